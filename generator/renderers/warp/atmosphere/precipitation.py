@@ -77,20 +77,20 @@ def snow(rate_mm_h: float) -> Kind:
 
 
 def light_level_ev100(radiance: wp.array, fixed_ev100: float | None) -> float:
-    """The exposure value that a camera is set to, or one that suits the light it receives.
+    """Exposure value that a camera is set to, or that suits the light it receives.
 
     Args:
         radiance: Linear RGB [cd/m^2], flat.
-        fixed_ev100: Of the camera; None = it meters for itself. Its median luminance stands for
-            what it will meter: only the length of streaks depends on it.
+        fixed_ev100: Setting of the camera; None = automatic, approximated from the median
+            luminance: only the length of streaks depends on it.
     """
     if fixed_ev100 is not None:
         return fixed_ev100
     levels = luminance(radiance.numpy()[::_METERED_EVERY])
-    # Black pixels, beyond a lens's field or without a background, say nothing about the light.
+    # Black pixels, outside a lens's field or without a background, are ignored.
     lit = levels[levels > 0.0]
     median_cd_m2 = float(np.median(lit)) if len(lit) else 0.0
-    # On a grid, so that the last bit of a logarithm is never seen.
+    # Rounded, so that the last bit of a logarithm has no effect.
     return round(math.log2(max(median_cd_m2, 1e-6) / (1.2 * _MIDDLE_GREY)) * 16.0) / 16.0
 
 

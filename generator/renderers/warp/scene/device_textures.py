@@ -81,10 +81,11 @@ def remove_fringe(albedo: UInt8, alpha: UInt8) -> UInt8:
 
     Args:
         albedo: [height, width, 3].
-        alpha: Coverage; below 128 there is a hole, [height, width].
+        alpha: Coverage, [height, width]; holes are below 128.
     """
     solid = (alpha >= 128).astype(np.float32)[..., None]
     levels = _mip_levels(np.concatenate([albedo * solid, solid], axis=2))
+    # Push: from coarse to fine, take the finer level's colour where it has any.
     filled = levels[-1][..., :3] / np.maximum(levels[-1][..., 3:], 1e-6)
     for level in levels[-2::-1]:
         height, width = level.shape[:2]

@@ -94,7 +94,7 @@ def _upload(
 
 
 def irradiance_coefficients(image: Float32) -> Array:
-    """Nine RGB coefficients of irradiance over pi, with the basis' constants folded in.
+    """Nine RGB coefficients of irradiance over pi, with the basis constants included.
 
     Source: Ramamoorthi and Hanrahan 2001, equations 3, 8 and 10.
     """

@@ -28,7 +28,7 @@ class BodyMaterials:
     """Materials of one body.
 
     Attributes:
-        materials: One per slot of its mesh.
+        materials: Materials, one per slot of its mesh.
         surfaces: Their MaterialRecord records; ``texture`` is an index into ``textures``, or -1.
         textures: Texture ids, sorted.
         roles: Role of each, as an index into ``gen_data.generator.core.asset_types.SURFACES``.

@@ -49,7 +49,7 @@ def upload_optics(intrinsics: Intrinsics, device: wp.Device) -> DeviceOptics:
 def pixel_table(intrinsics: Intrinsics) -> Float32:
     """Unit directions and the angle of each pixel [rad], shape [h, w, 4].
 
-    Where the lens shows nothing: the optical axis, and 0.
+    The optical axis and 0 where the lens shows nothing.
     """
     rays = intrinsics.pixel_rays()
     shown = np.isfinite(rays[..., 0])

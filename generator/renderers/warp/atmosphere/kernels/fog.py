@@ -191,6 +191,7 @@ def fill_with_fog(
     length = wp.length(d)
     distance_m = seen_distance(images, i, length)
     d = d * (1.0 / length)
+    # Bounded: nothing remains visible beyond an optical depth of 80.
     clear = wp.exp(-wp.min(optical_depth(fog, view.eye_m[2], d[2], distance_m), 80.0))
     # The first coefficient of irradiance is the mean over the sphere: fog scatters from everywhere.
     air = world.sky.irradiance[0] * world.sky.luminance

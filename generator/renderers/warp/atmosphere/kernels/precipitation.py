@@ -67,10 +67,11 @@ def draw_streaks(
     """Blend particles over each row of the image where no surface is nearer.
 
     Args:
-        first: Where each row's list begins, and the end of the last.
-        listed: Numbers of streaks, far ones first.
+        first: First entry of each row in ``listed``, and the end of the last row.
+        listed: Numbers of streaks, distant ones first.
     """
     y = wp.tid()
+    # Distant streaks first: nearer ones are blended over them.
     for k in range(first[y], first[y + 1]):
         s = listed[k]
         a = streaks[s].start_px

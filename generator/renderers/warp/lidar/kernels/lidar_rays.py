@@ -289,6 +289,7 @@ def first_hit(
         hit = intersect_body(world, motion, likely, ray, hit, offset)
     eye_m = world_origin(scan, ray, offset)
     inverse = reciprocals(scan.R_world_lidar @ ray.direction)
+    # An overflowing list: test every body's box.
     count = wp.where(listed.count < 0, boxes.lows_m.shape[0], listed.count)
     for k in range(count):
         b = int(k)
@@ -449,6 +450,7 @@ def trace_behind_panes(
             hits[j] = wp.vec2i(-1, -1)
             ray = make_ray(scan, motion, axes, selected[j])
             begin_m = ray.origin_m
+            # Start just before the pane, so that its own face is found first.
             way_m = wp.max(first_m[selected[j]] - LASER_OFFSET_M, 0.0)
             passed = float(1.0)
             for face in range(FACES_MAX):

@@ -60,7 +60,7 @@ class LightSample:
     """A light source in one direction from a point.
 
     Attributes:
-        direction: Unit.
+        direction: Unit direction to it.
         distance_m: Distance to it [m]; negative for none.
         radiance: Radiance towards the point [cd/m^2].
         density: Density with which this source samples the direction [1/sr].
@@ -124,6 +124,7 @@ def lamp_weight(lamp: LightRecord, p: wp.vec3, n: wp.vec3):
             # A floor where there is light: sources that are sampled too rarely cause fireflies.
             weight = luminance(lamp.power) * (wp.min(above, 1.0) + 0.02) * (inverse * inverse)
             if is_panel(lamp):
+                # Panels emit by the cosine; a floor keeps grazing directions sampled.
                 front = -wp.dot(to_lamp, lamp.direction) * inverse
                 weight = wp.where(front > 0.0, weight * (front + 0.05), 0.0)
             else:
@@ -213,6 +214,7 @@ def draw_panel(lamp: LightRecord, p: wp.vec3, u: wp.vec2):
     squared = wp.max(wp.dot(way, way), 1.0e-12)
     g = LightSample()
     g.direction = way * (1.0 / wp.sqrt(squared))
+    # Panels are one-sided.
     front = -wp.dot(g.direction, lamp.direction)
     g.distance_m = -1.0
     if front > 1.0e-6:
@@ -343,6 +345,7 @@ def sky_density(table: SkyTable, place: wp.vec3):
     """The density with which ``draw_sky`` samples the direction at a position [1/sr]."""
     height = table.rows.shape[0] - 1
     width = table.columns.shape[1] - 1
+    # Rounding at the image's last edge would leave the table.
     column = wp.clamp(int(place[0] * float(width)), 0, width - 1)
     row = wp.clamp(int(place[1] * float(height)), 0, height - 1)
     share = table.rows[row + 1] - table.rows[row]

@@ -141,7 +141,7 @@ class Vertex:
     """A surface point on a path.
 
     Attributes:
-        p: World [m].
+        p: Position in the world [m].
         flat: Geometric normal on the side that the path comes from.
         look: Material; its normal is the shading normal.
         surface: Index of the material.
@@ -196,6 +196,7 @@ def make_vertex(world: World, hit: RayHit, d: wp.vec3, width_m: float):
     e1 = vertex_at(world, g, corner[1]) - p0
     e2 = vertex_at(world, g, corner[2]) - p0
     m = p0 + e1 * hit.weight[0] + e2 * hit.weight[1]
+    # From barycentric weights: more accurate than the ray's parameter at a distance.
     v.p = R @ (m * world.bodies[b].scale) + world.bodies[b].t_world_mesh
     v.flat = R @ fast_normalize(wp.cross(e1, e2))
     v.outside = wp.dot(v.flat, d) < 0.0
@@ -304,6 +305,7 @@ def pane_chain_transmittance(world: World, o: wp.vec3, d: wp.vec3, distance_m: f
     passages = int(0)
     going = bool(True)
     while going:
+        # March from surface to surface until the light or an opaque surface is reached.
         hit = closest_hit(world, origin, d, rest_m, HOLES)
         going = False
         if hit.at[0] >= 0:
@@ -332,6 +334,7 @@ def hit_lamp_light(world: World, budget: Budget, a: Anchor, d: wp.vec3, end_m: f
     shown = int(0)
     for j in range(world.lamps.shape[0]):
         g = intersect_lamp(world.lamps[j], a.p, d)
+        # Straight passages split the ray: each lamp counts in one segment only.
         if g.distance_m > a.way_m and g.distance_m < end_m:
             part = float(1.0)
             if a.density >= 0.0 and budget.lights != 2:
@@ -399,6 +402,7 @@ def sample_source(
             # As the only technique it carries all light and needs no weight.
             if budget.lights == 3:
                 part = power_heuristic(asked, density)
+            # The shadow ray comes last: it is the most expensive part.
             through = transmittance(world, o, g.direction, g.distance_m, budget.clear)
             light = wp.cw_mul(f, through) * (part / asked)
     return light
@@ -653,6 +657,7 @@ def trace_path(
             if shown == 0:
                 light += wp.cw_mul(through, v.glow)
             if bounces < budget.bounces and passages < PASSAGES_MAX:
+                # Pair 0 is the position in the pixel; every segment has its own dimensions.
                 pair = 1 + PAIRS * (bounces + passages)
                 step = scatter_path(world, table, budget, v, d, key, pair, sample)
                 light += wp.cw_mul(through, step.light)

@@ -118,7 +118,7 @@ class Maps:
     Attributes:
         metallic: Factor on metallic.
         occlusion: Factor on ambient light.
-        glow: Factor on emission.
+        glow: Factor on emission, linear RGB.
     """
 
     metallic: float
@@ -393,6 +393,7 @@ def radiance_along(view: View, world: World, probe: Probe, ray: Ray, k: int):
             total += wp.cw_mul(ray.share, sky_along(world, ray))
         else:
             p = ray.origin + ray.d * m.t
+            # A cone that converges has a focus; behind it the width grows again.
             ray.width_m = wp.abs(ray.width_m + ray.spread * m.t)
             surface = surface_index(world, m.hit)
             v = -ray.d
@@ -540,6 +541,7 @@ def layers_at(
         # The reflected ray will find these lamps itself: do not count them twice.
         layers.own -= lamps.shown
     else:
+        # Rough layers reflect the prefiltered environment, dimmed by specular occlusion.
         sky = sky_reflection(world.sky, material.normal * (2.0 * n_v) - v, brdf.roughness)
         layers.own += wp.cw_mul(gloss, sky) * specular_occlusion(brdf, open_sky)
     coat = world.surfaces[surface].coat * bare
@@ -695,6 +697,7 @@ def shade_layers(
     """Shade the listed pixels that show layered surfaces, each by itself."""
     k = wp.tid()
     i = pixels[k]
+    # lattice_lighting.shade_points has shaded all others.
     if world.surfaces[surface_index(world, images.hits[i])].layered != 0:
         x = float(i % view.width) + 0.5
         y = float(i / view.width) + 0.5

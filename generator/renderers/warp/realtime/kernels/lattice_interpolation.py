@@ -109,6 +109,7 @@ def quad_at(view: View, world: World, images: GBufferRecord, lattice: Lattice, q
             smooth = False
             if lattice.surface[r] == surface:
                 other = images.hits[lattice.pixel[r]]
+                # One face is flat, whatever its vertex normals.
                 smooth = other[0] == quad.face[0] and other[1] == quad.face[1]
                 if not smooth:
                     cosine = points_agree(p, n, lattice.p_m[r], lattice.normal[r], tolerance_m)
@@ -397,6 +398,7 @@ def gather_light(
         x0 = column * lattice.stride
         x1 = wp.min(x0 + lattice.stride, view.width)
         quad = quad_at(view, world, images, lattice, row * lattice.width + column)
+        # Fast path: the whole cell shows one smooth, flat face.
         whole = quad.smooth != 0
         if whole:
             whole = is_one_face(view, images, quad.face, x0, x1, y0, y1)
@@ -425,6 +427,7 @@ def gather_light(
                         )
                     elif world.sky.visible != 0:
                         c = sky_image(world.sky, d_world)
+                    # Not interpolable: an atomic counter appends the pixel to the list.
                     if c[0] < 0.0:
                         pixels[wp.atomic_add(count, 0, 1)] = i
                     else:

@@ -185,6 +185,7 @@ def light_at(
     light.towards = lamps.towards
     ambient = sky_irradiance(world.sky, n) * open_sky
     mirror = sky_reflection(world.sky, n * (2.0 * n_v) - v, brdf.roughness)
+    # Lambert: illuminance over pi is luminance per albedo.
     lux = lamps.lux * (1.0 / wp.pi)
     light.diffuse = wp.cw_mul(brdf.matte, lux + ambient)
     light.rest = wp.cw_mul(brdf.gloss, mirror) * specular_occlusion(brdf, open_sky) + lamps.shine
@@ -225,6 +226,7 @@ def light_lattice(
         z = images.z_m[i]
         weight = images.weights[i]
         width_m = pixel_width(view, i, z)
+        # The texture sets roughness here; pixels apply their own albedo.
         material = evaluate_material(
             world, surface, images.hits[i], weight, lattice.normal[k], width_m, v
         )

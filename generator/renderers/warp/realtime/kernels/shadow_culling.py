@@ -177,6 +177,7 @@ def may_shade(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
     shaft = make_shaft(world, b, tile, way, radius_m)
     shades = may_touch(shaft, world.geometries[g].low_m, world.geometries[g].high_m)
     if shades:
+        # Then the many boxes: they exclude rooms and slanted bodies.
         shades = any_box_touches(shaft, world, g)
     return shades
 

@@ -25,7 +25,7 @@ class View:
     Attributes:
         inverse_fx, inverse_fy: Reciprocal focal lengths [1/px].
         lens: PINHOLE, or one of the models of gen_data.generator.core.lens.
-        coefficients: Of the lens.
+        coefficients: Distortion coefficients of the lens.
         directions: Unit directions in the camera frame through every pixel centre; the fourth
             component is the pixel's angle [rad], 0 outside the lens's field. Empty for a pinhole.
         R_world_camera: Camera X right, Y down, Z forward.
@@ -55,7 +55,7 @@ class Geometry:
 
     Attributes:
         mesh: Warp's hierarchy, on CUDA; 0 on the CPU.
-        tree: That of gen_data.generator.renderers.warp.scene.bvh, on the CPU; empty on CUDA.
+        tree: Hierarchy of gen_data.generator.renderers.warp.scene.bvh, on the CPU; empty on CUDA.
         faces: Three vertex indices per face, flat.
         box_lows_m, box_highs_m: Corners of boxes that together bound all faces.
         convex: 1 for a convex solid, which never shadows itself when seen from outside.
@@ -142,14 +142,14 @@ class MaterialRecord:
 
 @wp.struct
 class TextureRecord:
-    """Mip chains of one texture, levels one after the other, rows from the top.
+    """Mip chains of one texture, levels concatenated, rows from the top.
 
     Attributes:
-        texels: Albedo as square roots of linear values and roughness factor, 8 bits each
-            (red lowest).
+        texels: Albedo as square roots of linear values and roughness factor, 8 bits each (red
+            lowest).
         bumps: Tangent-space normals, 8 bits each; empty where there are none.
-        shares: Factors on metallic (lowest byte) and occlusion of ambient light; empty where
-            there are none.
+        shares: Factors on metallic (lowest byte) and occlusion of ambient light; empty where there
+            are none.
         glow: Factor on emission as square roots of linear values; empty where there is none.
         cover: Coverage of the finest level; empty where there are no holes.
         offsets: First texel of each level.
@@ -181,8 +181,8 @@ class LightRecord:
         radiance: Radiance of a panel's front [cd/m^2], independent of direction.
         along, across: From a panel's centre to the middles of two of its sides, or to its rim [m];
             they are at right angles to each other and to ``direction``.
-        radius: Of the ball or the disk, or of the circle around the rectangle [m], or tangent of
-            the sun's angular radius.
+        radius: Radius of the sphere, the disk or the rectangle's circumscribed circle [m], or
+            tangent of the sun's angular radius.
         shown: 1 if rays hit a visible counterpart: a body behind a panel, a part of a panorama.
         cos_outer, cos_inner: Cosines at which a spot's intensity reaches zero and begins to fall.
         cutoff: Slope of a dipped headlight's cut-off; 0 for other lamps.
@@ -211,7 +211,7 @@ class EnvironmentRecord:
             and Hanrahan 2001.
         glossy: Radiance convolved with GGX lobes on octahedral maps [level, row, column]; level
             ``k`` has perceptual roughness ``k / (levels - 1)``.
-        image: Equirectangular radiance for pixels that see no body.
+        image: Equirectangular radiance, for pixels without a body.
         rest: The same without the parts that lamps represent, as are irradiance and reflections.
         cos_yaw, sin_yaw: Rotation of the image about world Z.
         visible: Whether pixels without a body show the image.
@@ -235,7 +235,7 @@ class GroundRecord:
         covered: 0 if everything is dry and bare; the other fields are then unused.
         wetness, puddles, snow_cover: As in ``gen_data.generator.core.scene.Weather``.
         puddle_level, snow_level: Thresholds of the noise above which there is water or snow.
-        seed: Of the noise.
+        seed: Seed of the noise.
         exposed: Exposure of each lattice point to precipitation, [0, 1], flat.
     """
 

@@ -24,8 +24,8 @@ class Patch:
 
     Attributes:
         face: (body, face).
-        texels_per_m: Square root of the texels per area, of the finest mip level.
-        tangent, bitangent, normal: Frame of the normal map, world.
+        texels_per_m: Square root of texels per area, at the finest mip level.
+        tangent, bitangent, normal: Tangent frame of the normal map, world.
     """
 
     face: wp.vec2i

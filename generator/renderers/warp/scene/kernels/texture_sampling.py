@@ -43,7 +43,7 @@ class Sampler:
     """A texture's mip levels for one size of footprint.
 
     Attributes:
-        first, width, height: Of the mip level.
+        first, width, height: First texel and size of the finer mip level.
         coarser_first: Of the next level, blended with weight ``part``; unused if that is 0.
     """
 

@@ -24,7 +24,7 @@ class AmodalWindow:
     """The part of the canvas in which one body may be visible.
 
     Attributes:
-        body: Its number.
+        body: Number of the body.
         window: The pixels, in image coordinates.
         first_pixel: Index of its first pixel in the buffer.
         stride: Pixels between rows of the buffer.

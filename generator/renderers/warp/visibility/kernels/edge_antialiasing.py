@@ -175,6 +175,7 @@ def antialias(
         if source < 0:
             x_px = float(x) + offsets[s][0]
             y_px = float(y) + offsets[s][1]
+            # No visible face nearby covers the sample: other faces of the same bodies may.
             source = trace_source(view, world, images, x, y, x_px, y_px, t_min)
         if source >= 0:
             total += radiance[source]

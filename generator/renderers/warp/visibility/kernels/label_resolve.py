@@ -53,6 +53,7 @@ def make_facet(world: World, hit: wp.vec2i):
     p = vertex_at(world, g, corner[0])
     e1 = vertex_at(world, g, corner[1]) - p
     e2 = vertex_at(world, g, corner[2]) - p
+    # In the mesh frame: only the results are rotated.
     to_eye = world.bodies[b].eye_mesh - p
     camera = wp.transpose(world.bodies[b].B_mesh_camera)
     q = wp.cross(to_eye, e1)

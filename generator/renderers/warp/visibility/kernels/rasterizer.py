@@ -166,6 +166,7 @@ def make_edges(p: wp.vec2i, q: wp.vec2i, r: wp.vec2i, window: Window):
     # Degenerate after snapping: it covers no centre.
     if area == wp.int64(0):
         return edges
+    # Centre of the first pixel, in snapped units.
     x = ((edges.x_first + window.x0) << 8) + 128
     y = ((edges.y_first + window.y0) << 8) + 128
     if area > wp.int64(0):
@@ -390,6 +391,7 @@ def draw_bodies(
             if e.covers != 0:
                 plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
                 draw_nearest(e, plane, b, f, window.width, nearness, hits)
+        # A vertex lies outside the guard band: clip, and draw the polygon as a fan.
         elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
             polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
             plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
