@@ -1,4 +1,4 @@
-"""Renderers: a Scene and a Camera in, a Reading out."""
+"""Renderers: from a Scene and a Camera to a SensorReading."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from gen_data.generator.core.plugins import PluginTable
 
 TABLE = PluginTable[RendererSettings](
     "renderer",
-    {"warp": "gen_data.generator.renderers.warp.plugin:WarpPlugin"},
+    {"warp": "gen_data.generator.renderers.warp.settings:WarpPlugin"},
     (RendererSettings,),
     tag="renderer",
 )

@@ -1,4 +1,4 @@
-"""An independent ray caster: Open3D's Embree scene, given the same bodies and the same rays."""
+"""An independent ray caster: Open3D's Embree scene with the same bodies and rays."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def cast(scene: Scene, assets: AssetLibrary, camera: Camera) -> tuple[np.ndarray
 
 
 def near_edges(ids: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
-    """Pixels that touch a silhouette: another id, or a jump in depth, among the 8 neighbours."""
+    """Pixels that touch a silhouette: another id or a jump in depth among the 8 neighbours."""
     edge = np.zeros(ids.shape, bool)
     filled = np.where(np.isfinite(depth_m), depth_m, 1e3)
     padded_ids, padded_m = np.pad(ids, 1, mode="edge"), np.pad(filled, 1, mode="edge")

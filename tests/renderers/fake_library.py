@@ -1,4 +1,4 @@
-"""A small asset library made of arithmetic: boxes, spheres, planes, checkers."""
+"""A small library of procedural test assets: boxes, spheres, planes, checkers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A Scene for Mitsuba 3: the same triangles, lights and camera, by its own plug-ins."""
+"""Translation of a Scene to Mitsuba 3: the same triangles, lights and camera."""
 
 from __future__ import annotations
 

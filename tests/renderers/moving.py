@@ -1,4 +1,4 @@
-"""Worlds in which bodies and the camera move evenly."""
+"""Test scenes in which bodies and the camera move uniformly."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MESHES = FakeLibrary(
 
 
 def even_track(body: str, start: SE3, velocity_m_s: Vec3, turn_rad_s: float = 0.0) -> Trajectory:
-    """A straight way from -1 s to 1 s that passes the start at 0, turning about the world's Y.
+    """A straight track from -1 s to 1 s through the start at 0, turning about the world's Y.
 
     Knots are close enough for turns to be even between them.
     """
@@ -57,7 +57,7 @@ def world(
     shutter: Shutter = INSTANT,
     time_s: float = 0.2,
 ) -> Scene:
-    """Bodies before a camera that rides on a speck; its frame is the world's at 0 s."""
+    """Bodies in front of a camera on a moving body; its frame is the world's at 0 s."""
     instances = tuple(
         Instance(b.instance_id, b.name, "thing", 1, b.asset, T_world_instance=b.T_world_body)
         for b in bodies

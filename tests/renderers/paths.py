@@ -25,7 +25,7 @@ def settings_of(samples: int, max_bounces: int = 16) -> RenderSettings:
 def radiance_of(
     scene: Scene, camera: Camera, library: FakeLibrary, samples: int, max_bounces: int = 16
 ) -> np.ndarray:
-    """cd/m^2, float64 [h, w, 3], as the renderer gives it."""
+    """Radiance [cd/m^2] of the renderer, float64 [h, w, 3]."""
     renderer = WarpRenderer(library, "cpu", settings_of(samples, max_bounces))
     reading = renderer.render(scene, camera, frozenset({Channel.RADIANCE}))
     return reading.channels[Channel.RADIANCE].astype(np.float64)
@@ -40,14 +40,14 @@ def replicates_of(
     lights: int = BOTH,
     max_bounces: int = 16,
 ) -> np.ndarray:
-    """Independent images of as many seeds, [count, h, w, 3]: their spread is the true error."""
-    stock = DeviceCache(library, open_device("cpu"))
-    tracer = PathTracer(stock, settings_of(samples, max_bounces))
-    view = pack_view(camera, stock)
+    """Independent images with different seeds, [count, h, w, 3]: their spread is the true error."""
+    cache = DeviceCache(library, open_device("cpu"))
+    tracer = PathTracer(cache, settings_of(samples, max_bounces))
+    view = pack_view(camera, cache)
     shape = (view.height, view.width, 3)
     images = []
     for seed in range(count):
-        world = pack_world(scene, camera, stock)
+        world = pack_world(scene, camera, cache)
         traced = tracer.radiance(scene, camera, world, view, seed=seed, lights=lights)
         images.append(traced.numpy().reshape(shape).astype(np.float64))
     return np.stack(images)

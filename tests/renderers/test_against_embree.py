@@ -1,4 +1,4 @@
-"""Depth and ids against Intel Embree, through Open3D: scenes made here and as users make them."""
+"""Depth and ids against Intel Embree (Open3D), on constructed and on shipped scenes."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def assert_agrees_with_embree(
 
 
 def random_scene(seed: int) -> tuple[Scene, Camera]:
-    """A room with a slab and twenty turned and scaled bodies that may cut each other."""
+    """A room with a slab and twenty rotated and scaled bodies that may intersect."""
     rng = np.random.default_rng(seed)
     bodies = [Body("room", "room"), Body("slab", "slab", SE3((0.0, 0.0, 0.7)), instance_id=1)]
     for k in range(20):
@@ -66,7 +66,7 @@ def random_scene(seed: int) -> tuple[Scene, Camera]:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_bodies_that_cut_each_other_agree_with_embree(seed: int) -> None:
-    """Scaled, turned, interpenetrating: nothing is assumed about scenes."""
+    """Scaled, rotated, interpenetrating bodies: nothing is assumed about scenes."""
     open3d_or_skip()
     assert_agrees_with_embree(WarpRenderer(LIBRARY, "cpu"), LIBRARY, *random_scene(seed))
 
@@ -93,7 +93,7 @@ def test_scenes_of_users_agree_with_embree(tabletop: Pipeline, index: int) -> No
 
 @pytest.mark.slow
 def test_fifty_scenes_of_both_kinds_agree_with_embree(tabletop: Pipeline) -> None:
-    """None excepted: what a few scenes might miss."""
+    """Every shipped scene, for cases that a few scenes might miss."""
     renderer = WarpRenderer(LIBRARY, "cpu")
     for number in range(3, 53):
         assert_agrees_with_embree(renderer, LIBRARY, *random_scene(number))

@@ -1,4 +1,4 @@
-"""Holes that a texture's coverage cuts, against the same mesh with the holes cut out."""
+"""Holes by texture coverage, against the same mesh with the holes cut out."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ CHANNELS = frozenset(
 
 
 def grate_texture() -> TextureData:
-    """Upright stripes: eight texels of metal, eight of nothing, four times."""
+    """Upright stripes: eight opaque texels, eight transparent ones, four times."""
     solid = np.arange(TEXELS) // 8 % 2 == 0
     alpha = np.broadcast_to(np.where(solid, 255, 0), (TEXELS, TEXELS)).astype(np.uint8)
     return TextureData(np.full((TEXELS, TEXELS, 3), 200, np.uint8), alpha=alpha.copy())
@@ -87,7 +87,7 @@ FISHEYE = Camera(
 
 @pytest.mark.parametrize("method", ["raster", "rays"])
 def test_labels_behind_holes_are_those_of_what_is_behind(method: str) -> None:
-    """Ids and depths as Embree has them for stripes that are cut out: all but 0.3 % of pixels."""
+    """Ids and depths match Embree's for geometrically cut stripes on all but 0.3 % of pixels."""
     settings = RenderSettings(visibility=method)
     scene = scene_of("grate")
 
@@ -104,7 +104,7 @@ def test_labels_behind_holes_are_those_of_what_is_behind(method: str) -> None:
 def test_shadows_light_and_silhouettes_are_those_of_stripes_that_are_cut_out(
     camera: Camera,
 ) -> None:
-    """One picture but for single pixels on edges; mean light within half a percent."""
+    """The same image except single pixels on edges; mean light within half a percent."""
     renderer = WarpRenderer(library(), "cpu", RenderSettings())
 
     holed = renderer.render(scene_of("grate"), camera, CHANNELS)
@@ -123,7 +123,7 @@ def test_shadows_light_and_silhouettes_are_those_of_stripes_that_are_cut_out(
 
 
 def test_laser_beams_pass_holes() -> None:
-    """Ranges and labels of 20,000 rays as Embree has them for the cut stripes: all but 0.3 %."""
+    """Ranges and labels of 20,000 rays match Embree's for the cut stripes on all but 0.3 %."""
     o3d = open3d_or_skip()
     scene, cut = scene_of("grate"), scene_of("cut")
     lidar = Lidar("top", "", T_world_lidar=SE3((0.1, -1.5, 0.9)))
@@ -149,7 +149,7 @@ def test_laser_beams_pass_holes() -> None:
 
 
 def test_triplanar_holes_repeat_with_the_texture() -> None:
-    """Stripes of 1/8 of a repeat of 0.5 m: half of a wall's pixels show what is behind it."""
+    """Stripes of 1/8 of a repeat of 0.5 m: half of a wall's pixels show the background."""
     wall = replace(GRATE, texture_scale_m=0.5)
     assets = FakeLibrary({"wall": plane_mesh(2.0, (wall,))}, {"grate": grate_texture()})
     scene = Scene("t", (Body("wall", "wall", instance_id=1),), environment=DARK)
@@ -179,7 +179,7 @@ def test_a_mesh_without_coverage_is_drawn_as_ever() -> None:
 
 
 def test_colours_of_holes_do_not_reach_coarser_levels() -> None:
-    """A green leaf before a magenta nothing: all that is averaged is green."""
+    """A green leaf on a transparent magenta ground: every mean is green."""
     y, x = np.mgrid[:32, :32]
     leaf = (x - 15.5) ** 2 + (y - 15.5) ** 2 < 100
     albedo = np.where(leaf[..., None], (20, 180, 40), (255, 0, 255)).astype(np.uint8)
@@ -191,7 +191,7 @@ def test_colours_of_holes_do_not_reach_coarser_levels() -> None:
 
 
 def test_an_environment_shines_through_holes() -> None:
-    """Through a grate that is half nothing, half of an even sky of 100 cd/m^2 is seen."""
+    """A grate that is half open shows half of an even sky of 100 cd/m^2."""
     scene = replace(
         scene_of("grate"), bodies=scene_of("grate").bodies[1:], lights=(),
         environment=Environment(luminance_cd_m2=100.0),

@@ -1,4 +1,4 @@
-"""Amodal silhouettes: whole, alone, and consistent with what is visible."""
+"""Amodal silhouettes: complete, independent, and consistent with visible pixels."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_a_silhouette_goes_on_beside_the_image() -> None:
 
 @pytest.mark.parametrize("visibility", ["raster", "rays"])
 def test_what_is_visible_of_an_instance_lies_in_its_silhouette(visibility: str) -> None:
-    """For bodies that hide each other at random, and instances of several bodies."""
+    """For bodies that occlude each other at random, and instances of several bodies."""
     rng = np.random.default_rng(5)
     camera = forward_camera((96, 72), focal_px=70.0)
     bodies = []
@@ -98,7 +98,7 @@ def test_an_instance_out_of_sight_has_an_empty_silhouette() -> None:
 
 
 def test_a_body_cut_by_the_plane_of_the_camera_is_bounded_by_the_canvas() -> None:
-    """A long beam that passes the camera: its silhouette ends where three images end."""
+    """A long beam beside the camera: its silhouette ends at the canvas of three images."""
     body = Body("beam", "box", SE3((0.6, 0.0, 0.0)), scale=1.0, instance_id=1)
 
     silhouette = rendered(scene_of(body), forward_camera()).silhouettes[1]

@@ -1,4 +1,4 @@
-"""Panels: rectangles and disks that shine to one side, against quadrature over their area."""
+"""Panels: one-sided rectangles and disks, against quadrature over their area."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ UPRIGHT_DISK = replace(DISK, position_m=(0.9, 0.2, -0.1), direction=(-1.0, 0.0, 
 
 
 def points_on(light: Light, n: int) -> tuple[np.ndarray, float]:
-    """Points spread evenly over a panel, shape [n * n, 3], and the area that each stands for."""
+    """Points distributed evenly over a panel, shape [n * n, 3], and the area of each."""
     normal = np.asarray(light.direction)
     s = (np.arange(n) + 0.5) / n
     if light.kind == "rectangle":
@@ -94,7 +94,7 @@ def _at_points(  # noqa: ANN202, PLR0917
     mirrored: wp.array(dtype=float),
     summed: wp.array(dtype=float),
 ):
-    """Illuminance; a white metal's reflection by one point; the same summed over the panel."""
+    """Illuminance; reflection of a white metal by one point; the same summed over the panel."""
     i = wp.tid()
     beam = analytic_lights.beam_from(lamps[0], p[i])
     share = analytic_lights.relative_illuminance(lamps[0], beam, p[i], n[i])
@@ -103,7 +103,7 @@ def _at_points(  # noqa: ANN202, PLR0917
     s = make_brdf(table, wp.vec3(1.0, 1.0, 1.0), roughness, 1.0, 0.5, n_v)
     alpha = s.roughness * s.roughness
     ray = n[i] * (2.0 * n_v) - v[i]
-    way = analytic_lights.towards_mirror(lamps[0], beam, p[i], ray, alpha)
+    way = analytic_lights.representative_direction(lamps[0], beam, p[i], ray, alpha)
     n_l = wp.max(wp.dot(n[i], way), 1.0e-3)
     wider = analytic_lights.lobe_widening(lamps[0], beam, alpha)
     if share > 0.0:
@@ -130,7 +130,7 @@ def _at_points(  # noqa: ANN202, PLR0917
 def at_points(
     light: Light, p: np.ndarray, n: np.ndarray, v: np.ndarray, roughness: float = 0.5
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What the kernel says: illuminance, reflection, reflection summed over the panel."""
+    """Results of the kernel: illuminance, reflection, reflection summed over the panel."""
     open_device("cpu")
     q, area_m2 = points_on(light, 60)
     outputs = [wp.zeros(len(p), dtype=float, device="cpu") for _ in range(3)]
@@ -153,7 +153,7 @@ def scattered(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("light", [RECTANGLE, DISK, UPRIGHT, UPRIGHT_DISK])
 def test_a_panel_gives_the_illuminance_of_lamberts_integral(light: Light) -> None:
-    """To 0.2 % of the whole panel's, wherever the point is and however the horizon cuts it."""
+    """To 0.2 % of the whole panel's, at any point and for any horizon."""
     p, n = scattered(250, 3)
     # Close to the panel quadrature itself is too coarse.
     height = (p - np.asarray(light.position_m)) @ np.asarray(light.direction)
@@ -170,7 +170,7 @@ def test_a_panel_gives_the_illuminance_of_lamberts_integral(light: Light) -> Non
 
 
 def test_a_panel_far_away_is_a_point_with_a_cosine() -> None:
-    """I cos / d^2 to 0.2 % where a rectangle is 20 to 40 of its radii away: no step between."""
+    """I cos / d^2 to 0.2 % for a rectangle at 20 to 40 of its radii: no step in between."""
     small = replace(RECTANGLE, size_m=(0.06, 0.08))
     d = np.linspace(0.9, 2.1, 60)
     p = np.asarray(small.position_m) + d[:, None] * (0.0, 0.0, -1.0)
@@ -201,7 +201,7 @@ def test_nothing_is_lit_behind_a_panel(light: Light) -> None:
 def test_a_panel_is_mirrored_about_as_brightly_as_its_integral(
     light: Light, roughness: float, bias: float, error: float
 ) -> None:
-    """One point stands for the panel: mean and mean error over views, relative to quadrature."""
+    """Representative point of a panel: mean and mean error over views, relative to quadrature."""
     rng = np.random.default_rng(5)
     p = np.concatenate([rng.uniform(-1.2, 1.2, (300, 2)), np.zeros((300, 1))], axis=1)
     polar, turn = rng.uniform(0.0, 1.2, 300), rng.uniform(0.0, 2.0 * np.pi, 300)
@@ -293,7 +293,7 @@ def test_shadows_of_panels_are_as_soft_as_their_shape_says(light: Light) -> None
 
 
 def test_a_panel_is_seen_in_its_fixture_and_labels_do_not_know_it() -> None:
-    """As bright as I / A from before it, dark from behind; instance 0; nothing shades itself."""
+    """As bright as I / A from the front, dark from behind; instance 0; no self-shadow."""
     light = replace(RECTANGLE, position_m=(0.0, 0.0, 1.0), direction=(0.0, 0.0, -1.0))
     asset = fixture_asset(light)
     glass = Material((0.8, 0.8, 0.8), role="lamp")
@@ -337,7 +337,7 @@ def _fixture_mesh(size_m: Vec3, front: Material):  # noqa: ANN202
 
 
 def test_of_many_panels_those_that_light_what_is_seen_are_kept() -> None:
-    """One that faces away lights nothing, however strong and near; the others go by their light."""
+    """A panel that faces away contributes nothing; the others rank by their light."""
     down = replace(RECTANGLE, position_m=(0.0, 0.0, 2.0), direction=(0.0, 0.0, -1.0))
     away = replace(down, direction=(0.0, 0.0, 1.0), intensity_cd=1e5)
     far = replace(down, position_m=(0.0, 0.0, 20.0))
@@ -350,7 +350,7 @@ def test_of_many_panels_those_that_light_what_is_seen_are_kept() -> None:
 
 @pytest.mark.parametrize("visible", [True, False])
 def test_a_mirror_shows_a_panel_once(visible: bool) -> None:
-    """As bright as the panel times the metal's 0.9, whether a ray finds it or only its lobe."""
+    """As bright as the panel times the metal's 0.9, whether by a reflected ray or by the lobe."""
     light = replace(RECTANGLE, position_m=(0.0, 0.0, 1.0), direction=(0.0, 0.0, -1.0))
     asset = fixture_asset(light)
     glass = Material((0.8, 0.8, 0.8), role="lamp")

@@ -1,4 +1,4 @@
-"""Trees of boxes and the rays that go through them, against every face by itself and Embree."""
+"""Bounding volume hierarchies and their traversal, against brute force and Embree."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from tests.renderers.fake_library import FakeLibrary, box_mesh, forward_camera, 
 WIDTH = 8
 REACH = 1e3
 STACK = 128
-"""Half of what a ray has room for: one tree over bodies and one over a body's faces share it."""
+"""Half of a ray's stack: one tree over bodies and one over a body's faces share it."""
 
 
 @wp.kernel
@@ -71,7 +71,7 @@ def tree_of(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 def traced(
     tree: np.ndarray, origins: np.ndarray, ways: np.ndarray, reach: float = REACH
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Parameters, weights of first and second corners, faces (-1 = none), whether any is met."""
+    """Parameters, weights of first and second corners, faces (-1 = none), any-hit results."""
     device, n = open_device("cpu"), len(origins)
     o, d = (wp.array(a.astype(np.float32), dtype=wp.vec3, device=device) for a in (origins, ways))
     out = [wp.zeros(n, dtype=kind, device=device) for kind in (wp.vec3, wp.vec2i)]
@@ -84,7 +84,7 @@ def traced(
 def by_every_face(
     corners: np.ndarray, origins: np.ndarray, ways: np.ndarray, reach: float = REACH
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Parameter of the first hit, float64, by Moeller and Trumbore 1997; and whether it is clear.
+    """Parameter of the first hit, float64 (Moeller and Trumbore 1997), and whether it is clear.
 
     It is not where the ray passes the edge of a face so closely that 32 bits cannot tell, or lies
     in a face's plane.
@@ -106,7 +106,7 @@ def by_every_face(
 
 
 def soup(seed: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Faces here and there, some large, some flat along an axis, some of no area."""
+    """Scattered faces, some large, some axis-aligned, some degenerate."""
     rng = np.random.default_rng(seed)
     middles = rng.uniform(-1, 1, (count, 1, 3))
     size = 10.0 ** rng.uniform(-3, 0, (count, 1, 1))
@@ -120,7 +120,7 @@ def soup(seed: int, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def rays(seed: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Origins around and among, directions of several lengths, many along axes."""
+    """Origins outside and inside, directions of several lengths, many along axes."""
     rng = np.random.default_rng(seed)
     origins = rng.uniform(-2, 2, (count, 3))
     ways = rng.uniform(-1, 1, (count, 3)) - 0.5 * origins
@@ -130,7 +130,7 @@ def rays(seed: int, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def walked(tree: np.ndarray, leaf_groups: int) -> tuple[list[int], int]:
-    """Faces or bodies in a tree, and how many entries wait at most if all is entered.
+    """Faces or bodies in a tree, and the maximum size of the stack if every box is entered.
 
     Asserts that whatever is in a lane lies in the lane's box.
     """
@@ -162,7 +162,7 @@ def walked(tree: np.ndarray, leaf_groups: int) -> tuple[list[int], int]:
 
 
 def geometric_series(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Faces each of which is half as large and half as far from the corner as the one before."""
+    """Faces, each half as large and half as far from the corner as the one before."""
     size = 0.5 ** np.arange(count)[:, None, None]
     corners = size * (1.0 + np.array([[0, 0, 0], [0.4, 0, 0], [0, 0.4, 0]])[None])
     faces = np.arange(3 * count, dtype=np.int32).reshape(-1, 3)

@@ -57,7 +57,7 @@ def glowing(luminance_cd_m2: float) -> Material:
 
 
 def fresnel_by_angles(incidence_rad: float, ior: float) -> float:
-    """Mean of the sine and the tangent law (Fresnel 1823)."""
+    """Fresnel reflectance as the mean of the sine and the tangent law (Fresnel 1823)."""
     if incidence_rad == 0.0:
         return ((ior - 1.0) / (ior + 1.0)) ** 2
     t = math.asin(math.sin(incidence_rad) / ior)
@@ -118,7 +118,7 @@ def test_a_pane_sums_the_series_of_its_inner_reflections(tint: float) -> None:
 )
 @pytest.mark.parametrize("coat_roughness", [0.03, 0.3, 0.8])
 def test_a_coated_ball_in_a_furnace_keeps_the_energy(base: Material, coat_roughness: float) -> None:
-    """White stays white within 2 %, and no base becomes brighter than the furnace."""
+    """White stays white within 2 %, and no base exceeds the furnace."""
     coated = replace(base, coat=1.0, coat_roughness=coat_roughness)
     library = FakeLibrary({"ball": sphere_mesh(0.5, 48, (coated,))})
     camera = camera_at((2.0, 0.0, 0.5), (0.0, 0.0, 0.0), (64, 48), hfov_deg=20.0)
@@ -136,7 +136,7 @@ def test_a_coated_ball_in_a_furnace_keeps_the_energy(base: Material, coat_roughn
 
 @pytest.mark.parametrize("thin", [True, False])
 def test_clear_glass_vanishes_in_a_furnace(thin: bool) -> None:
-    """What it reflects it does not let through: 1 within 3 % for a pane and for a solid ball."""
+    """Reflection and transmission sum to 1 within 3 % for a pane and for a solid ball."""
     library = FakeLibrary({"ball": sphere_mesh(0.5, 64, (replace(GLASS, thin=thin),))})
     camera = camera_at((2.0, 0.0, 0.5), (0.0, 0.0, 0.0), (64, 48), hfov_deg=20.0)
 
@@ -150,7 +150,7 @@ def test_clear_glass_vanishes_in_a_furnace(thin: bool) -> None:
 @pytest.mark.parametrize("angle_deg", [0.0, 50.0])
 @pytest.mark.parametrize("tint", [1.0, 0.5])
 def test_light_behind_a_pane_is_what_the_series_leaves(angle_deg: float, tint: float) -> None:
-    """100 cd/m^2 behind a thin pane at normal and at slanted incidence, in an otherwise dark room.
+    """100 cd/m^2 behind a thin pane at normal and oblique incidence, in an otherwise dark room.
 
     The mesh is a single sheet; with F of one face T = (1 - F)^2 a / (1 - F^2 a^2).
     """
@@ -170,7 +170,7 @@ def test_light_behind_a_pane_is_what_the_series_leaves(angle_deg: float, tint: f
 
 
 def snell(d: np.ndarray, n: np.ndarray, n1: float, n2: float) -> np.ndarray:
-    """Direction behind a border, by splitting it along and across the normal."""
+    """Refracted direction, by decomposition along and across the normal."""
     across = (d - n * (d @ n)) * (n1 / n2)
     return across - n * math.sqrt(1.0 - float(across @ across))
 
@@ -216,7 +216,7 @@ def test_an_edge_behind_a_slab_is_displaced_as_snell_says() -> None:
 
 
 def test_a_glass_ball_shows_the_world_upside_down_where_snell_says() -> None:
-    """Rows at which the border between a bright and a dark half is seen, within 1.5 px."""
+    """Rows at which the border between a bright and a dark half appears, within 1.5 px."""
     radius, middle, wall, border_m = 0.5, 2.0, 4.0, 0.15
     library = FakeLibrary(
         {
@@ -256,7 +256,7 @@ def test_a_glass_ball_shows_the_world_upside_down_where_snell_says() -> None:
 
 
 def test_a_mirror_shows_the_mirrored_scene() -> None:
-    """A box before a perfect mirror, as the same box behind a window: all but 1 % of pixels.
+    """A box before a perfect mirror equals the same box behind a window: all but 1 % of pixels.
 
     The sun shines along the mirror, so that both boxes are lit alike.
     """
@@ -279,7 +279,7 @@ def test_a_mirror_shows_the_mirrored_scene() -> None:
 
 
 def test_what_is_seen_in_a_mirror_is_as_far_as_the_whole_way() -> None:
-    """A fine checker far away in a mirror is its mean: levels follow the ray's whole length."""
+    """A fine, distant checker in a mirror becomes its mean: mip levels follow the whole path."""
     y, x = np.mgrid[:256, :256]
     tile = np.where(((x // 2 + y // 2) % 2)[..., None], 255, 0) * np.ones(3)
     checker = Material((1, 1, 1), 1.0, specular=0.0, texture="checker", texture_scale_m=0.5)
@@ -316,7 +316,7 @@ WHITE = np.full((64, 64, 3), 255, np.uint8)
 
 
 def of_halves(image: np.ndarray) -> list[float]:
-    """Green of the middles of an image's left and right half; sorted by the mesh's u."""
+    """Green at the centres of an image's left and right half; sorted by the mesh's u."""
     return sorted(float(image[20:28, at, 1].mean()) for at in (slice(8, 20), slice(44, 56)))
 
 
@@ -358,7 +358,7 @@ def test_metallic_maps_take_the_diffuse_light_of_metals() -> None:
 
 
 def test_opacity_mixes_with_what_is_behind() -> None:
-    """0.3 of 200 cd/m^2 over 0.7 of 100 cd/m^2 is 130; labels take the veil for solid."""
+    """0.3 of 200 cd/m^2 over 0.7 of 100 cd/m^2 is 130; labels treat the veil as solid."""
     veil = replace(glowing(200.0), opacity=0.3)
     library = FakeLibrary(
         {"veil": plane_mesh(1.0, (veil,)), "wall": plane_mesh(9.0, (glowing(100.0),))}
@@ -377,7 +377,7 @@ def test_opacity_mixes_with_what_is_behind() -> None:
 
 @pytest.mark.parametrize("material", [GLASS, replace(MATTE, opacity=0.2)])
 def test_clear_bodies_throw_no_shadow(material: Material) -> None:
-    """Below a clear plate the sun's light is that beside it."""
+    """The sun's light below a clear plate equals that beside it."""
     library = FakeLibrary(
         {"floor": plane_mesh(9.0, (MATTE,)), "plate": box_mesh((1, 1, 0.1), (material,))}
     )
@@ -393,7 +393,7 @@ def test_clear_bodies_throw_no_shadow(material: Material) -> None:
 
 
 def test_glass_out_of_sight_changes_no_byte() -> None:
-    """A glass ball and a mirror behind the camera: the same picture, byte by byte."""
+    """A glass ball and a mirror behind the camera leave every byte of the image unchanged."""
     plain = Material((0.3, 0.5, 0.2), 0.2, texture="map")
     texture = TextureData(halves(90, 200, 3))
     meshes = {
@@ -415,7 +415,7 @@ def test_glass_out_of_sight_changes_no_byte() -> None:
 
 @pytest.mark.parametrize("color", [(0.5, 0.02, 0.02), (0.02, 0.02, 0.3)])
 def test_a_coat_mirrors_what_is_around(color: Vec3) -> None:
-    """A glowing wall at grazing incidence: Fresnel's share of it lies over the base."""
+    """A glowing wall at grazing incidence: Fresnel reflection over the base."""
     base = Material(color, 0.6, specular=0.0, coat=1.0, coat_roughness=0.0)
     library = FakeLibrary(
         {"floor": plane_mesh(6.0, (base,)), "wall": box_mesh((8, 0.1, 8), (glowing(1000.0),))}

@@ -1,4 +1,4 @@
-"""Kernels are compiled once, side by side, and found again."""
+"""Kernels are compiled once, in parallel, and then found in the cache."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ KERNEL_MODULES = sorted(
 
 @pytest.mark.slow
 def test_what_is_compiled_side_by_side_is_all_that_a_photograph_takes(tmp_path: Path) -> None:
-    """After it the first sample of a process adds nothing to the cache, nor does the next."""
+    """Afterwards, the first sample of a process adds nothing to the cache, nor does the next."""
     compiler = [
         sys.executable,
         "-c",
@@ -52,7 +52,7 @@ def test_what_is_compiled_side_by_side_is_all_that_a_photograph_takes(tmp_path: 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", KERNEL_MODULES)
 def test_kernels_compile_for_cuda(name: str, tmp_path: Path) -> None:
-    """To PTX, which takes Warp's compiler but no GPU."""
+    """Compilation to PTX, which needs Warp's compiler but no GPU."""
     open_device("cpu")
     module = importlib.import_module(f"{warp.__name__}.{name}")
 

@@ -1,4 +1,4 @@
-"""What is left out before rendering is what cannot matter; and edges are where they should be."""
+"""Culling before rendering removes only what cannot matter, and edges stay in place."""
 
 from __future__ import annotations
 
@@ -41,11 +41,13 @@ def ring_of_boxes() -> Scene:
 
 @pytest.mark.parametrize("margin", [0.0, 1.0])
 def test_a_body_with_a_vertex_in_the_pyramid_is_kept(margin: float) -> None:
-    """Vertices are projected by Intrinsics; most bodies are left out all the same."""
+    """Vertices are projected by Intrinsics; most bodies are culled all the same."""
     scene, camera = ring_of_boxes(), camera_at((0.0, 0.0, 0.0), (1.0, 0.2, 0.1))
-    stock = DeviceCache(FakeLibrary(MESHES), open_device("cpu"))
+    cache = DeviceCache(FakeLibrary(MESHES), open_device("cpu"))
     kept = set(
-        bodies_within(pack_world(scene, camera, stock).placed, pack_view(camera, stock), margin)
+        bodies_within(
+            pack_world(scene, camera, cache).body_records, pack_view(camera, cache), margin
+        )
     )
     size = np.array([camera.intrinsics.width_px, camera.intrinsics.height_px])
     needed = set()
@@ -60,7 +62,7 @@ def test_a_body_with_a_vertex_in_the_pyramid_is_kept(margin: float) -> None:
 
 
 def slabs_all_around() -> Scene:
-    """Long thin boxes, many of which reach from before the camera to behind it, or stand beside."""
+    """Long thin boxes, many of which extend from the front of the camera to behind it."""
     rng = np.random.default_rng(5)
     spots, turns = rng.uniform(-5.0, 5.0, (200, 3)), rng.uniform(0.0, 6.3, 200)
     bodies = [
@@ -72,16 +74,16 @@ def slabs_all_around() -> Scene:
 
 
 def test_whatever_is_drawn_was_projected() -> None:
-    """The narrow test alone keeps bodies that the wide one refuses: those must not be drawn."""
+    """Bodies that pass the narrow test but not the wide one must not be drawn."""
     meshes = {"slab": box_mesh((8.0, 0.4, 1.0))}
     scene = slabs_all_around()
-    stock = DeviceCache(FakeLibrary(meshes), open_device("cpu"))
+    cache = DeviceCache(FakeLibrary(meshes), open_device("cpu"))
     apart = 0
     for target in ((1.0, 0.2, 0.1), (-1.0, 0.4, -0.3), (0.2, 1.0, 0.5)):
         camera = camera_at((0.0, 0.0, 0.0), target)
-        world, view = pack_world(scene, camera, stock), pack_view(camera, stock)
-        projected = project_vertices(world, view, stock)
-        narrow = bodies_within(world.placed, view, 0.0)
+        world, view = pack_world(scene, camera, cache), pack_view(camera, cache)
+        projected = project_vertices(world, view, cache)
+        narrow = bodies_within(world.body_records, view, 0.0)
         apart += len(np.setdiff1d(narrow, projected.reached))
         assert np.isin(projected.in_view, projected.reached).all()
     assert apart > 0
@@ -106,7 +108,7 @@ def test_a_frame_does_not_depend_on_the_frames_before_it() -> None:
 
 
 def test_labels_do_not_depend_on_bodies_out_of_view() -> None:
-    """The same image and silhouettes with and without what lies behind the camera."""
+    """The same image and silhouettes with and without bodies behind the camera."""
     scene, camera = ring_of_boxes(), camera_at((0.0, 0.0, 0.0), (1.0, 0.2, 0.1))
     forward = camera.T_world_camera.rotation()[:, 2]
     ahead = [b for b in scene.bodies if np.dot(b.T_world_body.translation_m, forward) > -0.6]

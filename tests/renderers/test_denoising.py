@@ -1,4 +1,4 @@
-"""The denoiser: closer to the truth than what it is given, and clear words where it is missing."""
+"""The denoiser: closer to the reference than its input, and a clear error if missing."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DENOISED = RenderSettings(tier="pathtraced", samples=4, denoise=True)
 
 
 def test_a_denoised_image_is_closer_to_the_converged_one() -> None:
-    """Four samples, with and without, against 512."""
+    """Four samples, with and without denoising, against 512."""
     pytest.importorskip("pyoidn")
     library = FakeLibrary({"room": room_mesh((2, 2, 2), (MATTE,)), "box": box_mesh()})
     bodies = (Body("room", "room"), Body("box", "box", SE3((0.3, 0.4, 0.3)), scale=0.6))

@@ -13,9 +13,9 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.light_selection import dipped_share, main_lamps
+from gen_data.generator.renderers.warp.settings import RenderSettings
 from gen_data.randomizers.vehicle_lights import dipped_beam
 from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, camera_at
-from tests.renderers.test_shading import OPEN
 
 BEAMS_CD = (9000.0, 11_500.0, 14_000.0)
 SCREEN_M = 25.0
@@ -42,7 +42,7 @@ def headlight(beam_cd: float, T_world_lens: SE3 | None = None) -> Light:
 
 
 def lamp_records(lights: list[Light]) -> np.ndarray:
-    """What the renderer knows of spots."""
+    """Spot lamp as the renderer sees it."""
     values = np.zeros(len(lights), dtype=records.LightRecord.numpy_dtype())
     for value, light in zip(values, lights, strict=True):
         value["kind"], value["cutoff"] = 1, light.cutoff
@@ -84,7 +84,7 @@ def test_pictures_of_a_screen_show_what_the_regulation_asks(point: str) -> None:
     scene = Scene("t", (wall,), lights=(headlight(beam_cd),), environment=DARK)
     camera = camera_at((SCREEN_M - 2.0, p[1], p[2]), tuple(p), (9, 9), hfov_deg=0.2)
 
-    reading = WarpRenderer(library, "cpu", OPEN).render(
+    reading = WarpRenderer(library, "cpu", RenderSettings(ambient_occlusion_radius_m=0.0)).render(
         scene, camera, frozenset({Channel.RADIANCE})
     )
     lux = reading.channels[Channel.RADIANCE][4, 4] @ LUMINANCE * math.pi / 0.5

@@ -1,4 +1,4 @@
-"""Shadows of panoramas: what is brightest becomes lamps, and no light is lost or made."""
+"""Shadows of panoramas: the brightest parts become lamps, and light is conserved."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def directions(height: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def panorama(*lights: tuple[Vec3, float, float], height: int = 256) -> Float32:
-    """A grey sky, brighter above, with discs: direction, radius [rad], times as bright as it."""
+    """A grey sky, brighter above, with disks: direction, radius [rad], factor on the sky."""
     d, solid = directions(height)
     image = np.repeat(0.6 + 0.4 * d[..., 2:], 3, axis=2) * (0.9, 1.0, 1.2)
     for towards, radius_rad, luminance in lights:
@@ -68,7 +68,7 @@ def irradiance(image: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 
 def disc_irradiance(lamp: SkyLamp, normals: np.ndarray) -> np.ndarray:
-    """Of an even disc in the sky, by summing 4000 points over it."""
+    """Irradiance of a uniform disk in the sky, by summation over 4000 points."""
     k = np.arange(4000) + 0.5
     cosine = 1.0 - (1.0 - math.cos(lamp.angular_radius_rad)) * k / 4000
     sine, turn = np.sqrt(1.0 - cosine**2), k * 2.399963
@@ -102,7 +102,7 @@ SKIES = {
 def test_lamps_and_the_rest_give_the_irradiance_of_the_panorama(
     lights: tuple[tuple[Vec3, float, float], ...],
 ) -> None:
-    """On surfaces that face any way, to 1 % of what the brightest of them gets."""
+    """On surfaces of any orientation, to 1 % of the brightest one's irradiance."""
     image, normals = panorama(*lights), every_normal()
 
     rest, lamps = remove_peaks(image)
@@ -132,7 +132,7 @@ def test_a_disc_in_the_sky_is_found_where_and_as_large_as_it_is(
 
 
 def test_a_fine_panorama_is_lit_and_mirrored_like_a_coarse_one() -> None:
-    """1200 rows: the light of the mirrored image and of the lamps is still that of the panorama."""
+    """1200 rows: the reflected image and the lamps together have the panorama's light."""
     image = panorama(((0.6, 0.3, 0.7), 0.05, 900.0), height=1200)
     device = open_device("cpu")
 
@@ -148,7 +148,7 @@ def test_a_fine_panorama_is_lit_and_mirrored_like_a_coarse_one() -> None:
 
 
 def test_even_and_cloudy_skies_stay_as_they_are() -> None:
-    """Nothing stands out of them: no lamp, and the same image."""
+    """Nothing outstanding in the panorama: no lamp, and the same image."""
     for image in (panorama(), panorama(((0.5, 0.5, 0.6), 0.6, 3.0))):
         rest, lamps = remove_peaks(image)
 
@@ -188,7 +188,7 @@ def luminance_of(
 
 @pytest.mark.parametrize("name", SKIES)
 def test_open_ground_is_as_bright_with_shadows_as_without(name: str) -> None:
-    """Nothing shades it: the sum is the panorama's irradiance, to 2 %, in every channel."""
+    """Without occlusion the sum is the panorama's irradiance, to 2 %, in every channel."""
     scene, library = scene_under(Environment(name, MEAN_CD_M2, yaw_rad=0.7))
 
     lit, _ = luminance_of(scene, library)
@@ -202,7 +202,7 @@ def test_open_ground_is_as_bright_with_shadows_as_without(name: str) -> None:
 @pytest.mark.parametrize("name", ["sun", "window", "two soft boxes"])
 @pytest.mark.parametrize("yaw_rad", [0.0, 2.0])
 def test_a_block_throws_the_shadow_that_the_panorama_implies(name: str, yaw_rad: float) -> None:
-    """Against Embree: every texel of the bright parts, seen or hidden, from every fourth pixel.
+    """Against Embree: visibility of every texel of the bright parts from every fourth pixel.
 
     The rest of the sky is taken as unshaded on both sides: it throws no shadow here.
     """
@@ -245,7 +245,7 @@ def test_a_block_throws_the_shadow_that_the_panorama_implies(name: str, yaw_rad:
 
 
 def test_shadows_can_be_switched_off() -> None:
-    """Then all of the panorama is light without shadows, as it is behind other lamps."""
+    """Then the whole panorama is light without shadows, as it is when other lamps outshine it."""
     block = Body("b", "ball", SE3((0.0, 0.0, 0.6)), 0.4)
     scene, library = scene_under(Environment("sun", MEAN_CD_M2), block)
 
@@ -262,7 +262,7 @@ def test_shadows_can_be_switched_off() -> None:
     "what", ["a sun of its own", "walls all around", "lamps that drown it", "an even sky"]
 )
 def test_nothing_changes_where_no_shadow_would_be_seen(what: str) -> None:
-    """The same bytes as without: a room's light is not that of the sky behind its walls."""
+    """The same bytes as without: light in a closed room does not come from the sky."""
     environment = Environment("sun", MEAN_CD_M2)
     block = Body("b", "box", SE3((0.0, 0.0, 0.15)), 0.3)
     scene, library = scene_under(environment, block)
@@ -288,7 +288,7 @@ def test_nothing_changes_where_no_shadow_would_be_seen(what: str) -> None:
 
 
 def test_the_sun_of_a_panorama_is_seen_where_it_is() -> None:
-    """Pixels that look at it show the image itself, with the sun in it."""
+    """Background pixels show the image itself, with the sun in it."""
     scene, library = scene_under(Environment("sun", MEAN_CD_M2))
     towards = 10.0 * np.array((0.6, 0.3, 0.7))
     camera = camera_at((0.0, 0.0, 0.5), tuple(towards.tolist()), (33, 25), hfov_deg=20.0, ev100=8.0)
@@ -304,7 +304,7 @@ def test_the_sun_of_a_panorama_is_seen_where_it_is() -> None:
 
 
 def test_the_sun_of_a_panorama_is_seen_through_a_pane() -> None:
-    """Clear glass passes 0.92 of it; what stands for it as a lamp is not lost from the view."""
+    """Clear glass transmits 0.92 of it; the part that a lamp represents stays visible."""
     pane = Material((1.0, 1.0, 1.0), 0.0, transmission=1.0)
     scene, library = scene_under(Environment("sun", MEAN_CD_M2))
     library.meshes["sheet"] = plane_mesh(6.0, (pane,))

@@ -1,4 +1,4 @@
-"""Optical flow and scene flow against homographies, OpenCV and rays traced one by one."""
+"""Optical flow and scene flow against homographies, OpenCV and individually traced rays."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def centres(lens: Intrinsics = LENS) -> np.ndarray:
 
 
 def through(homography: np.ndarray) -> np.ndarray:
-    """The flow that a homography of the image makes."""
+    """The flow that a homography of the image induces."""
     moved = np.einsum("ij,hwj->hwi", homography, centres())
     return moved[..., :2] / moved[..., 2:] - centres()[..., :2]
 
@@ -83,7 +83,7 @@ def test_a_plane_before_a_moving_camera_flows_by_its_homography(
 
 
 def test_the_sky_is_at_infinity_and_flows_by_rotation_alone(renderer: WarpRenderer) -> None:
-    """K R K^-1, however the camera travels; it has no scene flow."""
+    """K R K^-1, independent of the camera's translation; no scene flow."""
     scene = world(camera_velocity_m_s=(5.0, 0.0, 5.0), camera_turn_rad_s=0.5)
     seen = images(renderer, scene)
     K = LENS.matrix()
@@ -107,7 +107,7 @@ def test_the_sky_is_at_infinity_and_flows_by_rotation_alone(renderer: WarpRender
 def test_a_moving_box_flows_through_a_lens_as_opencv_projects_it(
     renderer: WarpRenderer, lens: Lens
 ) -> None:
-    """Points of its face, found by OpenCV's undistortion, are moved and projected by OpenCV."""
+    """Points of a face, located by OpenCV's undistortion, moved and projected by OpenCV."""
     intrinsics = replace(LENS, lens=lens)
     start = SE3((0.0, 0.0, 3.0))
     box = Body("box", "box", start, instance_id=1)
@@ -137,7 +137,7 @@ def test_a_moving_box_flows_through_a_lens_as_opencv_projects_it(
 
 
 def test_going_there_and_back_leads_to_the_same_pixel(renderer: WarpRenderer) -> None:
-    """Where a point is seen at both steps, its backward flow there undoes the forward flow."""
+    """Where a point is visible at both steps, its backward flow there cancels the forward flow."""
     start = SE3((0.3, 0.1, 3.0))
     box = Body("box", "box", start, instance_id=1)
     scene = world(
@@ -170,7 +170,7 @@ def test_going_there_and_back_leads_to_the_same_pixel(renderer: WarpRenderer) ->
 def test_points_are_occluded_where_a_ray_to_them_meets_something_before(
     renderer: WarpRenderer,
 ) -> None:
-    """Every pixel's point, seen by a ray of its own a step later; edges are a pixel wide."""
+    """Every pixel's point, traced by a ray of its own a step later; edges are a pixel wide."""
     start = SE3((-0.6, 0.0, 3.0))
     box = Body("box", "box", start, instance_id=1)
     scene = world(
@@ -242,7 +242,7 @@ def test_what_changes_its_shape_flows_with_its_triangles() -> None:
 
 
 def test_there_is_nothing_to_look_back_on_in_the_first_step(renderer: WarpRenderer) -> None:
-    """NaN, and occluded; a step later there is."""
+    """NaN, and occluded; one step later defined."""
     first = images(renderer, world(WALL, camera_velocity_m_s=(1.0, 0.0, 0.0), time_s=0.0))
 
     assert np.isnan(first[Channel.FLOW_BACKWARD]).all()

@@ -31,7 +31,7 @@ def library() -> FakeLibrary:
 
 @pytest.fixture(scope="module", params=["raster", "rays"])
 def renderer(library: FakeLibrary, request: pytest.FixtureRequest) -> WarpRenderer:
-    """Both ways of finding what is seen."""
+    """Both methods of visibility."""
     return WarpRenderer(library, "cpu", RenderSettings(visibility=request.param))
 
 
@@ -87,7 +87,7 @@ def test_sphere_has_its_closed_form_depth(renderer: WarpRenderer) -> None:
 
 
 def test_nothing_has_the_stated_values(renderer: WarpRenderer) -> None:
-    """A camera that sees nothing: infinite depth, zero everything else, empty silhouettes."""
+    """A camera without anything in view: infinite depth, zero otherwise, empty silhouettes."""
     away = Camera("away", look_at((0.0, 0.0, 3.0), (0.0, 0.0, 9.0)), LENS)
     reading = renderer.render(scene_of(PLANE, BOX), away, ALL)
 
@@ -152,7 +152,7 @@ def test_silhouette_holds_hidden_and_outlying_parts(renderer: WarpRenderer) -> N
 
 
 def test_raster_and_rays_agree(library: FakeLibrary) -> None:
-    """Away from edges ids are equal, and depth has the same bits: one formula serves both."""
+    """Away from edges ids are equal, and depth has the same bits: both use one formula."""
     raster = WarpRenderer(library, "cpu", RenderSettings(visibility="raster"))
     rays = WarpRenderer(library, "cpu", RenderSettings(visibility="rays"))
     camera = Camera("c", look_at((1.9, -1.4, 1.7), (0.0, 0.0, 0.4), 0.2), LENS)

@@ -1,4 +1,4 @@
-"""Images through lenses that bend straight edges: OpenCV says where things are, Embree how far."""
+"""Images through lenses with distortion: positions against OpenCV, ranges against Embree."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def turned(seed: int) -> tuple[float, float, float, float]:
 
 
 def test_a_lens_without_coefficients_is_a_pinhole() -> None:
-    """The same labels but for rounding at edges, and the same colours."""
+    """The same labels except for rounding at edges, and the same colours."""
     pinhole = Intrinsics(160, 120, 130.0, 130.0, 80.0, 60.0)
     bodies = [Body("room", "room", SE3((0.0, 0.0, 2.0)))]
     bodies += [
@@ -136,10 +136,10 @@ def test_a_lens_without_coefficients_is_a_pinhole() -> None:
 
 
 def test_a_pinhole_has_no_table_of_directions() -> None:
-    """It costs what it did."""
-    stock = DeviceCache(LIBRARY, open_device("cpu"))
+    """No memory is spent on lenses without distortion."""
+    cache = DeviceCache(LIBRARY, open_device("cpu"))
 
-    view = pack_view(ahead(Intrinsics(8, 6, 5.0, 5.0, 4.0, 3.0)), stock)
+    view = pack_view(ahead(Intrinsics(8, 6, 5.0, 5.0, 4.0, 3.0)), cache)
 
     assert view.lens == 0
     assert not view.directions
@@ -188,7 +188,7 @@ def test_ranges_are_embrees_along_opencvs_directions(name: str) -> None:
 
 @pytest.mark.parametrize("name", CAMERAS)
 def test_a_ball_covers_the_pixels_whose_rays_meet_it(name: str) -> None:
-    """In closed form: rays within asin(r / d) of the centre's direction; all but the rim agree."""
+    """In closed form: rays within asin(r / d) of the centre's direction agree except at the rim."""
     k = CAMERAS[name]
     centre = np.array([0.5, -0.3, 1.6])
     ball = Body("ball", "ball", SE3(tuple(centre)), instance_id=1)
@@ -243,7 +243,7 @@ def test_object_coordinates_are_seen_where_opencv_projects_them(name: str) -> No
 
 
 def test_silhouettes_go_on_as_on_a_larger_sensor() -> None:
-    """Three by three images in one: the same outline, but for half a pixel beside the image."""
+    """One image of three by three: the same outline, except for half a pixel outside the image."""
     gentle = Lens("brown_conrady", (-0.28340811, 0.07395907, 1.9359e-4, 1.76e-5, *[0.0] * 4))
     k = replace(CAMERAS["barrel"], lens=gentle)
     w, h = k.width_px, k.height_px
@@ -263,7 +263,7 @@ def test_silhouettes_go_on_as_on_a_larger_sensor() -> None:
 
 
 def test_what_hides_does_not_change_a_silhouette() -> None:
-    """A hidden ball has the outline that it has alone."""
+    """An occluded ball has the outline that it has alone."""
     camera = ahead(CAMERAS["fisheye"])
     far = Body("far", "ball", SE3((0.4, 0.2, 3.0)), instance_id=2)
     near = Body("near", "box", SE3((0.2, 0.1, 1.2)), instance_id=1)
@@ -278,7 +278,7 @@ def test_what_hides_does_not_change_a_silhouette() -> None:
 
 
 def test_a_cone_around_a_box_holds_all_of_it() -> None:
-    """Points of boxes near and far, thin and thick; the whole sphere where the eye is inside."""
+    """Points of boxes near and far, thin and thick; the whole sphere from inside."""
     rng = np.random.default_rng(6)
     halves = []
     for _ in range(300):
@@ -293,7 +293,7 @@ def test_a_cone_around_a_box_holds_all_of_it() -> None:
 
 
 def test_a_panorama_sees_all_around() -> None:
-    """A room from within: every pixel sees something, and what lies behind is at both ends."""
+    """A room from inside: every pixel hits a surface, and the rear appears at both ends."""
     k = Intrinsics.from_hfov(128, 64, 2.0 * math.pi, Lens("equirectangular"))
     room = Body("room", "room", SE3((0.0, 0.0, -2.0)))
     ball = Body("ball", "ball", SE3((0.0, 0.0, -1.5)), instance_id=1)
@@ -346,7 +346,7 @@ def test_a_frame_does_not_depend_on_the_lenses_before_it() -> None:
 
 
 def test_dark_corners_see_nothing() -> None:
-    """Outside a fisheye's field: black, no depth, no ids, no light from around."""
+    """Outside a fisheye's field: black, no depth, no ids, no environment."""
     k = Intrinsics(96, 96, 40.0, 40.0, 48.0, 48.0, replace(FISHEYE, half_field_rad=1.0))
     room = Body("room", "room", SE3((0.0, 0.0, -2.0)), instance_id=1)
     lamp = Light("lamp", "sphere", (0.0, 0.0, 1.0), intensity_cd=300.0)
@@ -380,7 +380,7 @@ def test_edges_are_smooth() -> None:
 
 
 def test_rain_before_a_lens_is_as_dense_as_before_a_pinhole() -> None:
-    """Without coefficients, in the space that both fill: as many streaks, as long and as opaque."""
+    """Without coefficients, in the volume that both fill: equal numbers, lengths and opacities."""
     pinhole = Intrinsics(96, 64, 80.0, 80.0, 48.0, 32.0)
     found = []
     for lens in (Lens(), Lens("brown_conrady", (0.0,) * 8)):
@@ -412,7 +412,7 @@ def test_rain_falls_all_around_a_panorama() -> None:
 
 @wp.kernel
 def look_up(view: View, points: wp.array(dtype=wp.vec3), pixels: wp.array(dtype=int)):  # noqa: ANN201
-    """What the renderer takes for the pixels of points."""
+    """Pixel indices that the kernels assign to points."""
     i = wp.tid()
     j, _depth = project_to_pixel(view, points[i])
     pixels[i] = j
@@ -423,7 +423,7 @@ def look_up(view: View, points: wp.array(dtype=wp.vec3), pixels: wp.array(dtype=
 )
 def test_reflections_look_points_up_where_they_are_seen(k: Intrinsics) -> None:
     """The kernels' projection is that of Intrinsics; none outside the image or the field."""
-    stock = DeviceCache(LIBRARY, open_device("cpu"))
+    cache = DeviceCache(LIBRARY, open_device("cpu"))
     points = np.random.default_rng(2).normal(size=(4000, 3))
     places = k.project(points)
     inside = ((places >= 0.0) & (places < (k.width_px, k.height_px))).all(axis=1)
@@ -433,7 +433,7 @@ def test_reflections_look_points_up_where_they_are_seen(k: Intrinsics) -> None:
     near = inside & (np.abs(places - np.round(places)).min(axis=1) < 1e-2)
 
     pixels = wp.zeros(4000, dtype=int, device="cpu")
-    inputs = [pack_view(ahead(k), stock), wp.array(points, dtype=wp.vec3, device="cpu")]
+    inputs = [pack_view(ahead(k), cache), wp.array(points, dtype=wp.vec3, device="cpu")]
     wp.launch(look_up, 4000, inputs, [pixels], device="cpu")
 
     found = pixels.numpy()

@@ -21,7 +21,7 @@ MESHES = {
 
 
 def random_scene(seed: int) -> tuple[Scene, Lidar]:
-    """A hall far from the origin with forty turned and scaled bodies, and a tilted scanner."""
+    """A hall far from the origin with forty rotated and scaled bodies, and a tilted scanner."""
     rng = np.random.default_rng(seed)
     away = (300.0, -200.0, 5.0)
     bodies = [Body("room", "room", SE3(away))]
@@ -108,7 +108,7 @@ def test_nothing_beyond_the_reach_of_beams_is_hit() -> None:
 
 
 def test_rays_of_a_wide_beam_surround_its_axis() -> None:
-    """On a plane square on, the six rays end on a circle of half the beam's light."""
+    """On a plane at normal incidence, the six rays end on the circle of half the beam's light."""
     rays = np.array([[0.0, 0.0, -1.0]], np.float32)
     lidar = Lidar("top", "color", T_world_lidar=SE3((0.0, 0.0, 10.0)))
     scene = Scene("plane", (Body("plane", "plane"),))

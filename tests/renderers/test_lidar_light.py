@@ -1,4 +1,4 @@
-"""How much laser light comes back from materials, and that scanners see what cameras see."""
+"""Reflectance of materials for lasers, and agreement of scanners with cameras."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MATTE = Material(base_color=(0.4, 0.4, 0.4), roughness=1.0, specular=0.0)
 
 
 def seen_at(material: Material, angles_deg: list[float]) -> LidarHits:
-    """A plane from one metre, seen under angles of incidence."""
+    """A plane at one metre, at several angles of incidence."""
     angles = np.radians(angles_deg)
     rays = np.stack([np.sin(angles), np.zeros_like(angles), -np.cos(angles)], axis=1)
     library = FakeLibrary({"plane": plane_mesh(400.0, (material,))})
@@ -40,7 +40,7 @@ def test_a_matte_surface_falls_with_the_cosine_of_incidence() -> None:
 
 
 def test_rough_ground_stays_visible_at_grazing_incidence() -> None:
-    """Oren and Nayar: at 88 degrees, ten times what Lambert says; square on nearly as much."""
+    """Oren and Nayar: ten times Lambert at 88 degrees, nearly the same at normal incidence."""
     asphalt = Material(base_color=(0.05, 0.05, 0.05), roughness=1.0, specular=0.0, role="asphalt")
     square, grazing = seen_at(asphalt, [0.0, 88.0]).reflectance[:, 0]
     even, rim = oren_nayar(0.5)
@@ -52,7 +52,7 @@ def test_rough_ground_stays_visible_at_grazing_incidence() -> None:
 
 
 def test_a_glossy_surface_shines_square_on_and_vanishes_aslant() -> None:
-    """Glass: hundreds of times matte black at zero, next to nothing at thirty degrees."""
+    """Glass: hundreds of times matte black at normal incidence, almost nothing at 30 degrees."""
     glass = Material(base_color=(0.02, 0.02, 0.02), roughness=0.05, specular=0.5, role="glass")
     square, aslant = seen_at(glass, [0.0, 30.0]).reflectance[:, 0]
 
@@ -62,7 +62,7 @@ def test_a_glossy_surface_shines_square_on_and_vanishes_aslant() -> None:
 
 
 def test_signs_are_retro_reflectors() -> None:
-    """Hundreds of times white, also at 40 degrees; nothing of it at 75."""
+    """Hundreds of times white, also at 40 degrees; no retro-reflection at 75."""
     sign = Material(base_color=(0.5, 0.1, 0.1), roughness=0.8, role="sign")
     square, turned, edge = seen_at(sign, [0.0, 40.0, 75.0]).reflectance[:, 0]
 
@@ -73,7 +73,7 @@ def test_signs_are_retro_reflectors() -> None:
 
 @pytest.mark.parametrize("role", ["leaf", "skin", "asphalt", "top"])
 def test_the_infrared_is_not_what_the_eye_sees(role: str) -> None:
-    """A black leaf, face, road or shirt is none for a laser: roles have their own reflectance."""
+    """A black leaf, face, road or shirt is not black for a laser: roles have a reflectance."""
     even, rim, *_ = infrared_fields(Material(role=role), np.zeros(3))
 
     assert even + rim > 0.15
@@ -94,7 +94,7 @@ def test_surfaces_are_numbered_by_role() -> None:
 
 
 def test_camera_and_lidar_see_the_same_world() -> None:
-    """At 99 % of projected points that both see, z-depths agree within 5 mm."""
+    """On 99 % of the points visible to both, z-depths agree within 5 mm."""
     library = FakeLibrary({"plane": plane_mesh(80.0), "box": box_mesh(), "ball": sphere_mesh(0.7)})
     rng = np.random.default_rng(3)
     bodies = [Body("plane", "plane")]
@@ -127,7 +127,7 @@ def test_camera_and_lidar_see_the_same_world() -> None:
 
 
 def test_what_is_clear_to_the_eye_is_clear_to_a_laser() -> None:
-    """Without a role, transmission and opacity tell what passes; Fresnel tells what is mirrored."""
+    """Without a role, transmission and opacity decide what passes; Fresnel what is reflected."""
     white = np.ones(3)
     glass = Material((1, 1, 1), 0.04, transmission=0.75, ior=1.5)
     veil = Material((1, 1, 1), 1.0, opacity=0.25)

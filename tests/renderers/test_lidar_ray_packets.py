@@ -1,4 +1,4 @@
-"""Rays that are traced together find what each would find alone."""
+"""Rays traced together return the same hits as rays traced alone."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def cubes(count: int, seed: int, asset: str = "cube") -> tuple[Body, ...]:
 
 
 def slab_ranges_m(bodies: tuple[Body, ...], directions: NDArray[np.float32]) -> Array:
-    """Where rays from the origin enter the first of some cubes, by Kay and Kajiya's slabs."""
+    """Entry of rays from the origin into the first of some cubes, by Kay and Kajiya's slabs."""
     middle = np.array([body.T_world_body.translation_m for body in bodies])[:, None]
     inverse = 1.0 / directions.astype(np.float64)
     a, b = (middle - 0.5 * SIDE_M) * inverse, (middle + 0.5 * SIDE_M) * inverse
@@ -58,7 +58,7 @@ def scanned(scene: Scene, beams: LidarRays) -> LidarHits:
 
 
 def same(one: LidarHits, other: LidarHits, rows: slice | NDArray[np.int64] = slice(None)) -> bool:
-    """Whether rows of one are all of the other, bit by bit."""
+    """Whether the rows of two arrays are permutations of each other, bit by bit."""
     fields = ("range_m", "reflectance", "incidence_cos", "instance_id", "category_id", "surface")
     return all(
         getattr(one, name)[rows].tobytes() == getattr(other, name).tobytes() for name in fields
@@ -66,7 +66,7 @@ def same(one: LidarHits, other: LidarHits, rows: slice | NDArray[np.int64] = sli
 
 
 def test_runs_that_may_meet_more_than_a_list_holds_find_the_nearest() -> None:
-    """Hundreds of cubes before rays so mixed that every run may meet nearly all of them."""
+    """Hundreds of cubes and rays so mixed that every run may hit nearly all of them."""
     bodies = cubes(4 * int(LISTED_MAX), 1)
     directions = drawn(3000, 2, 0.2)
 
@@ -92,7 +92,7 @@ def test_runs_of_neighbours_find_the_nearest() -> None:
 
 
 def test_the_order_of_beams_changes_nothing() -> None:
-    """Same bytes for rays as they are and shuffled, with detours, subrays and what moves."""
+    """The same bytes for rays in order and shuffled, with secondary rays, subrays and motion."""
     windows = cubes(20, 5, "window") + cubes(10, 6, "pane")
     bodies = cubes(60, 7) + windows
     poses = tuple(bodies[0].T_world_body @ SE3((0.0, 0.5 * k, 0.0)) for k in range(3))
@@ -115,7 +115,7 @@ def test_the_order_of_beams_changes_nothing() -> None:
 
 
 def test_a_ray_alone_finds_what_it_finds_in_company() -> None:
-    """One in a run, all in runs: the same bytes."""
+    """One ray per run, and all in few runs: the same bytes."""
     scene = Scene("crowd", cubes(100, 10))
     directions = drawn(3 * RUN + 5, 11, 0.2)
     together = scanned(scene, LidarRays(directions, 0.0, 1, 100.0))

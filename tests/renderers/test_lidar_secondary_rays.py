@@ -1,4 +1,4 @@
-"""Laser light through glass, by way of mirrors, on wet ground and on snow."""
+"""Laser light through glass, by reflection, on wet ground and on snow."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def scan(
 
 
 def schlick(f0: float, angle_rad: float) -> float:
-    """Fresnel reflectance under an angle of incidence."""
+    """Fresnel reflectance at an angle of incidence."""
     return f0 + (1.0 - f0) * (1.0 - math.cos(angle_rad)) ** 5
 
 
@@ -81,7 +81,7 @@ def test_two_panes_dim_twice() -> None:
 
 
 def test_a_window_mirrors_a_wall_to_a_place_behind_itself() -> None:
-    """At 45 degrees: the ways add up, Fresnel counts twice, and there is no label."""
+    """At 45 degrees: distances add up, Fresnel applies twice, and there is no label."""
     turned = SE3.about_z(math.radians(45.0), (10.0, 0.0, 0.0))
     bodies = (
         Body("window", "window", turned, instance_id=1),
@@ -103,14 +103,14 @@ def test_a_window_mirrors_a_wall_to_a_place_behind_itself() -> None:
 
 
 def test_where_nothing_is_of_glass_there_are_no_detours() -> None:
-    """Nor does dry asphalt mirror."""
+    """Dry asphalt reflects nothing either."""
     bodies = (Body("road", "road"), Body("wall", "wall", SE3((10.0, 0.0, 0.0))))
 
     assert scan(Scene("street", bodies), AHEAD, 1.0).detours is None
 
 
 def test_puddles_mirror_what_stands_behind_them() -> None:
-    """The wall behind is seen as far below the road as it is above; Fresnel of water, twice."""
+    """The wall behind appears as far below the road as it is above; Fresnel of water, twice."""
     down = math.radians(4.0)
     ray = [[math.cos(down), 0.0, -math.sin(down)]]
     bodies = (Body("road", "road"), Body("wall", "wall", SE3((40.1, 0.0, 0.0))))
@@ -139,7 +139,7 @@ def test_wet_asphalt_sends_back_less_and_least_aslant(down_deg: float) -> None:
 
 
 def test_snow_is_bright_in_the_near_infrared() -> None:
-    """0.85 square on, by Lambert, where black asphalt had 0.17."""
+    """0.85 at normal incidence, by Lambert, instead of 0.17 of black asphalt."""
     road, ray = (Body("road", "road"),), [[0.0, 0.0, -1.0]]
     snow = Weather(snow_cover=1.0)
 

@@ -78,7 +78,7 @@ def test_rough_glass_loses_what_its_facets_hide_and_no_more() -> None:
 
 
 def test_a_grey_ball_under_an_even_sky_has_its_albedo() -> None:
-    """A convex matte body sees nothing of itself: radiance is albedo times 100."""
+    """A convex matte body receives no light from itself: radiance is albedo times 100."""
     images = ball_in_furnace(base_color=(0.5, 0.25, 0.1), roughness=1.0, specular=0.0)
 
     np.testing.assert_allclose(images.mean(axis=(0, 1, 2)), (50.0, 25.0, 10.0), rtol=2e-3)
@@ -144,7 +144,7 @@ def test_a_disk_overhead_has_the_form_factor_of_the_books() -> None:
 
 
 def test_a_spot_is_dark_outside_its_cone_and_fades_within() -> None:
-    """On its axis a spot is a ball; beyond its half angle nothing arrives."""
+    """On its axis a spot equals a sphere; beyond its half angle it is dark."""
     spot = Light(
         "spot", "spot", (0.0, 0.0, 2.0), intensity_cd=400.0, radius_m=0.01, cone_rad=0.3, even=0.5
     )
@@ -206,7 +206,7 @@ def test_a_panel_seen_in_a_mirror_has_its_luminance() -> None:
 
 
 def test_a_panel_that_a_body_shows_gives_its_light_once() -> None:
-    """The body's own light is the lamp's: the floor is lit as by the lamp alone."""
+    """The body's emission is the lamp's own light: the floor is lit by the lamp alone."""
     glowing = replace(MATTE, base_color=(0.0, 0.0, 0.0), emission_cd_m2=(1000.0, 1000.0, 1000.0))
     library = FakeLibrary(
         {"plane": plane_mesh(20.0, (MATTE,)), "face": plane_mesh(1.0, (glowing,))}
@@ -226,7 +226,7 @@ def test_a_panel_that_a_body_shows_gives_its_light_once() -> None:
 
 
 def test_emission_shines_in_the_picture_and_on_what_is_near() -> None:
-    """A closed room that emits 10 cd/m^2 and reflects a half: 10 + 5 + 2.5 ... = 20."""
+    """A closed room that emits 10 cd/m^2 and reflects half: 10 + 5 + 2.5 ... = 20."""
     glowing = replace(MATTE, emission_cd_m2=(10.0, 10.0, 10.0))
     library = FakeLibrary({"room": room_mesh(materials=(glowing,))})
     camera = camera_at((0.0, 0.0, 1.5), (1.0, 0.3, 1.2), (12, 12))
@@ -238,7 +238,7 @@ def test_emission_shines_in_the_picture_and_on_what_is_near() -> None:
 
 
 def test_holes_let_paths_and_shadows_through() -> None:
-    """A sheet whose texture is all hole changes nothing, neither seen nor as a shadow."""
+    """A sheet whose texture is all hole changes nothing, neither visibly nor by shadows."""
     nothing = TextureData(np.full((4, 4, 3), 200, np.uint8), alpha=np.zeros((4, 4), np.uint8))
     sheet = replace(MATTE, texture="nothing")
     library = FakeLibrary(
@@ -255,7 +255,7 @@ def test_holes_let_paths_and_shadows_through() -> None:
 
 
 def mixed_scene() -> tuple[Scene, Camera, FakeLibrary]:
-    """Two soft lamps and a sky with a bright patch over glossy and matte things."""
+    """Two soft lamps and a sky with a bright patch over glossy and matte objects."""
     sky = np.ones((32, 64, 3), np.float32)
     sky[6:10, 10:18] = 12.0
     sky /= sky.mean()
@@ -323,7 +323,7 @@ def test_error_falls_faster_than_that_of_independent_samples() -> None:
 
 
 def test_the_same_scene_gives_the_same_bytes() -> None:
-    """Two renderers, one of which has rendered something else before."""
+    """Two renderers, one of which has rendered another scene before."""
     scene, camera, library = mixed_scene()
     channels = frozenset({Channel.RADIANCE, Channel.INSTANCE})
     first, second = (WarpRenderer(library, "cpu", settings_of(4)) for _ in range(2))
@@ -336,7 +336,7 @@ def test_the_same_scene_gives_the_same_bytes() -> None:
 
 
 def test_labels_do_not_depend_on_the_tier() -> None:
-    """They come from the pixel-centre ray."""
+    """Labels come from the pixel-centre ray."""
     scene, camera, library = mixed_scene()
     channels = frozenset({Channel.RADIANCE, Channel.INSTANCE, Channel.Z_DEPTH, Channel.NORMALS})
     traced = WarpRenderer(library, "cpu", settings_of(1)).render(scene, camera, channels)
@@ -348,7 +348,7 @@ def test_labels_do_not_depend_on_the_tier() -> None:
 
 
 def test_both_tiers_agree_where_light_comes_straight_from_lamps() -> None:
-    """A matte floor under one lamp: no bounce to miss, the same radiance to 1 %."""
+    """A matte floor under one lamp: without indirect light, the same radiance to 1 %."""
     lamp = Light("lamp", "sphere", (0.5, 0.0, 2.0), intensity_cd=300.0, radius_m=0.1)
     scene = Scene("t", (Body("p", "plane"),), lights=(lamp,), environment=DARK)
     channels = frozenset({Channel.RADIANCE})
@@ -360,7 +360,7 @@ def test_both_tiers_agree_where_light_comes_straight_from_lamps() -> None:
 
 
 def test_fog_dims_what_is_far() -> None:
-    """Koschmieder: exp(-0.2 * 3) of a lit floor is left, plus the fog's own light."""
+    """Koschmieder: exp(-0.2 * 3) of a lit floor remains, plus the fog's own light."""
     sun = Light("sun", "sun", direction=(0.0, 0.0, -1.0), illuminance_lux=1000.0)
     weather = Weather(fog_extinction_per_m=0.2)
     scene = Scene("t", (Body("p", "plane"),), lights=(sun,), environment=DARK, weather=weather)
@@ -374,7 +374,7 @@ def test_fog_dims_what_is_far() -> None:
 
 
 def test_snow_whitens_and_puddles_mirror() -> None:
-    """Weather on the ground is part of paths."""
+    """Paths include water and snow on the ground."""
     dark = replace(MATTE, base_color=(0.1, 0.1, 0.1), roughness=0.9)
     scene = Scene("t", (Body("p", "plane"),), environment=FURNACE)
     dry = radiance_of(scene, from_above(), ground(dark), 32).mean()
@@ -389,7 +389,7 @@ def test_snow_whitens_and_puddles_mirror() -> None:
 
 
 def test_the_other_tier_never_loads_the_kernels_of_paths() -> None:
-    """Starting cold it costs what it did."""
+    """A cold start of the realtime tier takes as long as before."""
     code = (
         "import sys; from gen_data.generator.renderers.warp.settings import RenderSettings;"
         "from gen_data.generator.renderers.warp.renderer import WarpRenderer;"

@@ -152,7 +152,7 @@ SPOT = Light(
 
 
 def metal() -> Picture:
-    """Schlick's reflectance over GGX; separable masking there, height-correlated here."""
+    """Schlick's reflectance over GGX; separable masking in Mitsuba, height-correlated here."""
     gold = Material(base_color=(0.9, 0.7, 0.3), metallic=1.0, roughness=0.2)
     bsdf = {
         "type": "principled", "base_color": rgb(0.9, 0.7, 0.3), "metallic": 1.0, "roughness": 0.2,
@@ -218,13 +218,13 @@ def lamps() -> Picture:
 
 
 def sun_and_spot() -> Picture:
-    """Lamps that are points there, and small here."""
+    """Lamps that are points in Mitsuba, and small spheres here."""
     picture = lamps()
     return replace(picture, scene=replace(picture.scene, lights=(SUN, SPOT)))
 
 
 def textured() -> Picture:
-    """Four squares of colour, whose borders alone are mixed in another way.
+    """Four squares of colour, whose borders are interpolated differently.
 
     V goes down in Mitsuba.
     """
@@ -338,7 +338,7 @@ def test_converged_images_are_those_of_mitsuba(name: str) -> None:
 
 
 def test_a_closed_box_looks_as_in_mitsuba() -> None:
-    """In short: the same mean radiance to three standard errors, no pixel off beyond chance."""
+    """Few samples: the same mean radiance to three standard errors, no pixel off beyond chance."""
     pytest.importorskip("mitsuba")
 
     own, theirs = both(cornell(), 16, 8)

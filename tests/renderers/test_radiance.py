@@ -11,7 +11,7 @@ from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
 from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.realtime.light_visibility import pixel_parts
+from gen_data.generator.renderers.warp.realtime.light_visibility import pixel_samples
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from gen_data.generator.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import (
@@ -38,7 +38,7 @@ def glowing(pose: SE3, asset: str = "box", scale: float = 1.0, emission: float =
 
 
 def test_an_edge_is_as_grey_as_it_is_covered() -> None:
-    """A quarter of a pixel on a glowing box of 300 cd/m^2 before black: 75 cd/m^2."""
+    """A quarter of a pixel on a glowing box of 300 cd/m^2 in front of black: 75 cd/m^2."""
     left_m = (22.75 - 32.0) / 50.0 * 2.0
     scene = Scene("t", (glowing(SE3((left_m + 0.5, 0.0, 2.5)), emission=300.0),), environment=DARK)
     camera = forward_camera()
@@ -69,7 +69,7 @@ def test_anti_aliasing_does_not_touch_labels() -> None:
 @pytest.mark.parametrize("n", [2, 4, 8])
 def test_parts_of_a_pixel_share_no_row_and_no_column(n: int) -> None:
     """So that nearly upright and nearly level edges get n + 1 shades."""
-    parts = pixel_parts(n)
+    parts = pixel_samples(n)
 
     for axis in range(2):
         assert sorted(parts[:, axis]) == [(k + 0.5) / n for k in range(n)]
@@ -77,7 +77,7 @@ def test_parts_of_a_pixel_share_no_row_and_no_column(n: int) -> None:
 
 
 def test_nothing_shows_the_environment_or_black() -> None:
-    """Pixels that see no body: the sky's image if it is visible."""
+    """Pixels without a body show the sky's image if it is visible."""
     seen = Scene("t", environment=Environment(luminance_cd_m2=300.0))
     unseen = Scene("t", environment=Environment(luminance_cd_m2=300.0, visible=False))
 

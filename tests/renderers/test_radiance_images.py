@@ -26,7 +26,7 @@ DARK = Environment(luminance_cd_m2=0.0)
 
 @pytest.fixture(scope="module")
 def library() -> FakeLibrary:
-    """Things of grey chalk."""
+    """Bodies of grey chalk."""
     return FakeLibrary(
         {
             "plane": plane_mesh(materials=CHALK),
@@ -38,7 +38,7 @@ def library() -> FakeLibrary:
 
 @pytest.fixture(scope="module")
 def renderer(library: FakeLibrary) -> WarpRenderer:
-    """Without ambient occlusion: values that formulas can tell."""
+    """Settings without ambient occlusion: closed forms apply."""
     return WarpRenderer(library, "cpu", PLAIN)
 
 
@@ -69,7 +69,7 @@ def test_lamp_obeys_the_inverse_square_law(renderer: WarpRenderer) -> None:
 
 
 def test_chalk_in_an_even_environment_shows_its_albedo(renderer: WarpRenderer) -> None:
-    """A ball in light of equal luminance from everywhere reflects rho * L at every point."""
+    """A ball under uniform luminance from all directions reflects rho * L at every point."""
     around = Environment(luminance_cd_m2=100.0, visible=False)
     scene = Scene("t", bodies=(Body("ball", "ball"),), environment=around)
 
@@ -81,7 +81,7 @@ def test_chalk_in_an_even_environment_shows_its_albedo(renderer: WarpRenderer) -
 
 @pytest.mark.parametrize("roughness", [0.2, 0.5, 0.9])
 def test_white_metal_reflects_all_light_but_what_it_shades(roughness: float) -> None:
-    """White furnace: a white metal of GGX may lose some energy with roughness, and gains none."""
+    """White furnace: a white GGX metal may lose some energy with roughness, and gains none."""
     metal = (Material(base_color=(1.0, 1.0, 1.0), roughness=roughness, metallic=1.0),)
     library = FakeLibrary({"ball": sphere_mesh(0.5, rings=48, materials=metal)})
     around = Environment(luminance_cd_m2=100.0, visible=False)
@@ -141,7 +141,7 @@ def test_shadow_touches_its_box_and_has_a_penumbra_of_similar_triangles(
 
 
 def test_flat_lit_plane_has_no_acne(renderer: WarpRenderer) -> None:
-    """A plane alone shadows itself nowhere, not even in grazing light."""
+    """A plane alone has no shadows on itself, not even in grazing light."""
     direction = (math.cos(math.radians(8.0)), 0.0, -math.sin(math.radians(8.0)))
     sun = Light("sun", "sun", direction=direction, illuminance_lux=3000.0)
     scene = Scene("t", bodies=(Body("plane", "plane"),), lights=(sun,), environment=DARK)
@@ -152,7 +152,7 @@ def test_flat_lit_plane_has_no_acne(renderer: WarpRenderer) -> None:
 
 
 def test_radiance_grows_with_the_light(library: FakeLibrary) -> None:
-    """Ten times the light gives ten times the radiance, on edges too: nothing is exposed yet."""
+    """Ten times the light gives ten times the radiance, on edges too."""
     renderer = WarpRenderer(library, "cpu")
     bodies = (Body("plane", "plane"), Body("ball", "ball", SE3((0.2, 0.1, 0.5))))
     images = []
@@ -206,7 +206,7 @@ def test_picture_does_not_depend_on_what_was_rendered_before(library: FakeLibrar
 
 
 def test_returned_images_are_not_overwritten_by_the_next_render(library: FakeLibrary) -> None:
-    """A reading belongs to its caller."""
+    """The arrays of a reading belong to the caller."""
     renderer = WarpRenderer(library, "cpu")
     channels = frozenset({Channel.RADIANCE, Channel.Z_DEPTH})
     scene = Scene("t", bodies=(Body("plane", "plane"),))

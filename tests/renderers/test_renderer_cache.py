@@ -1,4 +1,4 @@
-"""What a renderer keeps between calls changes no pixel and no point."""
+"""Caches of the renderer change no pixel and no point."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ CHANNELS = frozenset({Channel.RADIANCE, Channel.Z_DEPTH, Channel.INSTANCE})
 
 
 def test_values_are_kept_by_identity_and_the_oldest_go() -> None:
-    """An equal object is another; a value asked for again stays."""
+    """An equal but different object is another key; a value requested again is the same."""
     cache: ObjectCache[int] = ObjectCache(2)
     first, second, third = [1], [1], [1]
     made: list[int] = []
@@ -51,7 +51,7 @@ def test_values_are_kept_by_identity_and_the_oldest_go() -> None:
 
 
 def test_cameras_of_one_scene_see_what_they_see_of_a_fresh_one() -> None:
-    """Weather, lamps and places of one view are not left in the next."""
+    """Weather, lamps and poses of one view do not persist in the next."""
     shared = WarpRenderer(LIBRARY, "cpu")
 
     for eye in (*EYES, EYES[0]):
@@ -62,7 +62,7 @@ def test_cameras_of_one_scene_see_what_they_see_of_a_fresh_one() -> None:
 
 
 def test_another_scene_is_packed_anew() -> None:
-    """A body that moved and one that was painted, in a scene that is equal otherwise."""
+    """One body moved and one repainted, in an otherwise equal scene."""
     renderer = WarpRenderer(LIBRARY, "cpu")
     red = (Material((0.8, 0.1, 0.1)),)
     before = renderer.render(SCENE, EYES[0], CHANNELS).channels
@@ -82,12 +82,12 @@ def test_another_scene_is_packed_anew() -> None:
 
 def test_textures_of_several_bodies_find_their_places() -> None:
     """Materials with and without textures, in any order of bodies."""
-    stock = DeviceCache(LIBRARY, open_device("cpu"))
+    cache = DeviceCache(LIBRARY, open_device("cpu"))
     plain, brick, wood = (Material(texture=name) for name in ("", "brick", "ash"))
     looks = ((plain,), (brick,), (wood,), (plain,), (brick,))
     bodies = tuple(Body(f"{k}", "box", materials=look) for k, look in enumerate(looks))
 
-    record = pack_world(Scene("t", bodies), EYES[0], stock).record
+    record = pack_world(Scene("t", bodies), EYES[0], cache).record
 
     assert record.surfaces.numpy()["texture"].tolist() == [-1, 1, 0, -1, 1]
     assert len(record.textures.numpy()) == 2

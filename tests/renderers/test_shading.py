@@ -95,7 +95,7 @@ def test_a_spot_lights_its_cone_and_nothing_beside() -> None:
 
 @pytest.mark.parametrize("albedo", [(0.2, 0.5, 0.8), (0.9, 0.9, 0.9)])
 def test_a_matte_ball_under_a_uniform_sky_has_luminance_albedo_times_sky(albedo: Vec3) -> None:
-    """In a furnace a matte surface is seen in its albedo, wherever it faces."""
+    """In a furnace a matte surface shows its albedo at any orientation."""
     material = Material(base_color=albedo, roughness=1.0, specular=0.0)
     library = FakeLibrary({"ball": sphere_mesh(0.5, 32, (material,))})
     scene = Scene("t", (Body("b", "ball"),), environment=Environment(luminance_cd_m2=200.0))
@@ -231,7 +231,7 @@ def test_the_penumbra_of_a_sun_has_the_width_of_its_disc() -> None:
 
 
 def test_hard_shadows_have_no_penumbra() -> None:
-    """The same lamp, taken for a point: from dark to light within the smoothing window."""
+    """The same lamp as a point: from dark to light within the smoothing window."""
     x, visible = shadow_profile(0.2, OPEN.model_copy(update={"shadows": "hard"}))
 
     on_ground = x > 0.33
@@ -331,7 +331,7 @@ def pointing_sky(direction: Vec3) -> Float32:
 def test_the_sky_is_seen_and_mirrored_where_it_is(
     direction: Vec3, yaw_rad: float, seen: Vec3, roughness: float
 ) -> None:
-    """Its bright spot, turned about Z, is where pixels look and where a metal ball mirrors it."""
+    """Its bright spot, rotated about Z, appears in the image and in a metal ball's reflection."""
     metal = Material((1.0, 1.0, 1.0), roughness, 1.0)
     library = FakeLibrary(
         {"ball": sphere_mesh(0.5, 64, (metal,))}, environments={"s": pointing_sky(direction)}

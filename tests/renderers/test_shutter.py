@@ -1,4 +1,4 @@
-"""Exposure over time and rows one after the other, against what even motion must look like."""
+"""Motion blur and rolling shutter, against the closed forms of uniform motion."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ PX_PER_M = 80.0 / 2.5
 
 @pytest.fixture(scope="module")
 def renderer() -> WarpRenderer:
-    """Without what scatters light beyond where it falls."""
+    """An image pipeline without scattering in the lens."""
     return WarpRenderer(MESHES, "cpu")
 
 
@@ -74,7 +74,7 @@ def test_a_streak_is_as_long_as_the_way_and_holds_the_same_light(renderer: WarpR
 
 
 def test_a_streak_along_columns_is_as_long_as_the_way(renderer: WarpRenderer) -> None:
-    """Twenty rows up and down, though the middle of the exposure shows nothing there."""
+    """Twenty rows up and down, although the middle of the exposure shows nothing there."""
     track = even_track("lamp", LAMP.T_world_body, (0.0, 1000.0 / PX_PER_M, 0.0))
     scene = world(LAMP, tracks=(track,), shutter=Shutter(exposure_s=0.04, samples=80), time_s=0.0)
     blurred = shot(renderer, scene).channels[Channel.RADIANCE][:, 48, 1].astype(np.float64)
@@ -103,7 +103,7 @@ def test_labels_of_a_long_exposure_are_those_of_its_middle(renderer: WarpRendere
 def test_what_does_not_move_is_the_same_bytes_behind_any_shutter(
     renderer: WarpRenderer, shutter: Shutter
 ) -> None:
-    """Nothing moves; or so little that it cannot be told from nothing."""
+    """Nothing moves; or too little to be visible."""
     for scene in (world(LAMP, shutter=shutter), passing(0.5, shutter)):
         one, other = shot(renderer, scene), shot(renderer, without_shutter(scene))
         for channel, image in other.channels.items():
@@ -119,7 +119,7 @@ def test_what_does_not_move_is_the_same_bytes_behind_any_shutter(
 def test_slices_of_time_hold_every_row_once_around_its_instant(
     exposure_s: float, readout_s: float, samples: int
 ) -> None:
-    """Shares of a row sum to 1, and the mean of their instants is the row's to a slice's size."""
+    """Shares of a row sum to 1, and the mean of their instants is the row's within a slice."""
     lens = Intrinsics(8, 12, 10.0, 10.0, 4.0, 6.0)
     # Slices of a short exposure of many rows would be thousands.
     readout_s = max(min(readout_s, 10 * exposure_s), -10 * exposure_s)
@@ -129,7 +129,7 @@ def test_slices_of_time_hold_every_row_once_around_its_instant(
     for part in slices:
         rows = slice(part.band.first, part.band.end)
         shares[rows] += part.weights
-        instants[rows] += part.weights * (part.band.moment.scene.time_s - scene.time_s)
+        instants[rows] += part.weights * (part.band.state.scene.time_s - scene.time_s)
 
     np.testing.assert_allclose(shares, 1.0, atol=1e-5)
     delays = scene.cameras[0].shutter.row_delays_s(12)
@@ -138,18 +138,18 @@ def test_slices_of_time_hold_every_row_once_around_its_instant(
 
 @pytest.mark.parametrize("readout_s", [0.0, 0.03])
 def test_rows_in_which_nothing_moves_are_rendered_once(readout_s: float) -> None:
-    """In the slice nearest to their instant; others in every slice of their exposure."""
+    """In the slice nearest to their instant; blurred rows in every slice of their exposure."""
     scene = world(shutter=Shutter(0.01, readout_s, samples=4))
-    moment = CameraState.of(scene, scene.cameras[0])
+    state = CameraState.of(scene, scene.cameras[0])
     blurred = np.arange(LENS.height_px) >= 40
-    slices = split_slices(moment, 4, blurred)
+    slices = split_slices(state, 4, blurred)
     shares, times = np.zeros(LENS.height_px), np.zeros(LENS.height_px, int)
     delays = scene.cameras[0].shutter.row_delays_s(LENS.height_px)
     for part in slices:
         rows = slice(part.band.first, part.band.end)
         shares[rows] += part.weights
         times[rows] += part.weights > 0.0
-        offset_s = part.band.moment.scene.time_s - scene.time_s
+        offset_s = part.band.state.scene.time_s - scene.time_s
         once = np.flatnonzero(part.weights == 1.0) + part.band.first
         assert (np.abs(offset_s - delays[once]) <= 0.5 * 0.0025 + 1e-9).all()
 
@@ -164,7 +164,7 @@ def test_rows_in_which_nothing_moves_are_rendered_once(readout_s: float) -> None
 def test_an_edge_that_passes_leans_by_its_speed_times_the_time_between_rows(
     renderer: WarpRenderer, readout_s: float, exposure_s: float
 ) -> None:
-    """In masks and in the photograph alike, row by row, whichever way rows are read."""
+    """In masks and in radiance alike, row by row, in both directions of readout."""
     scene = passing(250.0, Shutter(exposure_s, readout_s, samples=16))
     seen = shot(renderer, scene)
     delays = scene.cameras[0].shutter.row_delays_s(LENS.height_px)
@@ -183,7 +183,7 @@ def test_an_edge_that_passes_leans_by_its_speed_times_the_time_between_rows(
 
 
 def test_depth_of_what_approaches_is_that_of_each_row(renderer: WarpRenderer) -> None:
-    """A wall at 6 m that comes nearer at 10 m/s, read within 80 ms."""
+    """A wall at 6 m that approaches at 10 m/s, read out within 80 ms."""
     wall = Body("wall", "wall", replace(FACING, translation_m=(0.0, 0.0, 6.0)))
     track = even_track("wall", wall.T_world_body, (0.0, 0.0, -10.0))
     shutter = Shutter(0.0, 0.08)
@@ -197,7 +197,7 @@ def test_depth_of_what_approaches_is_that_of_each_row(renderer: WarpRenderer) ->
 
 
 def test_silhouettes_roll_with_their_rows(renderer: WarpRenderer) -> None:
-    """Nothing hides the box: its silhouette is what is seen of it, and goes on beside the image."""
+    """An unoccluded box: its silhouette equals its visible pixels and extends beyond the image."""
     seen = shot(renderer, passing(400.0, Shutter(0.0, 0.06)))
     mask = seen.channels[Channel.INSTANCE] == 1
     outline = seen.silhouettes[1]
@@ -216,22 +216,22 @@ def test_silhouettes_roll_with_their_rows(renderer: WarpRenderer) -> None:
     "lens", [PINHOLE, Lens("kannala_brandt", (-0.02, 0.01, -0.004, 0.0005), 1.4)]
 )
 def test_bands_of_a_still_world_make_the_whole_image(renderer: WarpRenderer, lens: Lens) -> None:
-    """Bit for bit for labels; light differs by no more than the last bit of its sums."""
+    """Bit-identical labels; radiance differs by at most the last bit of its sums."""
     wall = Body("wall", "wall", replace(FACING, translation_m=(0.0, 0.0, 6.0)))
     scene = world(
         wall, replace(LAMP, scale=0.7), shutter=Shutter(0.0, 0.05), time_s=0.0,
         lens=replace(LENS, lens=lens),
     )  # fmt: skip
-    studio = renderer._studio
-    near = render_view(CameraState.of(scene, scene.cameras[0]), studio)
-    whole_bands = make_bands(near.moment, [0])
-    rows = make_bands(near.moment, list(range(0, LENS.height_px, 5)))
+    context = renderer._context
+    near = render_view(CameraState.of(scene, scene.cameras[0]), context)
+    whole_bands = make_bands(near.state, [0])
+    rows = make_bands(near.state, list(range(0, LENS.height_px, 5)))
 
     def light(see):  # noqa: ANN001, ANN202
-        return integrate_light(see, studio)
+        return integrate_light(see, context)
 
-    one, images = render_bands(whole_bands, LABELS, studio, near, light)
-    other, banded = render_bands(rows, LABELS, studio, near, light)
+    one, images = render_bands(whole_bands, LABELS, context, near, light)
+    other, banded = render_bands(rows, LABELS, context, near, light)
     for channel in LABELS:
         assert np.array_equal(images[channel], banded[channel]), channel
     assert np.array_equal(one.hits, other.hits)
@@ -251,7 +251,7 @@ def test_an_image_does_not_depend_on_what_was_rendered_before(renderer: WarpRend
 
 
 def test_points_are_projected_where_their_rows_show_them(renderer: WarpRenderer) -> None:
-    """Corners of the box's face, on a moving camera too: where the mask has its corners."""
+    """Corners of the box's face, also with a moving camera: at the corners of the mask."""
     shutter = Shutter(0.0, 0.06)
     track = even_track("lamp", LAMP.T_world_body, (6.0, 1.0, 0.0))
     scene = world(
@@ -286,7 +286,7 @@ def test_a_point_that_sinks_is_met_by_the_row_that_reads_it() -> None:
 
 
 def test_a_camera_without_rolling_rows_projects_as_ever() -> None:
-    """One look, at the image's instant."""
+    """One iteration, at the image's instant."""
     scene = world(LAMP, shutter=Shutter(exposure_s=0.05), camera_velocity_m_s=(1.0, 0.0, 0.0))
     p_camera, image_px = project_rolling_shutter(
         scene, scene.cameras[0], np.array([[0.0, 0.0, 3.0]])
@@ -298,7 +298,7 @@ def test_a_camera_without_rolling_rows_projects_as_ever() -> None:
 
 
 def test_points_of_pixels_are_placed_by_their_rows(renderer: WarpRenderer) -> None:
-    """A still wall before a camera that drives towards it and turns: all points lie on it."""
+    """A static wall and a camera that approaches and turns: all points lie on the wall."""
     wall = Body("wall", "wall", replace(FACING, translation_m=(0.0, 0.0, 6.0)))
     scene = world(
         wall, shutter=Shutter(0.0, 0.08), time_s=0.0,

@@ -1,4 +1,4 @@
-"""Depth, ids, normals and coordinates against geometry done by hand."""
+"""Depth, ids, normals and coordinates against geometry computed by hand."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ MESHES = {
 
 @pytest.fixture(params=["raster", "rays"])
 def renderer(request: pytest.FixtureRequest) -> WarpRenderer:
-    """Both ways to find surfaces."""
+    """Both methods of visibility."""
     settings = RenderSettings(visibility=request.param)
     return WarpRenderer(FakeLibrary(MESHES), "cpu", settings)
 
@@ -92,7 +92,7 @@ def test_depth_of_a_sphere_is_that_of_the_quadratic_equation(renderer: WarpRende
 def test_normals_of_a_sphere_point_from_its_centre_and_towards_the_camera(
     renderer: WarpRenderer,
 ) -> None:
-    """Normals are unit, in the camera frame, and zero where nothing is seen."""
+    """Normals are unit, in the camera frame, and zero in the background."""
     camera = forward_camera((64, 64), focal_px=60.0)
     scene = scene_of(Body("ball", "sphere", SE3((0.0, 0.0, 3.0))))
 
@@ -111,7 +111,7 @@ def test_normals_of_a_sphere_point_from_its_centre_and_towards_the_camera(
 def test_the_inside_of_a_surface_is_seen_with_its_normal_turned_round(
     renderer: WarpRenderer,
 ) -> None:
-    """Surfaces have two sides: a plane seen from behind is there, and its normal faces us."""
+    """Surfaces have two sides: a plane is visible from behind, and its normal faces the camera."""
     scene = scene_of(Body("plane", "plane", SE3((0.0, 0.0, 2.0))))
 
     normals = seen(renderer, scene, forward_camera()).channels[Channel.NORMALS]
@@ -120,7 +120,7 @@ def test_the_inside_of_a_surface_is_seen_with_its_normal_turned_round(
 
 
 def two_boxes() -> Scene:
-    """A unit box at 4 m and, before its right half, another one at 2.5 m."""
+    """A unit box at 4 m and another one at 2.5 m in front of its right half."""
     near = Body("near", "box", SE3((0.5, 0.0, 2.5)), instance_id=7, part_id=2)
     far = Body("far", "box", SE3((0.0, 0.0, 4.0)), instance_id=65535)
     instances = (
@@ -131,7 +131,7 @@ def two_boxes() -> Scene:
 
 
 def test_the_nearer_of_two_boxes_hides_the_other(renderer: WarpRenderer) -> None:
-    """Ids of instance, part and category all follow the visible body; 0 is nothing."""
+    """Ids of instance, part and category all follow the visible body; 0 is the background."""
     camera = forward_camera((64, 48), focal_px=48.0)
 
     channels = seen(renderer, two_boxes(), camera).channels
@@ -151,7 +151,7 @@ def test_the_nearer_of_two_boxes_hides_the_other(renderer: WarpRenderer) -> None
 def test_a_pixel_belongs_to_what_covers_its_centre(
     renderer: WarpRenderer, edge_px: float, first: int
 ) -> None:
-    """Pixel i is seen through i + 0.5."""
+    """The centre of pixel i is at i + 0.5."""
     camera = forward_camera((64, 48), focal_px=50.0)
     left_m = (edge_px - 32.0) / 50.0 * 2.0
     box = Body("box", "box", SE3((left_m + 0.5, 0.0, 2.5)), instance_id=1)
@@ -162,7 +162,7 @@ def test_a_pixel_belongs_to_what_covers_its_centre(
 
 
 def test_object_coordinates_run_from_0_to_1_over_the_instance_box(renderer: WarpRenderer) -> None:
-    """The instance may be scaled, turned and away from the origin; the background is 0."""
+    """The instance may be scaled, rotated and away from the origin; the background is 0."""
     pose = SE3.about_z(0.7, (0.3, -0.2, 3.0))
     body = Body("box", "box", pose, scale=0.5, instance_id=1)
     box = Instance(
@@ -182,7 +182,7 @@ def test_object_coordinates_run_from_0_to_1_over_the_instance_box(renderer: Warp
 
 
 def test_a_room_around_the_camera_fills_the_image(renderer: WarpRenderer) -> None:
-    """Walls that run past the camera are cut at its plane and leave no hole."""
+    """Walls that extend past the camera are clipped at its plane and leave no hole."""
     camera = camera_at((0.5, -1.0, 1.2), (2.0, 2.5, 0.7), (96, 72), hfov_deg=100.0)
 
     depth = seen(renderer, scene_of(Body("room", "room")), camera).channels[Channel.Z_DEPTH]
@@ -194,7 +194,7 @@ def test_a_room_around_the_camera_fills_the_image(renderer: WarpRenderer) -> Non
 
 
 def test_what_is_nearer_than_a_centimetre_is_not_seen(renderer: WarpRenderer) -> None:
-    """A plane 5 mm before the camera is looked through."""
+    """A plane 5 mm in front of the camera is clipped."""
     scene = scene_of(facing_plane(3.0), Body("near", "plane", SE3((0.0, 0.0, 0.005))))
 
     depth = seen(renderer, scene, forward_camera()).channels[Channel.Z_DEPTH]
@@ -203,7 +203,7 @@ def test_what_is_nearer_than_a_centimetre_is_not_seen(renderer: WarpRenderer) ->
 
 
 def test_a_scene_without_bodies_is_nothing_everywhere(renderer: WarpRenderer) -> None:
-    """The value for nothing is inf for distances and 0 for everything else; skies have flow."""
+    """The background is inf in distances and 0 in all other channels; skies have flow."""
     channels = seen(renderer, scene_of(), forward_camera()).channels
 
     for channel in channels.keys() - FLOW:
@@ -213,7 +213,7 @@ def test_a_scene_without_bodies_is_nothing_everywhere(renderer: WarpRenderer) ->
 
 
 def test_bodies_behind_the_camera_are_not_seen(renderer: WarpRenderer) -> None:
-    """No mirrored ghost of what lies at negative depth."""
+    """No mirrored image of bodies at negative depth."""
     scene = scene_of(Body("box", "box", SE3((0.0, 0.0, -3.0)), instance_id=1))
 
     assert not seen(renderer, scene, forward_camera()).channels[Channel.INSTANCE].any()
@@ -233,7 +233,7 @@ def scattered(seed: int, count: int = 12) -> Scene:
 
 
 def test_raster_and_rays_agree_but_for_pixels_at_silhouettes() -> None:
-    """Two independent ways to the same ids; snapping may move an edge by 1/512 px."""
+    """Two independent methods give the same ids; snapping may move an edge by 1/512 px."""
     library = FakeLibrary(MESHES)
     camera = camera_at((2.0, -1.5, 1.8), (0.0, 0.0, 0.7), (160, 120))
     for seed in range(3):
@@ -251,7 +251,7 @@ def test_raster_and_rays_agree_but_for_pixels_at_silhouettes() -> None:
 
 
 def test_triangles_that_share_an_edge_neither_overlap_nor_leave_a_gap() -> None:
-    """A fan of slivers around a pixel centre covers a disc exactly once, by the top-left rule."""
+    """A fan of slivers around a pixel centre covers a disk exactly once, by the top-left rule."""
     rng = np.random.default_rng(0)
     angles = np.sort(rng.uniform(0.0, 2 * np.pi, 200))
     rim = np.stack([np.cos(angles), np.sin(angles), np.zeros(200)], axis=1)

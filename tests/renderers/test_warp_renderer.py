@@ -1,4 +1,4 @@
-"""The renderer as a pure function: bytes, memory, devices."""
+"""The renderer as a pure function: reproducible bytes, bounded memory, devices."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def test_the_same_scene_gives_the_same_bytes_whatever_was_rendered_before() -> N
 
 
 def test_a_reading_is_not_changed_by_the_next_one() -> None:
-    """What was returned does not share memory with the renderer."""
+    """Returned arrays share no memory with the renderer."""
     renderer = WarpRenderer(library(), "cpu")
     reading = renderer.render(scene_of(0), camera(), EVERYTHING)
     copies = {channel: image.copy() for channel, image in reading.channels.items()}
@@ -86,7 +86,7 @@ def test_a_reading_is_not_changed_by_the_next_one() -> None:
 
 
 def test_materials_and_lights_may_change_from_view_to_view() -> None:
-    """Nothing of a scene is remembered: a new colour on the same bodies is seen at once."""
+    """No state of a scene persists: a new colour on the same bodies is visible at once."""
     renderer = WarpRenderer(library(), "cpu")
     scene = scene_of(0)
     before = renderer.render(scene, camera(), EVERYTHING).channels
@@ -102,7 +102,7 @@ def test_materials_and_lights_may_change_from_view_to_view() -> None:
 
 
 def test_only_what_is_asked_for_is_returned() -> None:
-    """No channel more, no channel less; silhouettes only on request."""
+    """Exactly the requested channels; silhouettes only on request."""
     wanted = frozenset({Channel.Z_DEPTH, Channel.CATEGORY})
 
     reading = WarpRenderer(library(), "cpu").render(scene_of(0), camera(), wanted)
@@ -133,7 +133,7 @@ class Weight:
 
 
 def test_a_cache_drops_what_was_used_longest_ago() -> None:
-    """Bounded in bytes, by least recent use."""
+    """Bounded in bytes, evicting the least recently used."""
     cache: ByteCache[Weight] = ByteCache(10)
     made: list[str] = []
 
@@ -164,12 +164,12 @@ def test_a_cache_drops_what_was_used_longest_ago() -> None:
     ],
 )
 def test_a_solid_is_convex_if_no_vertex_lies_outside_a_face(mesh: object, convex: bool) -> None:
-    """A room seen from within is a cavity, not a solid."""
+    """A room seen from inside is a cavity, not a solid."""
     assert is_convex_solid(mesh.vertices_m, mesh.faces) is convex
 
 
 def test_a_device_that_is_not_there_is_an_error_that_names_the_remedy() -> None:
-    """What exists, and what to choose instead."""
+    """The error lists the existing devices and the alternatives."""
     with pytest.raises(ConfigError, match=r"'cuda:7' does not exist .* Choose 'auto' or 'cpu'"):
         WarpRenderer(library(), "cuda:7")
 

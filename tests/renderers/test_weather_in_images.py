@@ -1,4 +1,4 @@
-"""What weather does to images, against closed forms; and what it leaves alone."""
+"""Weather in images, against closed forms; and its absence elsewhere."""
 
 from __future__ import annotations
 
@@ -60,12 +60,12 @@ def library() -> FakeLibrary:
 
 @pytest.fixture(scope="module")
 def renderer(library: FakeLibrary) -> WarpRenderer:
-    """Without ambient occlusion: values that formulas can tell."""
+    """Settings without ambient occlusion: closed forms apply."""
     return WarpRenderer(library, "cpu", PLAIN)
 
 
 def street(weather: Weather, environment: Environment = DARK, *lights: Light) -> Scene:
-    """A road with a box on it before a black wall, which instances label."""
+    """A road with a box in front of a black wall, labelled by instances."""
     bodies = (
         Body("road", "road"),
         Body("wall", "black", SE3((25.0, 0.0, 0.0)), instance_id=1),
@@ -82,12 +82,12 @@ def flat(weather: Weather, *bodies: Body) -> Scene:
 
 
 def luminance(reading: SensorReading) -> np.ndarray:
-    """Of grey things [cd/m^2]."""
+    """Mean of grey surfaces [cd/m^2]."""
     return reading.channels[Channel.RADIANCE][..., 1].astype(float)
 
 
 def test_no_weather_changes_no_byte(renderer: WarpRenderer) -> None:
-    """A seed alone, and a height of fog that is not there, are no weather."""
+    """A seed alone, or a fog height without fog, is no weather."""
     light = (Environment(luminance_cd_m2=60.0), SUN)
     plain = renderer.render(street(Weather(), *light), AHEAD, RADIANCE).channels[Channel.RADIANCE]
     empty = Weather(seed=99, fog_height_m=50.0)
@@ -97,7 +97,7 @@ def test_no_weather_changes_no_byte(renderer: WarpRenderer) -> None:
 
 
 def test_labels_do_not_see_the_weather(renderer: WarpRenderer) -> None:
-    """Ids, depth, normals and silhouettes are those of a clear day, bit by bit."""
+    """Ids, depth, normals and silhouettes equal those of a clear day, bit by bit."""
     channels = frozenset(Channel)
     light = (Environment(luminance_cd_m2=60.0), SUN)
     clear = renderer.render(street(Weather(), *light), AHEAD, channels)
@@ -112,7 +112,7 @@ def test_labels_do_not_see_the_weather(renderer: WarpRenderer) -> None:
 
 
 def test_same_weather_makes_the_same_bytes_in_another_renderer(library: FakeLibrary) -> None:
-    """And another seed makes other streaks, patches and drops."""
+    """Another seed gives other streaks, patches and drops."""
     light = (Environment(luminance_cd_m2=60.0), SUN)
     first, again, other = (
         WarpRenderer(library, "cpu", PLAIN)
@@ -127,7 +127,7 @@ def test_same_weather_makes_the_same_bytes_in_another_renderer(library: FakeLibr
 
 
 def test_even_fog_follows_beer_and_lambert(renderer: WarpRenderer) -> None:
-    """Before black things fog shines with L (1 - exp(-beta r)) in light L from all around."""
+    """In front of black, fog has the radiance L (1 - exp(-beta r)) in uniform light L."""
     beta, sky = 0.05, 200.0
     weather = Weather(fog_extinction_per_m=beta)
     scene = street(weather, Environment(luminance_cd_m2=sky))
@@ -140,7 +140,7 @@ def test_even_fog_follows_beer_and_lambert(renderer: WarpRenderer) -> None:
 
 
 def test_fog_thins_with_height(renderer: WarpRenderer) -> None:
-    """The optical depth of a sloping way: beta H exp(-z / H) (1 - exp(-d_z r / H)) / d_z."""
+    """The optical depth of a sloping ray: beta H exp(-z / H) (1 - exp(-d_z r / H)) / d_z."""
     beta, height, sky = 0.2, 4.0, 200.0
     weather = Weather(fog_extinction_per_m=beta, fog_height_m=height)
     scene = street(weather, Environment(luminance_cd_m2=sky))
@@ -157,7 +157,7 @@ def test_fog_thins_with_height(renderer: WarpRenderer) -> None:
 
 
 def test_lamp_in_fog_has_a_halo(renderer: WarpRenderer) -> None:
-    """Before the black wall there is light around the lamp, less of it farther away."""
+    """In front of the black wall light surrounds the lamp, decreasing with distance."""
     lamp = Light("lamp", "sphere", position_m=(10.0, 0.0, 1.2), intensity_cd=4000.0)
     foggy = renderer.render(street(Weather(fog_extinction_per_m=0.05), DARK, lamp), AHEAD, RADIANCE)
     row = luminance(foggy)[32, 48:]
@@ -178,7 +178,7 @@ def test_soaked_asphalt_keeps_a_fifth_of_its_albedo(renderer: WarpRenderer) -> N
 
 
 def test_nothing_falls_below_a_lid(renderer: WarpRenderer) -> None:
-    """Beneath a low roof the road stays as it was."""
+    """Below a low roof the road stays unchanged."""
     side = Camera("side", look_at((0.0, -4.0, 0.6), (0.0, 0.0, 0.0)), FINE)
     lid = Body("lid", "lid", SE3((0.0, 0.0, 1.4)))
     under = Environment(luminance_cd_m2=100.0)
@@ -203,7 +203,7 @@ def test_snow_covers_its_share_of_the_ground(renderer: WarpRenderer, cover: floa
 
 
 def test_puddles_mirror_what_stands_behind_them(renderer: WarpRenderer) -> None:
-    """All of the road under water: a lit wall appears in it with Fresnel's reflectance."""
+    """The whole road under water: a lit wall appears in it with Fresnel's reflectance."""
     glow = (Material(base_color=(0.0, 0.0, 0.0), roughness=1.0, specular=0.0,
                      emission_cd_m2=(200.0, 200.0, 200.0)),)  # fmt: skip
     scene = street(Weather(puddles=1.0))
@@ -233,7 +233,7 @@ def test_streaks_are_a_poisson_process() -> None:
 
 
 def test_small_poisson_numbers_have_the_right_mean_and_variance() -> None:
-    """Below the limit where the normal distribution takes over."""
+    """Below the limit where the normal approximation takes over."""
     rng = rng_of("poisson")
     numbers = np.array([poisson(3.0, rng) for _ in range(4000)])
 
@@ -256,7 +256,7 @@ def test_drops_fall_faster_than_flakes() -> None:
 
 
 def test_nearer_things_hide_what_falls_behind_them(renderer: WarpRenderer) -> None:
-    """A wall half a metre away leaves hardly a streak, the open road has many."""
+    """Few streaks in front of a wall half a metre away, many on the open road."""
     weather = Weather(snow_mm_h=3.0, seed=2)
     light = Environment(luminance_cd_m2=100.0)
     changed = []
@@ -280,7 +280,7 @@ def test_exposure_time_follows_the_light() -> None:
 
 
 def test_streaks_without_an_exposure_time_follow_the_median_luminance() -> None:
-    """Middle grey at 0.18 of saturation, 1.2 * 2^EV; a fixed EV wins, and black counts for nothing.
+    """Middle grey at 0.18 of saturation, 1.2 * 2^EV; a fixed EV takes precedence; black is ignored.
 
     Whatever part of the picture is far brighter: 0.216 * 2^6 cd/m^2 is EV 6.
     """
@@ -297,14 +297,14 @@ def test_streaks_without_an_exposure_time_follow_the_median_luminance() -> None:
 
 
 def test_lamps_that_light_the_view_are_kept(library: FakeLibrary) -> None:
-    """Of a row of lamps the near ones stay, in their order, and the sun always."""
+    """Of a row of lamps the nearest remain, in order, and the sun always."""
     lamps = tuple(
         Light(f"{k}", "spot", (5.0 * k, 0.0, 6.0), intensity_cd=2000.0, cone_rad=1.2)
         for k in range(40)
     )
     scene = street(Weather(), DARK, *lamps, SUN)
-    stock = DeviceCache(library, open_device("cpu"))
-    records = pack_world(scene, AHEAD, stock).record.lamps.numpy()
+    cache = DeviceCache(library, open_device("cpu"))
+    records = pack_world(scene, AHEAD, cache).record.lamps.numpy()
     ground = np.stack([np.linspace(1.0, 20.0, 60), np.zeros(60), np.zeros(60)], axis=-1)
     up = np.tile([0.0, 0.0, 1.0], (60, 1))
 
@@ -312,7 +312,7 @@ def test_lamps_that_light_the_view_are_kept(library: FakeLibrary) -> None:
 
 
 def test_lamps_left_out_change_little(library: FakeLibrary) -> None:
-    """Sixteen of forty lamps give the image of all of them, within 2 % of its light."""
+    """Sixteen of forty lamps reproduce the image of all of them, within 2 % of its light."""
     lamps = tuple(
         Light(f"{k}", "spot", (4.0 * k - 20.0, 0.0, 6.0), intensity_cd=2000.0, cone_rad=1.2)
         for k in range(40)

@@ -1,4 +1,4 @@
-"""Warp, started quietly and with the same code generation on every machine."""
+"""Warp devices, with reproducible code generation."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import warp as wp
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.silence_stdio import silence_stdio
 
-# Not -march=native: fused multiply-adds would give other bytes on other machines. Inlining
-# everything is worth a quarter of all ray time.
+# Not -march=native: fused multiply-adds would change bytes between machines. The inlining threshold
+# saves a quarter of all ray time.
 _COMPILER_FLAGS = "-ffp-contract=off -mllvm=-inline-threshold=30000"
 
 
 def open_device(name: str) -> wp.Device:
-    """The Warp device called ``auto``, ``cpu`` or ``cuda:N``.
+    """The Warp device named ``auto``, ``cpu`` or ``cuda:N``.
 
     Raises:
-        ConfigError: if there is no such device on this machine.
+        ConfigError: the machine has no such device.
     """
     _start()
     if name == "auto":

@@ -1,4 +1,4 @@
-"""What a renderer keeps between frames: assets, lenses, scratch memory and the latest scene."""
+"""Cache of a renderer between frames: assets, lenses, scratch memory and the latest scene."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _ENVIRONMENT_BYTES = 32 << 20
 _OPTICS_BYTES = 192 << 20
 _SCRATCH_BYTES = 64 << 20
 _BODIES = 2048
-"""Bodies whose materials are remembered."""
+"""Capacity of the caches of material records."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -40,11 +40,11 @@ class _Scratch:
 
 
 class DeviceCache:
-    """Meshes, textures and environments on one device, each bounded in bytes.
+    """Meshes, textures and environments on one device, each cache bounded in bytes.
 
     Attributes:
-        scenes: Packed scenes: cameras and scanners look at the same one after each other.
-        looks, infrared: Records of the materials of a body, by their tuple.
+        scenes: The latest packed scene, which all cameras and scanners of a sample share.
+        material_records, infrared: Records of a body's materials, by their tuple.
     """
 
     def __init__(self, assets: AssetLibrary, device: wp.Device) -> None:
@@ -52,7 +52,7 @@ class DeviceCache:
         self.device = device
         self.lobes = wp.array(lobe_albedo(), dtype=wp.vec2, device=device)
         self.scenes: ObjectCache[Any] = ObjectCache(1)
-        self.looks: ObjectCache[Any] = ObjectCache(_BODIES)
+        self.material_records: ObjectCache[Any] = ObjectCache(_BODIES)
         self.infrared: ObjectCache[NDArray[np.void]] = ObjectCache(_BODIES)
         self._meshes: ByteCache[DeviceMesh] = ByteCache(_MESH_BYTES)
         self._textures: ByteCache[DeviceTexture] = ByteCache(_TEXTURE_BYTES)
@@ -62,7 +62,7 @@ class DeviceCache:
         self._constants: dict[tuple[object, ...], wp.array] = {}
 
     def mesh(self, asset_id: str) -> DeviceMesh:
-        """Geometry of an asset."""
+        """Geometry of an asset on the device."""
         return self._meshes.get(
             asset_id, lambda: upload_mesh(self.assets.mesh(asset_id), self.device)
         )
@@ -72,13 +72,13 @@ class DeviceCache:
         return self.mesh(asset_id).materials
 
     def texture(self, texture_id: str) -> DeviceTexture:
-        """Images of a texture."""
+        """A texture on the device."""
         return self._textures.get(
             texture_id, lambda: upload_texture(self.assets.texture(texture_id), self.device)
         )
 
     def environment(self, environment_id: str) -> DeviceEnvironment:
-        """Light of an environment."""
+        """Light of an environment, as an image."""
         return self._environments.get(
             environment_id,
             lambda: upload_environment(self.assets.environment(environment_id), self.device),
@@ -93,22 +93,22 @@ class DeviceCache:
         )
 
     def optics(self, intrinsics: Intrinsics) -> DeviceOptics:
-        """Directions through the pixels of a camera that is no pinhole."""
+        """Directions through the pixels of a camera with lens distortion."""
         return self._optics.get(repr(intrinsics), lambda: upload_optics(intrinsics, self.device))
 
     def constant(
         self, dtype: Any, make: Callable[..., NDArray[Any]], *arguments: object
     ) -> wp.array:
-        """An array that a function of nothing else makes, kept for good."""
+        """An array computed from the arguments alone, kept for good."""
         key = (make.__name__, *arguments)
         if key not in self._constants:
             self._constants[key] = wp.array(make(*arguments), dtype=dtype, device=self.device)
         return self._constants[key]
 
     def scratch(self, name: str, shape: int | tuple[int, ...], dtype: Any) -> wp.array:
-        """An array with left-over contents: touching fresh memory costs as much as filling it.
+        """Uninitialised memory; reused, because touching fresh pages costs as much as filling them.
 
-        One name stands for one array per shape, valid until it is asked for again.
+        One name and shape stand for one array, valid until it is requested again.
         """
 
         def make() -> _Scratch:

@@ -1,4 +1,4 @@
-"""A camera and its world at several instants, and the bands of rows that are seen at each."""
+"""Rendering contexts: a camera and its world at several instants, and bands of image rows."""
 
 from __future__ import annotations
 
@@ -24,96 +24,96 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RenderContext:
-    """What all renderings have in common: assets and settings.
+    """Assets and settings that all renderings share.
 
     Attributes:
-        paths: What makes the light of the path-traced tier; None in the realtime tier.
+        paths: The path tracer; None in the realtime tier.
     """
 
-    stock: DeviceCache
+    cache: DeviceCache
     settings: RenderSettings
     paths: PathTracer | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CameraState:
-    """A world at one instant, without other sensors, and where the camera is then."""
+    """A world at one instant, without other sensors, and the camera's pose at that instant."""
 
     scene: Scene
     camera: Camera
 
     @classmethod
     def of(cls, scene: Scene, camera: Camera) -> CameraState:
-        """The scene's own instant."""
+        """State at the scene's own instant."""
         return cls(replace(scene, cameras=(camera,), lidars=(), devices=()), camera)
 
     def later(self, delay_s: float) -> CameraState:
-        """The same world, and what carries the camera, at another instant."""
+        """State of the same world and camera at another instant."""
         scene = scene_at(self.scene, round(self.scene.time_s + delay_s, 9))
         return CameraState(scene, scene.cameras[0])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RowBand:
-    """Rows of an image, ``first <= row < end``, and when they are exposed."""
+    """Rows of an image, ``first <= row < end``, and the state at their exposure."""
 
     first: int
     end: int
-    moment: CameraState
+    state: CameraState
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CameraView:
-    """What a camera, or a band of its rows, sees; ``seen`` is valid until the next one is drawn."""
+    """A rendered image or band of rows; ``gbuffer`` is valid until the next is rendered."""
 
-    moment: CameraState
+    state: CameraState
     world: PackedWorld
     view: records.View
-    seen: GBuffer
+    gbuffer: GBuffer
 
 
-def is_moving(moment: CameraState, open_s: float) -> bool:
-    """Whether anything differs between the ends of a span of time around a moment."""
-    scene = moment.scene
+def is_moving(state: CameraState, open_s: float) -> bool:
+    """Whether anything differs between the ends of an interval around a state."""
+    scene = state.scene
     start_s, end_s = scene.time_s - 0.5 * open_s, scene.time_s + 0.5 * open_s
     travelling = any(t.start_s < end_s and t.end_s > start_s for t in scene.tracks)
     return travelling or any(start_s < change.time_s <= end_s for change in scene.changes)
 
 
 def render_view(
-    moment: CameraState,
-    studio: RenderContext,
+    state: CameraState,
+    context: RenderContext,
     rows: tuple[int, int] | None = None,
-    near: CameraView | None = None,
+    reference: CameraView | None = None,
 ) -> CameraView:
-    """The surfaces at all pixel centres, or at those of some rows.
+    """Find the surfaces at all pixel centres, or at those of some rows.
 
     Args:
-        moment: What, and from where.
-        studio: Assets and settings.
-        rows: The first, and the one after the last; None = all.
-        near: The same world at another instant: what is the same need not be packed again.
+        state: World and camera.
+        context: Assets and settings.
+        rows: First row and end row (exclusive); None = all.
+        reference: The same world at another instant, whose assets need not be packed again.
     """
-    world = pack_moment(moment, studio, near)
-    view = pack_view(moment.camera, studio.stock)
+    world = pack_state(state, context, reference)
+    view = pack_view(state.camera, context.cache)
     if rows is not None:
         view = crop_rows(view, *rows)
     return CameraView(
-        moment, world, view, find_visible(world, view, studio.stock, studio.settings.visibility)
+        state, world, view, find_visible(world, view, context.cache, context.settings.visibility)
     )
 
 
-def pack_moment(
-    moment: CameraState, studio: RenderContext, near: CameraView | None = None
+def pack_state(
+    state: CameraState, context: RenderContext, reference: CameraView | None = None
 ) -> PackedWorld:
-    """The world on the device; arguments as of ``render_view``."""
-    if near is not None and _same_looks(near.moment.scene, moment.scene):
-        return repack_moved(near.world, moment.scene, moment.camera, studio.stock)
-    return pack_world(moment.scene, moment.camera, studio.stock)
+    """Pack the world onto the device; arguments as for ``render_view``."""
+    if reference is not None and _has_same_assets(reference.state.scene, state.scene):
+        return repack_moved(reference.world, state.scene, state.camera, context.cache)
+    return pack_world(state.scene, state.camera, context.cache)
 
 
-def _same_looks(one: Scene, other: Scene) -> bool:
-    """Whether bodies have the same meshes and the very same materials."""
+def _has_same_assets(one: Scene, other: Scene) -> bool:
+    """Whether the bodies have the same meshes and identical materials."""
     return all(
         a is b or (a.asset == b.asset and a.materials is b.materials)
         for a, b in zip(one.bodies, other.bodies, strict=True)
@@ -121,7 +121,7 @@ def _same_looks(one: Scene, other: Scene) -> bool:
 
 
 def crop_rows(view: records.View, first: int, end: int) -> records.View:
-    """The view whose image is a band of rows of another's."""
+    """The view of a band of an image's rows."""
     part = records.View()
     for name in records.View.vars:
         setattr(part, name, getattr(view, name))

@@ -1,9 +1,9 @@
-"""Kernels, compiled on all cores the first time a machine needs them.
+"""Parallel compilation of kernels on first use.
 
-Warp compiles a module when it is first used, one at a time and on one core: a dozen modules that
-every photograph takes would keep the first sample waiting. Processes of their own compile them
-side by side into Warp's cache instead. Whatever goes wrong there, nothing is lost: what is not in
-the cache is compiled when it is used.
+Warp compiles a module when it is first used, one at a time and on one core: the dozen modules that
+every image needs would delay the first sample. Here separate processes compile them side by side
+into Warp's cache. Failures are harmless: a module that is missing from the cache is compiled on
+first use.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ EVERY_FRAME = (
     "scene.kernels.environment_lighting",
     "scene.kernels.bvh_build",
 )
-"""Kernel modules, below this package, that every photograph takes; the order balances the load."""
+"""Kernel modules, below this package, that every image needs; their order balances the load."""
 
 
 @cache
 def compile_kernels(device: str) -> None:
-    """Fill Warp's cache for a device with the kernels of ``EVERY_FRAME``, if they are not there.
+    """Fill Warp's cache for a device with the kernels of ``EVERY_FRAME``, if they are missing.
 
     Of several processes that find the cache empty, one compiles and the others wait.
     """
@@ -51,12 +51,12 @@ def compile_kernels(device: str) -> None:
         return
     with stamp.with_suffix(".lock").open("a") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if not stamp.exists() and _compiled(device, cores):
+        if not stamp.exists() and _compile_in_parallel(device, cores):
             stamp.touch()
 
 
 def load_kernels(device_name: str, names: Sequence[str]) -> None:
-    """Load modules of kernels in this process, and so compile what the cache lacks."""
+    """Load kernel modules in this process, which compiles those missing from the cache."""
     from gen_data.generator.renderers.warp.device import open_device
 
     device = open_device(device_name)
@@ -66,8 +66,8 @@ def load_kernels(device_name: str, names: Sequence[str]) -> None:
         wp.load_module(module, device=device)
 
 
-def _compiled(device: str, cores: int) -> bool:
-    """Deal the modules out to as many processes as there are cores; whether all succeeded."""
+def _compile_in_parallel(device: str, cores: int) -> bool:
+    """Distribute the modules over one process per core; returns whether all succeeded."""
     shares = [EVERY_FRAME[k::cores] for k in range(min(cores, len(EVERY_FRAME)))]
     here = [sys.executable, "-m", __name__, str(os.getpid()), device]
     running = [subprocess.Popen([*here, *share], stdout=subprocess.DEVNULL) for share in shares]
@@ -76,7 +76,7 @@ def _compiled(device: str, cores: int) -> bool:
 
 
 def _digest() -> str:
-    """Of the kernels' sources and of what else decides what Warp makes of them."""
+    """Digest of the kernels' sources and of the compiler's settings."""
     digest = hashlib.sha256(f"{wp.config.version} {wp.config.cpu_compiler_flags}".encode())
     for source in sorted(Path(__file__).parent.glob("*/kernels/*.py")):
         digest.update(source.read_bytes())

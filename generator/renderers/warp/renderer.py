@@ -1,4 +1,4 @@
-"""The renderer: Scene and Camera in, SensorReading out, on NVIDIA Warp."""
+"""The Warp renderer: from a Scene and a Camera to a SensorReading."""
 
 from __future__ import annotations
 
@@ -13,7 +13,10 @@ from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.frame_context import CameraState, CameraView, RenderContext
 from gen_data.generator.renderers.warp.kernel_compilation import compile_kernels
 from gen_data.generator.renderers.warp.lidar.lidar_tracing import trace_scan
-from gen_data.generator.renderers.warp.realtime.realtime_shading import add_falling, radiance_image
+from gen_data.generator.renderers.warp.realtime.realtime_shading import (
+    add_precipitation,
+    radiance_image,
+)
 from gen_data.generator.renderers.warp.scene.scene_packing import pack_view, pack_world
 from gen_data.generator.renderers.warp.settings import RenderSettings
 from gen_data.generator.renderers.warp.shading_dispatch import shade_pixels, smooth_edges
@@ -28,16 +31,16 @@ from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow
 class WarpRenderer:
     """Renders on the CPU or on a CUDA device with the same kernels.
 
-    A pure function of its arguments: what it keeps between calls are assets and scratch memory.
-    One call uses one core; run several processes to use more.
+    A pure function of its arguments: between calls it keeps only assets and scratch memory. A call
+    uses one core; run several processes to use more.
 
     Args:
-        assets: Where meshes, textures and environments come from.
+        assets: Source of meshes, textures and environments.
         device: ``cpu``, ``cuda:N``, or ``auto`` for the first CUDA device if there is one.
         settings: How radiance is computed.
 
     Raises:
-        ConfigError: if the device does not exist, or a denoiser is asked for and not there.
+        ConfigError: the device does not exist, or the denoiser is requested but not installed.
     """
 
     def __init__(
@@ -51,42 +54,44 @@ class WarpRenderer:
                 " choose 'auto' or 'rays'."
             )
         compile_kernels(self._device.alias)
-        self._stock = DeviceCache(assets, self._device)
-        self._studio = RenderContext(self._stock, self._settings)
+        self._cache = DeviceCache(assets, self._device)
+        self._context = RenderContext(self._cache, self._settings)
         if self._settings.tier == "pathtraced":
-            # Its kernels take long to compile and are of no use to the other tier.
+            # Its kernels take long to compile, and the realtime tier does not need them.
             from gen_data.generator.renderers.warp.pathtraced.path_tracer import PathTracer
 
-            tracer = PathTracer(self._stock, self._settings)
-            self._studio = replace(self._studio, paths=tracer)
+            tracer = PathTracer(self._cache, self._settings)
+            self._context = replace(self._context, paths=tracer)
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
-        """Every asked channel of one camera."""
-        reading = expose_shutter(scene, camera, channels, self._studio)
-        return reading or self._at_once(scene, camera, channels)
+        """All requested channels of one camera."""
+        reading = expose_shutter(scene, camera, channels, self._context)
+        return reading or self._render_instant(scene, camera, channels)
 
-    def _at_once(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
-        """The image of one instant."""
-        world = pack_world(scene, camera, self._stock)
-        view = pack_view(camera, self._stock)
-        seen = find_visible(world, view, self._stock, self._settings.visibility)
+    def _render_instant(
+        self, scene: Scene, camera: Camera, channels: frozenset[Channel]
+    ) -> SensorReading:
+        """The image of a single instant."""
+        world = pack_world(scene, camera, self._cache)
+        view = pack_view(camera, self._cache)
+        gbuffer = find_visible(world, view, self._cache, self._settings.visibility)
         if Channel.AMODAL in channels:
             channels = channels | {Channel.INSTANCE}
-        images = label_images(scene, world, view, seen, channels)
+        images = label_images(scene, world, view, gbuffer, channels)
         if Channel.RADIANCE in channels:
-            radiance = shade_pixels(scene, camera, world, view, seen, self._studio)
-            smooth_edges(world, view, seen, radiance, self._studio)
-            add_falling(world, camera, view, seen.z_m, radiance, self._stock)
+            radiance = shade_pixels(scene, camera, world, view, gbuffer, self._context)
+            smooth_edges(world, view, gbuffer, radiance, self._context)
+            add_precipitation(world, camera, view, gbuffer.z_m, radiance, self._cache)
             images[Channel.RADIANCE] = radiance_image(radiance, view)
         outlines = {}
         if Channel.AMODAL in channels:
             ids = images[Channel.INSTANCE]
-            outlines = render_silhouettes(scene, camera, world, view, self._stock, seen, ids)
+            outlines = render_silhouettes(scene, camera, world, view, self._cache, gbuffer, ids)
         if channels & FLOW:
-            near = CameraView(CameraState.of(scene, camera), world, view, seen)
-            images |= flow_images(near, copy_gbuffer(near), channels, self._studio)
+            reference = CameraView(CameraState.of(scene, camera), world, view, gbuffer)
+            images |= flow_images(reference, copy_gbuffer(reference), channels, self._context)
         return SensorReading(camera.name, camera, images, outlines, scene.time_s)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
-        """What the rays of a laser scanner's beams hit first, and how well it reflects."""
-        return trace_scan(scene, lidar, beams, self._stock)
+        """First hits of a laser scanner's rays, and the reflectance of the surfaces."""
+        return trace_scan(scene, lidar, beams, self._cache)

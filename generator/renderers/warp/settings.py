@@ -1,4 +1,4 @@
-"""What a user can choose about rendering."""
+"""The section ``render:`` of configurations."""
 
 from __future__ import annotations
 
@@ -8,28 +8,30 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.interfaces import AssetLibrary, Renderer
 
 
 class RenderSettings(Strict):
-    """How radiance is computed. Labels do not depend on it; cameras have settings of their own.
+    """Computation of radiance. Labels do not depend on it; cameras have settings of their own.
 
     Attributes:
-        tier: ``realtime`` has no noise and takes a tenth of a second; ``pathtraced`` follows light
-            from surface to surface and converges to what physics says.
-        samples: Paths per pixel (path-traced tier); their mean over the pixel's square.
-        max_bounces: How often a path is scattered at most (path-traced tier).
-        denoise: Whether the noise of few samples is taken out by Open Image Denoise (path-traced
-            tier; package extra ``denoise``). Bytes are then those of one kind of processor.
-        antialias: Samples per pixel on edges; 1 switches anti-aliasing off.
-        shadows: ``soft`` follows the size of every light, ``hard`` takes lights for points.
-        ambient_occlusion_radius_m: How far away a surface still darkens its neighbourhood; 0
-            switches ambient occlusion off.
-        environment_shadow: ``auto`` lets the brightest parts of a panorama throw shadows, where
-            the scene is open to it and has no sun of its own; ``off`` takes all of it for light
-            without shadows.
-        max_lamps: Of a scene's lights, as many as give most of the light at what is seen.
-        visibility: How the surface at a pixel centre is found: ``raster`` (CPU only), ``rays``,
-            or the faster one on the device.
+        tier: ``realtime`` is free of noise and takes a tenth of a second; ``pathtraced`` simulates
+            light transport and converges to the physical result.
+        samples: Paths per pixel (path-traced tier), averaged over the pixel's square.
+        max_bounces: Maximum number of scattering events along a path (path-traced tier).
+        denoise: Whether Open Image Denoise removes the noise of few samples (path-traced tier;
+            package extra ``denoise``). Bytes then depend on the kind of processor.
+        antialias: Samples per pixel on edges; 1 disables anti-aliasing.
+        shadows: ``soft`` respects the size of every light, ``hard`` treats lights as points.
+        ambient_occlusion_radius_m: Distance up to which surfaces occlude ambient light; 0 disables
+            ambient occlusion.
+        environment_shadow: ``auto`` lets the brightest parts of a panorama cast shadows if the
+            scene is open to it and has no sun of its own; ``off`` treats all of it as light without
+            shadows.
+        max_lamps: Maximum number of a scene's lights, those that contribute most to the visible
+            surfaces.
+        visibility: Method that finds the surface at a pixel centre: ``raster`` (CPU only),
+            ``rays``, or the faster one on the device.
     """
 
     moved_keys: ClassVar[Mapping[str, str]] = {
@@ -47,3 +49,30 @@ class RenderSettings(Strict):
     environment_shadow: Literal["auto", "off"] = "auto"
     max_lamps: int = Field(16, ge=1)
     visibility: Literal["auto", "raster", "rays"] = "auto"
+
+
+class WarpPlugin(RenderSettings):
+    """Settings and device of the Warp renderer.
+
+    Attributes:
+        renderer: Name of the renderer.
+        device: auto, cpu or cuda:N; auto uses a CUDA GPU if there is one.
+    """
+
+    renderer: Literal["warp"] = "warp"
+    device: str = Field("auto", pattern=r"^(auto|cpu|cuda(:[0-9]+)?)$")
+
+    @property
+    def settings(self) -> RenderSettings:
+        """The settings without the device."""
+        return RenderSettings(**self.model_dump(exclude={"device", "renderer"}))
+
+    def open(self, assets: AssetLibrary) -> Renderer:
+        """Open the renderer on its device.
+
+        Raises:
+            ConfigError: the device does not exist, or the denoiser is requested but not installed.
+        """
+        from gen_data.generator.renderers.warp.renderer import WarpRenderer
+
+        return WarpRenderer(assets, self.device, self.settings)

@@ -1,4 +1,4 @@
-"""Light and shade by the tier that settings ask for."""
+"""Dispatch of shading to the realtime or the path-traced tier."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ def shade_pixels(
     camera: Camera,
     world: PackedWorld,
     view: View,
-    seen: GBuffer,
-    studio: RenderContext,
+    gbuffer: GBuffer,
+    context: RenderContext,
 ) -> wp.array:
-    """What comes from the pixels through the air [cd/m^2], linear RGB, flat; scratch memory.
+    """Radiance of all pixels through the air [cd/m^2], linear RGB, flat; scratch memory.
 
-    From their centres in the realtime tier, which is anti-aliased by ``smooth_edges``.
+    The realtime tier shades pixel centres, which ``smooth_edges`` anti-aliases.
     """
-    stock, settings = studio.stock, studio.settings
-    if studio.paths is not None:
-        return studio.paths.light(scene, camera, world, view, seen)
+    cache, settings = context.cache, context.settings
+    if context.paths is not None:
+        return context.paths.light(scene, camera, world, view, gbuffer)
     if settings.environment_shadow == "auto":
-        world = extract_sky_lights(world, scene, stock)
-    return surface_light(world, view, seen, stock, settings)
+        world = extract_sky_lights(world, scene, cache)
+    return surface_light(world, view, gbuffer, cache, settings)
 
 
 def smooth_edges(
-    world: PackedWorld, view: View, seen: GBuffer, radiance: wp.array, studio: RenderContext
+    world: PackedWorld, view: View, gbuffer: GBuffer, radiance: wp.array, context: RenderContext
 ) -> None:
-    """Anti-alias what has not been averaged over pixels, in place."""
-    if studio.paths is None:
-        mix_edges(world, view, seen, radiance, studio.stock, studio.settings)
+    """Anti-alias radiance that is not averaged over pixels yet, in place."""
+    if context.paths is None:
+        mix_edges(world, view, gbuffer, radiance, context.cache, context.settings)

@@ -1,9 +1,9 @@
-"""Radiance and labels of images whose rows are exposed at several instants, or for a while.
+"""Radiance and labels of images exposed at several instants, or over an interval.
 
-The camera's shutter names the instants. Labels are those of each row's own instant, the middle of
-its exposure. Light is averaged over the exposure: time is cut into slices, every slice is rendered
-at its middle as far as rows are exposed then, and every row is the mean of its slices. Both take no
-more instants than motion in the image makes necessary.
+The camera's shutter defines the instants. Labels are those of each row's own instant, the middle of
+its exposure. Radiance is averaged over the exposure: time is divided into slices, each slice is
+rendered at its middle for the rows exposed then, and each row is the weighted mean of its slices.
+Both use no more instants than the motion in the image requires.
 """
 
 from __future__ import annotations
@@ -29,9 +29,12 @@ from gen_data.generator.renderers.warp.frame_context import (
     is_moving,
     render_view,
 )
-from gen_data.generator.renderers.warp.realtime.realtime_shading import add_falling, radiance_image
+from gen_data.generator.renderers.warp.realtime.realtime_shading import (
+    add_precipitation,
+    radiance_image,
+)
 from gen_data.generator.renderers.warp.scene.light_selection import main_lamp_numbers
-from gen_data.generator.renderers.warp.scene.scene_packing import add_own_record, repack_moved
+from gen_data.generator.renderers.warp.scene.scene_packing import copy_world, repack_moved
 from gen_data.generator.renderers.warp.shading_dispatch import shade_pixels, smooth_edges
 from gen_data.generator.renderers.warp.visibility.amodal_rolling import rolling_silhouettes
 from gen_data.generator.renderers.warp.visibility.banded_gbuffer import (
@@ -50,10 +53,10 @@ from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Slice:
-    """A slice of time, and the rows that are exposed in it.
+    """A time slice, and the rows exposed during it.
 
     Attributes:
-        band: The rows, and the slice's middle.
+        band: The rows, and the state at the slice's middle.
         weights: Share of each row's exposure that falls into the slice, shape [rows].
     """
 
@@ -62,65 +65,72 @@ class Slice:
 
 
 def expose_shutter(
-    scene: Scene, camera: Camera, channels: frozenset[Channel], studio: RenderContext
+    scene: Scene, camera: Camera, channels: frozenset[Channel], context: RenderContext
 ) -> SensorReading | None:
-    """The image of a camera whose shutter is open for a while; None if nothing moves meanwhile."""
+    """Image of a camera with a finite exposure; None if nothing moves during it."""
     open_s = camera.shutter.open_s
     if not open_s > 0.0:
         return None
-    moment = CameraState.of(scene, camera)
-    if not is_moving(moment, open_s):
+    state = CameraState.of(scene, camera)
+    if not is_moving(state, open_s):
         return None
-    near = render_view(moment, studio)
-    pace = plan_sampling(near)
-    bands = split_bands(near, pace)
-    if len(bands) == 1 and pace.samples == 1:
+    reference = render_view(state, context)
+    sampling = plan_sampling(reference)
+    bands = split_bands(reference, sampling)
+    if len(bands) == 1 and sampling.samples == 1:
         return None
-    near = _with_main_lamps(near, studio)
+    reference = _keep_main_lamps(reference, context)
     drawn = channels - FLOW - {Channel.AMODAL}
     if Channel.AMODAL in channels:
         drawn = drawn | {Channel.INSTANCE}
-    shown, images = _images(near, bands, drawn, pace, studio)
+    gbuffer, images = _render_images(reference, bands, drawn, sampling, context)
     outlines: dict[int, Silhouette] = {}
     if Channel.AMODAL in channels:
-        outlines = rolling_silhouettes(bands, images[Channel.INSTANCE], studio, near)
-    images |= flow_images(near, shown, channels, studio)
+        outlines = rolling_silhouettes(bands, images[Channel.INSTANCE], context, reference)
+    images |= flow_images(reference, gbuffer, channels, context)
     return SensorReading(camera.name, camera, images, outlines, scene.time_s)
 
 
-def _images(
-    near: CameraView,
+def _render_images(
+    reference: CameraView,
     bands: Sequence[RowBand],
     channels: frozenset[Channel],
-    pace: ShutterSampling,
-    studio: RenderContext,
+    sampling: ShutterSampling,
+    context: RenderContext,
 ) -> tuple[BandedGBuffer, dict[Channel, NDArray[Any]]]:
-    """What pixels show, labels of it and, if asked for, radiance."""
+    """G-buffer, label images and, if requested, radiance."""
     labels = channels - {Channel.RADIANCE}
     if Channel.RADIANCE not in channels:
-        return render_bands(bands, labels, studio, near)
-    light = partial(integrate_light, studio=studio)
-    if pace.samples > 1:
-        shown, images = render_bands(bands, labels, studio, near)
-        mean = _averaged(split_slices(near.moment, pace.samples, pace.blurred), light, near, studio)
+        return render_bands(bands, labels, context, reference)
+    light = partial(integrate_light, context=context)
+    if sampling.samples > 1:
+        gbuffer, images = render_bands(bands, labels, context, reference)
+        mean = _average_slices(
+            split_slices(reference.state, sampling.samples, sampling.blurred),
+            light,
+            reference,
+            context,
+        )
     else:
-        shown, images = render_bands(bands, labels, studio, near, light)
+        gbuffer, images = render_bands(bands, labels, context, reference, light)
         mean = images[Channel.RADIANCE]
-    radiance = _on_device(mean, wp.vec3, studio)
-    depths = _on_device(shown.z_m, float, studio)
-    add_falling(near.world, near.moment.camera, near.view, depths, radiance, studio.stock)
-    return shown, images | {Channel.RADIANCE: radiance_image(radiance, near.view)}
+    radiance = _to_device(mean, wp.vec3, context)
+    depths = _to_device(gbuffer.z_m, float, context)
+    add_precipitation(
+        reference.world, reference.state.camera, reference.view, depths, radiance, context.cache
+    )
+    return gbuffer, images | {Channel.RADIANCE: radiance_image(radiance, reference.view)}
 
 
 def split_slices(
     middle: CameraState, samples: int, blurred: NDArray[np.bool_] | None = None
 ) -> list[Slice]:
-    """Slices of time that together hold every row's exposure once.
+    """Time slices that together cover every row's exposure once.
 
     Args:
-        middle: Of the exposure of the image.
-        samples: Slices to an exposure.
-        blurred: Rows that are worth it; the others are rendered in the slice nearest to their own
+        middle: State at the middle of the image's exposure.
+        samples: Slices per exposure.
+        blurred: Rows with motion blur; the others are rendered in the slice nearest to their own
             instant. None = all.
     """
     shutter, height = middle.camera.shutter, middle.camera.intrinsics.height_px
@@ -130,7 +140,7 @@ def split_slices(
     delays, half_s = shutter.row_delays_s(height), 0.5 * shutter.exposure_s
     starts, ends = offsets[:, None] - 0.5 * step_s, offsets[:, None] + 0.5 * step_s
     shares = np.minimum(ends, delays + half_s) - np.maximum(starts, delays - half_s)
-    # What rounding leaves of a slice is not worth rendering.
+    # Slivers left by rounding are not worth rendering.
     shares = np.where(shares > 1e-6 * step_s, shares, 0.0)
     shares /= shares.sum(axis=0)
     if blurred is not None:
@@ -147,44 +157,46 @@ def split_slices(
     return slices
 
 
-def _averaged(
-    slices: Sequence[Slice], light: RadianceFunction, near: CameraView, studio: RenderContext
+def _average_slices(
+    slices: Sequence[Slice], light: RadianceFunction, reference: CameraView, context: RenderContext
 ) -> Float32:
-    """Means over slices of what comes from every pixel [cd/m^2], float32 [h, w, 3]."""
-    lens = near.moment.camera.intrinsics
+    """Mean radiance over slices [cd/m^2], float32 [h, w, 3]."""
+    lens = reference.state.camera.intrinsics
     mean = np.zeros((lens.height_px, lens.width_px, 3), np.float32)
     for part in slices:
         band = part.band
         first, end = add_margin(band, lens.height_px)
-        see = near = render_view(band.moment, studio, (first, end), near)
-        own = light(see)[band.first - first : band.end - first]
+        rendered = reference = render_view(band.state, context, (first, end), reference)
+        own = light(rendered)[band.first - first : band.end - first]
         mean[band.first : band.end] += part.weights[:, None, None] * own
     return mean
 
 
-def integrate_light(see: CameraView, studio: RenderContext) -> Float32:
-    """What comes from every pixel, anti-aliased; valid until the next call."""
-    # What light does to the world's record is of no concern to those who start from it.
-    see = replace(see, world=add_own_record(see.world))
-    scene, camera = see.moment.scene, see.moment.camera
-    radiance = shade_pixels(scene, camera, see.world, see.view, see.seen, studio)
-    smooth_edges(see.world, see.view, see.seen, radiance, studio)
-    image: Float32 = radiance.numpy().reshape(see.view.height, see.view.width, 3)
+def integrate_light(rendered: CameraView, context: RenderContext) -> Float32:
+    """Radiance of every pixel, anti-aliased; valid until the next call."""
+    # Shading changes the world's record, from which other instants start.
+    rendered = replace(rendered, world=copy_world(rendered.world))
+    scene, camera = rendered.state.scene, rendered.state.camera
+    radiance = shade_pixels(scene, camera, rendered.world, rendered.view, rendered.gbuffer, context)
+    smooth_edges(rendered.world, rendered.view, rendered.gbuffer, radiance, context)
+    image: Float32 = radiance.numpy().reshape(rendered.view.height, rendered.view.width, 3)
     return image
 
 
-def _with_main_lamps(near: CameraView, studio: RenderContext) -> CameraView:
-    """Only those lamps that matter in the middle of the exposure light the whole of it."""
-    chosen = main_lamp_numbers(near.world, near.view, near.seen, studio.settings.max_lamps)
+def _keep_main_lamps(reference: CameraView, context: RenderContext) -> CameraView:
+    """The view with only the lamps that matter at the middle of the exposure."""
+    chosen = main_lamp_numbers(
+        reference.world, reference.view, reference.gbuffer, context.settings.max_lamps
+    )
     if chosen is None:
-        return near
-    scene, camera = near.moment.scene, near.moment.camera
+        return reference
+    scene, camera = reference.state.scene, reference.state.camera
     scene = replace(scene, lights=tuple(scene.lights[k] for k in chosen))
-    world = repack_moved(near.world, scene, camera, studio.stock)
-    return replace(near, moment=CameraState(scene, camera), world=world)
+    world = repack_moved(reference.world, scene, camera, context.cache)
+    return replace(reference, state=CameraState(scene, camera), world=world)
 
 
-def _on_device(image: Float32, dtype: Any, studio: RenderContext) -> wp.array:
-    """An image as kernels have it, flat."""
+def _to_device(image: Float32, dtype: Any, context: RenderContext) -> wp.array:
+    """An image as a flat array on the device."""
     flat = image.reshape(-1, *image.shape[2:])
-    return wp.array(flat, dtype=dtype, device=studio.stock.device)
+    return wp.array(flat, dtype=dtype, device=context.cache.device)

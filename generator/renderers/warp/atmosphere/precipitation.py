@@ -1,7 +1,7 @@
-"""Rain and snow in the air, as traces in the image.
+"""Falling rain and snow as motion-blurred streaks in the image.
 
-Only what is large in the image is drawn one by one: the rest is haze, which presets of rain and
-snow have as fog.
+Only particles that are large in the image are drawn individually: the rest is haze, which presets
+of rain and snow contain as fog.
 
 Sources: Marshall and Palmer, "The distribution of raindrops with size", J. Meteorology 5, 1948;
 Atlas, Srivastava and Sekhon, Reviews of Geophysics 11, 1973 (speed of drops); Sekhon and
@@ -29,28 +29,28 @@ from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
 
 _NEAREST_M = 0.35
-# Of the lens: what is near is out of focus by that much.
+# Aperture of the lens: near particles are defocused by that much.
 _APERTURE_M = 0.002
 _EXPOSURE_S = (1.0 / 500.0, 1.0 / 40.0)
 _F_NUMBER = 2.0
-# White is 1.2 * 2^EV100 cd/m^2 (ISO 12232), and metering puts the light's middle at this share.
+# White is 1.2 * 2^EV100 cd/m^2 (ISO 12232); metering places the mean at this share of it.
 _MIDDLE_GREY = 0.18
 _METERED_EVERY = 61
 _COUNT_MAX = 60_000
 _SPHERE_MAX = 480_000
-# Diameter of a flake over that of the drop it melts to: its density is about 0.05.
+# Diameter of a flake relative to the drop to which it melts: its density is about 0.05.
 _FLAKE = 2.7
 
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """Particles whose number falls exponentially with their diameter.
+    """Particles with an exponential distribution of diameters.
 
     Attributes:
-        density_per_m3: Of particles of at least the least diameter.
-        slope_per_m: Of the distribution.
-        least_m: Smaller ones are not drawn.
-        farthest_m: Nor are those beyond.
+        density_per_m3: Number density of particles above the smallest diameter.
+        slope_per_m: Slope of the distribution.
+        least_m: Smallest diameter that is drawn.
+        farthest_m: Largest distance at which particles are drawn.
     """
 
     density_per_m3: float
@@ -67,9 +67,9 @@ def rain(rate_mm_h: float) -> Kind:
 
 
 def snow(rate_mm_h: float) -> Kind:
-    """Flakes; Sekhon and Srivastava: 2500 R^-0.94 per m^3 and mm, slope 2.29 R^-0.45 per mm.
+    """Snowflakes; Sekhon and Srivastava: 2500 R^-0.94 per m^3 and mm, slope 2.29 R^-0.45 per mm.
 
-    Their diameters are those of the drops that flakes melt to.
+    Diameters are those of the melted drops.
     """
     slope_per_mm, least_mm = 2.29 * rate_mm_h**-0.45, 0.7
     density = 2500.0 * rate_mm_h**-0.94 / slope_per_mm * math.exp(-slope_per_mm * least_mm)
@@ -77,25 +77,25 @@ def snow(rate_mm_h: float) -> Kind:
 
 
 def light_level_ev100(radiance: wp.array, fixed_ev100: float | None) -> float:
-    """The exposure value that a camera is set to, or one that suits the light it receives.
+    """Exposure value that a camera is set to, or that suits the light it receives.
 
     Args:
         radiance: Linear RGB [cd/m^2], flat.
-        fixed_ev100: Of the camera; None = it meters for itself. Its median luminance stands for
-            what it will meter: only the length of streaks depends on it.
+        fixed_ev100: Setting of the camera; None = automatic, approximated from the median
+            luminance: only the length of streaks depends on it.
     """
     if fixed_ev100 is not None:
         return fixed_ev100
     levels = luminance(radiance.numpy()[::_METERED_EVERY])
-    # Black pixels, beyond a lens's field or without a background, say nothing about the light.
+    # Black pixels, outside a lens's field or without a background, are ignored.
     lit = levels[levels > 0.0]
     median_cd_m2 = float(np.median(lit)) if len(lit) else 0.0
-    # On a grid, so that the last bit of a logarithm is never seen.
+    # Rounded, so that the last bit of a logarithm has no effect.
     return round(math.log2(max(median_cd_m2, 1e-6) / (1.2 * _MIDDLE_GREY)) * 16.0) / 16.0
 
 
 def usual_exposure_s(ev100: float) -> float:
-    """Exposure time of a camera at ISO 100 and f/2, within what such cameras can."""
+    """Exposure time of a camera at ISO 100 and f/2, limited to a usual range."""
     return float(min(max(_F_NUMBER**2 / 2.0**ev100, _EXPOSURE_S[0]), _EXPOSURE_S[1]))
 
 
@@ -105,9 +105,9 @@ def draw_precipitation(
     view: records.View,
     z_m: wp.array,
     radiance: wp.array,
-    stock: DeviceCache,
+    cache: DeviceCache,
 ) -> bool:
-    """Draw what falls over the image, in place; whether anything falls."""
+    """Draw falling particles over the image, in place; returns whether there are any."""
     weather = world.weather
     if weather.rain_mm_h <= 0.0 and weather.snow_mm_h <= 0.0:
         return False
@@ -126,61 +126,77 @@ def draw_precipitation(
     if not len(values):
         return False
     values = values[np.argsort(-values["z_m"], kind="stable")]
-    first, listed = _rows(values, view.height)
-    streaks = wp.array(values, dtype=precipitation.Streak, device=stock.device)
+    first, listed = _streaks_by_row(values, view.height)
+    streaks = wp.array(values, dtype=precipitation.Streak, device=cache.device)
     wp.launch(
-        precipitation.light_streaks, len(values), [view, world.record, streaks], device=stock.device
+        precipitation.light_streaks, len(values), [view, world.record, streaks], device=cache.device
     )
-    lists = [wp.array(a, dtype=wp.int32, device=stock.device) for a in (first, listed)]
+    lists = [wp.array(a, dtype=wp.int32, device=cache.device) for a in (first, listed)]
     inputs = [view.width, z_m, streaks, *lists]
-    wp.launch(precipitation.draw_streaks, view.height, inputs, [radiance], device=stock.device)
+    wp.launch(precipitation.draw_streaks, view.height, inputs, [radiance], device=cache.device)
     return True
 
 
 def make_streaks(
     kind: Kind, camera: Camera, weather: Weather, exposure_s: float, name: str
 ) -> NDArray[np.void]:
-    """Streak records of all particles of a kind that a camera sees."""
+    """Streak records of all visible particles of a kind."""
     k = camera.intrinsics
     if not k.straight:
         return trace_through_lens(kind, camera, weather, exposure_s, name)
     T = camera.T_world_camera
-    rng = Streams(seed=weather.seed, scene=0).rng(
-        f"{name} {camera.name} {T.translation_m} {T.quaternion_wxyz}"
-    )
     spread = (k.width_px / k.fx_px) * (k.height_px / k.fy_px) / 3.0
     expected = kind.density_per_m3 * spread * (kind.farthest_m**3 - _NEAREST_M**3)
-    n = min(poisson(expected, rng), _COUNT_MAX)
-    u = rng.random((5, n))
-    z = np.cbrt(_NEAREST_M**3 + u[0] * (kind.farthest_m**3 - _NEAREST_M**3))
+    u, z, diameter_m, way = _draw_particles(
+        kind, camera, weather, exposure_s, name, expected, _COUNT_MAX
+    )
     x = (u[1] * k.width_px - k.cx_px) / k.fx_px * z
     y = (u[2] * k.height_px - k.cy_px) / k.fy_px * z
     p = np.stack([x, y, z], axis=-1)
-    diameter_m = kind.least_m - np.log(1.0 - u[3]) / kind.slope_per_m
-    R_camera_world = T.rotation().T
-    way = _velocity(name, diameter_m, u[4], weather.seed) * exposure_s
-    way = np.einsum("ij,nj->ni", R_camera_world, way, optimize=False)
-    values = np.zeros(n, dtype=precipitation.Streak.numpy_dtype())
+    values = np.zeros(len(z), dtype=precipitation.Streak.numpy_dtype())
     for end, side in (("start_px", -0.5), ("end_px", 0.5)):
         q = p + side * way
         depth = np.maximum(q[:, 2], 0.5 * _NEAREST_M)
         values[end][:, 0] = q[:, 0] / depth * k.fx_px + k.cx_px
         values[end][:, 1] = q[:, 1] / depth * k.fy_px + k.cy_px
     values["z_m"] = z
-    R_world_camera = R_camera_world.T
+    R_world_camera = T.rotation()
     values["p_m"] = np.einsum("ij,nj->ni", R_world_camera, p, optimize=False) + T.translation_m
-    _spread_out(values, diameter_m, z, k.fx_px)
+    _fill_shape(values, diameter_m, z, k.fx_px)
     return values
 
 
-def _spread_out(
+def _draw_particles(
+    kind: Kind,
+    camera: Camera,
+    weather: Weather,
+    exposure_s: float,
+    name: str,
+    expected: float,
+    count_max: int,
+) -> tuple[Array, Array, Array, Array]:
+    """Uniform numbers [5, n], distances, diameters and motion in the camera frame [n, 3]."""
+    T = camera.T_world_camera
+    rng = Streams(seed=weather.seed, scene=0).rng(
+        f"{name} {camera.name} {T.translation_m} {T.quaternion_wxyz}"
+    )
+    u = rng.random((5, min(poisson(expected, rng), count_max)))
+    # Uniform in volume: the cube of the distance is uniform.
+    distance_m = np.cbrt(_NEAREST_M**3 + u[0] * (kind.farthest_m**3 - _NEAREST_M**3))
+    diameter_m = kind.least_m - np.log(1.0 - u[3]) / kind.slope_per_m
+    way = _velocity(name, diameter_m, u[4], weather.seed) * exposure_s
+    way = np.einsum("ij,nj->ni", T.rotation().T, way, optimize=False)
+    return u, distance_m, diameter_m, way
+
+
+def _fill_shape(
     values: NDArray[np.void], diameter_m: Array, depth_m: Array, px_per_rad: Array | float
 ) -> None:
-    """Fill in how wide and how opaque traces are, in place."""
+    """Fill in width and opacity of streaks, in place."""
     length = np.sqrt(((values["end_px"] - values["start_px"]) ** 2).sum(axis=1))
     sharp = px_per_rad * diameter_m / depth_m
     wide = np.maximum(sharp + px_per_rad * _APERTURE_M / depth_m, 1.0)
-    # The disc's area over that of the trace it leaves.
+    # Area of the particle's disk over that of its streak.
     area = 0.25 * math.pi * sharp**2 / (wide * length + 0.25 * math.pi * wide**2)
     values["opacity"] = np.minimum(area, 1.0)
     values["radius_px"] = 0.5 * wide
@@ -189,43 +205,38 @@ def _spread_out(
 def trace_through_lens(
     kind: Kind, camera: Camera, weather: Weather, exposure_s: float, name: str
 ) -> NDArray[np.void]:
-    """As ``make_streaks``, before a lens that is no pinhole: depths are ranges.
+    """As ``make_streaks``, for lenses with distortion: depths are ranges.
 
-    Particles are spread over the narrowest cone that holds the image; those in it are kept.
+    Particles are distributed over the narrowest cone that contains the image, and those in it are
+    kept.
     """
     k, T = camera.intrinsics, camera.T_world_camera
-    rng = Streams(seed=weather.seed, scene=0).rng(
-        f"{name} {camera.name} {T.translation_m} {T.quaternion_wxyz}"
-    )
     least_cosine = _rim_cosine(k)
     cube_m3 = kind.farthest_m**3 - _NEAREST_M**3
     expected = kind.density_per_m3 * 2.0 * math.pi * (1.0 - least_cosine) / 3.0 * cube_m3
-    u = rng.random((5, min(poisson(expected, rng), _SPHERE_MAX)))
-    range_m = np.cbrt(_NEAREST_M**3 + u[0] * cube_m3)
+    u, range_m, diameter_m, way = _draw_particles(
+        kind, camera, weather, exposure_s, name, expected, _SPHERE_MAX
+    )
     cosine = 1.0 - u[1] * (1.0 - least_cosine)
     sine, turn = np.sqrt(np.maximum(1.0 - cosine * cosine, 0.0)), 2.0 * math.pi * u[2]
     p = np.stack([sine * np.cos(turn), sine * np.sin(turn), cosine], axis=-1) * range_m[:, None]
-    diameter_m = kind.least_m - np.log(1.0 - u[3]) / kind.slope_per_m
-    R_camera_world = T.rotation().T
-    way = _velocity(name, diameter_m, u[4], weather.seed) * exposure_s
-    way = np.einsum("ij,nj->ni", R_camera_world, way, optimize=False)
     ends = np.stack([k.project(p - 0.5 * way), k.project(p + 0.5 * way)], axis=1)
     middle = k.project(p)
     inside = ((middle >= 0.0) & (middle < (k.width_px, k.height_px))).all(axis=1)
-    # Ends apart by half an image lie on both sides of a seam.
+    # Ends half an image apart lie on both sides of a seam.
     whole = np.abs(ends[:, 1] - ends[:, 0]).max(axis=1) < 0.5 * k.width_px
     kept = np.flatnonzero(inside & whole)[:_COUNT_MAX]
     values = np.zeros(len(kept), dtype=precipitation.Streak.numpy_dtype())
     values["start_px"], values["end_px"] = ends[kept, 0], ends[kept, 1]
     values["z_m"] = range_m[kept]
-    there = np.einsum("ij,nj->ni", R_camera_world.T, p[kept], optimize=False)
+    there = np.einsum("ij,nj->ni", T.rotation(), p[kept], optimize=False)
     values["p_m"] = there + T.translation_m
-    _spread_out(values, diameter_m[kept], range_m[kept], _px_per_rad(k, middle[kept]))
+    _fill_shape(values, diameter_m[kept], range_m[kept], _px_per_rad(k, middle[kept]))
     return values
 
 
 def _rim_cosine(k: Intrinsics) -> float:
-    """Cosine of the widest angle to the axis in the image; -1 where its corners are dark."""
+    """Cosine of the widest angle to the axis in the image; -1 if its corners are dark."""
     u, v = (np.linspace(0.0, size, 65) for size in (k.width_px, k.height_px))
     sides = [np.stack(np.broadcast_arrays(u, end), axis=-1) for end in (0.0, float(k.height_px))]
     sides += [np.stack(np.broadcast_arrays(end, v), axis=-1) for end in (0.0, float(k.width_px))]
@@ -234,7 +245,7 @@ def _rim_cosine(k: Intrinsics) -> float:
 
 
 def _px_per_rad(k: Intrinsics, places_px: Array) -> Array:
-    """Side of the square that a small square angle is in the image, shape [n]."""
+    """Side in pixels of the image of a small square angle, per radian, [n]."""
     right, below = np.array([0.5, 0.0]), np.array([0.0, 0.5])
     across = k.rays(places_px + right) - k.rays(places_px - right)
     down = k.rays(places_px + below) - k.rays(places_px - below)
@@ -246,7 +257,7 @@ def _px_per_rad(k: Intrinsics, places_px: Array) -> Array:
 
 
 def poisson(expected: float, rng: Rng) -> int:
-    """A Poisson number, from its normal limit where it is large."""
+    """A Poisson-distributed number, by the normal limit for large means."""
     if expected > 64.0:
         u1, u2 = (float(v) for v in rng.random(2))
         normal = math.sqrt(-2.0 * math.log(1.0 - u1)) * math.cos(2.0 * math.pi * u2)
@@ -259,7 +270,7 @@ def poisson(expected: float, rng: Rng) -> int:
 
 
 def _velocity(name: str, diameter_m: Array, u: Array, seed: int) -> Array:
-    """World velocities [m/s], shape [n, 3]: falling, and drifting with a wind."""
+    """World velocities [m/s], [n, 3]: fall, and drift with the wind."""
     wind = Streams(seed=seed, scene=0).rng("wind").random(2)
     angle, gust = 2.0 * math.pi * wind[0], 3.0 * wind[1]
     drift = gust * (0.8 + 0.4 * u)
@@ -271,8 +282,10 @@ def _velocity(name: str, diameter_m: Array, u: Array, seed: int) -> Array:
     return np.stack([drift * np.cos(angle), drift * np.sin(angle), -fall], axis=-1)
 
 
-def _rows(values: NDArray[np.void], height: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """The streaks that touch each row, in the order given: starts [height + 1] and numbers."""
+def _streaks_by_row(
+    values: NDArray[np.void], height: int
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Streaks that touch each row, in the given order: starts [height + 1] and numbers."""
     ys = np.stack([values["start_px"][:, 1], values["end_px"][:, 1]])
     margin = values["radius_px"] + 0.5
     top = np.clip(np.floor(ys.min(axis=0) - margin), 0, height).astype(np.int64)

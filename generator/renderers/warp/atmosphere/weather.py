@@ -1,6 +1,6 @@
-"""Weather in the image: surfaces, air, what falls, and the lens.
+"""Weather in images: wet ground, reflections in water, and fog.
 
-Every function returns at once where the scene's weather has nothing for it to do.
+Every function returns at once if the scene's weather does not concern it.
 """
 
 from __future__ import annotations
@@ -19,31 +19,31 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
 
-# Standard deviation of kernels.ground.patches; it is close to normal.
+# Standard deviation of ground_weathering.fractal_noise, which is nearly normal.
 _PATCH_DEVIATION = 0.513
 
 
-def expose_ground(world: PackedWorld, lattice: Lattice, stock: DeviceCache) -> None:
-    """Prepare the world's surfaces for being wet or under snow."""
+def expose_ground(world: PackedWorld, lattice: Lattice, cache: DeviceCache) -> None:
+    """Prepare wetness and snow of the world's surfaces."""
     weather = world.weather
     if not weather.wetness + weather.puddles + weather.snow_cover:
         return
     points = lattice.width * lattice.height
-    probed = stock.scratch("probed shelter", points, float)
-    exposed = stock.scratch("exposed", points, float)
+    probed = cache.scratch("probed shelter", points, float)
+    exposed = cache.scratch("exposed", points, float)
     inputs = [world.record, lattice]
-    wp.launch(water_reflections.find_shelter, points, inputs, [probed], device=stock.device)
+    wp.launch(water_reflections.probe_exposure, points, inputs, [probed], device=cache.device)
     inputs = [lattice, probed]
-    wp.launch(water_reflections.average_shelter, points, inputs, [exposed], device=stock.device)
+    wp.launch(water_reflections.average_exposure, points, inputs, [exposed], device=cache.device)
     world.record.ground = ground_record(weather, exposed)
 
 
 def ground_record(weather: Weather, exposed: wp.array | None = None) -> records.GroundRecord:
-    """The Ground record: dry and bare where the weather has left nothing.
+    """The GroundRecord of a scene's weather.
 
     Args:
-        weather: Of the scene.
-        exposed: Share of what falls that reaches each point of a lattice, where there is one.
+        weather: Weather of the scene.
+        exposed: Exposure of each lattice point to precipitation, if there is a lattice.
     """
     ground = records.GroundRecord()
     ground.covered = int(weather.wetness + weather.puddles + weather.snow_cover > 0.0)
@@ -62,12 +62,12 @@ def fill_air(
     images: lattice_lighting.GBufferRecord,
     lattice: Lattice,
     radiance: wp.array,
-    stock: DeviceCache,
+    cache: DeviceCache,
 ) -> None:
-    """Reflections in water, then fog; in place."""
+    """Add reflections in water, then fog; in place."""
     if world.weather.wetness + world.weather.puddles > 0.0:
-        _mirror(world, view, images, lattice, radiance, stock)
-    fill_fog(world, view, images, radiance, stock)
+        _add_reflections(world, view, images, lattice, radiance, cache)
+    fill_fog(world, view, images, radiance, cache)
 
 
 def fill_fog(
@@ -75,57 +75,57 @@ def fill_fog(
     view: records.View,
     images: lattice_lighting.GBufferRecord,
     radiance: wp.array,
-    stock: DeviceCache,
+    cache: DeviceCache,
 ) -> None:
-    """Dim what is seen by the fog before it, and add the fog's own light, in place."""
+    """Attenuate radiance by fog and add the fog's own light, in place."""
     if world.weather.fog_extinction_per_m > 0.0:
         frame = [view, world.record, images, fog_record(world.weather)]
-        columns, glow = _glow(world, view, frame, stock)
+        columns, glow = _lamp_glow(world, view, frame, cache)
         inputs, n = [*frame, columns, glow], view.width * view.height
-        wp.launch(kernels.fill_with_fog, n, inputs, [radiance], device=stock.device)
+        wp.launch(kernels.fill_with_fog, n, inputs, [radiance], device=cache.device)
 
 
-def _mirror(
+def _add_reflections(
     world: PackedWorld,
     view: records.View,
     images: lattice_lighting.GBufferRecord,
     lattice: Lattice,
     radiance: wp.array,
-    stock: DeviceCache,
+    cache: DeviceCache,
 ) -> None:
-    """Lay what water on the ground mirrors over the image, in place."""
-    device, n = stock.device, view.width * view.height
+    """Blend reflections in water on the ground over the image, in place."""
+    device, n = cache.device, view.width * view.height
     points = lattice.width * lattice.height
-    share = stock.scratch("water", points, wp.vec2)
-    films, rows = (stock.scratch(name, points, wp.vec4) for name in ("films", "film rows"))
+    share = cache.scratch("water", points, wp.vec2)
+    films, rows = (cache.scratch(name, points, wp.vec4) for name in ("films", "film rows"))
     frame = [view, world.record, images, lattice, radiance]
     wp.launch(water_reflections.mirror_in_films, points, frame, [share, films], device=device)
     for step, source, spread in ((1, films, rows), (lattice.width, rows, films)):
         inputs = [images, lattice, share, source, step]
         wp.launch(water_reflections.blur_films, points, inputs, [spread], device=device)
-    laid = stock.scratch("laid", n, wp.vec4)
+    laid = cache.scratch("laid", n, wp.vec4)
     ripples = min(0.004 * world.weather.rain_mm_h, 0.05)
     inputs = [*frame, ripples, share, films]
     wp.launch(water_reflections.mirror_in_puddles, n, inputs, [laid], device=device)
     wp.launch(water_reflections.lay_water, n, [laid], [radiance], device=device)
 
 
-def _glow(
-    world: PackedWorld, view: records.View, frame: list[Any], stock: DeviceCache
+def _lamp_glow(
+    world: PackedWorld, view: records.View, frame: list[Any], cache: DeviceCache
 ) -> tuple[int, wp.array]:
-    """Glow of lamps in fog at a lattice of points, and its columns; 0 where no lamp shines."""
+    """Columns and values of a grid of lamps' glow in fog; 0 columns without lamps."""
     stride = int(kernels.GLOW_STRIDE)
     columns, rows = (-(-(size - 1) // stride) + 2 for size in (view.width, view.height))
-    glow = stock.scratch("glow", columns * rows, wp.vec3)
+    glow = cache.scratch("glow", columns * rows, wp.vec3)
     if not (world.record.lamps.numpy()["kind"] != LIGHT_KINDS.index("sun")).any():
         return 0, glow
     inputs = [*frame, columns]
-    wp.launch(kernels.glow_at_points, columns * rows, inputs, [glow], device=stock.device)
+    wp.launch(kernels.glow_at_points, columns * rows, inputs, [glow], device=cache.device)
     return columns, glow
 
 
 def fog_record(weather: Weather) -> kernels.Fog:
-    """The Fog record."""
+    """The Fog record of a scene's weather."""
     fog = kernels.Fog()
     fog.extinction_per_m = weather.fog_extinction_per_m
     fog.height_m = weather.fog_height_m
@@ -133,7 +133,7 @@ def fog_record(weather: Weather) -> kernels.Fog:
 
 
 def _level(share: float) -> float:
-    """Level that the noise exceeds on that share of the ground."""
+    """Threshold that the noise exceeds on the given share of the ground."""
     if share <= 0.0 or share >= 1.0:
         return 9.0 if share <= 0.0 else -9.0
     return -_PATCH_DEVIATION * NormalDist().inv_cdf(share)

@@ -1,1 +1,1 @@
-"""Laser rays through the same scene that cameras see."""
+"""Laser scanners: first and secondary hits, and materials in the infrared."""

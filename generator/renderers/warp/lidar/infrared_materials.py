@@ -1,23 +1,23 @@
-"""What materials do to the light of lasers, near 905 nm.
+"""Reflectance of materials for lasers near 905 nm.
 
-The eye's colours say little about the near infrared, so the roles that materials have on their
-objects come first, and colour decides among what is left.
+Visible colour says little about the near infrared, so a material's role on its object takes
+precedence, and colour decides for all others.
 
 * **Leaves** reflect about half (Jacquemoud and Baret, "PROSPECT", 1990), bark and wood about 0.4.
 * **Asphalt, concrete, brick, stone**: ECOSTRESS spectral library (Meerdink et al. 2019): asphalt
   0.1 to 0.2, concrete 0.3 to 0.4, glass beads of markings aside.
-* **Skin** about 0.55 (Cooksey and Allen, "Reflectance measurements of human skin", NIST 2013);
-  dyed **textiles** are bright, dark ones too: dyes are made for the eye.
+* **Skin** about 0.55 (Cooksey and Allen, "Reflectance measurements of human skin", NIST 2013); dyed
+  **textiles** are bright, dark ones too: dyes absorb visible light only.
 * **Car paint, rubber** follow their colour: carbon black is black in the infrared as well.
-* **Ground, walls and plants** are rough: Oren and Nayar 1994 with slopes of 0.5 rad. Distant road
-  stays visible to scanners because of it.
+* **Ground, walls and plants** are rough: Oren and Nayar 1994 with slopes of 0.5 rad, which keeps
+  distant road visible to scanners.
 * **Signs and plates**: coefficients of retro-reflection of ASTM D4956, 250 cd/lx/m^2 for type III
-  and 70 for type I. A white matte surface has 1 / pi, so they are 785 and 220 times as bright.
-* **Glass**: tinted panes of vehicles pass about half of it (Rubin, "Optical properties of soda lime
-  silica glasses", 1985); panes of buildings mirror about a third with their silver coatings, and no
-  rooms are behind them here.
-* **Markings** send back some hundred mcd/lx/m^2 at 30 m geometry (EN 1436); a scanner looks more
-  steeply and finds about twice white paint.
+  and 70 for type I. A white Lambertian surface has 1 / pi, so they are 785 and 220 times as bright.
+* **Glass**: tinted panes of vehicles transmit about half (Rubin, "Optical properties of soda lime
+  silica glasses", 1985); panes of buildings reflect about a third with their silver coatings, and
+  have no rooms behind them here.
+* **Markings** return some hundred mcd/lx/m^2 in 30 m geometry (EN 1436); a scanner's steeper view
+  yields about twice white paint.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.lidar.kernels.lidar_rays import Infrared
-from gen_data.generator.renderers.warp.scene.body_materials import BodyMaterials
+from gen_data.generator.renderers.warp.scene.material_packing import BodyMaterials
 from gen_data.generator.renderers.warp.scene.struct_dtypes import stack_records, struct_dtype
 
 DIFFUSE = {
@@ -50,7 +50,7 @@ DIFFUSE = {
     "chrome": 0.05,
     "underbody": 0.08,
 }
-"""Diffuse reflectance of roles whose colour does not matter."""
+"""Diffuse reflectance of roles whose visible colour is irrelevant."""
 
 TEXTILES = frozenset({"top", "bottom", "bag"})
 RETRO = {
@@ -59,7 +59,7 @@ RETRO = {
     "taillight": 40.0,
     "marking": 1.0,
 }
-"""Retro-reflectance of roles, in units of a white matte surface; tail lights hold a reflector."""
+"""Retro-reflectance of roles, relative to a white Lambertian surface; tail lights reflect."""
 
 ROUGH = frozenset(
     {"asphalt", "pavement", "kerb", "grass", "marking", "leaf", "bark", "facade", "roof", *TEXTILES}
@@ -68,30 +68,30 @@ SLOPE_RAD = 0.5
 """Spread of the facets of rough surfaces."""
 
 CLEAR = {"glass": 0.5}
-"""What panes let through, one way, square on."""
+"""Transmittance of panes, one way, at normal incidence."""
 
 MIRRORS = {"glass": 0.06, "window": 0.3}
-"""Fresnel reflectance, square on, of what is flat and smooth enough to mirror a beam."""
+"""Reflectance at normal incidence of surfaces that are flat enough to mirror a beam."""
 
 ALPHA_MIN = 0.03
-"""Narrower lobes than this are wider than the material says: no glass is flat to a milliradian."""
+"""Smallest width of a specular lobe: no glass is flat to a milliradian."""
 
 
-def infrared_surfaces(looks: Sequence[BodyMaterials], stock: DeviceCache) -> NDArray[np.void]:
+def infrared_surfaces(per_body: Sequence[BodyMaterials], cache: DeviceCache) -> NDArray[np.void]:
     """Infrared records of the materials of all bodies, in their order; at least one."""
 
-    def records(look: BodyMaterials) -> NDArray[np.void]:
-        return stock.infrared.get(look.materials, lambda: _infrared(look.materials, stock))
+    def records(entry: BodyMaterials) -> NDArray[np.void]:
+        return cache.infrared.get(entry.materials, lambda: _pack_infrared(entry.materials, cache))
 
-    return stack_records([records(look) for look in looks], Infrared)
+    return stack_records([records(entry) for entry in per_body], Infrared)
 
 
-def _infrared(materials: Sequence[Material], stock: DeviceCache) -> NDArray[np.void]:
+def _pack_infrared(materials: Sequence[Material], cache: DeviceCache) -> NDArray[np.void]:
     values: NDArray[Any] = np.zeros(len(materials), dtype=struct_dtype(Infrared))
     for k, material in enumerate(materials):
         color = np.asarray(material.base_color, dtype=np.float64)
         if material.texture:
-            color = color * mean_albedo(stock, material.texture)
+            color = color * mean_albedo(cache, material.texture)
         values[k] = infrared_fields(material, color)
     return values
 
@@ -100,7 +100,7 @@ def infrared_fields(material: Material, color: Array) -> tuple[float, ...]:
     """The fields of one material's Infrared record.
 
     Args:
-        material: What it is made of.
+        material: The material.
         color: Its mean linear RGB, texture included.
     """
     red = float(0.7 * color[0] + 0.2 * color[1] + 0.1 * color[2])
@@ -108,7 +108,7 @@ def infrared_fields(material: Material, color: Array) -> tuple[float, ...]:
     if material.role in TEXTILES:
         diffuse = 0.45 + 0.4 * red
     diffuse *= 1.0 - material.metallic
-    # Panes of known roles go by their role; other clear things by what they say of visible light.
+    # Panes of known roles go by their role, other clear materials by their visible transmittance.
     passed = material.transmission * red * material.opacity + 1.0 - material.opacity
     clear = CLEAR.get(material.role, passed)
     if material.role not in DIFFUSE:
@@ -123,7 +123,7 @@ def infrared_fields(material: Material, color: Array) -> tuple[float, ...]:
 
 
 def oren_nayar(slope_rad: float) -> tuple[float, float]:
-    """Factors of cosine and of squared sine of incidence, light and eye on one side.
+    """Factors of cosine and of squared sine of incidence, for coincident source and viewer.
 
     Oren and Nayar 1994: ``cos(t) (A + B sin(t) tan(t)) = A cos(t) + B sin(t)^2``; Lambert: (1, 0).
     """
@@ -131,8 +131,8 @@ def oren_nayar(slope_rad: float) -> tuple[float, float]:
     return 1.0 - 0.5 * s2 / (s2 + 0.33), 0.45 * s2 / (s2 + 0.09)
 
 
-def mean_albedo(stock: DeviceCache, texture_id: str) -> Array:
+def mean_albedo(cache: DeviceCache, texture_id: str) -> Array:
     """Mean linear colour of a texture: its coarsest level, a single texel."""
-    texels = stock.texture(texture_id).texels.numpy()
+    texels = cache.texture(texture_id).texels.numpy()
     roots = texels[-1:].view(np.uint8)[:3] / 255.0
     return np.asarray(roots * roots, dtype=np.float64)

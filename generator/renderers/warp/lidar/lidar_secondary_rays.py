@@ -1,6 +1,6 @@
-"""What laser rays meet through glass and by way of mirrors.
+"""Secondary hits of laser rays: behind glass and by reflection in mirrors.
 
-Few rays come to a pane, a mirror or a puddle; only these are followed, after all first hits.
+Few rays hit a pane, a mirror or a puddle; only these are traced further, after all first hits.
 """
 
 from __future__ import annotations
@@ -18,32 +18,32 @@ from gen_data.generator.core.capture import SecondaryHits
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.lidar.kernels import lidar_rays as kernels
-from gen_data.generator.renderers.warp.scene.body_materials import BodyMaterials
+from gen_data.generator.renderers.warp.scene.material_packing import BodyMaterials
 from gen_data.generator.renderers.warp.visibility.label_images import category_ids
 
 PUDDLE_MIN = 0.05
-"""Less of standing water than this mirrors nothing."""
+"""Smallest share of standing water that reflects."""
 
 Labels = tuple[NDArray[np.uint16], NDArray[np.uint16], NDArray[np.uint8]]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class HitLabels:
-    """Tables from body and material to labels; the first entry is that of nothing."""
+    """Lookup tables from body and material to labels; the first entry is the background's."""
 
     instances: NDArray[np.uint16]
     categories: NDArray[np.uint16]
     surfaces: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, scene: Scene, looks: Sequence[BodyMaterials]) -> HitLabels:
-        """Of a scene, whose bodies look like this."""
+    def of(cls, scene: Scene, per_body: Sequence[BodyMaterials]) -> HitLabels:
+        """Tables of a scene with the given materials of its bodies."""
         instances = [0, *(body.instance_id for body in scene.bodies)]
         nothing = np.zeros(1, np.uint8)
         return cls(
             np.array(instances, np.uint16),
             np.array([0, *category_ids(scene)], np.uint16),
-            np.concatenate([nothing, *(look.roles for look in looks)]),
+            np.concatenate([nothing, *(entry.roles for entry in per_body)]),
         )
 
     def at(self, hits: NDArray[np.int32]) -> Labels:
@@ -54,11 +54,11 @@ class HitLabels:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FirstHits:
-    """First hits of all rays: ranges and (body, material) on the device, the latter also here.
+    """First hits of all rays: ranges and (body, material) on the device, hits also on the host.
 
     Attributes:
-        normals: Where there are mirrors, on the device, lidar frame.
-        puddles: Share of each ray's end that is standing water; None where everything is dry.
+        normals: Normals at mirrors, on the device, lidar frame.
+        puddles: Share of standing water at each ray's end; None if everything is dry.
     """
 
     ranges_m: wp.array
@@ -74,17 +74,17 @@ def trace_secondary(
     order: NDArray[np.int32] | None,
     infrared: NDArray[np.void],
     labels: HitLabels,
-    stock: DeviceCache,
+    cache: DeviceCache,
 ) -> SecondaryHits | None:
-    """What rays meet besides their first hits; None = nothing.
+    """Secondary hits of all rays; None without any.
 
     Args:
-        inputs: Of the kernel that found the first hits.
-        first: What it found.
-        order: Of the beams.
-        infrared: Records of the materials.
-        labels: Of the scene.
-        stock: Of the renderer.
+        inputs: Inputs of the kernel that found the first hits.
+        first: The first hits.
+        order: Order of the beams.
+        infrared: Infrared records of the materials.
+        labels: Label tables of the scene.
+        cache: Cache of the renderer.
     """
     material = first.hits[:, 1]
     clear = np.append(infrared["clear"] > 0.0, False)[material]
@@ -92,22 +92,22 @@ def trace_secondary(
     if first.puddles is not None:
         mirror = mirror | (first.puddles > PUDDLE_MIN)
     found = []
-    panes, mirrors = (_picked(which, order) for which in (clear, mirror))
+    panes, mirrors = (_select_rays(which, order) for which in (clear, mirror))
     if len(panes):
-        given = [wp.array(panes, dtype=int, device=stock.device), first.ranges_m]
-        found.append(_launched(kernels.look_through, [*inputs, *given], panes, labels, stock))
+        given = [wp.array(panes, dtype=int, device=cache.device), first.ranges_m]
+        found.append(_launch(kernels.trace_behind_panes, [*inputs, *given], panes, labels, cache))
     if len(mirrors):
         water = np.zeros(len(mirrors), np.float32)
         if first.puddles is not None:
             water = np.where(first.puddles[mirrors] > PUDDLE_MIN, first.puddles[mirrors], 0.0)
         given = [
-            wp.array(mirrors, dtype=int, device=stock.device),
+            wp.array(mirrors, dtype=int, device=cache.device),
             first.ranges_m,
             first.on_device,
             first.normals,
-            wp.array(water, dtype=float, device=stock.device),
+            wp.array(water, dtype=float, device=cache.device),
         ]
-        seen = _launched(kernels.look_in_mirrors, [*inputs, *given], mirrors, labels, stock)
+        seen = _launch(kernels.trace_mirrors, [*inputs, *given], mirrors, labels, cache)
         seen[3][:], seen[4][:], seen[5][:] = 0, 0, SURFACES.index("mirrored")
         found.append(seen)
     if not found:
@@ -115,8 +115,8 @@ def trace_secondary(
     return SecondaryHits(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 
-def _picked(which: NDArray[np.bool_], order: NDArray[np.int32] | None) -> NDArray[np.int32]:
-    """Numbers of the rays that are marked, those of neighbouring beams after each other."""
+def _select_rays(which: NDArray[np.bool_], order: NDArray[np.int32] | None) -> NDArray[np.int32]:
+    """Numbers of the marked rays, with neighbouring beams adjacent."""
     if order is None or not which.any():
         return np.flatnonzero(which).astype(np.int32)
     subrays = len(which) // len(order)
@@ -124,20 +124,20 @@ def _picked(which: NDArray[np.bool_], order: NDArray[np.int32] | None) -> NDArra
     return rays[which[rays]].astype(np.int32, copy=False)
 
 
-def _launched(
+def _launch(
     kernel: wp.Kernel,
     inputs: Sequence[Any],
-    picked: NDArray[np.int32],
+    selected: NDArray[np.int32],
     labels: HitLabels,
-    stock: DeviceCache,
+    cache: DeviceCache,
 ) -> list[NDArray[Any]]:
-    """The fields of SecondaryHits of picked rays that meet something."""
-    count = len(picked)
-    ranges_m, reflectances = (wp.zeros(count, dtype=float, device=stock.device) for _ in range(2))
-    hits_ = wp.zeros(count, dtype=wp.vec2i, device=stock.device)
+    """Fields of SecondaryHits for the selected rays that hit something."""
+    count = len(selected)
+    ranges_m, reflectances = (wp.zeros(count, dtype=float, device=cache.device) for _ in range(2))
+    hits_ = wp.zeros(count, dtype=wp.vec2i, device=cache.device)
     outputs = [ranges_m, reflectances, hits_]
-    wp.launch(kernel, inputs[0].threads, list(inputs), outputs, device=stock.device)
+    wp.launch(kernel, inputs[0].threads, list(inputs), outputs, device=cache.device)
     hits = hits_.numpy()
     there = hits[:, 0] >= 0
     seen = (ranges_m.numpy()[there], reflectances.numpy()[there])
-    return [picked[there].astype(np.int64), *seen, *labels.at(hits[there])]
+    return [selected[there].astype(np.int64), *seen, *labels.at(hits[there])]

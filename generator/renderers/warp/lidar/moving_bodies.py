@@ -1,4 +1,4 @@
-"""Bodies that move while laser pulses leave one after the other."""
+"""Moving bodies during a laser scan, whose pulses are emitted one after another."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from gen_data.generator.renderers.warp.lidar.kernels import lidar_rays as kernel
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
 
 KEYS = 9
-"""Poses over a sweep, straight between them: at 10 m/s^2 and 0.1 s within 0.2 mm."""
+"""Poses over a sweep, interpolated linearly: within 0.2 mm at 10 m/s^2 and 0.1 s."""
 
 SLACK_M = 2e-3
-"""Between keys a body may leave the boxes it has there by as much."""
+"""Margin by which a body may leave its boxes between keys."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Mover:
-    """A body that moves: its number, rotation matrices [KEYS, 3, 3] and positions [KEYS, 3]."""
+    """A moving body: its number, rotation matrices [KEYS, 3, 3] and positions [KEYS, 3]."""
 
     number: int
     body: Body
@@ -34,15 +34,15 @@ class Mover:
 
 
 def pack_moving_bodies(
-    scene: Scene, lidar: Lidar, beams: LidarRays, world: PackedWorld, stock: DeviceCache
+    scene: Scene, lidar: Lidar, beams: LidarRays, world: PackedWorld, cache: DeviceCache
 ) -> tuple[PackedWorld, kernels.BodyMotion]:
-    """The world with boxes around all the ways that bodies take, and these ways."""
-    device = stock.device
-    travel = kernels.BodyMotion()
-    travel.keys = 0
-    movers = _movers(scene, beams.time_s)
+    """The world with boxes around the bodies' whole motion, and that motion."""
+    device = cache.device
+    motion = kernels.BodyMotion()
+    motion.keys = 0
+    movers = _find_movers(scene, beams.time_s)
     if beams.time_s is None or not (movers or beams.origins_m is not None):
-        return world, travel
+        return world, motion
     rows = np.full(max(len(scene.bodies), 1), -1, np.int32)
     rows[[mover.number for mover in movers]] = np.arange(len(movers))
     start_s, end_s = float(beams.time_s.min()), float(beams.time_s.max())
@@ -50,18 +50,18 @@ def pack_moving_bodies(
     origins_m = beams.origins_m
     if origins_m is None:
         origins_m = np.zeros((len(beams.time_s), 3), np.float32)
-    B_mesh_lidar, eye_mesh = _seen_from(lidar, movers)
-    travel.keys = KEYS
-    travel.rows = wp.array(rows, dtype=int, device=device)
-    travel.B_mesh_lidar = wp.array(B_mesh_lidar, dtype=wp.mat33, device=device)
-    travel.eye_mesh = wp.array(eye_mesh, dtype=wp.vec3, device=device)
-    travel.phases = wp.array(phases, dtype=float, device=device, copy=False)
-    travel.origins_m = wp.array(origins_m, dtype=wp.vec3, device=device, copy=False)
-    return _enclosing(world, movers, stock), travel
+    B_mesh_lidar, eye_mesh = _lidar_in_mesh_frames(lidar, movers)
+    motion.keys = KEYS
+    motion.rows = wp.array(rows, dtype=int, device=device)
+    motion.B_mesh_lidar = wp.array(B_mesh_lidar, dtype=wp.mat33, device=device)
+    motion.eye_mesh = wp.array(eye_mesh, dtype=wp.vec3, device=device)
+    motion.phases = wp.array(phases, dtype=float, device=device, copy=False)
+    motion.origins_m = wp.array(origins_m, dtype=wp.vec3, device=device, copy=False)
+    return _enclose(world, movers, cache), motion
 
 
-def _movers(scene: Scene, time_s: NDArray[np.float32] | None) -> list[Mover]:
-    """Bodies whose pose changes while pulses leave."""
+def _find_movers(scene: Scene, time_s: NDArray[np.float32] | None) -> list[Mover]:
+    """Bodies whose pose changes during the scan."""
     if time_s is None or not scene.tracks:
         return []
     keys_s = scene.time_s + np.linspace(float(time_s.min()), float(time_s.max()), KEYS)
@@ -77,10 +77,10 @@ def _movers(scene: Scene, time_s: NDArray[np.float32] | None) -> list[Mover]:
     return [Mover(number, scene.bodies[number], R[k], t[k]) for number, k in moving]
 
 
-def _seen_from(
+def _lidar_in_mesh_frames(
     lidar: Lidar, movers: list[Mover]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Directions and the origin of the lidar frame in each mover's mesh frame, at each key."""
+    """Directions and origin of the lidar frame in each mover's mesh frame, at each key."""
     if not movers:
         return np.zeros((1, KEYS, 3, 3), np.float32), np.zeros((1, KEYS, 3), np.float32)
     R_world_lidar = lidar.T_world_lidar.rotation()
@@ -93,13 +93,13 @@ def _seen_from(
     return B.astype(np.float32), eye.astype(np.float32)
 
 
-def _enclosing(world: PackedWorld, movers: list[Mover], stock: DeviceCache) -> PackedWorld:
-    """The world with boxes that hold movers wherever they are."""
+def _enclose(world: PackedWorld, movers: list[Mover], cache: DeviceCache) -> PackedWorld:
+    """The world with boxes that contain the movers at all keys."""
     if not movers:
         return world
-    low_m, high_m = world.placed["low_m"].copy(), world.placed["high_m"].copy()
+    low_m, high_m = world.body_records["low_m"].copy(), world.body_records["high_m"].copy()
     numbers = [mover.number for mover in movers]
-    meshes = [stock.mesh(mover.body.asset) for mover in movers]
+    meshes = [cache.mesh(mover.body.asset) for mover in movers]
     scale = np.array([mover.body.scale for mover in movers])[:, None]
     low, high = (
         np.stack(corner) for corner in zip(*((m.low_m, m.high_m) for m in meshes), strict=True)
@@ -112,6 +112,6 @@ def _enclosing(world: PackedWorld, movers: list[Mover], stock: DeviceCache) -> P
     low_m[numbers] = (centre - reach).min(axis=1)
     high_m[numbers] = (centre + reach).max(axis=1)
     lows_m, highs_m = (
-        wp.array(corner, dtype=wp.vec3, device=stock.device) for corner in (low_m, high_m)
+        wp.array(corner, dtype=wp.vec3, device=cache.device) for corner in (low_m, high_m)
     )
     return replace(world, lows_m=lows_m, highs_m=highs_m)

@@ -1,1 +1,1 @@
-"""The path-traced tier: integrator, BSDF, emitters, sampler and denoiser."""
+"""The path-traced tier: integrator, BSDFs, emitters, sampler and denoiser."""

@@ -1,4 +1,4 @@
-"""Noise taken out of path-traced images by Intel's Open Image Denoise (package ``pyoidn``)."""
+"""Denoising of path-traced images by Intel's Open Image Denoise (package ``pyoidn``)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from gen_data.generator.core.errors import ConfigError
 
 
 def require_denoiser() -> None:
-    """Find the denoiser before anything is traced.
+    """Check that the denoiser is installed before anything is rendered.
 
     Raises:
         ConfigError: it is not installed.
@@ -24,19 +24,22 @@ def require_denoiser() -> None:
 
 
 def denoise(light: Float32, albedo: Float32, normal: Float32) -> Float32:
-    """An image as if it had been traced with more samples.
+    """Denoise an image.
 
-    One thread, as all of this renderer: processes fill the cores. The same bytes for the same
-    image on processors of one kind; others round other digits.
+    Single-threaded like the whole renderer: processes use the cores. The bytes are reproducible on
+    processors of one kind; others round differently.
 
     Args:
         light: Linear RGB, [h, w, 3].
-        albedo: Colours of what is seen, [0, 1], same shape.
-        normal: Its normals, [-1, 1], same shape.
+        albedo: Albedo of the visible surfaces, [0, 1], same shape.
+        normal: Their normals, [-1, 1], same shape.
+
+    Raises:
+        ConfigError: the denoiser reports an error.
     """
     import pyoidn
 
-    # Values near 1, whatever the unit of light.
+    # Normalise to a mean of 1, independent of the unit of light.
     scale = np.float32(1.0 / max(float(light.mean()), 1e-12))
     color, result = np.ascontiguousarray(light * scale), np.zeros_like(light)
     with pyoidn.Device(pyoidn.OIDN_DEVICE_TYPE_CPU) as device:

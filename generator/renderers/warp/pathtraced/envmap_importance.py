@@ -1,4 +1,4 @@
-"""Where the light of an environment comes from, as tables to draw directions from."""
+"""Tables for importance sampling of environments."""
 
 from __future__ import annotations
 
@@ -14,19 +14,18 @@ _HEIGHT_MAX = 512
 
 
 def sky_shares(image: Float32, *, whole: bool) -> tuple[float, Float32, Float32]:
-    """Cumulated light of an equirectangular image, looked up bilinearly.
+    """Cumulative distribution of light over an equirectangular image, for bilinear lookup.
 
     Args:
         image: Radiance, [h, 2h, 3].
-        whole: Whether to take all light, or what is brighter than the mean: the rest is found as
-            well by surfaces that look around. Source: Karlik et al., "MIS compensation", SIGGRAPH
-            Asia 2019, section 5.
+        whole: Whether to sample all light, or only the excess over the mean: BSDF sampling finds
+            the rest as well. Source: Karlik et al., "MIS compensation", SIGGRAPH Asia 2019, section
+            5.
 
     Returns:
-        The part of the light that is taken; shares of that above the upper edge of each row,
-        [rows + 1]; and in each row those left of each column's edge, [rows, columns + 1]. Images
-        of more than 512 rows have theirs taken together. If ``whole``, there is a share wherever
-        there is light.
+        Share of the light that is sampled; its cumulative distribution over rows, [rows + 1]; and
+        over the columns of each row, [rows, columns + 1]. Images of more than 512 rows are reduced
+        to that. If ``whole``, the density is positive wherever there is light.
     """
     light = _mean_of_texels(np.maximum(luminance(image.astype(np.float64)), 0.0))
     if len(light) > _HEIGHT_MAX:
@@ -39,13 +38,13 @@ def sky_shares(image: Float32, *, whole: bool) -> tuple[float, Float32, Float32]
         mean = float(taken.sum()) / (float(areas.sum()) * light.shape[1])
         taken = np.maximum(light - mean, 0.0) * areas
     part = float(taken.sum()) / max(float((light * areas).sum()), 1e-300)
-    # Below what rounding leaves of an even sky.
+    # An even sky leaves rounding errors only.
     part = part if part > 1e-6 else 0.0
-    return part, _cumulated(taken.sum(axis=1)), _cumulated(taken)
+    return part, _cumulate(taken.sum(axis=1)), _cumulate(taken)
 
 
 def _mean_of_texels(values: Array) -> Array:
-    """Means of the bilinear interpolation over each texel; columns go around."""
+    """Means of the bilinear interpolation over each texel; columns wrap around."""
     beside = np.roll(values, 1, axis=1) + np.roll(values, -1, axis=1)
     values = 0.75 * values + 0.125 * beside
     padded = np.pad(values, ((1, 1), (0, 0)), "edge")
@@ -53,8 +52,8 @@ def _mean_of_texels(values: Array) -> Array:
     return mean
 
 
-def _cumulated(light: Array) -> NDArray[np.float32]:
-    """Shares before each edge along the last axis; even where there is no light."""
+def _cumulate(light: Array) -> NDArray[np.float32]:
+    """Cumulative shares at each edge along the last axis; uniform where there is no light."""
     total = light.sum(axis=-1, keepdims=True)
     share = np.where(total > 0.0, light / np.maximum(total, 1e-300), 1.0 / light.shape[-1])
     sums = np.cumsum(share, axis=-1)

@@ -1,4 +1,4 @@
-"""Colour images by path tracing."""
+"""Path-traced radiance images."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld, l
 from gen_data.generator.renderers.warp.settings import RenderSettings
 from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer
 
-# A launch is bounded, so that a device that also drives a screen is not held for long.
+# Launches are short, so that a device that also drives a screen stays responsive.
 _SAMPLES_AT_ONCE = 32
 _GUIDE_SAMPLES = 16
 _TABLE_BYTES = 16 << 20
@@ -36,7 +36,7 @@ _IRRADIANCE_SIZE = (64, 32)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _SkyLight:
-    """An environment as paths need it: its table, and its irradiance as of a Sky record."""
+    """An environment for the path tracer: its table, and its irradiance as of EnvironmentRecord."""
 
     table: SkyTable
     irradiance: wp.array
@@ -44,29 +44,29 @@ class _SkyLight:
 
 
 class PathTracer:
-    """Traces paths; keeps tables of environments between images.
+    """Renders radiance by path tracing; caches tables of environments.
 
     Args:
-        stock: Where assets are on the device.
-        settings: How colour images are made.
+        cache: Assets on the device.
+        settings: Settings of the renderer.
     """
 
-    def __init__(self, stock: DeviceCache, settings: RenderSettings) -> None:
-        self._stock = stock
+    def __init__(self, cache: DeviceCache, settings: RenderSettings) -> None:
+        self._cache = cache
         self._settings = settings
         if settings.denoise:
             require_denoiser()
-        self._lobes = wp.array(smith_albedo(), dtype=wp.vec2, device=stock.device)
+        self._lobes = wp.array(smith_albedo(), dtype=wp.vec2, device=cache.device)
         self._skies: ByteCache[_SkyLight] = ByteCache(_TABLE_BYTES)
 
     def light(
-        self, scene: Scene, camera: Camera, world: PackedWorld, view: records.View, seen: GBuffer
+        self, scene: Scene, camera: Camera, world: PackedWorld, view: records.View, gbuffer: GBuffer
     ) -> wp.array:
-        """As of ``radiance``, through the air: that of the pixel centres' depths."""
+        """As ``radiance``, denoised and through fog, at the depths of the pixel centres."""
         radiance = self.radiance(scene, camera, world, view)
         if self._settings.denoise:
             self._denoise(world, view, radiance)
-        fill_fog(world, view, gbuffer_record(seen), radiance, self._stock)
+        fill_fog(world, view, gbuffer_record(gbuffer), radiance, self._cache)
         darken_outside(view, radiance)
         return radiance
 
@@ -80,42 +80,42 @@ class PathTracer:
         seed: int = 0,
         lights: int = 3,
     ) -> wp.array:
-        """Mean light of each pixel's square [cd/m^2], linear RGB, flat; scratch memory.
+        """Mean radiance of each pixel's square [cd/m^2], linear RGB, flat; scratch memory.
 
         Args:
-            scene: What ``world`` was packed from.
+            scene: The scene of ``world``.
             camera: Its name keys the noise.
-            world: Changed: gets every light, and the tables of paths.
-            view: Of the camera.
-            seed: Images of other seeds have other noise.
-            lights: How sources are found: 1 by asking them, 2 by meeting them, 3 by both.
+            world: Modified in place: receives all lights and the path tracer's tables.
+            view: View of the camera.
+            seed: Seed of the noise.
+            lights: Techniques: 1 light sampling, 2 BSDF sampling, 3 both.
         """
         sky = self._sky_light(scene.environment.image, whole=lights == 1)
         record = world.record
         record.lobes = self._lobes
         record.lamps = wp.array(
-            lamp_records(scene.lights), dtype=records.LightRecord, device=self._stock.device
+            lamp_records(scene.lights), dtype=records.LightRecord, device=self._cache.device
         )
         record.ground = ground_record(world.weather)
         record.sky.irradiance = sky.irradiance
         n = view.width * view.height
-        radiance = self._stock.scratch("radiance", n, wp.vec3)
+        radiance = self._cache.scratch("radiance", n, wp.vec3)
         radiance.zero_()
         budget = self._budget(scene, camera, world, seed, lights)
         for first in range(0, self._settings.samples, _SAMPLES_AT_ONCE):
             budget.first = first
             budget.samples = min(_SAMPLES_AT_ONCE, self._settings.samples - first)
             inputs = [view, record, sky.table, budget]
-            wp.launch(integrator.trace_paths, n, inputs, [radiance], device=self._stock.device)
+            wp.launch(integrator.trace_paths, n, inputs, [radiance], device=self._cache.device)
         share = 1.0 / self._settings.samples
-        wp.launch(integrator.scale_light, n, [share], [radiance], device=self._stock.device)
+        wp.launch(integrator.scale_light, n, [share], [radiance], device=self._cache.device)
         return radiance
 
     def _denoise(self, world: PackedWorld, view: records.View, radiance: wp.array) -> None:
-        """Take out the noise, in place."""
+        """Denoise in place."""
         from gen_data.generator.renderers.warp.pathtraced.kernels.denoise_aovs import trace_guides
 
-        device, n = self._stock.device, view.width * view.height
+        device, n = self._cache.device, view.width * view.height
         shape = (view.height, view.width, 3)
         albedo, normal = (wp.zeros(n, dtype=wp.vec3, device=device) for _ in range(2))
         inputs = [view, world.record, _GUIDE_SAMPLES]
@@ -141,8 +141,8 @@ class PathTracer:
 
     def _sky_light(self, environment_id: str, *, whole: bool) -> _SkyLight:
         def make() -> _SkyLight:
-            device = self._stock.device
-            image = self._stock.assets.environment(environment_id)
+            device = self._cache.device
+            image = self._cache.assets.environment(environment_id)
             part, rows, columns = sky_shares(image, whole=whole)
             table = SkyTable()
             table.part = part

@@ -1,1 +1,1 @@
-"""The realtime tier: direct light, soft shadows, clear coats and glass."""
+"""The realtime tier: direct lighting, soft shadows, clear coats and glass."""

@@ -1,4 +1,4 @@
-"""Coats, glass, mirrors and further maps, over what plain shading has left."""
+"""Shading of layered surfaces: clear coats, glass, mirrors and further maps."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import warp as wp
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.realtime.kernels import lattice_lighting
 from gen_data.generator.renderers.warp.realtime.light_visibility import (
-    lamp_parts,
-    pixel_parts,
+    lamp_samples,
+    pixel_samples,
     sunflower,
 )
 from gen_data.generator.renderers.warp.scene.kernels import records
@@ -21,14 +21,14 @@ from gen_data.generator.renderers.warp.visibility.kernels import edge_detection
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ListedPixels:
-    """Pixels that are shaded by themselves.
+    """Pixels that are shaded individually.
 
     Attributes:
-        count: Their number; the arrays are longer.
-        pixels: Which ones.
-        lit: Visible part of each lamp [lamp, place in the list].
-        open_sky: Visible part of the hemisphere, [1, place].
-        exposed: Share of what falls that reaches them.
+        count: Number of pixels; the arrays are longer.
+        pixels: Indices of the pixels.
+        lit: Visible fraction of each lamp [lamp, position in the list].
+        open_sky: Visible fraction of the hemisphere, [1, position].
+        exposed: Exposure to precipitation.
     """
 
     count: int
@@ -39,7 +39,7 @@ class ListedPixels:
 
 
 _PARTS = 2
-"""Rays per pixel where edges are seen in a mirror or through glass."""
+"""Samples per pixel on edges in reflections or behind glass."""
 
 
 def shade_layers(
@@ -48,22 +48,22 @@ def shade_layers(
     images: lattice_lighting.GBufferRecord,
     listed: ListedPixels,
     radiance: wp.array,
-    stock: DeviceCache,
+    cache: DeviceCache,
     settings: RenderSettings,
 ) -> None:
-    """Shade those of the listed pixels that see layered surfaces, in place.
+    """Shade the listed pixels that show layered surfaces, in place.
 
-    Where edges are seen in them or through them, by several rays.
+    Pixels with edges in reflections or behind glass take several samples.
     """
     # A module of its own: scenes without such surfaces neither compile nor load it.
     from gen_data.generator.renderers.warp.realtime.kernels import clearcoat_glass
 
-    device = stock.device
+    device = cache.device
     probe = clearcoat_glass.Probe()
-    probe.parts = stock.constant(wp.vec2, lamp_parts, 4, settings.shadows)
-    probe.disc = stock.constant(wp.vec2, sunflower, 4)
+    probe.parts = cache.constant(wp.vec2, lamp_samples, 4, settings.shadows)
+    probe.disc = cache.constant(wp.vec2, sunflower, 4)
     probe.radius_m = settings.ambient_occlusion_radius_m
-    probe.lit = stock.scratch("lit where rays end", listed.lit.shape, float)
+    probe.lit = cache.scratch("lit where rays end", listed.lit.shape, float)
     frame = [view, world.record, images]
     seen = [listed.pixels, listed.lit, listed.open_sky, listed.exposed, probe]
     wp.launch(
@@ -72,13 +72,13 @@ def shade_layers(
     if settings.antialias == 1:
         return
     count = wp.zeros(1, dtype=wp.int32, device=device)
-    places = stock.scratch("contrasts", view.width * view.height, wp.int32)
+    places = cache.scratch("contrasts", view.width * view.height, wp.int32)
     inputs = [*frame, listed.pixels, radiance]
     wp.launch(clearcoat_glass.find_contrasts, listed.count, inputs, [count, places], device=device)
     found = int(count.numpy()[0])
-    pixels = stock.scratch("contrast pixels", view.width * view.height, wp.int32)
-    mixed = stock.scratch("contrast colours", view.width * view.height, wp.vec3)
-    offsets = stock.constant(wp.vec2, pixel_parts, _PARTS)
+    pixels = cache.scratch("contrast pixels", view.width * view.height, wp.int32)
+    mixed = cache.scratch("contrast colours", view.width * view.height, wp.vec3)
+    offsets = cache.constant(wp.vec2, pixel_samples, _PARTS)
     inputs = [*frame, places, *seen, offsets]
     wp.launch(clearcoat_glass.shade_contrasts, found, inputs, [pixels, mixed], device=device)
-    wp.launch(edge_detection.put_mixed, found, [pixels, mixed], [radiance], device=device)
+    wp.launch(edge_detection.write_mixed, found, [pixels, mixed], [radiance], device=device)

@@ -1,4 +1,4 @@
-"""Shadows and ambient occlusion: what of each lamp and of the sky the lattice's points see."""
+"""Shadows and ambient occlusion: visibility of each lamp and of the sky from lattice points."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer
 _STRIDE_PX = 3
 _TILE = int(shadow_culling.TILE)
 _LIST_LENGTH = int(shadow_culling.LIST_LENGTH)
-# Column of the sample in each row of a pixel, far from that of the rows beside it.
+# Column of the sample in each row of a pixel, far from those of neighbouring rows (n-rooks).
 _ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LightVisibility:
-    """What reaches the lattice's points.
+    """Visibility of lights from the lattice's points.
 
     Attributes:
-        lit: Visible part of each lamp, [lamps, points]; UNSEEN where it lights nothing.
-        open_sky: Visible part of the hemisphere, [1, points].
+        lit: Visible fraction of each lamp, [lamps, points]; UNSEEN where it has no effect.
+        open_sky: Visible fraction of the hemisphere, [1, points].
     """
 
     lit: wp.array
@@ -38,23 +38,31 @@ class LightVisibility:
 
 
 def make_lattice(
-    world: PackedWorld, view: records.View, seen: GBuffer, stock: DeviceCache
+    world: PackedWorld, view: records.View, gbuffer: GBuffer, cache: DeviceCache
 ) -> lattice_kernels.Lattice:
-    """The lattice of a view."""
+    """Sample the lattice of a view."""
     lattice = lattice_kernels.Lattice()
     lattice.stride = _STRIDE_PX
     lattice.width = (view.width - 1) // _STRIDE_PX + 2
     lattice.height = (view.height - 1) // _STRIDE_PX + 2
     n = lattice.width * lattice.height
-    lattice.body = stock.scratch("lattice body", n, wp.int32)
-    lattice.surface = stock.scratch("lattice surface", n, wp.int32)
-    lattice.pixel = stock.scratch("lattice pixel", n, wp.int32)
-    lattice.skip = stock.scratch("lattice skip", n, wp.int32)
-    lattice.p_m = stock.scratch("lattice p", n, wp.vec3)
-    lattice.normal = stock.scratch("lattice normal", n, wp.vec3)
-    lattice.origin_m = stock.scratch("lattice origin", n, wp.vec3)
-    inputs = [view, world.record, seen.hits, seen.z_m, seen.weights, seen.normals, lattice]
-    wp.launch(lattice_kernels.sample_lattice, n, inputs, device=stock.device)
+    lattice.body = cache.scratch("lattice body", n, wp.int32)
+    lattice.surface = cache.scratch("lattice surface", n, wp.int32)
+    lattice.pixel = cache.scratch("lattice pixel", n, wp.int32)
+    lattice.skip = cache.scratch("lattice skip", n, wp.int32)
+    lattice.p_m = cache.scratch("lattice p", n, wp.vec3)
+    lattice.normal = cache.scratch("lattice normal", n, wp.vec3)
+    lattice.origin_m = cache.scratch("lattice origin", n, wp.vec3)
+    inputs = [
+        view,
+        world.record,
+        gbuffer.hits,
+        gbuffer.z_m,
+        gbuffer.weights,
+        gbuffer.normals,
+        lattice,
+    ]
+    wp.launch(lattice_kernels.sample_lattice, n, inputs, device=cache.device)
     return lattice
 
 
@@ -62,98 +70,98 @@ def find_light_visibility(
     world: PackedWorld,
     view: records.View,
     lattice: lattice_kernels.Lattice,
-    stock: DeviceCache,
+    cache: DeviceCache,
     settings: RenderSettings,
 ) -> LightVisibility:
-    """Shadows and ambient occlusion of all points."""
+    """Compute shadows and ambient occlusion of all points."""
     lamps = world.record.lamps.shape[0]
     columns = -(-lattice.width // _TILE)
     tiles = columns * -(-lattice.height // _TILE)
-    lists = stock.scratch("occluders", (tiles, lamps + 1, 1 + _LIST_LENGTH), wp.int32)
+    lists = cache.scratch("occluders", (tiles, lamps + 1, 1 + _LIST_LENGTH), wp.int32)
     radius_m = settings.ambient_occlusion_radius_m
     points = lattice.width * lattice.height
-    shares = stock.scratch("shares", (max(lamps, 1), points), float)
+    shares = cache.scratch("shares", (max(lamps, 1), points), float)
     wp.launch(
-        soft_shadows.weigh_lamps, points, [world.record, lattice], [shares], device=stock.device
+        soft_shadows.weigh_lamps, points, [world.record, lattice], [shares], device=cache.device
     )
     inputs = [world.record, lattice, columns, radius_m, shares, lists]
-    wp.launch(shadow_culling.list_occluders, tiles, inputs, device=stock.device)
+    wp.launch(shadow_culling.list_occluders, tiles, inputs, device=cache.device)
     return LightVisibility(
-        _lit(world, view, lattice, lists, shares, settings, stock),
-        _open_sky(world, view, lattice, lists, columns, radius_m, stock),
+        _lamp_visibility(world, view, lattice, lists, shares, settings, cache),
+        _sky_visibility(world, view, lattice, lists, columns, radius_m, cache),
     )
 
 
 def sunflower(n: int) -> Array:
-    """Points spread evenly over the unit disc, shape [n, 2] (Vogel, Math. Biosciences 44, 1979)."""
+    """Points evenly distributed over the unit disk, [n, 2] (Vogel, Math. Biosciences 44, 1979)."""
     k = np.arange(n)
     radius, angle = np.sqrt((k + 0.5) / n), k * math.pi * (3.0 - math.sqrt(5.0))
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
 
 
-def lamp_parts(n: int, shadows: str) -> Array:
-    """Points of a lamp's disc that shadows look at, shape [n, 2]; all at its centre if hard."""
+def lamp_samples(n: int, shadows: str) -> Array:
+    """Points of a lamp's disk at which shadow rays aim, [n, 2]; its centre for hard shadows."""
     return sunflower(n) * (1.0 if shadows == "soft" else 0.0)
 
 
-def pixel_parts(n: int) -> Array:
-    """Sample positions in a pixel, [0, 1), shape [n, 2]: no two in one row or column (n-rooks)."""
+def pixel_samples(n: int) -> Array:
+    """Sample positions in a pixel, [0, 1), [n, 2]: no two in one row or column (n-rooks)."""
     columns = _ROOKS[n]
     return (np.stack([columns, np.arange(n)], axis=-1) + 0.5) / n
 
 
 def cosine_hemisphere(n: int) -> Array:
-    """Unit directions about +Z whose density goes with the cosine (Malley), shape [n, 3]."""
+    """Unit directions about +Z distributed by the cosine (Malley), [n, 3]."""
     disc = sunflower(n)
     up = np.sqrt(1.0 - (disc * disc).sum(axis=1))
     return np.concatenate([disc, up[:, None]], axis=1)
 
 
-def _lit(
+def _lamp_visibility(
     world: PackedWorld,
     view: records.View,
     lattice: lattice_kernels.Lattice,
     lists: wp.array,
     shares: wp.array,
     settings: RenderSettings,
-    stock: DeviceCache,
+    cache: DeviceCache,
 ) -> wp.array:
-    device = stock.device
+    device = cache.device
     n, lamps = lattice.width * lattice.height, world.record.lamps.shape[0]
-    probed = stock.scratch("probed", (max(lamps, 1), n), float)
-    lit = stock.scratch("lit", (max(lamps, 1), n), float)
+    probed = cache.scratch("probed", (max(lamps, 1), n), float)
+    lit = cache.scratch("lit", (max(lamps, 1), n), float)
     if lamps == 0:
         return lit
-    disc = stock.constant(wp.vec2, lamp_parts, 48, settings.shadows)
+    disc = cache.constant(wp.vec2, lamp_samples, 48, settings.shadows)
     columns = -(-lattice.width // _TILE)
     inputs = [world.record, lattice, columns, lists, disc, shares]
     for parity in (0, 1):
         wp.launch(soft_shadows.probe_lamps, n, [*inputs, parity], [probed], device=device)
-    classes = _classes(lattice, probed, lamps, stock)
+    classes = _classify(lattice, probed, lamps, cache)
     wp.launch(soft_shadows.refine_lamps, n, [*inputs, classes, probed], [lit], device=device)
-    _smooth(view, lattice, lit, probed, stock)
+    _smooth(view, lattice, lit, probed, cache)
     return probed
 
 
-def _open_sky(
+def _sky_visibility(
     world: PackedWorld,
     view: records.View,
     lattice: lattice_kernels.Lattice,
     lists: wp.array,
     columns: int,
     radius_m: float,
-    stock: DeviceCache,
+    cache: DeviceCache,
 ) -> wp.array:
     n = lattice.width * lattice.height
-    probed = stock.scratch("probed sky", (1, n), float)
-    open_sky = stock.scratch("open sky", (1, n), float)
+    probed = cache.scratch("probed sky", (1, n), float)
+    open_sky = cache.scratch("open sky", (1, n), float)
     if radius_m == 0.0:
         open_sky.fill_(1.0)
         return open_sky
-    hemisphere = stock.constant(wp.vec3, cosine_hemisphere, 16)
+    hemisphere = cache.constant(wp.vec3, cosine_hemisphere, 16)
     inputs = [world.record, lattice, columns, lists, hemisphere, radius_m]
-    wp.launch(soft_shadows.probe_ambient, n, inputs, [probed], device=stock.device)
-    _smooth(view, lattice, probed, open_sky, stock)
+    wp.launch(soft_shadows.probe_ambient, n, inputs, [probed], device=cache.device)
+    _smooth(view, lattice, probed, open_sky, cache)
     return open_sky
 
 
@@ -162,22 +170,22 @@ def _smooth(
     lattice: lattice_kernels.Lattice,
     values: wp.array,
     smoothed: wp.array,
-    stock: DeviceCache,
+    cache: DeviceCache,
 ) -> None:
     rows, n = values.shape
-    classes = _classes(lattice, values, rows, stock)
-    sums = stock.scratch("row sums", (rows, n), wp.vec2)
+    classes = _classify(lattice, values, rows, cache)
+    sums = cache.scratch("row sums", (rows, n), wp.vec2)
     inputs = [view, lattice, classes, values]
-    wp.launch(soft_shadows.sum_rows, n, inputs, [sums], device=stock.device)
-    wp.launch(soft_shadows.smooth_lattice, n, [*inputs, sums], [smoothed], device=stock.device)
+    wp.launch(soft_shadows.sum_rows, n, inputs, [sums], device=cache.device)
+    wp.launch(soft_shadows.smooth_lattice, n, [*inputs, sums], [smoothed], device=cache.device)
 
 
-def _classes(
-    lattice: lattice_kernels.Lattice, values: wp.array, rows: int, stock: DeviceCache
+def _classify(
+    lattice: lattice_kernels.Lattice, values: wp.array, rows: int, cache: DeviceCache
 ) -> wp.array:
     shape = (-(-lattice.height // 4), -(-lattice.width // 4), rows)
-    classes = stock.scratch("classes", shape, wp.int32)
+    classes = cache.scratch("classes", shape, wp.int32)
     wp.launch(
-        soft_shadows.classify_blocks, shape, [lattice, values], [classes], device=stock.device
+        soft_shadows.classify_blocks, shape, [lattice, values], [classes], device=cache.device
     )
     return classes

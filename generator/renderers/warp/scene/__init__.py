@@ -1,1 +1,1 @@
-"""A scene on the device: packing, materials, textures, lights and trees of boxes."""
+"""The scene on the device: packing, materials, textures, lights and bounding volume hierarchies."""

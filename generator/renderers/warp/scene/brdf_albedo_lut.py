@@ -1,4 +1,4 @@
-"""Reflectance of specular lobes under uniform light."""
+"""Lookup tables of the directional albedo of GGX lobes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def lobe_albedo() -> Float32:
     half vectors of GGX, with the masking of
     ``gen_data.generator.renderers.warp.scene.kernels.brdf``.
     """
-    # The ends themselves are limits without a value of their own.
+    # Roughness 0 and grazing view are limits without a value of their own.
     nodes = np.clip(np.arange(_ENTRIES) / (_ENTRIES - 1.0), 1e-3, 1.0)
     roughness, n_v = nodes[:, None, None], nodes[None, :, None]
     strata = (np.arange(_STRATA) + 0.5) / _STRATA
@@ -44,15 +44,15 @@ def lobe_albedo() -> Float32:
 
 @cache
 def smith_albedo() -> Float32:
-    """As ``lobe_albedo``, finer and with Smith's height-correlated masking as it is: [64, 64, 2].
+    """As ``lobe_albedo``, finer, with Smith's exact height-correlated masking: [64, 64, 2].
 
-    Source: directions drawn from the visible normals of Dupuy and Benyoub, "Sampling visible GGX
-    normals with spherical caps", HPG 2023, whose weight is masking alone.
+    Source: sampling of visible normals by Dupuy and Benyoub, "Sampling visible GGX normals with
+    spherical caps", HPG 2023, whose weight is the masking alone.
     """
     nodes = np.clip(np.arange(64) / 63.0, 1e-3, 1.0)
     strata = (np.arange(32) + 0.5) / 32.0
     u1, rest = (axis.reshape(1, -1) for axis in np.meshgrid(strata, strata, indexing="ij"))
-    # Finer towards the few steep facets, whose light is lost.
+    # Denser towards the few steep facets, whose light is lost.
     u2, share = 1.0 - rest**3, rest**2 / (rest**2).mean()
     n_v = nodes[:, None]
     table = np.zeros((64, 64, 2), np.float32)

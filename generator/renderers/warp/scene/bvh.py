@@ -1,12 +1,12 @@
-"""Trees of boxes for the rays of bvh_traverse, which says who reads them.
+"""Bounding volume hierarchies of eight-wide nodes, in the layout that kernels.bvh_traverse reads.
 
-A tree is one array of floats, in groups of eight; integers are stored as their bits.
+A tree is one array of floats, in groups of eight; integers are stored by their bits.
 
-- Group 0: the root's code. A code is the number of a node's first group; or minus that of a
-  leaf's; or in trees over bodies, whose leaves are bodies, -1 - body.
+- Group 0: the root's code. A code is the index of a node's first group; or minus that of a leaf;
+  or, in trees over bodies, whose leaves are bodies, -1 - body.
 - A node has seven groups of eight lanes: low x, high x, low y, high y, low z, high z, codes.
-- A leaf of a mesh has ten: x of its faces' first corners, of their second and third, then y and z
-  likewise; and numbers of the faces.
+- A leaf of a mesh has ten groups: x of its faces' first, second and third corners, then y and z
+  likewise; and the numbers of the faces.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ from gen_data.generator.renderers.warp.scene.kernels import bvh_build
 
 _WIDTH = int(bvh_build.WIDTH)
 _NODE_GROUPS, _LEAF_GROUPS = 7, 10
-# Up to 2**24 boxes: eight depths of any cuts and eight of halves, each of seven more than it takes.
+# Stack for up to 2**24 boxes: eight levels of arbitrary splits and eight of halves, each pushing
+# seven more than it pops.
 _WAITING_MAX = 128
 
 Floats = NDArray[np.float32]
@@ -30,15 +31,15 @@ Ints = NDArray[np.int32]
 
 
 def face_boxes(vertices_m: Floats, faces: Ints) -> tuple[Floats, Floats]:
-    """Low and high corners [n, 3] of boxes around the faces."""
-    # Corner by corner: reducing over the short middle axis of [n, 3, 3] takes ten times as long.
+    """Low and high corners [n, 3] of the faces' bounding boxes."""
+    # Corner by corner: a reduction over the short middle axis of [n, 3, 3] takes ten times as long.
     a, b, c = (vertices_m.take(faces[:, k], axis=0) for k in range(3))
     return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
 
 def mesh_tree(vertices_m: Floats, faces: Ints, lows_m: Floats, highs_m: Floats) -> Floats:
-    """A tree over a mesh's faces, given their boxes; triangles that a leaf lacks are points."""
-    order, nodes, codes, leaves = _grown(lows_m, highs_m, _WIDTH)
+    """Tree over a mesh's faces, given their boxes; missing triangles of a leaf are points."""
+    order, nodes, codes, leaves = _grow(lows_m, highs_m, _WIDTH)
     lanes = leaves[:, :1] + np.arange(_WIDTH, dtype=np.int32)
     lacking = lanes >= leaves[:, 1:]
     numbers = order[np.minimum(lanes, len(order) - 1)]
@@ -50,33 +51,33 @@ def mesh_tree(vertices_m: Floats, faces: Ints, lows_m: Floats, highs_m: Floats) 
         leaf_groups[:, k:9:3] = corners.transpose(0, 2, 1)
     leaf_groups[:, 9] = numbers.view(np.float32)
     first_leaf = 1 + _NODE_GROUPS * len(nodes)
-    return _packed(nodes, codes, first_leaf + _LEAF_GROUPS * np.arange(len(leaves)), leaf_groups)
+    return _pack(nodes, codes, first_leaf + _LEAF_GROUPS * np.arange(len(leaves)), leaf_groups)
 
 
 def body_tree(lows_m: Floats, highs_m: Floats) -> Floats:
-    """A tree over bodies' boxes."""
-    order, nodes, codes, leaves = _grown(lows_m, highs_m, 1)
-    return _packed(nodes, codes, 1 + order[leaves[:, 0]], np.zeros((0, 1, _WIDTH), np.float32))
+    """Tree over the bodies' boxes."""
+    order, nodes, codes, leaves = _grow(lows_m, highs_m, 1)
+    return _pack(nodes, codes, 1 + order[leaves[:, 0]], np.zeros((0, 1, _WIDTH), np.float32))
 
 
-def _packed(nodes: Floats, codes: Ints, leaf_places: NDArray[np.integer], tail: Floats) -> Floats:
-    """One array of groups."""
+def _pack(nodes: Floats, codes: Ints, leaf_places: NDArray[np.integer], tail: Floats) -> Floats:
+    """Concatenate a tree into one array of groups."""
     if len(leaf_places):
         leaf_codes = -leaf_places[np.maximum(-1 - codes, 0)]
         codes = np.where(codes < 0, leaf_codes, 1 + _NODE_GROUPS * codes).astype(np.int32)
     head = np.zeros((1, _WIDTH), np.int32)
-    # Everything but a single leaf begins with node 0.
+    # Every tree but a single leaf begins with node 0.
     head[0, 0] = 1 if len(nodes) else -leaf_places[0]
     inner = np.concatenate([nodes, codes[:, None].view(np.float32)], axis=1)
     groups = [head.view(np.float32), *(part.reshape(-1, _WIDTH) for part in (inner, tail))]
     return np.concatenate(groups).reshape(-1)
 
 
-def _grown(lows: Floats, highs: Floats, leaf: int) -> tuple[Ints, Floats, Ints, Ints]:
-    """The order of boxes, and the nodes, codes and leaves of ``growing.grow_tree``."""
+def _grow(lows: Floats, highs: Floats, leaf: int) -> tuple[Ints, Floats, Ints, Ints]:
+    """Build a tree; returns the order of boxes and the outputs of ``bvh_build.grow_tree``."""
     n = len(lows)
     order = np.arange(n, dtype=np.int32)
-    # A node splits what is too many for a leaf: there are fewer nodes than boxes.
+    # Each node splits a range: there are fewer nodes than boxes.
     nodes = np.zeros((max(n, 1), 6, _WIDTH), np.float32)
     codes = np.zeros((max(n, 1), _WIDTH), np.int32)
     leaves = np.zeros((n, 2), np.int32)
@@ -84,23 +85,23 @@ def _grown(lows: Floats, highs: Floats, leaf: int) -> tuple[Ints, Floats, Ints, 
     if n == 0:
         nodes[:, ::2], nodes[:, 1::2] = bvh_build.NOWHERE, -bvh_build.NOWHERE
         return order, nodes, codes, leaves
-    boxes = _room()
-    boxes.lows, boxes.highs = _here(lows, wp.vec3), _here(highs, wp.vec3)
-    boxes.order = _here(order, wp.int32)
+    boxes = _workspace()
+    boxes.lows, boxes.highs = _wrap(lows, wp.vec3), _wrap(highs, wp.vec3)
+    boxes.order = _wrap(order, wp.int32)
     todo = np.zeros((_WAITING_MAX, 4), np.int32)
-    outputs = [_here(nodes, wp.float32), _here(codes, wp.int32), _here(leaves, wp.vec2i)]
-    outputs.append(_here(counts, wp.int32))
-    wp.launch(bvh_build.grow_tree, 1, [boxes, leaf, _here(todo, wp.vec4i)], outputs, device="cpu")
+    outputs = [_wrap(nodes, wp.float32), _wrap(codes, wp.int32), _wrap(leaves, wp.vec2i)]
+    outputs.append(_wrap(counts, wp.int32))
+    wp.launch(bvh_build.grow_tree, 1, [boxes, leaf, _wrap(todo, wp.vec4i)], outputs, device="cpu")
     return order, nodes[: counts[0]], codes[: counts[0]], leaves[: counts[1]]
 
 
-def _here(values: NDArray[np.generic], dtype: Any) -> wp.array:
-    """An array of the host's, for kernels on the CPU; it must outlive the kernels."""
+def _wrap(values: NDArray[np.generic], dtype: Any) -> wp.array:
+    """Wrap a host array for kernels on the CPU without a copy; it must outlive them."""
     shape = values.shape if dtype in (wp.int32, wp.float32) else values.shape[:-1]
     return wp.array(ptr=values.ctypes.data, dtype=dtype, shape=shape, device="cpu")
 
 
-def _room() -> bvh_build.Boxes:
+def _workspace() -> bvh_build.Boxes:
     boxes = bvh_build.Boxes()
     boxes.bin_lows, boxes.bin_highs, boxes.bin_counts, boxes.costs = _bins()
     return boxes

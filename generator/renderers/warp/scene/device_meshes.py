@@ -1,4 +1,4 @@
-"""Meshes on the device, one hierarchy each."""
+"""Meshes on the device, each with its hierarchy."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from gen_data.generator.renderers.warp.scene.bvh import face_boxes, mesh_tree
 from gen_data.generator.renderers.warp.scene.kernels.records import Geometry
 from gen_data.generator.renderers.warp.scene.struct_dtypes import to_record
 
-# Boxes around faces are those of the cells of a grid of this many along the longest side.
+# Cells along the longest side of the grid that groups faces into boxes.
 _CELLS = 6
-# Faces larger than three cells get boxes of their own, up to a number.
+# Faces larger than three cells get boxes of their own, up to this number.
 _LARGE_FACES_MAX = 256
 
-# Above this, asking every vertex about every face costs more than the answer saves.
+# Above this number of faces, the quadratic test costs more than it saves.
 _CONVEXITY_FACES_MAX = 2000
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DeviceMesh:
-    """One asset's geometry on the device.
+    """Geometry of one asset on the device.
 
     Attributes:
         record: A Geometry record [1].
@@ -43,7 +43,7 @@ class DeviceMesh:
 
 
 def upload_mesh(data: MeshData, device: wp.Device) -> DeviceMesh:
-    """A mesh with its hierarchy, ready for kernels."""
+    """Upload a mesh and build its hierarchy."""
     vertices = wp.array(data.vertices_m, dtype=wp.vec3, device=device)
     normals = wp.array(data.normals, dtype=wp.vec3, device=device)
     uvs = wp.array(data.uvs, dtype=wp.vec2, device=device)
@@ -59,7 +59,7 @@ def upload_mesh(data: MeshData, device: wp.Device) -> DeviceMesh:
     if device.is_cuda:
         hierarchy = wp.Mesh(points=vertices, indices=faces)
         record.mesh = hierarchy.id
-        # It holds two 16-byte nodes per triangle, built from 24-byte boxes.
+        # Warp's hierarchy has two 16-byte nodes per triangle, built from 24-byte boxes.
         hierarchy_nbytes = (64 + 24) * len(data.faces)
     else:
         tree = mesh_tree(data.vertices_m, data.faces, face_lows, face_highs)
@@ -86,9 +86,9 @@ def upload_mesh(data: MeshData, device: wp.Device) -> DeviceMesh:
 def boxes_around(
     lows: NDArray[np.float32], highs: NDArray[np.float32]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Low and high corners [m], shape [n, 3] each, of few boxes that hold those of all faces.
+    """Low and high corners [m], [n, 3] each, of a few boxes that contain those of all faces.
 
-    Faces whose middles lie in one cell of a coarse grid share a box; large ones have their own.
+    Faces whose centres lie in one cell of a coarse grid share a box; large ones have their own.
     """
     origin = np.array([column.min() for column in lows.T])
     top = np.array([column.max() for column in highs.T])
@@ -107,7 +107,7 @@ def is_convex_solid(vertices_m: NDArray[np.float32], faces: NDArray[np.int32]) -
     """Whether no vertex lies outside the plane of any face; False for large meshes."""
     if len(faces) > _CONVEXITY_FACES_MAX:
         return False
-    # Most solids that are not convex show it at any of a few faces.
+    # Most concave meshes fail at one of the first few faces.
     return all(_behind_faces(vertices_m, part) for part in (faces[:: len(faces) // 8 + 1], faces))
 
 

@@ -1,4 +1,4 @@
-"""Textures on the device, with their mip chains."""
+"""Textures on the device, with mip chains."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ class DeviceTexture:
     Attributes:
         record: A Texture record [1].
         keep: The device arrays that the record points to.
-        texels: One of them: packed colours of all levels, the coarsest last.
-        layered: Whether it has maps that plain surfaces do not: emission, metal, occlusion.
-        pierced: Whether it has holes.
+        texels: The packed colours of all levels, the coarsest last.
+        layered: Whether it has maps of emission, metal or occlusion.
+        has_cutouts: Whether it has holes.
     """
 
     record: NDArray[np.void]
@@ -39,11 +39,11 @@ class DeviceTexture:
     texels: wp.array
     nbytes: int
     layered: bool
-    pierced: bool
+    has_cutouts: bool
 
 
 def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
-    """A texture, ready for kernels."""
+    """Upload a texture and its mip levels."""
     height, width = data.albedo.shape[:2]
     white = np.full((height, width), 255, np.uint8)
     albedo = data.albedo if data.alpha is None else remove_fringe(data.albedo, data.alpha)
@@ -52,10 +52,10 @@ def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
     record.height, record.width, record.levels = height, width, len(sizes)
     images = [texels, _NO_TEXELS, _NO_TEXELS, _NO_TEXELS]
     if data.normal is not None:
-        record.has_bumps, images[1] = 1, _means(_with_fourth(data.normal, white))
+        record.has_bumps, images[1] = 1, _mean_levels(_append_channel(data.normal, white))
     if data.metallic is not None or data.occlusion is not None:
         shares = [white if share is None else share for share in (data.metallic, data.occlusion)]
-        record.has_shares, images[2] = 1, _means(cv2.merge([*shares, white, white]))
+        record.has_shares, images[2] = 1, _mean_levels(cv2.merge([*shares, white, white]))
     if data.emission is not None:
         record.has_glow, images[3] = 1, _texels(data.emission, white)[1]
     cover = white[:1, 0] if data.alpha is None else data.alpha.reshape(-1)
@@ -70,21 +70,22 @@ def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
         on_device[0],
         sum(values.nbytes for values in images) + cover.nbytes,
         layered=bool(record.has_shares or record.has_glow),
-        pierced=bool(record.has_cover),
+        has_cutouts=bool(record.has_cover),
     )
 
 
 def remove_fringe(albedo: UInt8, alpha: UInt8) -> UInt8:
-    """Colours with holes filled from around them, so that coarser levels do not mix theirs in.
+    """Fill the colours of holes from their surroundings, so that coarser levels have no fringes.
 
     Source: Gortler et al., "The lumigraph", SIGGRAPH 1996 (pull and push).
 
     Args:
         albedo: [height, width, 3].
-        alpha: Coverage; below 128 there is a hole, [height, width].
+        alpha: Coverage, [height, width]; holes are below 128.
     """
     solid = (alpha >= 128).astype(np.float32)[..., None]
-    levels = _halvings(np.concatenate([albedo * solid, solid], axis=2))
+    levels = _mip_levels(np.concatenate([albedo * solid, solid], axis=2))
+    # Push: from coarse to fine, take the finer level's colour where it has any.
     filled = levels[-1][..., :3] / np.maximum(levels[-1][..., 3:], 1e-6)
     for level in levels[-2::-1]:
         height, width = level.shape[:2]
@@ -97,7 +98,7 @@ def remove_fringe(albedo: UInt8, alpha: UInt8) -> UInt8:
 def halve_image(image: Pixels) -> Pixels:
     """Means of 2 x 2 blocks of an image [h, w, channels]; a single row or column stays.
 
-    Odd sizes drop their last row or column: of a tiling image that is a shift nobody sees.
+    Odd sizes drop their last row or column: an invisible shift in a tiling image.
     """
     height, width = max(image.shape[0] // 2, 1), max(image.shape[1] // 2, 1)
     even = np.ascontiguousarray(image[: 2 * height, : 2 * width])
@@ -106,57 +107,57 @@ def halve_image(image: Pixels) -> Pixels:
 
 
 def _texels(albedo: UInt8, roughness: UInt8) -> tuple[list[int], NDArray[np.uint32]]:
-    """Texels per mip level, and all levels packed one after the other.
+    """Texels per mip level, and all levels packed one after another.
 
-    Colours are kept as square roots of linear values, which spend the eight bits as evenly for
-    the eye as sRGB does and are quick to undo. Roughness is the fourth channel: its square, the
-    width of a highlight, is what coarser levels average.
+    Colours are stored as square roots of linear values, which distribute eight bits perceptually
+    much like sRGB and are cheap to invert. Roughness is the fourth channel: coarser levels average
+    its square, the width of a highlight.
     """
-    finest = _with_fourth(cv2.LUT(albedo, _root_of()), roughness)
+    finest = _append_channel(cv2.LUT(albedo, _sqrt_table()), roughness)
     levels = [finest]
     if max(finest.shape[:2]) > 1:
         squared = finest.astype(np.uint16)
         squared *= squared
         image = halve_image(squared).astype(np.float32) * np.float32(255.0**-2)
-        levels += [_in_bytes(cv2.sqrt(level)) for level in _halvings(image)]
-    return [level.shape[0] * level.shape[1] for level in levels], _packed(levels)
+        levels += [_to_bytes(cv2.sqrt(level)) for level in _mip_levels(image)]
+    return [level.shape[0] * level.shape[1] for level in levels], _pack(levels)
 
 
 @cache
-def _root_of() -> UInt8:
-    """Square roots of linear values by sRGB values."""
+def _sqrt_table() -> UInt8:
+    """Square roots of linear values by sRGB value."""
     return np.floor(np.sqrt(srgb_decode(np.arange(256) / 255.0)) * 255.0 + 0.5).astype(np.uint8)
 
 
-def _means(finest: Pixels) -> NDArray[np.uint32]:
-    """Four channels of all mip levels, packed one after the other."""
+def _mean_levels(finest: Pixels) -> NDArray[np.uint32]:
+    """Four channels of all mip levels, packed one after another."""
     levels = [finest]
     if max(finest.shape[:2]) > 1:
         image = halve_image(finest).astype(np.float32) * np.float32(1.0 / 255.0)
-        levels += [_in_bytes(level) for level in _halvings(image)]
-    return _packed(levels)
+        levels += [_to_bytes(level) for level in _mip_levels(image)]
+    return _pack(levels)
 
 
-def _halvings(image: Pixels) -> list[Pixels]:
-    """An image, and its halves down to one texel."""
+def _mip_levels(image: Pixels) -> list[Pixels]:
+    """An image and its halves down to one texel."""
     images = [image]
     while max(images[-1].shape[:2]) > 1:
         images.append(halve_image(images[-1]))
     return images
 
 
-def _with_fourth(three: Pixels, fourth: Pixels) -> Pixels:
-    """Three channels and one more."""
+def _append_channel(three: Pixels, fourth: Pixels) -> Pixels:
+    """Append a fourth channel to three."""
     four: Pixels = cv2.merge([*cv2.split(three), fourth])
     return four
 
 
-def _in_bytes(image: Pixels) -> Pixels:
+def _to_bytes(image: Pixels) -> Pixels:
     """Values in [0, 1] as bytes, rounded."""
     steps: Pixels = cv2.convertScaleAbs(image, alpha=255.0).reshape(image.shape)
     return steps
 
 
-def _packed(levels: Sequence[Pixels]) -> NDArray[np.uint32]:
-    """Four bytes of each texel as one integer, level after level; the first byte lowest."""
+def _pack(levels: Sequence[Pixels]) -> NDArray[np.uint32]:
+    """Pack the four bytes of each texel into one integer, level after level; first byte lowest."""
     return np.concatenate([level.reshape(-1) for level in levels]).view("<u4")

@@ -1,4 +1,4 @@
-"""Environment images on the device: irradiance, blurred reflections and the image itself."""
+"""Environments on the device: irradiance, prefiltered reflections and the image itself."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import
 
 _GLOSSY_LEVELS = 4
 _GLOSSY_SIZE = 24
-# Lobes of each level are wider than the texels of an image of that height.
+# Source resolution of each level: its lobe is wider than a texel of that size.
 _SOURCE_HEIGHTS = (48, 24, 24, 24)
 _IRRADIANCE_HEIGHT = 32
-# Finer images are split as coarsely: the time it takes, and the memory, grow with the texels.
+# Finer images are split at this resolution: time and memory grow with the texels.
 _SPLIT_HEIGHT = 512
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DeviceEnvironment:
-    """One environment of mean luminance 1; the arrays are those of a Sky record.
+    """One environment of mean luminance 1; arrays as of EnvironmentRecord.
 
     Attributes:
-        lamps: What stands for the parts that ``rest`` lacks.
+        lamps: Lamps that replace the parts missing from ``rest``.
     """
 
     irradiance: wp.array
@@ -45,23 +45,23 @@ class DeviceEnvironment:
 
 
 def upload_environment(image: Float32, device: wp.Device) -> DeviceEnvironment:
-    """An equirectangular image, shape [h, 2h, 3], ready for kernels, as light without shadows."""
+    """Upload an equirectangular image [h, 2h, 3] as light without shadows."""
     shown = wp.array(image, dtype=wp.vec3, device=device)
-    return _lit_by(image, (), shown, shown)
+    return _upload(image, (), shown, shown)
 
 
 def upload_split(image: Float32, whole: DeviceEnvironment) -> DeviceEnvironment:
-    """The same with its brightest parts as lamps; ``whole`` itself if it has none."""
-    light = _shrunk(image, _SPLIT_HEIGHT)
+    """The same environment with its brightest parts as lamps; ``whole`` itself without any."""
+    light = _shrink(image, _SPLIT_HEIGHT)
     rest, lamps = remove_peaks(light)
     if not lamps:
         return whole
-    mirrored = wp.array(_dimmed(image, light, rest), dtype=wp.vec3, device=whole.image.device)
-    return _lit_by(rest, lamps, whole.image, mirrored)
+    mirrored = wp.array(_dim(image, light, rest), dtype=wp.vec3, device=whole.image.device)
+    return _upload(rest, lamps, whole.image, mirrored)
 
 
-def _dimmed(image: Float32, light: Float32, rest: Float32) -> Float32:
-    """The image as much darker as its shrunk copy ``light`` is in ``rest``."""
+def _dim(image: Float32, light: Float32, rest: Float32) -> Float32:
+    """Darken the image as its reduced copy ``light`` is darkened in ``rest``."""
     if image.shape == rest.shape:
         return rest
     before = luminance(light)
@@ -72,17 +72,17 @@ def _dimmed(image: Float32, light: Float32, rest: Float32) -> Float32:
     return dimmed
 
 
-def _lit_by(
+def _upload(
     light: Float32, lamps: tuple[SkyLamp, ...], image: wp.array, rest: wp.array
 ) -> DeviceEnvironment:
     device = image.device
     maps = np.stack(
         [
-            add_border(_smoothed(light, level, device).numpy())
+            add_border(_prefilter_level(light, level, device).numpy())
             for level in range(1, _GLOSSY_LEVELS + 1)
         ]
     )
-    irradiance = irradiance_coefficients(_shrunk(light, _IRRADIANCE_HEIGHT))
+    irradiance = irradiance_coefficients(_shrink(light, _IRRADIANCE_HEIGHT))
     return DeviceEnvironment(
         wp.array(irradiance, dtype=wp.vec3, device=device),
         wp.array(maps, dtype=wp.vec3, device=device),
@@ -94,7 +94,7 @@ def _lit_by(
 
 
 def irradiance_coefficients(image: Float32) -> Array:
-    """Nine RGB coefficients of irradiance over pi, with the basis' constants folded in.
+    """Nine RGB coefficients of irradiance over pi, with the basis constants included.
 
     Source: Ramamoorthi and Hanrahan 2001, equations 3, 8 and 10.
     """
@@ -110,7 +110,7 @@ def irradiance_coefficients(image: Float32) -> Array:
 
 
 def add_border(maps: Float32) -> Float32:
-    """An octahedral map [n, n, 3] with a border that continues it, [n + 2, n + 2, 3]."""
+    """An octahedral map [n, n, 3] with a border across its folds, [n + 2, n + 2, 3]."""
     wide = np.pad(maps, ((1, 1), (1, 1), (0, 0)), mode="edge")
     wide[0, 1:-1], wide[-1, 1:-1] = maps[0, ::-1], maps[-1, ::-1]
     wide[1:-1, 0], wide[1:-1, -1] = maps[::-1, 0], maps[::-1, -1]
@@ -119,19 +119,19 @@ def add_border(maps: Float32) -> Float32:
     return wide
 
 
-def _smoothed(image: Float32, level: int, device: wp.Device) -> wp.array:
-    source = _shrunk(image, _SOURCE_HEIGHTS[level - 1])
-    shares = _shares(source.shape[0], level, device.alias)
+def _prefilter_level(image: Float32, level: int, device: wp.Device) -> wp.array:
+    source = _shrink(image, _SOURCE_HEIGHTS[level - 1])
+    shares = _texel_weights(source.shape[0], level, device.alias)
     smoothed = wp.zeros(_GLOSSY_SIZE**2, dtype=wp.vec3, device=device)
     radiance = wp.array(source.reshape(-1, 3), dtype=wp.vec3, device=device)
     wp.launch(prefilter, _GLOSSY_SIZE**2 // 4, [shares, radiance], [smoothed], device=device)
     return smoothed.reshape((_GLOSSY_SIZE, _GLOSSY_SIZE))
 
 
-# Environments of one height share them, and every view may have another environment.
+# Environments of one size share these weights, and every view may have another environment.
 @lru_cache(maxsize=_GLOSSY_LEVELS)
-def _shares(height: int, level: int, device: str) -> wp.array:
-    """What ``weigh_texels`` says for environments of a height, float [map texels, texels]."""
+def _texel_weights(height: int, level: int, device: str) -> wp.array:
+    """Weights computed by ``weigh_texels``, float [map texels, texels]."""
     directions, solid = texel_directions(height)
     roughness = level / _GLOSSY_LEVELS
     shares = wp.zeros((_GLOSSY_SIZE**2, solid.size), dtype=float, device=device)
@@ -145,7 +145,7 @@ def _shares(height: int, level: int, device: str) -> wp.array:
     return shares
 
 
-def _shrunk(image: Float32, height: int) -> Float32:
+def _shrink(image: Float32, height: int) -> Float32:
     if image.shape[0] <= height:
         return image
     size = (2 * height, height)

@@ -1,4 +1,4 @@
-"""Shadows that a panorama throws: its brightest parts become lamps where that can be seen."""
+"""Shadows of panoramas: their brightest parts become lamps where shadows would be visible."""
 
 from __future__ import annotations
 
@@ -11,52 +11,52 @@ from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.scene import Environment, Light, Scene
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import see_out
+from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import count_free_paths
 from gen_data.generator.renderers.warp.scene.envmap_peaks import SkyLamp
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.scene_packing import (
     PackedWorld,
-    add_own_record,
+    copy_world,
     lamp_records,
     sky_record,
 )
 
-# Fainter parts of all the light at the focus throw shadows that nobody would miss.
+# Parts with a smaller share of the light at the focus cast no visible shadows.
 _SHARE = 0.1
 _FAR_M = 1e3
 
 
-def extract_sky_lights(world: PackedWorld, scene: Scene, stock: DeviceCache) -> PackedWorld:
-    """The world with lamps for what is brightest in its panorama.
+def extract_sky_lights(world: PackedWorld, scene: Scene, cache: DeviceCache) -> PackedWorld:
+    """The world with lamps for the brightest parts of its panorama.
 
-    Not where the scene has a sun, which its panorama then lacks; nor where walls shut the panorama
-    out, whose light then is that of the room; nor where other lamps drown it.
+    Unchanged if the scene has a sun, which its panorama then lacks; if walls block the panorama,
+    whose light is then the room's; or if other lamps outshine it.
     """
     environment = scene.environment
     if environment.luminance_cd_m2 <= 0.0 or any(light.kind == "sun" for light in scene.lights):
         return world
     points = _viewpoints(scene)
-    if not _is_open(world, points, _directions_around(), stock):
+    if not _is_open(world, points, _directions_around(), cache):
         return world
-    split = stock.split_environment(environment.image)
-    if not split.lamps or not _matters(split.lamps[0], scene):
+    split = cache.split_environment(environment.image)
+    if not split.lamps or not _is_significant(split.lamps[0], scene):
         return world
     suns = [_sun(lamp, environment) for lamp in split.lamps]
     towards = np.array([np.negative(sun.direction) for sun in suns])
-    if not _is_open(world, points, towards, stock):
+    if not _is_open(world, points, towards, cache):
         return world
-    lit = add_own_record(world)
+    lit = copy_world(world)
     lit.record.sky = sky_record(environment, split)
     added = lamp_records(suns)
-    # Mirrored rays find them in the panorama.
+    # Reflected rays hit them in the panorama itself.
     added["shown"] = 1
     lamps = np.concatenate([world.record.lamps.numpy(), added])
-    lit.record.lamps = wp.array(lamps, dtype=records.LightRecord, device=stock.device)
+    lit.record.lamps = wp.array(lamps, dtype=records.LightRecord, device=cache.device)
     return lit
 
 
 def _sun(lamp: SkyLamp, environment: Environment) -> Light:
-    """The light in the world."""
+    """The lamp as a light in the world."""
     x, y, z = lamp.towards
     c, s = math.cos(environment.yaw_rad), math.sin(environment.yaw_rad)
     power = np.asarray(lamp.power)
@@ -72,8 +72,8 @@ def _sun(lamp: SkyLamp, environment: Environment) -> Light:
     )
 
 
-def _matters(lamp: SkyLamp, scene: Scene) -> bool:
-    """Whether a part of the panorama gives more than a little of the light at the focus."""
+def _is_significant(lamp: SkyLamp, scene: Scene) -> bool:
+    """Whether a part of the panorama contributes noticeably to the light at the focus."""
     lux = float(luminance(np.asarray(lamp.power))) * scene.environment.luminance_cd_m2
     others = sum(
         light.intensity_cd / max(math.dist(light.position_m, scene.focus.center_m) ** 2, 1e-4)
@@ -83,7 +83,7 @@ def _matters(lamp: SkyLamp, scene: Scene) -> bool:
 
 
 def _viewpoints(scene: Scene) -> Array:
-    """Points over the focus and at the cameras, shape [n, 3]."""
+    """Points above the focus and at the cameras, [n, 3]."""
     center, half = np.asarray(scene.focus.center_m), 0.5 * np.asarray(scene.focus.size_m)
     corners = [center + half * (x, y, 1.0) for x in (-1, 0, 1) for y in (-1, 0, 1)]
     eyes = [np.asarray(camera.T_world_camera.translation_m) for camera in scene.cameras]
@@ -91,21 +91,21 @@ def _viewpoints(scene: Scene) -> Array:
 
 
 def _directions_around() -> Array:
-    """Twelve directions over the horizon, evenly spread (a Fibonacci spiral), shape [12, 3]."""
+    """Twelve directions above the horizon, evenly distributed (Fibonacci spiral), [12, 3]."""
     k = np.arange(12)
     up = (k + 0.5) / 12.0
     level, azimuth = np.sqrt(1.0 - up * up), k * math.pi * (3.0 - math.sqrt(5.0))
     return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), up], axis=-1)
 
 
-def _is_open(world: PackedWorld, points: Array, towards: Array, stock: DeviceCache) -> bool:
-    """Whether any of these directions is free at any of these points."""
-    device = stock.device
+def _is_open(world: PackedWorld, points: Array, towards: Array, cache: DeviceCache) -> bool:
+    """Whether any of the directions is unobstructed at any of the points."""
+    device = cache.device
     free = wp.zeros(1, dtype=wp.int32, device=device)
     inputs = [
         world.record,
         wp.array(points, dtype=wp.vec3, device=device),
         wp.array(towards * _FAR_M, dtype=wp.vec3, device=device),
     ]
-    wp.launch(see_out, len(points), inputs, [free], device=device)
+    wp.launch(count_free_paths, len(points), inputs, [free], device=device)
     return int(free.numpy()[0]) > 0

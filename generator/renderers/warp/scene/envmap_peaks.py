@@ -1,11 +1,11 @@
-"""The brightest parts of a panorama as lamps at infinity, and the panorama without them.
+"""Extraction of a panorama's brightest parts as lamps at infinity.
 
-Light from all around throws no shadows here; what a sun, a window or a softbox in a panorama gives
-does. Each such part becomes a disc in the sky with the part's flow of light, so that a surface that
-has all of it before it is lit as before: exactly, whatever the part's shape.
+Environment light casts no shadows here, but a sun, a window or a softbox in a panorama should. Each
+such part becomes a disk in the sky with the part's vector irradiance, so that a surface with the
+whole part above its horizon receives exactly the same light, whatever the part's shape.
 
-Source, for the idea: Debevec, "A median cut algorithm for light probe sampling", SIGGRAPH 2005
-posters; here only what stands out is taken, and the rest stays an image.
+Source of the idea: Debevec, "A median cut algorithm for light probe sampling", SIGGRAPH 2005
+posters; here only outstanding parts are extracted, and the rest remains an image.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ from gen_data.generator.core.se3 import Array, Vec3
 from gen_data.generator.renderers.warp.scene.equirectangular import texel_directions
 
 LAMPS_MAX = 3
-# Rows of the image in which parts are looked for.
+# Rows of the reduced image in which parts are detected.
 _SEARCH_ROWS = 128
-# Times the mean luminance above which something is bright; a sun in its halo is found first.
+# Thresholds in units of the mean luminance, highest first: a sun is found before its halo.
 _LEVELS = (2048.0, 256.0, 32.0, 4.0)
-# Panes of one window are not farther apart than this.
+# Panes of one window are closer together than this.
 _GAP_RAD = math.radians(3.0)
-# Share of the light on a surface that faces it, and of the strongest part's, that a part gives.
+# Minimum share of the light on a surface that faces the part, and of the strongest part's.
 _SHARE = 0.1
-# Quantile of the luminance around a part down to which it is taken out.
+# Quantile of the luminance around a part, which remains in the image.
 _RIM = 0.25
-# Parts with less light than this, per mean luminance, are not looked at any closer.
+# Parts with less light than this, per mean luminance, are skipped.
 _FAINT = 0.08
-# Wider parts throw shadows that are as good as none.
+# Shadows of wider parts are invisible.
 _RADIUS_RAD_MAX = math.radians(25.0)
 
 
@@ -46,9 +46,10 @@ class SkyLamp:
 
     Attributes:
         towards: Unit vector from the scene to it.
-        power: Linear RGB illuminance of what faces it, per mean luminance of the panorama.
-        share: What part that is of all the panorama's light on such a surface.
-        angular_radius_rad: Of a disc that is as spread out.
+        power: Linear RGB illuminance of a surface that faces it, per mean luminance of the
+            panorama.
+        share: Its share of the panorama's light on such a surface.
+        angular_radius_rad: Angular radius of a disk with the same spread.
     """
 
     towards: Vec3
@@ -60,19 +61,19 @@ class SkyLamp:
 def remove_peaks(image: Float32) -> tuple[Float32, tuple[SkyLamp, ...]]:
     """The panorama without its brightest parts, and those parts, the strongest first.
 
-    Without any, the panorama itself.
+    The panorama itself if there are none.
 
     Args:
         image: Equirectangular luminance of mean 1, shape [h, 2h, 3].
     """
-    if float(_searched(image).max()) <= _LEVELS[-1]:
+    if float(_search_luminance(image).max()) <= _LEVELS[-1]:
         return image, ()
     sphere = _Sphere(*texel_directions(image.shape[0]), luminance(image.astype(np.float64)))
     rest, found = image.astype(np.float64), []
     for level in _LEVELS:
-        for part, floor in _parts(_searched(rest), level, sphere.luminance.shape):
+        for part, floor in _find_parts(_search_luminance(rest), level, sphere.luminance.shape):
             excess = _excess(rest, part, floor)
-            lamp = _lamp(excess, sphere)
+            lamp = _fit_lamp(excess, sphere)
             if lamp.share > _SHARE and lamp.angular_radius_rad < _RADIUS_RAD_MAX:
                 found.append((lamp, excess))
                 rest = rest - excess
@@ -86,15 +87,15 @@ def remove_peaks(image: Float32) -> tuple[Float32, tuple[SkyLamp, ...]]:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Sphere:
-    """Unit directions and solid angles of an image's texels, and what is seen there."""
+    """Unit directions, solid angles and luminance of an image's texels."""
 
     directions: Array
     solid: Array
     luminance: Array
 
 
-def _searched(image: Array | Float32) -> Array:
-    """Luminance at the size in which parts are looked for."""
+def _search_luminance(image: Array | Float32) -> Array:
+    """Luminance at the resolution of detection."""
     height = image.shape[0]
     if height > _SEARCH_ROWS:
         size = (2 * _SEARCH_ROWS, _SEARCH_ROWS)
@@ -102,15 +103,15 @@ def _searched(image: Array | Float32) -> Array:
     return luminance(image.astype(np.float64))
 
 
-def _parts(
+def _find_parts(
     small: Array, level: float, shape: tuple[int, ...]
 ) -> Iterator[tuple[NDArray[np.bool_], float]]:
-    """Coherent parts brighter than a level: their masks, and the luminance around them.
+    """Connected parts above a threshold: their masks, and the luminance around them.
 
     Args:
-        small: What ``_searched`` says.
-        level: Times the mean.
-        shape: Of the masks.
+        small: Result of ``_search_luminance``.
+        level: Threshold in units of the mean.
+        shape: Shape of the masks.
     """
     bright = small > level
     if not bright.any():
@@ -118,11 +119,11 @@ def _parts(
     rows = small.shape[0]
     reach = max(round(_GAP_RAD / math.pi * rows), 1)
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
-    # What is beyond one end of the image is at the other.
+    # The image wraps around horizontally.
     around = np.pad(bright.astype(np.uint8), ((0, 0), (reach, reach)), mode="wrap")
     grown = np.ascontiguousarray(cv2.dilate(around, kernel)[:, reach:-reach])
     count, labels = cv2.connectedComponents(grown, connectivity=8)
-    labels = np.asarray(_joined(labels, count), dtype=np.int32)[labels]
+    labels = np.asarray(_merge_labels(labels, count), dtype=np.int32)[labels]
     flux = small * texel_directions(rows)[1] * bright
     totals = np.bincount(labels.reshape(-1), weights=flux.reshape(-1), minlength=count)
     size = (shape[1], shape[0])
@@ -134,8 +135,8 @@ def _parts(
         yield whole.astype(bool), floor
 
 
-def _joined(labels: NDArray[np.int32], count: int) -> list[int]:
-    """The label that each label stands for where parts meet at the ends of the image."""
+def _merge_labels(labels: NDArray[np.int32], count: int) -> list[int]:
+    """Representative of each label, merging parts that meet across the image's ends."""
     first = list(range(count))
     for left, right in zip(labels[:, 0].tolist(), labels[:, -1].tolist(), strict=True):
         if left and right:
@@ -145,7 +146,7 @@ def _joined(labels: NDArray[np.int32], count: int) -> list[int]:
 
 
 def _excess(image: Array, part: NDArray[np.bool_], floor: float) -> Array:
-    """What a part is brighter than the floor, in its colours; 0 elsewhere. Shape of the image."""
+    """The part above the floor, in its own colours; 0 elsewhere. Shape of the image."""
     bright = luminance(image.astype(np.float64))
     brighter = part & (bright > floor)
     share = np.where(brighter, 1.0 - floor / np.where(brighter, bright, 1.0), 0.0)
@@ -153,16 +154,16 @@ def _excess(image: Array, part: NDArray[np.bool_], floor: float) -> Array:
     return excess
 
 
-def _lamp(excess: Array, sphere: _Sphere) -> SkyLamp:
-    """The disc that sends the same flow of light to the scene."""
+def _fit_lamp(excess: Array, sphere: _Sphere) -> SkyLamp:
+    """The disk with the same vector irradiance."""
     weights = luminance(excess) * sphere.solid
     flow = np.array([float((weights * sphere.directions[..., k]).sum()) for k in range(3)])
     towards = flow / math.sqrt(float((flow * flow).sum()))
     cosine = _cosine(towards, sphere)
     projected = sphere.solid * cosine
     red, green, blue = (float((excess[..., k] * projected).sum()) for k in range(3))
-    # Over a disc of radius r in the sky, 1 - cos of the angle from its middle is (1 - cos r) / 2 on
-    # average. A texel is itself as wide as that.
+    # For a disk of radius r in the sky, the mean of 1 - cos of the angle from its centre is (1 -
+    # cos r) / 2. The texels' own extent is subtracted.
     total = float(weights.sum())
     spread = 2.0 * float((weights * (1.0 - cosine)).sum()) / total
     texel = float((weights * sphere.solid).sum()) / total / (2.0 * math.pi)

@@ -1,4 +1,4 @@
-"""Directions and averages of equirectangular images."""
+"""Geometry of equirectangular images."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which of many lamps light a view: every lamp costs as much as the next, however dim."""
+"""Selection of the lights that matter in a view: each costs the same, however dim."""
 
 from __future__ import annotations
 
@@ -18,43 +18,43 @@ from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
 from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer
 
 _STRIDE_PX = 11
-# Light that is taken for granted, so that lamps are not ranked by what they do in the dark [lx].
+# Assumed background illuminance, so that lamps are not ranked by their effect in the dark [lx].
 _DIM_LUX = 0.05
-# A lamp also matters for what is turned away from it: its glow, its reflections.
+# Minimum cosine: a lamp also matters for surfaces turned away from it, by its glow and reflections.
 _TURNED_AWAY = 0.1
 
 
 def keep_main_lamps(
-    world: PackedWorld, view: records.View, seen: GBuffer, stock: DeviceCache, lamps_max: int
+    world: PackedWorld, view: records.View, gbuffer: GBuffer, cache: DeviceCache, lamps_max: int
 ) -> None:
-    """Leave the world the lamps that give most of the light at what is seen."""
-    chosen = main_lamp_numbers(world, view, seen, lamps_max)
+    """Restrict the world to the lamps that contribute most to the visible surfaces, in place."""
+    chosen = main_lamp_numbers(world, view, gbuffer, lamps_max)
     if chosen is not None:
         lamps = world.record.lamps.numpy()[chosen]
-        world.record.lamps = wp.array(lamps, dtype=records.LightRecord, device=stock.device)
+        world.record.lamps = wp.array(lamps, dtype=records.LightRecord, device=cache.device)
 
 
 def main_lamp_numbers(
-    world: PackedWorld, view: records.View, seen: GBuffer, lamps_max: int
+    world: PackedWorld, view: records.View, gbuffer: GBuffer, lamps_max: int
 ) -> NDArray[np.int64] | None:
     """Numbers of the lamps that ``keep_main_lamps`` keeps, ascending; None = all."""
     lamps = world.record.lamps.numpy()
     if len(lamps) <= lamps_max:
         return None
-    points, normals = _sparse_points(view, seen)
+    points, normals = _sparse_points(view, gbuffer)
     return main_lamps(lamps, points, normals, lamps_max)
 
 
 def main_lamps(
     lamps: NDArray[np.void], points_m: Array, normals: Array, lamps_max: int
 ) -> NDArray[np.int64]:
-    """Numbers of at most that many lamps, ascending: suns, then those with the largest shares.
+    """Numbers of the selected lamps, ascending: suns first, then by share of light.
 
     Args:
         lamps: Lamp records.
-        points_m: What is seen, world frame, shape [n, 3].
-        normals: Unit, there.
-        lamps_max: How many.
+        points_m: Visible points, world frame, [n, 3].
+        normals: Unit normals at these points, [n, 3].
+        lamps_max: Maximum number of lamps.
     """
     lux = np.stack([_illuminance(lamp, points_m, normals) for lamp in lamps])
     shares = (lux / (_DIM_LUX + lux.sum(axis=0))).sum(axis=1)
@@ -64,11 +64,11 @@ def main_lamps(
 
 
 def _illuminance(lamp: NDArray[np.void], points_m: Array, normals: Array) -> Array:
-    """Of one lamp at points [lx], without shadows."""
+    """Unshadowed illuminance of one lamp at points [lx]."""
     kind = LIGHT_KINDS[lamp["kind"]]
     if kind == "sun":
         return np.zeros(len(points_m))
-    # Axis by axis: reducing over a short last axis takes three times as long.
+    # Axis by axis: a reduction over a short last axis takes three times as long.
     away = [float(lamp["position_m"][k]) - points_m[:, k] for k in range(3)]
     squared = np.maximum(away[0] * away[0] + away[1] * away[1] + away[2] * away[2], 1e-2)
     distance = np.sqrt(squared)
@@ -88,7 +88,7 @@ def _illuminance(lamp: NDArray[np.void], points_m: Array, normals: Array) -> Arr
 
 
 def dipped_share(lamp: NDArray[np.void], d: Sequence[Array]) -> Array:
-    """As kernels.lighting.dipped_share, in many directions, given axis by axis."""
+    """As kernels.analytic_lights.dipped_share, for many directions, given axis by axis."""
     axis = [float(along) for along in lamp["direction"]]
     level = math.hypot(axis[0], axis[1])
     right = [axis[1] / level, -axis[0] / level, 0.0]
@@ -110,11 +110,11 @@ def _dot(a: Sequence[Array], b: Sequence[Array] | Sequence[float]) -> Array:
     return product
 
 
-def _sparse_points(view: records.View, seen: GBuffer) -> tuple[Array, Array]:
-    """Points and normals at every few pixels that see something, world frame."""
+def _sparse_points(view: records.View, gbuffer: GBuffer) -> tuple[Array, Array]:
+    """Visible points and normals at a sparse grid of pixels, world frame."""
     shape = (view.height, view.width)
-    z = seen.z_m.numpy().reshape(shape)[::_STRIDE_PX, ::_STRIDE_PX].astype(np.float64)
-    normals = seen.normals.numpy().reshape(*shape, 3)[::_STRIDE_PX, ::_STRIDE_PX]
+    z = gbuffer.z_m.numpy().reshape(shape)[::_STRIDE_PX, ::_STRIDE_PX].astype(np.float64)
+    normals = gbuffer.normals.numpy().reshape(*shape, 3)[::_STRIDE_PX, ::_STRIDE_PX]
     rows, columns = np.nonzero(np.isfinite(z))
     directions = _directions(view, rows * _STRIDE_PX, columns * _STRIDE_PX)
     p_camera = directions * z[rows, columns, None]

@@ -1,32 +1,79 @@
-"""Materials as the records that kernels read."""
+"""Materials of bodies as the records that kernels read."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.renderers.warp.scene.body_materials import BodyMaterials
+from gen_data.generator.core.asset_types import SURFACES, Material
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.scene.device_textures import DeviceTexture
 from gen_data.generator.renderers.warp.scene.kernels import records
-from gen_data.generator.renderers.warp.scene.struct_dtypes import stack_records
+from gen_data.generator.renderers.warp.scene.struct_dtypes import stack_records, struct_dtype
+
+_COLUMNS = (
+    "base_color", "roughness", "metallic", "specular", "texture_scale_m", "emission_cd_m2", "coat",
+    "coat_roughness", "transmission", "ior", "thin", "opacity",
+)  # fmt: skip
+_SURFACE = {role: number for number, role in enumerate(SURFACES)}
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class BodyMaterials:
+    """Materials of one body.
+
+    Attributes:
+        materials: Materials, one per slot of its mesh.
+        surfaces: Their MaterialRecord records; ``texture`` is an index into ``textures``, or -1.
+        textures: Texture ids, sorted.
+        roles: Role of each, as an index into ``gen_data.generator.core.asset_types.SURFACES``.
+    """
+
+    materials: tuple[Material, ...]
+    surfaces: NDArray[np.void]
+    textures: tuple[str, ...]
+    roles: NDArray[np.uint8]
+
+
+def body_materials(scene: Scene, cache: DeviceCache) -> list[BodyMaterials]:
+    """Materials of every body, packed once and cached."""
+    own = [body.materials or cache.materials(body.asset) for body in scene.bodies]
+    return [
+        cache.material_records.get(materials, partial(_pack_materials, materials))
+        for materials in own
+    ]
+
+
+def _pack_materials(materials: tuple[Material, ...]) -> BodyMaterials:
+    textures = tuple(sorted({m.texture for m in materials if m.texture}))
+    values = np.zeros(len(materials), dtype=struct_dtype(records.MaterialRecord))
+    if materials:
+        values["texture"] = [textures.index(m.texture) if m.texture else -1 for m in materials]
+        for name in _COLUMNS:
+            values[name] = [getattr(m, name) for m in materials]
+    roles = np.array([_SURFACE.get(m.role, 0) for m in materials], np.uint8)
+    return BodyMaterials(materials, values, textures, roles)
 
 
 def surface_records(
-    looks: Sequence[BodyMaterials], textures: Mapping[str, DeviceTexture]
+    per_body: Sequence[BodyMaterials], textures: Mapping[str, DeviceTexture]
 ) -> NDArray[np.void]:
-    """Surface records of all bodies, body after body; at least one.
+    """Material records of all bodies, body after body; at least one.
 
     Args:
-        looks: Of the bodies.
-        textures: All that the bodies name, in the order of the device's textures.
+        per_body: Materials of the bodies.
+        textures: All textures that the bodies name, in the order of the device's textures.
     """
-    values = stack_records([look.surfaces for look in looks], records.MaterialRecord)
+    values = stack_records([entry.surfaces for entry in per_body], records.MaterialRecord)
     place = {texture_id: k for k, texture_id in enumerate(textures)}
-    listed = np.array([*(place[t] for look in looks for t in look.textures), -1], np.int32)
-    counts = np.array([len(look.textures) for look in looks], np.int64)
-    first = np.repeat(np.cumsum(counts) - counts, [len(look.materials) for look in looks])
+    listed = np.array([*(place[t] for entry in per_body for t in entry.textures), -1], np.int32)
+    counts = np.array([len(entry.textures) for entry in per_body], np.int64)
+    first = np.repeat(np.cumsum(counts) - counts, [len(entry.materials) for entry in per_body])
     if not len(first):
         return values
     local = values["texture"]
@@ -45,8 +92,8 @@ def surface_records(
 def cutout_slots(
     surfaces: NDArray[np.void], textures: Mapping[str, DeviceTexture]
 ) -> NDArray[np.int32]:
-    """By surface, HOLES where its texture has any, and CLEAR where it casts no shadow."""
-    holes = np.array([*(texture.pierced for texture in textures.values()), False])
+    """Per material: HOLES if its texture has any, and CLEAR if it casts no shadow."""
+    holes = np.array([*(texture.has_cutouts for texture in textures.values()), False])
     clear = (surfaces["transmission"] > 0.5) | (surfaces["opacity"] < 0.5)
     flags = holes[surfaces["texture"]] * int(records.HOLES) + clear * int(records.CLEAR)
     slots: NDArray[np.int32] = flags.astype(np.int32)
@@ -54,11 +101,11 @@ def cutout_slots(
 
 
 def cutout_bodies(slots: NDArray[np.int32], counts: NDArray[np.int64]) -> NDArray[np.int32]:
-    """The union of the flags of each body's slots.
+    """Per body: the union of its slots' flags.
 
     Args:
-        slots: Of all bodies' materials, body after body.
-        counts: Materials of each body.
+        slots: Flags of all bodies' materials, body after body.
+        counts: Number of materials of each body.
     """
     if not slots.any():
         return np.zeros(len(counts), np.int32)

@@ -1,4 +1,4 @@
-"""A Scene and a Camera as the records that kernels read."""
+"""Packing of a Scene and a Camera into the records that kernels read."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from gen_data.generator.core.scene import (
 )
 from gen_data.generator.core.se3 import Array, unit_quaternions_to_rotations
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.scene.body_materials import body_materials
 from gen_data.generator.renderers.warp.scene.bvh import body_tree
 from gen_data.generator.renderers.warp.scene.device_meshes import DeviceMesh
 from gen_data.generator.renderers.warp.scene.environment_maps import DeviceEnvironment
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.material_packing import (
+    body_materials,
     cutout_bodies,
     cutout_slots,
     surface_records,
@@ -53,17 +53,17 @@ class PackedWorld:
 
     Attributes:
         record: The World record.
-        keep: Everything on the device that the record points to.
-        placed: Body records on the host, structured array [n].
-        vertex_count: Of all bodies together.
-        weather: Of the scene.
-        layered: Whether any surface has more to it than colour, roughness and bumps.
-        lows_m, highs_m: Corners of boxes in the world around the bodies, one at least.
+        keep: Device memory that the record points to.
+        body_records: Body records on the host, structured array [n].
+        vertex_count: Vertices of all bodies.
+        weather: Weather of the scene.
+        layered: Whether any surface is layered, see MaterialRecord.
+        lows_m, highs_m: Corners of the bodies' boxes in the world; at least one.
     """
 
     record: records.World
     keep: tuple[object, ...]
-    placed: NDArray[np.void]
+    body_records: NDArray[np.void]
     vertex_count: int
     weather: Weather
     layered: bool
@@ -72,196 +72,177 @@ class PackedWorld:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Trees:
-    """What finds bodies for rays: fields of the World record.
+class _Placement:
+    """Poses of a scene's bodies, independent of the camera.
 
     Attributes:
-        tree: On CUDA empty.
-        hierarchy: On the CPU None.
-        pierced: Numbers of bodies.
-        pierced_hierarchy: None where there are none.
-    """
-
-    tree: wp.array
-    hierarchy: wp.Bvh | None
-    pierced: wp.array
-    pierced_hierarchy: wp.Bvh | None
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class _Places:
-    """Where the bodies of a scene are, whoever looks at them.
-
-    Attributes:
-        placed: Body records without what depends on the camera.
-        R_world_mesh, t_world_mesh, scale: Of the bodies, float64 [n, 3, 3], [n, 3] and [n].
+        body_records: Body records without the fields that depend on the camera.
+        R_world_mesh, t_world_mesh, scale: Poses of the bodies, float64 [n, 3, 3], [n, 3] and [n].
         vertex_count, lows_m, highs_m: As of PackedWorld.
-        trees: What rays find them by.
+        hierarchies: Kept alive for the World record, which has only their ids.
     """
 
-    placed: NDArray[np.void]
+    body_records: NDArray[np.void]
     R_world_mesh: Array
     t_world_mesh: Array
     scale: Array
     vertex_count: int
     lows_m: wp.array
     highs_m: wp.array
-    trees: _Trees
+    hierarchies: tuple[wp.Bvh | None, ...]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Packed:
-    """What every camera and scanner shares of one scene.
+class _PackedScene:
+    """Data that all cameras and scanners of one scene share.
 
     Attributes:
         record: The World record, without bodies.
         assets: Meshes, textures and environment that the record points to.
-        places: Where the bodies are.
+        placement: Poses of the bodies.
         layered: As of PackedWorld.
     """
 
     record: records.World
     assets: tuple[object, ...]
-    places: _Places
+    placement: _Placement
     layered: bool
 
 
-def pack_world(scene: Scene, camera: Camera, stock: DeviceCache) -> PackedWorld:
-    """The scene as one camera sees it. Cheap enough to be done for every frame."""
-    packed: _Packed = stock.scenes.get(scene, lambda: _packed(scene, stock))
-    return _before(camera, packed, scene.weather, stock)
+def pack_world(scene: Scene, camera: Camera, cache: DeviceCache) -> PackedWorld:
+    """Pack a scene for one camera. Cheap enough for every frame."""
+    packed: _PackedScene = cache.scenes.get(scene, lambda: _pack_scene(scene, cache))
+    return _pack_for_camera(camera, packed, scene.weather, cache)
 
 
 def repack_moved(
-    world: PackedWorld, scene: Scene, camera: Camera, stock: DeviceCache
+    world: PackedWorld, scene: Scene, camera: Camera, cache: DeviceCache
 ) -> PackedWorld:
-    """Another instant of a packed scene: the same assets and materials at other places.
+    """Pack another instant of a packed scene: the same assets and materials at other poses.
 
     Args:
-        world: As ``pack_world`` made it.
+        world: Result of ``pack_world``.
         scene: Poses of bodies and lights may differ from those that were packed.
         camera: Its pose may differ.
-        stock: Assets.
+        cache: Assets.
     """
     _, *assets = world.keep
     meshes = assets[0]
     assert isinstance(meshes, list)
-    body_meshes = [meshes[k] for k in world.placed["geometry"]]
-    places = _places(world.placed.copy(), scene.bodies, body_meshes, stock)
-    record = _copy_of(world.record)
-    record.lamps = to_device(lamp_records(scene.lights), records.LightRecord, stock.device)
-    packed = _Packed(record, tuple(assets), places, world.layered)
-    return _before(camera, packed, world.weather, stock)
+    body_meshes = [meshes[k] for k in world.body_records["geometry"]]
+    record = _copy_record(world.record)
+    placement = _place_bodies(record, world.body_records.copy(), scene.bodies, body_meshes, cache)
+    record.lamps = to_device(lamp_records(scene.lights), records.LightRecord, cache.device)
+    packed = _PackedScene(record, tuple(assets), placement, world.layered)
+    return _pack_for_camera(camera, packed, world.weather, cache)
 
 
-def add_own_record(world: PackedWorld) -> PackedWorld:
-    """The same world, whose lamps, ground and sky can be changed without changing the other's."""
-    return replace(world, record=_copy_of(world.record))
+def copy_world(world: PackedWorld) -> PackedWorld:
+    """Copy of the world whose lamps, ground and sky can be changed independently."""
+    return replace(world, record=_copy_record(world.record))
 
 
-def _copy_of(record: records.World) -> records.World:
+def _copy_record(record: records.World) -> records.World:
     copy = records.World()
     for name in records.World.vars:
         setattr(copy, name, getattr(record, name))
     return copy
 
 
-def _before(camera: Camera, packed: _Packed, weather: Weather, stock: DeviceCache) -> PackedWorld:
-    """A packed scene with what depends on the camera."""
-    places = packed.places
-    placed = places.placed.copy()
-    if len(placed):
-        _see(placed, places, camera)
-    # A record of its own: weather and lamps are put into it for one view.
-    record = _copy_of(packed.record)
-    _fill_trees(record, places.trees)
-    record.bodies = to_device(placed, records.BodyRecord, stock.device)
+def _pack_for_camera(
+    camera: Camera, packed: _PackedScene, weather: Weather, cache: DeviceCache
+) -> PackedWorld:
+    """Complete a packed scene with the fields that depend on the camera."""
+    placement = packed.placement
+    body_records = placement.body_records.copy()
+    if len(body_records):
+        _fill_camera_poses(body_records, placement, camera)
+    # A record of its own: weather and lamps are set for one view.
+    record = _copy_record(packed.record)
+    record.bodies = to_device(body_records, records.BodyRecord, cache.device)
     return PackedWorld(
         record,
-        (places.trees, *packed.assets),
-        placed,
-        places.vertex_count,
+        (placement.hierarchies, *packed.assets),
+        body_records,
+        placement.vertex_count,
         weather,
         packed.layered,
-        places.lows_m,
-        places.highs_m,
+        placement.lows_m,
+        placement.highs_m,
     )
 
 
-def _packed(scene: Scene, stock: DeviceCache) -> _Packed:
+def _pack_scene(scene: Scene, cache: DeviceCache) -> _PackedScene:
     asset_ids = sorted({body.asset for body in scene.bodies})
     place = {asset_id: k for k, asset_id in enumerate(asset_ids)}
-    meshes = [stock.mesh(asset_id) for asset_id in asset_ids]
-    looks = body_materials(scene, stock)
-    texture_ids = sorted({texture_id for look in looks for texture_id in look.textures})
-    textures = {texture_id: stock.texture(texture_id) for texture_id in texture_ids}
-    surfaces = surface_records(looks, textures)
-    environment = stock.environment(scene.environment.image)
-    placed = np.zeros(len(scene.bodies), dtype=struct_dtype(records.BodyRecord))
-    placed["geometry"] = [place[body.asset] for body in scene.bodies]
-    counts = np.array([len(look.materials) for look in looks], dtype=np.int64)
-    placed["first_material"] = np.cumsum(counts) - counts
-    placed["pierced"] = cutout_bodies(cutout_slots(surfaces, textures), counts)
+    meshes = [cache.mesh(asset_id) for asset_id in asset_ids]
+    per_body = body_materials(scene, cache)
+    texture_ids = sorted({texture_id for entry in per_body for texture_id in entry.textures})
+    textures = {texture_id: cache.texture(texture_id) for texture_id in texture_ids}
+    surfaces = surface_records(per_body, textures)
+    environment = cache.environment(scene.environment.image)
+    body_records = np.zeros(len(scene.bodies), dtype=struct_dtype(records.BodyRecord))
+    body_records["geometry"] = [place[body.asset] for body in scene.bodies]
+    counts = np.array([len(entry.materials) for entry in per_body], dtype=np.int64)
+    body_records["first_material"] = np.cumsum(counts) - counts
+    body_records["cutouts"] = cutout_bodies(cutout_slots(surfaces, textures), counts)
     body_meshes = [meshes[place[body.asset]] for body in scene.bodies]
-    places = _places(placed, scene.bodies, body_meshes, stock)
-    device = stock.device
+    device = cache.device
     world = records.World()
+    placement = _place_bodies(world, body_records, scene.bodies, body_meshes, cache)
     geometries = stack_records([mesh.record for mesh in meshes], records.Geometry)
     images = stack_records([texture.record for texture in textures.values()], records.TextureRecord)
     world.geometries = to_device(geometries, records.Geometry, device)
     world.surfaces = to_device(surfaces, records.MaterialRecord, device)
     world.textures = to_device(images, records.TextureRecord, device)
     world.lamps = to_device(lamp_records(scene.lights), records.LightRecord, device)
-    world.lobes = stock.lobes
+    world.lobes = cache.lobes
     world.sky = sky_record(scene.environment, environment)
     layered = bool(surfaces["layered"].any())
-    return _Packed(world, (meshes, textures, environment), places, layered)
+    return _PackedScene(world, (meshes, textures, environment), placement, layered)
 
 
-def _places(
-    placed: NDArray[np.void],
+def _place_bodies(
+    record: records.World,
+    body_records: NDArray[np.void],
     bodies: Sequence[Body],
     meshes: Sequence[DeviceMesh],
-    stock: DeviceCache,
-) -> _Places:
-    """Fill in where bodies are, and put a hierarchy over them."""
-    R, t, scale, vertex_count = _place(placed, bodies, meshes)
-    placed["low_m"], placed["high_m"] = _world_boxes(placed, meshes)
-    # Kernels over boxes need one; rays never meet this one.
+    cache: DeviceCache,
+) -> _Placement:
+    """Fill in the bodies' poses, and the hierarchies of the World record over them."""
+    R, t, scale, vertex_count = _fill_poses(body_records, bodies, meshes)
+    body_records["low_m"], body_records["high_m"] = _world_boxes(body_records, meshes)
+    # Kernels over boxes need at least one; no ray hits this one.
     nowhere = np.full((1, 3), 1e9, np.float32)
-    low = placed["low_m"] if len(placed) else nowhere
-    high = placed["high_m"] if len(placed) else nowhere
+    low = body_records["low_m"] if len(body_records) else nowhere
+    high = body_records["high_m"] if len(body_records) else nowhere
     lows_m, highs_m = (
-        wp.array(np.ascontiguousarray(corner), dtype=wp.vec3, device=stock.device)
+        wp.array(np.ascontiguousarray(corner), dtype=wp.vec3, device=cache.device)
         for corner in (low, high)
     )
-    trees = _trees(placed, lows_m, highs_m, stock.device)
-    return _Places(placed, R, t, scale, vertex_count, lows_m, highs_m, trees)
+    hierarchies = _build_hierarchies(record, body_records, lows_m, highs_m)
+    return _Placement(body_records, R, t, scale, vertex_count, lows_m, highs_m, hierarchies)
 
 
-def _trees(
-    placed: NDArray[np.void], lows_m: wp.array, highs_m: wp.array, device: wp.Device
-) -> _Trees:
-    low, high = (np.ascontiguousarray(placed[name]) for name in ("low_m", "high_m"))
+def _build_hierarchies(
+    record: records.World, body_records: NDArray[np.void], lows_m: wp.array, highs_m: wp.array
+) -> tuple[wp.Bvh | None, ...]:
+    device = lows_m.device
+    low, high = (np.ascontiguousarray(body_records[name]) for name in ("low_m", "high_m"))
     tree = np.zeros(0, np.float32) if device.is_cuda else body_tree(low, high)
-    pierced = np.flatnonzero(placed["pierced"]).astype(np.int32)
-    corners = (wp.array(of[pierced], dtype=wp.vec3, device=device) for of in (low, high))
-    return _Trees(
-        wp.array(tree, dtype=wp.float32, device=device),
-        wp.Bvh(lows_m, highs_m) if device.is_cuda else None,
-        wp.array(pierced, dtype=wp.int32, device=device),
-        wp.Bvh(*corners) if len(pierced) else None,
-    )
+    cutouts = np.flatnonzero(body_records["cutouts"]).astype(np.int32)
+    corners = (wp.array(of[cutouts], dtype=wp.vec3, device=device) for of in (low, high))
+    hierarchy = wp.Bvh(lows_m, highs_m) if device.is_cuda else None
+    cutout_hierarchy = wp.Bvh(*corners) if len(cutouts) else None
+    record.tree = wp.array(tree, dtype=wp.float32, device=device)
+    record.cutouts = wp.array(cutouts, dtype=wp.int32, device=device)
+    record.hierarchy = hierarchy.id if hierarchy else 0
+    record.cutout_hierarchy = cutout_hierarchy.id if cutout_hierarchy else 0
+    return hierarchy, cutout_hierarchy
 
 
-def _fill_trees(record: records.World, trees: _Trees) -> None:
-    record.tree, record.pierced = trees.tree, trees.pierced
-    record.hierarchy = trees.hierarchy.id if trees.hierarchy else 0
-    record.pierced_hierarchy = trees.pierced_hierarchy.id if trees.pierced_hierarchy else 0
-
-
-def pack_view(camera: Camera, stock: DeviceCache) -> records.View:
-    """The camera."""
+def pack_view(camera: Camera, cache: DeviceCache) -> records.View:
+    """Pack a camera."""
     k = camera.intrinsics
     view = records.View()
     view.width, view.height = k.width_px, k.height_px
@@ -274,14 +255,14 @@ def pack_view(camera: Camera, stock: DeviceCache) -> records.View:
         view.lens = _LENSES[k.lens.model]
         coefficients = (*k.lens.coefficients, *[0.0] * 8)[:8]
         view.coefficients = records.Coefficients(*coefficients)
-        view.directions = stock.optics(k).directions
+        view.directions = cache.optics(k).directions
     return view
 
 
-def _place(
+def _fill_poses(
     values: NDArray[np.void], bodies: Sequence[Body], meshes: Sequence[DeviceMesh]
 ) -> tuple[Array, Array, Array, int]:
-    """Fill in poses and vertex ranges; returns rotations, positions, scales, number of vertices."""
+    """Fill in poses and vertex ranges; returns rotations, positions, scales, vertex count."""
     if not bodies:
         return np.zeros((0, 3, 3)), np.zeros((0, 3)), np.zeros(0), 0
     R = unit_quaternions_to_rotations(
@@ -299,14 +280,15 @@ def _place(
     return R, t, scale, int(counts.sum())
 
 
-def _see(values: NDArray[np.void], places: _Places, camera: Camera) -> None:
-    """Fill in where bodies are before a camera.
+def _fill_camera_poses(values: NDArray[np.void], placement: _Placement, camera: Camera) -> None:
+    """Fill in the bodies' poses relative to a camera.
 
-    Products are taken in float64, so that a camera far from the world's origin loses nothing.
+    Products are computed in float64, so that a camera far from the world's origin loses no
+    precision.
     """
     R_camera_world = camera.T_world_camera.rotation().T
-    away = places.t_world_mesh - np.asarray(camera.T_world_camera.translation_m)
-    R, scale = places.R_world_mesh, places.scale
+    away = placement.t_world_mesh - np.asarray(camera.T_world_camera.translation_m)
+    R, scale = placement.R_world_mesh, placement.scale
     A = np.einsum("ij,njk->nik", R_camera_world, R, optimize=False)
     values["A_camera_mesh"] = A * scale[:, None, None]
     values["t_camera_mesh"] = np.einsum("ij,nj->ni", R_camera_world, away, optimize=False)
@@ -315,23 +297,25 @@ def _see(values: NDArray[np.void], places: _Places, camera: Camera) -> None:
 
 
 def _world_boxes(
-    placed: NDArray[np.void], meshes: Sequence[DeviceMesh]
+    body_records: NDArray[np.void], meshes: Sequence[DeviceMesh]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     if not meshes:
         return np.zeros((0, 3), np.float32), np.zeros((0, 3), np.float32)
-    scale = placed["scale"].astype(np.float64)[:, None]
-    R = placed["R_world_mesh"].astype(np.float64)
+    scale = body_records["scale"].astype(np.float64)[:, None]
+    R = body_records["R_world_mesh"].astype(np.float64)
     low = np.stack([mesh.low_m for mesh in meshes]) * scale
     high = np.stack([mesh.high_m for mesh in meshes]) * scale
-    centre = placed["t_world_mesh"] + np.einsum("nij,nj->ni", R, (low + high) / 2, optimize=False)
+    centre = body_records["t_world_mesh"] + np.einsum(
+        "nij,nj->ni", R, (low + high) / 2, optimize=False
+    )
     half = np.einsum("nij,nj->ni", np.abs(R), (high - low) / 2, optimize=False)
-    # A hair of slack keeps flat boxes traversable after rounding to float32.
+    # Slack keeps flat boxes traversable after rounding to float32.
     half = half + 1e-6 * (1.0 + np.abs(centre))
     return (centre - half).astype(np.float32), (centre + half).astype(np.float32)
 
 
 def sky_record(environment: Environment, light: DeviceEnvironment) -> records.EnvironmentRecord:
-    """The Sky record of an environment."""
+    """The EnvironmentRecord of an environment."""
     sky = records.EnvironmentRecord()
     sky.irradiance, sky.glossy = light.irradiance, light.glossy
     sky.image, sky.rest = light.image, light.rest
@@ -342,7 +326,7 @@ def sky_record(environment: Environment, light: DeviceEnvironment) -> records.En
 
 
 def lamp_records(lights: Sequence[Light]) -> NDArray[np.void]:
-    """Lamp records, in the order of the lights."""
+    """LightRecord records, in the order of the lights."""
     values = np.zeros(len(lights), dtype=struct_dtype(records.LightRecord))
     for value, light in zip(values, lights, strict=True):
         strength = light.illuminance_lux if light.kind == "sun" else light.intensity_cd
@@ -361,11 +345,11 @@ def lamp_records(lights: Sequence[Light]) -> NDArray[np.void]:
 
 
 def _fill_panel(value: NDArray[np.void], light: Light) -> None:
-    """The fields that only panels have."""
+    """Fill in the fields that only panels have."""
     normal = np.asarray(light.direction, dtype=np.float64)
     if light.kind == "rectangle":
         half_m = 0.5 * np.asarray(light.size_m, dtype=np.float64)
-        # Kept at right angles to the normal, whatever rounding has left of it.
+        # Re-orthogonalised: rounding may have tilted it.
         side = np.asarray(light.side) - normal * float((normal * light.side).sum())
         side = side / math.sqrt(float((side * side).sum()))
         area_m2 = 4.0 * half_m[0] * half_m[1]

@@ -1,4 +1,4 @@
-"""Warp's structs as NumPy records."""
+"""Conversion between Warp structs and NumPy records."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from numpy.typing import NDArray
 
 @cache
 def struct_dtype(struct: Any) -> np.dtype[Any]:
-    """The structured type of a Warp struct; Warp works it out anew at every question."""
+    """Structured dtype of a Warp struct; cached, because Warp computes it on every request."""
     dtype: np.dtype[Any] = np.dtype(struct.numpy_dtype())
     return dtype
 
 
 def to_record(instance: Any, struct: Any) -> NDArray[np.void]:
-    """An instance of a Warp struct, as an array [1]."""
+    """An instance of a Warp struct as an array [1]."""
     return np.array([instance.numpy_value()], dtype=struct_dtype(struct))
 
 
 def stack_records(records: Sequence[NDArray[np.void]], struct: Any) -> NDArray[np.void]:
-    """Arrays of one struct's records after each other; at least one, of zeros, in all."""
+    """Concatenated records of one struct; a single record of zeros if there are none."""
     dtype = struct_dtype(struct)
     joined = np.frombuffer(b"".join(record.tobytes() for record in records), dtype)
     return joined.copy() if len(joined) else np.zeros(1, dtype)
 
 
 def to_device(records: NDArray[np.void], struct: Any, device: wp.Device) -> wp.array:
-    """Records as an array on a device.
+    """Upload records as an array.
 
-    ``wp.array`` would work out the structured type again, which takes longer than copying.
+    ``wp.array`` would compute the structured dtype again, which takes longer than copying.
     """
     shape = records.shape
     here = wp.array(ptr=records.ctypes.data, dtype=struct, shape=shape, device="cpu")

@@ -1,1 +1,1 @@
-"""Which surface every pixel shows, and the label images that follow from it."""
+"""Visible surfaces of all pixels, and the label images derived from them."""

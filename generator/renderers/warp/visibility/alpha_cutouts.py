@@ -1,4 +1,4 @@
-"""Bodies with holes where the rasteriser decides what is seen: they are traced over it."""
+"""Bodies with cut-outs in rasterised images: ray-traced into the z-buffer."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
 from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M
 
 
-def has_holes(placed: NDArray[np.void]) -> NDArray[np.bool_]:
-    """By body, whether rays may pass holes in it."""
-    holes: NDArray[np.bool_] = (placed["pierced"] & int(records.HOLES)) != 0
+def has_cutouts(body_records: NDArray[np.void]) -> NDArray[np.bool_]:
+    """Whether rays may pass holes in each body, bool [n]."""
+    holes: NDArray[np.bool_] = (body_records["cutouts"] & int(records.HOLES)) != 0
     return holes
 
 
@@ -27,7 +27,7 @@ def trace_over(
     """Add listed bodies to a z-buffer of pixel centres, in place."""
     from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
 
-    bodies = _on_device(world, view, seen, hits.device)
+    bodies = _upload_bodies(world, view, seen, hits.device)
     inputs = [view, world.record, bodies, Z_NEAR_M]
     wp.launch(
         alpha_cutouts.trace_centres, view.height, inputs, [nearness, hits], device=hits.device
@@ -43,11 +43,11 @@ def trace_over_samples(
     nearness: wp.array,
     hits: wp.array,
 ) -> None:
-    """Add listed bodies to a z-buffer of samples of listed pixels, in place."""
+    """Add listed bodies to a z-buffer of listed pixels' samples, in place."""
     from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
 
     device = hits.device
-    bodies = _on_device(world, view, seen, device)
+    bodies = _upload_bodies(world, view, seen, device)
     offsets = wp.array(parts, dtype=wp.vec2, device=device)
     inputs = [view, world.record, bodies, Z_NEAR_M, pixels, offsets]
     wp.launch(alpha_cutouts.trace_samples, len(pixels), inputs, [nearness, hits], device=device)
@@ -56,7 +56,7 @@ def trace_over_samples(
 def trace_outlines(
     world: PackedWorld, view: records.View, canvases: NDArray[np.void], mask: wp.array
 ) -> None:
-    """Draw silhouettes of bodies with holes into their Canvas records' pixels of a mask."""
+    """Draw silhouettes of bodies with cut-outs into the mask pixels of their Canvas records."""
     from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
 
     outlines = np.zeros(len(canvases), dtype=alpha_cutouts.Outline.numpy_dtype())
@@ -68,9 +68,9 @@ def trace_outlines(
             int(whole["x0"] + whole["width"]),
             int(whole["y0"] + whole["height"]),
         )
-        box = _within(window_of(world.placed[canvas["body"]], view), around)
+        box = _intersect(project_window(world.body_records[canvas["body"]], view), around)
         outline["body"] = canvas["body"]
-        outline["window"] = _window(box)
+        outline["window"] = _window_fields(box)
         offset = (box.y_min - around.y_min) * around.width_px + box.x_min - around.x_min
         outline["first_pixel"] = canvas["first_pixel"] + offset
         outline["stride"] = around.width_px
@@ -80,9 +80,9 @@ def trace_outlines(
     wp.launch(alpha_cutouts.trace_outlines, shape, inputs, [mask], device=mask.device)
 
 
-def window_of(placed: np.void, view: records.View) -> BoxPx:
-    """Pixels at which a body may be seen before a pinhole; they may lie beside the image."""
-    ends = np.stack([placed["low_m"], placed["high_m"]]).astype(np.float64)
+def project_window(body_records: np.void, view: records.View) -> BoxPx:
+    """Pixels that a body may cover before a pinhole; may lie outside the image."""
+    ends = np.stack([body_records["low_m"], body_records["high_m"]]).astype(np.float64)
     picks = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
     corners = ends[picks, np.arange(3)] - np.array(view.eye_m, dtype=np.float64)
     R_world_camera = np.array(view.R_world_camera, dtype=np.float64).reshape(3, 3)
@@ -93,10 +93,10 @@ def window_of(placed: np.void, view: records.View) -> BoxPx:
     x_px, y_px = view.fx * x / z + view.cx, view.fy * y / z + view.cy
     low = np.floor([x_px.min(), y_px.min()]) - 1.0
     high = np.ceil([x_px.max(), y_px.max()]) + 1.0
-    return _within(BoxPx(int(low[0]), int(low[1]), int(high[0]), int(high[1])), everywhere)
+    return _intersect(BoxPx(int(low[0]), int(low[1]), int(high[0]), int(high[1])), everywhere)
 
 
-def _on_device(
+def _upload_bodies(
     world: PackedWorld, view: records.View, seen: NDArray[np.int32], device: wp.Device
 ) -> wp.array:
     from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
@@ -104,16 +104,16 @@ def _on_device(
     values = np.zeros(len(seen), dtype=alpha_cutouts.CutoutBody.numpy_dtype())
     for value, number in zip(values, seen.tolist(), strict=True):
         value["body"] = number
-        value["window"] = _window(window_of(world.placed[number], view))
+        value["window"] = _window_fields(project_window(world.body_records[number], view))
     return wp.array(values, dtype=alpha_cutouts.CutoutBody, device=device)
 
 
-def _window(box: BoxPx) -> tuple[int, int, int, int]:
+def _window_fields(box: BoxPx) -> tuple[int, int, int, int]:
     return (box.x_min, box.y_min, box.width_px, box.height_px)
 
 
-def _within(box: BoxPx, bounds: BoxPx) -> BoxPx:
-    """The common part of two boxes; empty, at the second's corner, where there is none."""
+def _intersect(box: BoxPx, bounds: BoxPx) -> BoxPx:
+    """Intersection of two boxes; empty, at the second's corner, if they are disjoint."""
     x_min, y_min = max(box.x_min, bounds.x_min), max(box.y_min, bounds.y_min)
     x_max, y_max = min(box.x_max, bounds.x_max), min(box.y_max, bounds.y_max)
     if x_min >= x_max or y_min >= y_max:

@@ -12,8 +12,12 @@ from gen_data.generator.core.scene import Camera, Scene
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
-from gen_data.generator.renderers.warp.visibility.alpha_cutouts import has_holes, trace_outlines
-from gen_data.generator.renderers.warp.visibility.amodal_lens import trace_masks, union_box
+from gen_data.generator.renderers.warp.visibility.alpha_cutouts import has_cutouts, trace_outlines
+from gen_data.generator.renderers.warp.visibility.amodal_lens import (
+    mask_offsets,
+    trace_masks,
+    union_box,
+)
 from gen_data.generator.renderers.warp.visibility.gbuffer import (
     GBuffer,
     Projected,
@@ -31,47 +35,47 @@ def render_silhouettes(
     camera: Camera,
     world: PackedWorld,
     view: records.View,
-    stock: DeviceCache,
-    seen: GBuffer,
+    cache: DeviceCache,
+    gbuffer: GBuffer,
     seen_ids: NDArray[np.uint16],
 ) -> dict[int, Silhouette]:
     """The silhouette of every annotated instance, by instance id.
 
-    Coverage is the rasteriser's before a pinhole, else that of rays. ``seen_ids``, the image of
-    visible instance ids, is united with it: where rays decide visibility, they may differ from the
+    Coverage is the rasteriser's for a pinhole, else that of rays. It is united with ``seen_ids``,
+    the image of visible instance ids: where rays decide visibility, they may differ from the
     rasteriser by a pixel at an edge.
     """
     if view.lens == records.PINHOLE:
-        projected = seen.projected or project_vertices(world, view, stock)
-        boxes, drawn = _drawn_masks(scene, world, view, projected, stock)
+        projected = gbuffer.projected or project_vertices(world, view, cache)
+        boxes, drawn = _rasterize_masks(scene, world, view, projected, cache)
     else:
-        boxes, drawn = trace_masks(scene, world, view, camera, stock)
+        boxes, drawn = trace_masks(scene, world, view, camera, cache)
     found: dict[int, Silhouette] = {}
     first = 0
     for instance_id, box in boxes.items():
         end = first + box.width_px * box.height_px
         pixels = drawn[first:end].reshape(box.height_px, box.width_px) > 0
         _unite(pixels, box, seen_ids, instance_id)
-        found[instance_id] = _tight(instance_id, pixels, box)
+        found[instance_id] = _crop(instance_id, pixels, box)
         first = end
     return found
 
 
-def _drawn_masks(
-    scene: Scene, world: PackedWorld, view: records.View, projected: Projected, stock: DeviceCache
+def _rasterize_masks(
+    scene: Scene, world: PackedWorld, view: records.View, projected: Projected, cache: DeviceCache
 ) -> tuple[dict[int, BoxPx], NDArray[np.uint8]]:
-    """Per annotated instance a box that holds its silhouette, and the pixels of all boxes."""
+    """A bounding box of each annotated instance's silhouette, and the masks of all boxes."""
     p_camera, xy = projected.p_camera, projected.xy
     boxes = _boxes_px(scene, world, view, projected)
     canvases, size = _canvases(scene, boxes, projected.reached)
-    mask = wp.zeros(size, dtype=wp.uint8, device=stock.device)
-    pierced = has_holes(world.placed)[canvases["body"]]
-    if not pierced.all():
-        drawn_into = wp.array(canvases[~pierced], dtype=Canvas, device=stock.device)
+    mask = wp.zeros(size, dtype=wp.uint8, device=cache.device)
+    cutouts = has_cutouts(world.body_records)[canvases["body"]]
+    if not cutouts.all():
+        drawn_into = wp.array(canvases[~cutouts], dtype=Canvas, device=cache.device)
         inputs = [view, world.record, p_camera, xy, drawn_into]
-        wp.launch(draw_silhouettes, len(drawn_into), inputs, [mask], device=stock.device)
-    if pierced.any():
-        trace_outlines(world, view, canvases[pierced], mask)
+        wp.launch(draw_silhouettes, len(drawn_into), inputs, [mask], device=cache.device)
+    if cutouts.any():
+        trace_outlines(world, view, canvases[cutouts], mask)
     drawn: NDArray[np.uint8] = mask.numpy()
     return boxes, drawn
 
@@ -82,12 +86,12 @@ def _boxes_px(
     view: records.View,
     projected: Projected,
 ) -> dict[int, BoxPx]:
-    """Per annotated instance, the pixels of the canvas that its vertices reach; may be empty."""
+    """Pixels of the canvas that each annotated instance's vertices span; may be empty."""
     canvas = BoxPx(-view.width, -view.height, 2 * view.width, 2 * view.height)
     annotated = sorted(i.instance_id for i in scene.instances if i.annotated)
     boxes = dict.fromkeys(annotated, BoxPx(0, 0, 0, 0))
-    # All bodies at once: asking hundreds of them one by one takes longer than drawing them.
-    first = world.placed["first_vertex"]
+    # All bodies at once: hundreds of small queries take longer than drawing them.
+    first = world.body_records["first_vertex"]
     solid = np.flatnonzero(np.diff([*first, world.vertex_count]))
     p_camera, xy = projected.p_camera.numpy(), projected.xy.numpy()
     nearest = np.maximum.reduceat(p_camera[:, 2], first[solid])
@@ -97,14 +101,14 @@ def _boxes_px(
     for k in np.flatnonzero(drawn).tolist():
         instance_id = scene.bodies[solid[k]].instance_id
         if instance_id in boxes:
-            # A triangle that is cut at the camera's plane may reach anywhere.
+            # A triangle clipped at the camera's plane may reach anywhere.
             cut = lows[k, 0] == _UNSNAPPED
-            reached = canvas if cut else _within(canvas, lows[k] >> 8, (highs[k] >> 8) + 1)
+            reached = canvas if cut else _clip_to_canvas(canvas, lows[k] >> 8, (highs[k] >> 8) + 1)
             boxes[instance_id] = union_box(boxes[instance_id], reached)
     return boxes
 
 
-def _within(canvas: BoxPx, low: NDArray[np.int32], high: NDArray[np.int32]) -> BoxPx:
+def _clip_to_canvas(canvas: BoxPx, low: NDArray[np.int32], high: NDArray[np.int32]) -> BoxPx:
     x_min, y_min = max(int(low[0]), canvas.x_min), max(int(low[1]), canvas.y_min)
     x_max, y_max = min(int(high[0]), canvas.x_max), min(int(high[1]), canvas.y_max)
     return BoxPx(x_min, y_min, max(x_max, x_min), max(y_max, y_min))
@@ -113,11 +117,8 @@ def _within(canvas: BoxPx, low: NDArray[np.int32], high: NDArray[np.int32]) -> B
 def _canvases(
     scene: Scene, boxes: dict[int, BoxPx], reached: NDArray[np.int32]
 ) -> tuple[NDArray[np.void], int]:
-    """One record per reached body of an instance with a box, and the pixels of all masks."""
-    first_pixels, size = {}, 0
-    for instance_id, box in boxes.items():
-        first_pixels[instance_id] = size
-        size += box.width_px * box.height_px
+    """One record per projected body of an instance with a box, and the size of all masks."""
+    first_pixels, size = mask_offsets(boxes)
     drawn = [
         (number, scene.bodies[number].instance_id)
         for number in reached.tolist()
@@ -137,7 +138,7 @@ def _canvases(
 def _unite(
     pixels: NDArray[np.bool_], box: BoxPx, seen_ids: NDArray[np.uint16], instance_id: int
 ) -> None:
-    """Set what is seen of an instance in its silhouette, in place."""
+    """Add an instance's visible pixels to its silhouette, in place."""
     inside = box.clipped(seen_ids.shape[1], seen_ids.shape[0])
     if inside is None:
         return
@@ -147,7 +148,7 @@ def _unite(
     pixels[rows, columns] |= window == instance_id
 
 
-def _tight(instance_id: int, pixels: NDArray[np.bool_], box: BoxPx) -> Silhouette:
+def _crop(instance_id: int, pixels: NDArray[np.bool_], box: BoxPx) -> Silhouette:
     tight = tight_box(pixels)
     if tight is None:
         return Silhouette(instance_id, 0, 0, _NOTHING)

@@ -1,7 +1,7 @@
-"""Silhouettes before lenses that bend straight edges: by rays, on a canvas of 3 x 3 images.
+"""Amodal silhouettes for lenses with distortion: by rays, on a canvas of 3 x 3 images.
 
-The canvas goes on where the lens's model does: its pixels beside the image look where a larger
-sensor behind the same lens would, and nowhere beyond the lens's field.
+The canvas extends the lens model: its pixels outside the image look where a larger sensor behind
+the same lens would, and nowhere beyond the lens's field.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ _CORNERS = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
 
 
 def trace_masks(
-    scene: Scene, world: PackedWorld, view: records.View, camera: Camera, stock: DeviceCache
+    scene: Scene, world: PackedWorld, view: records.View, camera: Camera, cache: DeviceCache
 ) -> tuple[dict[int, BoxPx], NDArray[np.uint8]]:
-    """Per annotated instance a box that holds its silhouette, and the pixels of all boxes."""
-    optics = stock.optics(camera.intrinsics)
+    """A bounding box of each annotated instance's silhouette, and the masks of all boxes."""
+    optics = cache.optics(camera.intrinsics)
     annotated = sorted(i.instance_id for i in scene.instances if i.annotated)
     boxes = dict.fromkeys(annotated, EMPTY)
     of_bodies: dict[int, BoxPx] = {}
@@ -42,26 +42,26 @@ def trace_masks(
     step_rad = _widest_step(optics.nodes)
     for number, body in enumerate(scene.bodies):
         if body.instance_id in boxes:
-            ends_m = np.stack([world.placed[end][number] for end in ("low_m", "high_m")])
+            ends_m = np.stack([world.body_records[end][number] for end in ("low_m", "high_m")])
             axis, half_rad = bounding_cone(ends_m - np.array(camera.T_world_camera.translation_m))
             cosines = optics.nodes @ (R_camera_world @ axis).astype(np.float32)
-            # Every pixel that is shown has a node within a diagonal of a cell.
+            # Every visible pixel has a node within the diagonal of a cell.
             box = box_around(cosines >= math.cos(min(half_rad + 1.5 * step_rad, math.pi)))
-            of_bodies[number] = _on_canvas(box, view)
+            of_bodies[number] = _clip_to_canvas(box, view)
             boxes[body.instance_id] = union_box(boxes[body.instance_id], of_bodies[number])
-    outlooks, size = _outlooks(scene, boxes, of_bodies)
-    mask = wp.zeros(size, dtype=wp.uint8, device=stock.device)
-    if len(outlooks):
-        shape = (len(outlooks), int(outlooks["window"]["height"].max()))
-        records_ = wp.array(outlooks, dtype=AmodalWindow, device=stock.device)
+    windows, size = _window_records(scene, boxes, of_bodies)
+    mask = wp.zeros(size, dtype=wp.uint8, device=cache.device)
+    if len(windows):
+        shape = (len(windows), int(windows["window"]["height"].max()))
+        records_ = wp.array(windows, dtype=AmodalWindow, device=cache.device)
         inputs = [view, world.record, optics.nodes_on_device, NODE_STRIDE_PX, Z_NEAR_M, records_]
-        wp.launch(trace_silhouettes, shape, inputs, [mask], device=stock.device)
+        wp.launch(trace_silhouettes, shape, inputs, [mask], device=cache.device)
     pixels: NDArray[np.uint8] = mask.numpy()
     return boxes, pixels
 
 
 def bounding_cone(ends_m: Array) -> tuple[Array, float]:
-    """Axis and half angle of a cone from the origin that holds a box; pi where it holds that.
+    """Axis and half angle of a cone from the origin around a box; pi if it contains the origin.
 
     Args:
         ends_m: Low and high corner, [2, 3].
@@ -75,20 +75,22 @@ def bounding_cone(ends_m: Array) -> tuple[Array, float]:
     corners = ends_m[_CORNERS, [0, 1, 2]]
     cosines = corners @ axis / np.sqrt((corners * corners).sum(axis=1))
     least = float(cosines.min())
-    # Narrow cones are convex: one that holds all corners holds the box.
+    # Cones below 90 degrees are convex: one that contains all corners contains the box.
     narrow_rad = math.acos(min(least, 1.0)) if least > 0.0 else math.pi
     return axis, min(narrow_rad, math.asin(radius_m / distance_m))
 
 
-def box_around(near: NDArray[np.bool_]) -> BoxPx:
-    """Pixels around set nodes, counted from the canvas's first, and two cells more; may be empty.
+def box_around(marked: NDArray[np.bool_]) -> BoxPx:
+    """Bounding box of marked nodes and two more cells, from the canvas's first pixel.
+
+    May be empty.
 
     Args:
-        near: By node, [rows, columns].
+        marked: Flags of nodes, [rows, columns].
     """
-    if not near.any():
+    if not marked.any():
         return EMPTY
-    ys, xs = np.flatnonzero(near.any(axis=1)), np.flatnonzero(near.any(axis=0))
+    ys, xs = np.flatnonzero(marked.any(axis=1)), np.flatnonzero(marked.any(axis=0))
     return BoxPx(
         (int(xs[0]) - 2) * NODE_STRIDE_PX,
         (int(ys[0]) - 2) * NODE_STRIDE_PX,
@@ -98,7 +100,7 @@ def box_around(near: NDArray[np.bool_]) -> BoxPx:
 
 
 def union_box(a: BoxPx, b: BoxPx) -> BoxPx:
-    """Smallest box around two, of which either may be empty."""
+    """Smallest box around two boxes, either of which may be empty."""
     if not a.width_px * a.height_px:
         return b
     if not b.width_px * b.height_px:
@@ -108,8 +110,17 @@ def union_box(a: BoxPx, b: BoxPx) -> BoxPx:
     )
 
 
+def mask_offsets(boxes: dict[int, BoxPx]) -> tuple[dict[int, int], int]:
+    """First pixel of each instance's mask in a common buffer, and the buffer's size."""
+    first_pixels, size = {}, 0
+    for instance_id, box in boxes.items():
+        first_pixels[instance_id] = size
+        size += box.width_px * box.height_px
+    return first_pixels, size
+
+
 def _widest_step(nodes: Float32) -> float:
-    """Largest angle between neighbouring nodes that are both shown [rad]."""
+    """Largest angle between neighbouring visible nodes [rad]."""
     widest = 0.0
     for a, b in ((nodes[1:], nodes[:-1]), (nodes[:, 1:], nodes[:, :-1])):
         chords = ((a - b) ** 2).sum(axis=-1)
@@ -117,8 +128,8 @@ def _widest_step(nodes: Float32) -> float:
     return 2.0 * math.asin(min(0.5 * math.sqrt(widest), 1.0))
 
 
-def _on_canvas(box: BoxPx, view: records.View) -> BoxPx:
-    """The part of a box on the canvas, in image coordinates."""
+def _clip_to_canvas(box: BoxPx, view: records.View) -> BoxPx:
+    """Part of a box on the canvas, in image coordinates."""
     inside = box.clipped(3 * view.width, 3 * view.height)
     if inside is None:
         return EMPTY
@@ -130,14 +141,11 @@ def _on_canvas(box: BoxPx, view: records.View) -> BoxPx:
     )
 
 
-def _outlooks(
+def _window_records(
     scene: Scene, boxes: dict[int, BoxPx], of_bodies: dict[int, BoxPx]
 ) -> tuple[NDArray[np.void], int]:
-    """One record per body that may be on the canvas, and the pixels of all instances' boxes."""
-    first_pixels, size = {}, 0
-    for instance_id, box in boxes.items():
-        first_pixels[instance_id] = size
-        size += box.width_px * box.height_px
+    """One record per body that may be on the canvas, and the size of all instances' boxes."""
+    first_pixels, size = mask_offsets(boxes)
     listed = [(number, box) for number, box in of_bodies.items() if box != EMPTY]
     values = np.zeros(len(listed), dtype=AmodalWindow.numpy_dtype())
     for value, (number, box) in zip(values, listed, strict=True):

@@ -1,4 +1,4 @@
-"""Silhouettes behind a rolling shutter."""
+"""Amodal silhouettes with a rolling shutter."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from gen_data.generator.renderers.warp.frame_context import (
     CameraView,
     RenderContext,
     RowBand,
-    pack_moment,
+    pack_state,
 )
 from gen_data.generator.renderers.warp.scene.scene_packing import pack_view
 from gen_data.generator.renderers.warp.visibility.amodal import render_silhouettes
@@ -24,45 +24,45 @@ _BANDS = 12
 
 
 def rolling_silhouettes(
-    bands: Sequence[RowBand], ids: NDArray[np.uint16], studio: RenderContext, near: CameraView
+    bands: Sequence[RowBand], ids: NDArray[np.uint16], context: RenderContext, reference: CameraView
 ) -> dict[int, Silhouette]:
-    """Silhouettes, each row at its instant as far as a dozen bands can tell.
+    """Silhouettes with each row at its own instant, approximated by a dozen bands.
 
-    What lies above the image is as in its first row, what lies below as in its last. What is
-    visible is always part of them.
+    The canvas above the image is as at the first row, below it as at the last row. Visible pixels
+    are always included.
     """
     if len(bands) > _BANDS:
         starts = [band.first for band in bands][:: -(-len(bands) // _BANDS)]
-        bands = make_bands(near.moment, starts)
+        bands = make_bands(reference.state, starts)
     pieces: dict[int, list[Silhouette]] = {}
-    height = near.moment.camera.intrinsics.height_px
-    none, unseen = np.zeros_like(ids), replace(near.seen, projected=None)
+    height = reference.state.camera.intrinsics.height_px
+    none, unseen = np.zeros_like(ids), replace(reference.gbuffer, projected=None)
     for band in bands:
-        scene, camera = band.moment.scene, band.moment.camera
-        world, view = pack_moment(band.moment, studio, near), pack_view(camera, studio.stock)
-        near = CameraView(band.moment, world, view, unseen)
-        drawn = render_silhouettes(scene, camera, world, view, studio.stock, unseen, none)
+        scene, camera = band.state.scene, band.state.camera
+        world, view = pack_state(band.state, context, reference), pack_view(camera, context.cache)
+        reference = CameraView(band.state, world, view, unseen)
+        drawn = render_silhouettes(scene, camera, world, view, context.cache, unseen, none)
         top = band.first if band.first > 0 else -height
         end = band.end if band.end < height else 2 * height
         for instance_id, outline in drawn.items():
-            pieces.setdefault(instance_id, []).append(_between(outline, top, end))
-    return {k: _joined(k, [*parts, _visible(k, ids)]) for k, parts in sorted(pieces.items())}
+            pieces.setdefault(instance_id, []).append(_crop_rows(outline, top, end))
+    return {k: _merge(k, [*parts, _visible_mask(k, ids)]) for k, parts in sorted(pieces.items())}
 
 
-def _visible(instance_id: int, ids: NDArray[np.uint16]) -> Silhouette:
-    """The pixels that show an instance."""
+def _visible_mask(instance_id: int, ids: NDArray[np.uint16]) -> Silhouette:
+    """The visible pixels of an instance."""
     return Silhouette(instance_id, 0, 0, ids == instance_id)
 
 
-def _between(outline: Silhouette, top: int, end: int) -> Silhouette:
-    """The rows of a silhouette from one to before another."""
+def _crop_rows(outline: Silhouette, top: int, end: int) -> Silhouette:
+    """Rows ``top`` to ``end`` (exclusive) of a silhouette."""
     first = max(top - outline.y_px, 0)
     mask = outline.mask[first : max(end - outline.y_px, first)]
     return replace(outline, y_px=outline.y_px + first, mask=mask)
 
 
-def _joined(instance_id: int, parts: Sequence[Silhouette]) -> Silhouette:
-    """One silhouette of several bands of rows."""
+def _merge(instance_id: int, parts: Sequence[Silhouette]) -> Silhouette:
+    """One silhouette from several bands of rows."""
     filled = [part for part in parts if part.mask.any()]
     if not filled:
         return Silhouette(instance_id, 0, 0, np.zeros((0, 0), np.bool_))

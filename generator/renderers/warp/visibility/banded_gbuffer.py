@@ -1,4 +1,4 @@
-"""What the pixels of an image show, put together from bands of rows."""
+"""G-buffers assembled from bands of rows."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ from gen_data.generator.renderers.warp.frame_context import (
 from gen_data.generator.renderers.warp.visibility.label_images import label_images
 
 RadianceFunction = Callable[[CameraView], Float32]
-"""What comes from every pixel of a sight [cd/m^2], float32 [h, w, 3]."""
+"""Radiance of every pixel of a view [cd/m^2], float32 [h, w, 3]."""
 
-# The lattice that light is gathered on has a point every so many pixels; what it looks at repeats
-# after so many, and is smoothed over so many to either side.
+# Spacing of the lattice of realtime shading; period of its sampling pattern; and half width of its
+# smoothing.
 _STRIDE_PX, _PATTERN_PX, _MARGIN_PX = 3, 12, 6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class BandedGBuffer:
-    """What the pixels of an image show.
+    """G-buffer of an image whose rows may differ in time.
 
     Attributes:
-        bands: In order of rows; together all of them.
-        hits, z_m, weights: As of Seen, shapes [h, w, 2], [h, w], [h, w, 2].
+        bands: Bands in order of rows, covering the image.
+        hits, z_m, weights: As of GBuffer, shapes [h, w, 2], [h, w], [h, w, 2].
     """
 
     bands: Sequence[RowBand]
@@ -45,44 +45,44 @@ class BandedGBuffer:
 
     @property
     def intrinsics(self) -> Intrinsics:
-        """Of the camera; where it is, the bands say."""
-        return self.bands[0].moment.camera.intrinsics
+        """Intrinsics of the camera; the bands hold its poses."""
+        return self.bands[0].state.camera.intrinsics
 
 
-def full_band(moment: CameraState) -> RowBand:
+def full_band(state: CameraState) -> RowBand:
     """All rows at one instant."""
-    return RowBand(0, moment.camera.intrinsics.height_px, moment)
+    return RowBand(0, state.camera.intrinsics.height_px, state)
 
 
-def copy_gbuffer(see: CameraView) -> BandedGBuffer:
-    """What the pixels of an image of one instant show; a copy."""
-    lens = see.moment.camera.intrinsics
+def copy_gbuffer(rendered: CameraView) -> BandedGBuffer:
+    """Copy of the G-buffer of an image of one instant."""
+    lens = rendered.state.camera.intrinsics
     shape = (lens.height_px, lens.width_px)
     return BandedGBuffer(
-        (full_band(see.moment),),
-        see.seen.hits.numpy().reshape(*shape, 2).copy(),
-        see.seen.z_m.numpy().reshape(shape).copy(),
-        see.seen.weights.numpy().reshape(*shape, 2).copy(),
+        (full_band(rendered.state),),
+        rendered.gbuffer.hits.numpy().reshape(*shape, 2).copy(),
+        rendered.gbuffer.z_m.numpy().reshape(shape).copy(),
+        rendered.gbuffer.weights.numpy().reshape(*shape, 2).copy(),
     )
 
 
 def render_bands(
     bands: Sequence[RowBand],
     channels: frozenset[Channel],
-    studio: RenderContext,
-    near: CameraView,
+    context: RenderContext,
+    reference: CameraView,
     light: RadianceFunction | None = None,
 ) -> tuple[BandedGBuffer, dict[Channel, NDArray[Any]]]:
-    """What pixels show, and images of it, each band at its own instant.
+    """Render G-buffer and images, each band at its own instant.
 
     Args:
-        bands: In order of rows; together all of them.
+        bands: Bands in order of rows, covering the image.
         channels: Labels.
-        studio: Assets and settings.
-        near: The world at about that time.
-        light: Makes the channel RADIANCE; None = it is not asked for.
+        context: Assets and settings.
+        reference: The world at a nearby instant.
+        light: Computes the channel RADIANCE; None = not requested.
     """
-    lens = near.moment.camera.intrinsics
+    lens = reference.state.camera.intrinsics
     shape = (lens.height_px, lens.width_px)
     hits, weights = np.zeros((*shape, 2), np.int32), np.zeros((*shape, 2), np.float32)
     z_m = np.zeros(shape, np.float32)
@@ -90,16 +90,16 @@ def render_bands(
     for band in bands:
         rows = slice(band.first, band.end)
         first, end = (band.first, band.end) if light is None else add_margin(band, lens.height_px)
-        # Neighbours in time have most in common.
-        see = near = render_view(band.moment, studio, (first, end), near)
+        # Neighbouring bands share the most packed data.
+        rendered = reference = render_view(band.state, context, (first, end), reference)
         own = slice(band.first - first, band.end - first)
-        seen, rows_px = see.seen, (end - first, lens.width_px)
-        hits[rows] = seen.hits.numpy().reshape(*rows_px, 2)[own]
-        weights[rows] = seen.weights.numpy().reshape(*rows_px, 2)[own]
-        z_m[rows] = seen.z_m.numpy().reshape(rows_px)[own]
-        drawn = label_images(band.moment.scene, see.world, see.view, seen, channels)
+        gbuffer, rows_px = rendered.gbuffer, (end - first, lens.width_px)
+        hits[rows] = gbuffer.hits.numpy().reshape(*rows_px, 2)[own]
+        weights[rows] = gbuffer.weights.numpy().reshape(*rows_px, 2)[own]
+        z_m[rows] = gbuffer.z_m.numpy().reshape(rows_px)[own]
+        drawn = label_images(band.state.scene, rendered.world, rendered.view, gbuffer, channels)
         if light is not None:
-            drawn[Channel.RADIANCE] = light(see)
+            drawn[Channel.RADIANCE] = light(rendered)
         for channel, image in drawn.items():
             parts.setdefault(channel, []).append(image[own].copy())
     images = {channel: np.concatenate(pieces) for channel, pieces in parts.items()}
@@ -107,7 +107,7 @@ def render_bands(
 
 
 def add_margin(band: RowBand, height_px: int) -> tuple[int, int]:
-    """Rows to render so that light in a band is as it is in the whole image."""
+    """Rows to render so that light in a band equals that of the whole image."""
     first = max(band.first - _MARGIN_PX, 0) // _PATTERN_PX * _PATTERN_PX
     end = -(-(band.end + _MARGIN_PX) // _STRIDE_PX) * _STRIDE_PX + 1
     return first, min(end, height_px)

@@ -1,4 +1,4 @@
-"""Directions through the pixels of a camera that is no pinhole."""
+"""Lookup tables of directions through the pixels of a camera with lens distortion."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.se3 import Array
 
 NODE_STRIDE_PX = 8
-"""Distance of the nodes between which directions beside the image are interpolated."""
+"""Spacing of the nodes between which directions outside the image are interpolated."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -20,10 +20,10 @@ class DeviceOptics:
     """A lens on the device.
 
     Attributes:
-        directions: As in records.View: unit and the pixel's angle, flat.
+        directions: As of records.View: unit direction and pixel angle, flat.
         nodes: Unit directions, [rows, columns, 3], on a canvas of three by three images, at every
             few pixel centres from the canvas's first; NaN where the lens shows nothing.
-        nodes_on_device: The same with a fourth place: 1, or 0 where the lens shows nothing.
+        nodes_on_device: The same with a fourth component: 1, or 0 where the lens shows nothing.
     """
 
     directions: wp.array
@@ -33,7 +33,7 @@ class DeviceOptics:
 
 
 def upload_optics(intrinsics: Intrinsics, device: wp.Device) -> DeviceOptics:
-    """Tables of a camera's lens, from double precision."""
+    """Tables of a camera's lens, computed in double precision."""
     directions = pixel_table(intrinsics)
     nodes = canvas_nodes(intrinsics)
     shown = np.isfinite(nodes[..., 0])
@@ -49,7 +49,7 @@ def upload_optics(intrinsics: Intrinsics, device: wp.Device) -> DeviceOptics:
 def pixel_table(intrinsics: Intrinsics) -> Float32:
     """Unit directions and the angle of each pixel [rad], shape [h, w, 4].
 
-    Where the lens shows nothing: the optical axis, and 0.
+    The optical axis and 0 where the lens shows nothing.
     """
     rays = intrinsics.pixel_rays()
     shown = np.isfinite(rays[..., 0])
@@ -60,7 +60,7 @@ def pixel_table(intrinsics: Intrinsics) -> Float32:
 
 
 def canvas_nodes(intrinsics: Intrinsics) -> Float32:
-    """See DeviceOptics."""
+    """Directions at the nodes of the canvas; see DeviceOptics."""
     width, height = intrinsics.width_px, intrinsics.height_px
     u, v = (
         np.arange(-(-3 * size // NODE_STRIDE_PX) + 1) * NODE_STRIDE_PX - size + 0.5
@@ -71,18 +71,18 @@ def canvas_nodes(intrinsics: Intrinsics) -> Float32:
 
 
 def _pixel_angles(rays: Array, intrinsics: Intrinsics) -> Array:
-    """Side of a square as large as each pixel on the unit sphere."""
+    """Side of the square with each pixel's solid angle [rad]."""
     across, down = (_slopes(rays, axis) for axis in (1, 0))
     area = np.cross(across, down)
     angles = np.sqrt(np.sqrt((area * area).sum(axis=-1)))
     usual = 1.0 / intrinsics.fx_px
-    # Rows of an equirectangular image shrink to nothing at the poles, and what they show does not.
+    # Pixels of an equirectangular image shrink to nothing at the poles, but their contents do not.
     filled: Array = np.maximum(np.nan_to_num(angles, nan=usual), 0.05 * usual)
     return filled
 
 
 def _slopes(rays: Array, axis: int) -> Array:
-    """Change per pixel along an axis; NaN beside what is not shown."""
+    """Change per pixel along an axis; NaN beside pixels that are not shown."""
     if rays.shape[axis] == 1:
         return np.full_like(rays, np.nan)
     slopes: Array = np.gradient(rays, axis=axis)

@@ -1,4 +1,4 @@
-"""Which surface is seen at every pixel centre."""
+"""G-buffer: the visible surface at every pixel centre."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from numpy.typing import NDArray
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.scene.kernels import ray_queries, records
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
-from gen_data.generator.renderers.warp.visibility.alpha_cutouts import has_holes, trace_over
+from gen_data.generator.renderers.warp.visibility.alpha_cutouts import has_cutouts, trace_over
 from gen_data.generator.renderers.warp.visibility.kernels import label_resolve, rasterizer
 
 Method = Literal["auto", "raster", "rays"]
-"""How the surface at a pixel centre is found, as in RenderSettings."""
+"""How visibility is determined, as in RenderSettings."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Projected:
-    """The vertices of bodies in or beside an image, body after body.
+    """Projected vertices of bodies in or near an image, body after body.
 
     Attributes:
-        reached: Numbers of the bodies that may lie on a canvas of three by three images; the
-            vertices of others are left over from before.
+        reached: Numbers of the bodies that may lie on a canvas of three by three images; vertices
+            of other bodies are stale.
         in_view: Numbers of the bodies that may lie in the image.
-        p_camera: In the camera frame [m].
-        xy: Snapped to the image plane; see
+        p_camera: Vertices in the camera frame [m].
+        xy: Vertices snapped to the image plane; see
             gen_data.generator.renderers.warp.visibility.kernels.rasterizer.
     """
 
@@ -40,14 +40,14 @@ class Projected:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GBuffer:
-    """Flat images of what is seen, row by row.
+    """Flat images of the visible surfaces, row by row.
 
     Attributes:
-        hits: (body, face); (-1, -1) where there is nothing.
-        z_m: Depth along the optical axis before a pinhole, else along the ray; inf.
-        weights: Barycentric (u, v); u + 2 where a triangle's inside is seen.
-        normals: Smooth, unit, world frame, towards the camera; 0.
-        projected: What was drawn; None where rays were traced.
+        hits: (body, face); (-1, -1) for the background.
+        z_m: Depth along the optical axis for a pinhole, else along the ray; inf for the background.
+        weights: Barycentric (u, v); u + 2 where the back of a triangle is visible.
+        normals: Smooth unit normals, world frame, towards the camera; 0 for the background.
+        projected: Rasterised vertices; None where rays were traced.
     """
 
     hits: wp.array
@@ -60,74 +60,77 @@ class GBuffer:
 def find_visible(
     world: PackedWorld,
     view: records.View,
-    stock: DeviceCache,
+    cache: DeviceCache,
     method: Method,
 ) -> GBuffer:
-    """The surfaces at all pixel centres of a view."""
+    """Find the surfaces at all pixel centres of a view."""
     n = view.width * view.height
-    # Straight edges have straight images before a pinhole only.
-    drawn = method == "raster" or (method == "auto" and stock.device.is_cpu)
+    # Straight edges have straight images only for a pinhole.
+    drawn = method == "raster" or (method == "auto" and cache.device.is_cpu)
     drawn = drawn and view.lens == records.PINHOLE
-    projected = project_vertices(world, view, stock) if drawn else None
-    seen = GBuffer(
-        stock.scratch("hits", n, wp.vec2i),
-        stock.scratch("z", n, float),
-        stock.scratch("weights", n, wp.vec2),
-        stock.scratch("normals", n, wp.vec3),
+    projected = project_vertices(world, view, cache) if drawn else None
+    gbuffer = GBuffer(
+        cache.scratch("hits", n, wp.vec2i),
+        cache.scratch("z", n, float),
+        cache.scratch("weights", n, wp.vec2),
+        cache.scratch("normals", n, wp.vec3),
         projected,
     )
     if projected is not None:
-        _rasterise(world, view, stock, projected, seen.hits)
+        _rasterise(world, view, cache, projected, gbuffer.hits)
     else:
         inputs = [view, world.record, rasterizer.Z_NEAR_M]
-        wp.launch(ray_queries.trace_pixels, n, inputs, [seen.hits], device=stock.device)
+        wp.launch(ray_queries.trace_pixels, n, inputs, [gbuffer.hits], device=cache.device)
     # One thread per row on the CPU, where threads run one after the other anyway.
-    run = view.width if stock.device.is_cpu else 1
-    outputs = [seen.z_m, seen.weights, seen.normals]
-    inputs = [view, world.record, run, seen.hits]
+    run = view.width if cache.device.is_cpu else 1
+    outputs = [gbuffer.z_m, gbuffer.weights, gbuffer.normals]
+    inputs = [view, world.record, run, gbuffer.hits]
     wp.launch(
         label_resolve.resolve,
         (view.height, view.width // run),
         inputs,
         outputs,
-        device=stock.device,
+        device=cache.device,
     )
-    return seen
+    return gbuffer
 
 
-def project_vertices(world: PackedWorld, view: records.View, stock: DeviceCache) -> Projected:
-    """Vertices as the camera sees them; valid until the next call."""
+def project_vertices(world: PackedWorld, view: records.View, cache: DeviceCache) -> Projected:
+    """Project vertices into the camera; valid until the next call."""
     count = max(world.vertex_count, 1)
-    reached = bodies_within(world.placed, view, 1.0)
-    # The wider test may refuse a body that the narrower one cannot: it is outside of both.
-    in_view = np.intersect1d(reached, bodies_within(world.placed, view, 0.0))
+    reached = bodies_within(world.body_records, view, 1.0)
+    # Rounding may let the wider test reject a body that the narrower one accepts: it is outside
+    # both.
+    in_view = np.intersect1d(reached, bodies_within(world.body_records, view, 0.0))
     projected = Projected(
         reached,
         in_view,
-        stock.scratch("p camera", count, wp.vec3),
-        stock.scratch("xy", count, wp.vec2i),
+        cache.scratch("p camera", count, wp.vec3),
+        cache.scratch("xy", count, wp.vec2i),
     )
-    bodies = wp.array(projected.reached, dtype=wp.int32, device=stock.device)
+    bodies = wp.array(projected.reached, dtype=wp.int32, device=cache.device)
     inputs = [view, world.record, bodies]
     outputs = [projected.p_camera, projected.xy]
-    wp.launch(rasterizer.project_vertices, len(bodies), inputs, outputs, device=stock.device)
+    wp.launch(rasterizer.project_vertices, len(bodies), inputs, outputs, device=cache.device)
     return projected
 
 
-def bodies_within(placed: NDArray[np.void], view: records.View, margin: float) -> NDArray[np.int32]:
-    """Numbers, ascending, of the bodies whose boxes reach into the pyramid of an image.
+def bodies_within(
+    body_records: NDArray[np.void], view: records.View, margin: float
+) -> NDArray[np.int32]:
+    """Numbers, ascending, of the bodies whose boxes reach into an image's frustum.
 
     Args:
-        placed: Body records.
+        body_records: Body records.
         view: The camera.
-        margin: How far the pyramid reaches beyond each side of the image, in images.
+        margin: How far the frustum extends beyond each side of the image, in images.
     """
-    ends = np.stack([placed["low_m"], placed["high_m"]], axis=1).astype(np.float64)
+    ends = np.stack([body_records["low_m"], body_records["high_m"]], axis=1).astype(np.float64)
     picks = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
     corners = ends[:, picks, np.arange(3)] - np.array(view.eye_m, dtype=np.float64)
     R_world_camera = np.array(view.R_world_camera, dtype=np.float64).reshape(3, 3)
     x, y, z = np.moveaxis(np.einsum("nki,ij->nkj", corners, R_world_camera, optimize=False), -1, 0)
-    # A pixel more than asked for swallows every rounding.
+    # One more pixel absorbs all rounding.
     beyond_x, beyond_y = margin * view.width + 1.0, margin * view.height + 1.0
     outside = [
         z < rasterizer.Z_NEAR_M,
@@ -143,18 +146,18 @@ def bodies_within(placed: NDArray[np.void], view: records.View, margin: float) -
 def _rasterise(
     world: PackedWorld,
     view: records.View,
-    stock: DeviceCache,
+    cache: DeviceCache,
     projected: Projected,
     hits: wp.array,
 ) -> None:
-    nearness = stock.scratch("nearness", view.width * view.height, float)
+    nearness = cache.scratch("nearness", view.width * view.height, float)
     nearness.zero_()
     hits.fill_(wp.vec2i(-1, -1))
     window = rasterizer.Window()
     window.width, window.height = view.width, view.height
-    pierced = has_holes(world.placed)[projected.in_view]
-    bodies = wp.array(projected.in_view[~pierced], dtype=wp.int32, device=stock.device)
+    cutouts = has_cutouts(world.body_records)[projected.in_view]
+    bodies = wp.array(projected.in_view[~cutouts], dtype=wp.int32, device=cache.device)
     inputs = [view, window, world.record, bodies, projected.p_camera, projected.xy]
-    wp.launch(rasterizer.draw_bodies, len(bodies), inputs, [nearness, hits], device=stock.device)
-    if pierced.any():
-        trace_over(world, view, projected.in_view[pierced], nearness, hits)
+    wp.launch(rasterizer.draw_bodies, len(bodies), inputs, [nearness, hits], device=cache.device)
+    if cutouts.any():
+        trace_over(world, view, projected.in_view[cutouts], nearness, hits)

@@ -1,4 +1,4 @@
-"""How fast things move in an image, and how many instants of time it therefore takes."""
+"""Speed of motion in an image, and the number of instants that it requires."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from gen_data.generator.renderers.warp.visibility.reprojection import (
 )
 
 BAND_PX = 0.25
-"""Nothing that is seen moves farther within a band of rows."""
+"""Largest motion of visible points within a band of rows."""
 BLUR_PX = 0.3
-"""Nor within a slice of an exposure, if the camera's number of samples allows."""
+"""Largest motion within a slice of an exposure, if the camera's number of samples allows."""
 _STRIDE_PX = 4
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ShutterSampling:
-    """How an image has to be taken.
+    """Sampling in time that an image requires.
 
     Attributes:
-        speeds_px_s: Of the fastest thing in or near each row, shape [height].
-        samples: Slices of an exposure.
-        blurred: Rows in which something moves while they are exposed, shape [height].
+        speeds_px_s: Speed of the fastest point in or near each row, shape [height].
+        samples: Slices per exposure.
+        blurred: Rows with visible motion during their exposure, shape [height].
     """
 
     speeds_px_s: Array
@@ -46,45 +46,49 @@ class ShutterSampling:
     blurred: NDArray[np.bool_]
 
 
-def plan_sampling(see: CameraView) -> ShutterSampling:
-    """How an image is taken while the camera's shutter is open.
+def plan_sampling(rendered: CameraView) -> ShutterSampling:
+    """Plan the sampling of an image over the time its shutter is open.
 
     Args:
-        see: What the camera sees in the middle of that time.
+        rendered: The image at the middle of that time.
     """
-    middle, shown = see.moment, copy_gbuffer(see)
+    middle, gbuffer = rendered.state, copy_gbuffer(rendered)
     shutter = middle.camera.shutter
-    ends = [_at_once(middle.later(side * shutter.open_s)) for side in (-0.5, 0.5)]
+    ends = [_global_shutter_band(middle.later(side * shutter.open_s)) for side in (-0.5, 0.5)]
     carriers = find_carriers(middle.scene)
-    points = gather_points(shown, carriers, _STRIDE_PX)
+    points = gather_points(gbuffer, carriers, _STRIDE_PX)
     before, after = (reproject(points, [end], carriers, _STRIDE_PX).image_px for end in ends)
     way = after - before
     length = np.where(np.isfinite(way).all(axis=-1), np.sqrt((way * way).sum(axis=-1)), 0.0)
     vertical = np.where(length > 0.0, np.abs(way[..., 1]), 0.0)
-    speeds = _spread(length.max(axis=1) / shutter.open_s, vertical.max(axis=1), len(shown.z_m))
+    speeds = _dilate_rows(
+        length.max(axis=1) / shutter.open_s, vertical.max(axis=1), len(gbuffer.z_m)
+    )
     wanted = math.ceil(float(speeds.max()) * shutter.exposure_s / BLUR_PX)
     blurred = speeds * shutter.exposure_s > BLUR_PX
     return ShutterSampling(speeds, min(max(wanted, 1), shutter.samples), blurred)
 
 
-def split_bands(see: CameraView, pace: ShutterSampling | None = None) -> tuple[RowBand, ...]:
-    """Bands of rows within which nothing moves farther than ``BAND_PX``, each at its instant.
+def split_bands(
+    rendered: CameraView, sampling: ShutterSampling | None = None
+) -> tuple[RowBand, ...]:
+    """Bands of rows, each at its instant, within which nothing moves farther than ``BAND_PX``.
 
     Args:
-        see: What the camera sees in the middle of the exposure of the image.
-        pace: Of the image; None = it is to be found out.
+        rendered: The image at the middle of its exposure.
+        sampling: Sampling of the image; None = determine it.
     """
-    middle = see.moment
+    middle = rendered.state
     shutter = middle.camera.shutter
     if not shutter.rolls or not is_moving(middle, shutter.open_s):
         return (full_band(middle),)
-    pace = pace or plan_sampling(see)
-    per_row_s = abs(shutter.readout_s) / len(pace.speeds_px_s)
-    return make_bands(middle, band_starts(pace.speeds_px_s * per_row_s))
+    sampling = sampling or plan_sampling(rendered)
+    per_row_s = abs(shutter.readout_s) / len(sampling.speeds_px_s)
+    return make_bands(middle, band_starts(sampling.speeds_px_s * per_row_s))
 
 
 def make_bands(middle: CameraState, starts: Sequence[int]) -> tuple[RowBand, ...]:
-    """Bands that begin at those rows, each at the instant of its middle."""
+    """Bands that begin at the given rows, each at the instant of its middle."""
     height = middle.camera.intrinsics.height_px
     delay_s = middle.camera.shutter.delay_s
     return tuple(
@@ -97,20 +101,20 @@ def band_starts(motion_px: Array) -> list[int]:
     """First rows of bands, each as high as the motion in it allows.
 
     Args:
-        motion_px: How far things move from one row to the next, shape [height].
+        motion_px: Motion from one row to the next, shape [height].
     """
     travelled = np.concatenate([[0.0], np.cumsum(motion_px)])[:-1]
     begins: NDArray[np.bool_] = np.diff(np.floor(travelled / BAND_PX), prepend=-1.0) > 0.0
     return [int(row) for row in np.flatnonzero(begins)]
 
 
-def _spread(speeds: Array, travels_px: Array, height: int) -> Array:
-    """The highest speed of what comes to be in each row while the shutter is open, [height].
+def _dilate_rows(speeds: Array, travels_px: Array, height: int) -> Array:
+    """Highest speed of anything that may reach each row while the shutter is open, [height].
 
     Args:
-        speeds: In every few rows.
-        travels_px: How far the same things go up or down meanwhile.
-        height: Of the image.
+        speeds: Speeds in every few rows.
+        travels_px: Vertical motion of the same points in that time.
+        height: Height of the image.
     """
     highest = np.zeros(height)
     reaches = np.ceil(0.5 * np.minimum(travels_px, 2.0 * height)).astype(int) + 2 * _STRIDE_PX
@@ -120,7 +124,7 @@ def _spread(speeds: Array, travels_px: Array, height: int) -> Array:
     return highest
 
 
-def _at_once(moment: CameraState) -> RowBand:
-    """The whole image of a camera whose rows are all exposed then."""
-    camera = replace(moment.camera, shutter=INSTANT)
-    return full_band(replace(moment, camera=camera))
+def _global_shutter_band(state: CameraState) -> RowBand:
+    """The whole image with all rows exposed at one instant."""
+    camera = replace(state.camera, shutter=INSTANT)
+    return full_band(replace(state, camera=camera))

@@ -1,6 +1,6 @@
-"""Where what pixels show is in the same camera's image a step later or earlier.
+"""Optical flow and scene flow: positions of visible points one step later or earlier.
 
-Only whether it is hidden then takes an image of that instant.
+Only occlusion requires an image of that instant.
 """
 
 from __future__ import annotations
@@ -41,52 +41,59 @@ BACKWARD = frozenset({Channel.FLOW_BACKWARD, Channel.FLOW_OCCLUDED_BACKWARD})
 FLOW = FORWARD | BACKWARD
 
 _NEARER = 2e-3
-"""What is nearer than a point by less, as a share of its distance, does not hide it."""
+"""Relative depth tolerance: a surface hides a point only if it is nearer by more than this."""
 
 
 def flow_images(
-    near: CameraView, shown: BandedGBuffer, channels: frozenset[Channel], studio: RenderContext
+    reference: CameraView,
+    gbuffer: BandedGBuffer,
+    channels: frozenset[Channel],
+    context: RenderContext,
 ) -> dict[Channel, NDArray[Any]]:
-    """All channels of flow that are asked for, as listed at Channel.
+    """All requested flow channels, as documented at Channel.
 
     Args:
-        near: The world at the image's instant.
-        shown: What its pixels show, each row at its own.
-        channels: Of any kind.
-        studio: Assets and settings.
+        reference: The world at the image's instant.
+        gbuffer: G-buffer of the image, each row at its own instant.
+        channels: Requested channels of any kind.
+        context: Assets and settings.
     """
     images: dict[Channel, NDArray[Any]] = {}
     if not channels & FLOW:
         return images
-    middle = near.moment
+    middle = reference.state
     step_s = middle.scene.step_s
     carriers = find_carriers(middle.scene)
-    points = gather_points(shown, carriers)
+    points = gather_points(gbuffer, carriers)
     if channels & FORWARD:
-        images |= _carried(points, shown, middle.later(step_s), channels & FORWARD, near, studio)
+        images |= _flow_channels(
+            points, gbuffer, middle.later(step_s), channels & FORWARD, reference, context
+        )
     if channels & BACKWARD and middle.scene.time_s < step_s - 1e-9:
-        images |= _nowhere(points.carriers.shape, channels)
+        images |= _undefined_flow(points.carriers.shape, channels)
     elif channels & BACKWARD:
-        images |= _carried(points, shown, middle.later(-step_s), channels & BACKWARD, near, studio)
+        images |= _flow_channels(
+            points, gbuffer, middle.later(-step_s), channels & BACKWARD, reference, context
+        )
     return images
 
 
-def _carried(
+def _flow_channels(
     points: ScenePoints,
-    shown: BandedGBuffer,
+    gbuffer: BandedGBuffer,
     then: CameraState,
     channels: frozenset[Channel],
-    near: CameraView,
-    studio: RenderContext,
+    reference: CameraView,
+    context: RenderContext,
 ) -> dict[Channel, NDArray[Any]]:
     """Channels of one direction."""
     images: dict[Channel, NDArray[Any]] = {}
     carriers = find_carriers(then.scene)
     bands: Sequence[RowBand] = (full_band(then),)
     if then.camera.shutter.rolls:
-        near = render_view(then, studio, None, near)
-        bands = split_bands(near)
-    points = deform_points(points, shown, then.scene, studio.stock.assets)
+        reference = render_view(then, context, None, reference)
+        bands = split_bands(reference)
+    points = deform_points(points, gbuffer, then.scene, context.cache.assets)
     found = reproject(points, bands, carriers)
     for channel in sorted(channels, key=lambda c: c.value):
         if channel in (Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD):
@@ -95,10 +102,10 @@ def _carried(
             images[channel] = _scene_flow(points, found)
         else:
             seen = frozenset({Channel.RANGE, Channel.NORMALS})
-            # Four times as far as bands allow is a pixel: as sharp as occlusion is told.
+            # Bands four times as high allow one pixel of motion: as accurate as the occlusion test.
             starts = [band.first for band in bands[::4]]
-            _, other = render_bands(make_bands(then, starts), seen, studio, near)
-            images[channel] = find_occluded(points, found, other, shown.intrinsics)
+            _, other = render_bands(make_bands(then, starts), seen, context, reference)
+            images[channel] = find_occluded(points, found, other, gbuffer.intrinsics)
     return images
 
 
@@ -121,16 +128,16 @@ def find_occluded(
     then: Mapping[Channel, NDArray[Any]],
     camera: Intrinsics,
 ) -> NDArray[np.uint8]:
-    """1 where a point is hidden in the image of then, or not in it, shape [h, w].
+    """Occlusion of points in another image, uint8 [h, w]: 1 if hidden or outside it.
 
-    It is seen if one of the four pixels around it shows no surface nearer than it is; surfaces are
-    continued from the pixels' centres along their tangent planes.
+    A point is visible if any of the four pixels around it shows no nearer surface; surfaces are
+    extrapolated from pixel centres along their tangent planes.
 
     Args:
-        points: Of now.
-        found: Where they are then.
-        then: Range and normals of the image of then.
-        camera: Of that image.
+        points: Points of this image.
+        found: Their positions at the other instant.
+        then: Range and normals of the image at the other instant.
+        camera: Intrinsics of that image.
     """
     range_m, normals = then[Channel.RANGE], then[Channel.NORMALS]
     u, v = found.image_px[..., 0], found.image_px[..., 1]
@@ -148,15 +155,17 @@ def find_occluded(
             normal = normals[row, column]
             steep = _dot(normal, rays[row, column])
             tilt = _dot(normal, towards)
-            # Where a tangent plane is seen edge-on, it says nothing: the depth itself does.
+            # Tangent planes seen edge-on cannot be extrapolated: use the depth itself.
             usable = (tilt < -0.02) & (steep < -0.02)
             factor = np.where(usable, steep / np.where(usable, tilt, 1.0), 1.0)
             seen |= range_m[row, column] * np.clip(factor, 0.8, 1.25) >= limit
     return np.asarray(~(seen & inside), np.uint8)
 
 
-def _nowhere(shape: tuple[int, ...], channels: frozenset[Channel]) -> dict[Channel, NDArray[Any]]:
-    """Backward flow before there is anything to look back on."""
+def _undefined_flow(
+    shape: tuple[int, ...], channels: frozenset[Channel]
+) -> dict[Channel, NDArray[Any]]:
+    """Backward flow at the beginning of a sequence."""
     values: dict[Channel, NDArray[Any]] = {
         Channel.FLOW_BACKWARD: np.full((*shape, 2), np.nan, np.float32),
         Channel.FLOW_OCCLUDED_BACKWARD: np.ones(shape, np.uint8),

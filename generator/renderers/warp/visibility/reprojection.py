@@ -1,6 +1,6 @@
-"""The points that pixels show, carried along to other instants.
+"""Reprojection of visible points to other instants.
 
-Every point is held in the frame of what carries it, a body or the world: there is no search.
+Every point is expressed in the frame of its carrier, a body or the world: no search is needed.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from gen_data.generator.renderers.warp.frame_context import RowBand
 from gen_data.generator.renderers.warp.visibility.banded_gbuffer import BandedGBuffer
 
 _ROWS_AT_ONCE = 32
-_LOOKS = 4
-"""At a rolling shutter: where a point is decides when it is seen, and that where it is."""
+_ITERATIONS = 4
+"""Fixed-point iterations for rolling shutters: position and time of exposure are coupled."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ScenePoints:
-    """Points of a grid of pixels, each in the frame of what carries it.
+    """Points of a grid of pixels, each in the frame of its carrier.
 
     Attributes:
-        places: Homogeneous [m], [h, w, 4]: the fourth is 0 for what is at infinity. NaN where a
-            lens shows nothing.
+        places: Homogeneous coordinates [m], [h, w, 4]; the fourth is 0 for points at infinity. NaN
+            where a lens shows nothing.
         carriers: 0 = the world, else a number that ``find_carriers`` gives, [h, w].
-        p_camera: The same in the camera frame of their own instant, [h, w, 3].
+        p_camera: The points in the camera frame at their own instant, [h, w, 3].
     """
 
     places: Array
@@ -41,34 +41,34 @@ class ScenePoints:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ReprojectedPoints:
-    """Where points are at other instants: camera frame [m] [h, w, 3], and image [px] [h, w, 2]."""
+    """Positions at other instants: camera frame [m] [h, w, 3] and image [px] [h, w, 2]."""
 
     p_camera: Array
     image_px: Array
 
 
 def find_carriers(scene: Scene) -> dict[int, int]:
-    """Numbers, from 1, of the bodies that may move or change shape, by their place in the scene."""
+    """Numbers, from 1, of the bodies that may move or change shape, by body index."""
     names = {track.body for track in scene.tracks} | {c.body for c in scene.changes if c.asset}
     moving = [k for k, body in enumerate(scene.bodies) if body.name in names]
     return {k: number for number, k in enumerate(moving, 1)}
 
 
 def gather_points(
-    shown: BandedGBuffer, carriers: Mapping[int, int], stride: int = 1
+    gbuffer: BandedGBuffer, carriers: Mapping[int, int], stride: int = 1
 ) -> ScenePoints:
-    """The points that every few pixels show."""
-    hits = shown.hits[::stride, ::stride]
+    """The visible points at every few pixels."""
+    hits = gbuffer.hits[::stride, ::stride]
     places = np.zeros((*hits.shape[:2], 4))
     numbers = np.zeros(hits.shape[:2], np.intp)
-    p_camera = _seen_points(shown, stride)
+    p_camera = _seen_points(gbuffer, stride)
     known = np.zeros(int(hits[..., 0].max(initial=-1)) + 2, np.intp)
     for body, number in carriers.items():
         if body + 1 < len(known):
             known[body + 1] = number
-    for band in shown.bands:
+    for band in gbuffer.bands:
         rows = slice(-(-band.first // stride), -(-band.end // stride))
-        scene, T_world_camera = band.moment.scene, band.moment.camera.T_world_camera
+        scene, T_world_camera = band.state.scene, band.state.camera.T_world_camera
         there = hits[rows, :, 0] >= 0
         shift = np.where(there[..., None], np.asarray(T_world_camera.translation_m), 0.0)
         place = T_world_camera.rotate(p_camera[rows]) + shift
@@ -83,9 +83,9 @@ def gather_points(
 def reproject(
     points: ScenePoints, bands: Sequence[RowBand], carriers: Mapping[int, int], stride: int = 1
 ) -> ReprojectedPoints:
-    """Where points are in an image that the same camera takes at other instants."""
-    camera = bands[0].moment.camera
-    ways = _ways(bands, carriers)
+    """Positions of points in an image of the same camera at other instants."""
+    camera = bands[0].state.camera
+    ways = _carrier_transforms(bands, carriers)
     shape = points.carriers.shape
     p_camera, image_px = np.zeros((*shape, 3)), np.zeros((*shape, 2))
     band_of_row = np.repeat(np.arange(len(bands)), [band.end - band.first for band in bands])
@@ -93,10 +93,10 @@ def reproject(
         rows = slice(first, first + _ROWS_AT_ONCE)
         carrier, place = points.carriers[rows], points.places[rows]
         row = stride * np.arange(first, first + len(carrier))[:, None] + np.zeros_like(carrier)
-        for _ in range(_LOOKS if len(bands) > 1 else 1):
+        for _ in range(_ITERATIONS if len(bands) > 1 else 1):
             moved = np.einsum("hwij,hwj->hwi", ways[carrier, band_of_row[row]], place)
             image = camera.intrinsics.project(moved)
-            # What a lens does not show at one instant is looked for where it was.
+            # Points outside the lens's field at one instant keep their previous row.
             v = np.where(np.isfinite(image[..., 1]), image[..., 1], row)
             row = np.clip(np.floor(v), 0, len(band_of_row) - 1).astype(np.intp)
         p_camera[rows], image_px[rows] = moved, image
@@ -104,30 +104,30 @@ def reproject(
 
 
 def deform_points(
-    points: ScenePoints, shown: BandedGBuffer, then: Scene, assets: AssetLibrary
+    points: ScenePoints, gbuffer: BandedGBuffer, then: Scene, assets: AssetLibrary
 ) -> ScenePoints:
-    """The points on the shapes that bodies have then, as far as they have the same triangles."""
+    """The points on the bodies' shapes at another instant, where the triangles are the same."""
     places = points.places.copy()
-    for band in shown.bands:
+    for band in gbuffer.bands:
         rows = slice(band.first, band.end)
-        numbers = shown.hits[rows, :, 0]
+        numbers = gbuffer.hits[rows, :, 0]
         for body in np.unique(numbers[points.carriers[rows] > 0]):
-            now, other = band.moment.scene.bodies[body], then.bodies[body]
+            now, other = band.state.scene.bodies[body], then.bodies[body]
             if now.asset == other.asset:
                 continue
             one, two = assets.mesh(now.asset), assets.mesh(other.asset)
             if np.array_equal(one.faces, two.faces):
                 own = numbers == body
-                corners = one.faces[shown.hits[rows, :, 1][own]]
+                corners = one.faces[gbuffer.hits[rows, :, 1][own]]
                 steps = (two.vertices_m.astype(np.float64) - one.vertices_m)[corners] * now.scale
-                places[rows][own, :3] += _weighted(steps, shown.weights[rows][own])
+                places[rows][own, :3] += _interpolate(steps, gbuffer.weights[rows][own])
     return replace(points, places=places)
 
 
-def _seen_points(shown: BandedGBuffer, stride: int) -> Array:
-    """Points in the camera frame; directions where nothing is hit, NaN where nothing is shown."""
-    camera, z_m = shown.intrinsics, shown.z_m[::stride, ::stride].astype(np.float64)
-    depth_m = np.where(shown.hits[::stride, ::stride, 0] >= 0, z_m, 1.0)
+def _seen_points(gbuffer: BandedGBuffer, stride: int) -> Array:
+    """Visible points in the camera frame; directions for the background, NaN if not shown."""
+    camera, z_m = gbuffer.intrinsics, gbuffer.z_m[::stride, ::stride].astype(np.float64)
+    depth_m = np.where(gbuffer.hits[::stride, ::stride, 0] >= 0, z_m, 1.0)
     if not camera.straight:
         scaled: Array = camera.pixel_rays()[::stride, ::stride] * depth_m[..., None]
         return scaled
@@ -138,20 +138,20 @@ def _seen_points(shown: BandedGBuffer, stride: int) -> Array:
     return np.stack([x, y, depth_m], axis=-1)
 
 
-def _ways(bands: Sequence[RowBand], carriers: Mapping[int, int]) -> Array:
-    """From carriers' frames to the camera's, by carrier and band: [carriers + 1, bands, 3, 4]."""
+def _carrier_transforms(bands: Sequence[RowBand], carriers: Mapping[int, int]) -> Array:
+    """Carrier frame to camera frame, by carrier and band: [carriers + 1, bands, 3, 4]."""
     ways = np.zeros((len(carriers) + 1, len(bands), 3, 4))
     for k, band in enumerate(bands):
-        T_camera_world = band.moment.camera.T_world_camera.inverse()
+        T_camera_world = band.state.camera.T_world_camera.inverse()
         ways[0, k] = T_camera_world.matrix()[:3]
         for body, number in carriers.items():
-            pose = T_camera_world @ band.moment.scene.bodies[body].T_world_body
+            pose = T_camera_world @ band.state.scene.bodies[body].T_world_body
             ways[number, k] = pose.matrix()[:3]
     return ways
 
 
-def _weighted(corners: Array, weights: Float32) -> Array:
-    """Sums over the corners of triangles [n, 3, 3] with stored barycentric weights [n, 2]."""
+def _interpolate(corners: Array, weights: Float32) -> Array:
+    """Interpolation over triangle corners [n, 3, 3] by stored barycentric weights [n, 2]."""
     u = np.where(weights[:, 0] > 1.5, weights[:, 0] - 2.0, weights[:, 0]).astype(np.float64)
     v = weights[:, 1].astype(np.float64)
     shares = np.stack([1.0 - u - v, u, v], axis=-1)

@@ -1,10 +1,10 @@
-"""Rain and snow in the air."""
+"""Falling rain and snow."""
 
 from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.atmosphere.kernels.fog import scattering
+from gen_data.generator.renderers.warp.atmosphere.kernels.fog import phase_function
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import beam_from
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_irradiance
 from gen_data.generator.renderers.warp.scene.kernels.records import (
@@ -19,15 +19,15 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 @wp.struct
 class Streak:
-    """The trace of one particle during the exposure, in the image.
+    """Motion-blurred image of one particle.
 
     Attributes:
         start_px, end_px: Ends of its axis.
         radius_px: Half its width, at least half a pixel.
-        opacity: Part of the background that it hides, in the mean over the exposure.
+        opacity: Share of the background that it hides, averaged over the exposure.
         z_m: Depth.
-        p_m: Where it is, world.
-        radiance: What it shines with [cd/m^2]; filled in by ``light_streaks``.
+        p_m: Position in the world.
+        radiance: Radiance towards the camera [cd/m^2]; written by ``light_streaks``.
     """
 
     start_px: wp.vec2
@@ -41,15 +41,17 @@ class Streak:
 
 @wp.kernel
 def light_streaks(view: View, world: World, streaks: wp.array(dtype=Streak)):
-    """Light that particles send to the camera: the sky's from all sides, and that of lamps."""
+    """Radiance of particles towards the camera: ambient light, and that of lamps."""
     k = wp.tid()
     p = streaks[k].p_m
     d = fast_normalize(p - view.eye_m)
+    # The mean of the sphere and of the upper hemisphere: drops refract light from all around, most
+    # of it from above.
     mean = world.sky.irradiance[0] * world.sky.luminance
     c = (mean + sky_irradiance(world.sky, wp.vec3(0.0, 0.0, 1.0))) * 0.5
     for j in range(world.lamps.shape[0]):
         beam = beam_from(world.lamps[j], p)
-        c += beam.normal_lux * scattering(wp.dot(d, beam.direction))
+        c += beam.normal_lux * phase_function(wp.dot(d, beam.direction))
     streaks[k].radiance = c
 
 
@@ -62,13 +64,14 @@ def draw_streaks(
     listed: wp.array(dtype=int),
     radiance: wp.array(dtype=wp.vec3),
 ):
-    """Lay particles over each row of the image, where nothing nearer hides them.
+    """Blend particles over each row of the image where no surface is nearer.
 
     Args:
-        first: Where each row's list begins, and the end of the last.
-        listed: Numbers of streaks, far ones first.
+        first: First entry of each row in ``listed``, and the end of the last row.
+        listed: Numbers of streaks, distant ones first.
     """
     y = wp.tid()
+    # Distant streaks first: nearer ones are blended over them.
     for k in range(first[y], first[y + 1]):
         s = listed[k]
         a = streaks[s].start_px
@@ -79,6 +82,7 @@ def draw_streaks(
         high = wp.max(a[0], a[0] + along[0]) + radius + 0.5
         for x in range(wp.max(floor_int(low), 0), wp.min(floor_int(high) + 1, width)):
             q = wp.vec2(float(x) + 0.5, float(y) + 0.5) - a
+            # Distance to the streak's axis; one pixel of ramp antialiases its edge.
             t = wp.clamp(wp.dot(q, along) / squared, 0.0, 1.0)
             away = wp.length(q - along * t)
             cover = wp.clamp(radius + 0.5 - away, 0.0, 1.0) * streaks[s].opacity

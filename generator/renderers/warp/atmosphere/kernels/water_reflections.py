@@ -1,7 +1,7 @@
-"""Water on the ground: films that mirror softly, puddles that mirror sharply.
+"""Reflections in water on the ground: blurred in films, sharp in puddles.
 
-Films change slowly over the image: what they mirror is traced from points of the lattice and
-averaged around each. Puddles are traced pixel by pixel.
+Films vary slowly over the image: their reflections are traced from lattice points and averaged
+around each. Puddles are traced pixel by pixel.
 """
 
 from __future__ import annotations
@@ -46,24 +46,24 @@ from gen_data.generator.renderers.warp.visibility.kernels.distortion import proj
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-# How far mirrored rays are followed.
+# Length of reflected rays.
 MIRRORED_M = wp.constant(1.0e3)
 
-# Films smoother than this mirror like puddles.
+# Smoother films are traced like puddles.
 SHARP = wp.constant(0.02)
-# Slopes of a film on rough ground.
+# Spread of a film's slopes on rough ground.
 FILM_SLOPE = wp.constant(0.16)
-# pi (3 - sqrt(5)): turned by it, points of a spiral cover a disk evenly (Vogel 1979).
+# Golden angle, pi (3 - sqrt(5)): a spiral with this step covers a disk evenly (Vogel 1979).
 GOLDEN_ANGLE = wp.constant(2.39996323)
-# Points nearer to each other than this share their shelter.
+# Points closer than this share their exposure.
 BESIDE_M = wp.constant(0.12)
-# Points to either side over which films are averaged: whole periods of the pattern of slopes.
+# Points to either side over which films are averaged: a whole period of the pattern of slopes.
 FILM_REACH = wp.constant(8)
 
 
 @wp.kernel
-def find_shelter(world: World, lattice: Lattice, exposed: wp.array(dtype=float)):
-    """Share of what falls that reaches each point of the lattice, by one ray each."""
+def probe_exposure(world: World, lattice: Lattice, exposed: wp.array(dtype=float)):
+    """Exposure of each lattice point to precipitation, by one ray each."""
     k = wp.tid()
     exposed[k] = 1.0
     if lattice.body[k] >= 0 and lattice.normal[k][2] > 0.1:
@@ -71,10 +71,10 @@ def find_shelter(world: World, lattice: Lattice, exposed: wp.array(dtype=float))
 
 
 @wp.kernel
-def average_shelter(
+def average_exposure(
     lattice: Lattice, probed: wp.array(dtype=float), exposed: wp.array(dtype=float)
 ):
-    """The mean of find_shelter over points beside each other on the ground."""
+    """Mean of probe_exposure over nearby points on the same material."""
     k = wp.tid()
     column = k % lattice.width
     row = k / lattice.width
@@ -96,37 +96,37 @@ def average_shelter(
 def water_at(
     world: World, surface: int, p: wp.vec3, n: wp.vec3, exposed: float, footprint_m: float
 ):
-    """How much of a point is a mirror of water, and how rough that mirror is."""
-    # Water runs off what is steeper than 60 degrees.
+    """Share of a point that reflects as water, and the roughness of that water."""
+    # Water runs off slopes above 60 degrees.
     if n[2] < 0.5:
         return wp.vec2(0.0)
     porous = estimate_porosity(world, surface)
     puddle = puddle_at(world, p, n, exposed, footprint_m) * porous
     film = world.ground.wetness * wp.clamp(n[2], 0.0, 1.0) * exposed * porous
-    # A film follows the grain of the ground: half of it mirrors, and not sharply.
+    # A film follows the grain of the ground: half of it reflects, and not sharply.
     share = wp.max(puddle, 0.5 * film) * (1.0 - snow_at(world, p, n, exposed, footprint_m))
     return wp.vec2(share, FILM_SLOPE * (1.0 - puddle) * (1.0 - puddle))
 
 
 @wp.func
 def mean_color(world: World, surface: int):
-    """A material's colour without the detail of its texture."""
+    """A material's mean colour, without the detail of its texture."""
     color = world.surfaces[surface].base_color
     texture = world.surfaces[surface].texture
     if texture >= 0:
-        # Past the last level of any texture: its mean.
+        # Beyond the last level of any texture: its mean.
         coarsest = make_sampler(world, texture, 30.0)
         color = wp.cw_mul(color, texel_at(world, texture, coarsest, 0.5, 0.5, False).albedo)
     return color
 
 
 @wp.func
-def mirrored_sky(world: World, d: wp.vec3, width: float):
-    """Sky in one direction, with the suns that are blurred over an angle."""
+def reflected_sky(world: World, d: wp.vec3, width: float):
+    """Radiance of the sky in one direction, with suns blurred by an angle."""
     c = sky_rest(world.sky, d)
     for j in range(world.lamps.shape[0]):
         if world.lamps[j].kind == SUN:
-            # Gaussian over the angle: 1 - cos is half its square; width and sun add in squares.
+            # Gaussian in the angle: 1 - cos is half its square; blur and sun add in quadrature.
             away = wp.max(1.0 - wp.dot(d, -world.lamps[j].direction), 0.0)
             spread = 0.5 * (width * width + world.lamps[j].radius * world.lamps[j].radius)
             c += world.lamps[j].power * (wp.exp(-away / spread) / (2.0 * wp.pi * spread))
@@ -134,7 +134,7 @@ def mirrored_sky(world: World, d: wp.vec3, width: float):
 
 
 @wp.func
-def mirrored_body(
+def reflected_surface(
     view: View,
     world: World,
     images: GBufferRecord,
@@ -145,12 +145,13 @@ def mirrored_body(
     hit: wp.vec2i,
     normal: wp.vec3,
 ):
-    """Light of what a mirrored ray meets: as the image shows it, else without shadows."""
+    """Radiance of a surface that a reflected ray hits: from the image, else without shadows."""
     p = origin + d * t
     q = wp.transpose(view.R_world_camera) @ (p - view.eye_m)
     c = wp.vec3(-1.0)
     j, depth_m = project_to_pixel(view, q)
     if j >= 0:
+        # The image shows that very point: same body, same depth.
         if images.hits[j][0] == hit[0] and wp.abs(images.z_m[j] - depth_m) < 0.05 + 0.02 * depth_m:
             c = radiance[j]
     if c[0] < 0.0:
@@ -158,6 +159,7 @@ def mirrored_body(
         n = normal
         if wp.dot(n, d) > 0.0:
             n = -n
+        # Outside the image or hidden in it: 0.7 stands for average ambient occlusion.
         light = sky_irradiance(world.sky, n) * 0.7
         for j in range(world.lamps.shape[0]):
             beam = beam_from(world.lamps[j], p)
@@ -167,7 +169,7 @@ def mirrored_body(
 
 
 @wp.func
-def mirrored(
+def reflected_radiance(
     view: View,
     world: World,
     images: GBufferRecord,
@@ -176,16 +178,16 @@ def mirrored(
     d: wp.vec3,
     width: float,
 ):
-    """Radiance along a mirrored ray."""
+    """Radiance along a reflected ray."""
     m = closest_hit(world, origin, d, MIRRORED_M, HOLES)
     if m.at[0] < 0:
-        return mirrored_sky(world, d, width)
+        return reflected_sky(world, d, width)
     normal = flat_normal(world, m.at)
-    return mirrored_body(view, world, images, radiance, origin, d, m.t, m.at, normal)
+    return reflected_surface(view, world, images, radiance, origin, d, m.t, m.at, normal)
 
 
 @wp.func
-def mirrored_by(
+def facet_reflection(
     view: View,
     world: World,
     images: GBufferRecord,
@@ -195,15 +197,15 @@ def mirrored_by(
     m: wp.vec3,
     width: float,
 ):
-    """What a facet of water with normal m mirrors [cd/m^2], reflected, and its reflectance."""
+    """Weighted radiance [cd/m^2] and reflectance of a facet of water with normal m."""
     d = fast_normalize(p - view.eye_m)
-    # Facets that face away would mirror from below; grazing ones stay at one degree.
+    # Facets that face away would reflect from below; at least one degree of incidence remains.
     c = wp.max(-wp.dot(d, m), 0.02)
     r = d + m * (2.0 * c)
-    # What a tilted facet mirrors downwards would be the ground it lies on.
+    # A tilted facet would reflect the ground on which it lies.
     r = fast_normalize(wp.vec3(r[0], r[1], wp.max(r[2], 0.02)))
     fresnel = fresnel_schlick(WATER_F0, c)
-    seen = mirrored(view, world, images, radiance, origin, r, 0.02 + width) * fresnel
+    seen = reflected_radiance(view, world, images, radiance, origin, r, 0.02 + width) * fresnel
     return wp.vec4(seen[0], seen[1], seen[2], fresnel)
 
 
@@ -217,11 +219,11 @@ def mirror_in_films(
     water: wp.array(dtype=wp.vec2),
     films: wp.array(dtype=wp.vec4),
 ):
-    """Water at the lattice's points, and one ray of what a film there mirrors.
+    """Water at the lattice's points, and one reflected ray of the film there.
 
     Args:
-        water: Share of each point that is water, and how rough it is.
-        films: As mirrored_by says; not written where there is no water.
+        water: Share and roughness of water at each point.
+        films: As of facet_reflection; not written without water.
     """
     k = wp.tid()
     water[k] = wp.vec2(0.0)
@@ -231,22 +233,22 @@ def mirror_in_films(
     n = lattice.normal[k]
     size_m = footprint(view, p, n, float(lattice.stride))
     wet = water_at(world, lattice.surface[k], p, n, world.ground.exposed[k], size_m)
-    # Less than a percent of a mirror is not worth its ray.
+    # Less than one percent of water is not worth a ray.
     if wet[0] < 0.01:
         return
     water[k] = wet
-    # The points of any square of eight share one even spread of slopes, neighbours far from each
-    # other in it.
+    # Every 8 x 8 block of points shares one even distribution of slopes, with neighbours far apart
+    # in it.
     x = k % lattice.width
     y = k / lattice.width
     place = float(((x % 8) * 24 + (y % 8) * 19) % 64) + 0.5
-    # The root spreads points evenly over the disk of slopes, as Vogel's spiral has it.
+    # The square root makes the distribution even over the disk of slopes (Vogel's spiral).
     slope = wp.max(wet[1], 0.25 * FILM_SLOPE) * wp.sqrt(place / 64.0)
     tilt = wp.vec3(wp.cos(GOLDEN_ANGLE * place), wp.sin(GOLDEN_ANGLE * place), 0.0) * slope
-    seen = mirrored_by(
+    seen = facet_reflection(
         view, world, images, radiance, p, lattice.origin_m[k], fast_normalize(n + tilt), FILM_SLOPE
     )
-    # Few rays do not find small bright lamps evenly; their lobes are shaded already.
+    # A few rays sample small bright lamps unevenly; their highlights are shaded elsewhere: clamp.
     limit = 30.0 * wp.max(radiance[lattice.pixel[k]])
     limit += 4.0 * wp.max(world.sky.irradiance[0]) * world.sky.luminance
     brightest = wp.max(wp.max(seen[0], wp.max(seen[1], seen[2])), 1.0e-9)
@@ -263,7 +265,7 @@ def blur_films(
     step: int,
     spread: wp.array(dtype=wp.vec4),
 ):
-    """Average over the points at one depth along a row (``step`` 1) or a column (the width)."""
+    """Average over points of similar depth along a row (``step`` 1) or column (``step`` width)."""
     k = wp.tid()
     if water[k][0] == 0.0:
         return
@@ -278,7 +280,7 @@ def blur_films(
     for o in range(wp.max(-FILM_REACH, -place), wp.min(FILM_REACH, size - 1 - place) + 1):
         q = k + o * step
         if water[q][0] > 0.0 and wp.abs(images.z_m[lattice.pixel[q]] - z) < 0.2 * z:
-            # A tent: as even as a box of one period of the pattern, and without its corners.
+            # A tent filter averages the pattern's period as evenly as a box, without its corners.
             w = float(FILM_REACH + 1 - wp.abs(o))
             total += films[q] * w
             weights += w
@@ -287,11 +289,11 @@ def blur_films(
 
 @wp.struct
 class Around:
-    """Water around a pixel, mixed from points of the lattice on its surface, and what films mirror.
+    """Water around a pixel, interpolated from lattice points on its surface, and its reflections.
 
     Attributes:
-        found: Sum of weights; 0 where no point lies on the surface.
-        film: As mirrored_by says; of points with any water.
+        found: Sum of weights; 0 if no point lies on the surface.
+        film: Weighted sum of facet_reflection over points with water.
         films: Sum of their weights.
     """
 
@@ -322,7 +324,8 @@ def around_pixel(
     for k in range(4):
         q, w = cell_corner(lattice, cell, k)
         if lattice.body[q] >= 0 and wp.abs(images.z_m[lattice.pixel[q]] - z) < 0.1 * z:
-            # A pixel on a lattice point still takes a trace of its neighbours, if that point fails.
+            # A trace of every neighbour, so that a pixel on an unusable lattice point has a
+            # fallback.
             w += 1.0e-4
             around.exposed += world.ground.exposed[q] * w
             if lattice.surface[q] == surface:
@@ -346,11 +349,11 @@ def mirror_in_puddles(
     films: wp.array(dtype=wp.vec4),
     laid: wp.array(dtype=wp.vec4),
 ):
-    """What water at each pixel mirrors: traced in puddles, elsewhere from the films around.
+    """Reflections of water at each pixel: traced in puddles, elsewhere from films around.
 
     Args:
         ripples: Slope of waves on puddles.
-        laid: Light to be added [cd/m^2], and the part of the light below that it hides.
+        laid: Light to be added [cd/m^2], and the share of the light below that it hides.
     """
     i = wp.tid()
     laid[i] = wp.vec4(0.0)
@@ -378,17 +381,17 @@ def mirror_in_puddles(
         laid[i] = around.film * (wet[0] / around.films)
         return
     origin = ray_origin(world, hit, images.weights[i], p, way)
-    # Waves finer than a pixel would flicker from pixel to pixel.
+    # Waves smaller than a pixel would flicker between pixels.
     slope = ripples * wp.min(5.0 / images.z_m[i], 1.0)
     tilt_x = fractal_noise(p[0], p[1], 0.09, world.ground.seed + 48) * slope
     tilt_y = fractal_noise(p[0], p[1], 0.09, world.ground.seed + 52) * slope
     m = fast_normalize(n + wp.vec3(tilt_x, tilt_y, 0.0))
-    laid[i] = mirrored_by(view, world, images, radiance, p, origin, m, wet[1]) * wet[0]
+    laid[i] = facet_reflection(view, world, images, radiance, p, origin, m, wet[1]) * wet[0]
 
 
 @wp.kernel
 def lay_water(laid: wp.array(dtype=wp.vec4), radiance: wp.array(dtype=wp.vec3)):
-    """Lay what water mirrors over what is seen."""
+    """Blend reflections of water over the image."""
     i = wp.tid()
     c = laid[i]
     if c[3] > 0.0:

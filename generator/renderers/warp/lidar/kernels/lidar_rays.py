@@ -1,4 +1,4 @@
-"""Rays of laser scanners: what they hit first, and how much of the light comes straight back."""
+"""Rays of laser scanners: first hits, reflectance, and secondary hits behind panes and mirrors."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from gen_data.generator.renderers.warp.lidar.kernels.ray_packets import (
     Boxes,
     Bundle,
     ListedBodies,
+    empty_bundle,
+    extend_bundle,
+    is_box_entered,
     list_bodies,
-    no_rays,
-    ray_enters,
     reciprocals,
-    with_ray,
 )
 from gen_data.generator.renderers.warp.scene.kernels.alpha_test import closest_solid_hit
 from gen_data.generator.renderers.warp.scene.kernels.dielectrics import WATER_F0, fresnel_schlick
@@ -39,28 +39,30 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 PI = wp.constant(3.14159265)
-# Fresh and settled snow near 905 nm (Wiscombe and Warren, "A model for the spectral albedo of
-# snow", 1980: 0.9 to 0.75 for grains of 0.1 to 1 mm).
+# Reflectance of fresh and settled snow near 905 nm (Wiscombe and Warren, "A model for the spectral
+# albedo of snow", 1980: 0.9 to 0.75 for grains of 0.1 to 1 mm).
 SNOW = wp.constant(0.85)
-# Wet markings keep a quarter of what their beads send back (EN 1436, classes R and RW).
+# Share of a marking's retro-reflection that water suppresses: a quarter remains (EN 1436, classes R
+# and RW).
 DROWNED = wp.constant(0.75)
-# Faces of glass on the way of a ray, and what is behind them.
+# Faces along one ray: panes, and the surface behind them.
 FACES_MAX = wp.constant(9)
-# Two faces of glass that are nearer to each other are one pane.
+# Two faces of glass closer than this form one pane.
 PANE_M = wp.constant(0.05)
 
 
 @wp.struct
 class Infrared:
-    """What a surface does to a laser's light that comes back the way it went.
+    """Reflection of a surface for laser light, back towards its source.
 
     Attributes:
         even, rim: Diffuse reflectance is ``even * cosine + rim * sine^2`` of incidence.
         specular: Fresnel reflectance at normal incidence.
         alpha: Width of the specular lobe (GGX).
-        retro: Reflectance of a retro-reflector, in units of a white matte surface seen square on.
-        mirror: Fresnel reflectance at normal incidence of what mirrors a beam; 0 = it does not.
-        clear: What it lets through one way, square on.
+        retro: Reflectance of a retro-reflector, relative to a white Lambertian surface at normal
+            incidence.
+        mirror: Fresnel reflectance at normal incidence of a mirror; 0 for all other surfaces.
+        clear: Transmittance of one passage at normal incidence.
     """
 
     even: float
@@ -74,15 +76,15 @@ class Infrared:
 
 @wp.struct
 class Scan:
-    """Where rays start and how they spread.
+    """Origin and divergence of a scan's rays.
 
     Attributes:
         R_world_lidar, eye_m: Pose of the scanner.
-        reach_m: Rays end here.
+        reach_m: Maximum range.
         spread: Tangent of the angle between a beam's axis and the rays around it.
-        subrays: 1 or 7.
-        run, threads: Rays in a run, and threads that take runs in turn.
-        divergence_rad: Angle of a beam: what it lights on a surface.
+        subrays: Rays per beam: 1 or 7.
+        run, threads: Rays per run, and threads, which process runs in turn.
+        divergence_rad: Full divergence of a beam, for the size of its footprint.
     """
 
     R_world_lidar: wp.mat33
@@ -97,15 +99,16 @@ class Scan:
 
 @wp.struct
 class BodyMotion:
-    """What moves while beams leave one after the other.
+    """Motion of bodies and of the scanner during a scan.
 
     Attributes:
-        keys: Poses that every mover has over the sweep; 0 = nothing moves, nothing else is read.
-        rows: Row of each body among the movers; -1 = it stands still.
-        B_mesh_lidar, eye_mesh: Directions and origin of the lidar frame in movers' mesh frames,
-            [mover, key].
-        phases: When each beam leaves, in keys.
-        origins_m: Where it begins in the lidar frame.
+        keys: Poses per moving body over the sweep; 0 if nothing moves, and the other fields are
+            unused.
+        rows: Row of each body among the moving ones; -1 for static bodies.
+        B_mesh_lidar, eye_mesh: Directions and origin of the lidar frame in the moving bodies' mesh
+            frames, [mover, key].
+        phases: Emission time of each beam, in keys.
+        origins_m: Its origin in the lidar frame.
     """
 
     keys: int
@@ -121,7 +124,7 @@ class Ray:
     """A ray in the lidar frame.
 
     Attributes:
-        key, share: It leaves this share of a step after this key.
+        key, share: Emission time: the key before it, and the fraction of the step after that key.
     """
 
     direction: wp.vec3
@@ -131,31 +134,31 @@ class Ray:
 
 
 @wp.func
-def ray_of_beam(axis: wp.vec3, k: int, spread: float):
-    """The axis of a beam, or one of six rays around it."""
+def beam_direction(axis: wp.vec3, k: int, spread: float):
+    """The axis of a beam, or one of six directions around it."""
     if k == 0:
         return axis
-    # Any axis that is not nearly parallel: the cross product must keep its digits.
+    # Any axis far from parallel keeps the digits of the cross product.
     helper = wp.where(wp.abs(axis[2]) < 0.9, wp.vec3(0.0, 0.0, 1.0), wp.vec3(1.0, 0.0, 0.0))
     across = fast_normalize(wp.cross(helper, axis))
     up = wp.cross(axis, across)
-    # Six around one: the densest even pattern in a round beam.
+    # Six around one: the densest regular pattern in a round beam.
     turn = float(k - 1) * (PI / 3.0)
     return fast_normalize(axis + (across * wp.cos(turn) + up * wp.sin(turn)) * spread)
 
 
 @wp.func
-def returned(light: Infrared, cosine: float):
-    """Reflectance for light that returns along its way, incidence included.
+def backscatter(light: Infrared, cosine: float):
+    """Reflectance towards the source, including the cosine of incidence.
 
     The diffuse term is Lambert's, ``even * cosine``, or that of a rough surface, whose facets face
-    the scanner however it looks (Oren and Nayar, "Generalization of Lambert's reflectance model",
-    1994, with light and eye on one side). The lobe is GGX with its half vector along the ray, in
-    units of a white matte surface: ``pi * D * F * G / (4 cosine^2) * cosine`` with Smith's G, both
-    ways alike (Walter et al., "Microfacet models for refraction", 2007).
-    A retro-reflector keeps its entrance angles to about 60 degrees (ASTM D4956).
+    the scanner at any angle (Oren and Nayar, "Generalization of Lambert's reflectance model", 1994,
+    for coincident source and viewer). The lobe is GGX with its half vector along the ray, relative
+    to a white Lambertian surface: ``pi * D * F * G / (4 cosine^2) * cosine`` with Smith's G, equal
+    both ways (Walter et al., "Microfacet models for refraction", 2007). A retro-reflector works up
+    to entrance angles of about 60 degrees (ASTM D4956).
     """
-    # The lobe divides by it; light within 0.06 degrees of the surface brings nothing back.
+    # The lobe divides by the cosine; within 0.06 degrees of grazing nothing returns.
     c = wp.max(cosine, 1.0e-3)
     a2 = light.alpha * light.alpha
     c2 = c * c
@@ -168,7 +171,7 @@ def returned(light: Infrared, cosine: float):
 
 @wp.struct
 class Nearest:
-    """The nearest hit of a ray so far; body -1 where there is none.
+    """The nearest hit of a ray so far; body -1 for none.
 
     Attributes:
         u, v: Weights of the face's first two vertices.
@@ -182,28 +185,28 @@ class Nearest:
 
 
 @wp.func
-def mover_frame(travel: BodyMotion, m: int, ray: Ray):
-    """Directions of the lidar frame in the mesh frame of mover m when a ray leaves."""
-    # Mixed matrices are no rotations, by the square of the small turn between two keys.
-    before = travel.B_mesh_lidar[m, ray.key]
-    return before + (travel.B_mesh_lidar[m, ray.key + 1] - before) * ray.share
+def mover_frame(motion: BodyMotion, m: int, ray: Ray):
+    """Directions of the lidar frame in the mesh frame of mover m when a ray is emitted."""
+    # Interpolated matrices deviate from rotations by the square of the small angle between keys.
+    before = motion.B_mesh_lidar[m, ray.key]
+    return before + (motion.B_mesh_lidar[m, ray.key + 1] - before) * ray.share
 
 
 @wp.func
-def nearer(world: World, travel: BodyMotion, b: int, ray: Ray, hit: Nearest, offset: bool):
-    """The hit, or a nearer one on a body.
+def intersect_body(world: World, motion: BodyMotion, b: int, ray: Ray, hit: Nearest, offset: bool):
+    """The nearer of a hit and the first point of a body.
 
-    From the scanner's own frame: what is far from the world's origin loses nothing.
+    Computed in the scanner's own frame: positions far from the world's origin lose no precision.
     """
     d = world.bodies[b].B_mesh_camera @ ray.direction
     o = world.bodies[b].eye_mesh
     m = int(-1)
-    if travel.keys > 0:
-        m = travel.rows[b]
+    if motion.keys > 0:
+        m = motion.rows[b]
     if m >= 0:
-        B = mover_frame(travel, m, ray)
-        before = travel.eye_mesh[m, ray.key]
-        o = before + (travel.eye_mesh[m, ray.key + 1] - before) * ray.share
+        B = mover_frame(motion, m, ray)
+        before = motion.eye_mesh[m, ray.key]
+        o = before + (motion.eye_mesh[m, ray.key + 1] - before) * ray.share
         o += B @ ray.origin_m
         d = B @ ray.direction
     elif offset:
@@ -219,39 +222,40 @@ def nearer(world: World, travel: BodyMotion, b: int, ray: Ray, hit: Nearest, off
 
 
 @wp.func
-def normal_of(scan: Scan, world: World, travel: BodyMotion, ray: Ray, hit: Nearest):
+def hit_normal(scan: Scan, world: World, motion: BodyMotion, ray: Ray, hit: Nearest):
     """Interpolated unit normal of a hit, lidar frame."""
     g = world.bodies[hit.body].geometry
     corner = face_vertices(world, g, hit.face)
     n = normal_at(world, g, corner[0]) * hit.u
     n += normal_at(world, g, corner[1]) * hit.v
     n += normal_at(world, g, corner[2]) * (1.0 - hit.u - hit.v)
-    if travel.keys > 0:
-        m = travel.rows[hit.body]
+    if motion.keys > 0:
+        m = motion.rows[hit.body]
         if m >= 0:
-            return fast_normalize(wp.transpose(mover_frame(travel, m, ray)) @ n)
+            # The transpose of mesh-from-lidar; its scale cancels in the normalisation.
+            return fast_normalize(wp.transpose(mover_frame(motion, m, ray)) @ n)
     return wp.transpose(scan.R_world_lidar) @ (
         world.bodies[hit.body].R_world_mesh @ fast_normalize(n)
     )
 
 
 @wp.func
-def ray_number(scan: Scan, travel: BodyMotion, axes: wp.array(dtype=wp.vec3), i: int):
-    """Ray i of all."""
+def make_ray(scan: Scan, motion: BodyMotion, axes: wp.array(dtype=wp.vec3), i: int):
+    """Ray i of all, in the lidar frame."""
     beam = i / scan.subrays
     ray = Ray()
-    ray.direction = ray_of_beam(axes[beam], i % scan.subrays, scan.spread)
-    if travel.keys > 0:
-        ray.origin_m = travel.origins_m[beam]
-        # The last pulse may leave at the last key: it belongs to the step before it.
-        ray.key = wp.min(int(travel.phases[beam]), travel.keys - 2)
-        ray.share = travel.phases[beam] - float(ray.key)
+    ray.direction = beam_direction(axes[beam], i % scan.subrays, scan.spread)
+    if motion.keys > 0:
+        ray.origin_m = motion.origins_m[beam]
+        # A pulse emitted exactly at the last key belongs to the step before it.
+        ray.key = wp.min(int(motion.phases[beam]), motion.keys - 2)
+        ray.share = motion.phases[beam] - float(ray.key)
     return ray
 
 
 @wp.func
-def eye_of(scan: Scan, ray: Ray, offset: bool):
-    """Where a ray begins, world frame; at the lidar frame's origin unless it is ``offset``."""
+def world_origin(scan: Scan, ray: Ray, offset: bool):
+    """Origin of a ray in the world; the lidar frame's origin unless it is ``offset``."""
     eye_m = scan.eye_m
     if offset:
         eye_m += scan.R_world_lidar @ ray.origin_m
@@ -262,7 +266,7 @@ def eye_of(scan: Scan, ray: Ray, offset: bool):
 def first_hit(
     scan: Scan,
     world: World,
-    travel: BodyMotion,
+    motion: BodyMotion,
     boxes: Boxes,
     listed: ListedBodies,
     ray: Ray,
@@ -270,37 +274,39 @@ def first_hit(
     gone_m: float,
     offset: bool,
 ):
-    """What a ray hits first; the ``likely`` body, if not -1, is tried first.
+    """The first hit of a ray; the ``likely`` body, if not -1, is tested first.
 
     Args:
-        listed: Bodies that it may meet.
-        gone_m: How far the ray begins after that of the list.
-        offset: Whether the ray may begin elsewhere than at the lidar frame's origin.
+        listed: Bodies that the ray may hit.
+        gone_m: Distance of the ray's origin along the ray of the list.
+        offset: Whether the ray may start elsewhere than at the lidar frame's origin.
     """
     hit = Nearest()
     hit.range_m = scan.reach_m
     hit.body = -1
     if likely >= 0:
-        hit = nearer(world, travel, likely, ray, hit, offset)
-    eye_m = eye_of(scan, ray, offset)
+        # Neighbouring rays mostly hit the same body: its range rejects most other boxes.
+        hit = intersect_body(world, motion, likely, ray, hit, offset)
+    eye_m = world_origin(scan, ray, offset)
     inverse = reciprocals(scan.R_world_lidar @ ray.direction)
+    # An overflowing list: test every body's box.
     count = wp.where(listed.count < 0, boxes.lows_m.shape[0], listed.count)
     for k in range(count):
         b = int(k)
         if listed.count >= 0:
-            # Bodies are listed by distance: none of the rest can be nearer.
+            # Bodies are sorted by distance: none of the rest can be nearer.
             if boxes.enters_m[listed.row, k] - gone_m >= hit.range_m:
                 break
             b = boxes.listed[listed.row, k]
         if b != likely:
-            if ray_enters(boxes, b, eye_m, inverse, hit.range_m):
-                hit = nearer(world, travel, b, ray, hit, offset)
+            if is_box_entered(boxes, b, eye_m, inverse, hit.range_m):
+                hit = intersect_body(world, motion, b, ray, hit, offset)
     return hit
 
 
 @wp.func
-def coat_of(scan: Scan, world: World, ray: Ray, range_m: float, surface: int, n_lidar: wp.vec3):
-    """What weather has laid where a ray ends."""
+def coat_at_hit(scan: Scan, world: World, ray: Ray, range_m: float, surface: int, n_lidar: wp.vec3):
+    """Water and snow at the end of a ray."""
     n = scan.R_world_lidar @ n_lidar
     if wp.dot(n_lidar, ray.direction) > 0.0:
         n = -n
@@ -308,24 +314,24 @@ def coat_of(scan: Scan, world: World, ray: Ray, range_m: float, surface: int, n_
     exposed = float(1.0)
     if n[2] > 0.1:
         exposed = precipitation_exposure(world, p + n * SHELTER_OFFSET_M)
-    # A beam's mark grows as 1 / cosine; fifty beams long is as good as any longer.
+    # A footprint grows by 1 / cosine; beyond fifty beam widths its length no longer matters.
     slant = wp.max(wp.abs(wp.dot(n_lidar, ray.direction)), 0.02)
     return coat_at(world, surface, p, n, exposed, scan.divergence_rad * range_m / slant)
 
 
 @wp.func
-def weathered(world: World, light: Infrared, coat: Coat, surface: int, cosine: float):
+def apply_weather(world: World, light: Infrared, coat: Coat, surface: int, cosine: float):
     """A surface under water and snow.
 
-    Water darkens rough ground at every wavelength that it does not absorb (Lekner and Dorf, "Why
-    some things are darker when wet", 1988), and reflects away what comes aslant, on both ways:
-    wet roads vanish at a distance. Wojtanowski et al., "Comparison of 905 nm and 1550 nm
-    semiconductor laser rangefinders' performance deterioration due to adverse environmental
-    conditions", 2014, measured it.
+    Water darkens rough ground also at wavelengths that it does not absorb (Lekner and Dorf, "Why
+    some things are darker when wet", 1988), and reflects oblique rays away in both directions: wet
+    roads vanish at a distance. Wojtanowski et al., "Comparison of 905 nm and 1550 nm semiconductor
+    laser rangefinders' performance deterioration due to adverse environmental conditions", 2014,
+    measured it.
     """
     porous = estimate_porosity(world, surface)
     film = wp.max(coat.puddle, 0.5 * porous * coat.wet)
-    # Twice through the surface of the water, and twice in ``kept``: in and out.
+    # Two passages of the water's surface here, two more in ``kept``: down and up.
     passes = 1.0 - film * fresnel_schlick(WATER_F0, cosine)
     kept = coat.mixable[0] * passes * passes
     bare = 1.0 - wp.min(coat.snow, 1.0)
@@ -339,8 +345,8 @@ def weathered(world: World, light: Infrared, coat: Coat, surface: int, cosine: f
 
 
 @wp.func
-def number_at(scan: Scan, order: wp.array(dtype=int), j: int):
-    """Number of the ray at a place in the order of beams; an empty order leaves all in theirs."""
+def ray_index(scan: Scan, order: wp.array(dtype=int), j: int):
+    """Index of the ray at a position in the order of beams; an empty order is the identity."""
     i = int(j)
     if order.shape[0] > 0:
         i = order[j / scan.subrays] * scan.subrays + j % scan.subrays
@@ -348,19 +354,17 @@ def number_at(scan: Scan, order: wp.array(dtype=int), j: int):
 
 
 @wp.func
-def with_ray_number(
-    bundle: Bundle, scan: Scan, travel: BodyMotion, axes: wp.array(dtype=wp.vec3), i: int
-):
-    """The bundle with ray i of all."""
-    ray = ray_number(scan, travel, axes, i)
-    return with_ray(bundle, eye_of(scan, ray, True), scan.R_world_lidar @ ray.direction)
+def add_ray(bundle: Bundle, scan: Scan, motion: BodyMotion, axes: wp.array(dtype=wp.vec3), i: int):
+    """The bundle extended by ray i of all."""
+    ray = make_ray(scan, motion, axes, i)
+    return extend_bundle(bundle, world_origin(scan, ray, True), scan.R_world_lidar @ ray.direction)
 
 
 @wp.kernel
 def scan_beams(
     scan: Scan,
     world: World,
-    travel: BodyMotion,
+    motion: BodyMotion,
     boxes: Boxes,
     lights: wp.array(dtype=Infrared),
     axes: wp.array(dtype=wp.vec3),
@@ -374,26 +378,26 @@ def scan_beams(
 ):
     """First hit of every ray; ray k of beam i is at ``i * subrays + k``.
 
-    Each thread takes runs of ``run`` rays, one after the other: what the last one hit is tried
-    first, and mostly leaves nothing else to try. Hits are (body, material), (-1, -1) where there is
-    nothing; normals, in the lidar frame, are written where there is a mirror, and puddles, shares
-    of standing water, where weather has left something.
+    Each thread processes runs of ``run`` rays in turn; the body that the previous ray hit is tested
+    first, and mostly excludes all others. Hits are (body, material), (-1, -1) for none; normals, in
+    the lidar frame, are written for mirrors, and puddles, shares of standing water, if the ground
+    is covered.
 
     Args:
-        order: Beams, neighbours after each other; empty = they are already.
+        order: Order of beams in which neighbours are adjacent; empty if they already are.
     """
     t = wp.tid()
     for begin in range(t * scan.run, ranges_m.shape[0], scan.threads * scan.run):
         end = wp.min(begin + scan.run, ranges_m.shape[0])
-        bundle = no_rays()
+        bundle = empty_bundle()
         for j in range(begin, end):
-            bundle = with_ray_number(bundle, scan, travel, axes, number_at(scan, order, j))
+            bundle = add_ray(bundle, scan, motion, axes, ray_index(scan, order, j))
         listed = list_bodies(boxes, t, bundle, scan.reach_m)
         last = int(-1)
         for j in range(begin, end):
-            i = number_at(scan, order, j)
-            ray = ray_number(scan, travel, axes, i)
-            hit = first_hit(scan, world, travel, boxes, listed, ray, last, 0.0, travel.keys > 0)
+            i = ray_index(scan, order, j)
+            ray = make_ray(scan, motion, axes, i)
+            hit = first_hit(scan, world, motion, boxes, listed, ray, last, 0.0, motion.keys > 0)
             last = hit.body
             if hit.body < 0:
                 hits[i] = wp.vec2i(-1, -1)
@@ -403,7 +407,7 @@ def scan_beams(
                 if world.ground.covered != 0:
                     puddles[i] = 0.0
             else:
-                n_lidar = normal_of(scan, world, travel, ray, hit)
+                n_lidar = hit_normal(scan, world, motion, ray, hit)
                 cosine = wp.min(wp.abs(wp.dot(n_lidar, ray.direction)), 1.0)
                 material = surface_index(world, wp.vec2i(hit.body, hit.face))
                 hits[i] = wp.vec2i(hit.body, material)
@@ -412,85 +416,88 @@ def scan_beams(
                 if lights[material].mirror > 0.0 or world.ground.covered != 0:
                     normals[i] = n_lidar
                 if world.ground.covered == 0:
-                    reflectances[i] = returned(lights[material], cosine)
+                    reflectances[i] = backscatter(lights[material], cosine)
                 else:
-                    coat = coat_of(scan, world, ray, hit.range_m, material, n_lidar)
-                    light = weathered(world, lights[material], coat, material, cosine)
-                    reflectances[i] = returned(light, cosine)
+                    coat = coat_at_hit(scan, world, ray, hit.range_m, material, n_lidar)
+                    light = apply_weather(world, lights[material], coat, material, cosine)
+                    reflectances[i] = backscatter(light, cosine)
                     puddles[i] = coat.puddle * (1.0 - wp.min(coat.snow, 1.0))
 
 
 @wp.kernel
-def look_through(
+def trace_behind_panes(
     scan: Scan,
     world: World,
-    travel: BodyMotion,
+    motion: BodyMotion,
     boxes: Boxes,
     lights: wp.array(dtype=Infrared),
     axes: wp.array(dtype=wp.vec3),
-    picked: wp.array(dtype=int),
+    selected: wp.array(dtype=int),
     first_m: wp.array(dtype=float),
     ranges_m: wp.array(dtype=float),
     reflectances: wp.array(dtype=float),
     hits: wp.array(dtype=wp.vec2i),
 ):
-    """What picked rays, which have met a pane, meet behind it and behind any further pane."""
+    """Last surfaces on selected rays that have hit a pane, behind it and any further pane."""
     t = wp.tid()
-    for begin in range(t * scan.run, picked.shape[0], scan.threads * scan.run):
-        end = wp.min(begin + scan.run, picked.shape[0])
-        bundle = no_rays()
+    for begin in range(t * scan.run, selected.shape[0], scan.threads * scan.run):
+        end = wp.min(begin + scan.run, selected.shape[0])
+        bundle = empty_bundle()
         for j in range(begin, end):
-            bundle = with_ray_number(bundle, scan, travel, axes, picked[j])
+            bundle = add_ray(bundle, scan, motion, axes, selected[j])
         listed = list_bodies(boxes, t, bundle, FAR_M)
         for j in range(begin, end):
             hits[j] = wp.vec2i(-1, -1)
-            ray = ray_number(scan, travel, axes, picked[j])
+            ray = make_ray(scan, motion, axes, selected[j])
             begin_m = ray.origin_m
-            way_m = wp.max(first_m[picked[j]] - LASER_OFFSET_M, 0.0)
+            # Start just before the pane, so that its own face is found first.
+            way_m = wp.max(first_m[selected[j]] - LASER_OFFSET_M, 0.0)
             passed = float(1.0)
             for face in range(FACES_MAX):
                 if passed > 0.0:
                     ray.origin_m = begin_m + ray.direction * way_m
-                    hit = first_hit(scan, world, travel, boxes, listed, ray, -1, way_m, True)
+                    hit = first_hit(scan, world, motion, boxes, listed, ray, -1, way_m, True)
                     if hit.body < 0:
                         passed = 0.0
                     else:
                         way_m += hit.range_m + LASER_OFFSET_M
-                        n = normal_of(scan, world, travel, ray, hit)
+                        n = hit_normal(scan, world, motion, ray, hit)
                         cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
                         material = surface_index(world, wp.vec2i(hit.body, hit.face))
                         clear = lights[material].clear
                         if face > 0:
-                            # Each further pane is overwritten by what is behind it, if anything is.
+                            # A pane's echo is overwritten by that of the surface behind it, if any.
                             hits[j] = wp.vec2i(hit.body, material)
                             ranges_m[j] = way_m - LASER_OFFSET_M
-                            reflectances[j] = passed * returned(lights[material], cosine)
+                            reflectances[j] = passed * backscatter(lights[material], cosine)
                         if clear == 0.0:
                             passed = 0.0
                         elif face == 0 or hit.range_m > PANE_M:
+                            # Two faces of one pane count once; the light passes each pane twice.
                             kept = clear * (1.0 - fresnel_schlick(lights[material].mirror, cosine))
                             passed *= kept * kept
 
 
 @wp.func
-def mirrored(ray: Ray, n: wp.vec3, range_m: float):
-    """A ray after its reflection at a range, where the surface has normal n."""
+def reflect_ray(ray: Ray, n: wp.vec3, range_m: float):
+    """A ray after reflection at the given range, at a surface with normal n."""
     facing = wp.dot(n, ray.direction)
     ray.origin_m = ray.origin_m + ray.direction * range_m
     ray.direction = fast_normalize(ray.direction - n * (2.0 * facing))
+    # Off the mirror along both directions: it must not be hit again.
     ray.origin_m += ray.direction * LASER_OFFSET_M - n * (wp.sign(facing) * LASER_OFFSET_M)
     return ray
 
 
 @wp.kernel
-def look_in_mirrors(
+def trace_mirrors(
     scan: Scan,
     world: World,
-    travel: BodyMotion,
+    motion: BodyMotion,
     boxes: Boxes,
     lights: wp.array(dtype=Infrared),
     axes: wp.array(dtype=wp.vec3),
-    picked: wp.array(dtype=int),
+    selected: wp.array(dtype=int),
     first_m: wp.array(dtype=float),
     first_hits: wp.array(dtype=wp.vec2i),
     normals: wp.array(dtype=wp.vec3),
@@ -499,38 +506,41 @@ def look_in_mirrors(
     reflectances: wp.array(dtype=float),
     hits: wp.array(dtype=wp.vec2i),
 ):
-    """What picked rays, which have met a mirror, meet after one reflection.
+    """Surfaces that selected rays hit after one reflection at a mirror.
 
-    The light comes back the same way, so the mirror weakens it twice.
+    The light returns by the same path, so the mirror attenuates it twice.
 
     Args:
-        waters: Share of each picked ray's end that is a puddle; 0 = the material mirrors.
+        waters: Share of a puddle at each selected ray's end; 0 if the material itself is the
+            mirror.
     """
     t = wp.tid()
-    for begin in range(t * scan.run, picked.shape[0], scan.threads * scan.run):
-        end = wp.min(begin + scan.run, picked.shape[0])
-        bundle = no_rays()
+    for begin in range(t * scan.run, selected.shape[0], scan.threads * scan.run):
+        end = wp.min(begin + scan.run, selected.shape[0])
+        bundle = empty_bundle()
         for j in range(begin, end):
-            i = picked[j]
-            ray = mirrored(ray_number(scan, travel, axes, i), normals[i], first_m[i])
-            bundle = with_ray(bundle, eye_of(scan, ray, True), scan.R_world_lidar @ ray.direction)
+            i = selected[j]
+            ray = reflect_ray(make_ray(scan, motion, axes, i), normals[i], first_m[i])
+            bundle = extend_bundle(
+                bundle, world_origin(scan, ray, True), scan.R_world_lidar @ ray.direction
+            )
         listed = list_bodies(boxes, t, bundle, scan.reach_m)
         last = int(-1)
         for j in range(begin, end):
-            i = picked[j]
-            ray = ray_number(scan, travel, axes, i)
+            i = selected[j]
+            ray = make_ray(scan, motion, axes, i)
             cosine = wp.min(wp.abs(wp.dot(normals[i], ray.direction)), 1.0)
             kept = fresnel_schlick(lights[first_hits[i][1]].mirror, cosine)
             if waters[j] > 0.0:
                 kept = waters[j] * fresnel_schlick(WATER_F0, cosine)
-            ray = mirrored(ray, normals[i], first_m[i])
-            hit = first_hit(scan, world, travel, boxes, listed, ray, last, 0.0, True)
+            ray = reflect_ray(ray, normals[i], first_m[i])
+            hit = first_hit(scan, world, motion, boxes, listed, ray, last, 0.0, True)
             last = hit.body
             hits[j] = wp.vec2i(-1, -1)
             if hit.body >= 0:
-                n = normal_of(scan, world, travel, ray, hit)
+                n = hit_normal(scan, world, motion, ray, hit)
                 material = surface_index(world, wp.vec2i(hit.body, hit.face))
                 hits[j] = wp.vec2i(hit.body, material)
                 ranges_m[j] = first_m[i] + LASER_OFFSET_M + hit.range_m
                 cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
-                reflectances[j] = kept * kept * returned(lights[material], cosine)
+                reflectances[j] = kept * kept * backscatter(lights[material], cosine)

@@ -1,8 +1,8 @@
-"""Runs of rays that start and go nearly alike: which bodies any of them may meet, nearest first.
+"""Packets of coherent rays: the bodies that any ray of a run may hit, sorted by distance.
 
-Asking the hierarchy over all bodies for every single ray takes a third of a scan's time; a run of
-neighbours asks once, with intervals in the place of numbers (Boulos, Wald and Shirley, "Geometric
-and arithmetic culling methods for entire ray packets", 2006).
+Querying the hierarchy over all bodies for every single ray takes a third of a scan's time; a run of
+neighbours queries once, with interval arithmetic (Boulos, Wald and Shirley, "Geometric and
+arithmetic culling methods for entire ray packets", 2006).
 """
 
 from __future__ import annotations
@@ -18,22 +18,22 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-# Bodies that a list holds; a run that may meet more looks at all there are.
+# Capacity of a list; a run that may hit more bodies tests all of them.
 LISTED_MAX = wp.constant(96)
 FAR_M = wp.constant(3.0e38)
-# Boxes grow by this, and distances to them shrink, so that rounding hides no body from a run.
+# Boxes are enlarged, and distances to them reduced, such that rounding never excludes a body.
 SLACK_M = wp.constant(1.0e-3)
 SLACK = wp.constant(1.0e-4)
 
 
 @wp.struct
 class Boxes:
-    """Boxes around bodies in the world, and room for lists of them.
+    """Boxes around bodies in the world, and memory for lists of them.
 
     Attributes:
         lows_m, highs_m: Their corners.
-        listed: Bodies that a run may meet [row, LISTED_MAX].
-        enters_m: Least distance at which a ray of the run may enter the body's box; rising.
+        listed: Bodies that a run may hit [row, LISTED_MAX].
+        enters_m: Smallest distance at which a ray of the run may enter the body's box, ascending.
     """
 
     lows_m: wp.array(dtype=wp.vec3)
@@ -44,7 +44,7 @@ class Boxes:
 
 @wp.struct
 class Bundle:
-    """Bounds of the origins and of the unit directions of a run of rays, world frame."""
+    """Bounds of the origins and unit directions of a run of rays, world frame."""
 
     origin_low_m: wp.vec3
     origin_high_m: wp.vec3
@@ -54,15 +54,15 @@ class Bundle:
 
 @wp.struct
 class ListedBodies:
-    """Bodies that a bundle may meet: a row of the lists; ``count`` -1 = too many for one."""
+    """Bodies that a bundle may hit: a row of the lists; ``count`` is -1 on overflow."""
 
     row: int
     count: int
 
 
 @wp.func
-def no_rays():
-    """The bundle of no ray."""
+def empty_bundle():
+    """The bundle without rays."""
     bundle = Bundle()
     bundle.origin_low_m = wp.vec3(FAR_M)
     bundle.origin_high_m = wp.vec3(-FAR_M)
@@ -72,8 +72,8 @@ def no_rays():
 
 
 @wp.func
-def with_ray(bundle: Bundle, origin_m: wp.vec3, way: wp.vec3):
-    """The bundle with one more ray."""
+def extend_bundle(bundle: Bundle, origin_m: wp.vec3, way: wp.vec3):
+    """The bundle extended by a ray."""
     bundle.origin_low_m = componentwise_min(bundle.origin_low_m, origin_m)
     bundle.origin_high_m = componentwise_max(bundle.origin_high_m, origin_m)
     bundle.way_low = componentwise_min(bundle.way_low, way)
@@ -82,15 +82,16 @@ def with_ray(bundle: Bundle, origin_m: wp.vec3, way: wp.vec3):
 
 
 @wp.func
-def enters_slab(near_m: float, far_m: float, way_low: float, way_high: float):
-    """Least distance at which any ray can be between two planes; FAR_M = none ever is.
+def slab_entry(near_m: float, far_m: float, way_low: float, way_high: float):
+    """Smallest distance at which any ray can be between two planes; FAR_M for never.
 
     Args:
-        near_m, far_m: Coordinates of the planes, seen from the origins that are nearest to them.
-        way_low, way_high: Bounds of the directions' coordinate.
+        near_m, far_m: Coordinates of the planes relative to the nearest origins.
+        way_low, way_high: Bounds of the directions' component.
     """
     enter = float(0.0)
     if near_m > 0.0:
+        # The fastest approach bounds the distance from below.
         enter = wp.where(way_high > 0.0, near_m / way_high, FAR_M)
     elif far_m < 0.0:
         enter = wp.where(way_low < 0.0, far_m / way_low, FAR_M)
@@ -98,8 +99,8 @@ def enters_slab(near_m: float, far_m: float, way_low: float, way_high: float):
 
 
 @wp.func
-def leaves_slab(near_m: float, far_m: float, way_low: float, way_high: float):
-    """Largest distance at which any ray can still be between two planes that it can reach."""
+def slab_exit(near_m: float, far_m: float, way_low: float, way_high: float):
+    """Largest distance at which any ray can still be between two planes."""
     leave = float(FAR_M)
     if way_low > 0.0:
         leave = far_m / way_low
@@ -109,32 +110,33 @@ def leaves_slab(near_m: float, far_m: float, way_low: float, way_high: float):
 
 
 @wp.func
-def enters_m(bundle: Bundle, low_m: wp.vec3, high_m: wp.vec3):
-    """Least distance at which a ray of a bundle may enter a box; FAR_M where none does."""
+def entry_distance(bundle: Bundle, low_m: wp.vec3, high_m: wp.vec3):
+    """Smallest distance at which a ray of a bundle may enter a box; FAR_M for never."""
     slack = wp.vec3(SLACK_M)
     a = low_m - slack - bundle.origin_high_m
     c = high_m + slack - bundle.origin_low_m
     low, high = bundle.way_low, bundle.way_high
-    enter = enters_slab(a[0], c[0], low[0], high[0])
-    enter = max_of_two(enter, enters_slab(a[1], c[1], low[1], high[1]))
-    enter = max_of_two(enter, enters_slab(a[2], c[2], low[2], high[2]))
-    leave = leaves_slab(a[0], c[0], low[0], high[0])
-    leave = min_of_two(leave, leaves_slab(a[1], c[1], low[1], high[1]))
-    leave = min_of_two(leave, leaves_slab(a[2], c[2], low[2], high[2]))
+    enter = slab_entry(a[0], c[0], low[0], high[0])
+    enter = max_of_two(enter, slab_entry(a[1], c[1], low[1], high[1]))
+    enter = max_of_two(enter, slab_entry(a[2], c[2], low[2], high[2]))
+    leave = slab_exit(a[0], c[0], low[0], high[0])
+    leave = min_of_two(leave, slab_exit(a[1], c[1], low[1], high[1]))
+    leave = min_of_two(leave, slab_exit(a[2], c[2], low[2], high[2]))
     enter = enter * (1.0 - SLACK)
     return wp.where(enter > leave * (1.0 + SLACK), FAR_M, enter)
 
 
 @wp.func
 def list_bodies(boxes: Boxes, row: int, bundle: Bundle, reach_m: float):
-    """List what a bundle may meet within reach, the nearest first."""
+    """List the bodies that a bundle may hit within reach, the nearest first."""
     count = int(0)
     for b in range(boxes.lows_m.shape[0]):
-        enter = enters_m(bundle, boxes.lows_m[b], boxes.highs_m[b])
+        enter = entry_distance(bundle, boxes.lows_m[b], boxes.highs_m[b])
         if enter < reach_m and enter < FAR_M and count >= 0:
             if count == LISTED_MAX:
                 count = -1
             else:
+                # Insertion sort: lists are short.
                 k = count
                 moving = bool(True)
                 while moving:
@@ -156,8 +158,8 @@ def list_bodies(boxes: Boxes, row: int, bundle: Bundle, reach_m: float):
 
 @wp.func
 def reciprocals(way: wp.vec3):
-    """One over each coordinate; a grain in the place of zero."""
-    # 0 / 0 would be NaN where a ray lies in a box's face; this is as good as infinity.
+    """Componentwise reciprocals; zeros become tiny numbers."""
+    # 0 / 0 would be NaN for a ray in a box's face; a large number is as good as infinity.
     x = wp.where(wp.abs(way[0]) < 1.0e-20, 1.0e-20, way[0])
     y = wp.where(wp.abs(way[1]) < 1.0e-20, 1.0e-20, way[1])
     z = wp.where(wp.abs(way[2]) < 1.0e-20, 1.0e-20, way[2])
@@ -165,8 +167,8 @@ def reciprocals(way: wp.vec3):
 
 
 @wp.func
-def ray_enters(boxes: Boxes, b: int, origin_m: wp.vec3, inverse: wp.vec3, reach_m: float):
-    """Whether a ray may enter a body's box before its reach."""
+def is_box_entered(boxes: Boxes, b: int, origin_m: wp.vec3, inverse: wp.vec3, reach_m: float):
+    """Whether a ray may enter a body's box within its reach."""
     a = wp.cw_mul(boxes.lows_m[b] - origin_m, inverse)
     c = wp.cw_mul(boxes.highs_m[b] - origin_m, inverse)
     enter = max_of_two(

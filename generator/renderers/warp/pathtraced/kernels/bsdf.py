@@ -1,8 +1,8 @@
-"""What surfaces do with light, for paths: evaluated, and drawn from.
+"""BSDFs of the path tracer: evaluation and sampling.
 
 All directions are in the shading frame, whose Z axis is the normal; ``v`` points to where the path
-comes from, ``l`` to where it goes on. The model is that of ``brdf``, with Smith's height-correlated
-masking as it is instead of its approximation, and a coat above it.
+comes from, ``l`` to where it continues. The model is that of ``brdf`` with Smith's exact
+height-correlated masking instead of its approximation, and a coat above it.
 
 Sources: those of ``brdf``; Heitz, "Sampling the GGX distribution of visible normals", JCGT 7(4),
 2018; Dupuy and Benyoub, "Sampling visible GGX normals with spherical caps", HPG 2023 (the same
@@ -21,28 +21,28 @@ from gen_data.generator.renderers.warp.scene.kernels.records import fast_normali
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-# Smoother surfaces than this are taken for this: alpha 0.002, as in ``brdf``.
+# Smallest roughness: alpha 0.002, as in ``brdf``.
 SMOOTHEST = wp.constant(0.045)
-# Lacquers have indices about 1.5: ((n - 1) / (n + 1))^2.
+# Lacquers have refractive indices about 1.5: ((n - 1) / (n + 1))^2.
 COAT_F0 = wp.constant(0.04)
 
 
 @wp.struct
 class Bsdf:
-    """What reflects at a vertex, for one direction ``v``.
+    """Reflection at a vertex, for one direction ``v``.
 
     Attributes:
-        v: To where the path comes from; Z > 0.
-        diffuse: Albedo of the matte layer, seen through those above it.
-        f0, f90: Reflectance of the specular layer (Schlick); its share below the coat and its
-            multiple scattering are in ``scale``.
-        ior: If not 0, the specular layer is all there is, reflects by Fresnel's equations for this
-            index instead, and lets the rest through.
+        v: Direction to where the path comes from; Z > 0.
+        diffuse: Albedo of the diffuse layer, attenuated by those above it.
+        f0, f90: Reflectance of the specular layer (Schlick); ``scale`` contains the coat's
+            attenuation and multiple scattering.
+        ior: If not 0, a dielectric interface: only a specular layer, which reflects by Fresnel's
+            equations for this index and transmits the rest.
         alpha: Width of the specular lobe.
         coat: Weight of the clear coat, multiple scattering included.
         coat_f0: Its reflectance at normal incidence.
         coat_alpha: Width of its lobe.
-        p_coat, p_shine: Probabilities of drawing from the coat and from the specular layer.
+        p_coat, p_shine: Probabilities of sampling the coat and the specular layer.
     """
 
     v: wp.vec3
@@ -61,12 +61,13 @@ class Bsdf:
 
 @wp.struct
 class Scattering:
-    """A direction that was drawn.
+    """A sampled direction.
 
     Attributes:
         l: Unit.
-        weight: BSDF times cosine over density; 0 where the draw has failed and the path ends.
-        density: Per solid angle [1/sr]; below zero for what only this draw can find.
+        weight: BSDF times cosine over density; 0 where sampling fails and the path ends.
+        density: Density per solid angle [1/sr]; negative for directions that no other technique
+            samples.
     """
 
     l: wp.vec3  # noqa: E741
@@ -76,14 +77,14 @@ class Scattering:
 
 @wp.func
 def roughness_to_alpha(roughness: float):
-    """Width of a lobe."""
+    """Width of a GGX lobe from perceptual roughness."""
     r = wp.clamp(roughness, SMOOTHEST, 1.0)
     return r * r
 
 
 @wp.func
-def fifth(c: float):
-    """(1 - c)^5, Schlick's."""
+def schlick_weight(c: float):
+    """(1 - c)^5, the weight of F90 in Schlick's approximation."""
     d = 1.0 - c
     d2 = d * d
     return d2 * d2 * d
@@ -101,12 +102,12 @@ def make_bsdf(
     coat_f0: float,
     coat_roughness: float,
 ):
-    """An opaque surface.
+    """BSDF of an opaque surface.
 
     Args:
         table: Directional albedo of GGX lobes, see
             gen_data.generator.renderers.warp.scene.brdf_albedo_lut.smith_albedo.
-        v: To the viewer.
+        v: Unit direction to the viewer.
         albedo, roughness, metallic, specular: As of gen_data.generator.core.asset_types.Material.
         coat, coat_f0, coat_roughness: Weight of the coat above it, its reflectance at normal
             incidence, and its roughness.
@@ -122,11 +123,11 @@ def make_bsdf(
     # Nothing real reflects less than 2 %: below that even the grazing reflection fades.
     s.f90 = wp.min(50.0 * wp.max(s.f0), 1.0)
     part = directional_albedo(table, wp.sqrt(s.alpha), n_v)
-    # Turquin 2019; the floor is for entries of the table near 0.
+    # Turquin 2019; the floor guards against entries of the table near 0.
     s.scale = one + s.f0 * (1.0 / wp.max(part[0] + part[1], 0.05) - 1.0)
     gloss = wp.cw_mul(s.f0 * part[0] + one * (s.f90 * part[1]), s.scale)
     s.diffuse = wp.cw_mul(one - gloss, albedo) * (1.0 - metallic)
-    # Layers are drawn as often as they send light on, as the eye counts it.
+    # Layers are sampled in proportion to the luminance of their albedo.
     shine = luminance(gloss)
     if coat > 0.0:
         s.coat_f0 = coat_f0
@@ -134,6 +135,7 @@ def make_bsdf(
         above = directional_albedo(table, wp.sqrt(s.coat_alpha), n_v)
         s.coat = coat * (1.0 + coat_f0 * (1.0 / (above[0] + above[1]) - 1.0))
         coated = s.coat * (coat_f0 * above[0] + above[1])
+        # What the coat reflects is missing below it.
         s.scale = s.scale * (1.0 - coated)
         s.diffuse = s.diffuse * (1.0 - coated)
         shine = shine * (1.0 - coated)
@@ -147,7 +149,7 @@ def make_bsdf(
 
 @wp.func
 def make_interface(v: wp.vec3, alpha: float, ior: float):
-    """The reflection of a dielectric, without what goes through."""
+    """Reflection of a dielectric interface, without the transmitted part."""
     s = Bsdf()
     s.v = v
     s.alpha = alpha
@@ -159,28 +161,28 @@ def make_interface(v: wp.vec3, alpha: float, ior: float):
 
 @wp.func
 def reflectance(s: Bsdf, v_h: float):
-    """Of the specular layer's facets."""
+    """Reflectance of the specular layer's facets at the cosine ``v_h``."""
     f = s.f0
     if s.ior > 0.0:
         r = fresnel_dielectric(v_h, s.ior)
         f = wp.vec3(r, r, r)
     else:
-        k = fifth(wp.min(v_h, 1.0))
+        k = schlick_weight(wp.min(v_h, 1.0))
         f = f * (1.0 - k) + wp.vec3(s.f90, s.f90, s.f90) * k
     return wp.cw_mul(f, s.scale)
 
 
 @wp.func
-def slope(alpha: float, c: float):
-    """The root in Smith's functions for one cosine."""
+def smith_root(alpha: float, c: float):
+    """The root in Smith's masking function for one cosine."""
     a2 = alpha * alpha
     return wp.sqrt(a2 + (1.0 - a2) * c * c)
 
 
 @wp.func
-def facets(alpha: float, h: wp.vec3):
-    """GGX: the density of facets' normals."""
-    # By the tangent's square, which keeps its digits where the lobe is narrow.
+def ggx_density(alpha: float, h: wp.vec3):
+    """GGX: the density of facet normals."""
+    # From the squared tangent, which keeps its digits in narrow lobes.
     a2 = alpha * alpha
     q = (h[0] * h[0] + h[1] * h[1]) / a2 + h[2] * h[2]
     return 1.0 / (wp.pi * a2 * q * q)
@@ -188,57 +190,59 @@ def facets(alpha: float, h: wp.vec3):
 
 @wp.func
 def evaluate(s: Bsdf, l: wp.vec3):  # noqa: E741
-    """BSDF times cosine for one direction, and the density with which ``scatter`` draws it."""
+    """BSDF times cosine for one direction, and the density with which ``scatter`` samples it."""
     n_l = l[2]
     n_v = s.v[2]
     diffuse = n_l * (1.0 / wp.pi)
     f = s.diffuse * diffuse
     density = diffuse * (1.0 - s.p_coat - s.p_shine)
-    # Matte surfaces are the most common: they skip the half vector.
+    # Purely diffuse surfaces are the most common: they skip the half vector.
     if s.p_shine == 0.0 and s.coat == 0.0:
         return f, density
     h = fast_normalize(s.v + l)
     v_h = wp.max(wp.dot(s.v, h), 0.0)
     if s.p_shine > 0.0:
-        lobe = 0.5 * facets(s.alpha, h)
-        root = slope(s.alpha, n_v)
+        lobe = 0.5 * ggx_density(s.alpha, h)
+        root = smith_root(s.alpha, n_v)
         reflected = reflectance(s, v_h)
         p = s.p_shine
-        # At an interface the lot between both ways is Fresnel's, facet by facet.
+        # At an interface ``scatter_glass`` chooses reflection by Fresnel's equations, facet by
+        # facet.
         if s.ior > 0.0:
             p = reflected[0]
-        f += reflected * (lobe * n_l / (n_l * root + n_v * slope(s.alpha, n_l)))
+        f += reflected * (lobe * n_l / (n_l * root + n_v * smith_root(s.alpha, n_l)))
+        # Density of reflected visible normals: D G1 / (4 n_v); n_v cancels in Smith's form.
         density += p * lobe / (n_v + root)
     if s.coat > 0.0:
-        lobe = 0.5 * facets(s.coat_alpha, h)
-        root = slope(s.coat_alpha, n_v)
-        k = fifth(wp.min(v_h, 1.0))
+        lobe = 0.5 * ggx_density(s.coat_alpha, h)
+        root = smith_root(s.coat_alpha, n_v)
+        k = schlick_weight(wp.min(v_h, 1.0))
         shine = s.coat * (s.coat_f0 + (1.0 - s.coat_f0) * k) * lobe * n_l
-        shine = shine / (n_l * root + n_v * slope(s.coat_alpha, n_l))
+        shine = shine / (n_l * root + n_v * smith_root(s.coat_alpha, n_l))
         f += wp.vec3(shine, shine, shine)
         density += s.p_coat * lobe / (n_v + root)
     return f, density
 
 
 @wp.func
-def visible_facet(v: wp.vec3, alpha: float, u: wp.vec2):
-    """A facet's normal, drawn as often as it is seen from ``v``."""
-    # Heitz 2018: stretched by alpha, a GGX surface is a hemisphere.
+def sample_visible_normal(v: wp.vec3, alpha: float, u: wp.vec2):
+    """Sample the GGX distribution of normals visible from ``v``."""
+    # Heitz 2018: scaled by alpha, a GGX surface becomes a hemisphere.
     w = fast_normalize(wp.vec3(v[0] * alpha, v[1] * alpha, v[2]))
-    # Dupuy and Benyoub 2023: a spherical cap of directions gives the visible normals.
+    # Dupuy and Benyoub 2023: a uniform spherical cap of directions gives the visible normals.
     z = (1.0 - u[1]) * (1.0 + w[2]) - w[2]
     r = wp.sqrt(wp.max(1.0 - z * z, 0.0))
     angle = 2.0 * wp.pi * u[0]
     x = r * wp.cos(angle) + w[0]
     y = r * wp.sin(angle) + w[1]
-    # And back. Rounding may leave Z a little below 0, where no facet faces out.
+    # Scale back. Rounding may leave Z slightly below 0, where no facet faces outwards.
     return fast_normalize(wp.vec3(x * alpha, y * alpha, wp.max(z + w[2], 0.0)))
 
 
 @wp.func
-def around_normal(u: wp.vec2):
-    """A direction, drawn in proportion to its cosine."""
-    # Malley: evenly on a disk, lifted to the hemisphere, is in proportion to the cosine.
+def sample_cosine(u: wp.vec2):
+    """A direction distributed by the cosine."""
+    # Malley's method: uniform on a disk, lifted to the hemisphere.
     r = wp.sqrt(u[0])
     angle = 2.0 * wp.pi * u[1]
     return wp.vec3(r * wp.cos(angle), r * wp.sin(angle), wp.sqrt(1.0 - u[0]))
@@ -246,21 +250,22 @@ def around_normal(u: wp.vec2):
 
 @wp.func
 def scatter(s: Bsdf, choice: float, u: wp.vec2):
-    """A direction, drawn nearly in proportion to what it brings.
+    """Sample a direction approximately in proportion to BSDF times cosine.
 
     Args:
-        choice: In [0, 1), for the layer.
-        u: In [0, 1), for the direction.
+        choice: In [0, 1), selects the layer.
+        u: In [0, 1), select the direction.
     """
     out = Scattering()
     if choice < s.p_coat + s.p_shine:
         alpha = s.alpha
         if choice < s.p_coat:
             alpha = s.coat_alpha
-        h = visible_facet(s.v, alpha, u)
+        h = sample_visible_normal(s.v, alpha, u)
         out.l = h * (2.0 * wp.dot(s.v, h)) - s.v
     else:
-        out.l = around_normal(u)
+        out.l = sample_cosine(u)
+    # The weight contains all layers, whichever was sampled: a one-sample mixture.
     if out.l[2] > 0.0:
         f, density = evaluate(s, out.l)
         out.density = density
@@ -270,21 +275,21 @@ def scatter(s: Bsdf, choice: float, u: wp.vec2):
 
 
 @wp.func
-def scatter_glass(s: Bsdf, lot: float, u: wp.vec2):
-    """A direction that is reflected, or goes through towards negative Z.
+def scatter_glass(s: Bsdf, xi: float, u: wp.vec2):
+    """Sample a reflected direction, or a transmitted one towards negative Z.
 
-    The weight lacks any tint. No density is told for what goes through: nothing else draws such
-    directions. Radiance is that of the outside on both sides: what is seen through a body leaves
-    it again. Masking of what goes through is separable, as by Walter.
+    The weight excludes tint. Transmitted directions have no density: no other technique samples
+    them. Radiance is not scaled by the squared index on entry: light that enters a body leaves it
+    again. Masking of transmission is separable, as in Walter et al. 2007.
 
     Args:
-        lot: In [0, 1), decides between the two.
-        u: In [0, 1), for the direction.
+        xi: In [0, 1), selects reflection or transmission.
+        u: In [0, 1), select the direction.
     """
     out = Scattering()
-    h = visible_facet(s.v, s.alpha, u)
+    h = sample_visible_normal(s.v, s.alpha, u)
     v_h = wp.min(wp.dot(s.v, h), 1.0)
-    if lot < fresnel_dielectric(v_h, s.ior):
+    if xi < fresnel_dielectric(v_h, s.ior):
         out.l = h * (2.0 * v_h) - s.v
         if out.l[2] > 0.0:
             f, density = evaluate(s, out.l)
@@ -295,7 +300,7 @@ def scatter_glass(s: Bsdf, lot: float, u: wp.vec2):
         out.density = -1.0
         n_l = -out.l[2]
         if n_l > 0.0:
-            # Over the density of visible facets, all of Walter's BTDF cancels but Smith's G1 of l.
-            passed = 2.0 * n_l / (n_l + slope(s.alpha, n_l))
+            # Divided by the density of visible normals, Walter's BTDF reduces to Smith's G1 of l.
+            passed = 2.0 * n_l / (n_l + smith_root(s.alpha, n_l))
             out.weight = wp.vec3(passed, passed, passed)
     return out

@@ -1,4 +1,4 @@
-"""What a denoiser looks at besides the light: colours and normals of what is seen first."""
+"""Auxiliary images for the denoiser: albedo and normals of the first visible surfaces."""
 
 from __future__ import annotations
 
@@ -29,12 +29,13 @@ def trace_guides(
     albedo: wp.array(dtype=wp.vec3),
     normal: wp.array(dtype=wp.vec3),
 ):
-    """Means over each pixel's square; where nothing is seen, white and no normal."""
+    """Mean albedo and normal over each pixel's square; white and no normal for the background."""
     i = wp.tid()
     if not is_in_view(view, i):
         return
     colors = wp.vec3(0.0)
     normals = wp.vec3(0.0)
+    # Independent sequences per pixel: correlated ones would look like structure to the denoiser.
     pixel = hash_bits(wp.uint32(i))
     for k in range(samples):
         place = random_pair(pixel, 0, wp.uint32(k))
@@ -43,10 +44,11 @@ def trace_guides(
         d = fast_normalize(view.R_world_camera @ pixel_direction(view, x, y))
         hit = closest_hit(world, view.eye_m + d * Z_NEAR_M, d, AT_INFINITY, HOLES)
         if hit.at[0] < 0:
+            # The background counts as white.
             colors += wp.vec3(1.0, 1.0, 1.0)
         else:
             v = make_vertex(world, hit, d, 0.0)
-            colors += v.look.albedo
-            normals += v.look.normal
+            colors += v.material.albedo
+            normals += v.material.normal
     albedo[i] = colors * (1.0 / float(samples))
     normal[i] = normals * (1.0 / float(samples))

@@ -1,10 +1,10 @@
-"""Light sources, for paths: drawn from, and met by chance.
+"""Light sources of the path tracer: sampling, and intersection with rays.
 
 Sources: Veach, "Robust Monte Carlo methods for light transport simulation", 1997 (multiple
 importance sampling, power heuristic); Karlik et al., "MIS compensation: optimizing sampling
-techniques in multiple importance sampling", SIGGRAPH Asia 2019 (skies); Shirley, Wang and
+techniques in multiple importance sampling", SIGGRAPH Asia 2019 (environments); Shirley, Wang and
 Zimmerman, "Monte Carlo techniques for direct lighting calculations", ACM TOG 15(1), 1996 (spheres
-by their cone, panels by area).
+by solid angle, panels by area).
 """
 
 from __future__ import annotations
@@ -30,21 +30,24 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-# Farther than any scene reaches.
+# Larger than any scene.
 AT_INFINITY = wp.constant(1.0e6)
-# Share of the mean light that no surface is taken to see less of: coefficients are blurred.
+# Floor of the estimated irradiance, as a share of the mean: spherical harmonics are blurred and may
+# underestimate it.
 SKY_FLOOR = wp.constant(0.1)
+# Number of the environment among the light sources; lamps count from 0.
 SKY = wp.constant(-1)
 
 
 @wp.struct
 class SkyTable:
-    """Where the light comes from for which a sky is asked.
+    """Tables for importance sampling of an environment.
 
     Attributes:
-        part: Of the sky's light; the rest is left to paths that meet it by chance.
-        rows: Share of the light above each row's upper edge, [rows + 1].
-        columns: In each row, share of its light left of each column's edge, [rows, columns + 1].
+        part: Share of the environment's light that is sampled; the rest is left to BSDF sampling.
+        rows: Cumulative share of light above each row's upper edge, [rows + 1].
+        columns: Cumulative share of each row's light left of each column's edge, [rows, columns +
+            1].
     """
 
     part: float
@@ -54,13 +57,13 @@ class SkyTable:
 
 @wp.struct
 class LightSample:
-    """A source in one direction from a point.
+    """A light source in one direction from a point.
 
     Attributes:
-        direction: Unit.
-        distance_m: To it; below zero where there is none.
-        radiance: That it sends to the point [cd/m^2].
-        density: Of drawing that direction from this source [1/sr].
+        direction: Unit direction to it.
+        distance_m: Distance to it [m]; negative for none.
+        radiance: Radiance towards the point [cd/m^2].
+        density: Density with which this source samples the direction [1/sr].
     """
 
     direction: wp.vec3
@@ -71,10 +74,10 @@ class LightSample:
 
 @wp.func
 def spot_fade(lamp: LightRecord, away: wp.vec3):
-    """What is left of a spot's light in a unit direction away from it; 1 for a sphere."""
+    """Falloff of a spot in a unit direction away from it; 1 for a sphere."""
     fade = float(1.0)
     if lamp.kind == SPOT:
-        # A spot that is even to its rim has no span: it ends within a ten-thousandth.
+        # A spot without falloff has no span: it ends within a ten-thousandth of the cosine.
         span = wp.max(lamp.cos_inner - lamp.cos_outer, 1.0e-4)
         t = wp.clamp((wp.dot(away, lamp.direction) - lamp.cos_outer) / span, 0.0, 1.0)
         fade = t * t * (3.0 - 2.0 * t)
@@ -83,21 +86,21 @@ def spot_fade(lamp: LightRecord, away: wp.vec3):
 
 @wp.func
 def ball_radius(lamp: LightRecord):
-    """Radius of a lamp [m]; points are taken for small balls."""
-    # A solid angle of zero could not be drawn from.
+    """Radius of a lamp [m]; points become small spheres."""
+    # A solid angle of zero cannot be sampled.
     return max_of_two(lamp.radius, 1.0e-3)
 
 
 @wp.func
 def cone_width(squared: float):
-    """One minus the cosine of a cone's half angle, from its sine squared."""
-    # 1 - sqrt(1 - s) would cancel for small s; this is the same without a difference.
+    """One minus the cosine of a cone's half angle, from its squared sine."""
+    # 1 - sqrt(1 - s) cancels for small s; this form does not.
     return squared / (1.0 + wp.sqrt(1.0 - squared))
 
 
 @wp.func
 def ball_sine(lamp: LightRecord, distance_squared: float):
-    """Squared sine of the angle under which a lamp's radius is seen."""
+    """Squared sine of a lamp's angular radius."""
     squared = lamp.radius * lamp.radius / (1.0 + lamp.radius * lamp.radius)
     if lamp.kind != SUN:
         r = ball_radius(lamp)
@@ -107,7 +110,7 @@ def ball_sine(lamp: LightRecord, distance_squared: float):
 
 @wp.func
 def lamp_weight(lamp: LightRecord, p: wp.vec3, n: wp.vec3):
-    """About the illuminance [lx] that a lamp gives a surface; zero only where it is nothing."""
+    """Approximate illuminance of a surface by a lamp [lx]; 0 only where there is none."""
     weight = float(0.0)
     if lamp.kind == SUN:
         weight = luminance(lamp.power) * wp.clamp(lamp.radius - wp.dot(n, lamp.direction), 0.0, 1.0)
@@ -118,9 +121,10 @@ def lamp_weight(lamp: LightRecord, p: wp.vec3, n: wp.vec3):
         inverse = 1.0 / wp.sqrt(squared)
         above = (wp.dot(n, to_lamp) + lamp.radius) * inverse
         if above > 0.0:
-            # Never near zero where there is light: what is drawn too rarely is noise.
+            # A floor where there is light: sources that are sampled too rarely cause fireflies.
             weight = luminance(lamp.power) * (wp.min(above, 1.0) + 0.02) * (inverse * inverse)
             if is_panel(lamp):
+                # Panels emit by the cosine; a floor keeps grazing directions sampled.
                 front = -wp.dot(to_lamp, lamp.direction) * inverse
                 weight = wp.where(front > 0.0, weight * (front + 0.05), 0.0)
             else:
@@ -130,7 +134,7 @@ def lamp_weight(lamp: LightRecord, p: wp.vec3, n: wp.vec3):
 
 @wp.func
 def sky_weight(sky: EnvironmentRecord, table: SkyTable, n: wp.vec3):
-    """About the illuminance [lx] that a surface gets from what the sky is asked for."""
+    """Approximate illuminance of a surface by the sampled part of the environment [lx]."""
     weight = float(0.0)
     if table.part * sky.luminance > 0.0:
         mean = luminance(sky.irradiance[0]) * sky.luminance
@@ -139,9 +143,9 @@ def sky_weight(sky: EnvironmentRecord, table: SkyTable, n: wp.vec3):
 
 
 @wp.func
-def in_cone(axis: wp.vec3, sine_squared: float, u: wp.vec2):
-    """A direction, drawn evenly from a cone; with one minus its cosine to the axis."""
-    # Even in solid angle is even in the cosine (Shirley, Wang and Zimmerman 1996).
+def sample_cone(axis: wp.vec3, sine_squared: float, u: wp.vec2):
+    """A direction sampled uniformly from a cone, and one minus its cosine to the axis."""
+    # Uniform in solid angle is uniform in the cosine (Shirley, Wang and Zimmerman 1996).
     low = u[0] * cone_width(sine_squared)
     x, y = make_frame(axis)
     r = wp.sqrt(wp.max(low * (2.0 - low), 0.0))
@@ -152,7 +156,7 @@ def in_cone(axis: wp.vec3, sine_squared: float, u: wp.vec2):
 
 @wp.func
 def draw_ball(lamp: LightRecord, p: wp.vec3, u: wp.vec2):
-    """A point of a sphere, of a spot or of the sun."""
+    """Sample a point of a sphere, a spot or the sun."""
     g = LightSample()
     g.distance_m = -1.0
     axis = -lamp.direction
@@ -160,12 +164,12 @@ def draw_ball(lamp: LightRecord, p: wp.vec3, u: wp.vec2):
     if lamp.kind != SUN:
         to_lamp = lamp.position_m - p
         squared = wp.dot(to_lamp, to_lamp)
-        # A point at the very centre of a lamp has no axis; any will do.
+        # At the centre of a lamp any axis will do.
         axis = to_lamp * (1.0 / wp.sqrt(wp.max(squared, 1.0e-12)))
     sine = ball_sine(lamp, squared)
-    # Inside a ball it fills all directions: it is left to paths that meet it.
+    # Inside a sphere it fills all directions and is left to BSDF sampling.
     if sine < 1.0:
-        direction, low = in_cone(axis, sine, u)
+        direction, low = sample_cone(axis, sine, u)
         g.direction = direction
         g.density = 1.0 / (2.0 * wp.pi * cone_width(sine))
         g.radiance = ball_radiance(lamp, axis)
@@ -174,13 +178,14 @@ def draw_ball(lamp: LightRecord, p: wp.vec3, u: wp.vec2):
             c = 1.0 - low
             r = ball_radius(lamp)
             beside = squared * low * (2.0 - low)
+            # Nearer intersection of the sampled direction with the sphere.
             g.distance_m = wp.sqrt(squared) * c - wp.sqrt(wp.max(r * r - beside, 0.0))
     return g
 
 
 @wp.func
 def ball_radiance(lamp: LightRecord, axis: wp.vec3):
-    """Radiance of a ball seen along an axis; that of the sun over its disc."""
+    """Radiance of a sphere seen along an axis; of the sun, over its disk."""
     area = wp.pi * lamp.radius * lamp.radius / (1.0 + lamp.radius * lamp.radius)
     if lamp.kind != SUN:
         r = ball_radius(lamp)
@@ -197,7 +202,7 @@ def panel_area(lamp: LightRecord):
 
 @wp.func
 def draw_panel(lamp: LightRecord, p: wp.vec3, u: wp.vec2):
-    """A point of a rectangle or disk, drawn evenly over its area."""
+    """Sample a point of a rectangle or disk, uniformly over its area."""
     x = 2.0 * u[0] - 1.0
     y = 2.0 * u[1] - 1.0
     if lamp.kind == DISK:
@@ -209,24 +214,26 @@ def draw_panel(lamp: LightRecord, p: wp.vec3, u: wp.vec2):
     squared = wp.max(wp.dot(way, way), 1.0e-12)
     g = LightSample()
     g.direction = way * (1.0 / wp.sqrt(squared))
+    # Panels are one-sided.
     front = -wp.dot(g.direction, lamp.direction)
     g.distance_m = -1.0
     if front > 1.0e-6:
         g.distance_m = wp.sqrt(squared)
+        # From density per area to density per solid angle.
         g.density = squared / (front * panel_area(lamp))
         g.radiance = lamp.radiance
     return g
 
 
 @wp.func
-def meet_lamp(lamp: LightRecord, p: wp.vec3, d: wp.vec3):
-    """What a ray sees of a lamp."""
+def intersect_lamp(lamp: LightRecord, p: wp.vec3, d: wp.vec3):
+    """Intersection of a ray with a lamp."""
     g = LightSample()
     g.direction = d
     g.distance_m = -1.0
     if lamp.kind == SUN:
         sine = ball_sine(lamp, 1.0)
-        # By the chord: cosines of a twentieth of a degree have no digits left.
+        # By the chord: the cosine of a twentieth of a degree has no digits left.
         chord = d + lamp.direction
         if wp.dot(chord, chord) < 2.0 * cone_width(sine):
             g.distance_m = AT_INFINITY
@@ -261,8 +268,8 @@ def meet_lamp(lamp: LightRecord, p: wp.vec3, d: wp.vec3):
 
 
 @wp.func
-def interval_of(shares: wp.array(dtype=float), last: int, u: float):
-    """The largest k < last with ``shares[k] <= u``."""
+def find_interval(shares: wp.array(dtype=float), last: int, u: float):
+    """The largest k < last with ``shares[k] <= u``; binary search."""
     low = int(0)
     high = last
     while high - low > 1:
@@ -276,7 +283,7 @@ def interval_of(shares: wp.array(dtype=float), last: int, u: float):
 
 @wp.func
 def sky_place(sky: EnvironmentRecord, d: wp.vec3):
-    """Where a unit direction lies in the sky's image, [0, 1) along rows and columns; its sine."""
+    """Position of a unit direction in the sky's image, [0, 1) along rows and columns; its sine."""
     x = sky.cos_yaw * d[0] + sky.sin_yaw * d[1]
     y = sky.cos_yaw * d[1] - sky.sin_yaw * d[0]
     z = wp.clamp(d[2], -1.0, 1.0)
@@ -286,7 +293,7 @@ def sky_place(sky: EnvironmentRecord, d: wp.vec3):
 
 @wp.func
 def sky_light(sky: EnvironmentRecord, place: wp.vec3):
-    """The image at a place, bilinear, as ``sky.panorama`` reads it."""
+    """The image at a position, bilinear, as environment_lighting.sample_panorama."""
     height = sky.image.shape[0]
     width = sky.image.shape[1]
     x = place[0] * float(width) - 0.5
@@ -306,14 +313,15 @@ def sky_light(sky: EnvironmentRecord, place: wp.vec3):
 
 @wp.func
 def draw_sky(sky: EnvironmentRecord, table: SkyTable, u: wp.vec2):
-    """A direction of the sky, drawn by the brightness of the image."""
+    """Sample a direction of the environment by the image's luminance."""
     height = table.rows.shape[0] - 1
     width = table.columns.shape[1] - 1
-    row = interval_of(table.rows, height, u[1])
+    row = find_interval(table.rows, height, u[1])
     edges = table.columns[row]
-    column = interval_of(edges, width, u[0])
+    column = find_interval(edges, width, u[0])
     tall = table.rows[row + 1] - table.rows[row]
     wide = edges[column + 1] - edges[column]
+    # Uniform within the texel, by what is left of the number.
     x = (float(column) + wp.min((u[0] - edges[column]) / wide, 1.0)) / float(width)
     y = (float(row) + wp.min((u[1] - table.rows[row]) / tall, 1.0)) / float(height)
     azimuth = wp.pi * (1.0 - 2.0 * x)
@@ -326,6 +334,7 @@ def draw_sky(sky: EnvironmentRecord, table: SkyTable, u: wp.vec2):
     )
     g.distance_m = AT_INFINITY
     g.radiance = sky_light(sky, wp.vec3(x, y, sine))
+    # Change of variables: a texel covers 2 pi^2 sin(polar) / cells of solid angle.
     cells = float(width) * float(height)
     g.density = tall * wide * cells / (2.0 * wp.pi * wp.pi * wp.max(sine, 1.0e-6))
     return g
@@ -333,9 +342,10 @@ def draw_sky(sky: EnvironmentRecord, table: SkyTable, u: wp.vec2):
 
 @wp.func
 def sky_density(table: SkyTable, place: wp.vec3):
-    """The density with which ``draw_sky`` draws the direction at a place [1/sr]."""
+    """The density with which ``draw_sky`` samples the direction at a position [1/sr]."""
     height = table.rows.shape[0] - 1
     width = table.columns.shape[1] - 1
+    # Rounding at the image's last edge would leave the table.
     column = wp.clamp(int(place[0] * float(width)), 0, width - 1)
     row = wp.clamp(int(place[1] * float(height)), 0, height - 1)
     share = table.rows[row + 1] - table.rows[row]
@@ -346,11 +356,11 @@ def sky_density(table: SkyTable, place: wp.vec3):
 
 @wp.struct
 class SourceChoice:
-    """The source that a vertex asks for light.
+    """The light source that a vertex samples.
 
     Attributes:
         source: Number of a lamp, or SKY.
-        part: Probability of that choice; 0 where no source gives light.
+        part: Probability of that choice; 0 without any light.
         total: Sum of all weights [lx].
     """
 
@@ -361,18 +371,19 @@ class SourceChoice:
 
 @wp.func
 def choose_source(world: World, table: SkyTable, p: wp.vec3, n: wp.vec3, u: float):
-    """One source, nearly in proportion to the light that it gives a surface if nothing shades."""
+    """Sample one source, approximately in proportion to its unshadowed light."""
     c = SourceChoice()
     c.source = SKY
     weight = sky_weight(world.sky, table, n)
     c.total = weight
+    # Weighted reservoir sampling: one pass, without a table of weights.
     rest = u
     for j in range(world.lamps.shape[0]):
         w = lamp_weight(world.lamps[j], p, n)
         if w > 0.0:
             c.total += w
             part = w / c.total
-            # What is left of the number decides between those after.
+            # Rescaled, the number is uniform again and decides between the remaining sources.
             if rest < part:
                 c.source = j
                 weight = w
@@ -386,5 +397,5 @@ def choose_source(world: World, table: SkyTable, p: wp.vec3, n: wp.vec3, u: floa
 
 @wp.func
 def power_heuristic(a: float, b: float):
-    """Weight of a technique with density a against one with density b: the power heuristic."""
+    """Power heuristic: MIS weight of a technique with density a against one with density b."""
     return a * a / wp.max(a * a + b * b, 1.0e-30)

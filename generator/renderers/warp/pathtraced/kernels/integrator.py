@@ -1,12 +1,12 @@
-"""Paths of light, from the camera: one thread per pixel, one path after the other.
+"""Path integrator: one thread per pixel, one path after another.
 
 Source: Kajiya, "The rendering equation", SIGGRAPH 1986, with next-event estimation, multiple
 importance sampling and Russian roulette as in Pharr, Jakob and Humphreys, "Physically Based
 Rendering", 4th ed., chapters 13 and 14.
 
-Every vertex asks one source for light and goes on in one direction. What a surface is made of in
-shares, such as glass and paint, is decided by lot, so that a vertex is one thing at a time. Clear
-panes and opacity bend nothing: paths and shadows go straight through them.
+Every vertex samples one light source and continues in one direction. Mixed materials, such as glass
+and paint, are chosen between at random, so that a vertex has a single BSDF. Clear panes and opacity
+refract nothing: paths and shadow rays pass straight through them.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ from gen_data.generator.renderers.warp.pathtraced.kernels.emitters import (
     draw_ball,
     draw_panel,
     draw_sky,
+    intersect_lamp,
     lamp_weight,
-    meet_lamp,
     power_heuristic,
     sky_density,
     sky_light,
@@ -49,7 +49,7 @@ from gen_data.generator.renderers.warp.pathtraced.kernels.emitters import (
 )
 from gen_data.generator.renderers.warp.pathtraced.kernels.sampler import (
     hash_bits,
-    place_on_curve,
+    morton_index,
     random_number,
     random_pair,
 )
@@ -95,34 +95,35 @@ from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Z_NE
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-# Straight passages that are not counted as bounces.
+# Limit on straight passages, which are not counted as bounces.
 PASSAGES_MAX = wp.constant(64)
-# Paths of which less than this is left, of what the first surface leaves, go on by lot, and then
-# with this much: dark things are seen as well as bright ones. Measured: half the variance, for the
-# same time, of going on with probability of what is left.
-WORTH = wp.constant(0.25)
-# Rougher panes scatter what they let through.
+# Russian roulette: paths whose throughput falls below this share of that after the first surface
+# survive at random, and then with this throughput: dark surfaces are sampled as well as bright
+# ones. Measured: half the variance, for the same time, of survival in proportion to throughput.
+SURVIVAL_SHARE = wp.constant(0.25)
+# Rougher panes scatter the light that they transmit.
 CLEAR_ROUGHNESS = wp.constant(0.1)
-# Probability at least of what an interface reflects, and of what it lets through.
-LOT_FLOOR = wp.constant(0.02)
-# Numbers that one segment of a path takes, in pairs.
+# Lower bound on the probabilities of reflection and of transmission at an interface.
+PROBABILITY_FLOOR = wp.constant(0.02)
+# Pairs of random numbers per path segment.
 PAIRS = wp.constant(4)
 
 
 @wp.struct
 class Budget:
-    """How much is spent on a pixel.
+    """Number of samples and bounces of an image.
 
     Attributes:
         first: Number of the first sample.
-        samples: How many are taken now.
-        whole: How many a pixel gets in all.
-        sample_bits: Bits that number these.
-        bounces: Number of times that light is scattered at most.
-        key: Of the image: tells its noise from that of others.
-        clear: 1 where some surface lets light through, so that shadows have to look closer.
-        lights: Bits of the techniques: 1 asks sources for light, 2 meets them by chance; 3 for an
-            image, the others to check one against the other.
+        samples: Samples of this launch.
+        whole: Samples per pixel in all launches.
+        sample_bits: Bits that number all samples.
+        bounces: Maximum number of scattering events.
+        key: Key of the image's noise.
+        clear: 1 if some surface transmits light straight, so that shadow rays have to accumulate
+            transmittance.
+        lights: Bits of techniques: 1 samples light sources, 2 hits them by BSDF sampling; 3 for
+            images, the others to validate one against the other.
     """
 
     first: int
@@ -137,23 +138,23 @@ class Budget:
 
 @wp.struct
 class Vertex:
-    """A surface where a path meets it.
+    """A surface point on a path.
 
     Attributes:
-        p: World [m].
-        flat: Normal of the face, to the side that the path comes from.
-        look: What it looks like; its normal is for shading.
-        surface: Its material.
+        p: Position in the world [m].
+        flat: Geometric normal on the side that the path comes from.
+        look: Material; its normal is the shading normal.
+        surface: Index of the material.
         outside: Whether that side is the face's front.
-        glow: What it sends out by itself [cd/m^2].
-        clear: Share of what is below the specular layer that lets light pass.
-        opacity: Share of what is behind that it hides.
-        film, film_f0, film_roughness: Of a coat, or of water.
+        glow: Emission [cd/m^2].
+        clear: Share of the light below the specular layer that is transmitted.
+        opacity: Share of the background that it hides.
+        film, film_f0, film_roughness: Weight, F0 and roughness of a coat or a film of water.
     """
 
     p: wp.vec3
     flat: wp.vec3
-    look: SurfaceMaterial
+    material: SurfaceMaterial
     surface: int
     outside: bool
     glow: wp.vec3
@@ -166,14 +167,14 @@ class Vertex:
 
 @wp.struct
 class Anchor:
-    """The last vertex that chose a direction, for what that direction meets.
+    """The last vertex that scattered, for MIS weights of the sources that its ray hits.
 
     Attributes:
-        p: Where the ray began.
+        p: Origin of the ray.
         n: Normal there.
-        density: Of the direction; below zero where sources could not have been asked.
-        total: Weights of all sources there [lx].
-        way_m: From there to where the path is now.
+        density: Density of the direction; negative if no source was sampled there.
+        total: Sum of all source weights there [lx].
+        way_m: Distance from there to the path's current segment.
     """
 
     p: wp.vec3
@@ -185,7 +186,7 @@ class Anchor:
 
 @wp.func
 def make_vertex(world: World, hit: RayHit, d: wp.vec3, width_m: float):
-    """The surface at a hit, dry and bare."""
+    """The vertex at a hit, with its layers and weather."""
     b = hit.at[0]
     g = world.bodies[b].geometry
     corner = face_vertices(world, g, hit.at[1])
@@ -195,6 +196,7 @@ def make_vertex(world: World, hit: RayHit, d: wp.vec3, width_m: float):
     e1 = vertex_at(world, g, corner[1]) - p0
     e2 = vertex_at(world, g, corner[2]) - p0
     m = p0 + e1 * hit.weight[0] + e2 * hit.weight[1]
+    # From barycentric weights: more accurate than the ray's parameter at a distance.
     v.p = R @ (m * world.bodies[b].scale) + world.bodies[b].t_world_mesh
     v.flat = R @ fast_normalize(wp.cross(e1, e2))
     v.outside = wp.dot(v.flat, d) < 0.0
@@ -203,31 +205,33 @@ def make_vertex(world: World, hit: RayHit, d: wp.vec3, width_m: float):
     n = normal_at(world, g, corner[0]) * (1.0 - hit.weight[0] - hit.weight[1])
     n += normal_at(world, g, corner[1]) * hit.weight[0]
     n += normal_at(world, g, corner[2]) * hit.weight[1]
+    # Interpolated normals may face away from the ray; the BSDF needs a positive cosine.
     smooth = face_viewer((R @ n) * side, d)
     v.surface = surface_index(world, hit.at)
     weight = wp.vec2(hit.weight[0] + 1.0 - side, hit.weight[1])
-    v.look = evaluate_material(world, v.surface, hit.at, weight, smooth, width_m, -d)
+    v.material = evaluate_material(world, v.surface, hit.at, weight, smooth, width_m, -d)
     v.glow = world.surfaces[v.surface].emission_cd_m2
     v.opacity = 1.0
     if world.surfaces[v.surface].layered != 0:
-        v = layered(world, v, hit.at, weight, width_m)
+        v = add_layers(world, v, hit.at, weight, width_m)
     if world.ground.covered != 0:
-        v = weathered(world, v, smooth, width_m)
-    v.look.normal = face_viewer(v.look.normal, d)
+        v = add_weather(world, v, smooth, width_m)
+    v.material.normal = face_viewer(v.material.normal, d)
     return v
 
 
 @wp.func(**OUT_OF_LINE)
-def layered(world: World, v: Vertex, at: wp.vec2i, weight: wp.vec2, width_m: float):
-    """A surface with all there is to it."""
+def add_layers(world: World, v: Vertex, at: wp.vec2i, weight: wp.vec2, width_m: float):
+    """Add further maps, transmission, opacity and coat to a vertex."""
     maps = maps_at(world, v.surface, at, weight, width_m)
-    v.look.metallic *= maps.metallic
+    v.material.metallic *= maps.metallic
     v.glow = wp.cw_mul(v.glow, maps.glow)
-    v.clear = world.surfaces[v.surface].transmission * (1.0 - v.look.metallic)
+    v.clear = world.surfaces[v.surface].transmission * (1.0 - v.material.metallic)
     if v.clear > 0.0:
         ior = world.surfaces[v.surface].ior
+        # F0 of the refractive index, expressed as Burley's ``specular`` (0.08 at 1).
         normal = (ior - 1.0) / (ior + 1.0)
-        v.look.specular = normal * normal / 0.08
+        v.material.specular = normal * normal / 0.08
     v.opacity = world.surfaces[v.surface].opacity
     v.film = world.surfaces[v.surface].coat
     v.film_f0 = COAT_F0
@@ -236,18 +240,19 @@ def layered(world: World, v: Vertex, at: wp.vec2i, weight: wp.vec2, width_m: flo
 
 
 @wp.func(**OUT_OF_LINE)
-def weathered(world: World, v: Vertex, n: wp.vec3, width_m: float):
-    """A surface as the weather leaves it; ``n`` is its normal without bumps."""
+def add_weather(world: World, v: Vertex, n: wp.vec3, width_m: float):
+    """Add water and snow to a vertex; ``n`` is its normal without bumps."""
     exposed = float(1.0)
     if n[2] > 0.1:
         exposed = precipitation_exposure(world, offset_origin(v.p, v.flat))
     coat = coat_at(world, v.surface, v.p, n, exposed, width_m)
-    v.look = apply_coat(world, v.surface, v.look, coat, n)
+    v.material = apply_coat(world, v.surface, v.material, coat, n)
     bare = 1.0 - wp.min(coat.snow, 1.0)
     v.clear *= bare
     v.film *= bare
     v.opacity = 1.0 - (1.0 - v.opacity) * bare
     wet = water_at(world, v.surface, v.p, n, exposed, width_m)
+    # A vertex has one film: the stronger of coat and water.
     if wet[0] > v.film:
         v.film = wet[0]
         v.film_f0 = WATER_F0
@@ -256,57 +261,58 @@ def weathered(world: World, v: Vertex, n: wp.vec3, width_m: float):
 
 
 @wp.func
-def pane_leaves(world: World, v: Vertex, d: wp.vec3):
-    """Transmittance of what bends nothing: gaps in opacity, and clear panes."""
+def straight_transmittance(world: World, v: Vertex, d: wp.vec3):
+    """Transmittance without refraction: opacity below 1, and clear panes."""
     through = wp.vec3(1.0, 1.0, 1.0) * (1.0 - v.opacity)
     if v.clear > 0.0 and is_clear_pane(world, v.surface):
-        cosine = wp.min(wp.abs(wp.dot(v.look.normal, d)), 1.0)
+        cosine = wp.min(wp.abs(wp.dot(v.material.normal, d)), 1.0)
         f = fresnel_dielectric(cosine, world.surfaces[v.surface].ior)
-        through += pane_transmittance(f, v.look.albedo) * (v.opacity * v.clear)
+        through += pane_transmittance(f, v.material.albedo) * (v.opacity * v.clear)
     return through
 
 
 @wp.func
 def is_clear_pane(world: World, surface: int):
-    """Whether what a surface lets through goes straight on."""
+    """Whether a surface transmits light without scattering or refracting it."""
     smooth = world.surfaces[surface].roughness < CLEAR_ROUGHNESS
     return world.surfaces[surface].thin != 0 and smooth
 
 
 @wp.func
-def lets_straight(world: World, surface: int):
-    """Whether light may pass a surface unbent."""
+def may_pass_straight(world: World, surface: int):
+    """Whether light may pass a surface in a straight line."""
     pane = world.surfaces[surface].transmission > 0.0 and is_clear_pane(world, surface)
     return pane or world.surfaces[surface].opacity < 1.0
 
 
 @wp.func
-def light_through(world: World, o: wp.vec3, d: wp.vec3, distance_m: float, clear: int):
-    """What is left of light from a distance."""
+def transmittance(world: World, o: wp.vec3, d: wp.vec3, distance_m: float, clear: int):
+    """Transmittance of a segment, 0 if it is blocked."""
     through = wp.vec3(1.0, 1.0, 1.0)
     if clear != 0:
-        through = light_through_panes(world, o, d, distance_m)
+        through = pane_chain_transmittance(world, o, d, distance_m)
     elif is_intersected(world, path_along(o, d * distance_m), HOLES):
         through = wp.vec3(0.0)
     return through
 
 
 @wp.func(**OUT_OF_LINE)
-def light_through_panes(world: World, o: wp.vec3, d: wp.vec3, distance_m: float):
-    """What is left of light where some surfaces let it through."""
+def pane_chain_transmittance(world: World, o: wp.vec3, d: wp.vec3, distance_m: float):
+    """Transmittance of a segment that may pass several clear surfaces."""
     through = wp.vec3(1.0, 1.0, 1.0)
     origin = o
     rest_m = distance_m
     passages = int(0)
     going = bool(True)
     while going:
+        # March from surface to surface until the light or an opaque surface is reached.
         hit = closest_hit(world, origin, d, rest_m, HOLES)
         going = False
         if hit.at[0] >= 0:
             leaves = wp.vec3(0.0)
-            if lets_straight(world, surface_index(world, hit.at)):
+            if may_pass_straight(world, surface_index(world, hit.at)):
                 v = make_vertex(world, hit, d, 0.0)
-                leaves = pane_leaves(world, v, d)
+                leaves = straight_transmittance(world, v, d)
                 origin = offset_origin(v.p, -v.flat)
             through = wp.cw_mul(through, leaves)
             passages += 1
@@ -318,22 +324,24 @@ def light_through_panes(world: World, o: wp.vec3, d: wp.vec3, distance_m: float)
 
 
 @wp.func
-def lamps_met(world: World, budget: Budget, a: Anchor, d: wp.vec3, end_m: float):
-    """Light of the lamps that a stretch of a ray meets, up to a distance from its anchor.
+def hit_lamp_light(world: World, budget: Budget, a: Anchor, d: wp.vec3, end_m: float):
+    """MIS-weighted light of the lamps on a ray's segment that ends at ``end_m`` from the anchor.
 
-    Also 1 where the body at its end shows one of them: that body's own light is the lamp's.
+    Also 1 if a lamp is shown by the body at the segment's end, whose emission is then the lamp's
+    own.
     """
     light = wp.vec3(0.0)
     shown = int(0)
     for j in range(world.lamps.shape[0]):
-        g = meet_lamp(world.lamps[j], a.p, d)
+        g = intersect_lamp(world.lamps[j], a.p, d)
+        # Straight passages split the ray: each lamp counts in one segment only.
         if g.distance_m > a.way_m and g.distance_m < end_m:
             part = float(1.0)
             if a.density >= 0.0 and budget.lights != 2:
-                # Density of the other technique: source by its share of all weights, then
-                # direction.
+                # Density of the other technique: the source's share of all weights, times its
+                # density.
                 asked = g.density * lamp_weight(world.lamps[j], a.p, a.n) / wp.max(a.total, 1.0e-20)
-                # Where only the asking is on trial (1), what is met counts for nothing.
+                # If only source sampling is under test (1), hits count for nothing.
                 part = power_heuristic(a.density, asked) * float(budget.lights >> 1)
             light += g.radiance * part
             shown = wp.max(shown, world.lamps[j].shown)
@@ -341,8 +349,8 @@ def lamps_met(world: World, budget: Budget, a: Anchor, d: wp.vec3, end_m: float)
 
 
 @wp.func
-def sky_met(world: World, table: SkyTable, budget: Budget, a: Anchor, d: wp.vec3):
-    """Light of the sky that a ray meets."""
+def hit_sky_light(world: World, table: SkyTable, budget: Budget, a: Anchor, d: wp.vec3):
+    """MIS-weighted light of the environment that a ray hits."""
     light = wp.vec3(0.0)
     if world.sky.luminance > 0.0:
         place = sky_place(world.sky, d)
@@ -356,13 +364,13 @@ def sky_met(world: World, table: SkyTable, budget: Budget, a: Anchor, d: wp.vec3
 
 
 @wp.func
-def to_frame(v: wp.vec3, x: wp.vec3, y: wp.vec3, n: wp.vec3):
-    """World to the shading frame."""
+def to_shading_frame(v: wp.vec3, x: wp.vec3, y: wp.vec3, n: wp.vec3):
+    """World vector in the shading frame."""
     return wp.vec3(wp.dot(x, v), wp.dot(y, v), wp.dot(n, v))
 
 
 @wp.func
-def light_asked(
+def sample_source(
     world: World,
     table: SkyTable,
     budget: Budget,
@@ -374,7 +382,7 @@ def light_asked(
     choice: SourceChoice,
     u: wp.vec2,
 ):
-    """Light of one source that a vertex sends on; x, y complete its shading frame."""
+    """Reflected light of one sampled source; x, y complete the vertex's shading frame."""
     light = wp.vec3(0.0)
     g = LightSample()
     if choice.source == SKY:
@@ -383,30 +391,31 @@ def light_asked(
         g = draw_panel(world.lamps[choice.source], o, u)
     else:
         g = draw_ball(world.lamps[choice.source], o, u)
-    l = to_frame(g.direction, x, y, v.look.normal)  # noqa: E741
-    # Above both horizons: light must not leak through a face by its shading normal.
+    l = to_shading_frame(g.direction, x, y, v.material.normal)  # noqa: E741
+    # Above both horizons: light must not leak through a face because of its shading normal.
     if g.distance_m > 0.0 and l[2] > 0.0 and wp.dot(g.direction, v.flat) > 0.0:
         f, density = evaluate(s, l)
         asked = g.density * choice.part
         f = wp.cw_mul(f, g.radiance)
         if asked > 0.0 and wp.max(f) > 0.0:
             part = float(1.0)
-            # Alone, the technique has all the light and needs no weight.
+            # As the only technique it carries all light and needs no weight.
             if budget.lights == 3:
                 part = power_heuristic(asked, density)
-            through = light_through(world, o, g.direction, g.distance_m, budget.clear)
+            # The shadow ray comes last: it is the most expensive part.
+            through = transmittance(world, o, g.direction, g.distance_m, budget.clear)
             light = wp.cw_mul(f, through) * (part / asked)
     return light
 
 
 @wp.struct
-class Dealt:
-    """What a vertex is, after the lot.
+class ChosenLobe:
+    """The BSDF lobe of a vertex, after random selection.
 
     Attributes:
         kind: One of OPAQUE, STRAIGHT, SOLID and ROUGH_PANE.
-        bsdf: What reflects.
-        weight: What is left of light that passes, over the probability of that.
+        bsdf: BSDF of the reflected part.
+        weight: Transmittance over the probability of transmission.
     """
 
     kind: int
@@ -421,37 +430,40 @@ ROUGH_PANE = wp.constant(3)
 
 
 @wp.func
-def lot_between(reflected: float, passed: float):
-    """Probability of reflection, not too far from what it brings."""
+def reflection_probability(reflected: float, passed: float):
+    """Probability of choosing reflection, in proportion to luminance but bounded."""
     p = reflected / wp.max(reflected + passed, 1.0e-9)
     if passed > 0.0:
-        p = wp.clamp(p, LOT_FLOOR, 1.0 - LOT_FLOOR)
+        p = wp.clamp(p, PROBABILITY_FLOOR, 1.0 - PROBABILITY_FLOOR)
     return p
 
 
 @wp.func(**OUT_OF_LINE)
-def deal_glass(world: World, v: Vertex, w: wp.vec3, lot: float):
-    """Glass; of panes, whether they reflect or let pass. ``w`` is to where the path comes from."""
-    out = Dealt()
-    tint = v.look.albedo
-    alpha = roughness_to_alpha(v.look.roughness)
+def choose_glass_lobe(world: World, v: Vertex, w: wp.vec3, xi: float):
+    """Glass; for panes, choose between reflection and transmission.
+
+    ``w`` points to where the path comes from.
+    """
+    out = ChosenLobe()
+    tint = v.material.albedo
+    alpha = roughness_to_alpha(v.material.roughness)
     ior = world.surfaces[v.surface].ior
     if world.surfaces[v.surface].thin != 0:
         f = fresnel_dielectric(w[2], ior)
         back = pane_reflectance(f, tint)
         on = pane_transmittance(f, tint)
-        p = lot_between(luminance(back), luminance(on))
+        p = reflection_probability(luminance(back), luminance(on))
         out.bsdf = make_interface(w, alpha, 0.0)
         out.bsdf.f0 = wp.vec3(1.0, 1.0, 1.0)
         out.bsdf.f90 = 1.0
-        # Over the probability of the lot, so that the mean over lots is right.
+        # Divided by the probability of the choice: the estimate stays unbiased.
         out.weight = on * (1.0 / (1.0 - p))
-        # All that rough facets hide is scattered on.
+        # Multiple scattering returns what rough facets mask.
         part = directional_albedo(world.lobes, wp.sqrt(alpha), w[2])
-        # A pane of F0 1 would lose what single scattering loses: it is given back.
+        # At F0 1 single scattering would lose energy: it is restored.
         boost = 1.0 / (part[0] + part[1])
         out.bsdf.scale = back * (boost / p)
-        if lot < p:
+        if xi < p:
             out.kind = OPAQUE
         elif is_clear_pane(world, v.surface):
             out.kind = STRAIGHT
@@ -460,35 +472,39 @@ def deal_glass(world: World, v: Vertex, w: wp.vec3, lot: float):
             out.bsdf.scale = wp.vec3(boost, boost, boost)
     else:
         out.bsdf = make_interface(w, alpha, wp.where(v.outside, ior, 1.0 / ior))
-        # One half of the tint on the way in, the other on the way out.
+        # Half of the tint on entry, the other half on exit.
         out.weight = wp.vec3(wp.sqrt(tint[0]), wp.sqrt(tint[1]), wp.sqrt(tint[2]))
         out.kind = SOLID
     return out
 
 
 @wp.func
-def deal(world: World, v: Vertex, w: wp.vec3, key: wp.uint32, pair: int, sample: wp.uint32):
-    """What a vertex is; ``w`` points to where the path comes from, in the shading frame."""
-    out = Dealt()
-    lot = float(0.0)
+def choose_lobe(world: World, v: Vertex, w: wp.vec3, key: wp.uint32, pair: int, sample: wp.uint32):
+    """Choose the lobe of a vertex at random.
+
+    ``w`` points to where the path comes from, in the shading frame.
+    """
+    out = ChosenLobe()
+    xi = float(0.0)
     if v.opacity < 1.0 or v.clear > 0.0:
-        lot = random_pair(key, pair, sample)[0]
+        xi = random_pair(key, pair, sample)[0]
     if v.opacity < 1.0:
-        if lot >= v.opacity:
+        if xi >= v.opacity:
             out.kind = STRAIGHT
             out.weight = wp.vec3(1.0, 1.0, 1.0)
             return out
-        # What is left of a lot below a bound is a fresh one on [0, 1): no second draw is due.
-        lot = lot / v.opacity
-    if lot < v.clear:
-        return deal_glass(world, v, w, lot / v.clear)
+        # Rescaled below its bound, a random number is uniform on [0, 1) again: no second draw is
+        # needed.
+        xi = xi / v.opacity
+    if xi < v.clear:
+        return choose_glass_lobe(world, v, w, xi / v.clear)
     out.bsdf = make_bsdf(
         world.lobes,
         w,
-        v.look.albedo,
-        v.look.roughness,
-        v.look.metallic,
-        v.look.specular,
+        v.material.albedo,
+        v.material.roughness,
+        v.material.metallic,
+        v.material.specular,
         v.film,
         v.film_f0,
         v.film_roughness,
@@ -498,14 +514,14 @@ def deal(world: World, v: Vertex, w: wp.vec3, key: wp.uint32, pair: int, sample:
 
 @wp.struct
 class Step:
-    """How a path goes on from a vertex.
+    """Continuation of a path at a vertex.
 
     Attributes:
-        light: That the vertex sends back from the source it has asked.
-        weight: Of what the new direction brings.
-        straight: Whether nothing has happened.
+        light: Reflected light of the sampled source.
+        weight: Weight of the radiance from the new direction.
+        straight: Whether the path passes without scattering.
         o, d: The next ray, if ``weight`` is not 0.
-        density, total: As of an Anchor.
+        density, total: As for Anchor.
     """
 
     light: wp.vec3
@@ -518,7 +534,7 @@ class Step:
 
 
 @wp.func
-def step_from(
+def scatter_path(
     world: World,
     table: SkyTable,
     budget: Budget,
@@ -528,18 +544,18 @@ def step_from(
     pair: int,
     sample: wp.uint32,
 ):
-    """Light that a vertex sends back at once, and where the path goes on.
+    """Sample a light source and the next direction at a vertex.
 
     Args:
-        d: Direction in which the path has come.
-        key, pair, sample: Of the first of its PAIRS pairs of numbers.
+        d: Direction of the arriving path.
+        key, pair, sample: Identify the first of its PAIRS pairs of random numbers.
     """
-    n = v.look.normal
+    n = v.material.normal
     x, y = make_frame(n)
-    w = to_frame(-d, x, y, n)
-    # Bumps may turn a normal away from where the path comes from; the model needs Z > 0.
+    w = to_shading_frame(-d, x, y, n)
+    # Bumps may turn the normal away from the path; the BSDF needs Z > 0.
     w = wp.vec3(w[0], w[1], wp.max(w[2], 1.0e-3))
-    dealt = deal(world, v, w, key, pair, sample)
+    dealt = choose_lobe(world, v, w, key, pair, sample)
     step = Step()
     step.density = -1.0
     step.straight = dealt.kind == STRAIGHT
@@ -556,7 +572,7 @@ def step_from(
     else:
         sent = scatter(dealt.bsdf, choices[0], u)
     if dealt.kind == ROUGH_PANE:
-        # A rough pane scatters on as it would reflect, mirrored in its plane.
+        # A rough pane transmits like it reflects, mirrored at its plane.
         sent.l = wp.vec3(sent.l[0], sent.l[1], -sent.l[2])
         sent.density = -1.0
     step.weight = sent.weight
@@ -565,25 +581,25 @@ def step_from(
         side = -v.flat
         step.weight = wp.cw_mul(sent.weight, dealt.weight)
     o = offset_origin(v.p, v.flat)
-    # Inside glass nothing is asked: what is outside is seen by going there.
+    # No source is sampled inside glass: refracted paths have to find the outside themselves.
     if dealt.kind == OPAQUE or (dealt.kind == SOLID and v.outside):
         choice = choose_source(world, table, o, n, choices[1])
         step.density = sent.density
         step.total = choice.total
         if choice.part > 0.0 and budget.lights != 2:
             u = random_pair(key, pair + 3, sample)
-            step.light = light_asked(world, table, budget, dealt.bsdf, v, o, x, y, choice, u)
+            step.light = sample_source(world, table, budget, dealt.bsdf, v, o, x, y, choice, u)
     step.o = offset_origin(v.p, side)
     step.d = x * sent.l[0] + y * sent.l[1] + n * sent.l[2]
-    # A shading normal has sent it into the face: that light is lost, as in a groove.
+    # The shading normal has sent it into the face: that light is lost, as in a groove.
     if wp.dot(step.d, side) <= 0.0:
         step.weight = wp.vec3(0.0)
     return step
 
 
 @wp.func
-def anchor_of(step: Step, n: wp.vec3):
-    """The anchor that a vertex with a normal becomes, where a path has just left it."""
+def make_anchor(step: Step, n: wp.vec3):
+    """The anchor of a path that has just left a vertex with the given normal."""
     a = Anchor()
     a.p = step.o
     a.n = n
@@ -593,7 +609,7 @@ def anchor_of(step: Step, n: wp.vec3):
 
 
 @wp.func
-def path_light(
+def trace_path(
     view: View,
     world: World,
     table: SkyTable,
@@ -610,39 +626,40 @@ def path_light(
     a = Anchor()
     a.p = view.eye_m
     a.density = -1.0
-    # Where the rasterised image begins: both tiers show the same.
+    # Same near plane as the rasteriser: both tiers show the same surfaces.
     a.way_m = Z_NEAR_M * length
     o = view.eye_m + d * a.way_m
-    # Samples share the pixel: each stands for a part of it.
+    # Texture footprints: each sample covers its share of the pixel.
     cone = pixel_width(view, i, 1.0) / (length * wp.sqrt(float(budget.whole)))
     width_m = float(0.0)
     light = wp.vec3(0.0)
     through = wp.vec3(1.0, 1.0, 1.0)
-    worth = float(0.0)
+    survival = float(0.0)
     bounces = int(0)
     passages = int(0)
     going = bool(True)
     while going:
         going = False
         hit = closest_hit(world, o, d, AT_INFINITY, HOLES)
-        # Farther than suns, which are at infinity and would else lie behind the end.
+        # Beyond suns, which are at AT_INFINITY and would otherwise lie behind the segment's end.
         end_m = a.way_m + wp.where(hit.at[0] < 0, 2.0 * AT_INFINITY, hit.t)
         shown = int(0)
-        # Cameras do not see lamps without a body, as in the other tier.
+        # Cameras do not show lamps without a body, as in the realtime tier.
         if bounces > 0:
-            met, shown = lamps_met(world, budget, a, d, end_m)
+            met, shown = hit_lamp_light(world, budget, a, d, end_m)
             light += wp.cw_mul(through, met)
         if hit.at[0] < 0:
             if bounces > 0 or world.sky.visible != 0:
-                light += wp.cw_mul(through, sky_met(world, table, budget, a, d))
+                light += wp.cw_mul(through, hit_sky_light(world, table, budget, a, d))
         else:
             width_m += cone * hit.t
             v = make_vertex(world, hit, d, width_m)
             if shown == 0:
                 light += wp.cw_mul(through, v.glow)
             if bounces < budget.bounces and passages < PASSAGES_MAX:
+                # Pair 0 is the position in the pixel; every segment has its own dimensions.
                 pair = 1 + PAIRS * (bounces + passages)
-                step = step_from(world, table, budget, v, d, key, pair, sample)
+                step = scatter_path(world, table, budget, v, d, key, pair, sample)
                 light += wp.cw_mul(through, step.light)
                 through = wp.cw_mul(through, step.weight)
                 going = wp.max(through) > 0.0
@@ -653,18 +670,19 @@ def path_light(
                     a.way_m = end_m
                 else:
                     bounces += 1
-                    a = anchor_of(step, v.look.normal)
+                    a = make_anchor(step, v.material.normal)
                     if a.density > 0.0:
-                        # A direction stands for those around it that are not drawn.
+                        # Footprint by density: a sampled direction represents its neighbourhood.
                         spread = wp.sqrt(1.0 / (a.density * float(budget.whole)))
                         cone = wp.max(cone, wp.min(spread, 0.5))
-                    # Relative to the first surface: dark ones are followed as far as bright ones.
-                    worth = wp.where(bounces == 1, WORTH * wp.max(through), worth)
-                    keep = wp.max(through) / wp.max(worth, 1.0e-20)
+                    # Relative to the first surface: paths from dark ones are followed as far as
+                    # from bright ones.
+                    survival = wp.where(bounces == 1, SURVIVAL_SHARE * wp.max(through), survival)
+                    keep = wp.max(through) / wp.max(survival, 1.0e-20)
                     if going and keep < 1.0:
                         going = random_number(key, pair, sample) < keep
-                        # Survivors stand for those that have died (Russian roulette): the mean
-                        # stays.
+                        # Russian roulette: survivors carry the weight of terminated paths, which
+                        # keeps the mean.
                         through = through * (1.0 / keep)
     return light
 
@@ -681,8 +699,8 @@ def trace_paths(
     i = wp.tid()
     if not is_in_view(view, i):
         return
-    # Pixels whose places are too many for the sequence's numbers begin others.
-    place = place_on_curve(i % view.width, i / view.width)
+    # Morton numbers that exceed the sequence's 32 bits start another sequence.
+    place = morton_index(i % view.width, i / view.width)
     bits = wp.uint32(budget.sample_bits)
     key = budget.key
     if budget.sample_bits > 0:
@@ -690,7 +708,7 @@ def trace_paths(
     first = (place << bits) + wp.uint32(budget.first)
     total = wp.vec3(0.0)
     for k in range(budget.samples):
-        total += path_light(view, world, table, budget, i, key, first + wp.uint32(k))
+        total += trace_path(view, world, table, budget, i, key, first + wp.uint32(k))
     light[i] = light[i] + total
 
 

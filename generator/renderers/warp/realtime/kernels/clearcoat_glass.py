@@ -1,19 +1,19 @@
-"""Surfaces with more to them than colour, roughness and bumps: coats, glass, mirrors, more maps.
+"""Layered surfaces of the realtime tier: clear coats, glass, mirrors and further maps.
 
-Only pixels that see such a surface come here, and only scenes that have one load this module. A
+Only pixels that show such a surface are shaded here, and only scenes with one load this module. A
 pixel's own light is computed as in
-gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting; up to three rays add what it
-mirrors and what is behind it.
+gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting; up to three rays add
+reflections and what lies behind.
 
-* A **clear coat** is a second GGX layer of reflectance 0.04; what it reflects is taken from all
-  that is below (KHR_materials_clearcoat; Filament, "Physically based rendering", 4.9). It lies
-  smoothly over the bumps of the base.
-* **Glass** reflects as Fresnel says. A thin pane passes the rest straight on, all reflections
-  between its faces summed, and tints it once; a solid refracts, and its surface tints what enters
-  by the square root of its colour and what leaves by as much.
-* **Mirrors**, that is metals, coats and glass of a roughness below MIRROR_ROUGHNESS, show what is
-  around them by one ray, shaded where it ends with lamps, their shadows and the environment; what
-  that surface mirrors is the environment. Rougher ones show the environment alone.
+* A **clear coat** is a second GGX layer of reflectance 0.04; what it reflects is subtracted from
+  all layers below (KHR_materials_clearcoat; Filament, "Physically based rendering", 4.9). It is
+  smooth over the bumps of the base.
+* **Glass** reflects by Fresnel's equations. A thin pane transmits the rest without bending it, all
+  inter-reflections summed, and tints it once; a solid refracts, and its surface tints what enters
+  and what leaves by the square root of its colour.
+* **Mirrors**, that is metals, coats and glass of a roughness below MIRROR_ROUGHNESS, reflect the
+  scene by one ray, shaded at its end with lamps, their shadows and the environment; reflections in
+  that surface show the environment. Rougher ones reflect the environment alone.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import ray_origi
 from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import (
     GBufferRecord,
     light_at,
-    open_lobe,
     sky_exposure_at,
+    specular_occlusion,
     sum_lamp_light,
     visible_lamp_fraction,
     visible_sky_fraction,
@@ -64,10 +64,10 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     fast_normalize,
     first_weight,
     flat_normal,
+    is_back_face,
     normal_at,
     pixel_direction,
     pixel_width,
-    seen_inside,
     surface_index,
     vertex_at,
 )
@@ -84,24 +84,25 @@ from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import (
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 1})
 
-# Ambient occlusion is looked at only where more than this share of its light is seen.
+# Ambient occlusion is traced only where a ray's end contributes more than this share of the pixel.
 AMBIENT_SHARE = wp.constant(0.2)
+# Surfaces clearer than this show little but highlights: their shadows are not traced.
 MOSTLY_CLEAR = wp.constant(0.9)
-# Neighbours on a layered surface that differ more than this are looked at more closely.
+# Neighbours on a layered surface with more contrast than this are supersampled.
 CONTRAST = wp.constant(0.15)
-# Clear surfaces that a ray passes one after the other.
+# Limit on the clear surfaces along one ray.
 SURFACES_MAX = wp.constant(8)
 
 
 @wp.struct
 class Probe:
-    """How surfaces that rays meet are lit.
+    """Samples that light the ends of rays.
 
     Attributes:
-        parts: Points of the unit disc at which rays to lamps aim.
-        disc: Points of the unit disc under those of the hemisphere at which other rays aim.
-        radius_m: Of ambient occlusion.
-        lit: Scratch: visible part of each lamp where the ray of a pixel ends [lamp, pixel].
+        parts: Points of the unit disk at which shadow rays aim.
+        disc: Points of the unit disk, lifted to the hemisphere for ambient occlusion.
+        radius_m: Radius of ambient occlusion.
+        lit: Scratch: visible fraction of each lamp at the end of a pixel's ray [lamp, pixel].
     """
 
     parts: wp.array(dtype=wp.vec2)
@@ -112,12 +113,12 @@ class Probe:
 
 @wp.struct
 class Maps:
-    """What further maps of a texture say at a point.
+    """Values of a texture's further maps at a point.
 
     Attributes:
-        metallic: Factor.
-        occlusion: Share of ambient light that arrives.
-        glow: Factor on emission.
+        metallic: Factor on metallic.
+        occlusion: Factor on ambient light.
+        glow: Factor on emission, linear RGB.
     """
 
     metallic: float
@@ -127,7 +128,7 @@ class Maps:
 
 @wp.func
 def texels_per_m2(world: World, surface: int, hit: wp.vec2i):
-    """Texels of the finest level per area of a face."""
+    """Texels of the finest level per area of a face [1/m^2]."""
     texture = world.surfaces[surface].texture
     size = float(world.textures[texture].width * world.textures[texture].height)
     scale_m = world.surfaces[surface].texture_scale_m
@@ -143,6 +144,7 @@ def texels_per_m2(world: World, surface: int, hit: wp.vec2i):
     p = vertex_at(world, g, corner[0])
     e1 = (vertex_at(world, g, corner[1]) - p) * world.bodies[b].scale
     e2 = (vertex_at(world, g, corner[2]) - p) * world.bodies[b].scale
+    # Twice the face's area, as the UV determinant below is twice its area: the factors cancel.
     area_m2 = wp.max(wp.length(wp.cross(e1, e2)), 1.0e-12)
     return wp.abs(d1[0] * d2[1] - d1[1] * d2[0]) * size / area_m2
 
@@ -151,13 +153,13 @@ def texels_per_m2(world: World, surface: int, hit: wp.vec2i):
 def texture_mix(
     texels: wp.array(dtype=wp.uint32), first: int, width: int, height: int, uv: wp.vec2
 ):
-    """Four channels of one level at a point, [0, 1]."""
+    """Four channels of one mip level at a point, [0, 1]."""
     return mix_texels(texels, taps_at(first, width, height, uv[0], uv[1])) * (1.0 / FULL)
 
 
 @wp.func
 def maps_at(world: World, surface: int, hit: wp.vec2i, weight: wp.vec2, footprint_m: float):
-    """The further maps of a surface at a point seen that wide."""
+    """The further maps of a surface at a point, averaged over a footprint."""
     maps = Maps()
     maps.metallic = 1.0
     maps.occlusion = 1.0
@@ -170,7 +172,7 @@ def maps_at(world: World, surface: int, hit: wp.vec2i, weight: wp.vec2, footprin
             uv = uv_at(world, surface, hit[0], hit[1], weights)
             texels = texels_per_m2(world, surface, hit) * footprint_m * footprint_m
             s = make_sampler(world, t, 0.5 * wp.log2(wp.max(texels, 1.0e-6)))
-            # The coarser of two levels alone where both would be mixed: these maps are smooth.
+            # One level without blending: these maps are smooth.
             if world.textures[t].has_shares != 0:
                 c = texture_mix(world.textures[t].shares, s.first, s.width, s.height, uv)
                 maps.metallic = c[0]
@@ -182,14 +184,14 @@ def maps_at(world: World, surface: int, hit: wp.vec2i, weight: wp.vec2, footprin
 
 
 @wp.struct
-class Meeting:
-    """Where a ray meets a surface; ``hit`` is (-1, -1) where it meets none.
+class SurfaceHit:
+    """Intersection of a ray with a surface; ``hit`` is (-1, -1) for a miss.
 
     Attributes:
         t: Parameter along the ray.
-        weight: Barycentric, as surface.resolve stores them.
-        normal: Smooth, unit, turned against the ray.
-        entering: 1 where it comes from outside.
+        weight: Barycentric weights, as label_resolve.resolve stores them.
+        normal: Smooth unit normal, facing against the ray.
+        entering: 1 if the ray comes from outside.
     """
 
     hit: wp.vec2i
@@ -200,10 +202,10 @@ class Meeting:
 
 
 @wp.func(**OUT_OF_LINE)
-def met(world: World, origin: wp.vec3, d: wp.vec3):
+def trace_surface(world: World, origin: wp.vec3, d: wp.vec3):
     """The first surface along a ray."""
     first = closest_hit(world, origin, d, FARTHEST, HOLES)
-    m = Meeting()
+    m = SurfaceHit()
     m.hit = first.at
     m.t = first.t
     if m.hit[0] >= 0:
@@ -216,13 +218,14 @@ def met(world: World, origin: wp.vec3, d: wp.vec3):
         n += normal_at(world, g, corner[2]) * w
         side = wp.where(m.entering != 0, 1.0, -1.0)
         m.normal = face_viewer(world.bodies[m.hit[0]].R_world_mesh @ n * side, d)
+        # Adds 2 to the weight where the back of the face is hit, as records.is_back_face expects.
         m.weight = wp.vec2(v + 1.0 - side, w)
     return m
 
 
 @wp.func
 def curvature(world: World, hit: wp.vec2i):
-    """Mean curvature of a face's normals along its edges [1/m]; positive where convex.
+    """Mean curvature of a face from its vertex normals [1/m]; positive where convex.
 
     Source: Akenine-Moeller et al., "Improved shader and texture level of detail using ray cones",
     JCGT 2021, equation 9.
@@ -240,13 +243,14 @@ def curvature(world: World, hit: wp.vec2i):
 
 
 @wp.func
-def above(r: wp.vec3, n: wp.vec3):
-    """A direction lifted over a surface that bumps have turned it into."""
+def lift_over_horizon(r: wp.vec3, n: wp.vec3):
+    """Lift a reflected direction that bumps have turned below the surface."""
+    # At least about one degree above the horizon, so that the ray leaves the surface.
     return fast_normalize(r + n * wp.max(0.02 - wp.dot(r, n), 0.0))
 
 
 @wp.func(**OUT_OF_LINE)
-def looked_at(
+def evaluate_with_maps(
     world: World,
     surface: int,
     hit: wp.vec2i,
@@ -255,20 +259,20 @@ def looked_at(
     width_m: float,
     v: wp.vec3,
 ):
-    """A surface with all its maps, and the further ones by themselves."""
-    look = evaluate_material(world, surface, hit, weight, n, width_m, v)
+    """Material of a surface with all its maps, and the further maps themselves."""
+    material = evaluate_material(world, surface, hit, weight, n, width_m, v)
     slant = wp.sqrt(wp.max(wp.dot(n, v), 0.05))
     maps = maps_at(world, surface, hit, weight, width_m / slant)
-    look.metallic *= maps.metallic
-    return look, maps
+    material.metallic *= maps.metallic
+    return material, maps
 
 
 @wp.func(**OUT_OF_LINE)
-def light_of_meeting(
+def light_at_hit(
     world: World,
     probe: Probe,
-    m: Meeting,
-    look: SurfaceMaterial,
+    m: SurfaceHit,
+    material: SurfaceMaterial,
     occlusion: float,
     p: wp.vec3,
     d: wp.vec3,
@@ -276,14 +280,15 @@ def light_of_meeting(
     clear: float,
     k: int,
 ):
-    """Light of a surface that a ray has met, towards where it came from.
+    """Light of the surface at the end of a ray, towards the ray's origin [cd/m^2].
 
     Args:
-        share: Of that light in the pixel.
-        clear: Share of it that only glitters: nobody sees whether that is shaded.
+        share: Largest weight of that light in the pixel.
+        clear: Share of clear glass, whose highlights need no shadows.
     """
     origin = ray_origin(world, m.hit, m.weight, p, d)
     for j in range(world.lamps.shape[0]):
+        # Scratch memory holds values of earlier rays: set every lamp.
         probe.lit[j, k] = 1.0
         if clear < MOSTLY_CLEAR:
             probe.lit[j, k] = visible_lamp_fraction(
@@ -293,18 +298,18 @@ def light_of_meeting(
     if share > AMBIENT_SHARE and clear < MOSTLY_CLEAR:
         open_sky *= visible_sky_fraction(world, origin, m.normal, probe.disc, probe.radius_m)
     surface = surface_index(world, m.hit)
-    return light_at(world, surface, look, p, -d, probe.lit, open_sky, k)
+    return light_at(world, surface, material, p, -d, probe.lit, open_sky, k)
 
 
 @wp.struct
 class Ray:
-    """A ray that leaves a surface.
+    """A secondary ray that leaves a layered surface.
 
     Attributes:
-        share: Of its light, in that of the pixel.
-        roughness: Of what mirrors it: how blurred the sky is that it meets.
-        spread: Angle that it covers; ``width_m`` where it begins.
-        mirrored: 1 where it is reflected: it sees the sky even if pixels do not.
+        share: Weight of its radiance in the pixel.
+        roughness: Roughness of the reflecting layer, by which the sky is blurred.
+        spread: Opening angle of its cone [rad]; ``width_m`` is the cone's width at its origin.
+        mirrored: 1 for reflections, which show the sky even where pixels do not.
     """
 
     origin: wp.vec3
@@ -318,10 +323,11 @@ class Ray:
 
 @wp.func
 def sky_along(world: World, ray: Ray):
-    """What a ray sees that meets nothing."""
+    """Radiance of the sky along a ray that hits nothing."""
     c = wp.vec3(0.0)
     if ray.mirrored != 0:
-        # With the parts for which lamps stand, in their own shapes.
+        # Prefiltered maps lack the parts that lamps represent; the difference adds them in their
+        # own shape.
         c = sky_reflection(world.sky, ray.d, ray.roughness)
         c += sky_image(world.sky, ray.d) - sky_rest(world.sky, ray.d)
     elif world.sky.visible != 0:
@@ -330,19 +336,19 @@ def sky_along(world: World, ray: Ray):
 
 
 @wp.func
-def root_of(color: wp.vec3):
+def sqrt_color(color: wp.vec3):
     """The square root of a colour, channel by channel."""
     return wp.vec3(wp.sqrt(color[0]), wp.sqrt(color[1]), wp.sqrt(color[2]))
 
 
 @wp.func
-def gone_on(
-    world: World, ray: Ray, m: Meeting, look: SurfaceMaterial, clear: float, opacity: float
+def continue_ray(
+    world: World, ray: Ray, m: SurfaceHit, material: SurfaceMaterial, clear: float, opacity: float
 ):
-    """A ray behind a surface: its direction, and its share of what is there.
+    """The ray behind a surface, with its direction and weight.
 
     Args:
-        clear: Share of the light under the specular layer that goes through.
+        clear: Share of the light below the specular layer that is transmitted.
     """
     surface = surface_index(world, m.hit)
     c = wp.min(-wp.dot(ray.d, m.normal), 1.0)
@@ -352,17 +358,21 @@ def gone_on(
     if clear > 0.0:
         if world.surfaces[surface].thin != 0:
             f = fresnel_dielectric(c, ior)
-            passed = pane_transmittance(f, look.albedo)
+            passed = pane_transmittance(f, material.albedo)
             onward += wp.cw_mul(ray.share, passed) * (clear * opacity)
         else:
             eta = wp.where(m.entering != 0, ior, 1.0 / ior)
             way = refract(ray.d, m.normal, eta)
             f = fresnel_dielectric(c, eta)
-            onward += wp.cw_mul(ray.share, root_of(look.albedo)) * ((1.0 - f) * clear * opacity)
+            onward += wp.cw_mul(ray.share, sqrt_color(material.albedo)) * (
+                (1.0 - f) * clear * opacity
+            )
             side = wp.where(m.entering != 0, 1.0, -1.0)
+            # Refraction at a curved surface focuses or spreads the ray's cone (Akenine-Moeller et
+            # al. 2021).
             ray.spread -= (1.0 - 1.0 / eta) * side * curvature(world, m.hit) * ray.width_m
             if wp.dot(way, way) == 0.0:
-                # All is reflected back inside.
+                # Total internal reflection.
                 way = ray.d + m.normal * (2.0 * c)
                 onward = ray.share * (clear * opacity)
     ray.share = onward
@@ -371,43 +381,47 @@ def gone_on(
 
 
 @wp.func
-def seen_along(view: View, world: World, probe: Probe, ray: Ray, k: int):
-    """Radiance along a ray, behind clear surfaces too, times its share."""
+def radiance_along(view: View, world: World, probe: Probe, ray: Ray, k: int):
+    """Weighted radiance along a ray, including what lies behind clear surfaces."""
     total = wp.vec3(0.0)
     surfaces = int(0)
     going = bool(True)
     while going:
         going = False
-        m = met(world, ray.origin, ray.d)
+        m = trace_surface(world, ray.origin, ray.d)
         if m.hit[0] < 0:
             total += wp.cw_mul(ray.share, sky_along(world, ray))
         else:
             p = ray.origin + ray.d * m.t
+            # A cone that converges has a focus; behind it the width grows again.
             ray.width_m = wp.abs(ray.width_m + ray.spread * m.t)
             surface = surface_index(world, m.hit)
             v = -ray.d
             n = m.normal
-            look, maps = looked_at(world, surface, m.hit, m.weight, n, ray.width_m, v)
+            material, maps = evaluate_with_maps(world, surface, m.hit, m.weight, n, ray.width_m, v)
             if world.ground.covered != 0:
                 lifted = ray_origin(world, m.hit, m.weight, p, ray.d)
                 exposed = sky_exposure_at(world, lifted, n)
                 coat = coat_at(world, surface, p, n, exposed, ray.width_m)
-                look = apply_coat(world, surface, look, coat, n)
-            clear = world.surfaces[surface].transmission * (1.0 - look.metallic)
+                material = apply_coat(world, surface, material, coat, n)
+            clear = world.surfaces[surface].transmission * (1.0 - material.metallic)
             opacity = world.surfaces[surface].opacity
-            # From inside a solid nothing but what goes on is seen.
+            # Inside a solid only the transmitted ray counts: the back of its surface has no light
+            # of its own.
             if clear == 0.0 or m.entering != 0 or world.surfaces[surface].thin != 0:
                 share = wp.max(ray.share)
-                light = light_of_meeting(
-                    world, probe, m, look, maps.occlusion, p, ray.d, share, clear, k
+                light = light_at_hit(
+                    world, probe, m, material, maps.occlusion, p, ray.d, share, clear, k
                 )
-                own = wp.cw_mul(light.diffuse, look.albedo) * (1.0 - clear) + light.rest
+                own = wp.cw_mul(light.diffuse, material.albedo) * (1.0 - clear) + light.rest
                 own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow - wp.vec3(1.0))
                 total += wp.cw_mul(ray.share, own) * opacity
             if clear > 0.0 or opacity < 1.0:
-                ray = gone_on(world, ray, m, look, clear, opacity)
+                ray = continue_ray(world, ray, m, material, clear, opacity)
                 ray.origin = passed_origin(p, ray.d, view.eye_m)
                 surfaces += 1
+                # Weights below 0.2 % are invisible; the sky stands in for whatever the ray would
+                # still hit.
                 going = surfaces < SURFACES_MAX and wp.max(ray.share) > 0.002
                 if not going:
                     total += wp.cw_mul(ray.share, sky_along(world, ray))
@@ -416,13 +430,13 @@ def seen_along(view: View, world: World, probe: Probe, ray: Ray, k: int):
 
 @wp.struct
 class Layers:
-    """A layered surface at a pixel.
+    """Shaded layers of a surface at a pixel.
 
     Attributes:
-        own: Light that needs no ray [cd/m^2].
-        mirror, coat, behind: Shares of what the base and the coat mirror and of what is behind;
-            0 where no ray is needed.
-        straight: Share of what is behind it, unbent.
+        own: Light that needs no secondary ray [cd/m^2].
+        mirror, coat, behind: Weights of the rays that the base and the coat reflect, and of the
+            refracted ray; 0 if no ray is needed.
+        straight: Weight of the unrefracted background.
         n: Normal with bumps.
     """
 
@@ -436,10 +450,10 @@ class Layers:
 
 @wp.func
 def glass_shares(world: World, surface: int, albedo: wp.vec3, c: float):
-    """What glass mirrors and what it lets through, from outside; ``c`` is the cosine to it."""
+    """Reflectance and transmittance of glass from outside, at the cosine ``c`` of incidence."""
     f = fresnel_dielectric(c, world.surfaces[surface].ior)
     mirrored = wp.vec3(f)
-    passed = root_of(albedo) * (1.0 - f)
+    passed = sqrt_color(albedo) * (1.0 - f)
     if world.surfaces[surface].thin != 0:
         mirrored = pane_reflectance(f, albedo)
         passed = pane_transmittance(f, albedo)
@@ -447,7 +461,7 @@ def glass_shares(world: World, surface: int, albedo: wp.vec3, c: float):
 
 
 @wp.func
-def below_coat(
+def add_clearcoat(
     world: World,
     surface: int,
     layers: Layers,
@@ -459,7 +473,7 @@ def below_coat(
     open_sky: float,
     k: int,
 ):
-    """Layers under a clear coat of that weight, which takes what it reflects from all of them."""
+    """Add a clear coat of the given weight, which attenuates all layers below it."""
     c = wp.clamp(wp.dot(n, v), 0.0, 1.0)
     rough = world.surfaces[surface].coat_roughness
     lacquer = make_brdf(world.lobes, wp.vec3(0.0), rough, 0.0, 0.5, c)
@@ -470,10 +484,11 @@ def below_coat(
     layers.behind = layers.behind * (1.0 - share)
     if lacquer.roughness < MIRROR_ROUGHNESS:
         layers.coat = share
+        # The reflected ray will find these lamps itself: do not count them twice.
         layers.own -= lamps.shown * coat
     else:
         sky = sky_reflection(world.sky, n * (2.0 * c) - v, lacquer.roughness)
-        layers.own += sky * (share * open_lobe(lacquer, open_sky))
+        layers.own += sky * (share * specular_occlusion(lacquer, open_sky))
     return layers
 
 
@@ -481,7 +496,7 @@ def below_coat(
 def layers_at(
     world: World,
     surface: int,
-    look: SurfaceMaterial,
+    material: SurfaceMaterial,
     maps: Maps,
     bare: float,
     n: wp.vec3,
@@ -491,42 +506,47 @@ def layers_at(
     open_sky: float,
     k: int,
 ):
-    """A pixel's own light, and what share of it is to be found by rays.
+    """Split a pixel's light into its own part and the weights of secondary rays.
 
     Args:
-        bare: Part that no snow covers.
+        bare: Share that no snow covers.
         n: Normal without bumps.
     """
     layers = Layers()
-    layers.n = look.normal
-    n_v = wp.dot(look.normal, v)
-    clear = world.surfaces[surface].transmission * (1.0 - look.metallic) * bare
-    specular = look.specular
+    layers.n = material.normal
+    n_v = wp.dot(material.normal, v)
+    clear = world.surfaces[surface].transmission * (1.0 - material.metallic) * bare
+    specular = material.specular
     if clear > 0.0:
         ior = world.surfaces[surface].ior
+        # F0 of the refractive index, expressed as Burley's ``specular`` (0.08 at 1).
         normal = (ior - 1.0) / (ior + 1.0)
         specular = normal * normal / 0.08
-    brdf = make_brdf(world.lobes, look.albedo, look.roughness, look.metallic, specular, n_v)
+    brdf = make_brdf(
+        world.lobes, material.albedo, material.roughness, material.metallic, specular, n_v
+    )
     gloss = brdf.gloss
     if clear > 0.0:
         c = wp.clamp(wp.dot(n, v), 0.0, 1.0)
-        mirrored, passed = glass_shares(world, surface, look.albedo, c)
+        mirrored, passed = glass_shares(world, surface, material.albedo, c)
         gloss = gloss * (1.0 - clear) + mirrored * clear
         layers.behind = passed * clear
-    lamps = sum_lamp_light(world, brdf, look.normal, p, v, lit, k)
-    ambient = sky_irradiance(world.sky, look.normal) * open_sky
-    diffuse = wp.cw_mul(brdf.matte, look.albedo) * (1.0 - clear)
+    lamps = sum_lamp_light(world, brdf, material.normal, p, v, lit, k)
+    ambient = sky_irradiance(world.sky, material.normal) * open_sky
+    diffuse = wp.cw_mul(brdf.matte, material.albedo) * (1.0 - clear)
     layers.own = wp.cw_mul(diffuse, lamps.lux * (1.0 / wp.pi) + ambient) + lamps.shine
     layers.own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow)
-    if brdf.roughness < MIRROR_ROUGHNESS and (look.metallic >= 0.5 or clear > 0.0):
+    if brdf.roughness < MIRROR_ROUGHNESS and (material.metallic >= 0.5 or clear > 0.0):
         layers.mirror = gloss
+        # The reflected ray will find these lamps itself: do not count them twice.
         layers.own -= lamps.shown
     else:
-        sky = sky_reflection(world.sky, look.normal * (2.0 * n_v) - v, brdf.roughness)
-        layers.own += wp.cw_mul(gloss, sky) * open_lobe(brdf, open_sky)
+        # Rough layers reflect the prefiltered environment, dimmed by specular occlusion.
+        sky = sky_reflection(world.sky, material.normal * (2.0 * n_v) - v, brdf.roughness)
+        layers.own += wp.cw_mul(gloss, sky) * specular_occlusion(brdf, open_sky)
     coat = world.surfaces[surface].coat * bare
     if coat > 0.0:
-        layers = below_coat(world, surface, layers, coat, n, p, v, lit, open_sky, k)
+        layers = add_clearcoat(world, surface, layers, coat, n, p, v, lit, open_sky, k)
     opacity = 1.0 - (1.0 - world.surfaces[surface].opacity) * bare
     layers.own = layers.own * opacity
     layers.mirror = layers.mirror * opacity
@@ -537,7 +557,7 @@ def layers_at(
 
 
 @wp.func
-def ray_of(
+def make_layer_ray(
     view: View,
     world: World,
     layers: Layers,
@@ -549,9 +569,9 @@ def ray_of(
     way: wp.vec3,
     width_m: float,
 ):
-    """The ray of one part of a layered pixel: 0 base mirror, 1 coat, 2 bent behind, 3 straight.
+    """One secondary ray of a pixel: 0 base reflection, 1 coat, 2 refracted, 3 straight behind.
 
-    Its share is 0 where there is none.
+    Its weight is 0 where there is none.
     """
     ray = Ray()
     surface = surface_index(world, hit)
@@ -567,10 +587,12 @@ def ray_of(
             m = layers.n
             ray.share = layers.mirror
             ray.roughness = world.surfaces[surface].roughness
-        ray.d = above(d - m * (2.0 * wp.dot(m, d)), n)
+        ray.d = lift_over_horizon(d - m * (2.0 * wp.dot(m, d)), n)
         ray.origin = ray_origin(world, hit, weight, p, way)
         ray.mirrored = 1
-        side = wp.where(seen_inside(weight), -1.0, 1.0)
+        side = wp.where(is_back_face(weight), -1.0, 1.0)
+        # A convex mirror widens the ray's cone by twice the turn of its normal (Akenine-Moeller et
+        # al. 2021).
         ray.spread += 2.0 * side * curvature(world, hit) * width_m
     else:
         ray.share = wp.vec3(layers.straight)
@@ -580,14 +602,14 @@ def ray_of(
                 ray.share += wp.vec3(layers.straight)
             else:
                 ior = world.surfaces[surface].ior
-                eta = wp.where(seen_inside(weight), 1.0 / ior, ior)
+                eta = wp.where(is_back_face(weight), 1.0 / ior, ior)
                 bent = refract(d, layers.n, eta)
-                side = wp.where(seen_inside(weight), -1.0, 1.0)
+                side = wp.where(is_back_face(weight), -1.0, 1.0)
                 ray.spread -= (1.0 - 1.0 / eta) * side * curvature(world, hit) * width_m
                 if wp.dot(bent, bent) > 0.0:
                     ray.d = bent
         elif world.surfaces[surface].thin != 0:
-            # Part of the ray behind the pane.
+            # Already part of the refracted ray: a pane bends nothing.
             ray.share = wp.vec3(0.0)
         ray.origin = passed_origin(p, ray.d, view.eye_m)
     return ray
@@ -595,7 +617,7 @@ def ray_of(
 
 @wp.struct
 class Point:
-    """A point of a face at a point of the image; fields as surface.resolve makes them."""
+    """A point of a face at a point of the image; fields as label_resolve.resolve stores them."""
 
     way: wp.vec3
     weight: wp.vec2
@@ -604,11 +626,12 @@ class Point:
 
 @wp.func
 def point_at(view: View, world: World, hit: wp.vec2i, x_px: float, y_px: float):
-    """Where a ray through a point of the image meets the plane of a face."""
+    """Intersection of a pixel's ray with the plane of a face."""
     facet = make_facet(world, hit)
     d = pixel_direction(view, x_px, y_px)
     det = wp.dot(d, facet.across)
     inverse = 1.0 / wp.where(wp.abs(det) < 1.0e-30, 1.0e-30, det)
+    # Subpixel rays may miss the face: clamped to its edge, whose attributes are defined.
     u = wp.clamp(wp.dot(d, facet.along_u) * inverse, 0.0, 1.0)
     v = wp.clamp(wp.dot(d, facet.along_v) * inverse, 0.0, 1.0 - u)
     side = wp.where(det < 0.0, -1.0, 1.0)
@@ -620,7 +643,7 @@ def point_at(view: View, world: World, hit: wp.vec2i, x_px: float, y_px: float):
     return point
 
 
-# Two kernels call it: it is compiled once.
+# Two kernels call this function: compiled out of line, it exists once.
 @wp.func(**OUT_OF_LINE)
 def layered_radiance(
     view: View,
@@ -635,7 +658,7 @@ def layered_radiance(
     probe: Probe,
     k: int,
 ):
-    """Radiance of a layered surface that pixel i sees, at a point of the image in that pixel."""
+    """Radiance of the layered surface of pixel i, at a point of the image within that pixel."""
     hit = images.hits[i]
     surface = surface_index(world, hit)
     point = point_at(view, world, hit, x_px, y_px)
@@ -643,19 +666,19 @@ def layered_radiance(
     v = fast_normalize(-point.way)
     p = view.eye_m + point.way
     width_m = pixel_width(view, i, images.z_m[i])
-    look, maps = looked_at(world, surface, hit, point.weight, n, width_m, v)
+    material, maps = evaluate_with_maps(world, surface, hit, point.weight, n, width_m, v)
     bare = float(1.0)
     if world.ground.covered != 0:
         coat = coat_at(world, surface, p, n, exposed, footprint(view, p, n, 1.0))
-        look = apply_coat(world, surface, look, coat, n)
+        material = apply_coat(world, surface, material, coat, n)
         bare = 1.0 - wp.min(coat.snow, 1.0)
     sky = open_sky * maps.occlusion
-    layers = layers_at(world, surface, look, maps, bare, n, p, v, lit, sky, k)
+    layers = layers_at(world, surface, material, maps, bare, n, p, v, lit, sky, k)
     c = layers.own
     for part in range(4):
-        ray = ray_of(view, world, layers, part, hit, point.weight, n, p, point.way, width_m)
+        ray = make_layer_ray(view, world, layers, part, hit, point.weight, n, p, point.way, width_m)
         if wp.max(ray.share) > 0.0:
-            c += seen_along(view, world, probe, ray, k)
+            c += radiance_along(view, world, probe, ray, k)
     return c
 
 
@@ -671,9 +694,10 @@ def shade_layers(
     probe: Probe,
     radiance: wp.array(dtype=wp.vec3),
 ):
-    """Shade those of a list of pixels that see layered surfaces, each by itself."""
+    """Shade the listed pixels that show layered surfaces, each by itself."""
     k = wp.tid()
     i = pixels[k]
+    # lattice_lighting.shade_points has shaded all others.
     if world.surfaces[surface_index(world, images.hits[i])].layered != 0:
         x = float(i % view.width) + 0.5
         y = float(i / view.width) + 0.5
@@ -684,7 +708,7 @@ def shade_layers(
 
 @wp.func
 def contrast(a: wp.vec3, b: wp.vec3):
-    """How far two lights are apart, 0 to 1."""
+    """Michelson contrast of two colours' channel sums, 0 to 1."""
     light = a[1] + a[0] + a[2]
     other = b[1] + b[0] + b[2]
     return wp.abs(light - other) / wp.max(light + other, 1.0e-12)
@@ -700,7 +724,7 @@ def find_contrasts(
     count: wp.array(dtype=int),
     places: wp.array(dtype=int),
 ):
-    """List the places in a list of those layered pixels in which edges are seen.
+    """List the layered pixels among listed ones that show edges by reflection or refraction.
 
     Args:
         count: Length of the new list; 0 at first.
@@ -714,6 +738,7 @@ def find_contrasts(
     y = i / view.width
     largest = float(0.0)
     for side in range(4):
+        # Sides 0 to 3 are below, right, above and left.
         u = wp.clamp(x + (side & 1) * (1 - (side & 2)), 0, view.width - 1)
         v = wp.clamp(y + (1 - (side & 1)) * (1 - (side & 2)), 0, view.height - 1)
         j = v * view.width + u
@@ -738,7 +763,7 @@ def shade_contrasts(
     listed: wp.array(dtype=int),
     mixed: wp.array(dtype=wp.vec3),
 ):
-    """Radiance of pixels with contrasts: the mean over parts of each.
+    """Radiance of pixels with contrasts: the mean over several points of each.
 
     Args:
         offsets: Positions within a pixel, [0, 1).

@@ -1,7 +1,7 @@
-"""The lattice: every few pixels of every few rows, where light is gathered first.
+"""The lattice: a sparse grid of pixels at which light is computed first.
 
-Light changes slowly along a surface. Shadows, ambient occlusion and shading are computed on the
-lattice, and every other pixel takes what lattice points on the same stretch of surface agree on.
+Light varies slowly along a surface. Shadows, ambient occlusion and shading are computed on the
+lattice, and all other pixels interpolate between lattice points on the same stretch of surface.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     face_vertices,
     fast_normalize,
     first_weight,
+    is_back_face,
     normal_at,
     pixel_direction,
-    seen_inside,
     surface_index,
     vertex_at,
 )
@@ -30,16 +30,16 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 @wp.struct
 class Lattice:
-    """What is seen at the lattice's points, flat, row by row.
+    """G-buffer at the lattice's points, flat, row by row.
 
     Attributes:
-        stride: Pixels from point to point. The last column and row are the image's last.
-        body: -1 where nothing is seen.
+        stride: Pixels between neighbouring points. The last column and row are the image's last.
+        body: -1 for the background.
         surface: Index of the material.
         pixel: Index of the pixel.
-        p_m, normal: Point and smooth unit normal in the world.
-        origin_m: Where rays start that leave the surface.
-        skip: The body that cannot shade the point although it lies on it, or -1.
+        p_m, normal: Point [m] and smooth unit normal in the world.
+        origin_m: Origin of rays that leave the surface.
+        skip: A convex body on which the point lies and which cannot shade it, or -1.
     """
 
     stride: int
@@ -56,7 +56,7 @@ class Lattice:
 
 @wp.func
 def ray_origin(world: World, hit: wp.vec2i, weight: wp.vec2, p_world: wp.vec3, d_world: wp.vec3):
-    """A point just off the surface, on the curved surface that the normals speak of.
+    """Origin of rays just off the smooth surface that the vertex normals describe.
 
     Source: Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, 2021.
     """
@@ -66,7 +66,7 @@ def ray_origin(world: World, hit: wp.vec2i, weight: wp.vec2, p_world: wp.vec3, d
     p0 = vertex_at(world, g, corner[0])
     p1 = vertex_at(world, g, corner[1])
     p2 = vertex_at(world, g, corner[2])
-    side = wp.where(seen_inside(weight), -1.0, 1.0)
+    side = wp.where(is_back_face(weight), -1.0, 1.0)
     u = first_weight(weight)
     v = weight[1]
     w = 1.0 - u - v
@@ -74,6 +74,8 @@ def ray_origin(world: World, hit: wp.vec2i, weight: wp.vec2, p_world: wp.vec3, d
     n0 = normal_at(world, g, corner[0]) * side
     n1 = normal_at(world, g, corner[1]) * side
     n2 = normal_at(world, g, corner[2]) * side
+    # Project the point onto each vertex's tangent plane, and interpolate: coarse meshes then do not
+    # shade themselves where the smooth normal still faces the light.
     shift = n0 * (w * wp.min(0.0, wp.dot(p - p0, n0)))
     shift += n1 * (u * wp.min(0.0, wp.dot(p - p1, n1)))
     shift += n2 * (v * wp.min(0.0, wp.dot(p - p2, n2)))
@@ -92,7 +94,7 @@ def sample_lattice(
     normals: wp.array(dtype=wp.vec3),
     lattice: Lattice,
 ):
-    """Fill in the lattice's points."""
+    """Compute the lattice's points from the G-buffer."""
     i = wp.tid()
     x = wp.min(lattice.stride * (i % lattice.width), view.width - 1)
     y = wp.min(lattice.stride * (i / lattice.width), view.height - 1)
@@ -111,14 +113,16 @@ def sample_lattice(
     lattice.normal[i] = normals[pixel]
     lattice.origin_m[i] = ray_origin(world, hit, weights[pixel], p, offset)
     convex = world.geometries[world.bodies[hit[0]].geometry].convex
+    # Only its own back could occlude a point on the front of a convex solid, and that is behind the
+    # horizon.
     lattice.skip[i] = wp.where(convex != 0 and weights[pixel][0] < 1.5, hit[0], -1)
 
 
 @wp.func
 def points_agree(p: wp.vec3, n: wp.vec3, q: wp.vec3, m: wp.vec3, tolerance_m: float):
-    """Whether two points lie on one stretch of surface; 0 or the cosine between normals."""
+    """Cosine between the normals of two points on one stretch of surface; else 0."""
     cosine = wp.dot(n, m)
-    # Normals within 26 degrees, and in each other's tangent plane: one stretch of surface.
+    # One stretch of surface: normals within 26 degrees, and one point in the other's tangent plane.
     if cosine < 0.9 or wp.abs(wp.dot(n, q - p)) > tolerance_m:
         cosine = 0.0
     return cosine
@@ -126,11 +130,11 @@ def points_agree(p: wp.vec3, n: wp.vec3, q: wp.vec3, m: wp.vec3, tolerance_m: fl
 
 @wp.struct
 class Cell:
-    """Where a pixel lies between four lattice points.
+    """Position of a pixel between four lattice points.
 
     Attributes:
-        first: The upper left of them.
-        right, down: From it to the others, [0, 1).
+        first: Index of the upper left point.
+        right, down: Fractions towards its neighbours, [0, 1).
     """
 
     first: int
@@ -152,14 +156,14 @@ def cell_at(view: View, lattice: Lattice, x: int, y: int):
 
 @wp.func
 def step_at(lattice: Lattice, x: int, width: int):
-    """One pixel as a part of its cell; the last cell of a row or column may be narrower."""
+    """Width of one pixel in units of its cell; the last cell of a row or column may be narrower."""
     first = x - x % lattice.stride
     return 1.0 / float(wp.max(wp.min(lattice.stride, width - 1 - first), 1))
 
 
 @wp.func
 def cell_corner(lattice: Lattice, cell: Cell, k: int):
-    """The k-th lattice point of a cell, and its bilinear weight."""
+    """The k-th lattice point of a cell and its bilinear weight."""
     wx = wp.where((k & 1) == 1, cell.right, 1.0 - cell.right)
     wy = wp.where(k >= 2, cell.down, 1.0 - cell.down)
     return cell.first + (k & 1) + wp.where(k >= 2, lattice.width, 0), wx * wy

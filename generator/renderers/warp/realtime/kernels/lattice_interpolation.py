@@ -1,8 +1,8 @@
-"""Light of most pixels: what the four lattice points around them agree on.
+"""Interpolation of light from the lattice to all pixels.
 
 A cell lies between four lattice points. Where all four lie on one smooth stretch of surface, the
-cell's pixels share what they have in common: mixing light takes a few multiplications, and looking
-up a texture takes its addresses and its texels. Elsewhere each pixel asks each point.
+cell's pixels share the work: light takes a few multiplications per pixel, and a texture only its
+addresses and texels. Elsewhere each pixel tests each point.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import warp as wp
 
 from gen_data.generator.renderers.warp.atmosphere.kernels.ground_weathering import (
     albedo_below_coat,
-    bumps_through,
+    bump_visibility,
 )
 from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     Cell,
@@ -46,7 +46,7 @@ from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import (
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-# Light of two points may be mixed if their normals differ by less than eight degrees.
+# Light of two points may be blended if their normals differ by less than eight degrees.
 SMOOTH_COSINE = wp.constant(0.99)
 
 
@@ -54,9 +54,9 @@ SMOOTH_COSINE = wp.constant(0.99)
 def agreement(
     view: View, images: GBufferRecord, lattice: Lattice, surface: int, i: int, p: wp.vec3, q: int
 ):
-    """Cosine between the normals of pixel i and lattice point q; 0 if on other surfaces.
+    """Cosine between the normals of pixel i and lattice point q; 0 on different surfaces.
 
-    One triangle is taken to be flat.
+    Two points of one triangle count as coplanar.
     """
     cosine = float(0.0)
     if lattice.surface[q] == surface:
@@ -77,8 +77,8 @@ class Quad:
 
     Attributes:
         face: (body, face) of the first corner.
-        normal: Mean of the corners', unit, world frame.
-        to_viewer: Unit, from the middle.
+        normal: Mean unit normal of the corners, world frame.
+        to_viewer: Unit direction to the viewer from the middle.
     """
 
     smooth: int
@@ -109,6 +109,7 @@ def quad_at(view: View, world: World, images: GBufferRecord, lattice: Lattice, q
             smooth = False
             if lattice.surface[r] == surface:
                 other = images.hits[lattice.pixel[r]]
+                # One face is flat, whatever its vertex normals.
                 smooth = other[0] == quad.face[0] and other[1] == quad.face[1]
                 if not smooth:
                     cosine = points_agree(p, n, lattice.p_m[r], lattice.normal[r], tolerance_m)
@@ -125,12 +126,12 @@ def quad_at(view: View, world: World, images: GBufferRecord, lattice: Lattice, q
 
 @wp.struct
 class Tilt:
-    """How light of a cell changes with the normal: see on_bump.
+    """Dependence of a cell's light on the normal: see bump_factors.
 
     Attributes:
-        towards: Where lamps' light comes from, unit; 0 for none.
-        half: Between it and the viewer.
-        before: Cosine between it and the surface's normal.
+        towards: Unit direction towards the lamps; 0 for none.
+        half: Half vector between it and the viewer.
+        before: Cosine between ``towards`` and the surface's normal.
         n_h: Cosine between ``half`` and the surface's normal.
         lamps, shine: As in LatticeLight.
     """
@@ -144,13 +145,13 @@ class Tilt:
 
 
 @wp.func
-def tilt_of(towards: wp.vec3, lamps: float, shine: float, n: wp.vec3, v: wp.vec3):
-    """What on_bump needs, from the sum of the light's directions, normal and viewer."""
+def make_tilt(towards: wp.vec3, lamps: float, shine: float, n: wp.vec3, v: wp.vec3):
+    """Tilt from the sum of the light's directions, the normal and the viewer."""
     tilt = Tilt()
     if wp.dot(towards, towards) > 0.0:
         tilt.towards = fast_normalize(towards)
         tilt.half = fast_normalize(tilt.towards + v)
-        # At grazing light the ratio of cosines would be boundless.
+        # The ratio of cosines diverges at grazing light.
         tilt.before = wp.max(wp.dot(n, tilt.towards), 0.1)
         tilt.n_h = wp.dot(n, tilt.half)
         tilt.lamps = lamps
@@ -159,25 +160,25 @@ def tilt_of(towards: wp.vec3, lamps: float, shine: float, n: wp.vec3, v: wp.vec3
 
 
 @wp.func
-def on_bump(tilt: Tilt, roughness: float, m: wp.vec3):
+def bump_factors(tilt: Tilt, roughness: float, m: wp.vec3):
     """Factors on diffuse light and on the rest where a texture tilts the normal to m.
 
-    The lamps are taken for one, where their light comes from on average.
+    All lamps are approximated by one in their mean direction.
     """
     after = wp.max(wp.dot(m, tilt.towards), 0.0)
     alpha = roughness * roughness
     narrow = 1.0 - alpha * alpha
     m_h = wp.dot(m, tilt.half)
-    # Ratio of two GGX densities is the square of this; alpha^2 cancels.
+    # The ratio of two GGX densities is the square of this; alpha^2 cancels.
     lobe = (1.0 - tilt.n_h * tilt.n_h * narrow) / wp.max(1.0 - m_h * m_h * narrow, 1.0e-4)
-    # Bounded: several lamps have no one direction, and one bump would gleam.
+    # Bounded: several lamps have no single direction, and isolated bumps would sparkle.
     diffuse = 1.0 + tilt.lamps * (wp.min(after / tilt.before, 3.0) - 1.0)
     return wp.vec2(diffuse, 1.0 + tilt.shine * (wp.min(lobe * lobe, 8.0) - 1.0))
 
 
 @wp.func
 def quad_tilt(lattice: Lattice, lights: wp.array(dtype=LatticeLight), q: int, quad: Quad):
-    """The tilt of a whole cell."""
+    """The tilt of a whole cell, from the mean of its corners."""
     a = lights[q]
     b = lights[q + 1]
     c = lights[q + lattice.width]
@@ -185,7 +186,7 @@ def quad_tilt(lattice: Lattice, lights: wp.array(dtype=LatticeLight), q: int, qu
     towards = a.towards + b.towards + c.towards + d.towards
     lamps = 0.25 * (a.lamps + b.lamps + c.lamps + d.lamps)
     shine = 0.25 * (a.shine + b.shine + c.shine + d.shine)
-    return tilt_of(towards, lamps, shine, quad.normal, quad.to_viewer)
+    return make_tilt(towards, lamps, shine, quad.normal, quad.to_viewer)
 
 
 @wp.func
@@ -200,9 +201,10 @@ def gathered_radiance(
     i: int,
     d: wp.vec3,
 ):
-    """Radiance of a pixel from the lattice points around it; negative if the surface turns there.
+    """Radiance of a pixel interpolated from lattice points; negative if that is impossible.
 
-    Points on other surfaces are left out; negative, too, if that leaves none.
+    That is where the surface turns too sharply, or where no point lies on the pixel's surface;
+    points on other surfaces are left out.
     """
     hit = images.hits[i]
     surface = surface_index(world, hit)
@@ -241,13 +243,15 @@ def gathered_radiance(
         v = fast_normalize(-d)
         n = images.normals[i]
         width_m = pixel_width(view, i, images.z_m[i])
-        look = evaluate_material(world, surface, hit, images.weights[i], n, width_m, v)
-        albedo = look.albedo
+        material = evaluate_material(world, surface, hit, images.weights[i], n, width_m, v)
+        albedo = material.albedo
         if bumpy:
             if covered:
-                look.normal = fast_normalize(n + (look.normal - n) * bumps_through(coat * share))
-            tilt = tilt_of(light.towards, light.lamps * share, light.shine * share, n, v)
-            factors = on_bump(tilt, look.roughness, look.normal)
+                material.normal = fast_normalize(
+                    n + (material.normal - n) * bump_visibility(coat * share)
+                )
+            tilt = make_tilt(light.towards, light.lamps * share, light.shine * share, n, v)
+            factors = bump_factors(tilt, material.roughness, material.normal)
             light.diffuse *= factors[0]
             light.rest *= factors[1]
     if covered:
@@ -256,8 +260,10 @@ def gathered_radiance(
 
 
 @wp.func
-def one_face(view: View, images: GBufferRecord, face: wp.vec2i, x0: int, x1: int, y0: int, y1: int):
-    """Whether all pixels of a rectangle see one face."""
+def is_one_face(
+    view: View, images: GBufferRecord, face: wp.vec2i, x0: int, x1: int, y0: int, y1: int
+):
+    """Whether all pixels of a rectangle show one face."""
     same = bool(True)
     y = int(y0)
     while y < y1 and same:
@@ -272,20 +278,21 @@ def one_face(view: View, images: GBufferRecord, face: wp.vec2i, x0: int, x1: int
 
 @wp.func
 def quad_sampler(world: World, texture: int, quad: Quad, patch: Patch, footprint_m: float):
-    """The sampler of a cell whose pixels are that wide at its depth."""
-    # Footprints are ellipses: the level that suits the geometric mean of both axes.
+    """The texture sampler of a cell whose pixels have the given footprint."""
+    # Footprints are ellipses: use the level of the geometric mean of both axes.
     slant = wp.max(wp.dot(quad.normal, quad.to_viewer), 0.05)
     return make_sampler(world, texture, wp.log2(footprint_m * patch.texels_per_m / wp.sqrt(slant)))
 
 
 @wp.func
-def bumped(patch: Patch, bump: wp.vec3, covered: bool, coat: wp.vec4):
-    """The normal of a patch with a texture's bumps, below what weather has laid on them."""
+def bump_normal(patch: Patch, bump: wp.vec3, covered: bool, coat: wp.vec4):
+    """Normal of a patch with the texture's bumps, attenuated by water and snow on them."""
     b = bump
     if covered:
-        bumps = bumps_through(coat)
+        bumps = bump_visibility(coat)
         b = b * bumps + wp.vec3(0.0, 0.0, 1.0 - bumps)
     m = patch.tangent * b[0] + patch.bitangent * b[1]
+    # The floor keeps the normal on the outer side, as in material_eval.tilt_normal.
     return fast_normalize(m + patch.normal * wp.max(b[2], 0.1))
 
 
@@ -303,7 +310,7 @@ def light_patch(
     row: int,
     radiance: wp.array(dtype=wp.vec3),
 ):
-    """Light a smooth cell all of whose pixels see one face."""
+    """Shade a smooth cell all of whose pixels show one face."""
     q = row * lattice.width + column
     x0 = column * lattice.stride
     y0 = row * lattice.stride
@@ -328,6 +335,7 @@ def light_patch(
     for y in range(y0, y1):
         down = float(y - y0) * step_at(lattice, y0, view.height)
         up = 1.0 - down
+        # Bilinear interpolation by steps: the row's ends once, then one addition per pixel.
         diffuse = lights[q].diffuse * up + lights[below].diffuse * down
         rest = lights[q].rest * up + lights[below].rest * down
         diffuse_step = lights[q + 1].diffuse * up + lights[below + 1].diffuse * down
@@ -337,7 +345,7 @@ def light_patch(
         if covered:
             coat = coats[q] * up + coats[below] * down
             coat_step = (coats[q + 1] * up + coats[below + 1] * down - coat) * right_step
-        x = int(x0)  # Warp's ranges are slow where little is done in them.
+        x = int(x0)  # While: Warp's range loops cost more than this body.
         while x < x1:
             color = albedo
             lit, shine = diffuse, rest
@@ -349,8 +357,8 @@ def light_patch(
                 texel = texel_at(world, texture, sampler, u, v, bumpy)
                 color = wp.cw_mul(albedo, texel.albedo)
                 if bumpy:
-                    m = bumped(patch, texel.bump, covered, coat)
-                    factors = on_bump(tilt, roughness * texel.roughness, m)
+                    m = bump_normal(patch, texel.bump, covered, coat)
+                    factors = bump_factors(tilt, roughness * texel.roughness, m)
                     lit = lit * factors[0]
                     shine = shine * factors[1]
             if covered:
@@ -375,10 +383,10 @@ def gather_light(
     pixels: wp.array(dtype=int),
     radiance: wp.array(dtype=wp.vec3),
 ):
-    """Light every pixel from lattice points, or list it to be shaded by itself.
+    """Shade every pixel from lattice points, or list it for individual shading.
 
     Args:
-        coats: As light_lattice leaves them.
+        coats: As written by light_lattice.
         run: Cells in a row per thread.
         count: Length of the list; 0 at first.
         pixels: The list, in any order.
@@ -390,9 +398,10 @@ def gather_light(
         x0 = column * lattice.stride
         x1 = wp.min(x0 + lattice.stride, view.width)
         quad = quad_at(view, world, images, lattice, row * lattice.width + column)
+        # Fast path: the whole cell shows one smooth, flat face.
         whole = quad.smooth != 0
         if whole:
-            whole = one_face(view, images, quad.face, x0, x1, y0, y1)
+            whole = is_one_face(view, images, quad.face, x0, x1, y0, y1)
         if whole:
             surface = lattice.surface[row * lattice.width + column]
             patch = Patch()
@@ -418,6 +427,7 @@ def gather_light(
                         )
                     elif world.sky.visible != 0:
                         c = sky_image(world.sky, d_world)
+                    # Not interpolable: an atomic counter appends the pixel to the list.
                     if c[0] < 0.0:
                         pixels[wp.atomic_add(count, 0, 1)] = i
                     else:

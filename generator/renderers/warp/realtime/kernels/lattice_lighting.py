@@ -1,4 +1,4 @@
-"""Light at what is seen: computed on the lattice, and where it cannot be gathered from there."""
+"""Lighting of lattice points, and of single pixels that cannot be interpolated from them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     beam_from,
     lobe_widening,
     relative_illuminance,
-    towards_mirror,
+    representative_direction,
 )
 from gen_data.generator.renderers.warp.scene.kernels.brdf import Brdf, make_brdf, specular_lobe
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
@@ -50,16 +50,16 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-# Lamps of a smaller radius over distance, such as the sun, have penumbrae of no importance to
-# surfaces that are too small for the lattice.
+# Lamps of a smaller radius over distance, such as the sun: their penumbrae do not matter on
+# surfaces too small for the lattice.
 SMALL_SPREAD = wp.constant(0.02)
-# Highlights of smoother surfaces are too small to be gathered.
+# Highlights of smoother surfaces are too small to be interpolated.
 GATHERED_ROUGHNESS = wp.constant(0.25)
 
 
 @wp.struct
 class GBufferRecord:
-    """What is seen at every pixel centre, flat; as in gbuffer.GBuffer."""
+    """G-buffer at every pixel centre, flat; fields as in gbuffer.GBuffer."""
 
     hits: wp.array(dtype=wp.vec2i)
     z_m: wp.array(dtype=float)
@@ -72,11 +72,11 @@ class LatticeLight:
     """Light that leaves a point towards the viewer [cd/m^2].
 
     Attributes:
-        diffuse: To be multiplied by the albedo.
-        rest: Reflected, and the surface's own.
-        towards: Where the lamps' light comes from, on average; any length.
-        lamps: Part of ``diffuse`` that comes from lamps.
-        shine: Part of ``rest`` that comes from lamps.
+        diffuse: Diffuse light, before the albedo.
+        rest: Specular reflection and emission.
+        towards: Mean direction towards the lamps, weighted by illuminance; any length.
+        lamps: Share of lamps in ``diffuse``.
+        shine: Share of lamps in ``rest``.
     """
 
     diffuse: wp.vec3
@@ -87,9 +87,9 @@ class LatticeLight:
 
 
 @wp.func
-def part_of(a: wp.vec3, b: wp.vec3):
-    """How much of b is a, over all channels."""
-    # The floor is for black: nothing is a part of nothing.
+def share_of(a: wp.vec3, b: wp.vec3):
+    """Share of ``a`` in ``b``, over all channels."""
+    # The floor makes the share of black in black zero.
     return (a[0] + a[1] + a[2]) / wp.max(b[0] + b[1] + b[2], 1.0e-20)
 
 
@@ -99,9 +99,9 @@ class LampLight:
 
     Attributes:
         lux: Illuminance of the surface [lx].
-        shine: Reflected by the specular layer towards the viewer [cd/m^2].
-        shown: Part of ``shine`` from lamps that a mirrored ray finds.
-        towards: Where it comes from, on average; any length.
+        shine: Specular reflection towards the viewer [cd/m^2].
+        shown: Share of ``shine`` of lamps that reflected rays hit themselves.
+        towards: Mean direction towards the lamps; any length.
     """
 
     lux: wp.vec3
@@ -130,9 +130,9 @@ def sum_lamp_light(
             beam = beam_from(world.lamps[j], p_world)
             n_l = relative_illuminance(world.lamps[j], beam, p_world, n)
             if n_l > 0.0:
-                l = towards_mirror(world.lamps[j], beam, p_world, mirrored, alpha)  # noqa: E741
-                # A wide lamp's brightest point may be set while the lamp still lights: see
-                # ``above_horizon_fraction``.
+                l = representative_direction(world.lamps[j], beam, p_world, mirrored, alpha)  # noqa: E741
+                # The representative point of a wide lamp may be below the horizon while the lamp
+                # still contributes: see ``above_horizon_fraction``.
                 n_s = wp.max(wp.dot(n, l), 1.0e-3)
                 wider = lobe_widening(world.lamps[j], beam, alpha)
                 lobe = specular_lobe(brdf, n, v, l, n_s, wider)
@@ -148,8 +148,8 @@ def sum_lamp_light(
 
 
 @wp.func
-def open_lobe(brdf: Brdf, open_sky: float):
-    """Visible part of the sky in the specular lobe.
+def specular_occlusion(brdf: Brdf, open_sky: float):
+    """Visible fraction of the environment in the specular lobe.
 
     Source: Lagarde and de Rousiers 2014, with a fixed exponent.
     """
@@ -161,34 +161,37 @@ def open_lobe(brdf: Brdf, open_sky: float):
 def light_at(
     world: World,
     surface: int,
-    look: SurfaceMaterial,
+    material: SurfaceMaterial,
     p_world: wp.vec3,
     v: wp.vec3,
     lit: wp.array(dtype=float, ndim=2),
     open_sky: float,
     k: int,
 ):
-    """Light of all lamps and of the sky at a point.
+    """Light of all lamps and of the environment at a point.
 
     Args:
-        v: To the viewer.
-        lit: Visible part of each lamp at points [lamp, k]; UNSEEN is none.
-        open_sky: Visible part of the hemisphere.
+        v: Unit direction to the viewer.
+        lit: Visible fraction of each lamp at points [lamp, k]; UNSEEN counts as none.
+        open_sky: Visible fraction of the hemisphere.
     """
-    n = look.normal
+    n = material.normal
     n_v = wp.dot(n, v)
-    brdf = make_brdf(world.lobes, look.albedo, look.roughness, look.metallic, look.specular, n_v)
+    brdf = make_brdf(
+        world.lobes, material.albedo, material.roughness, material.metallic, material.specular, n_v
+    )
     lamps = sum_lamp_light(world, brdf, n, p_world, v, lit, k)
     light = LatticeLight()
     light.towards = lamps.towards
     ambient = sky_irradiance(world.sky, n) * open_sky
     mirror = sky_reflection(world.sky, n * (2.0 * n_v) - v, brdf.roughness)
+    # Lambert: illuminance over pi is luminance per albedo.
     lux = lamps.lux * (1.0 / wp.pi)
     light.diffuse = wp.cw_mul(brdf.matte, lux + ambient)
-    light.rest = wp.cw_mul(brdf.gloss, mirror) * open_lobe(brdf, open_sky) + lamps.shine
+    light.rest = wp.cw_mul(brdf.gloss, mirror) * specular_occlusion(brdf, open_sky) + lamps.shine
     light.rest += world.surfaces[surface].emission_cd_m2
-    light.lamps = part_of(lux, lux + ambient)
-    light.shine = part_of(lamps.shine, light.rest)
+    light.lamps = share_of(lux, lux + ambient)
+    light.shine = share_of(lamps.shine, light.rest)
     return light
 
 
@@ -203,10 +206,11 @@ def light_lattice(
     lights: wp.array(dtype=LatticeLight),
     coats: wp.array(dtype=wp.vec4),
 ):
-    """Light at the lattice's points, on surfaces whose light is gathered; bumps are left out.
+    """Light at the lattice's points on surfaces that are interpolated; bumps are left out.
 
     Args:
-        coats: What weather lays there, ``mixable`` of a Coat; written if the ground is covered.
+        coats: Field ``mixable`` of a Coat: what weather leaves there; written if the ground is
+            covered.
     """
     k = wp.tid()
     surface = lattice.surface[k]
@@ -217,21 +221,23 @@ def light_lattice(
     i = lattice.pixel[k]
     p = lattice.p_m[k]
     v = fast_normalize(view.eye_m - p)
-    look = plain_material(world, surface, lattice.normal[k])
+    material = plain_material(world, surface, lattice.normal[k])
     if world.surfaces[surface].texture >= 0:
         z = images.z_m[i]
         weight = images.weights[i]
         width_m = pixel_width(view, i, z)
-        look = evaluate_material(
+        # The texture sets roughness here; pixels apply their own albedo.
+        material = evaluate_material(
             world, surface, images.hits[i], weight, lattice.normal[k], width_m, v
         )
     if world.ground.covered != 0:
         size_m = footprint(view, p, lattice.normal[k], float(lattice.stride))
         coat = coat_at(world, surface, p, lattice.normal[k], world.ground.exposed[k], size_m)
-        look = apply_coat(world, surface, look, coat, lattice.normal[k])
+        material = apply_coat(world, surface, material, coat, lattice.normal[k])
         coats[k] = coat.mixable
-    look.normal = lattice.normal[k]
-    lights[k] = light_at(world, surface, look, p, v, lit, open_sky[0, k], k)
+    # The pixels apply bumps themselves: see lattice_interpolation.bump_factors.
+    material.normal = lattice.normal[k]
+    lights[k] = light_at(world, surface, material, p, v, lit, open_sky[0, k], k)
 
 
 @wp.kernel
@@ -245,7 +251,7 @@ def shade_points(
     exposed: wp.array(dtype=float),
     radiance: wp.array(dtype=wp.vec3),
 ):
-    """Shade a list of pixels, each by itself; layered surfaces are left out."""
+    """Shade listed pixels individually, except layered surfaces."""
     k = wp.tid()
     i = pixels[k]
     hit = images.hits[i]
@@ -258,29 +264,32 @@ def shade_points(
     v = fast_normalize(-d)
     z = images.z_m[i]
     width_m = pixel_width(view, i, z)
-    look = evaluate_material(world, surface, hit, images.weights[i], images.normals[i], width_m, v)
+    material = evaluate_material(
+        world, surface, hit, images.weights[i], images.normals[i], width_m, v
+    )
     p = view.eye_m + d * z
     if world.ground.covered != 0:
         n = images.normals[i]
         coat = coat_at(world, surface, p, n, exposed[k], footprint(view, p, n, 1.0))
-        look = apply_coat(world, surface, look, coat, n)
-    light = light_at(world, surface, look, p, v, lit, open_sky[0, k], k)
-    radiance[i] = wp.cw_mul(light.diffuse, look.albedo) + light.rest
+        material = apply_coat(world, surface, material, coat, n)
+    light = light_at(world, surface, material, p, v, lit, open_sky[0, k], k)
+    radiance[i] = wp.cw_mul(light.diffuse, material.albedo) + light.rest
 
 
 @wp.func
 def is_gatherable(world: World, surface: int):
-    """Whether a material's light changes slowly enough to be taken from the lattice."""
+    """Whether a material's light varies slowly enough to be interpolated from the lattice."""
     smooth = world.surfaces[surface].roughness >= GATHERED_ROUGHNESS
     smooth = smooth and world.surfaces[surface].layered == 0
     texture = world.surfaces[surface].texture
     if smooth and texture >= 0:
+        # A textured metal reflects its colour: light and albedo do not separate.
         smooth = world.surfaces[surface].metallic < 0.05
     return smooth
 
 
 @wp.kernel
-def look_around(
+def find_pixel_visibility(
     view: View,
     world: World,
     images: GBufferRecord,
@@ -295,12 +304,12 @@ def look_around(
     open_sky: wp.array(dtype=float, ndim=2),
     exposed: wp.array(dtype=float),
 ):
-    """What listed pixels see of lamps and sky: the mean of lattice points, or by rays.
+    """Visibility of lamps and environment at listed pixels, from lattice points or by rays.
 
     Args:
-        parts: Points of the unit disc at which rays to lamps aim.
-        disc: Points of the unit disc under those of the hemisphere at which other rays aim.
-        radius_m: Of ambient occlusion.
+        parts: Points of the unit disk at which shadow rays aim.
+        disc: Points of the unit disk, lifted to the hemisphere for ambient occlusion.
+        radius_m: Radius of ambient occlusion.
     """
     k = wp.tid()
     i = pixels[k]
@@ -311,28 +320,29 @@ def look_around(
     cell = cell_at(view, lattice, x, y)
     for j in range(world.lamps.shape[0]):
         lit[j, k] = 0.0
-    # Light and shade change less than looks do: the points need not share the material.
+    # Visibility varies less than appearance: the points need not share the pixel's material.
     column = x / lattice.stride
     row = y / lattice.stride
     found = float(0.0)
     sky = float(0.0)
     rained_on = float(0.0)
     for reach in range(2):
-        # The cell's corners, and those around them only where none of the four will do.
+        # First the cell's corners; the ring around them only if none of the four is usable.
         if found == 0.0:
             for v in range(wp.max(row - reach, 0), wp.min(row + 2 + reach, lattice.height)):
                 for u in range(
                     wp.max(column - reach, 0), wp.min(column + 2 + reach, lattice.width)
                 ):
                     q = v * lattice.width + u
-                    if related(view, images, lattice, i, p, q):
+                    if is_usable_point(view, images, lattice, i, p, q):
                         right = float(column - u) + cell.right
                         down = float(row - v) + cell.down
-                        w = nearness(right, down)
+                        w = distance_weight(right, down)
                         found += w
                         sky += lattice_sky[0, q] * w
-                        rained_on += exposed_point(world, q) * w
+                        rained_on += lattice_exposure(world, q) * w
                         for j in range(world.lamps.shape[0]):
+                            # UNSEEN is negative and counts as dark.
                             lit[j, k] = lit[j, k] + wp.max(lattice_lit[j, q], 0.0) * w
     if found > 0.0:
         open_sky[0, k] = sky / found
@@ -344,7 +354,7 @@ def look_around(
         origin = ray_origin(world, images.hits[i], images.weights[i], p, d * images.z_m[i])
         for j in range(world.lamps.shape[0]):
             lit[j, k] = visible_lamp_fraction(world, world.lamps[j], origin, n, parts)
-        sky, found = sky_of_body(lattice, lattice_sky, cell.first, images.hits[i][0])
+        sky, found = body_sky_visibility(lattice, lattice_sky, cell.first, images.hits[i][0])
         if found == 0.0:
             sky = visible_sky_fraction(world, origin, n, disc, radius_m)
             found = 1.0
@@ -353,8 +363,8 @@ def look_around(
 
 
 @wp.func
-def exposed_point(world: World, q: int):
-    """Share of what falls that reaches lattice point q."""
+def lattice_exposure(world: World, q: int):
+    """Exposure of lattice point q to precipitation."""
     exposed = float(1.0)
     if world.ground.covered != 0:
         exposed = world.ground.exposed[q]
@@ -363,18 +373,22 @@ def exposed_point(world: World, q: int):
 
 @wp.func
 def sky_exposure_at(world: World, origin: wp.vec3, n: wp.vec3):
-    """Share of what falls that reaches a point, by a ray."""
+    """Exposure of a point to precipitation, by a ray."""
     exposed = float(1.0)
+    # Steep surfaces hold no water or snow: their exposure is never used.
     if world.ground.covered != 0 and n[2] > 0.1:
         exposed = precipitation_exposure(world, origin)
     return exposed
 
 
 @wp.func
-def sky_of_body(lattice: Lattice, lattice_sky: wp.array(dtype=float, ndim=2), q: int, body: int):
-    """Sum and number of the sky's visible parts at those corners of a cell that lie on a body.
+def body_sky_visibility(
+    lattice: Lattice, lattice_sky: wp.array(dtype=float, ndim=2), q: int, body: int
+):
+    """Sum and number of the sky's visible fractions at a cell's corners on one body.
 
-    A leaf or a spoke is as open to the sky as those beside it, whichever way they are turned.
+    Thin parts such as leaves and spokes are as open to the sky as their neighbours, whatever their
+    orientation.
     """
     total = float(0.0)
     found = float(0.0)
@@ -387,21 +401,23 @@ def sky_of_body(lattice: Lattice, lattice_sky: wp.array(dtype=float, ndim=2), q:
 
 
 @wp.func
-def nearness(dx: float, dy: float):
-    """Weight of a lattice point, by its distance in cells."""
+def distance_weight(dx: float, dy: float):
+    """Weight of a lattice point by its distance in cells."""
     squared = dx * dx + dy * dy
-    # Fourth powers of the distance: the nearest point counts, without a seam where it changes.
+    # Fourth powers of the distance: the nearest point dominates, without a seam where it changes.
     return 1.0 / (0.05 + squared * squared)
 
 
 @wp.func
-def related(view: View, images: GBufferRecord, lattice: Lattice, i: int, p: wp.vec3, q: int):
-    """Whether a lattice point lies on the body of pixel i, near it and turned like it."""
+def is_usable_point(
+    view: View, images: GBufferRecord, lattice: Lattice, i: int, p: wp.vec3, q: int
+):
+    """Whether a lattice point lies on the body of pixel i, near it and similarly oriented."""
     same = lattice.body[q] == images.hits[i][0]
     if same:
         n = images.normals[i]
         tolerance_m = 2.0 * surface_tolerance(view, p)
-        # 37 degrees: round things have such neighbours, edges of boxes do not.
+        # 37 degrees: neighbours on round surfaces pass, those across an edge of a box do not.
         same = wp.dot(n, lattice.normal[q]) > 0.8
         same = same and wp.abs(wp.dot(n, lattice.p_m[q] - p)) < tolerance_m
     return same
@@ -411,13 +427,13 @@ def related(view: View, images: GBufferRecord, lattice: Lattice, i: int, p: wp.v
 def visible_lamp_fraction(
     world: World, lamp: LightRecord, origin: wp.vec3, n: wp.vec3, parts: wp.array(dtype=wp.vec2)
 ):
-    """How much of a lamp a point sees; two rays that agree speak for all, one for a small lamp."""
+    """Visible fraction of a lamp from a point, by up to all ``parts``; one ray for small lamps."""
     beam = beam_from(lamp, origin)
     seen = float(0.0)
     cast = int(0)
     if wp.dot(beam.direction, n) > -beam.spread and wp.max(beam.normal_lux) > 0.0:
         for k in range(wp.where(beam.spread < SMALL_SPREAD, 1, parts.shape[0])):
-            # Penumbras are rare: where the first two rays agree, the rest would too.
+            # Penumbrae are rare: where the first two rays agree, the rest is taken to agree.
             if k < 2 or (seen > 0.0 and seen < float(cast)):
                 cast += 1
                 if not is_occluded(
@@ -431,16 +447,16 @@ def visible_lamp_fraction(
 def visible_sky_fraction(
     world: World, origin: wp.vec3, n: wp.vec3, disc: wp.array(dtype=wp.vec2), radius_m: float
 ):
-    """How open a point is to the sky."""
+    """Visible fraction of the hemisphere within a radius, weighted by the cosine."""
     if radius_m == 0.0:
         return 1.0
     x, y = make_frame(n)
     total = float(0.0)
     for k in range(disc.shape[0]):
         c = disc[k]
-        # Points of the disk lifted to the hemisphere: in proportion to the cosine.
+        # Malley's method: disk points lifted to the hemisphere are distributed by the cosine.
         up = wp.sqrt(1.0 - wp.dot(c, c))
         t = free_path(world, path_along(origin, (x * c[0] + y * c[1] + n * up) * radius_m))
-        # Near things hide the sky fully; at the radius their shade has faded with no slope.
+        # Full occlusion on contact, fading with zero slope at the radius.
         total += t * (2.0 - t)
     return total / float(disc.shape[0])

@@ -1,4 +1,4 @@
-"""Which bodies may come between a stretch of surface and a lamp.
+"""Shaft culling: which bodies may block the light between a tile of points and a lamp.
 
 Source: Haines and Wallace, "Shaft culling for efficient ray-traced radiosity", 1991.
 """
@@ -21,18 +21,17 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-# Lattice points along the edge of a tile.
+# Lattice points along a tile's edge.
 TILE = wp.constant(8)
-# Longer lists are not worth their memory: rays then use the hierarchy over all bodies.
+# Longer lists are not worth their memory: rays then query the hierarchy over all bodies.
 LIST_LENGTH = wp.constant(48)
-# Lamps that would give less of a point's light than this are left out there: half a step of eight
-# bits at most.
+# Lamps with a smaller share of a point's light are neglected: half a step of eight bits at most.
 FAINT_SHARE = wp.constant(0.006)
 
 
 @wp.struct
 class Tile:
-    """A ball around the points of a tile, and the plane they lie on if they do."""
+    """Bounding sphere of a tile's points, and their common plane if they have one."""
 
     count: int
     centre_m: wp.vec3
@@ -43,7 +42,7 @@ class Tile:
 
 
 @wp.func
-def tile_of(lattice: Lattice, column: int, row: int):
+def tile_bounds(lattice: Lattice, column: int, row: int):
     """Bounds of one tile."""
     low = wp.vec3(1.0e9)
     high = wp.vec3(-1.0e9)
@@ -62,6 +61,7 @@ def tile_of(lattice: Lattice, column: int, row: int):
                     tile.normal = lattice.normal[i]
                 if wp.dot(lattice.normal[i], tile.normal) < 0.99999:
                     tile.flat = 0
+                # Height along the first point's normal; nothing below it can shade a flat tile.
                 tile.height_m = wp.max(tile.height_m, wp.dot(p, tile.normal))
                 lowest_m = wp.min(lowest_m, wp.dot(p, tile.normal))
                 tile.count += 1
@@ -69,20 +69,20 @@ def tile_of(lattice: Lattice, column: int, row: int):
     if tile.height_m - lowest_m > 1.0e-3:
         tile.flat = 0
     tile.centre_m = (low + high) * 0.5
-    # Rays start a little off the surface.
+    # Rays start slightly off the surface.
     tile.radius_m = wp.length(high - low) * 0.5 + 2.0e-3
     return tile
 
 
 @wp.struct
 class Shaft:
-    """All straight ways from a tile to a lamp, in a body's mesh frame.
+    """The union of all segments from a tile to a lamp, in a body's mesh frame.
 
     Attributes:
         start, way: From the tile's centre to the lamp's.
-        inverse: Reciprocals of ``way``.
-        radius, end_radius: Of a tube around it that holds the tile, and the lamp.
-        normal, height: Plane below which nothing shades the tile, if ``flat``.
+        inverse: Componentwise reciprocals of ``way``.
+        radius, end_radius: Radii of a cone frustum around it at the tile and at the lamp.
+        normal, height: Plane below which nothing can shade the tile, if ``flat``.
     """
 
     start: wp.vec3
@@ -96,8 +96,8 @@ class Shaft:
 
 
 @wp.func
-def shaft_to(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
-    """The shaft from a tile along a way, to a ball, seen from body b."""
+def make_shaft(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
+    """The shaft from a tile to a sphere at the end of a way, in the frame of body b."""
     shrink = 1.0 / world.bodies[b].scale
     shaft = Shaft()
     shaft.start = to_mesh_point(world, b, tile.centre_m)
@@ -108,14 +108,14 @@ def shaft_to(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
     shaft.flat = tile.flat
     shaft.normal = wp.transpose(world.bodies[b].R_world_mesh) @ tile.normal
     height_m = tile.height_m + 1.0e-4 - wp.dot(world.bodies[b].t_world_mesh, tile.normal)
-    # In the mesh's own frame, where boxes and planes need no transform each.
+    # Transform the plane once instead of every box.
     shaft.height = height_m * shrink
     return shaft
 
 
 @wp.func
 def overlap(shaft: Shaft, low: wp.vec3, high: wp.vec3, grown: float):
-    """The stretch of a shaft's axis that lies in a grown box; empty if it ends before it begins."""
+    """Interval of a shaft's axis inside an enlarged box; empty if its start exceeds its end."""
     margin = wp.vec3(grown, grown, grown)
     a = wp.cw_mul(low - shaft.start - margin, shaft.inverse)
     c = wp.cw_mul(high - shaft.start + margin, shaft.inverse)
@@ -129,13 +129,14 @@ def overlap(shaft: Shaft, low: wp.vec3, high: wp.vec3, grown: float):
 
 
 @wp.func
-def touches(shaft: Shaft, low: wp.vec3, high: wp.vec3):
-    """Whether a box may reach into a shaft."""
+def may_touch(shaft: Shaft, low: wp.vec3, high: wp.vec3):
+    """Whether a box may intersect a shaft; conservative."""
     if shaft.flat != 0:
+        # The box's highest point above the tile's plane.
         top = wp.dot(shaft.normal, (low + high) * 0.5)
         if top + wp.dot(wp.abs(shaft.normal), (high - low) * 0.5) <= shaft.height:
             return False
-    # The shaft is as wide as its wider end, then only as wide as where the box may touch it.
+    # Start with the wider end's radius, then narrow the shaft to where the box may touch it.
     t0, t1 = overlap(shaft, low, high, wp.max(shaft.radius, shaft.end_radius))
     for _ in range(2):
         if t0 <= t1:
@@ -146,16 +147,16 @@ def touches(shaft: Shaft, low: wp.vec3, high: wp.vec3):
 
 
 @wp.func
-def boxes_touch(shaft: Shaft, world: World, g: int):
-    """Whether any of a mesh's boxes may reach into a shaft.
+def any_box_touches(shaft: Shaft, world: World, g: int):
+    """Whether any of a mesh's boxes may intersect a shaft.
 
-    Bodies that surround the scene (a room), have holes or are long and slanted have one box that
-    touches everything; the many boxes around their faces do not.
+    The single box of a room, of a body with holes or of a long slanted body touches everything; the
+    boxes around groups of its faces do not.
     """
     found = bool(False)
     for k in range(world.geometries[g].box_lows_m.shape[0]):
         low = world.geometries[g].box_lows_m[k]
-        if touches(shaft, low, world.geometries[g].box_highs_m[k]):
+        if may_touch(shaft, low, world.geometries[g].box_highs_m[k]):
             found = True
             break
     return found
@@ -163,8 +164,8 @@ def boxes_touch(shaft: Shaft, world: World, g: int):
 
 @wp.func
 def may_shade(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
-    """Whether a body may come between a tile and a ball at the end of a way."""
-    # Box against box first: it settles most cases.
+    """Whether a body may block light between a tile and a sphere at the end of a way."""
+    # A test of world boxes comes first: it decides most cases.
     here = wp.vec3(tile.radius_m, tile.radius_m, tile.radius_m)
     there = wp.vec3(radius_m, radius_m, radius_m)
     end = tile.centre_m + way
@@ -173,16 +174,17 @@ def may_shade(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
     if wp.max(low) > 0.0 or wp.min(high) < 0.0:
         return False
     g = world.bodies[b].geometry
-    shaft = shaft_to(world, b, tile, way, radius_m)
-    shades = touches(shaft, world.geometries[g].low_m, world.geometries[g].high_m)
+    shaft = make_shaft(world, b, tile, way, radius_m)
+    shades = may_touch(shaft, world.geometries[g].low_m, world.geometries[g].high_m)
     if shades:
-        shades = boxes_touch(shaft, world, g)
+        # Then the many boxes: they exclude rooms and slanted bodies.
+        shades = any_box_touches(shaft, world, g)
     return shades
 
 
 @wp.func
 def may_shade_from(world: World, b: int, tile: Tile, lamp: LightRecord):
-    """Whether a body may come between a tile and a lamp."""
+    """Whether a body may block light between a tile and a lamp."""
     way = lamp.position_m - tile.centre_m
     radius_m = lamp.radius
     if lamp.kind == SUN:
@@ -192,8 +194,8 @@ def may_shade_from(world: World, b: int, tile: Tile, lamp: LightRecord):
 
 
 @wp.func
-def append(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: int):
-    """Put a body on a list, or mark the list as too long."""
+def append_occluder(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: int):
+    """Append a body to a list, or mark the list as overflowing."""
     n = lists[tile, j, 0]
     if n >= 0 and n < LIST_LENGTH:
         lists[tile, j, 1 + n] = b
@@ -203,7 +205,9 @@ def append(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: int):
 
 
 @wp.func
-def matters(lattice: Lattice, shares: wp.array(dtype=float, ndim=2), j: int, column: int, row: int):
+def is_lamp_relevant(
+    lattice: Lattice, shares: wp.array(dtype=float, ndim=2), j: int, column: int, row: int
+):
     """Whether lamp j is more than faint at any point of a tile."""
     found = bool(False)
     for y in range(row * TILE, wp.min((row + 1) * TILE, lattice.height)):
@@ -225,29 +229,30 @@ def list_occluders(
 ):
     """Bodies that may shade each tile from each lamp; the last list is for ambient occlusion.
 
-    A list begins with its length, which is -1 where it would be too long.
+    A list begins with its length, which is -1 on overflow.
 
     Args:
-        ambient_radius_m: Of ambient occlusion.
-        shares: Of each lamp in the light of each point [lamp, point]; lamps that are faint
-            everywhere in a tile are not asked about.
+        ambient_radius_m: Radius of ambient occlusion.
+        shares: Share of each lamp in the light of each point [lamp, point]; lamps that are faint
+            throughout a tile get an empty list.
     """
     i = wp.tid()
     column = i % tile_columns
     row = i / tile_columns
-    tile = tile_of(lattice, column, row)
+    tile = tile_bounds(lattice, column, row)
     lamps = world.lamps.shape[0]
     for j in range(lamps + 1):
         lists[i, j, 0] = 0
     if tile.count == 0:
         return
     near = tile
+    # A shaft of length zero: a sphere that contains every ambient ray of the tile.
     near.radius_m = tile.radius_m + ambient_radius_m
     for j in range(lamps):
-        if matters(lattice, shares, j, column, row):
+        if is_lamp_relevant(lattice, shares, j, column, row):
             for b in range(world.bodies.shape[0]):
                 if may_shade_from(world, b, tile, world.lamps[j]):
-                    append(lists, i, j, b)
+                    append_occluder(lists, i, j, b)
     for b in range(world.bodies.shape[0]):
         if may_shade(world, b, near, wp.vec3(0.0), near.radius_m):
-            append(lists, i, lamps, b)
+            append_occluder(lists, i, lamps, b)

@@ -1,14 +1,14 @@
 """Soft shadows and ambient occlusion on the lattice, with as few rays as possible.
 
-1. Tiles find which bodies may shade them
-(gen_data.generator.renderers.warp.realtime.kernels.shadow_culling): most find none, and
-   no ray need be cast.
-2. Points cast one ray per lamp, every other point only where those around it differ. The sixteen
+1. Tiles list the bodies that may shade them
+   (gen_data.generator.renderers.warp.realtime.kernels.shadow_culling): most list none and need no
+   ray.
+2. Points trace one ray per lamp, every other point only where its neighbours differ. The sixteen
    points of a 4 x 4 block aim at sixteen parts of the lamp (interleaved sampling, Keller and
    Heidrich, 2001).
-3. Where all points around one agree, that is the answer. Elsewhere, in penumbrae, points cast
-   more rays, and sixteen neighbours on one surface are averaged, rows first: together they have
-   looked at all parts of the lamp, wherever they lie, so that no pattern remains.
+3. Where a whole neighbourhood agrees, its value is final. In penumbrae, points trace further rays,
+   and sixteen neighbours on one surface are averaged, rows first: together they sample all parts of
+   the lamp from every position, so that no pattern remains.
 """
 
 from __future__ import annotations
@@ -40,8 +40,9 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
+# Marks points without a value: off all surfaces, or where a lamp contributes nothing.
 UNSEEN = wp.constant(-1.0)
-# Lamps that give less of a point's light than this have shadows too faint to be smoothed by rays.
+# Shadows of lamps with a smaller share of a point's light are too faint for further rays.
 SMOOTHED_SHARE = wp.constant(0.08)
 
 
@@ -54,7 +55,7 @@ def bayer(x: int, y: int):
 
 @wp.func
 def make_frame(z: wp.vec3):
-    """Two unit vectors that complete a right-handed frame.
+    """Two unit vectors that complete a right-handed frame with z.
 
     Source: Duff et al., "Building an orthonormal basis, revisited", JCGT 2017.
     """
@@ -69,11 +70,11 @@ def make_frame(z: wp.vec3):
 
 @wp.func
 def path_to_lamp(lamp: LightRecord, origin: wp.vec3, n: wp.vec3, part: wp.vec2):
-    """From a point to a part of a lamp, or to the opposite part if the first is below the horizon.
+    """Displacement from a point to a part of a lamp; mirrored if below the horizon.
 
     Args:
         n: Normal of the horizon.
-        part: Of the unit disc, which stands for the lamp's outline.
+        part: Point of the unit disk, which parametrises the lamp's outline.
     """
     to_lamp = lamp.position_m - origin
     off = wp.vec3(0.0)
@@ -89,7 +90,7 @@ def path_to_lamp(lamp: LightRecord, origin: wp.vec3, n: wp.vec3, part: wp.vec2):
             radius = lamp.radius * SUN_DISTANCE_M
         x, y = make_frame(fast_normalize(to_lamp))
         off = (x * part[0] + y * part[1]) * radius
-    # What is below the horizon sends nothing: its ray is spent on the opposite part.
+    # Parts below the horizon contribute nothing: the ray samples the opposite part instead.
     if wp.dot(to_lamp + off, n) < 0.0:
         off = -off
     return to_lamp + off
@@ -97,7 +98,7 @@ def path_to_lamp(lamp: LightRecord, origin: wp.vec3, n: wp.vec3, part: wp.vec2):
 
 @wp.func
 def square_of_disc(part: wp.vec2):
-    """From the unit disc to the square [-1, 1] x [-1, 1], areas in proportion.
+    """Area-preserving map from the unit disk to the square [-1, 1] x [-1, 1].
 
     Source: the inverse of Shirley and Chiu, "A low distortion map between disk and square", Journal
     of Graphics Tools 2, 1997.
@@ -113,15 +114,15 @@ def square_of_disc(part: wp.vec2):
 
 @wp.func
 def tile_index(lattice: Lattice, i: int, tile_columns: int):
-    """The tile a lattice point belongs to."""
+    """The tile of a lattice point."""
     return ((i / lattice.width) / TILE) * tile_columns + (i % lattice.width) / TILE
 
 
 @wp.func
-def settled(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: int, y: int):
-    """What the points beside, above and below a point agree on; UNSEEN if they do not.
+def agreed_value(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: int, y: int):
+    """Common value of a point's four neighbours; UNSEEN if they differ.
 
-    Each of them must be there, on the same material.
+    All four must exist and share its material.
     """
     i = y * lattice.width + x
     value = float(UNSEEN)
@@ -137,10 +138,7 @@ def settled(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: 
 
 @wp.kernel
 def weigh_lamps(world: World, lattice: Lattice, shares: wp.array(dtype=float, ndim=2)):
-    """The part of each point's light that each lamp would give if nothing shaded it [lamp, point].
-
-    UNSEEN where the lamp is behind the surface.
-    """
+    """Share of each lamp in each point's unshadowed light [lamp, point]; UNSEEN behind surfaces."""
     i = wp.tid()
     if lattice.body[i] < 0:
         return
@@ -152,7 +150,7 @@ def weigh_lamps(world: World, lattice: Lattice, shares: wp.array(dtype=float, nd
         brightest = wp.max(beam.normal_lux)
         lux = float(UNSEEN)
         if cosine > -beam.spread and brightest > 0.0:
-            # Highlights at grazing angles are as bright as others.
+            # Grazing highlights remain bright: the cosine has a floor.
             lux = brightest * wp.max(cosine, 0.2)
             total += lux
         shares[j, i] = lux
@@ -162,8 +160,10 @@ def weigh_lamps(world: World, lattice: Lattice, shares: wp.array(dtype=float, nd
 
 
 @wp.func
-def mean_beside(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: int, y: int):
-    """Mean of what the points beside, above and below a point say on its material, if any does."""
+def mean_of_neighbours(
+    lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: int, y: int
+):
+    """Mean of the known values beside, above and below a point on its material; else UNSEEN."""
     i = y * lattice.width + x
     total = float(0.0)
     found = float(0.0)
@@ -187,13 +187,13 @@ def probe_lamps(
     parity: int,
     lit: wp.array(dtype=float, ndim=2),
 ):
-    """One ray per point and lamp: 1, 0, or UNSEEN where the lamp lights nothing anyway.
+    """One shadow ray per point and lamp: 1, 0, or UNSEEN for lamps without effect.
 
     Args:
-        disc: Forty-eight points of the unit disc; a point looks at one of three in a row.
-        shares: As weigh_lamps says.
-        parity: 0 to probe the black fields of a chessboard. 1, after that, for the white ones:
-            they are probed only where black ones around them differ.
+        disc: Forty-eight points of the unit disk; each lattice point uses one of three in a row.
+        shares: As computed by weigh_lamps.
+        parity: 0 probes the black squares of a checkerboard, 1 then the white ones, which trace a
+            ray only where their black neighbours differ.
     """
     i = wp.tid()
     x = i % lattice.width
@@ -205,16 +205,17 @@ def probe_lamps(
         value = float(UNSEEN)
         if lattice.body[i] >= 0 and shares[j, i] > FAINT_SHARE:
             if parity == 1:
-                value = settled(lattice, lit, j, x, y)
+                value = agreed_value(lattice, lit, j, x, y)
                 if value == UNSEEN and shares[j, i] < SMOOTHED_SHARE:
-                    value = mean_beside(lattice, lit, j, x, y)
+                    # Faint lamps: an interpolated shadow is as good as a traced one.
+                    value = mean_of_neighbours(lattice, lit, j, x, y)
             if value == UNSEEN:
-                value = probed(world, lattice, lists, tile, i, j, disc[3 * bayer(x, y) + 1])
+                value = probe_lamp(world, lattice, lists, tile, i, j, disc[3 * bayer(x, y) + 1])
         lit[j, i] = value
 
 
 @wp.func
-def probed(
+def probe_lamp(
     world: World,
     lattice: Lattice,
     lists: wp.array(dtype=int, ndim=3),
@@ -223,7 +224,7 @@ def probed(
     j: int,
     part: wp.vec2,
 ):
-    """Whether point i sees a part of lamp j."""
+    """Visibility of a part of lamp j from point i, 1 or 0, by one ray."""
     value = float(1.0)
     if lists[tile, j, 0] != 0:
         origin = lattice.origin_m[i]
@@ -237,13 +238,13 @@ def probed(
 def classify_blocks(
     lattice: Lattice, values: wp.array(dtype=float, ndim=2), classes: wp.array(dtype=int, ndim=3)
 ):
-    """What the points of each aligned 4 x 4 block say: bits 1 for zeros, 2 for ones, 4 for else."""
+    """Values in each aligned 4 x 4 block, as bits: 1 zeros, 2 ones, 4 others."""
     row, column, j = wp.tid()
     found = int(0)
     for y in range(4 * row, wp.min(4 * row + 4, lattice.height)):
         k = int(y * lattice.width + 4 * column)
         end = y * lattice.width + wp.min(4 * column + 4, lattice.width)
-        # While: Warp's ranges take longer than what is done in them.
+        # A while loop: Warp's range loops cost more than this body.
         while k < end:
             value = values[j, k]
             if value == 0.0:
@@ -258,7 +259,7 @@ def classify_blocks(
 
 @wp.func
 def classes_around(classes: wp.array(dtype=int, ndim=3), x: int, y: int, j: int):
-    """What the blocks say that a window around a point touches."""
+    """Union of the classes of the blocks that a point's window touches."""
     last_row = classes.shape[0] - 1
     last_column = classes.shape[1] - 1
     x0 = wp.max((x - 2) >> 2, 0)
@@ -270,7 +271,7 @@ def classes_around(classes: wp.array(dtype=int, ndim=3), x: int, y: int, j: int)
 
 @wp.func
 def window_bits(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, i: int):
-    """What the points of the same material say in the window around a point."""
+    """Values of the points of the same material in the window around a point, as bits."""
     x = i % lattice.width
     y = i / lattice.width
     own = lattice.surface[i]
@@ -298,7 +299,7 @@ def refine_lamps(
     probed: wp.array(dtype=float, ndim=2),
     lit: wp.array(dtype=float, ndim=2),
 ):
-    """Two more rays where a lamp is neither seen by all points around nor by none.
+    """Trace two more rays where a lamp is visible from part of the neighbourhood only.
 
     Args:
         disc, shares: As for probe_lamps.
@@ -315,6 +316,7 @@ def refine_lamps(
                 seen = value
                 origin = lattice.origin_m[i]
                 for k in range(2):
+                    # The two points of the triple that probe_lamps has left out.
                     part = disc[3 * bayer(x, y) + 2 * k]
                     way = path_to_lamp(world.lamps[j], origin, lattice.normal[i], part)
                     path = path_along(origin, way)
@@ -326,22 +328,22 @@ def refine_lamps(
 
 @wp.func
 def surface_tolerance(view: View, p: wp.vec3):
-    """How far from a point's tangent plane its neighbours may be: three pixels' width."""
+    """Allowed distance of neighbours from a point's tangent plane: three pixels' width [m]."""
     return 3.0 * view.pixel_rad * wp.length(p - view.eye_m)
 
 
 @wp.func
 def rim_weight(offset: int, half: int):
-    """Windows are 2 ``half`` wide: the points on their rims belong to them by half.
+    """Weight of a window's offset: points at the rims of windows of width 2 ``half`` count half.
 
-    So they are centred, and hold every part of a 4 x 4 pattern equally often.
+    Windows are thus centred and contain every part of a 4 x 4 pattern equally often.
     """
     return wp.where(wp.abs(offset) == half, 0.5, 1.0)
 
 
 @wp.func
-def alike(lattice: Lattice, i: int, k: int, tolerance_m: float):
-    """Whether two lattice points lie on one stretch of surface."""
+def is_same_surface(lattice: Lattice, i: int, k: int, tolerance_m: float):
+    """Whether two lattice points lie on one smooth stretch of surface."""
     same = bool(False)
     if lattice.surface[i] == lattice.surface[k]:
         p = lattice.p_m[i]
@@ -359,9 +361,9 @@ def sum_rows(
     values: wp.array(dtype=float, ndim=2),
     sums: wp.array(dtype=wp.vec2, ndim=2),
 ):
-    """Sum and number of the values beside each point, on its own surface.
+    """Sum and number of the values beside each point on its own surface.
 
-    Skipped where all agree, and nothing above or below asks.
+    Skipped where all values agree and neither row above nor below needs the sums.
     """
     i = wp.tid()
     x = i % lattice.width
@@ -376,7 +378,7 @@ def sum_rows(
             end = i + wp.min(lattice.width - 1 - x, 2)
             while k <= end:
                 value = values[j, k]
-                if value != UNSEEN and alike(lattice, i, k, tolerance_m):
+                if value != UNSEEN and is_same_surface(lattice, i, k, tolerance_m):
                     total += wp.vec2(value, 1.0) * rim_weight(k - i, 2)
                 k += 1
         sums[j, i] = total
@@ -391,13 +393,13 @@ def column_sum(
     half: int,
     tolerance_m: float,
 ):
-    """The sums of rows, summed above and below a point, on its own surface."""
+    """Row sums added over the points above and below a point on its own surface."""
     y = i / lattice.width
     total = wp.vec2(0.0, 0.0)
     v = int(wp.max(-y, -half))
     while v <= wp.min(lattice.height - 1 - y, half):
         k = i + v * lattice.width
-        if alike(lattice, i, k, tolerance_m):
+        if is_same_surface(lattice, i, k, tolerance_m):
             total += sums[j, k] * rim_weight(v, half)
         v += 1
     return total
@@ -412,7 +414,7 @@ def smooth_lattice(
     sums: wp.array(dtype=wp.vec2, ndim=2),
     smoothed: wp.array(dtype=float, ndim=2),
 ):
-    """Average the values of neighbours on one surface, wherever they differ."""
+    """Average differing values over neighbours on one surface."""
     i = wp.tid()
     x = i % lattice.width
     y = i / lattice.width
@@ -421,12 +423,14 @@ def smooth_lattice(
         if value != UNSEEN:
             found = classes_around(classes, x, y, j)
             if found == 1 or found == 2:  # noqa: PLR1714
+                # Only zeros (1) or only ones (2) around: the mean is exact.
                 value = float(found - 1)
             else:
                 tolerance_m = surface_tolerance(view, lattice.p_m[i])
                 total = column_sum(lattice, sums, j, i, 2, tolerance_m)
                 if total[1] < 8.0:
-                    # Where its surface ends, part of a window has seen part of the lamp only.
+                    # At the end of a surface a window holds part of the pattern only: take a larger
+                    # one.
                     total = column_sum(lattice, sums, j, i, 4, tolerance_m)
                 if total[1] > 0.0:
                     value = total[0] / total[1]
@@ -443,10 +447,10 @@ def probe_ambient(
     radius_m: float,
     open_sky: wp.array(dtype=float, ndim=2),
 ):
-    """One short ray per point: 1 where it meets nothing, less the nearer the obstacle.
+    """Ambient occlusion by one short ray per point: 1 if free, less the nearer the obstacle.
 
     Args:
-        hemisphere: Sixteen directions about +Z with cosine-weighted density.
+        hemisphere: Sixteen directions about +Z, distributed by the cosine.
     """
     i = wp.tid()
     value = float(UNSEEN)
@@ -461,18 +465,19 @@ def probe_ambient(
             way = (x * h[0] + y * h[1] + n * h[2]) * radius_m
             path = path_along(lattice.origin_m[i], way)
             t = free_path_of_listed(world, lists, tile, lattice.skip[i], path)
+            # Full occlusion on contact, fading with zero slope at the radius: no visible boundary.
             value = t * (2.0 - t)
     open_sky[0, i] = value
 
 
 @wp.kernel
-def see_out(
+def count_free_paths(
     world: World,
     points: wp.array(dtype=wp.vec3),
     ways: wp.array(dtype=wp.vec3),
     free: wp.array(dtype=int),
 ):
-    """Count the ways that are free, over all points."""
+    """Count the unobstructed paths over all points and directions."""
     i = wp.tid()
     for k in range(ways.shape[0]):
         if not is_occluded(world, path_along(points[i], ways[k])):

@@ -1,7 +1,8 @@
-"""What rays pass: holes that a texture's coverage cuts into faces, and clear faces.
+"""Alpha test: holes that a texture's coverage cuts into faces, and clear faces that rays pass.
 
-Coverage is that of the texture's finest level, bilinear, and below half there is a hole: labels,
-shadows and laser beams agree on where, at every distance.
+Coverage is sampled bilinearly at the texture's finest level, and a point is a hole where it is
+below one half. The mip level does not depend on distance, so labels, shadows and laser beams agree
+everywhere.
 """
 
 from __future__ import annotations
@@ -25,11 +26,11 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-# Few bodies have holes: what they take is compiled once per module, not wherever it is called.
+# Few bodies have holes: these functions are compiled once per module, not inlined at every call.
 OUT_OF_LINE = {"inline": False} if "inline" in inspect.signature(wp.func).parameters else {}
-# Rays that have passed a face go on this far behind it.
+# A ray that has passed a face continues this far behind it [m].
 STEP_M = wp.constant(2.0e-5)
-# Faces of one body that a ray passes at most.
+# Limit on the faces of one body that a ray passes; it bounds the loop, not the image.
 FACES_MAX = wp.constant(64)
 
 
@@ -46,18 +47,21 @@ def project_uv(p: wp.vec3, axis: int):
 
 
 @wp.func
-def covered_at(world: World, texture: int, uv: wp.vec2):
-    """Whether a texture's coverage is at least a half; it wraps around, rows from the top."""
+def is_covered(world: World, texture: int, uv: wp.vec2):
+    """Whether a texture's coverage is at least one half; textures repeat, rows run from the top."""
     width = world.textures[texture].width
     height = world.textures[texture].height
+    # Beyond a million repeats, single precision holds no position within a texel.
     u = wp.clamp(uv[0], -1.0e6, 1.0e6)
     v = wp.clamp(uv[1], -1.0e6, 1.0e6)
+    # Texel centres are at half-integers; v grows upwards while rows are stored from the top.
     x = (u - float(floor_int(u))) * float(width) - 0.5
     y = (1.0 - (v - float(floor_int(v)))) * float(height) - 0.5
     x0 = floor_int(x)
     y0 = floor_int(y)
     right = x - float(x0)
     down = y - float(y0)
+    # x0 may be -1 or width - 1: adding the width keeps the remainder non-negative.
     xa = (x0 + width) % width
     xb = (x0 + 1 + width) % width
     top = ((y0 + height) % height) * width
@@ -65,12 +69,13 @@ def covered_at(world: World, texture: int, uv: wp.vec2):
     c = world.textures[texture].cover
     upper = float(c[top + xa]) * (1.0 - right) + float(c[top + xb]) * right
     lower = float(c[below + xa]) * (1.0 - right) + float(c[below + xb]) * right
+    # One half of the eight-bit range.
     return upper * (1.0 - down) + lower * down >= 127.5
 
 
 @wp.func
 def uv_at(world: World, surface: int, b: int, face: int, weights: wp.vec3):
-    """Texture coordinates at a point of a face, by UVs or along the axis that it faces most.
+    """Texture coordinates at a point of a face: by UVs, or projected along its dominant axis.
 
     Args:
         weights: Barycentric, of the face's three corners.
@@ -85,6 +90,7 @@ def uv_at(world: World, surface: int, b: int, face: int, weights: wp.vec3):
         p0 = vertex_at(world, g, corner[0])
         p1 = vertex_at(world, g, corner[1])
         p2 = vertex_at(world, g, corner[2])
+        # The largest component of the face's normal selects the projection.
         n = wp.abs(wp.cross(p1 - p0, p2 - p0))
         axis = int(1)
         if n[0] > n[1] and n[0] > n[2]:
@@ -97,8 +103,8 @@ def uv_at(world: World, surface: int, b: int, face: int, weights: wp.vec3):
 
 
 @wp.func(**OUT_OF_LINE)
-def hole_at(world: World, b: int, face: int, weights: wp.vec3):
-    """Whether there is a hole at a point of a face."""
+def is_hole(world: World, b: int, face: int, weights: wp.vec3):
+    """Whether a point of a face is a hole."""
     g = world.bodies[b].geometry
     surface = world.bodies[b].first_material + world.geometries[g].face_slots[face]
     texture = world.surfaces[surface].texture
@@ -106,33 +112,34 @@ def hole_at(world: World, b: int, face: int, weights: wp.vec3):
     if texture >= 0:
         if world.textures[texture].has_cover != 0:
             uv = uv_at(world, surface, b, face, weights)
-            hole = not covered_at(world, texture, uv)
+            hole = not is_covered(world, texture, uv)
     return hole
 
 
 @wp.func
-def passable(world: World, b: int, face: int, weights: wp.vec3, through: int):
+def is_passable(world: World, b: int, face: int, weights: wp.vec3, through: int):
     """Whether a ray passes a point of a face.
 
     Args:
-        through: HOLES, or HOLES and CLEAR: shadows pass clear faces as well.
+        through: HOLES, or HOLES and CLEAR: shadow rays also pass clear faces.
     """
     clear = bool(False)
     if (through & CLEAR) != 0:
         g = world.bodies[b].geometry
         surface = world.bodies[b].first_material + world.geometries[g].face_slots[face]
+        # Shadow rays are binary: a face counts as clear if it passes more than half of the light.
         clear = world.surfaces[surface].transmission > 0.5 or world.surfaces[surface].opacity < 0.5
     if not clear:
-        clear = hole_at(world, b, face, weights)
+        clear = is_hole(world, b, face, weights)
     return clear
 
 
 @wp.struct
 class Strike:
-    """Where a ray meets a mesh.
+    """Intersection of a ray with a mesh.
 
     Attributes:
-        face: -1 where it does not.
+        face: -1 for a miss.
         t: Parameter along the ray.
         u, v: Barycentric, of the face's first and second corner.
     """
@@ -144,8 +151,8 @@ class Strike:
 
 
 @wp.func
-def strike_of(found: Found):
-    """The same as numbers of 32 bits."""
+def to_strike(found: Found):
+    """Convert a result of the tree traversal to single precision."""
     strike = Strike()
     strike.t = float(found[0])
     strike.u = float(found[1])
@@ -155,8 +162,8 @@ def strike_of(found: Found):
 
 
 @wp.func(**OUT_OF_LINE)
-def beyond_holes(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, through: int):
-    """The first point of a body with holes that a ray does not pass; arguments as for solid_hit."""
+def first_opaque_hit(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, through: int):
+    """The first point of a body with holes that a ray does not pass."""
     g = world.bodies[b].geometry
     strike = Strike()
     strike.face = -1
@@ -165,7 +172,7 @@ def beyond_holes(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, thr
     going = bool(True)
     while going:
         going = False
-        met = strike_of(
+        met = to_strike(
             first_in_mesh(
                 world.geometries[g].tree,
                 world.geometries[g].mesh,
@@ -176,7 +183,9 @@ def beyond_holes(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, thr
         )
         if met.face >= 0:
             weights = wp.vec3(met.u, met.v, 1.0 - met.u - met.v)
-            if passable(world, b, met.face, weights, through):
+            if is_passable(world, b, met.face, weights, through):
+                # A relative step for distant hits and an absolute one for near hits: the same face
+                # is not found again.
                 begin += met.t * 1.000001 + STEP_M / wp.length(d)
                 faces += 1
                 going = faces < FACES_MAX
@@ -193,14 +202,15 @@ def closest_solid_hit(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float
     Args:
         o, d: The ray in the mesh frame.
         reach: Largest parameter along it.
-        through: What it may pass, HOLES or CLEAR or both.
+        through: What the ray may pass: HOLES, CLEAR or both.
     """
     g = world.bodies[b].geometry
     strike = Strike()
-    if (world.bodies[b].pierced & through) != 0:
-        strike = beyond_holes(world, b, o, d, reach, through)
+    if (world.bodies[b].cutouts & through) != 0:
+        # Only bodies whose flags match need a test at every face.
+        strike = first_opaque_hit(world, b, o, d, reach, through)
     else:
-        strike = strike_of(
+        strike = to_strike(
             first_in_mesh(world.geometries[g].tree, world.geometries[g].mesh, o, d, reach)
         )
     return strike
@@ -208,9 +218,10 @@ def closest_solid_hit(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float
 
 @wp.func
 def is_mesh_intersected(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float, through: int):
-    """Whether a body cuts a ray that passes what ``through`` says; arguments as for solid_hit."""
+    """Whether a body blocks a ray; arguments as for closest_solid_hit."""
     g = world.bodies[b].geometry
+    # The cheaper any-hit query comes first: only hits on cut-outs need the test at every face.
     hit = any_in_mesh(world.geometries[g].tree, world.geometries[g].mesh, o, d, reach)
-    if hit and (world.bodies[b].pierced & through) != 0:
-        hit = beyond_holes(world, b, o, d, reach, through).face >= 0
+    if hit and (world.bodies[b].cutouts & through) != 0:
+        hit = first_opaque_hit(world, b, o, d, reach, through).face >= 0
     return hit

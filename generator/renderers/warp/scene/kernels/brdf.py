@@ -1,11 +1,11 @@
-"""The metallic-roughness surface: GGX over Lambert, energy-conserving.
+"""Metallic-roughness BRDF: GGX over Lambert, energy-conserving.
 
 Sources: Walter et al., "Microfacet models for refraction through rough surfaces", EGSR 2007 (GGX);
 Hammon, "PBR diffuse lighting for GGX+Smith microsurfaces", GDC 2017 (height-correlated Smith
-without square roots); Burley, "Physically based shading at Disney", 2012 (parameters); Karis,
-"Real shading in Unreal Engine 4", 2013 (directional albedo from a table); Turquin, "Practical
-multiple scattering compensation for microfacet models", 2019; Lagarde and de Rousiers, "Moving
-Frostbite to PBR", 2014 (F90).
+without square roots); Burley, "Physically based shading at Disney", 2012 (parameters); Karis, "Real
+shading in Unreal Engine 4", 2013 (directional albedo from a table); Turquin, "Practical multiple
+scattering compensation for microfacet models", 2019; Lagarde and de Rousiers, "Moving Frostbite to
+PBR", 2014 (F90).
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 @wp.struct
 class Brdf:
-    """A surface at a point, seen from one direction.
+    """A BRDF at a point, for one viewing direction.
 
     Attributes:
-        matte: Part of the light that the specular layer leaves to the diffuse albedo.
+        matte: Share of the light that the specular layer transmits to the diffuse albedo.
         f0, f90: Specular reflectance at normal and grazing incidence.
         gloss: Directional albedo of the specular layer, multiple scattering included.
-        boost: Multiple scattering relative to single scattering.
+        boost: Multiple scattering factor on single scattering.
         roughness: Perceptual; alpha is its square.
         n_v: Cosine between normal and viewer.
     """
@@ -41,13 +41,13 @@ class Brdf:
 
 @wp.func
 def directional_albedo(table: wp.array(dtype=wp.vec2, ndim=2), roughness: float, n_v: float):
-    """Factors on F0 and on F90 of the GGX layer's reflectance under uniform light.
+    """Factors on F0 and on F90 of the GGX lobe's directional albedo.
 
     Args:
-        table: The factors over [0, 1] x [0, 1], ends included, roughness by row.
+        table: The factors over [0, 1] x [0, 1], ends included; roughness by row, cosine by column.
     """
     last = float(table.shape[0] - 1)
-    # The last cell ends at 1: a whisker less keeps its right neighbour inside the table.
+    # The last cell ends at 1: staying just below keeps the right neighbour inside the table.
     x = wp.min(n_v * last, last - 0.001)
     y = wp.min(roughness * last, last - 0.001)
     x0 = int(x)
@@ -68,9 +68,9 @@ def make_brdf(
     specular: float,
     n_v: float,
 ):
-    """The surface at a point with its view-dependent constants."""
+    """The BRDF at a point with its view-dependent constants."""
     s = Brdf()
-    # Alpha 0.002: in narrower lobes n_h^2 (alpha^2 - 1) + 1 has no digits left at the peak.
+    # Alpha 0.002: in narrower lobes n_h^2 (alpha^2 - 1) + 1 cancels at the peak.
     s.roughness = wp.clamp(roughness, 0.045, 1.0)
     # Interpolated normals may turn away from the viewer; Smith's term divides by this.
     s.n_v = wp.max(n_v, 1.0e-3)
@@ -80,23 +80,26 @@ def make_brdf(
     # Nothing real reflects less than 2 %: below that even the grazing reflection fades.
     s.f90 = wp.min(50.0 * wp.max(s.f0[0], wp.max(s.f0[1], s.f0[2])), 1.0)
     part = directional_albedo(table, s.roughness, s.n_v)
-    # Turquin 2019: what single scattering loses of white light, by what it keeps.
+    # Turquin 2019: energy that single scattering loses under white light, relative to what it
+    # keeps. The floor guards against table entries near 0.
     loss = 1.0 / wp.max(part[0] + part[1], 0.05) - 1.0
     s.boost = wp.vec3(1.0, 1.0, 1.0) + s.f0 * loss
     s.gloss = wp.cw_mul(s.f0 * part[0] + wp.vec3(s.f90, s.f90, s.f90) * part[1], s.boost)
+    # The diffuse layer receives what the specular layer does not reflect; metals have none.
     s.matte = wp.vec3(1.0 - s.gloss[0], 1.0 - s.gloss[1], 1.0 - s.gloss[2]) * (1.0 - metallic)
     return s
 
 
 @wp.func
 def specular_lobe(s: Brdf, n: wp.vec3, v: wp.vec3, l: wp.vec3, n_l: float, widening: float):  # noqa: E741
-    """GGX reflection, without the cosine.
+    """GGX reflection without the cosine [1/sr].
 
     Args:
-        widening: Added to alpha for a light that is not a point, with the peak lowered to
-            keep its energy (Karis, "Real shading in Unreal Engine 4", 2013).
+        widening: Added to alpha for a light that is not a point, with the peak lowered to keep its
+            energy (Karis, "Real shading in Unreal Engine 4", 2013).
     """
     h = fast_normalize(l + v)
+    # Rounding may leave the cosine above 1, where the denominator would change sign.
     n_h = wp.min(wp.dot(n, h), 1.0)
     alpha = s.roughness * s.roughness
     wide = wp.min(alpha + widening, 1.0)

@@ -1,9 +1,9 @@
-"""Rays through trees of boxes, eight boxes or eight triangles at a time.
+"""Ray traversal of bounding volume hierarchies, eight boxes or eight triangles at a time.
 
-On the CPU, trees are those of gen_data.generator.renderers.warp.scene.bvh, and what walks them is
-written with the vector types of the compiler that Warp brings: plain IEEE arithmetic, the same on
-every processor. Measured against ``wp.mesh_query_ray``, which takes boxes and triangles one by one:
-a third of the time. On CUDA the same functions ask Warp's own hierarchies.
+On the CPU, trees are those of gen_data.generator.renderers.warp.scene.bvh, and the traversal uses
+the vector extensions of the compiler that Warp ships: plain IEEE arithmetic, the same on every
+processor. It takes a third of the time of ``wp.mesh_query_ray``, which tests boxes and triangles
+one by one. On CUDA the same functions query Warp's own hierarchies.
 
 Sources: Wald, Benthin and Boulos, "Getting rid of packets: efficient SIMD single-ray traversal
 using multi-branching BVHs", 2008; Woop, Benthin and Wald, "Watertight ray/triangle intersection",
@@ -19,21 +19,23 @@ from gen_data.generator.renderers.warp.scene.kernels.records import BodyRecord, 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 Found = wp.spatial_vectord
-"""Where a ray meets something: parameter, weights of a face's first and second corner, face, body
-(0 within a mesh), and a spare number; face and body are -1 where it meets nothing."""
+"""Intersection of a ray: parameter, weights of a face's first and second corner, face, body
+(0 within a mesh), and an unused number; face and body are -1 for a miss."""
 
 _RAY = """
     typedef float Lanes __attribute__((ext_vector_type(8)));
     typedef float LanesInMemory __attribute__((ext_vector_type(8), aligned(4)));
     typedef bool Mask __attribute__((ext_vector_type(8)));
-    typedef unsigned long long Entry;  // parameter and code: nearer ones are lesser numbers
-    constexpr float FARTHER = 1.0000004f;  // 1 + twice the rounding of a slab's parameter
+    // Parameter and code in one integer: positive floats compare like integers, nearest first.
+    typedef unsigned long long Entry;
+    // Ize 2013: 1 + twice the rounding error of a slab's parameter, so that no box is missed.
+    constexpr float FARTHER = 1.0000004f;
 
     struct Ray {
         float o[3], d[3], inverse[3];
-        int near[3];        // first lanes of the sides through which it enters a box
-        int kx, ky, kz;     // the longest axis last
-        float sx, sy, sz;   // shear along it
+        int near[3];        // offsets of the planes through which it enters a box
+        int kx, ky, kz;     // axes, the dominant one last
+        float sx, sy, sz;   // shear that aligns the ray with that axis
     };
     struct Strike { float t, u, v; int face; };
     struct Walk { Entry stack[256]; int top; };
@@ -41,7 +43,7 @@ _RAY = """
     auto start = [](Ray& ray, const wp::vec3& o, const wp::vec3& d) {
         for (int k = 0; k < 3; ++k) {
             ray.o[k] = o[k];
-            // A grain instead of zero: its reciprocal is large, and its sign does not matter.
+            // A tiny number instead of zero: a finite reciprocal, and 0 * inf cannot arise.
             ray.d[k] = d[k] < 1.0e-20f && d[k] > -1.0e-20f ? 1.0e-20f : d[k];
             ray.inverse[k] = 1.0f / ray.d[k];
             ray.near[k] = 8 * (2 * k + (ray.d[k] < 0.0f));
@@ -57,7 +59,7 @@ _RAY = """
         ray.sy = ray.d[ray.ky] * ray.sz;
     };
 
-    // Put the boxes of a node that a ray enters on the stack, the nearest on top.
+    // Slab test of a node's eight boxes: push those that the ray enters, the nearest on top.
     auto enter = [](Walk& walk, const Ray& ray, const float* node, float reach, bool sorted) {
         auto slab = [&](int k, int lanes) {
             return (*(const LanesInMemory*)(node + lanes) - Lanes(ray.o[k])) * ray.inverse[k];
@@ -66,6 +68,7 @@ _RAY = """
         const Lanes enters_y = slab(1, ray.near[1]), leaves_y = slab(1, ray.near[1] ^ 8);
         const Lanes enters_z = slab(2, ray.near[2]), leaves_z = slab(2, ray.near[2] ^ 8);
         const Lanes begin = 0.0f, end = reach;
+        // Selects by comparison: NaN is treated the same on every processor.
         Lanes enters = enters_z > begin ? enters_z : begin;
         enters = enters_y > enters ? enters_y : enters;
         enters = enters_x > enters ? enters_x : enters;
@@ -82,6 +85,7 @@ _RAY = """
             hits &= hits - 1;
             const unsigned bits = __builtin_bit_cast(unsigned, (float)enters[lane]);
             const Entry entry = (Entry)bits << 32 | (unsigned)codes[lane];
+            // Insertion sort: a ray enters few of the eight boxes.
             int at = walk.top++;
             for (; sorted && at > first && walk.stack[at - 1] < entry; --at)
                 walk.stack[at] = walk.stack[at - 1];
@@ -89,7 +93,7 @@ _RAY = """
         }
     };
 
-    // The next code above a floor that begins before a reach; false if there is none.
+    // Pop the next code that begins within reach, down to a floor; false if there is none.
     auto next = [](Walk& walk, int floor, float reach, int& code) {
         while (walk.top > floor) {
             const Entry entry = walk.stack[--walk.top];
@@ -100,7 +104,7 @@ _RAY = """
         return false;
     };
 
-    // Meet eight triangles: whether any is nearer than what was met before.
+    // Watertight test of eight triangles (Woop et al. 2013): whether any hit is nearer than before.
     auto meet = [](const float* faces, const Ray& ray, Strike& strike) {
         const Lanes ox = ray.o[ray.kx], oy = ray.o[ray.ky], oz = ray.o[ray.kz];
         auto corner = [&](int axis, int k) {
@@ -115,6 +119,7 @@ _RAY = """
         const Lanes ay = corner(ray.ky, 0) - oy - az * ray.sy;
         const Lanes by = corner(ray.ky, 1) - oy - bz * ray.sy;
         const Lanes cy = corner(ray.ky, 2) - oy - cz * ray.sy;
+        // Scaled barycentric weights: edge functions in the sheared plane.
         const Lanes u = cx * by - cy * bx, v = ax * cy - ay * cx, w = bx * ay - by * ax;
         Lanes low = u < v ? u : v, high = u > v ? u : v;
         low = low < w ? low : w;
@@ -122,6 +127,7 @@ _RAY = """
         const Lanes sum = u + v + w;
         const Lanes t = (u * az + v * bz + w * cz) * ray.sz / sum;
         const Lanes zero = 0.0f, reach = strike.t;
+        // All weights of one sign: faces have two sides, and shared edges leave no gap.
         const auto inside = (low >= zero) | (high <= zero);
         unsigned hits = __builtin_bit_cast(unsigned char, __builtin_convertvector(
             inside & (t >= zero) & (t < reach), Mask));
@@ -129,6 +135,7 @@ _RAY = """
         while (hits) {
             const int lane = __builtin_ctz(hits);
             hits &= hits - 1;
+            // In lane order: equal distances keep the first face, whatever the processor.
             if (t[lane] < strike.t) {
                 strike.t = t[lane];
                 strike.u = u[lane] / sum[lane];
@@ -139,7 +146,7 @@ _RAY = """
         return any;
     };
 
-    // Go through a mesh: whether any face is nearer than what was met before.
+    // Traverse a mesh: whether any face is nearer than before.
     auto search = [&](Walk& walk, const float* tree, const Ray& ray, Strike& strike, bool any) {
         const int floor = walk.top;
         int code = *(const int*)tree;
@@ -177,7 +184,7 @@ _IN_SCENE = """
             continue;
         }
         const auto& placed = bodies.data[-1 - code];
-        if (placed.pierced & through)
+        if (placed.cutouts & through)
             continue;
         const wp::vec3 begin = mul(placed.B_mesh_world, o) + placed.t_mesh_world;
         start(local, begin, mul(placed.B_mesh_world, d));
@@ -206,7 +213,7 @@ _IN_SCENE_ON_CUDA = """
     int body = -1, b = 0;
     while (!(ANY && body >= 0) && wp::bvh_query_next(candidates, b, strike.t)) {
         const auto& placed = bodies.data[b];
-        if (placed.pierced & through)
+        if (placed.cutouts & through)
             continue;
         const wp::vec3 begin = mul(placed.B_mesh_world, o) + placed.t_mesh_world;
         if (search(geometries.data[placed.geometry].mesh, begin, mul(placed.B_mesh_world, d)))
@@ -226,13 +233,13 @@ _FOUND = """
 
 
 def _snippet(cpu: str, cuda: str, *, first: bool) -> str:
-    """One text for both devices.
+    """Source of one native function for both devices.
 
-    On the CPU it is a function out of line: most modules go through trees in several places.
+    On the CPU it is compiled out of line: most modules traverse trees in several places.
 
     Args:
-        cpu, cuda: Look for a ``body`` and its ``strike``, either one (if ``ANY``) or the first.
-        first: Whether to tell all about the first, or whether there is any.
+        cpu, cuda: Code that finds a ``body`` and its ``strike``: any one (if ``ANY``) or the first.
+        first: Whether to return the first intersection, or whether there is any.
     """
     any_only = f"constexpr bool ANY = {str(not first).lower()};"
     told = _FOUND if first else "    return body >= 0;\n"
@@ -252,7 +259,7 @@ def _snippet(cpu: str, cuda: str, *, first: bool) -> str:
 def first_in_mesh(
     tree: wp.array(dtype=wp.float32), mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
 ) -> wp.spatial_vectord:
-    """The first face along a ray in the mesh frame, nearer than a parameter."""
+    """The first face along a ray in the mesh frame, before a parameter."""
     ...
 
 
@@ -275,7 +282,7 @@ def first_in_scene(
     reach: float,
     through: int,
 ) -> wp.spatial_vectord:
-    """The first face along a ray of all bodies but those that are pierced by what it passes."""
+    """The first face along a ray, of all bodies without the cut-outs that ``through`` names."""
     ...
 
 
@@ -290,5 +297,5 @@ def any_in_scene(
     reach: float,
     through: int,
 ) -> bool:
-    """Whether a ray meets any body but those that are pierced by what it passes."""
+    """Whether a ray meets any body without the cut-outs that ``through`` names."""
     ...

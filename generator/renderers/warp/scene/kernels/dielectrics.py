@@ -1,4 +1,4 @@
-"""Light at the border of two clear media, and at panes between two of them.
+"""Fresnel reflection and refraction at dielectric interfaces and thin panes.
 
 Sources: Born and Wolf, "Principles of Optics", 1.5.2 (Fresnel's formulae); Snell's law as in Pharr,
 Jakob and Humphreys, "Physically Based Rendering", 4th ed., 9.3.
@@ -17,7 +17,7 @@ WATER_F0 = wp.constant(0.02)
 
 @wp.func
 def fresnel_schlick(f0: float, cosine: float):
-    """Reflectance by Schlick's fit to Fresnel's formulae, 1994; ``f0`` at normal incidence."""
+    """Reflectance by Schlick's approximation, 1994; ``f0`` at normal incidence."""
     grazing = 1.0 - cosine
     squared = grazing * grazing
     return f0 + (1.0 - f0) * squared * squared * grazing
@@ -25,31 +25,31 @@ def fresnel_schlick(f0: float, cosine: float):
 
 @wp.func
 def fresnel_dielectric(cosine: float, eta: float):
-    """Reflectance for unpolarised light; 1 where all of it is reflected.
+    """Reflectance of unpolarised light; 1 for total internal reflection.
 
     Args:
         cosine: Of the angle of incidence, [0, 1].
-        eta: Refractive index behind the border over that before it.
+        eta: Refractive index behind the interface over that before it.
     """
     reflectance = float(1.0)
-    # Snell's law; above 1 there is no direction behind: total reflection.
+    # Snell's law; a squared sine above 1 has no refracted direction.
     sine2 = (1.0 - cosine * cosine) / (eta * eta)
     if sine2 < 1.0:
         behind = wp.sqrt(1.0 - sine2)
         across = (cosine - eta * behind) / (cosine + eta * behind)
         along = (eta * cosine - behind) / (eta * cosine + behind)
-        # Unpolarised light is half of each polarisation.
+        # The mean of both polarisations.
         reflectance = 0.5 * (across * across + along * along)
     return reflectance
 
 
 @wp.func
 def refract(d: wp.vec3, n: wp.vec3, eta: float):
-    """Unit direction behind a border; 0 where all light is reflected.
+    """Unit refracted direction; 0 for total internal reflection.
 
     Args:
         d: Unit direction of travel.
-        n: Unit normal against it.
+        n: Unit normal, facing the incident side.
         eta: As for fresnel_dielectric.
     """
     cosine = -wp.dot(n, d)
@@ -62,13 +62,14 @@ def refract(d: wp.vec3, n: wp.vec3, eta: float):
 
 @wp.func
 def pane_reflectance(f: float, tint: wp.vec3):
-    """Reflectance of a thin pane, all reflections between its faces summed.
+    """Reflectance of a thin pane with all inter-reflections.
 
     Args:
         f: Of one face.
-        tint: What one way through it leaves.
+        tint: Transmittance of one passage.
     """
-    # In, off the back face, out: the first term; each further pair of reflections adds f^2 t^2.
+    # Geometric series: enter, reflect at the back face, leave; each further pair of reflections
+    # adds a factor f^2 t^2. The small term avoids 0 / 0 at grazing incidence.
     part = (1.0 - f) * (1.0 - f) * f
     return wp.vec3(
         f + part * tint[0] * tint[0] / (1.0 - f * f * tint[0] * tint[0] + 1.0e-6),
@@ -80,7 +81,7 @@ def pane_reflectance(f: float, tint: wp.vec3):
 @wp.func
 def pane_transmittance(f: float, tint: wp.vec3):
     """Transmittance of a thin pane; arguments as for pane_reflectance."""
-    # The same series for what leaves by the back face.
+    # The same series for light that leaves by the back face.
     part = (1.0 - f) * (1.0 - f)
     return wp.vec3(
         part * tint[0] / (1.0 - f * f * tint[0] * tint[0] + 1.0e-6),

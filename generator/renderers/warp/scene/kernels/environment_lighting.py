@@ -1,4 +1,4 @@
-"""Light from all around.
+"""Environment lighting: irradiance, prefiltered reflections and the image itself.
 
 Sources: Ramamoorthi and Hanrahan, "An efficient representation for irradiance environment maps",
 SIGGRAPH 2001; Karis, "Real shading in Unreal Engine 4", 2013 (prefiltered reflections); Cigolle et
@@ -20,7 +20,7 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 @wp.func
 def to_sky(sky: EnvironmentRecord, d: wp.vec3):
-    """World direction to the frame of the image."""
+    """Rotate a world direction into the frame of the image."""
     return wp.vec3(
         sky.cos_yaw * d[0] + sky.sin_yaw * d[1], sky.cos_yaw * d[1] - sky.sin_yaw * d[0], d[2]
     )
@@ -28,36 +28,37 @@ def to_sky(sky: EnvironmentRecord, d: wp.vec3):
 
 @wp.func
 def sky_irradiance(sky: EnvironmentRecord, n_world: wp.vec3):
-    """Irradiance over pi from the hemisphere around a normal."""
+    """Irradiance over pi from the hemisphere around a normal [cd/m^2]."""
     n = to_sky(sky, n_world)
     c = sky.irradiance
     e = c[0] + c[1] * n[1] + c[2] * n[2] + c[3] * n[0]
     e += c[4] * (n[0] * n[1]) + c[5] * (n[1] * n[2]) + c[6] * (3.0 * n[2] * n[2] - 1.0)
     e += c[7] * (n[0] * n[2]) + c[8] * (n[0] * n[0] - n[1] * n[1])
+    # Second-order harmonics may ring below zero opposite to a strong source.
     return wp.max(e, wp.vec3(0.0, 0.0, 0.0)) * sky.luminance
 
 
 @wp.func
 def sky_image(sky: EnvironmentRecord, d_world: wp.vec3):
-    """What is seen of the sky in one direction; any length."""
-    return panorama(sky.image, to_sky(sky, d_world)) * sky.luminance
+    """Luminance of the image in one direction of any length [cd/m^2]."""
+    return sample_panorama(sky.image, to_sky(sky, d_world)) * sky.luminance
 
 
 @wp.func
 def sky_rest(sky: EnvironmentRecord, d_world: wp.vec3):
-    """The same without what lamps stand for."""
-    return panorama(sky.rest, to_sky(sky, d_world)) * sky.luminance
+    """As sky_image, without the parts that lamps represent."""
+    return sample_panorama(sky.rest, to_sky(sky, d_world)) * sky.luminance
 
 
 @wp.func
-def panorama(image: wp.array(dtype=wp.vec3, ndim=2), direction: wp.vec3):
+def sample_panorama(image: wp.array(dtype=wp.vec3, ndim=2), direction: wp.vec3):
     """An equirectangular image in one direction of its own frame, bilinear; any length."""
     d = fast_normalize(direction)
     height = image.shape[0]
     width = image.shape[1]
     # Row 0 is the zenith and columns run clockwise from -X; texel centres are at halves.
     x = (0.5 - wp.atan2(d[1], d[0]) * (0.5 / wp.pi)) * float(width) - 0.5
-    # Clamped: rounding of a unit vector may leave 1 + 1e-7, whose arc cosine is NaN.
+    # Clamped: rounding may leave a unit vector's z at 1 + 1e-7, whose arc cosine is NaN.
     y = wp.acos(wp.clamp(d[2], -1.0, 1.0)) / wp.pi * float(height) - 0.5
     x0 = floor_int(x)
     y0 = floor_int(y)
@@ -75,7 +76,7 @@ def panorama(image: wp.array(dtype=wp.vec3, ndim=2), direction: wp.vec3):
 
 @wp.func
 def octahedral(d: wp.vec3):
-    """Direction to the square [-1, 1] x [-1, 1]."""
+    """Project a direction to the square [-1, 1] x [-1, 1]."""
     # Onto the octahedron |x| + |y| + |z| = 1 (Meyer et al., "On floating-point normal vectors",
     # 2010).
     s = 1.0 / (wp.abs(d[0]) + wp.abs(d[1]) + wp.abs(d[2]))
@@ -92,6 +93,7 @@ def octahedral(d: wp.vec3):
 @wp.func
 def glossy_level(sky: EnvironmentRecord, level: int, p: wp.vec2):
     """One prefiltered map at a point of the square; maps have a border of one texel."""
+    # The border repeats texels across the fold: bilinear taps need no special cases.
     inner = float(sky.glossy.shape[1] - 2)
     x = (p[0] * 0.5 + 0.5) * inner + 0.5
     y = (p[1] * 0.5 + 0.5) * inner + 0.5
@@ -106,7 +108,7 @@ def glossy_level(sky: EnvironmentRecord, level: int, p: wp.vec2):
 
 @wp.func
 def sky_reflection(sky: EnvironmentRecord, d_world: wp.vec3, roughness: float):
-    """Radiance around a mirrored direction, averaged over the lobe of that roughness."""
+    """Radiance averaged over the lobe of a roughness around a mirrored direction."""
     levels = sky.glossy.shape[0]
     level = roughness * float(levels) - 1.0
     p = octahedral(to_sky(sky, d_world))
@@ -118,14 +120,14 @@ def sky_reflection(sky: EnvironmentRecord, d_world: wp.vec3, roughness: float):
         rough = rough * (1.0 - part) + glossy_level(sky, upper, p) * part
     rough = rough * sky.luminance
     if level < 0.0:
-        # Below the first map, towards the image itself.
+        # Between the sharp image and the first map.
         rough = sky_rest(sky, d_world) * (-level) + rough * (1.0 + level)
     return rough
 
 
 @wp.func
 def octahedral_direction(x: float, y: float):
-    """The inverse of ``octahedral``, unit length."""
+    """The inverse of ``octahedral``; unit length."""
     # On the octahedron; negative in the folded corners, the lower half.
     z = 1.0 - wp.abs(x) - wp.abs(y)
     if z < 0.0:
@@ -143,9 +145,9 @@ def weigh_texels(
     size: int,
     shares: wp.array(dtype=float, ndim=2),
 ):
-    """Shares that an environment's texels have in the GGX lobe around each of a map's directions.
+    """Weights of an environment's texels in the GGX lobe around each direction of a map.
 
-    The lobe is that of a surface seen head-on, weighted by the cosine to the light as by Karis.
+    The lobe is that of a surface viewed head-on, weighted by the cosine to the light (Karis 2013).
 
     Args:
         directions, solid_angles: Of the environment's texels.
@@ -158,6 +160,7 @@ def weigh_texels(
     n = octahedral_direction(x / float(size) * 2.0 - 1.0, y / float(size) * 2.0 - 1.0)
     weight = float(0.0)
     a2 = alpha * alpha
+    # The GGX constant cancels in the normalisation below.
     for i in range(directions.shape[0]):
         c = wp.dot(n, directions[i])
         share = float(0.0)
@@ -179,7 +182,7 @@ def prefilter(
 ):
     """Average an environment over the lobe around each direction of an octahedral map.
 
-    Four texels of the map per thread: their sums do not wait for each other.
+    Four texels of the map per thread: independent sums hide the latency of additions.
     """
     first = 4 * wp.tid()
     a = wp.vec3(0.0)

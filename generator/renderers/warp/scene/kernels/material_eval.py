@@ -1,4 +1,4 @@
-"""What a surface looks like at a point: colour, roughness and normal from its textures."""
+"""Material evaluation: colour, roughness and normal of a surface from its textures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 @wp.struct
 class SurfaceMaterial:
-    """A surface with its textures looked up."""
+    """Material parameters at a point, textures included; ``normal`` in the world frame."""
 
     albedo: wp.vec3
     roughness: float
@@ -30,15 +30,15 @@ class SurfaceMaterial:
 
 
 @wp.func
-def mesh_mapped(
-    look: SurfaceMaterial,
+def apply_uv_texture(
+    material: SurfaceMaterial,
     world: World,
     texture: int,
     hit: wp.vec2i,
     weight: wp.vec2,
     footprint_m: float,
 ):
-    """Textures by the mesh's own UVs."""
+    """Apply a texture by the mesh's own UVs."""
     b = hit[0]
     g = world.bodies[b].geometry
     corner = face_vertices(world, g, hit[1])
@@ -54,29 +54,29 @@ def mesh_mapped(
     area_uv = d1[0] * d2[1] - d1[1] * d2[0]
     area_m2 = wp.length(wp.cross(e1, e2))
     size = float(world.textures[texture].width * world.textures[texture].height)
-    # Area of a pixel's footprint in texels; the level halves sides, hence half the logarithm.
+    # Area of the pixel's footprint in texels; a mip level halves sides, hence half the logarithm.
     texels = wp.abs(area_uv) * size * footprint_m * footprint_m / wp.max(area_m2, 1.0e-12)
     level = 0.5 * wp.log2(wp.max(texels, 1.0e-6))
     bumpy = world.textures[texture].has_bumps != 0
     texel = texel_at(world, texture, make_sampler(world, texture, level), uv[0], uv[1], bumpy)
-    look.albedo = wp.cw_mul(look.albedo, texel.albedo)
-    look.roughness *= texel.roughness
-    # Without an area in the texture there are no tangents: the normal stays.
+    material.albedo = wp.cw_mul(material.albedo, texel.albedo)
+    material.roughness *= texel.roughness
+    # Without an area in UV space there are no tangents: the normal stays.
     if bumpy and area_uv != 0.0:
         bump = texel.bump
         tangent = world.bodies[b].R_world_mesh @ ((e1 * d2[1] - e2 * d1[1]) / area_uv)
         bitangent = world.bodies[b].R_world_mesh @ ((e2 * d1[0] - e1 * d2[0]) / area_uv)
-        n = look.normal
-        # Gram and Schmidt: interpolated normals are not those of the flat face.
+        n = material.normal
+        # Gram-Schmidt: interpolated normals are not perpendicular to the face's tangents.
         tangent = fast_normalize(tangent - n * wp.dot(n, tangent))
         bitangent = fast_normalize(bitangent - n * wp.dot(n, bitangent))
-        look.normal = fast_normalize(tangent * bump[0] + bitangent * bump[1] + n * bump[2])
-    return look
+        material.normal = fast_normalize(tangent * bump[0] + bitangent * bump[1] + n * bump[2])
+    return material
 
 
 @wp.func
-def tilted(bump: wp.vec3, axis: int, n: wp.vec3):
-    """Normal of one projection, in the mesh frame.
+def tilt_normal(bump: wp.vec3, axis: int, n: wp.vec3):
+    """Perturbed normal of one projection, in the mesh frame.
 
     Source: Golus, "Normal mapping for a triplanar shader", 2017 (tangent offsets added).
     """
@@ -85,13 +85,13 @@ def tilted(bump: wp.vec3, axis: int, n: wp.vec3):
         offset = wp.vec3(0.0, bump[0], bump[1])
     elif axis == 1:
         offset = wp.vec3(bump[0], 0.0, bump[1])
-    # A texture may tilt a normal by 84 degrees at most: no side of it may face away.
+    # A texture tilts a normal by at most 84 degrees: no side of it may face away.
     return n * wp.max(bump[2], 0.1) + offset
 
 
 @wp.func
-def box_mapped(
-    look: SurfaceMaterial,
+def apply_triplanar_texture(
+    material: SurfaceMaterial,
     world: World,
     texture: int,
     b: int,
@@ -99,13 +99,13 @@ def box_mapped(
     scale_m: float,
     footprint_m: float,
 ):
-    """Textures projected along the body's three axes, blended where the surface turns."""
-    n = wp.transpose(world.bodies[b].R_world_mesh) @ look.normal
+    """Apply a texture projected along the body's three axes, blended by the normal."""
+    n = wp.transpose(world.bodies[b].R_world_mesh) @ material.normal
     p = p_mesh * (world.bodies[b].scale / scale_m)
     texels = footprint_m / scale_m * float(world.textures[texture].width)
     sampler = make_sampler(world, texture, wp.log2(wp.max(texels, 1.0e-3)))
     bumpy = world.textures[texture].has_bumps != 0
-    # Eighth powers: projections meet in a narrow band only.
+    # Weights are eighth powers of the normal, so that projections blend in a narrow band only.
     w = wp.cw_mul(n, n)
     w = wp.cw_mul(w, w)
     w = wp.cw_mul(w, w)
@@ -114,30 +114,30 @@ def box_mapped(
     roughness = float(0.0)
     m = wp.vec3(0.0)
     for axis in range(3):
-        # Less than one step of 8 bits: not worth a look into the texture.
+        # A weight below one step of 8 bits is not worth a texture lookup.
         if w[axis] > 0.004:
             uv = project_uv(p, axis)
             texel = texel_at(world, texture, sampler, uv[0], uv[1], bumpy)
             albedo += texel.albedo * w[axis]
             roughness += texel.roughness * w[axis]
-            m += tilted(texel.bump, axis, n) * w[axis]
-    look.albedo = wp.cw_mul(look.albedo, albedo)
-    look.roughness *= roughness
+            m += tilt_normal(texel.bump, axis, n) * w[axis]
+    material.albedo = wp.cw_mul(material.albedo, albedo)
+    material.roughness *= roughness
     if bumpy:
-        look.normal = fast_normalize(world.bodies[b].R_world_mesh @ m)
-    return look
+        material.normal = fast_normalize(world.bodies[b].R_world_mesh @ m)
+    return material
 
 
 @wp.func
 def plain_material(world: World, surface: int, normal: wp.vec3):
-    """The material of a surface without its textures."""
-    look = SurfaceMaterial()
-    look.albedo = world.surfaces[surface].base_color
-    look.roughness = world.surfaces[surface].roughness
-    look.metallic = world.surfaces[surface].metallic
-    look.specular = world.surfaces[surface].specular
-    look.normal = normal
-    return look
+    """Material of a surface without its textures."""
+    material = SurfaceMaterial()
+    material.albedo = world.surfaces[surface].base_color
+    material.roughness = world.surfaces[surface].roughness
+    material.metallic = world.surfaces[surface].metallic
+    material.specular = world.surfaces[surface].specular
+    material.normal = normal
+    return material
 
 
 @wp.func
@@ -150,20 +150,19 @@ def evaluate_material(
     width_m: float,
     v: wp.vec3,
 ):
-    """The material at a pixel that is that wide there, with its textures looked up.
-
-    ``v`` points to the viewer.
-    """
-    look = plain_material(world, surface, normal)
+    """Material at a pixel of the given width, textures included; ``v`` points to the viewer."""
+    material = plain_material(world, surface, normal)
     texture = world.surfaces[surface].texture
     if texture >= 0:
-        # Half-way between the short and the long axis of the footprint's ellipse.
+        # Geometric mean of the axes of the footprint's ellipse; bounded at grazing angles.
         slant = wp.sqrt(wp.max(wp.dot(normal, v), 0.05))
         footprint_m = width_m / slant
         scale_m = world.surfaces[surface].texture_scale_m
         if scale_m > 0.0:
             p_mesh = mesh_point(world, hit, weight)
-            look = box_mapped(look, world, texture, hit[0], p_mesh, scale_m, footprint_m)
+            material = apply_triplanar_texture(
+                material, world, texture, hit[0], p_mesh, scale_m, footprint_m
+            )
         else:
-            look = mesh_mapped(look, world, texture, hit, weight, footprint_m)
-    return look
+            material = apply_uv_texture(material, world, texture, hit, weight, footprint_m)
+    return material

@@ -1,4 +1,4 @@
-"""Rays through the two-level hierarchy: bodies above, each mesh's triangles below."""
+"""Ray queries through the two-level hierarchy: bodies above, each mesh's triangles below."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import warp as wp
 
 from gen_data.generator.renderers.warp.scene.kernels.alpha_test import (
     OUT_OF_LINE,
-    beyond_holes,
     closest_solid_hit,
+    first_opaque_hit,
     is_mesh_intersected,
 )
 from gen_data.generator.renderers.warp.scene.kernels.bvh_traverse import (
@@ -30,20 +30,20 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 FARTHEST = wp.constant(1.0e6)
-# What is lower than this over a surface keeps rain and snow off it.
+# Only obstacles lower than this above a surface shelter it from rain and snow.
 SHELTER_M = wp.constant(2.5)
-# What shadows pass.
+# Shadow rays pass both holes and clear faces.
 LIGHT = wp.constant(HOLES | CLEAR)
 
 
 @wp.struct
 class RayHit:
-    """Where a ray meets a surface.
+    """Intersection of a ray with a surface.
 
     Attributes:
-        at: (body, face); (-1, -1) where it meets none.
-        t: Parameter along the ray; how far it was followed where it meets nothing.
-        weight: Barycentric, of the face's second and third corner.
+        at: (body, face); (-1, -1) for a miss.
+        t: Parameter along the ray; for a miss, how far it was traced.
+        weight: Barycentric weights of the face's second and third corner.
     """
 
     at: wp.vec2i
@@ -57,7 +57,7 @@ def closest_hit(world: World, o: wp.vec3, d: wp.vec3, reach: float, through: int
 
     Args:
         reach: Largest parameter along the ray.
-        through: What it may pass, HOLES or CLEAR or both.
+        through: What the ray may pass: HOLES, CLEAR or both.
     """
     found = first_in_scene(
         world.tree, world.hierarchy, world.bodies, world.geometries, o, d, reach, through
@@ -66,23 +66,25 @@ def closest_hit(world: World, o: wp.vec3, d: wp.vec3, reach: float, through: int
     met.at = wp.vec2i(int(found[4]), int(found[3]))
     met.t = float(found[0])
     met.weight = wp.vec2(float(found[2]), 1.0 - float(found[1]) - float(found[2]))
-    if world.pierced_hierarchy != wp.uint64(0):
-        met = first_pierced(world, o, d, through, met)
+    # Bodies with cut-outs are few: the main traversal skips them, and they are tested after it, up
+    # to its hit.
+    if world.cutout_hierarchy != wp.uint64(0):
+        met = closest_cutout_hit(world, o, d, through, met)
     return met
 
 
 @wp.func(**OUT_OF_LINE)
-def first_pierced(world: World, o: wp.vec3, d: wp.vec3, through: int, before: RayHit):
-    """The first point of bodies that may be passed, or what the ray meets before."""
+def closest_cutout_hit(world: World, o: wp.vec3, d: wp.vec3, through: int, before: RayHit):
+    """The nearer of a hit and the first opaque point of bodies with cut-outs."""
     met = before
-    candidates = wp.bvh_query_ray(world.pierced_hierarchy, o, d)
+    candidates = wp.bvh_query_ray(world.cutout_hierarchy, o, d)
     k = int(0)
     while wp.bvh_query_next(candidates, k, met.t):
-        b = world.pierced[k]
-        if (world.bodies[b].pierced & through) != 0:
+        b = world.cutouts[k]
+        if (world.bodies[b].cutouts & through) != 0:
             origin = to_mesh_point(world, b, o)
             direction = to_mesh_vector(world, b, d)
-            strike = beyond_holes(world, b, origin, direction, met.t, through)
+            strike = first_opaque_hit(world, b, origin, direction, met.t, through)
             if strike.face >= 0:
                 met.t = strike.t
                 met.at = wp.vec2i(b, strike.face)
@@ -105,7 +107,7 @@ def trace_pixels(view: View, world: World, t_min: float, hits: wp.array(dtype=wp
 
 @wp.struct
 class Path:
-    """A straight way in the world, from 0 to 1."""
+    """A straight segment in the world, at parameters from 0 to 1."""
 
     origin: wp.vec3
     way: wp.vec3
@@ -114,11 +116,12 @@ class Path:
 
 @wp.func
 def path_along(origin: wp.vec3, way: wp.vec3):
-    """The path with the reciprocals that box tests need."""
+    """A path with the reciprocals that box tests need."""
     path = Path()
     path.origin = origin
     path.way = way
-    # A grain instead of zero: its reciprocal is large, and its sign does not matter.
+    # A tiny number instead of zero: its reciprocal is large but finite, and its sign does not
+    # matter.
     x = wp.where(wp.abs(way[0]) < 1.0e-20, 1.0e-20, way[0])
     y = wp.where(wp.abs(way[1]) < 1.0e-20, 1.0e-20, way[1])
     z = wp.where(wp.abs(way[2]) < 1.0e-20, 1.0e-20, way[2])
@@ -128,7 +131,7 @@ def path_along(origin: wp.vec3, way: wp.vec3):
 
 @wp.func
 def enters_box(world: World, b: int, path: Path):
-    """Whether a path may enter a body's box: settles most cases before a query is made."""
+    """Whether a path may enter a body's box; a cheap test before any query of its mesh."""
     a = wp.cw_mul(world.bodies[b].low_m - path.origin, path.inverse)
     c = wp.cw_mul(world.bodies[b].high_m - path.origin, path.inverse)
     enters = max_of_two(
@@ -137,12 +140,13 @@ def enters_box(world: World, b: int, path: Path):
     leaves = min_of_two(
         min_of_two(max_of_two(a[0], c[0]), max_of_two(a[1], c[1])), max_of_two(a[2], c[2])
     )
+    # The slab test: the path is inside all three pairs of planes at once.
     return max_of_two(enters, 0.0) <= min_of_two(leaves, 1.0)
 
 
 @wp.func
-def cut_by(world: World, b: int, path: Path, through: int):
-    """Whether a body cuts a path that passes what ``through`` says, HOLES or CLEAR or both."""
+def is_cut_by(world: World, b: int, path: Path, through: int):
+    """Whether a body intersects a path that passes ``through``: HOLES, CLEAR or both."""
     hit = enters_box(world, b, path)
     if hit:
         o = to_mesh_point(world, b, path.origin)
@@ -152,20 +156,20 @@ def cut_by(world: World, b: int, path: Path, through: int):
 
 
 @wp.func
-def blocked_by(world: World, b: int, path: Path):
-    """Whether a body keeps light off a path."""
-    return cut_by(world, b, path, LIGHT)
+def is_blocked_by(world: World, b: int, path: Path):
+    """Whether a body blocks light along a path."""
+    return is_cut_by(world, b, path, LIGHT)
 
 
 @wp.func
 def is_occluded(world: World, path: Path):
-    """Whether anything keeps light off a path."""
+    """Whether anything blocks light along a path."""
     return is_intersected(world, path, LIGHT)
 
 
 @wp.func
 def is_intersected(world: World, path: Path, through: int):
-    """Whether anything cuts a path that passes what ``through`` says."""
+    """Whether anything intersects a path that passes ``through``."""
     hit = any_in_scene(
         world.tree,
         world.hierarchy,
@@ -176,21 +180,21 @@ def is_intersected(world: World, path: Path, through: int):
         1.0,
         through,
     )
-    if not hit and world.pierced_hierarchy != wp.uint64(0):
-        hit = cut_by_pierced(world, path, through)
+    if not hit and world.cutout_hierarchy != wp.uint64(0):
+        hit = is_cut_by_cutouts(world, path, through)
     return hit
 
 
 @wp.func(**OUT_OF_LINE)
-def cut_by_pierced(world: World, path: Path, through: int):
-    """Whether a body that may be passed cuts a path."""
+def is_cut_by_cutouts(world: World, path: Path, through: int):
+    """Whether a body with cut-outs intersects a path."""
     hit = bool(False)
-    candidates = wp.bvh_query_ray(world.pierced_hierarchy, path.origin, path.way)
+    candidates = wp.bvh_query_ray(world.cutout_hierarchy, path.origin, path.way)
     k = int(0)
     while wp.bvh_query_next(candidates, k, 1.0):
-        b = world.pierced[k]
-        if (world.bodies[b].pierced & through) != 0:
-            hit = cut_by(world, b, path, through)
+        b = world.cutouts[k]
+        if (world.bodies[b].cutouts & through) != 0:
+            hit = is_cut_by(world, b, path, through)
             if hit:
                 break
     return hit
@@ -200,15 +204,16 @@ def cut_by_pierced(world: World, path: Path, through: int):
 def is_occluded_by_listed(
     world: World, lists: wp.array(dtype=int, ndim=3), tile: int, j: int, skip: int, path: Path
 ):
-    """Whether anything but ``skip`` cuts the path from a point of a tile to lamp j."""
+    """Whether any body but ``skip`` blocks the path from a point of a tile to lamp j."""
     hit = bool(False)
     count = lists[tile, j, 0]
     if count < 0:
+        # The list was too long to keep: query the whole scene.
         return is_occluded(world, path)
     for k in range(count):
         b = lists[tile, j, 1 + k]
         if b != skip:
-            hit = blocked_by(world, b, path)
+            hit = is_blocked_by(world, b, path)
             if hit:
                 break
     return hit
@@ -216,7 +221,7 @@ def is_occluded_by_listed(
 
 @wp.func
 def free_path(world: World, path: Path):
-    """The part of a path that is free, from 0 to 1."""
+    """Length of the unobstructed part of a path, from 0 to 1."""
     return closest_hit(world, path.origin, path.way, 1.0, LIGHT).t
 
 
@@ -224,7 +229,8 @@ def free_path(world: World, path: Path):
 def free_path_of_listed(
     world: World, lists: wp.array(dtype=int, ndim=3), tile: int, skip: int, path: Path
 ):
-    """The part of a path from a point of a tile that is free of anything but ``skip``."""
+    """Unobstructed part of a path from a point of a tile, ignoring the body ``skip``."""
+    # The last list is that of ambient occlusion.
     j = world.lamps.shape[0]
     free = float(1.0)
     count = lists[tile, j, 0]
@@ -233,13 +239,13 @@ def free_path_of_listed(
     for k in range(count):
         b = lists[tile, j, 1 + k]
         if b != skip:
-            free = freed_by(world, b, path, free)
+            free = free_path_before(world, b, path, free)
     return free
 
 
 @wp.func
-def freed_by(world: World, b: int, path: Path, free: float):
-    """The free part of a path before one body, at most ``free``."""
+def free_path_before(world: World, b: int, path: Path, free: float):
+    """Unobstructed part of a path in front of one body, at most ``free``."""
     if enters_box(world, b, path):
         o = to_mesh_point(world, b, path.origin)
         d = to_mesh_vector(world, b, path.way)
@@ -251,7 +257,9 @@ def freed_by(world: World, b: int, path: Path, free: float):
 
 @wp.func
 def precipitation_exposure(world: World, origin: wp.vec3):
-    """Share of what falls that reaches a point: a ray up, astray by where the point is."""
+    """Exposure of a point to precipitation: 1 or 0, by one upward ray."""
+    # The ray is tilted by a smooth function of position: edges of shelter become irregular, without
+    # a random number.
     x = origin[0] * 5.0
     y = origin[1] * 5.0
     east = 0.15 * wp.sin(1.7 * x + 2.3 * wp.sin(1.3 * y))

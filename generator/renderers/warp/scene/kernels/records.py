@@ -1,16 +1,17 @@
-"""What the host hands to kernels."""
+"""Records that the host passes to kernels, and functions on them."""
 
 from __future__ import annotations
 
 import warp as wp
 
 NOTHING = wp.constant(-1)
-# Smoother surfaces mirror what is around them; on others an environment will do.
+# Smoother surfaces show reflections of the scene; for rougher ones the environment suffices.
 MIRROR_ROUGHNESS = wp.constant(0.1)
 PINHOLE = wp.constant(0)
 BROWN_CONRADY = wp.constant(1)
 KANNALA_BRANDT = wp.constant(2)
 EQUIRECTANGULAR = wp.constant(3)
+# Flags of cut-outs: bits that rays match against what they may pass.
 HOLES = wp.constant(1)
 CLEAR = wp.constant(2)
 
@@ -19,17 +20,17 @@ Coefficients = wp.types.vector(length=8, dtype=wp.float32)
 
 @wp.struct
 class View:
-    """A camera; image coordinates have pixel centres at i + 0.5.
+    """A camera; pixel centres are at i + 0.5.
 
     Attributes:
         inverse_fx, inverse_fy: Reciprocal focal lengths [1/px].
         lens: PINHOLE, or one of the models of gen_data.generator.core.lens.
-        coefficients: Of the lens.
-        directions: Unit, camera frame, through every pixel centre, and in the fourth place the
-            angle that the pixel covers, 0 where the lens shows nothing; empty for a pinhole.
+        coefficients: Distortion coefficients of the lens.
+        directions: Unit directions in the camera frame through every pixel centre; the fourth
+            component is the pixel's angle [rad], 0 outside the lens's field. Empty for a pinhole.
         R_world_camera: Camera X right, Y down, Z forward.
         eye_m: Camera centre in the world.
-        pixel_rad: Angle one pixel covers at the image centre.
+        pixel_rad: Angle of a pixel at the image centre [rad].
     """
 
     width: int
@@ -54,10 +55,10 @@ class Geometry:
 
     Attributes:
         mesh: Warp's hierarchy, on CUDA; 0 on the CPU.
-        tree: That of gen_data.generator.renderers.warp.scene.bvh, on the CPU; empty on CUDA.
+        tree: Hierarchy of gen_data.generator.renderers.warp.scene.bvh, on the CPU; empty on CUDA.
         faces: Three vertex indices per face, flat.
-        box_lows_m, box_highs_m: Corners of boxes that together hold all faces.
-        convex: 1 where the mesh is a convex solid: seen from outside it never shades itself.
+        box_lows_m, box_highs_m: Corners of boxes that together bound all faces.
+        convex: 1 for a convex solid, which never shadows itself when seen from outside.
     """
 
     mesh: wp.uint64
@@ -80,22 +81,21 @@ class BodyRecord:
 
     Attributes:
         geometry: Index into the geometries.
-        first_vertex: Where its vertices begin in per-view vertex buffers.
-        first_material: Where its slots begin in the materials.
+        first_vertex: First of its vertices in per-view vertex buffers.
+        first_material: First of its slots in the materials.
         A_camera_mesh, t_camera_mesh: Mesh to camera, scale included.
         B_mesh_camera: Camera direction to mesh direction, scale included.
         eye_mesh: The camera's centre in the mesh frame.
         R_world_mesh, t_world_mesh: Rotation without scale, and position.
         B_mesh_world, t_mesh_world: World to mesh, scale included.
         low_m, high_m: Box in the world.
-        pierced: HOLES, CLEAR or both, where rays may pass some of its faces; else 0, and no face
-            is looked at more closely.
+        cutouts: HOLES, CLEAR or both if rays may pass some of its faces; 0 needs no test per face.
     """
 
     geometry: int
     first_vertex: int
     first_material: int
-    pierced: int
+    cutouts: int
     scale: float
     A_camera_mesh: wp.mat33
     t_camera_mesh: wp.vec3
@@ -115,14 +115,13 @@ class MaterialRecord:
 
     Attributes:
         texture: Index into the textures; -1 where there is none.
-        layered: 1 where there is more to it than colour, roughness and bumps: a coat, light that
-            goes through, maps of emission, metal or occlusion, or a mirror; else nothing below
-            is read.
+        layered: 1 for a coat, transmission, maps of emission, metal or occlusion, or a mirror; for
+            0 the fields below are unused.
         coat, coat_roughness: Weight and perceptual roughness of the clear coat.
-        transmission: Share of the light below the specular layer that goes through.
-        ior: Refractive index of what transmits.
-        thin: 1 for a pane that bends nothing, 0 for a solid that refracts.
-        opacity: Share of what is behind that it hides.
+        transmission: Share of the light below the specular layer that is transmitted.
+        ior: Refractive index of a transmitting material.
+        thin: 1 for a pane that does not refract, 0 for a solid that does.
+        opacity: Share of the background that it hides.
     """
 
     base_color: wp.vec3
@@ -143,14 +142,14 @@ class MaterialRecord:
 
 @wp.struct
 class TextureRecord:
-    """Mip chains of one texture, levels one after the other, rows from the top.
+    """Mip chains of one texture, levels concatenated, rows from the top.
 
     Attributes:
-        texels: Albedo as square roots of linear values and roughness factor, 8 bits each
-            (red lowest).
+        texels: Albedo as square roots of linear values and roughness factor, 8 bits each (red
+            lowest).
         bumps: Tangent-space normals, 8 bits each; empty where there are none.
-        shares: Factors on metallic (lowest byte) and occlusion of ambient light; empty where
-            there are none.
+        shares: Factors on metallic (lowest byte) and occlusion of ambient light; empty where there
+            are none.
         glow: Factor on emission as square roots of linear values; empty where there is none.
         cover: Coverage of the finest level; empty where there are no holes.
         offsets: First texel of each level.
@@ -177,16 +176,16 @@ class LightRecord:
 
     Attributes:
         position_m: Centre (all but sun).
-        direction: In which the light travels; a panel's normal, on the side that shines.
+        direction: Direction of the light's travel; a panel's normal on its emitting side.
         power: Colour times intensity [cd] (all but sun) or illuminance [lx] (sun).
-        radiance: Of a panel's front, the same from everywhere [cd/m^2].
+        radiance: Radiance of a panel's front [cd/m^2], independent of direction.
         along, across: From a panel's centre to the middles of two of its sides, or to its rim [m];
             they are at right angles to each other and to ``direction``.
-        radius: Of the ball or the disk, or of the circle around the rectangle [m], or tangent of
-            the sun's angular radius.
-        shown: 1 where rays find it: a body before which a panel hangs, a part of a panorama.
-        cos_outer, cos_inner: Where a spot has faded to nothing, and where it begins to fade.
-        cutoff: Slope below which a dipped headlight lights the road; 0 = no such light.
+        radius: Radius of the sphere, the disk or the rectangle's circumscribed circle [m], or
+            tangent of the sun's angular radius.
+        shown: 1 if rays hit a visible counterpart: a body behind a panel, a part of a panorama.
+        cos_outer, cos_inner: Cosines at which a spot's intensity reaches zero and begins to fall.
+        cutoff: Slope of a dipped headlight's cut-off; 0 for other lamps.
     """
 
     kind: int
@@ -205,17 +204,17 @@ class LightRecord:
 
 @wp.struct
 class EnvironmentRecord:
-    """Light from all around.
+    """Environment lighting.
 
     Attributes:
-        irradiance: Nine coefficients of irradiance / pi in the world frame, basis of
-            Ramamoorthi and Hanrahan 2001.
+        irradiance: Nine coefficients of irradiance / pi in the world frame, basis of Ramamoorthi
+            and Hanrahan 2001.
         glossy: Radiance convolved with GGX lobes on octahedral maps [level, row, column]; level
             ``k`` has perceptual roughness ``k / (levels - 1)``.
-        image: Equirectangular radiance for pixels that see no body.
-        rest: The same without what lamps stand for, as is all that lights and is mirrored.
+        image: Equirectangular radiance, for pixels without a body.
+        rest: The same without the parts that lamps represent, as are irradiance and reflections.
         cos_yaw, sin_yaw: Rotation of the image about world Z.
-        visible: Whether such pixels show the image.
+        visible: Whether pixels without a body show the image.
     """
 
     irradiance: wp.array(dtype=wp.vec3)
@@ -230,14 +229,14 @@ class EnvironmentRecord:
 
 @wp.struct
 class GroundRecord:
-    """What weather has left on surfaces.
+    """Wetness and snow on surfaces.
 
     Attributes:
-        covered: 0 where everything is dry and bare: then nothing else is read.
+        covered: 0 if everything is dry and bare; the other fields are then unused.
         wetness, puddles, snow_cover: As in ``gen_data.generator.core.scene.Weather``.
-        puddle_level, snow_level: Levels of the noise above which there is water, snow.
-        seed: Of the noise.
-        exposed: Share of what falls that reaches each point of the lattice, flat.
+        puddle_level, snow_level: Thresholds of the noise above which there is water or snow.
+        seed: Seed of the noise.
+        exposed: Exposure of each lattice point to precipitation, [0, 1], flat.
     """
 
     covered: int
@@ -252,9 +251,10 @@ class GroundRecord:
 
 @wp.func
 def pixel_direction(view: View, x_px: float, y_px: float):
-    """Direction in the camera frame: before a pinhole with z = 1, else of length 1.
+    """Direction in the camera frame: with z = 1 for a pinhole, else of unit length.
 
-    A ray's parameter, which images of depths hold, is its z-depth before a pinhole, else its range.
+    The parameter along a ray, which depth images hold, is therefore z-depth for a pinhole, else
+    range.
     """
     d = wp.vec3((x_px - view.cx) * view.inverse_fx, (y_px - view.cy) * view.inverse_fy, 1.0)
     if view.lens != PINHOLE:
@@ -264,7 +264,7 @@ def pixel_direction(view: View, x_px: float, y_px: float):
 
 @wp.func
 def distorted_direction(view: View, x_px: float, y_px: float):
-    """Unit direction through a point of the image, from those through the centres around it."""
+    """Unit direction through a point of the image, interpolated from pixel centres."""
     x = wp.clamp(int(x_px), 0, view.width - 1)
     y = wp.clamp(int(y_px), 0, view.height - 1)
     i = y * view.width + x
@@ -307,7 +307,7 @@ def is_in_view(view: View, i: int):
 
 @wp.func
 def pixel_width(view: View, i: int, depth_m: float):
-    """Width of pixel i at what it sees there [m]; depths as ``pixel_direction`` has them."""
+    """Width of pixel i at the depth of its surface [m]; depth as of ``pixel_direction``."""
     width_m = depth_m * view.pixel_rad
     if view.lens != PINHOLE:
         width_m = depth_m * view.directions[i][3]
@@ -316,53 +316,54 @@ def pixel_width(view: View, i: int, depth_m: float):
 
 @wp.func
 def fast_normalize(v: wp.vec3):
-    """The unit vector along v; one division where ``wp.normalize`` takes three."""
+    """Unit vector along v, with one division instead of three of ``wp.normalize``."""
+    # The floor leaves the zero vector zero instead of NaN.
     return v * (1.0 / wp.sqrt(wp.max(wp.dot(v, v), 1.0e-30)))
 
 
 @wp.func
 def min_of_two(a: float, b: float):
-    """The smaller of two numbers; one instruction, where ``wp.min`` also looks for NaN."""
+    """The smaller of two numbers; one instruction, while ``wp.min`` also handles NaN."""
     return wp.where(a < b, a, b)
 
 
 @wp.func
 def max_of_two(a: float, b: float):
-    """The larger of two numbers."""
+    """The larger of two numbers; as ``min_of_two``."""
     return wp.where(a > b, a, b)
 
 
 @wp.func
 def componentwise_min(a: wp.vec3, b: wp.vec3):
-    """The smaller of each coordinate."""
+    """Componentwise minimum."""
     return wp.vec3(min_of_two(a[0], b[0]), min_of_two(a[1], b[1]), min_of_two(a[2], b[2]))
 
 
 @wp.func
 def componentwise_max(a: wp.vec3, b: wp.vec3):
-    """The larger of each coordinate."""
+    """Componentwise maximum."""
     return wp.vec3(max_of_two(a[0], b[0]), max_of_two(a[1], b[1]), max_of_two(a[2], b[2]))
 
 
 @wp.func
 def first_weight(weight: wp.vec2):
-    """Barycentric weight of a face's second corner, from what images of weights hold.
+    """Barycentric weight of a face's second corner, from a stored weight.
 
-    They have 2 added to it where the inside of the face is seen: see ``seen_inside``.
+    Stored weights have 2 added where the back of the face is visible: see ``is_back_face``.
     """
     return wp.where(weight[0] > 1.5, weight[0] - 2.0, weight[0])
 
 
 @wp.func
-def seen_inside(weight: wp.vec2):
-    """Whether the inside of a face is seen, from what images of weights hold."""
-    # Half-way between the largest weight, 1, and the smallest with 2 added to it.
+def is_back_face(weight: wp.vec2):
+    """Whether a stored weight marks the back of a face."""
+    # Half-way between 1, the largest weight, and 2, the smallest with the mark.
     return weight[0] > 1.5
 
 
 @wp.func
 def floor_int(x: float):
-    """The largest integer <= x; ``wp.floor`` is a library call on the plainest processors."""
+    """The largest integer <= x; ``wp.floor`` is a library call on baseline x86-64."""
     i = int(x)
     if float(i) > x:
         i -= 1
@@ -371,21 +372,21 @@ def floor_int(x: float):
 
 @wp.struct
 class World:
-    """Everything that is not the camera.
+    """The scene without the camera.
 
     Attributes:
-        tree: Over the bodies' boxes, see gen_data.generator.renderers.warp.scene.bvh; empty on
-            CUDA.
-        hierarchy: Warp's over the same, on CUDA; 0 on the CPU.
-        pierced: Bodies of which rays may pass some faces.
-        pierced_hierarchy: Warp's over their boxes; 0 where there are none.
+        tree: Hierarchy over the bodies' boxes, see gen_data.generator.renderers.warp.scene.bvh;
+            empty on CUDA.
+        hierarchy: Warp's hierarchy over the same boxes, on CUDA; 0 on the CPU.
+        cutouts: Numbers of the bodies with faces that rays may pass.
+        cutout_hierarchy: Warp's hierarchy over their boxes; 0 without any.
         lobes: Directional albedo of specular lobes, see brdf.directional_albedo.
     """
 
     tree: wp.array(dtype=wp.float32)
     hierarchy: wp.uint64
-    pierced: wp.array(dtype=wp.int32)
-    pierced_hierarchy: wp.uint64
+    cutouts: wp.array(dtype=wp.int32)
+    cutout_hierarchy: wp.uint64
     geometries: wp.array(dtype=Geometry)
     bodies: wp.array(dtype=BodyRecord)
     surfaces: wp.array(dtype=MaterialRecord)
@@ -396,19 +397,19 @@ class World:
     ground: GroundRecord
 
 
-# Functions take a World and an index rather than a BodyRecord or a Geometry: a record that is
-# copied costs more than the few of its fields that are read.
+# Functions take a World and an index rather than a BodyRecord or a Geometry: copying a record costs
+# more than reading the few fields that are needed.
 
 
 @wp.func
 def to_mesh_point(world: World, b: int, p_world: wp.vec3):
-    """World point to the mesh frame of body b."""
+    """Transform a world point to the mesh frame of body b."""
     return world.bodies[b].B_mesh_world @ p_world + world.bodies[b].t_mesh_world
 
 
 @wp.func
 def to_mesh_vector(world: World, b: int, v_world: wp.vec3):
-    """World displacement to the mesh frame of body b."""
+    """Transform a world displacement to the mesh frame of body b."""
     return world.bodies[b].B_mesh_world @ v_world
 
 
@@ -431,7 +432,7 @@ def vertex_at(world: World, g: int, i: int):
 
 @wp.func
 def flat_normal(world: World, hit: wp.vec2i):
-    """Unit normal of a (body, face) in the world, on the side where its corners turn left."""
+    """Unit geometric normal of a (body, face) in the world, on its front."""
     g = world.bodies[hit[0]].geometry
     corner = face_vertices(world, g, hit[1])
     p = vertex_at(world, g, corner[0])
@@ -447,6 +448,6 @@ def normal_at(world: World, g: int, i: int):
 
 @wp.func
 def surface_index(world: World, hit: wp.vec2i):
-    """The material of a (body, face)."""
+    """Index of the material of a (body, face)."""
     g = world.bodies[hit[0]].geometry
     return world.bodies[hit[0]].first_material + world.geometries[g].face_slots[hit[1]]

@@ -1,4 +1,4 @@
-"""Patches: faces on which a texture is looked up quickly."""
+"""Patches: flat faces whose texture coordinates are linear in space, for fast lookups."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 @wp.struct
 class Patch:
-    """A face whose texture coordinates are linear in space, and whose normal is one, if ``flat``.
+    """A face with linear texture coordinates and a single normal, if ``flat``.
 
-    The coordinate u of the point at depth z along a direction d of the camera frame (with z = 1)
-    is ``u + dot(to_u, d) * z``; v likewise.
+    The coordinate u of the point at depth z along a direction d of the camera frame (with z = 1) is
+    ``u + dot(to_u, d) * z``; v likewise.
 
     Attributes:
         face: (body, face).
-        texels_per_m: Square root of the texels per area, of the finest mip level.
-        tangent, bitangent, normal: Frame of the normal map, world.
+        texels_per_m: Square root of texels per area, at the finest mip level.
+        tangent, bitangent, normal: Tangent frame of the normal map, world.
     """
 
     face: wp.vec2i
@@ -41,12 +41,13 @@ class Patch:
 
 
 @wp.func
-def with_mapping(
+def set_mapping(
     patch: Patch, world: World, b: int, g_u: wp.vec3, c_u: float, g_v: wp.vec3, c_v: float
 ):
-    """The patch with coordinates that are ``c_u + dot(g_u, p)`` at points p of the mesh frame."""
+    """Patch with coordinates ``c_u + dot(g_u, p)`` at points p of the mesh frame; v likewise."""
     eye = world.bodies[b].eye_mesh
     to_camera = wp.transpose(world.bodies[b].B_mesh_camera)
+    # Folding the camera's pose into the gradients leaves one dot product per pixel.
     patch.u = c_u + wp.dot(g_u, eye)
     patch.v = c_v + wp.dot(g_v, eye)
     patch.to_u = to_camera @ g_u
@@ -56,8 +57,9 @@ def with_mapping(
 
 
 @wp.func
-def box_patch(patch: Patch, world: World, surface: int, b: int, n: wp.vec3):
-    """Projected textures, where one projection is all that counts (see look.box_mapped)."""
+def triplanar_patch(patch: Patch, world: World, surface: int, b: int, n: wp.vec3):
+    """Patch of a projected texture where one projection dominates."""
+    # As material_eval.apply_triplanar_texture, which blends all three.
     squared = wp.cw_mul(n, n)
     x = wp.vec3(1.0, 0.0, 0.0)
     y = wp.vec3(0.0, 1.0, 0.0)
@@ -72,12 +74,12 @@ def box_patch(patch: Patch, world: World, surface: int, b: int, n: wp.vec3):
         largest = squared[2]
         along_u = x
         along_v = y
-    # The other two weigh less than 0.004 in eighth powers.
+    # The other two projections then have weights below 0.004 (eighth powers), which are skipped.
     if wp.dot(n, n) - largest < 0.2 * largest:
         scale_m = world.surfaces[surface].texture_scale_m
         texture = world.surfaces[surface].texture
         scale = world.bodies[b].scale / scale_m
-        patch = with_mapping(patch, world, b, along_u * scale, 0.0, along_v * scale, 0.0)
+        patch = set_mapping(patch, world, b, along_u * scale, 0.0, along_v * scale, 0.0)
         patch.texels_per_m = float(world.textures[texture].width) / scale_m
         patch.tangent = world.bodies[b].R_world_mesh @ along_u
         patch.bitangent = world.bodies[b].R_world_mesh @ along_v
@@ -85,8 +87,8 @@ def box_patch(patch: Patch, world: World, surface: int, b: int, n: wp.vec3):
 
 
 @wp.func
-def mesh_patch(patch: Patch, world: World, texture: int, b: int, corner: wp.vec3i):
-    """Textures by the mesh's own UVs (see look.mesh_mapped)."""
+def uv_patch(patch: Patch, world: World, texture: int, b: int, corner: wp.vec3i):
+    """Patch of a texture mapped by the mesh's own UVs, as material_eval.apply_uv_texture."""
     g = world.bodies[b].geometry
     p = vertex_at(world, g, corner[0])
     e1 = vertex_at(world, g, corner[1]) - p
@@ -103,7 +105,7 @@ def mesh_patch(patch: Patch, world: World, texture: int, b: int, corner: wp.vec3
         along_2 = wp.cross(n, e1) * (1.0 / squared)
         g_u = along_1 * d1[0] + along_2 * d2[0]
         g_v = along_1 * d1[1] + along_2 * d2[1]
-        patch = with_mapping(
+        patch = set_mapping(
             patch, world, b, g_u, uv0[0] - wp.dot(g_u, p), g_v, uv0[1] - wp.dot(g_v, p)
         )
         scale = world.bodies[b].scale
@@ -120,7 +122,7 @@ def mesh_patch(patch: Patch, world: World, texture: int, b: int, corner: wp.vec3
 
 @wp.func
 def patch_at(world: World, surface: int, hit: wp.vec2i, normal: wp.vec3):
-    """The patch of a textured (body, face), seen where its normal is ``normal``."""
+    """The patch of a textured (body, face) at a point with the given normal."""
     patch = Patch()
     patch.face = hit
     patch.normal = normal
@@ -130,9 +132,10 @@ def patch_at(world: World, surface: int, hit: wp.vec2i, normal: wp.vec3):
     n = normal_at(world, g, corner[0])
     turn = wp.dot(n, normal_at(world, g, corner[1]))
     turn = wp.min(turn, wp.dot(n, normal_at(world, g, corner[2])))
+    # Vertex normals within 0.8 degrees: shading treats the face as flat.
     if turn > 0.9999:
         if world.surfaces[surface].texture_scale_m > 0.0:
-            patch = box_patch(patch, world, surface, b, n)
+            patch = triplanar_patch(patch, world, surface, b, n)
         else:
-            patch = mesh_patch(patch, world, world.surfaces[surface].texture, b, corner)
+            patch = uv_patch(patch, world, world.surfaces[surface].texture, b, corner)
     return patch

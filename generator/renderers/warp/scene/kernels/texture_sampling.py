@@ -1,4 +1,4 @@
-"""Textures: bilinear taps of mip levels chosen by the footprint of a pixel."""
+"""Texture sampling: bilinear taps of mip levels chosen by a pixel's footprint."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from gen_data.generator.renderers.warp.scene.kernels.records import World, floor
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
+# Mask of every second byte: two bytes are weighted by one multiplication without overlapping.
 EVEN_BYTES = wp.constant(wp.uint32(0x00FF00FF))
 LOW_HALF = wp.constant(wp.uint32(0xFFFF))
-# Four bytes, each times weights that sum to 256.
+# 255 times the weights' sum of 256: full scale of a weighted sum of bytes.
 FULL = wp.constant(65280.0)
 
 
 @wp.struct
 class Taps:
-    """Addresses of the four texels around a point, and weights in 1/256."""
+    """Addresses of the four texels around a point, with weights in 1/256."""
 
     a: int
     b: int
@@ -30,7 +31,7 @@ class Taps:
 
 @wp.struct
 class Texel:
-    """What a texture says at a point: linear albedo, factor on roughness, tangent-space normal."""
+    """Values of a texture at a point: linear albedo, factor on roughness, tangent-space normal."""
 
     albedo: wp.vec3
     roughness: float
@@ -39,11 +40,11 @@ class Texel:
 
 @wp.struct
 class Sampler:
-    """Where a texture is looked up for one size of footprint.
+    """A texture's mip levels for one size of footprint.
 
     Attributes:
-        first, width, height: Of the mip level.
-        coarser_first: Of the next level, which is mixed in by ``part``; not looked at if that is 0.
+        first, width, height: First texel and size of the finer mip level.
+        coarser_first: Of the next level, blended with weight ``part``; unused if that is 0.
     """
 
     first: int
@@ -55,10 +56,10 @@ class Sampler:
 
 @wp.func
 def make_sampler(world: World, texture: int, level: float):
-    """The sampler between two mip levels."""
+    """The sampler of a fractional mip level."""
     bounded = wp.clamp(level, 0.0, float(world.textures[texture].levels - 1))
     lower = int(bounded)
-    # Levels are blended over the middle half of their distance only: half the taps elsewhere.
+    # Levels blend over the middle half of their distance only: elsewhere half the taps suffice.
     part = wp.clamp(2.0 * (bounded - float(lower)) - 0.5, 0.0, 1.0)
     if part == 1.0:
         lower += 1
@@ -75,8 +76,8 @@ def make_sampler(world: World, texture: int, level: float):
 
 @wp.func
 def taps_at(first: int, width: int, height: int, u: float, v: float):
-    """The texels of a level around (u, v), which wraps around; v grows upwards, rows downwards."""
-    # Beyond what an integer holds there is no place within a texel left to speak of.
+    """Texels of a level around (u, v), which repeats; v grows upwards, rows downwards."""
+    # Beyond this, single precision holds no position within a texel.
     u = wp.clamp(u, -1.0e6, 1.0e6)
     v = wp.clamp(v, -1.0e6, 1.0e6)
     x = (u - float(floor_int(u))) * float(width) - 0.5
@@ -95,6 +96,7 @@ def taps_at(first: int, width: int, height: int, u: float, v: float):
     t.b = first + y0 * width + x1
     t.c = first + y1 * width + x0
     t.d = first + y1 * width + x1
+    # Three weights are derived from one product, so that all four sum to exactly 256.
     t.wd = (right * down) >> wp.uint32(8)
     t.wb = right - t.wd
     t.wc = down - t.wd
@@ -104,11 +106,12 @@ def taps_at(first: int, width: int, height: int, u: float, v: float):
 
 @wp.func
 def mix_texels(texels: wp.array(dtype=wp.uint32), t: Taps):
-    """Weighted sum of four texels of four bytes each, two bytes per multiplication."""
+    """Weighted sum of four texels of four bytes each."""
     a = texels[t.a]
     b = texels[t.b]
     c = texels[t.c]
     d = texels[t.d]
+    # A byte times 256 fits the 16 bits of its lane: no carry reaches the next one.
     even = (a & EVEN_BYTES) * t.wa + (b & EVEN_BYTES) * t.wb
     even += (c & EVEN_BYTES) * t.wc + (d & EVEN_BYTES) * t.wd
     shift = wp.uint32(8)
@@ -125,11 +128,12 @@ def mix_texels(texels: wp.array(dtype=wp.uint32), t: Taps):
 
 @wp.func
 def texel_at(world: World, texture: int, s: Sampler, u: float, v: float, bumpy: bool):
-    """The texture at a point; normals only if they are asked for."""
+    """The texture at a point; normals only on request."""
     taps = taps_at(s.first, s.width, s.height, u, v)
     c = mix_texels(world.textures[texture].texels, taps)
     texel = Texel()
     if bumpy:
+        # Normals come from the finer level alone: blending them is not worth four more taps.
         m = mix_texels(world.textures[texture].bumps, taps) * (2.0 / FULL)
         texel.bump = wp.vec3(m[0] - 1.0, m[1] - 1.0, m[2] - 1.0)
     if s.part > 0.0:
@@ -138,7 +142,7 @@ def texel_at(world: World, texture: int, s: Sampler, u: float, v: float, bumpy: 
         upper = taps_at(s.coarser_first, width, height, u, v)
         c = c * (1.0 - s.part) + mix_texels(world.textures[texture].texels, upper) * s.part
     c = c * (1.0 / FULL)
-    # Colours are stored as square roots.
+    # Colours are stored as square roots of linear values.
     texel.albedo = wp.vec3(c[0] * c[0], c[1] * c[1], c[2] * c[2])
     texel.roughness = c[3]
     return texel

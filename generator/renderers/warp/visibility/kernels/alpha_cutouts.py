@@ -1,6 +1,6 @@
-"""Bodies with holes among bodies that are drawn: by rays, over what the rasteriser has left.
+"""Ray-traced bodies with cut-outs, merged into the rasteriser's z-buffer.
 
-Loaded only when a scene has such a body.
+Loaded only if a scene has such a body.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ FARTHEST = wp.constant(1.0e6)
 
 @wp.struct
 class CutoutBody:
-    """A body with holes, and the pixels that it may be seen at."""
+    """A body with cut-outs and the window of pixels that it may cover."""
 
     body: int
     window: Window
 
 
 @wp.func
-def within(window: Window, x: int, y: int):
+def is_in_window(window: Window, x: int, y: int):
     """Whether a pixel lies in a window."""
     right = x - window.x0
     down = y - window.y0
@@ -40,13 +40,13 @@ def within(window: Window, x: int, y: int):
 
 
 @wp.func
-def nearness_of(
+def trace_nearness(
     view: View, world: World, b: int, x_px: float, y_px: float, z_near_m: float, behind: float
 ):
-    """1/z of a body at a point of the image, and its face; (0, -1) where it is not in front.
+    """1/z of a body at a point of the image, and its face; (0, -1) if not in front.
 
     Args:
-        behind: 1/z of what is there already; 0 for nothing.
+        behind: 1/z of the nearest surface so far; 0 for none.
     """
     nearness = float(0.0)
     face = int(-1)
@@ -54,6 +54,7 @@ def nearness_of(
     o = to_mesh_point(world, b, view.eye_m + d * z_near_m)
     reach = float(FARTHEST)
     if behind > 0.0:
+        # With z = 1 in the direction, the ray's parameter is z-depth, counted from the near plane.
         reach = 1.0 / behind - z_near_m
     answer = closest_solid_hit(world, b, o, to_mesh_vector(world, b, d), reach, HOLES)
     if answer.face >= 0:
@@ -71,7 +72,7 @@ def trace_centres(
     nearness: wp.array(dtype=float),
     hits: wp.array(dtype=wp.vec2i),
 ):
-    """Z-buffer over pixel centres, as raster.draw_bodies; one row of the image per thread."""
+    """Z-buffer over pixel centres, as rasterizer.draw_bodies; one image row per thread."""
     y = wp.tid()
     for k in range(bodies.shape[0]):
         window = bodies[k].window
@@ -79,7 +80,7 @@ def trace_centres(
         if y >= window.y0 and y < window.y0 + window.height:
             for x in range(wp.max(window.x0, 0), wp.min(window.x0 + window.width, view.width)):
                 i = y * view.width + x
-                near, face = nearness_of(
+                near, face = trace_nearness(
                     view, world, b, float(x) + 0.5, float(y) + 0.5, z_near_m, nearness[i]
                 )
                 if near > nearness[i]:
@@ -98,7 +99,7 @@ def trace_samples(
     nearness: wp.array(dtype=float, ndim=2),
     hits: wp.array(dtype=wp.vec2i, ndim=2),
 ):
-    """Z-buffer over samples of listed pixels, as samples.draw_samples.
+    """Z-buffer over samples of listed pixels, as msaa.draw_samples.
 
     Args:
         offsets: Sample positions within a pixel, [0, 1).
@@ -108,11 +109,11 @@ def trace_samples(
     y = pixels[row] / view.width
     for k in range(bodies.shape[0]):
         b = bodies[k].body
-        if within(bodies[k].window, x, y):
+        if is_in_window(bodies[k].window, x, y):
             for s in range(offsets.shape[0]):
                 x_px = float(x) + offsets[s][0]
                 y_px = float(y) + offsets[s][1]
-                near, face = nearness_of(view, world, b, x_px, y_px, z_near_m, nearness[row, s])
+                near, face = trace_nearness(view, world, b, x_px, y_px, z_near_m, nearness[row, s])
                 if near > nearness[row, s]:
                     nearness[row, s] = near
                     hits[row, s] = wp.vec2i(b, face)
@@ -120,12 +121,12 @@ def trace_samples(
 
 @wp.struct
 class Outline:
-    """Where the silhouette of a body goes.
+    """Where the silhouette of a body is written.
 
     Attributes:
-        window: The pixels that the body may cover; may lie beside the image.
-        first_pixel: Of the buffer, for the first of them.
-        stride: From row to row in the buffer.
+        window: The pixels that the body may cover; may lie outside the image.
+        first_pixel: Index in the buffer of the window's first pixel.
+        stride: Pixels between rows of the buffer.
     """
 
     body: int
@@ -142,16 +143,17 @@ def trace_outlines(
     z_near_m: float,
     mask: wp.array(dtype=wp.uint8),
 ):
-    """Write 1 at every pixel centre that a body covers, before a pinhole; one row per thread."""
+    """Write 1 at every pixel centre that a body covers, for a pinhole; one row per thread."""
     k, row = wp.tid()
     window = outlines[k].window
     if row >= window.height:
         return
     for column in range(window.width):
         i = outlines[k].first_pixel + row * outlines[k].stride + column
+        # Another body of the same instance may have covered the pixel already.
         if mask[i] == wp.uint8(0):
             x_px = float(window.x0 + column) + 0.5
             y_px = float(window.y0 + row) + 0.5
-            near, _face = nearness_of(view, world, outlines[k].body, x_px, y_px, z_near_m, 0.0)
+            near, _face = trace_nearness(view, world, outlines[k].body, x_px, y_px, z_near_m, 0.0)
             if near > 0.0:
                 mask[i] = wp.uint8(1)

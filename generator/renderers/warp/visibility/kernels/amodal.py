@@ -1,4 +1,4 @@
-"""Silhouettes before a pinhole: where each instance would be if nothing else were there."""
+"""Amodal silhouettes for a pinhole: each instance as if nothing else were there."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 @wp.struct
 class Canvas:
-    """The part of the mask buffer that an instance is drawn into.
+    """The part of the mask buffer into which an instance is drawn.
 
     Attributes:
         body: Number of one of its bodies.
         window: The pixels it covers, in image coordinates.
-        first_pixel: Where its mask begins in the buffer.
+        first_pixel: Index of its mask's first pixel in the buffer.
     """
 
     body: int
@@ -44,7 +44,7 @@ def draw_silhouettes(
 ):
     """Write 1 at every pixel centre that a body covers; one body per thread.
 
-    Threads only ever write the same value, so bodies of one instance may be drawn at once.
+    All threads write the same value, so bodies of one instance may be drawn concurrently.
     """
     canvas = canvases[wp.tid()]
     geometry = world.geometries[world.bodies[canvas.body].geometry]
@@ -59,6 +59,7 @@ def draw_silhouettes(
             if e.covers != 0:
                 draw_coverage(e, canvas.first_pixel, stride, mask)
         elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
+            # A vertex lies outside the snapping range: clip first, then draw the polygon as a fan.
             polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
             for t in range(1, corners - 1):
                 e = fan_edges(view, polygon, t, canvas.window)

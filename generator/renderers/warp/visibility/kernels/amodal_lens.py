@@ -1,4 +1,4 @@
-"""Silhouettes through lenses whose edges are bent: by rays, where a pinhole's are drawn."""
+"""Amodal silhouettes for lenses with distortion, by rays instead of rasterisation."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 @wp.struct
 class AmodalWindow:
-    """The part of the canvas in which one body may be seen.
+    """The part of the canvas in which one body may be visible.
 
     Attributes:
-        body: Its number.
+        body: Number of the body.
         window: The pixels, in image coordinates.
-        first_pixel: Where the first of them is in the buffer.
-        stride: From row to row in the buffer.
+        first_pixel: Index of its first pixel in the buffer.
+        stride: Pixels between rows of the buffer.
     """
 
     body: int
@@ -40,7 +40,7 @@ class AmodalWindow:
 def canvas_direction(
     view: View, nodes: wp.array(dtype=wp.vec4, ndim=2), stride: int, x: int, y: int
 ):
-    """Unit direction through a pixel's centre in the image or beside it; 0 where nothing shows.
+    """Unit direction through a pixel's centre inside or outside the image; 0 if not shown.
 
     Args:
         nodes: Directions at every ``stride``-th pixel centre of the canvas.
@@ -51,6 +51,7 @@ def canvas_direction(
         if d[3] == 0.0:
             d = wp.vec4(0.0)
     else:
+        # Outside the image: bilinear interpolation between nodes, if the lens shows all four.
         column = (x + view.width) / stride
         row = (y + view.height) / stride
         right = float(x + view.width - column * stride) / float(stride)
@@ -73,20 +74,20 @@ def trace_silhouettes(
     nodes: wp.array(dtype=wp.vec4, ndim=2),
     stride: int,
     t_min: float,
-    outlooks: wp.array(dtype=AmodalWindow),
+    windows: wp.array(dtype=AmodalWindow),
     mask: wp.array(dtype=wp.uint8),
 ):
-    """Write 1 at every pixel whose ray meets a body; one row of one outlook per thread."""
+    """Write 1 at every pixel whose ray meets a body; one row of one window per thread."""
     k, row = wp.tid()
-    outlook = outlooks[k]
-    if row >= outlook.window.height:
+    silhouette = windows[k]
+    if row >= silhouette.window.height:
         return
-    b = outlook.body
-    for column in range(outlook.window.width):
-        i = outlook.first_pixel + row * outlook.stride + column
+    b = silhouette.body
+    for column in range(silhouette.window.width):
+        i = silhouette.first_pixel + row * silhouette.stride + column
         if mask[i] == wp.uint8(0):
-            x = outlook.window.x0 + column
-            y = outlook.window.y0 + row
+            x = silhouette.window.x0 + column
+            y = silhouette.window.y0 + row
             d = view.R_world_camera @ canvas_direction(view, nodes, stride, x, y)
             if wp.dot(d, d) > 0.5:
                 o = to_mesh_point(world, b, view.eye_m + d * t_min)

@@ -1,4 +1,4 @@
-"""Where points are in the image, for every model of a lens.
+"""Projection of points into the image, for every lens model.
 
 The equations and their sources are those of gen_data.generator.core.lens, in single precision.
 """
@@ -22,14 +22,15 @@ NEAR_M = wp.constant(0.05)
 
 
 @wp.func
-def bent(view: View, q: wp.vec3):
-    """The point of the lens's plane at which a camera-frame point is seen."""
+def distort(view: View, q: wp.vec3):
+    """Undistorted plane coordinates of a camera-frame point, distorted by the lens model."""
     k = view.coefficients
     across = wp.sqrt(q[0] * q[0] + q[1] * q[1])
     place = wp.vec2(0.0, 0.0)
     if view.lens == EQUIRECTANGULAR:
         place = wp.vec2(wp.atan2(q[0], q[2]), wp.atan2(q[1], wp.sqrt(q[0] * q[0] + q[2] * q[2])))
     elif view.lens == KANNALA_BRANDT and across > 0.0:
+        # Kannala and Brandt 2006: an odd polynomial of the angle to the axis.
         a = wp.atan2(across, q[2])
         s = a * a
         radius = a * (1.0 + s * (k[0] + s * (k[1] + s * (k[2] + s * k[3]))))
@@ -38,6 +39,7 @@ def bent(view: View, q: wp.vec3):
         x = q[0] / q[2]
         y = q[1] / q[2]
         s = x * x + y * y
+        # Brown-Conrady with OpenCV's rational radial factor and tangential terms.
         radial = 1.0 + s * (k[0] + s * (k[1] + s * k[4]))
         radial /= 1.0 + s * (k[5] + s * (k[6] + s * k[7]))
         u = x * radial + 2.0 * k[2] * x * y + k[3] * (s + 2.0 * x * x)
@@ -48,14 +50,14 @@ def bent(view: View, q: wp.vec3):
 
 @wp.func
 def project_to_pixel(view: View, q: wp.vec3):
-    """The pixel that looks at a camera-frame point, -1 for none, and the point's depth there."""
+    """The pixel that shows a camera-frame point, -1 for none, and the point's depth."""
     j = int(-1)
     depth_m = q[2]
     x = int(-1)
     y = int(-1)
     if view.lens != PINHOLE:
         depth_m = wp.length(q)
-        place = bent(view, q)
+        place = distort(view, q)
         x = int(wp.floor(place[0] * view.fx + view.cx))
         y = int(wp.floor(place[1] * view.fy + view.cy))
     elif q[2] > NEAR_M:
@@ -64,7 +66,8 @@ def project_to_pixel(view: View, q: wp.vec3):
     if x >= 0 and x < view.width and y >= 0 and y < view.height:
         j = y * view.width + x
     if j >= 0 and view.lens != PINHOLE:
-        # Beyond the fold, and at what the model does not hold for, another direction is seen.
+        # Beyond the model's validity the polynomial folds back: check that the pixel does look
+        # there.
         d = view.directions[j]
         away = 2.0 * wp.max(d[3], view.pixel_rad)
         if wp.dot(fast_normalize(q), wp.vec3(d[0], d[1], d[2])) < 1.0 - 0.5 * away * away:
@@ -74,7 +77,7 @@ def project_to_pixel(view: View, q: wp.vec3):
 
 @wp.kernel
 def darken_outside(view: View, radiance: wp.array(dtype=wp.vec3)):
-    """Leave no light where the lens shows nothing."""
+    """Set radiance to zero where the lens shows nothing."""
     i = wp.tid()
     if view.directions[i][3] == 0.0:
         radiance[i] = wp.vec3(0.0)

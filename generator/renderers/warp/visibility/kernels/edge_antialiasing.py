@@ -1,7 +1,7 @@
-"""Anti-aliasing of colour where surfaces meet within a pixel.
+"""Anti-aliasing of radiance at edges, by rays.
 
-Coverage is sampled by rays at parts of the pixel; colour is taken from the pixel centres nearby
-that see the same surface, so that nothing is shaded twice.
+Coverage is sampled at several points of a pixel; colour is taken from nearby pixel centres that
+show the same surface, so that nothing is shaded twice.
 
 Source: Chajdas, McGuire and Luebke, "Subpixel reconstruction antialiasing", I3D 2011.
 """
@@ -11,7 +11,7 @@ from __future__ import annotations
 import warp as wp
 
 from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import GBufferRecord
-from gen_data.generator.renderers.warp.scene.kernels.alpha_test import closest_solid_hit, hole_at
+from gen_data.generator.renderers.warp.scene.kernels.alpha_test import closest_solid_hit, is_hole
 from gen_data.generator.renderers.warp.scene.kernels.ray_queries import FARTHEST
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     HOLES,
@@ -23,7 +23,10 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     to_mesh_point,
     to_mesh_vector,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import most_alike, nearby
+from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import (
+    most_similar_normal,
+    neighbour_pixel,
+)
 from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import make_facet
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -34,11 +37,11 @@ Vector8i = wp.types.vector(length=8, dtype=wp.int32)
 
 @wp.struct
 class Parts:
-    """What the parts of one pixel see.
+    """Nearest surfaces at the samples of one pixel.
 
     Attributes:
         nearness: 1/z of the nearest surface so far [1/m]; 0 for none.
-        source: Pixel whose centre sees the same surface and lends its colour; -1 for none.
+        source: Pixel whose centre shows the same surface and provides its colour; -1 for none.
     """
 
     nearness: Vector8
@@ -46,12 +49,12 @@ class Parts:
 
 
 @wp.func
-def seen_before(view: View, images: GBufferRecord, x: int, y: int, k: int):
-    """Whether an earlier of the nine pixels sees the same face as the k-th."""
-    hit = images.hits[nearby(view, x, y, k)]
+def is_face_repeated(view: View, images: GBufferRecord, x: int, y: int, k: int):
+    """Whether an earlier of the nine pixels shows the same face as the k-th."""
+    hit = images.hits[neighbour_pixel(view, x, y, k)]
     before = bool(False)
     for m in range(k):
-        other = images.hits[nearby(view, x, y, m)]
+        other = images.hits[neighbour_pixel(view, x, y, m)]
         if other[0] == hit[0] and other[1] == hit[1]:
             before = True
     return before
@@ -68,16 +71,16 @@ def cover(
     source: int,
     parts: Parts,
 ):
-    """Give the parts of pixel (x, y) to the face that pixel ``source`` sees where it is nearest."""
+    """Assign the samples of pixel (x, y) to the face of pixel ``source`` where it is nearest."""
     hit = images.hits[source]
     facet = make_facet(world, hit)
-    pierced = (world.bodies[hit[0]].pierced & HOLES) != 0
+    cutouts = (world.bodies[hit[0]].cutouts & HOLES) != 0
     for s in range(offsets.shape[0]):
         x_px = float(x) + offsets[s][0]
         y_px = float(y) + offsets[s][1]
         d = pixel_direction(view, x_px, y_px)
         det = wp.dot(d, facet.across)
-        # Barycentric weights and depth without a division: all have det for a factor.
+        # Barycentric weights and depth without a division: all are scaled by det.
         side = wp.where(det < 0.0, -1.0, 1.0)
         u = wp.dot(d, facet.along_u) * side
         v = wp.dot(d, facet.along_v) * side
@@ -85,9 +88,9 @@ def cover(
         if u >= 0.0 and v >= 0.0 and u + v <= w and facet.depth * side > 0.0:
             nearness = det / facet.depth
             seen = nearness > parts.nearness[s]
-            if seen and pierced:
+            if seen and cutouts:
                 weights = wp.vec3(w - u - v, u, v) * (1.0 / w)
-                seen = not hole_at(world, hit[0], hit[1], weights)
+                seen = not is_hole(world, hit[0], hit[1], weights)
             if seen:
                 parts.nearness[s] = nearness
                 parts.source[s] = source
@@ -95,7 +98,7 @@ def cover(
 
 
 @wp.func
-def traced_source(
+def trace_source(
     view: View,
     world: World,
     images: GBufferRecord,
@@ -105,9 +108,9 @@ def traced_source(
     y_px: float,
     t_min: float,
 ):
-    """The pixel around (x, y) that sees the body a ray meets first, for faces no centre sees.
+    """The pixel around (x, y) that shows the body at a sample, for faces no centre shows.
 
-    A body that no centre around sees has no colour to lend: it is not looked for.
+    Only bodies of the nine pixels are traced: no other has a colour to provide.
     """
     d = view.R_world_camera @ pixel_direction(view, x_px, y_px)
     origin = view.eye_m + d * t_min
@@ -116,7 +119,7 @@ def traced_source(
     normal = wp.vec3(0.0)
     last = int(-1)
     for k in range(9):
-        j = nearby(view, x, y, k)
+        j = neighbour_pixel(view, x, y, k)
         b = images.hits[j][0]
         if b < 0:
             if source < 0:
@@ -130,7 +133,7 @@ def traced_source(
                 source = j
                 normal = flat_normal(world, wp.vec2i(b, answer.face))
     if nearest < FARTHEST:
-        source = most_alike(view, images, x, y, source, normal)
+        source = most_similar_normal(view, images, x, y, source, normal)
     return source
 
 
@@ -145,11 +148,11 @@ def antialias(
     t_min: float,
     mixed: wp.array(dtype=wp.vec3),
 ):
-    """Radiance of listed pixels: the mean over parts of the pixel, in the order of the list.
+    """Radiance of listed pixels: the mean over their samples, in the order of the list.
 
     Args:
         offsets: At most eight sample positions within the pixel, [0, 1).
-        t_min: z-depth from which surfaces are seen.
+        t_min: z-depth of the near plane.
     """
     row = wp.tid()
     i = pixels[row]
@@ -162,8 +165,8 @@ def antialias(
     for s in range(offsets.shape[0]):
         parts.source[s] = -1
     for k in range(9):
-        j = nearby(view, x, y, k)
-        if images.hits[j][0] >= 0 and not seen_before(view, images, x, y, k):
+        j = neighbour_pixel(view, x, y, k)
+        if images.hits[j][0] >= 0 and not is_face_repeated(view, images, x, y, k):
             parts = cover(view, world, images, offsets, x, y, j, parts)
     total = wp.vec3(0.0)
     lit = int(0)
@@ -172,7 +175,8 @@ def antialias(
         if source < 0:
             x_px = float(x) + offsets[s][0]
             y_px = float(y) + offsets[s][1]
-            source = traced_source(view, world, images, x, y, x_px, y_px, t_min)
+            # No visible face nearby covers the sample: other faces of the same bodies may.
+            source = trace_source(view, world, images, x, y, x_px, y_px, t_min)
         if source >= 0:
             total += radiance[source]
             lit += 1

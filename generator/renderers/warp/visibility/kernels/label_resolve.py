@@ -1,4 +1,4 @@
-"""From (body, face) at a pixel to what lies there, and to label images."""
+"""Attributes of the visible (body, face) at each pixel, and label images."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 @wp.struct
 class Facet:
-    """One triangle, made ready for many rays from the camera's centre.
+    """A triangle prepared for many rays from the camera's centre.
 
-    For a direction d in the camera frame, with ``det = d . across``: the barycentric weights of
-    the second and third vertex are ``d . along_u / det`` and ``d . along_v / det``, the z-depth is
-    ``depth / det``, the side that is seen is the sign of ``det``.
-    Source: Moeller and Trumbore, "Fast, minimum storage ray-triangle intersection", 1997,
-    with the products of the triangle's own vectors taken first.
+    For a direction d in the camera frame and ``det = d . across``: the barycentric weights of the
+    second and third vertex are ``d . along_u / det`` and ``d . along_v / det``, z-depth is ``depth
+    / det``, and the sign of ``det`` tells front from back. Source: Moeller and Trumbore, "Fast,
+    minimum storage ray-triangle intersection", 1997, with the products of the triangle's own
+    vectors precomputed.
 
     Attributes:
         z_m: z-depths of the three vertices.
-        n, n_u, n_v: Normal of the first vertex and the steps to the others, world frame.
+        n, n_u, n_v: Normal of the first vertex and the differences to the others, world frame.
     """
 
     across: wp.vec3
@@ -53,6 +53,7 @@ def make_facet(world: World, hit: wp.vec2i):
     p = vertex_at(world, g, corner[0])
     e1 = vertex_at(world, g, corner[1]) - p
     e2 = vertex_at(world, g, corner[2]) - p
+    # In the mesh frame: only the results are rotated.
     to_eye = world.bodies[b].eye_mesh - p
     camera = wp.transpose(world.bodies[b].B_mesh_camera)
     q = wp.cross(to_eye, e1)
@@ -74,14 +75,14 @@ def make_facet(world: World, hit: wp.vec2i):
 
 @wp.func
 def face_viewer(n: wp.vec3, d_world: wp.vec3):
-    """A unit normal that is not turned away from the viewer.
+    """A unit normal that does not face away from the viewer.
 
-    Interpolation may tip a normal over the horizon: it is brought back to where it is seen edge-on.
+    Interpolation may tip a normal over the horizon: it is brought back to grazing view.
     """
     m = fast_normalize(n)
     over = wp.dot(m, d_world)
     if over > 0.0:
-        # A thousandth beyond the edge: exactly on it, rounding would decide.
+        # A thousandth beyond grazing: exactly there, rounding would decide.
         m = fast_normalize(m - d_world * (over * 1.001 / wp.dot(d_world, d_world)))
     return m
 
@@ -98,11 +99,11 @@ def resolve(
 ):
     """Depth (inf for nothing), barycentric weights and smooth world normal of every pixel.
 
-    Weights are stored as (u, v), with 2 added to u where the inside of the triangle is seen.
+    Weights are stored as (u, v), with 2 added to u where the back of the triangle is visible.
 
     Args:
         run: Pixels in a row per thread: neighbours on one triangle share its preparation.
-        z_m: Parameters of the pixels' rays: z-depths before a pinhole, else ranges.
+        z_m: Parameters of the pixels' rays: z-depths for a pinhole, else ranges.
     """
     y, segment = wp.tid()
     x = segment * run
@@ -120,19 +121,18 @@ def resolve(
             while same:
                 d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
                 det = wp.dot(d, facet.across)
-                # Seen edge-on, by an accident of snapping; the branch below mends depth and
-                # weights.
+                # Seen edge-on after snapping; the branch below repairs depth and weights.
                 inverse = 1.0 / wp.where(wp.abs(det) < 1.0e-30, 1.0e-30, det)
                 u = wp.dot(d, facet.along_u) * inverse
                 v = wp.dot(d, facet.along_v) * inverse
                 z = facet.depth * inverse
                 if u < 0.0 or v < 0.0 or u + v > 1.0:
-                    # Snapping moved an edge across this pixel's centre.
+                    # Snapping moved an edge across this pixel's centre: clamp to the triangle.
                     u = wp.clamp(u, 0.0, 1.0)
                     v = wp.clamp(v, 0.0, 1.0 - u)
                     z = facet.z_m[0] * (1.0 - u - v) + facet.z_m[1] * u + facet.z_m[2] * v
                     if view.lens != PINHOLE:
-                        z = range_of(world, hit, wp.vec2(u, v))
+                        z = distance_to(world, hit, wp.vec2(u, v))
                 n = facet.n + facet.n_u * u + facet.n_v * v
                 side = wp.where(det < 0.0, -1.0, 1.0)
                 z_m[row + x] = z
@@ -150,14 +150,14 @@ def label_ids(
     ids: wp.array(dtype=wp.uint16),
     labels: wp.array(dtype=wp.uint16),
 ):
-    """The id of the body at every pixel; ``ids[0]`` is for nothing, ``ids[1 + b]`` for b."""
+    """Id of the body at every pixel; ``ids[0]`` is the background's, ``ids[1 + b]`` that of b."""
     i = wp.tid()
     labels[i] = ids[hits[i][0] + 1]
 
 
 @wp.kernel
 def label_ranges(view: View, z_m: wp.array(dtype=float), ranges_m: wp.array(dtype=float)):
-    """Distance along the ray."""
+    """Distance along the ray [m]."""
     i = wp.tid()
     x = float(i % view.width) + 0.5
     y = float(i / view.width) + 0.5
@@ -166,10 +166,10 @@ def label_ranges(view: View, z_m: wp.array(dtype=float), ranges_m: wp.array(dtyp
 
 @wp.kernel
 def label_z_depths(view: View, ranges_m: wp.array(dtype=float), z_m: wp.array(dtype=float)):
-    """Distance along the optical axis; inf for what is not before the camera."""
+    """Distance along the optical axis [m]; inf behind the camera's plane."""
     i = wp.tid()
     z = ranges_m[i] * view.directions[i][2]
-    # NaN, where the lens shows nothing, compares false and is nothing too.
+    # NaN, outside the lens's field, compares false and counts as nothing.
     if not z > 0.0:
         z = wp.inf
     z_m[i] = z
@@ -201,9 +201,10 @@ def label_object_coordinates(
     frames: wp.array(dtype=BoxFrame),
     coordinates: wp.array(dtype=wp.vec3),
 ):
-    """Position within the instance's box, [0, 1] per axis."""
+    """Position within the instance's box, [0, 1] per axis; 0 for the background."""
     i = wp.tid()
     b = hits[i][0]
+    # Rounding may leave the box by a hair.
     p = wp.vec3(0.0)
     if b >= 0:
         if frames[b].labelled != 0:
@@ -216,8 +217,8 @@ def label_object_coordinates(
 
 
 @wp.func
-def range_of(world: World, hit: wp.vec2i, weight: wp.vec2):
-    """Distance from the camera's centre to a point of a (body, face)."""
+def distance_to(world: World, hit: wp.vec2i, weight: wp.vec2):
+    """Distance from the camera's centre to a point of a (body, face) [m]."""
     b = hit[0]
     m = mesh_point(world, hit, weight)
     return wp.length(world.bodies[b].A_camera_mesh @ m + world.bodies[b].t_camera_mesh)
@@ -225,7 +226,7 @@ def range_of(world: World, hit: wp.vec2i, weight: wp.vec2):
 
 @wp.func
 def mesh_point(world: World, hit: wp.vec2i, weight: wp.vec2):
-    """The point of a (body, face) with stored barycentric weights, in the mesh frame."""
+    """Point of a (body, face) in the mesh frame, from stored barycentric weights."""
     u = first_weight(weight)
     v = weight[1]
     g = world.bodies[hit[0]].geometry

@@ -1,7 +1,7 @@
-"""Anti-aliasing by the rasteriser: what the parts of pixels on edges see (CPU device only).
+"""Multisampling of edge pixels by the rasteriser (CPU device only).
 
-Triangles are drawn once more, into samples of the pixels that edges cross; colour is taken from the
-pixel centres nearby that see the same surface, as in
+Triangles are drawn again into samples of the pixels that edges cross; colour is taken from nearby
+pixel centres that show the same surface, as in
 gen_data.generator.renderers.warp.visibility.kernels.edge_antialiasing.
 """
 
@@ -17,7 +17,10 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     min_of_two,
     vertex_at,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import most_alike, nearby
+from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import (
+    most_similar_normal,
+    neighbour_pixel,
+)
 from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
     UNSNAPPED,
     Z_NEAR_M,
@@ -33,7 +36,7 @@ from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-# Above the nearness of any surface.
+# Larger than the nearness of any surface.
 UNLISTED = wp.constant(1.0e30)
 
 
@@ -45,26 +48,27 @@ def number_pixels(
     numbers: wp.array(dtype=int),
     floors: wp.array(dtype=float),
 ):
-    """At every listed pixel, its place in the list, and how near a surface must be to matter.
+    """Position in the list of every listed pixel, and the least nearness that matters there.
 
-    What lies behind all that the centres around see has no colour to take.
+    A surface behind all those of the surrounding centres has no colour to take.
 
     Args:
-        floors: 1/z [1/m]; to be UNLISTED at first.
+        floors: 1/z [1/m]; must be UNLISTED on entry.
     """
     k = wp.tid()
     i = pixels[k]
     farthest = float(0.0)
     for m in range(9):
-        j = nearby(view, i % view.width, i / view.width, m)
+        j = neighbour_pixel(view, i % view.width, i / view.width, m)
         farthest = wp.max(farthest, images.z_m[j])
     numbers[i] = k
+    # Two percent of slack: a surface's depth changes within a pixel.
     floors[i] = 0.98 / farthest
 
 
 @wp.struct
 class Side:
-    """An edge function: its value at a point, steps per 1/256 px, and their reach over a pixel.
+    """Edge function: value at a point, steps per 1/256 px, and its variation over half a pixel.
 
     Inside is >= 0.
     """
@@ -76,14 +80,15 @@ class Side:
 
 
 @wp.func
-def side_of(p: wp.vec2i, q: wp.vec2i, area: wp.int64, x: int, y: int):
-    """The edge from p to q of a triangle with that signed area, seen from a snapped point."""
+def make_side(p: wp.vec2i, q: wp.vec2i, area: wp.int64, x: int, y: int):
+    """Edge function from p to q of a triangle with signed ``area``, at a snapped point."""
     side = Side()
+    # Both orientations are drawn: the sign makes the inside positive.
     turn = wp.where(area > wp.int64(0), wp.int64(1), wp.int64(-1))
     side.dx = wp.int64(p[1] - q[1]) * turn
     side.dy = wp.int64(q[0] - p[0]) * turn
     side.value = wp.int64(x - p[0]) * side.dx + wp.int64(y - p[1]) * side.dy
-    # Left and top edges own what lies on them.
+    # Top-left rule: left and top edges own the points on them.
     if not (side.dx > wp.int64(0) or (side.dx == wp.int64(0) and side.dy > wp.int64(0))):
         side.value -= wp.int64(1)
     side.reach = wp.int64(128) * (wp.abs(side.dx) + wp.abs(side.dy))
@@ -92,9 +97,9 @@ def side_of(p: wp.vec2i, q: wp.vec2i, area: wp.int64, x: int, y: int):
 
 @wp.func
 def span_from(last: int, a: wp.int64, b: wp.int64, c: wp.int64, ea: Side, eb: Side, ec: Side):
-    """The first pixel of a row from 0 to ``last`` that edges with values a, b, c may reach."""
+    """First pixel of a row from 0 to ``last`` that edges with values a, b, c may reach."""
     start = int(0)
-    # Shorter rows are looked at one by one.
+    # Shorter rows are tested pixel by pixel.
     if last > 8:
         pixel = wp.int64(256)
         start = span_start(a + ea.reach, pixel * ea.dx, start)
@@ -105,7 +110,7 @@ def span_from(last: int, a: wp.int64, b: wp.int64, c: wp.int64, ea: Side, eb: Si
 
 @wp.func
 def span_to(last: int, a: wp.int64, b: wp.int64, c: wp.int64, ea: Side, eb: Side, ec: Side):
-    """The last pixel of a row from 0 to ``last`` that three edges may reach into."""
+    """Last pixel of a row from 0 to ``last`` that three edges may reach."""
     end = last
     if last > 8:
         pixel = wp.int64(256)
@@ -117,7 +122,7 @@ def span_to(last: int, a: wp.int64, b: wp.int64, c: wp.int64, ea: Side, eb: Side
 
 @wp.func
 def covers(ea: Side, eb: Side, ec: Side, a: wp.int64, b: wp.int64, c: wp.int64, at: wp.vec2i):
-    """Whether a triangle whose edges have values a, b, c at a point covers the one ``at`` off."""
+    """Whether a triangle whose edges have values a, b, c covers the point at offset ``at``."""
     right = wp.int64(at[0])
     down = wp.int64(at[1])
     inside = a + right * ea.dx + down * ea.dy
@@ -127,7 +132,7 @@ def covers(ea: Side, eb: Side, ec: Side, a: wp.int64, b: wp.int64, c: wp.int64, 
 
 
 @wp.func
-def draw_samples_of(
+def draw_triangle_samples(
     numbers: wp.array(dtype=int),
     floors: wp.array(dtype=float),
     window: Window,
@@ -150,13 +155,14 @@ def draw_samples_of(
     x_last = wp.min(wp.max(p[0], wp.max(q[0], r[0])) >> 8, window.width - 1)
     y_first = wp.max(wp.min(p[1], wp.min(q[1], r[1])) >> 8, 0)
     y_last = wp.min(wp.max(p[1], wp.max(q[1], r[1])) >> 8, window.height - 1)
-    # From the middle of the first pixel.
+    # Edge values at the first pixel's centre.
     x_middle = (x_first << 8) + 128
     y_middle = (y_first << 8) + 128
-    ea = side_of(p, q, area, x_middle, y_middle)
-    eb = side_of(q, r, area, x_middle, y_middle)
-    ec = side_of(r, p, area, x_middle, y_middle)
+    ea = make_side(p, q, area, x_middle, y_middle)
+    eb = make_side(q, r, area, x_middle, y_middle)
+    ec = make_side(r, p, area, x_middle, y_middle)
     pixel = wp.int64(256)
+    # Largest change of 1/z from a pixel's centre to its corner.
     slack = 0.5 * (wp.abs(plane.dx) + wp.abs(plane.dy))
     samples = offsets.shape[0]
     for y in range(y_first, y_last + 1):
@@ -169,7 +175,7 @@ def draw_samples_of(
         a += wp.int64(start) * pixel * ea.dx
         b += wp.int64(start) * pixel * eb.dx
         c += wp.int64(start) * pixel * ec.dx
-        # While: Warp's ranges take longer than what is done in them.
+        # A while loop: Warp's range loops cost more than this body.
         x = int(x_first + start)
         while x <= x_first + end:
             i = y * window.width + x
@@ -183,6 +189,7 @@ def draw_samples_of(
                     while s < samples:
                         at = offsets[s]
                         if covers(ea, eb, ec, a, b, c, at):
+                            # 1 / 256: offsets are in snapped units.
                             w = row + 0.00390625 * (
                                 float(at[0]) * plane.dx + float(at[1]) * plane.dy
                             )
@@ -201,7 +208,7 @@ def draw_samples_of(
 def floor_below(
     floors: wp.array(dtype=float), window: Window, p: wp.vec2i, q: wp.vec2i, r: wp.vec2i
 ):
-    """The lowest floor in a triangle's box; 0 where the box is too large to look."""
+    """Lowest floor within a triangle's box; 0 if the box is too large to scan."""
     x_first = wp.max(wp.min(p[0], wp.min(q[0], r[0])) >> 8, 0)
     x_last = wp.min(wp.max(p[0], wp.max(q[0], r[0])) >> 8, window.width - 1)
     y_first = wp.max(wp.min(p[1], wp.min(q[1], r[1])) >> 8, 0)
@@ -232,13 +239,13 @@ def draw_samples(
     nearness: wp.array(dtype=float, ndim=2),
     hits: wp.array(dtype=wp.vec2i, ndim=2),
 ):
-    """Z-buffer of listed bodies over samples of numbered pixels, as draw_bodies is over centres.
+    """Z-buffer of listed bodies over samples of numbered pixels, as draw_bodies over centres.
 
     Args:
         numbers: Row of each pixel in the outputs.
-        floors: Nearness below which a pixel takes nothing; UNLISTED where it has no row.
+        floors: Nearness below which a pixel takes nothing; UNLISTED for unlisted pixels.
         offsets: Sample positions, from the middle of a pixel [1/256 px].
-        nearness: 1/z [1/m], to be 0 at first.
+        nearness: 1/z [1/m]; must be 0 on entry.
         hits: Unchanged where nothing is hit.
     """
     b = bodies[wp.tid()]
@@ -253,13 +260,14 @@ def draw_samples(
             near = bool(False)
             if floor < UNLISTED:
                 z = wp.min(p_camera[i][2], wp.min(p_camera[j][2], p_camera[k][2]))
+                # Skip triangles that are entirely behind everything visible nearby.
                 near = floor * z <= 1.0
             if near:
                 p = xy[i]
                 q = xy[j]
                 r = xy[k]
                 plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
-                draw_samples_of(
+                draw_triangle_samples(
                     numbers, floors, window, offsets, p, q, r, plane, b, f, nearness, hits
                 )
         elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
@@ -270,19 +278,19 @@ def draw_samples(
                 p = snap_to_grid(view, polygon[0])
                 q = snap_to_grid(view, polygon[t])
                 r = snap_to_grid(view, polygon[t + 1])
-                draw_samples_of(
+                draw_triangle_samples(
                     numbers, floors, window, offsets, p, q, r, plane, b, f, nearness, hits
                 )
 
 
 @wp.func
-def lender(view: View, world: World, images: GBufferRecord, x: int, y: int, hit: wp.vec2i):
-    """The pixel around (x, y) that lends its colour to a sample; -1 if none sees its body."""
+def color_source(view: View, world: World, images: GBufferRecord, x: int, y: int, hit: wp.vec2i):
+    """The pixel around (x, y) that provides the colour of a sample; -1 if none shows its body."""
     source = int(-1)
     same_face = bool(False)
     others = int(0)
     for k in range(9):
-        j = nearby(view, x, y, k)
+        j = neighbour_pixel(view, x, y, k)
         if not same_face and images.hits[j][0] == hit[0]:
             if images.hits[j][1] == hit[1] or hit[0] < 0:
                 same_face = True
@@ -298,7 +306,8 @@ def lender(view: View, world: World, images: GBufferRecord, x: int, y: int, hit:
         e1 = vertex_at(world, world.bodies[b].geometry, corner[1]) - p
         e2 = vertex_at(world, world.bodies[b].geometry, corner[2]) - p
         n = world.bodies[b].R_world_mesh @ wp.normalize(wp.cross(e1, e2))
-        source = most_alike(view, images, x, y, source, n)
+        # Several faces of the body are near, none of them the sample's: choose by orientation.
+        source = most_similar_normal(view, images, x, y, source, n)
     return source
 
 
@@ -324,7 +333,7 @@ def mix_samples(
     for s in range(hits.shape[1]):
         hit = hits[row, s]
         if hit[0] != last[0] or hit[1] != last[1]:
-            source = lender(view, world, images, x, y, hit)
+            source = color_source(view, world, images, x, y, hit)
             last = hit
         if source >= 0:
             total += radiance[source]

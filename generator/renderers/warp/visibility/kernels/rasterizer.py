@@ -1,8 +1,7 @@
-"""Exact triangle rasteriser (CPU device only: bodies are drawn one after the other).
+"""Exact triangle rasteriser (CPU device only: bodies are drawn one after another).
 
-Vertices are snapped to 1/256 px and edges evaluated in 64-bit integers with the top-left rule, so
-that triangles that share an edge neither overlap nor leave a gap. Pixels are sampled at their
-centres.
+Vertices are snapped to 1/256 px and edges evaluated in 64-bit integers with the top-left rule:
+triangles that share an edge neither overlap nor leave a gap. Pixels are sampled at their centres.
 
 Source: Pineda, "A parallel algorithm for polygon rasterization", SIGGRAPH 1988.
 """
@@ -15,20 +14,21 @@ from gen_data.generator.renderers.warp.scene.kernels.records import View, World
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-# What is nearer is clipped; 1/z stays below 100.
+# Near plane; it keeps 1/z at most 100.
 Z_NEAR_M = wp.constant(0.01)
-# Vertices farther than this from the principal point are clipped, so that snapped coordinates
-# stay below 2^24 and edge products below 2^50. Float32 still resolves 1/256 px there.
+# Guard band: farther vertices are clipped, which keeps snapped coordinates below 2^24 and edge
+# products below 2^50. Single precision still resolves 1/256 px there.
 GUARD_PX = wp.constant(32768.0)
-# No snapped coordinate is as low: they stay below 2^24.
+# Marks vertices outside the guard band; snapped coordinates stay below 2^24.
 UNSNAPPED = wp.constant(wp.int32(-(2**31)))
 
+# A triangle clipped by five planes has at most eight corners.
 Polygon = wp.types.matrix(shape=(9, 3), dtype=wp.float32)
 
 
 @wp.struct
 class Window:
-    """The rectangle of pixels that is drawn into; ``x0``, ``y0`` in the image."""
+    """The rectangle of pixels to draw; ``x0``, ``y0`` in the image."""
 
     x0: int
     y0: int
@@ -38,7 +38,7 @@ class Window:
 
 @wp.struct
 class Edge:
-    """An edge function: its value at a first pixel, and its steps per pixel; inside is >= 0."""
+    """Edge function: value at a first pixel, and steps per pixel; inside is >= 0."""
 
     value: wp.int64
     dx: wp.int64
@@ -47,7 +47,7 @@ class Edge:
 
 @wp.struct
 class Edges:
-    """The three edges of a triangle over its box of pixels, relative to the window."""
+    """The edge functions of a triangle over its box of pixels, relative to the window."""
 
     covers: int
     x_first: int
@@ -75,13 +75,13 @@ def snap_to_grid(view: View, p: wp.vec3):
     """Image coordinates of a camera-frame point in units of 1/256 px."""
     x = p[0] / p[2] * view.fx + view.cx
     y = p[1] / p[2] * view.fy + view.cy
-    # Floor, not round: halves go one way on both sides of zero.
+    # Floor of x + 0.5, not round: halves go the same way on both sides of zero.
     return wp.vec2i(int(wp.floor(x * 256.0 + 0.5)), int(wp.floor(y * 256.0 + 0.5)))
 
 
 @wp.func
 def guard_distance(view: View, p: wp.vec3, plane: int):
-    """Signed distance-like value of the five planes that bound what can be snapped."""
+    """Signed distance, up to scale, to one of the five planes that bound the guard band."""
     d = p[2] - Z_NEAR_M
     if plane == 1:
         d = p[2] * GUARD_PX - view.fx * p[0]
@@ -124,7 +124,7 @@ def project_vertices(
 @wp.func
 def first_centre(fixed: int):
     """First pixel whose centre is at or after a snapped coordinate."""
-    # A centre is at 256 i + 128: the shift rounds (fixed - 128) up.
+    # A centre is at 256 i + 128; the shift rounds (fixed - 128) / 256 up.
     return (fixed + 127) >> 8
 
 
@@ -136,12 +136,12 @@ def last_centre(fixed: int):
 
 @wp.func
 def edge_between(p: wp.vec2i, q: wp.vec2i, x: int, y: int):
-    """The edge from p to q, seen from a snapped point; positive to its right (y is down)."""
+    """Edge function from p to q at a snapped point; positive on its right (y is down)."""
     dx = wp.int64(p[1] - q[1])
     dy = wp.int64(q[0] - p[0])
     edge = Edge()
     edge.value = wp.int64(x - p[0]) * dx + wp.int64(y - p[1]) * dy
-    # Left and top edges own the centres that lie on them.
+    # Top-left rule: left and top edges own the centres on them.
     if not (dx > wp.int64(0) or (dx == wp.int64(0) and dy > wp.int64(0))):
         edge.value -= wp.int64(1)
     edge.dx = dx * wp.int64(256)
@@ -151,7 +151,7 @@ def edge_between(p: wp.vec2i, q: wp.vec2i, x: int, y: int):
 
 @wp.func
 def make_edges(p: wp.vec2i, q: wp.vec2i, r: wp.vec2i, window: Window):
-    """Edge functions of a triangle of either orientation, and the pixels it may cover."""
+    """Edge functions of a triangle of either orientation, and the box of pixels it may cover."""
     edges = Edges()
     x_low, x_high = wp.min(p[0], wp.min(q[0], r[0])), wp.max(p[0], wp.max(q[0], r[0]))
     y_low, y_high = wp.min(p[1], wp.min(q[1], r[1])), wp.max(p[1], wp.max(q[1], r[1]))
@@ -163,9 +163,10 @@ def make_edges(p: wp.vec2i, q: wp.vec2i, r: wp.vec2i, window: Window):
         return edges
     area = wp.int64(q[0] - p[0]) * wp.int64(r[1] - p[1])
     area -= wp.int64(r[0] - p[0]) * wp.int64(q[1] - p[1])
-    # Seen edge-on, or smaller than the grid: it covers no centre.
+    # Degenerate after snapping: it covers no centre.
     if area == wp.int64(0):
         return edges
+    # Centre of the first pixel, in snapped units.
     x = ((edges.x_first + window.x0) << 8) + 128
     y = ((edges.y_first + window.y0) << 8) + 128
     if area > wp.int64(0):
@@ -182,11 +183,11 @@ def make_edges(p: wp.vec2i, q: wp.vec2i, r: wp.vec2i, window: Window):
 
 @wp.func
 def span_start(e: wp.int64, dx: wp.int64, first: int):
-    """Smallest step >= first at which ``e + step * dx >= 0``, were it the only bound."""
+    """Smallest step >= first at which ``e + step * dx >= 0``."""
     start = first
     if e < wp.int64(0):
         if dx > wp.int64(0):
-            # Rounded up; the limit keeps 64 bits from overflowing the step's 32.
+            # Rounded up; the limit keeps the 64-bit quotient within 32 bits.
             start = wp.max(first, int(wp.min((dx - e - wp.int64(1)) / dx, wp.int64(1 << 30))))
         else:
             start = 1 << 30
@@ -195,7 +196,7 @@ def span_start(e: wp.int64, dx: wp.int64, first: int):
 
 @wp.func
 def span_end(e: wp.int64, dx: wp.int64, last: int):
-    """Largest step <= last at which ``e + step * dx >= 0``, were it the only bound."""
+    """Largest step <= last at which ``e + step * dx >= 0``."""
     end = last
     if dx < wp.int64(0) and e >= wp.int64(0):
         end = wp.min(last, int(wp.min(e / -dx, wp.int64(1 << 30))))
@@ -204,20 +205,20 @@ def span_end(e: wp.int64, dx: wp.int64, last: int):
 
 @wp.func
 def depth_plane(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3, window: Window):
-    """1/z over the window's pixels, from the plane through three camera-frame points."""
+    """1/z over the window's pixels, of the plane through three camera-frame points."""
     plane = DepthPlane()
     z_low = wp.min(p0[2], wp.min(p1[2], p2[2]))
     z_high = wp.max(p0[2], wp.max(p1[2], p2[2]))
     plane.low = 1.0 / z_high
-    # Snapping moves edges by 1/512 px: depth outside the triangle is held to its corners'.
+    # Snapping moves edges by up to 1/512 px: depth beyond the triangle is clamped to its corners'.
     plane.high = 1.0 / wp.max(z_low, 0.5 * Z_NEAR_M)
     n = wp.cross(p1 - p0, p2 - p0)
     d = wp.dot(n, p0)
     if d == 0.0:
-        # Seen edge-on: covered pixels are an accident of snapping, any depth in between will do.
+        # Seen edge-on: pixels are covered by snapping alone, and any depth in between will do.
         plane.c = plane.low
         return plane
-    # 1/z is linear in the image: n . (x, y, 1) / (n . p0) for rays (x, y, 1).
+    # 1/z is linear in the image: n . (x, y, 1) / (n . p0) along rays (x, y, 1).
     n = n / d
     plane.dx = n[0] * view.inverse_fx
     plane.dy = n[1] * view.inverse_fy
@@ -237,7 +238,7 @@ def draw_nearest(
     nearness: wp.array(dtype=float),
     hits: wp.array(dtype=wp.vec2i),
 ):
-    """Write (body, face) wherever the triangle is nearer than what is there."""
+    """Write (body, face) where the triangle is nearer than the buffer."""
     a = e.a.value
     b = e.b.value
     c = e.c.value
@@ -245,7 +246,7 @@ def draw_nearest(
     for y in range(e.y_first, e.y_last + 1):
         first = int(0)
         last = count
-        # Short rows are tested pixel by pixel: that is quicker than the divisions.
+        # Short rows are tested pixel by pixel: faster than the divisions.
         if count > 8:
             first = span_start(a, e.a.dx, span_start(b, e.b.dx, span_start(c, e.c.dx, 0)))
             last = span_end(a, e.a.dx, span_end(b, e.b.dx, span_end(c, e.c.dx, count)))
@@ -254,10 +255,10 @@ def draw_nearest(
         c_here = c + wp.int64(first) * e.c.dx
         row = plane.c + float(y) * plane.dy
         pixel = y * stride + e.x_first + first
-        # While: Warp's ranges take longer than what is done in them.
+        # A while loop: Warp's range loops cost more than this body.
         x = int(e.x_first + first)
         while x <= e.x_first + last:
-            # One sign test for three edges: the sign bit of the union is set if any is.
+            # One sign test for three edges: the sign bit of the bitwise or is set if any is.
             if (a_here | b_here | c_here) >= wp.int64(0):
                 w = wp.clamp(row + float(x) * plane.dx, plane.low, plane.high)
                 if w > nearness[pixel]:
@@ -275,7 +276,7 @@ def draw_nearest(
 
 @wp.func
 def draw_coverage(e: Edges, first_pixel: int, stride: int, mask: wp.array(dtype=wp.uint8)):
-    """Write 1 wherever the triangle covers a pixel centre."""
+    """Write 1 where the triangle covers a pixel centre."""
     a = e.a.value
     b = e.b.value
     c = e.c.value
@@ -305,7 +306,7 @@ def draw_coverage(e: Edges, first_pixel: int, stride: int, mask: wp.array(dtype=
 
 @wp.func
 def clip(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3):
-    """The part of a triangle inside the five guard planes, as corners and their number.
+    """Part of a triangle inside the five guard planes, as corners and their number.
 
     Source: Sutherland and Hodgman, "Reentrant polygon clipping", CACM 17(1), 1974.
     """
@@ -329,7 +330,8 @@ def clip(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3):
                     clipped[m] = p + (q - p) * (dp / (dp - dq))
                     m += 1
             elif dq >= 0.0:
-                # From inside to outside whichever way the edge runs: neighbours agree exactly.
+                # Interpolate from inside to outside whatever the edge's direction: neighbouring
+                # triangles then get identical points.
                 clipped[m] = q + (p - q) * (dq / (dq - dp))
                 m += 1
         polygon = clipped
@@ -339,7 +341,7 @@ def clip(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3):
 
 @wp.func
 def fan_edges(view: View, polygon: Polygon, t: int, window: Window):
-    """Edges of the t-th triangle of a polygon's fan."""
+    """Edge functions of the t-th triangle of a polygon's fan."""
     p = snap_to_grid(view, polygon[0])
     q = snap_to_grid(view, polygon[t])
     r = snap_to_grid(view, polygon[t + 1])
@@ -374,7 +376,7 @@ def draw_bodies(
     """Z-buffer of listed bodies: the nearest (body, face) at every pixel centre.
 
     Args:
-        nearness: 1/z [1/m], to be 0 at first.
+        nearness: 1/z [1/m]; must be 0 on entry.
         hits: Unchanged where nothing is hit.
     """
     b = bodies[wp.tid()]
@@ -389,9 +391,11 @@ def draw_bodies(
             if e.covers != 0:
                 plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
                 draw_nearest(e, plane, b, f, window.width, nearness, hits)
+        # A vertex lies outside the guard band: clip, and draw the polygon as a fan.
         elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
             polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
             plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
+            # Corners behind the near plane bound nothing: the visible part ends at the near plane.
             plane.high = 1.0 / Z_NEAR_M
             for t in range(1, corners - 1):
                 e = fan_edges(view, polygon, t, window)
