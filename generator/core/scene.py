@@ -172,29 +172,29 @@ class ObjectGroup:
 
 @dataclass(frozen=True, slots=True)
 class ArmGoal:
-    """What the arm should do; drawn by a randomizer, made true by physics.
+    """A goal of an arm, drawn by a randomizer and accomplished by physics.
 
     Physics takes the first candidate that is within limits and free of collision.
 
     Attributes:
         kind: ``joints``: candidates are joint positions. ``reach``: candidates are poses of the
-            grasp frame in the world. ``hold``: like reach, with ``held`` between the fingers.
-            Only on a way: ``grasp`` takes up one of ``objects`` from where it rests, ``place``
-            puts down what is held.
+            grasp frame in the world. ``hold``: like reach, with ``grasped_object`` between the
+            fingers. In tasks only: ``grasp`` picks up one of ``objects``, ``place`` puts the held
+            object down.
         joint_candidates: One tuple per candidate [rad or m], arm joints in order.
         pose_candidates: ``T_world_grasp`` per candidate; for ``place``, a point on a surface and
-            a turn about Z that the object makes from how it lay or is held.
-        opening: Gripper opening in [0, 1]; ignored for ``hold``, ``grasp`` and ``place``.
-        held: Name of the body that is held.
+            a rotation about Z of the object from its former pose at rest.
+        gripper_opening: In [0, 1]; ignored for ``hold``, ``grasp`` and ``place``.
+        grasped_object: Name of the body to hold; empty = none.
         objects: Names of the bodies that may be grasped, the preferred one first.
-        speed: Share of the joints' speed limits that the way there may use.
+        speed: Share of the joints' speed limits to use.
     """
 
     kind: Literal["joints", "reach", "hold", "grasp", "place"]
     joint_candidates: tuple[tuple[float, ...], ...] = ()
     pose_candidates: tuple[SE3, ...] = ()
-    opening: float = 1.0
-    held: str = ""
+    gripper_opening: float = 1.0
+    grasped_object: str = ""
     objects: tuple[str, ...] = ()
     speed: float = 0.5
 
@@ -205,11 +205,11 @@ class Articulation:
 
     Attributes:
         joint_positions: One per movable joint, in the robot model's order [rad or m].
-        goal: What it does before anything moves.
-        workspace_m: Low and high corner [m], world, where its hand may be sent.
-        way: What it does from then on, one after the other: ``joints``, ``reach``, ``grasp``
+        goal: Its goal at time 0; None = its joint positions.
+        workspace_m: Low and high corner [m] of the targets of its hand, world.
+        task: Its goals from time 0 on, one after the other: ``joints``, ``reach``, ``grasp``
             and ``place``.
-        joint_track: How its joints move; None = they stand still.
+        joint_track: Trajectory of its joints; None = they do not move.
     """
 
     name: str
@@ -219,7 +219,7 @@ class Articulation:
     joint_positions: tuple[float, ...]
     goal: ArmGoal | None = None
     workspace_m: tuple[Vec3, Vec3] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    way: tuple[ArmGoal, ...] = ()
+    task: tuple[ArmGoal, ...] = ()
     joint_track: JointTrajectory | None = None
 
 
