@@ -36,7 +36,7 @@ from gen_data.generator.sensors.lidar.lidar_detection import (
 from gen_data.generator.sensors.lidar.motion_distortion import SweepPulses, fire_pulses
 from gen_data.generator.sensors.lidar.presets import lidar_model, model_names
 from gen_data.generator.sensors.lidar.scan_pattern import LidarModel, Sweep, make_sweep
-from gen_data.generator.sensors.mounting import Mounted, with_lidar
+from gen_data.generator.sensors.mounting import Mounted, add_lidar
 
 SUBRAYS = 7
 """Rays that stand for a beam with a width."""
@@ -128,7 +128,7 @@ class LidarSensor(Mounted):
         name = self.model if isinstance(self.model, str) else self.model.name
         sweep_s = round(1.0 / self.device.rotation_hz, 9)
         lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=name, sweep_s=sweep_s)
-        return with_lidar(scene, self, lidar)
+        return add_lidar(scene, self, lidar)
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng

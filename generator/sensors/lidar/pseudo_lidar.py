@@ -21,7 +21,7 @@ from gen_data.generator.core.scene import Lidar, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.shutter import INSTANT
 from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.mounting import Mounted, known_camera, with_lidar
+from gen_data.generator.sensors.mounting import Mounted, add_lidar, find_camera
 
 CHANNELS = frozenset({Channel.RANGE, Channel.INSTANCE, Channel.CATEGORY})
 
@@ -67,13 +67,13 @@ class PseudoLidar(Mounted):
             ConfigError: the scene has no such rig or camera, or no pixel is taken of its image.
         """
         lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=self.type)
-        image = known_camera(scene, self.name, self.camera).intrinsics
+        image = find_camera(scene, self.name, self.camera).intrinsics
         if self.stride_px > min(image.width_px, image.height_px):
             raise ConfigError(
                 f"sensor '{self.name}': stride_px {self.stride_px} is larger than the image of "
                 f"camera '{self.camera}', {image.width_px} x {image.height_px} px"
             )
-        return with_lidar(scene, self, lidar)
+        return add_lidar(scene, self, lidar)
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
