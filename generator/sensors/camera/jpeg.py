@@ -1,4 +1,4 @@
-"""JPEG: what compression leaves of a photograph."""
+"""Artefacts of JPEG compression."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def through_jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
-    """The image as it comes back out of a JPEG file.
+def compress_jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
+    """Encode and decode an image as JPEG, uint8 [h, w, 3].
 
     Args:
         image: sRGB, uint8 [h, w, 3].
-        quality: Of libjpeg, 1 to 100.
+        quality: Quality of libjpeg, 1 to 100.
     """
     ok, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
     assert ok, "the JPEG encoder takes any RGB image"
