@@ -35,7 +35,6 @@ from gen_data.generator.sensors.camera.exposure import (
 from gen_data.generator.sensors.camera.flare import add_flare
 from gen_data.generator.sensors.camera.glare import add_glare
 from gen_data.generator.sensors.camera.image_sensor import ImageSensor, expose, filter_at, mosaic
-from gen_data.generator.sensors.camera.jpeg import compress_jpeg
 from gen_data.generator.sensors.camera.lens_drops import lens_drops, refract_in_drops
 from gen_data.generator.sensors.camera.presets import camera_preset
 from gen_data.generator.sensors.camera.tone import Tone, display_values, to_bytes, tone_to_bytes
@@ -370,7 +369,7 @@ def _tone(light: Light, shot: Shot) -> NDArray[np.uint8]:
 
 def _compress(image: NDArray[np.uint8], shot: Shot) -> NDArray[np.uint8]:
     quality = shot.pipeline.jpeg_quality
-    return image if quality is None else compress_jpeg(image, round(quality.draw(shot.rng)))
+    return image if quality is None else isp.compress_jpeg(image, round(quality.draw(shot.rng)))
 
 
 def _color_matrices(pipeline: ImagePipeline) -> tuple[Float32, Float32]:

@@ -1,4 +1,4 @@
-"""Image signal processor: demosaicing, white balance, saturation and sharpening."""
+"""Image signal processor: demosaicing, white balance, saturation, sharpening and JPEG."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Literal
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.colorimetry import luminance
@@ -78,3 +79,17 @@ def sharpen(display: Float32, amount: float, radius_px: float) -> Float32:
     """Sharpen display values in [0, 1] by unsharp masking."""
     blurred = cv2.GaussianBlur(display, (0, 0), radius_px)
     return np.asarray(np.clip(display + amount * (display - blurred), 0.0, 1.0), np.float32)
+
+
+def compress_jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
+    """Encode and decode an image as JPEG, uint8 [h, w, 3].
+
+    Args:
+        image: sRGB, uint8 [h, w, 3].
+        quality: Quality of libjpeg, 1 to 100.
+    """
+    ok, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
+    assert ok, "the JPEG encoder takes any RGB image"
+    decoded = cv2.imdecode(data, cv2.IMREAD_COLOR)
+    assert decoded is not None, "encoded bytes can be decoded"
+    return np.ascontiguousarray(decoded[..., ::-1], np.uint8)

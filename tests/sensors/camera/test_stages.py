@@ -21,7 +21,6 @@ from gen_data.generator.sensors.camera import isp, optics
 from gen_data.generator.sensors.camera.exposure import ExposureControl, exposure_settings
 from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, develop
 from gen_data.generator.sensors.camera.image_sensor import ImageSensor, Pattern, expose, mosaic
-from gen_data.generator.sensors.camera.jpeg import compress_jpeg
 from gen_data.generator.sensors.camera.presets import camera_names
 from gen_data.generator.sensors.camera.tone import to_bytes
 
@@ -294,8 +293,8 @@ def test_compression_leaves_its_traces_and_little_else() -> None:
     ramp = np.linspace(0.2, 0.8, 64, dtype=np.float32)[:, None, None]
     noise = 0.05 * rng().standard_normal((64, 64, 1)).astype(np.float32)
     image = to_bytes(np.repeat(ramp + noise, 3, axis=2))
-    rough = compress_jpeg(image, 30).astype(int) - image
-    fine = compress_jpeg(image, 98).astype(int) - image
+    rough = isp.compress_jpeg(image, 30).astype(int) - image
+    fine = isp.compress_jpeg(image, 98).astype(int) - image
     assert np.abs(rough).mean() > 1.5 * np.abs(fine).mean() > 0.0
 
 
