@@ -68,11 +68,13 @@ class ArmConfiguration(RandomizerBase):
         held = _graspable(scene, robot, assets, rng) if mode == "hold" else ""
         if mode == "joints" or robot.gripper is None:
             joints = tuple(self._joints(robot, rng) for _ in range(self.candidates))
-            return ArmGoal("joints", joint_candidates=joints, opening=opening)
+            return ArmGoal("joints", joint_candidates=joints, gripper_opening=opening)
         poses = tuple(hand_over(arm, self.tilt_deg, rng) for _ in range(self.candidates))
         if held:
-            return ArmGoal("hold", pose_candidates=poses, opening=opening, held=held)
-        return ArmGoal("reach", pose_candidates=poses, opening=opening)
+            return ArmGoal(
+                "hold", pose_candidates=poses, gripper_opening=opening, grasped_object=held
+            )
+        return ArmGoal("reach", pose_candidates=poses, gripper_opening=opening)
 
     def _joints(self, robot: RobotModel, rng: Rng) -> tuple[float, ...]:
         return tuple(self._position(joint, rng) for joint in arm_joints(robot))

@@ -102,7 +102,7 @@ class ArmMotion(RandomizerBase):
         return replace(
             scene,
             articulations=tuple(
-                replace(arm, way=self._way(arm, scene, assets, rng)) for arm in scene.articulations
+                replace(arm, task=self._way(arm, scene, assets, rng)) for arm in scene.articulations
             ),
         )
 
@@ -173,7 +173,7 @@ class ArmMotion(RandomizerBase):
                 )
         limit_m = GRASP_MARGIN * gripper.stroke_m if gripper else 0.0
         wanted = groups or tuple(known)
-        held = arm.goal.held if arm.goal else ""
+        held = arm.goal.grasped_object if arm.goal else ""
         fitting = [
             body.name
             for body in scene.bodies
@@ -215,7 +215,7 @@ class ArmMotion(RandomizerBase):
         if stop.reach_m:
             tilt_rad, towards_rad = math.radians(stop.tilt_deg), math.radians(stop.towards_deg)
             pose = hand_pose(stop.reach_m, yaw_rad, tilt_rad, towards_rad)
-            return ArmGoal("reach", pose_candidates=(pose,), opening=stop.opening)
+            return ArmGoal("reach", pose_candidates=(pose,), gripper_opening=stop.opening)
         joints = arm_joints(assets.robot(arm.asset))
         given = stop.joints_deg or ()
         if len(given) != len(joints):
@@ -227,7 +227,7 @@ class ArmMotion(RandomizerBase):
             value if joint.kind == "prismatic" else round(math.radians(value), 6)
             for joint, value in zip(joints, given, strict=True)
         )
-        return ArmGoal("joints", joint_candidates=(positions,), opening=stop.opening)
+        return ArmGoal("joints", joint_candidates=(positions,), gripper_opening=stop.opening)
 
 
 def _spot(surface: SupportSurface, arm: Articulation, rng: Rng) -> SE3:

@@ -1,7 +1,7 @@
-"""Truth about instances in images, about images and about samples: exact, without randomness.
+"""Annotators: exact labels of instances, images and samples, without randomness.
 
-Each annotator is one file and one line in this table. ``truth`` runs them: what an annotator is
-about, its methods say (``gen_data.generator.core.interfaces``).
+Each annotator is one file and one line in this table; ``annotate`` runs them. Their methods
+determine what they annotate, see ``gen_data.generator.core.interfaces``.
 """
 
 from __future__ import annotations

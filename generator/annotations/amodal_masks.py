@@ -1,4 +1,4 @@
-"""Masks of whole silhouettes."""
+"""Amodal masks: whole silhouettes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from gen_data.generator.core.scene import Scene
 
 
 class AmodalMasks(Strict):
-    """The instance's pixels as if nothing stood before it; masks of instances may overlap."""
+    """Pixels of an instance as if nothing occluded it; masks of instances may overlap."""
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.AMODAL})
     type: Literal["amodal_masks"] = "amodal_masks"

@@ -1,4 +1,4 @@
-"""The truth about one image or sample: what is in it, and what the annotators say of that."""
+"""Runs the annotators on the objects of an image, on images and on samples."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ from gen_data.generator.core.scene_time import ego_rig, rig_twist
 
 
 class Thresholds(Strict):
-    """Which instances are annotated in an image; the others stay in the id images.
+    """Thresholds for annotating an instance in an image; the others remain in the id images.
 
-    Instances without a visible pixel are never annotated, unless ``include_invisible``.
+    Instances without a visible pixel are annotated only with ``include_invisible``.
     """
 
     min_visible_px: int = Field(16, ge=1)
-    """Fewest visible pixels."""
+    """Smallest number of visible pixels."""
     min_visible_fraction: float = Field(0.0, ge=0.0, le=1.0)
-    """Smallest visible share of the silhouette; above 0 it needs the annotation visibility."""
+    """Smallest visible share of the silhouette; above 0 it requires the annotation visibility."""
     min_box_px: int = Field(3, ge=1)
-    """Shortest side of the visible box."""
+    """Smallest side of the visible box."""
     include_invisible: bool = False
-    """Annotate every instance, hidden ones too; the other thresholds then do not apply."""
+    """Annotate all instances, hidden ones too; the other thresholds do not apply then."""
 
 
 def annotate_reading(
@@ -46,7 +46,7 @@ def annotate_reading(
     thresholds: Thresholds,
     assets: AssetLibrary,
 ) -> ImageTruth:
-    """Annotations of one reading: of its objects, and of the image as a whole.
+    """Annotate one reading: its objects, and the image as a whole.
 
     Raises:
         SampleError, ConfigError: see ``annotate_objects``.
@@ -61,10 +61,10 @@ def annotate_reading(
 def annotate_ego(
     scenes: Mapping[str, Scene], annotators: Sequence[AnyAnnotator], assets: AssetLibrary
 ) -> EgoTruth | None:
-    """Annotations of one sample as a whole; None where nothing annotates it.
+    """Annotate one sample as a whole; None without an annotator of samples.
 
     Args:
-        scenes: As ``FrameAnnotator`` has them.
+        scenes: As in ``FrameAnnotator``.
         annotators: All of the data set.
         assets: Geometry.
     """
@@ -84,13 +84,13 @@ def annotate_ego(
 def annotate_objects(
     scene: Scene, reading: SensorReading, annotators: Sequence[AnyAnnotator], thresholds: Thresholds
 ) -> ImageTruth:
-    """Annotations of the objects in one reading, in order of instance id.
+    """Annotate the objects in one reading, in order of instance id.
 
-    Annotators that are about no single object are passed over.
+    Annotators of whole images and samples are skipped.
 
     Raises:
-        SampleError: if the labels of an instance contradict each other or the images.
-        ConfigError: if a threshold needs an annotation that is not made.
+        SampleError: the labels of an instance contradict each other or the images.
+        ConfigError: a threshold requires an annotation that is not configured.
     """
     of_objects = [a for a in annotators if isinstance(a, Annotator)]
     if not of_objects:
@@ -116,7 +116,7 @@ def annotate_objects(
 
 
 def is_listed(truth: ObjectTruth, thresholds: Thresholds) -> bool:
-    """Whether an object shows enough of itself to be annotated.
+    """Whether an object is visible enough to be annotated.
 
     Raises:
         ConfigError: if ``min_visible_fraction`` is set and the visible fraction is not known.
@@ -129,7 +129,7 @@ def is_listed(truth: ObjectTruth, thresholds: Thresholds) -> bool:
         return False
     if thresholds.min_visible_fraction > 0 and truth.visible_fraction is None:
         raise ConfigError(
-            "min_visible_fraction: the visible share of objects is not known; "
-            "add 'visibility' to annotations or set it to 0"
+            "min_visible_fraction: the visible fraction of objects is unknown; "
+            "add 'visibility' to annotations or set min_visible_fraction to 0"
         )
     return (truth.visible_fraction or 0.0) >= thresholds.min_visible_fraction

@@ -1,4 +1,4 @@
-"""The ground around the ego from above."""
+"""Bird's-eye-view maps: masks of the ground around the ego vehicle."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from gen_data.generator.core.scene import Instance, Scene
 from gen_data.generator.core.se3 import SE3, Array
 
 LINE_PX = 1.5
-"""Width of borders: enough that none is broken by the centres it misses."""
+"""Width of borders: wide enough that rasterised lines have no gaps."""
 PEOPLE = frozenset({"pedestrian", "person"})
 
 
@@ -31,14 +31,14 @@ class BevMap(Strict):
     """Masks of the ground around the ego's rig, seen from above, its front up.
 
     ``drivable``: carriageways, parking strips and junctions; ``parking``, ``crosswalk``,
-    ``sidewalk``: strips of those lanes; ``lane_divider``, ``road_divider``: borders between lanes
-    that run the same way, and the opposite way; ``vehicles``, ``people``: footprints of the boxes
-    of annotated instances, by their assets' tags; ``free_space``: drivable, and nothing stands
-    there. The layers are those of nuScenes' maps, as far as a street has them.
+    ``sidewalk``: areas of those lanes; ``lane_divider``, ``road_divider``: borders between lanes of
+    the same and of opposite directions; ``vehicles``, ``people``: footprints of the boxes of
+    annotated instances, by their assets' tags; ``free_space``: drivable and unoccupied. The layers
+    follow nuScenes' maps.
 
     Attributes:
         px_m: Side of a pixel.
-        reach_m: From the ego to the nearest edge of the map.
+        reach_m: Distance from the ego to the nearest edge of the map.
     """
 
     channels: ClassVar[frozenset[Channel]] = frozenset()
@@ -56,7 +56,8 @@ class BevMap(Strict):
         """
         if not truth.rig:
             raise ConfigError(
-                "annotation 'bev_map': the scene has no rig to look down on; add an element 'ego'"
+                "annotation 'bev_map': the scene has no rig to centre the map on; add an element"
+                " 'ego'"
             )
         scene = scenes[""]
         T_world_map = level_pose(truth.T_world_ego)
@@ -83,9 +84,9 @@ class BevMap(Strict):
 
 
 def level_pose(pose: SE3) -> SE3:
-    """The pose turned upright: its X axis points where it did, but level.
+    """The pose with roll and pitch removed: the X axis keeps its heading.
 
-    Only square roots decide it, so that it has the same bits on every processor.
+    Only square roots are used, so that it has the same bits on every processor.
     """
     ahead = pose.rotate(np.array([1.0, 0.0, 0.0]))
     length = math.sqrt(float(ahead[0]) ** 2 + float(ahead[1]) ** 2)
@@ -101,7 +102,7 @@ def _lanes(scene: Scene, kind: str) -> Array:
 
 
 def _borders(scene: Scene, kind: str, width_m: float) -> Array:
-    """Ribbons [n, 3, 3] along borders of lanes."""
+    """Triangles [n, 3, 3] of ribbons along borders of lanes."""
     parts = [np.zeros((0, 3, 3))]
     for border in lane_borders(scene.lanes):
         if border.kind == kind:
@@ -112,7 +113,7 @@ def _borders(scene: Scene, kind: str, width_m: float) -> Array:
 
 
 def _floors(instances: list[Instance]) -> Array:
-    """The ground below boxes, as triangles [n, 3, 3]."""
+    """Bottom faces of boxes, as triangles [n, 3, 3]."""
     parts = [np.zeros((0, 3, 3))]
     for instance in instances:
         corners = oriented_box(instance).corners()

@@ -1,6 +1,6 @@
-"""Triangles on a grid seen from above: which cells they cover, and how high they lie there.
+"""Rasterisation of triangles on a horizontal grid: covered cells, and heights.
 
-A cell is covered where its centre is, as label pixels of images are decided by theirs.
+A cell is covered if its centre is, as for label pixels of images.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Grid:
     count: int
 
     def cells(self, p_world: Array) -> Array:
-        """Continuous (row, column) and height [m] of points, shape [..., 3]; half = a centre."""
+        """Continuous (row, column) and height [m] of points, [..., 3]; centres are at .5."""
         p = self.T_world_grid.inverse().apply(p_world)
         middle = 0.5 * self.count
         return np.stack(
@@ -39,11 +39,14 @@ class Grid:
 
 
 def heights_m(grid: Grid, triangles_m: Array) -> Float32:
-    """Height over the grid's origin of the highest triangle at every cell; -inf where none is.
+    """Height above the grid's origin of the highest triangle at every cell; -inf = none.
 
     Args:
-        grid: Where.
-        triangles_m: Corners in the world [n, 3, 3].
+        grid: The grid.
+        triangles_m: Corners in the world, [n, 3, 3].
+
+    Returns:
+        float32 [count, count].
     """
     high = np.full((grid.count, grid.count), -np.inf, np.float32)
     corners = _near(grid, triangles_m)
@@ -61,9 +64,9 @@ def heights_m(grid: Grid, triangles_m: Array) -> Float32:
 
 
 def covered_cells(grid: Grid, triangles_m: Array) -> NDArray[np.bool_]:
-    """Cells whose centres lie under any of the triangles [n, 3, 3], world."""
+    """Whether a cell's centre is covered by a triangle of [n, 3, 3], world; [count, count]."""
     row, first, last, _ = _spans(_near(grid, triangles_m), grid.count)
-    # One more column, so that a span may end behind the last cell.
+    # Difference array along rows; one more column for spans that end after the last cell.
     steps = np.zeros((grid.count, grid.count + 1), np.int32)
     np.add.at(steps, (row, first), 1)
     np.add.at(steps, (row, last), -1)
@@ -72,7 +75,7 @@ def covered_cells(grid: Grid, triangles_m: Array) -> NDArray[np.bool_]:
 
 
 def _near(grid: Grid, triangles_m: Array) -> Array:
-    """The triangles that may touch the grid, as (row, column, height) [n, 3, 3]."""
+    """The triangles that may overlap the grid, as (row, column, height) [n, 3, 3]."""
     corners = grid.cells(triangles_m)
     low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
     near: Array = corners[((high > 0.0) & (low < grid.count)).all(axis=1)]
@@ -82,7 +85,7 @@ def _near(grid: Grid, triangles_m: Array) -> Array:
 def _spans(
     corners: Array, count: int
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
-    """Rows of cells under triangles: row, first column, column behind the last one, triangle."""
+    """Spans of covered cells: row, first column, column after the last, index of the triangle."""
     top = np.maximum(np.ceil(corners[..., 0].min(axis=1) - 0.5), 0).astype(np.intp)
     bottom = np.minimum(np.floor(corners[..., 0].max(axis=1) - 0.5), count - 1).astype(np.intp)
     rows_of = np.maximum(bottom - top + 1, 0)
@@ -106,7 +109,7 @@ def _spans(
 
 
 def _slopes(corners: Array) -> Array:
-    """Rise per cell along rows and columns of every triangle [n, 2]; 0 where it stands upright."""
+    """Slope of every triangle along rows and columns, per cell, [n, 2]; 0 for vertical ones."""
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     flat = np.abs(area) > 1e-12

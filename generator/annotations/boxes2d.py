@@ -1,4 +1,4 @@
-"""Image boxes of the visible pixels and of the whole silhouette."""
+"""Image boxes of visible pixels and of whole silhouettes."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from gen_data.generator.core.scene import Scene
 
 
 class Boxes2d(Strict):
-    """Tight boxes [px]: ``box`` of what is visible, ``amodal_box`` of the silhouette.
+    """Tight boxes [px]: ``box`` of visible pixels, ``amodal_box`` of the silhouette.
 
-    The amodal box counts hidden parts and parts outside the image; None for an instance that is
-    wholly outside the renderer's canvas (three images wide and high).
+    The amodal box includes hidden parts and parts outside the image; None for an instance outside
+    the renderer's canvas of three images width and height.
     """
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.AMODAL})

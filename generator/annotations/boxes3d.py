@@ -1,4 +1,4 @@
-"""Oriented boxes in space."""
+"""Oriented 3D boxes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gen_data.generator.core.se3 import SE3
 
 
 class Boxes3d(Strict):
-    """The instance's tight box along its own axes, in the world and in sensors' frames."""
+    """Tight boxes of instances along their own axes, in the world and in sensors' frames."""
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
     type: Literal["boxes3d"] = "boxes3d"
@@ -43,12 +43,12 @@ class Boxes3d(Strict):
 def annotate_boxes(scene: Scene, T_world_frame: SE3) -> dict[int, OrientedBox]:
     """The boxes of all annotated instances in a frame, by instance id."""
     T_frame_world = T_world_frame.inverse()
-    things = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
-    return {i.instance_id: oriented_box(i).seen_from(T_frame_world) for i in things}
+    instances = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
+    return {i.instance_id: oriented_box(i).seen_from(T_frame_world) for i in instances}
 
 
 def oriented_box(instance: Instance) -> OrientedBox:
-    """The box around an instance in the world; its frame is the instance's, moved to the centre."""
+    """The box of an instance in the world, along the instance's axes, its origin in the centre."""
     (x0, y0, z0), (x1, y1, z1) = instance.box_min_m, instance.box_max_m
     T_instance_box = SE3((0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1)))
     return OrientedBox(instance.T_world_instance @ T_instance_box, (x1 - x0, y1 - y0, z1 - z0))

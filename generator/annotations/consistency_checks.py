@@ -1,4 +1,4 @@
-"""Checks that stay on in production: a label that contradicts another one is never written."""
+"""Consistency checks of labels, which also run in production: contradictions are never written."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def check_truth(reading: SensorReading, truth: ObjectTruth) -> None:
     """Check one object's labels against each other and against the images.
 
     Raises:
-        SampleError: naming sensor, instance and what is wrong.
+        SampleError: they contradict each other; names sensor, instance and contradiction.
     """
     for fault in _faults(reading, truth):
         instance = truth.instance

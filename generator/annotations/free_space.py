@@ -25,15 +25,15 @@ TILE_M = 16.0
 """Grids are centred on multiples of this, so that the cameras of a rig share one."""
 CELL_M = 0.1
 ON_IT_M = 0.03
-"""A point this near the carriageway's surface is on it: half of what it rises within a cell where
-streets are steepest, and lower than any kerb."""
+"""Points this near the carriageway's surface are on it: half the rise within a cell of the
+steepest streets, and lower than any kerb."""
 
 
 class FreeSpace(Strict):
-    """Pixels that show a carriageway with nothing on it, by the point that each of them sees.
+    """Pixels that show unoccupied carriageway, decided by the hit point of each pixel.
 
     Attributes:
-        far_m: Pixels that see something farther away than this, over the ground, are left out.
+        far_m: Pixels with points farther away than this, over the ground, are left out.
     """
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.RANGE, Channel.INSTANCE})
@@ -43,9 +43,9 @@ class FreeSpace(Strict):
     def annotate_image(
         self, scene: Scene, assets: AssetLibrary, reading: SensorReading, truth: ImageTruth
     ) -> ImageTruth:
-        """Fill in ``free_space``; an empty mask where there is none."""
+        """Fill in ``free_space``; an empty mask if no pixel is free."""
         ranges_m = reading.channels[Channel.RANGE]
-        # From above, what is near over the ground may be farther away.
+        # The range exceeds the distance over the ground: the factor allows for high cameras.
         free = (reading.channels[Channel.INSTANCE] == 0) & (ranges_m < 2.0 * self.far_m)
         rows, columns = np.nonzero(free)
         x, y, _ = reading.camera.T_world_camera.translation_m
@@ -60,17 +60,17 @@ class FreeSpace(Strict):
         cells = grid.cells(p_world)
         on = np.where(here[:, None], np.floor(cells[:, :2]), 0.0).astype(np.intp)
         free[rows, columns] = here & (np.abs(cells[:, 2] - ground[on[:, 0], on[:, 1]]) < ON_IT_M)
-        return replace(truth, free_space=_tight(free))
+        return replace(truth, free_space=_crop_mask(free))
 
 
 @lru_cache(maxsize=2)
 def _ground(background: tuple[Body, ...], assets: AssetLibrary, grid: Grid) -> Float32:
-    """Height of the carriageway over the world's origin; -inf where there is none."""
+    """Height of the carriageway above the world's origin; -inf = none."""
     parts = [np.zeros((0, 3, 3)), *(carriageway(body, assets) for body in background)]
     return heights_m(grid, np.concatenate(parts))
 
 
-def _tight(mask: NDArray[np.bool_]) -> MaskPx:
+def _crop_mask(mask: NDArray[np.bool_]) -> MaskPx:
     box = tight_box(mask)
     if box is None:
         return MaskPx(0, 0, np.zeros((0, 0), dtype=bool))

@@ -1,4 +1,4 @@
-"""What lies on the ground, as triangles in the world: carriageways, strips, footprints."""
+"""Geometry on the ground as triangles in the world: carriageways, lanes, footprints."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from gen_data.generator.core.scene import Body, Lane, Scene
 from gen_data.generator.core.se3 import Array
 
 CARRIAGEWAY = frozenset({"asphalt", "marking"})
-"""Roles of the materials that one may drive on."""
+"""Roles of materials of drivable surfaces."""
 LOW_M = 2.0
-"""What hangs higher than this over the ground leaves it free: crowns of trees, arms of signals."""
+"""Geometry higher than this above the ground, as crowns of trees, does not occupy it."""
 DIRECTIONS = 48
-"""In which the outline of a footprint is looked for."""
+"""Directions that sample the outline of a footprint."""
 NOTHING: Array = np.zeros((0, 3, 3))
 
 
 def carriageways(scene: Scene, assets: AssetLibrary) -> Array:
-    """Triangles [n, 3, 3] of everything that one may drive on."""
+    """Triangles [n, 3, 3] of all drivable surfaces."""
     parts = [
         carriageway(body, assets)
         for body in scene.bodies
@@ -33,7 +33,7 @@ def carriageways(scene: Scene, assets: AssetLibrary) -> Array:
 
 @lru_cache(maxsize=32)
 def carriageway(body: Body, assets: AssetLibrary) -> Array:
-    """Triangles [n, 3, 3] of a body that are carriageway and face up; most have none."""
+    """Upward triangles [n, 3, 3] of a body's carriageway; [0, 3, 3] for most bodies."""
     materials = body.materials or assets.materials(body.asset)
     slots = [k for k, material in enumerate(materials) if material.role in CARRIAGEWAY]
     if not slots:
@@ -48,7 +48,7 @@ def carriageway(body: Body, assets: AssetLibrary) -> Array:
 
 
 def strips(lanes: Iterable[Lane]) -> Array:
-    """Triangles [n, 3, 3] of the ground that lanes take up."""
+    """Triangles [n, 3, 3] of the areas of lanes."""
     parts = []
     for lane in lanes:
         left, right = (np.asarray(border_line(lane, side)) for side in ("left", "right"))
@@ -64,10 +64,7 @@ def ribbon(left: Array, right: Array) -> Array:
 
 
 def footprints(bodies: Iterable[Body], assets: AssetLibrary) -> Array:
-    """Triangles [n, 3, 3] of the ground that bodies stand on, or lean over lower than 2 m.
-
-    Each is the convex outline of what is low of it.
-    """
+    """Triangles [n, 3, 3] of the ground occupied by bodies: convex outlines of their lowest 2 m."""
     parts = []
     for body in bodies:
         outline = body.T_world_body.apply(low_outline(body.asset, body.scale, assets))
@@ -85,7 +82,7 @@ def low_outline(asset: str, scale: float, assets: AssetLibrary) -> Array:
     low = vertices[vertices[:, 2] < foot_m + LOW_M]
     angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
     towards = np.stack([np.cos(angles), np.sin(angles)])
-    # einsum keeps one order of summation, which a tie between vertices depends on.
+    # einsum keeps one order of summation, on which ties between vertices depend.
     along = np.einsum("ij,jk->ik", low[:, :2], towards, optimize=False)
     corners = along.argmax(axis=0)
     outline = low[corners[np.diff(corners, append=corners[0] - 1) != 0]]

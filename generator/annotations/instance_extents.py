@@ -1,4 +1,4 @@
-"""Pixels of instances: one pass over the id image, then work on crops only."""
+"""Extents of instances in images: one pass over the id image, then crops."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gen_data.generator.core.scene import Instance
 
 @dataclass(frozen=True, slots=True)
 class Extent:
-    """How many pixels show one id, and the tight box around them."""
+    """Number of pixels with an id, and the tight box around them."""
 
     visible_px: int
     box: BoxPx
@@ -25,8 +25,8 @@ class Extent:
 def find_extents(ids: NDArray[np.uint16]) -> dict[int, Extent]:
     """Pixel count and tight box of every id but 0 in an id image, shape [height, width].
 
-    The image is cut into horizontal runs of equal ids first: everything after that costs by the
-    number of runs (thousands), not by the number of pixels or of objects.
+    The image is first split into horizontal runs of equal ids: the cost of the rest depends on the
+    number of runs (thousands), not on that of pixels or objects.
     """
     height, width = ids.shape
     flat = ids.ravel()
@@ -72,22 +72,22 @@ def visible_mask(reading: SensorReading, truth: ObjectTruth) -> NDArray[np.bool_
 
 
 def find_silhouette(reading: SensorReading, instance: Instance) -> Silhouette:
-    """The instance as if nothing stood before it.
+    """The silhouette of an instance as if nothing occluded it.
 
     Raises:
-        SampleError: if the renderer returned none.
+        SampleError: the renderer returned none.
     """
     silhouette = reading.silhouettes.get(instance.instance_id)
     if silhouette is None:
         raise SampleError(
             f"sensor '{reading.sensor}', instance {instance.instance_id} '{instance.name}': the "
-            "renderer returned no silhouette of it although the amodal channel was asked for"
+            "renderer returned no silhouette of it although the amodal channel was requested"
         )
     return silhouette
 
 
 def silhouette_box(silhouette: Silhouette) -> BoxPx | None:
-    """The box that a silhouette fills, possibly outside the image; None when it is empty."""
+    """The tight box of a silhouette, possibly outside the image; None if it is empty."""
     height, width = silhouette.mask.shape
     if height == 0 or width == 0:
         return None

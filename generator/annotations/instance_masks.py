@@ -15,7 +15,7 @@ from gen_data.generator.core.scene import Scene
 
 
 class InstanceMasks(Strict):
-    """The pixels in which the instance is seen; no two instances share one."""
+    """Visible pixels of an instance; masks of instances never overlap."""
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
     type: Literal["instance_masks"] = "instance_masks"

@@ -1,4 +1,4 @@
-"""Named points of objects: where they are, and whether they can be seen."""
+"""Keypoints of objects: positions and visibility."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import Array, Vec3
 
 LEAST_COSINE = 1.0 / 3.0
-"""Of the angle under which a surface is seen: below it, depth counts as if it were this."""
+"""Lower bound of the cosine of incidence that converts ray lengths to depths below a surface."""
 
 
 class Keypoints(Strict):
     """Points of instances that have them: image and camera coordinates, and COCO's visibility.
 
-    0 = not in the image (nor in the lens's field), 1 = in the image and hidden, by other things or
-    by the object itself, 2 = visible. A point is seen through the surface of its own object as
-    long as it lies no deeper below it than its radius. Depth is measured across the surface, as
-    for a hub below the face of its wheel, which is seen from the side and obliquely alike.
+    0 = not in the image (or outside the lens's field), 1 = in the image but hidden by other objects
+    or by the object itself, 2 = visible. A point up to its radius below the surface of its object
+    counts as visible. The depth is measured along the surface's normal, so that a hub behind the
+    face of its wheel is visible from the side and obliquely alike.
 
-    Behind a rolling shutter image coordinates are those of the instant of the row that shows the
-    point, camera coordinates those of the image's instant.
+    With a rolling shutter image coordinates refer to the instant of the point's row, camera
+    coordinates to the image's instant.
     """
 
     channels: ClassVar[frozenset[Channel]] = frozenset(
@@ -93,10 +93,10 @@ def is_visible(
     pixel: tuple[int, int],
     radius_m: float,
 ) -> bool:
-    """Whether a point of an instance is seen at its pixel.
+    """Whether a point of an instance is visible at its pixel.
 
-    Where the pixel shows another thing that lies behind the point, its ray just misses the
-    silhouette: then one of the eight neighbours has to show the instance.
+    If the pixel shows another object behind the point, its ray just misses the silhouette: then one
+    of the eight neighbours must show the instance.
 
     Args:
         reading: With ids, range and normals.

@@ -1,4 +1,4 @@
-"""Borders of lanes, in the world and in images."""
+"""Lane borders, in the world and in images."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import Array
 
 FINE_M = 0.1
-"""Borders are followed in steps of this length before they are thinned."""
-STANDS_M = 0.15
-"""What is seen less than this above the ground hides no border: kerbs, wet leaves, rounding."""
+"""Borders are sampled at this step before they are thinned."""
+OCCLUDER_MIN_M = 0.15
+"""Hits less than this above the ground hide no border: kerbs, wet leaves, rounding."""
 
 
 class Lanes(Strict):
-    """The borders of driving lanes: lines in the world, and their points in every image.
+    """Borders of driving lanes: lines in the world, and their points in every image.
 
-    Occluded points are listed, as in CULane and TuSimple, and marked as such.
+    Occluded points are included, as in CULane and TuSimple, and flagged.
 
     Attributes:
         far_m: Points farther from the camera are left out.
-        step_px: Points of one line are about this far apart in the image.
+        step_px: Approximate distance of the points of a line in the image.
     """
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.RANGE})
@@ -62,7 +62,7 @@ class Lanes(Strict):
     def _project_border(
         self, border: LaneBorder, scene: Scene, reading: SensorReading
     ) -> Iterator[BorderTruth]:
-        """The stretches of a border that lie in the image."""
+        """Yield the parts of a border that are in the image."""
         camera = reading.camera
         lens = camera.intrinsics
         p_world = resample_line(np.asarray(border.points_m), FINE_M)
@@ -71,7 +71,7 @@ class Lanes(Strict):
         uv = lens.project(p_camera)
         if camera.shutter.rolls:
             p_camera, uv = project_rolling_shutter(scene, camera, p_world)
-        # What the lens does not show is NaN, and less than nothing.
+        # NaN, outside the lens's field, compares as False.
         inside = near & (uv >= 0.0).all(axis=1)
         inside &= (uv[:, 0] < lens.width_px) & (uv[:, 1] < lens.height_px)
         for start, end in runs(inside):
@@ -88,7 +88,7 @@ class Lanes(Strict):
 
 
 def resample_line(line_m: Array, step_m: float) -> Array:
-    """Points [n, 3] along a line, at most a step apart, its own points included at the ends."""
+    """Points [n, 3] along a line at equal distances of at most a step, including both ends."""
     lengths = np.sqrt((np.diff(line_m, axis=0) ** 2).sum(axis=1))
     at_m = np.concatenate([[0.0], np.cumsum(lengths)])
     even = np.linspace(0.0, at_m[-1], int(at_m[-1] / step_m) + 2)
@@ -96,31 +96,31 @@ def resample_line(line_m: Array, step_m: float) -> Array:
 
 
 def runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Half-open ranges in which the flags are set."""
+    """Half-open ranges of consecutive set flags."""
     edges = np.flatnonzero(np.diff(flags, prepend=False, append=False))
     return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def thin_line(uv: Array, step_px: float) -> NDArray[np.intp]:
-    """Rows of points about a step apart along a line of image points, both ends included."""
-    way = np.sqrt((np.diff(uv, axis=0) ** 2).sum(axis=1))
-    bins = (np.concatenate([[0.0], np.cumsum(way)]) / step_px).astype(np.int64)
+    """Indices of points about a step apart along a line of image points, including both ends."""
+    lengths = np.sqrt((np.diff(uv, axis=0) ** 2).sum(axis=1))
+    bins = (np.concatenate([[0.0], np.cumsum(lengths)]) / step_px).astype(np.int64)
     first = np.flatnonzero(np.diff(bins, prepend=-1))
     return np.unique(np.append(first, len(uv) - 1))
 
 
 def is_seen(reading: SensorReading, p_camera: Array, uv: Array) -> NDArray[np.bool_]:
-    """Whether points on the ground are seen: nothing that stands on it lies before them.
+    """Whether points on the ground are visible, bool [n]: not occluded by objects on it.
 
     Args:
         reading: With ranges.
-        p_camera: Points [n, 3].
-        uv: Where they are in the image [n, 2].
+        p_camera: Points, camera frame, [n, 3].
+        uv: Their image coordinates, [n, 2].
     """
     columns, rows = (uv[:, k].astype(np.intp) for k in (0, 1))
     range_m = reading.channels[Channel.RANGE][rows, columns].astype(np.float64)
     away_m = np.sqrt((p_camera * p_camera).sum(axis=1))
-    before = p_camera * (np.minimum(range_m, away_m) / away_m)[:, None]
-    above_m = reading.camera.T_world_camera.rotate(before - p_camera)[:, 2]
-    seen: NDArray[np.bool_] = above_m < STANDS_M
+    first_hit = p_camera * (np.minimum(range_m, away_m) / away_m)[:, None]
+    above_m = reading.camera.T_world_camera.rotate(first_hit - p_camera)[:, 2]
+    seen: NDArray[np.bool_] = above_m < OCCLUDER_MIN_M
     return seen

@@ -1,4 +1,4 @@
-"""How objects move."""
+"""Motion of objects."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from gen_data.generator.core.scene_time import ego_rig
 class Motion(Strict):
     """Velocity, acceleration and angular velocity along the world's, camera's and ego's axes.
 
-    They are those of the object over the ground; whoever wants them against a moving camera
-    subtracts the camera's. The track id of an object is its instance id.
+    They are relative to the ground, not to a moving camera. The track id of an object is its
+    instance id.
     """
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})

@@ -1,4 +1,4 @@
-"""Visible pixels of the parts of articulated things."""
+"""Visible pixels of the parts of articulated objects."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gen_data.generator.core.scene import Scene
 
 
 class PartMasks(Strict):
-    """How many pixels show each part; the masks themselves are the part image.
+    """Number of visible pixels of each part; the masks themselves are the part image.
 
     Pixels with part id 0 belong to the instance as a whole and to none of its parts.
     """

@@ -1,4 +1,4 @@
-"""Six-degree-of-freedom poses."""
+"""Six-degree-of-freedom poses of objects."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ class SemanticMasks(Strict):
     type: Literal["semantic_masks"] = "semantic_masks"
 
     def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
-        """The truth as it is, once the category image is known to agree with it.
+        """Check the category image against the truth, which stays unchanged.
 
         Raises:
             SampleError: if a visible pixel of the instance shows another category.

@@ -1,4 +1,4 @@
-"""How much of an instance is seen, hidden, and cut off by the image border."""
+"""Visible, occluded and truncated fractions of instances."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from gen_data.generator.core.scene import Scene
 class Visibility(Strict):
     """Three shares in [0, 1], all ratios of pixel counts.
 
-    ``visible_fraction`` is BOP's ``visib_fract``: the silhouette it refers to is counted outside
-    the image too, so a truncated object is below 1 even if nothing hides it (Hodan et al., "BOP
-    Challenge 2020", section 2). An instance without a silhouette is wholly truncated.
+    ``visible_fraction`` is BOP's ``visib_fract``: it refers to the silhouette inside and outside
+    the image, so that a truncated object is below 1 even without occlusion (Hodan et al., "BOP
+    Challenge 2020", section 2). An instance without a silhouette is fully truncated.
     """
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE, Channel.AMODAL})

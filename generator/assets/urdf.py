@@ -16,7 +16,7 @@ from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.core.asset_types import Joint
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.kinematics import leader_of
-from gen_data.generator.core.safe_xml import parse_xml, place_of
+from gen_data.generator.core.safe_xml import format_position, parse_xml
 from gen_data.generator.core.se3 import SE3, Vec3
 
 _MAX_ELEMENTS = 50_000
@@ -108,7 +108,9 @@ def read_urdf(folder: Folder, relative: str) -> Urdf:
         return _sort_links(links, joints)
     except (ValueError, KeyError) as error:
         reason = f"missing {error}" if isinstance(error, KeyError) else error
-        raise AssetError(f"{place}{place_of(at)}: malformed URDF ({reason}); correct it") from None
+        raise AssetError(
+            f"{place}{format_position(at)}: malformed URDF ({reason}); correct it"
+        ) from None
 
 
 def _iterate_unique(root: Element, tag: str) -> Iterator[tuple[str, Element]]:

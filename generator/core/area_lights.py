@@ -1,4 +1,4 @@
-"""Panels that shine: the light, and the body in which it is seen."""
+"""Area lights: panels and the visible fixtures that represent them."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from gen_data.generator.core.scene import PANEL_KINDS, Body, Light, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
 
 GAP_M = 1e-3
-"""A panel shines from this far before its fixture, which then does not shade it."""
+"""Distance of a panel in front of its fixture, so that the fixture does not shadow it."""
 LAMP = "lamp"
-"""Role of the slots of a fixture that shine."""
+"""Role of the emissive slots of a fixture."""
 
 
 def level_side(direction: Vec3) -> Vec3:
-    """The level unit vector at right angles to a direction; along X for what looks up or down."""
+    """The horizontal unit vector perpendicular to a direction; X for vertical directions."""
     x, y, _ = direction
     level = math.hypot(x, y)
     if level < 1e-6:
@@ -29,7 +29,7 @@ def level_side(direction: Vec3) -> Vec3:
 
 
 def fixture_asset(light: Light) -> str:
-    """Id of the fixture in which a panel is seen."""
+    """Asset id of a panel's fixture."""
     if light.kind == "disk":
         diameter_m = round(2.0 * light.radius_m, 6)
         return f"light_panel?shape=disk&size_m={diameter_m:g},{diameter_m:g}"
@@ -37,14 +37,14 @@ def fixture_asset(light: Light) -> str:
 
 
 def add_fixture(scene: Scene, light: Light, materials: Sequence[Material]) -> tuple[Scene, Light]:
-    """The scene with a body that shows a panel, and the panel as it moves with that body.
+    """Add the fixture of a panel to a scene; return the scene and the panel attached to it.
 
-    The body is background: it has no instance, and nothing falls on it.
+    The fixture is background: it has no instance and does not collide.
 
     Args:
-        scene: Without it.
+        scene: Without the fixture.
         light: Of kind rectangle or disk.
-        materials: Of ``fixture_asset(light)``; the slots with the role ``lamp`` shine.
+        materials: Of ``fixture_asset(light)``; slots with the role ``lamp`` become emissive.
     """
     z = -np.asarray(light.direction, dtype=np.float64)
     x = np.asarray(light.side if light.kind == "rectangle" else level_side(light.direction))
@@ -54,16 +54,16 @@ def add_fixture(scene: Scene, light: Light, materials: Sequence[Material]) -> tu
     matrix[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
     matrix[:3, 3] = np.asarray(light.position_m) + GAP_M * z
     red, green, blue = (round(c * luminance_cd_m2(light), 4) for c in light.color)
-    shining = tuple(
+    emissive = tuple(
         replace(m, emission_cd_m2=(red, green, blue)) if m.role == LAMP else m for m in materials
     )
     pose = SE3.from_matrix(matrix).rounded()
-    body = Body(light.name, fixture_asset(light), pose, collides=False, materials=shining)
+    body = Body(light.name, fixture_asset(light), pose, collides=False, materials=emissive)
     return replace(scene, bodies=(*scene.bodies, body)), replace(light, body=light.name)
 
 
 def remove_lights(scene: Scene) -> Scene:
-    """The scene without its lights, nor the fixtures of panels."""
+    """The scene without lights and fixtures."""
     fixtures = {light.body for light in scene.lights if light.kind in PANEL_KINDS and light.body}
     bodies = tuple(b for b in scene.bodies if b.name not in fixtures or b.instance_id)
     return replace(scene, lights=(), bodies=bodies)

@@ -1,4 +1,4 @@
-"""Geometry and images as plain arrays: what assets hand to physics and to renderers."""
+"""Types of assets: materials, meshes, textures, collision geometry, robots."""
 
 from __future__ import annotations
 
@@ -64,8 +64,8 @@ SURFACES = (
     "", "air", "asphalt", "marking", "pavement", "kerb", "grass", "leaf", "bark", "sign", "plate",
     "glass", "window", "facade", "roof", "paint", "tyre", "skin", "lamp", "mirrored",
 )  # fmt: skip
-"""What a laser may have hit, by number: fog and rain, something seen in a mirror and told to be
-behind it, or the role of a material; 0 = any other."""
+"""Kinds of surfaces that a laser may hit, by index: fog and rain (``air``), a mirror image, or the
+role of a material; 0 = any other."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

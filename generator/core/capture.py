@@ -1,4 +1,4 @@
-"""What sensors saw of one Scene at one instant."""
+"""Readings of sensors: images, point clouds and measurements."""
 
 from __future__ import annotations
 
@@ -78,14 +78,14 @@ class Channel(str, Enum):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Silhouette:
-    """One instance as if nothing stood before it, on a canvas three images wide and high.
+    """An instance without occlusion, on a canvas three images wide and high.
 
-    Beside the image the canvas shows what a larger sensor would, as far as the lens does: nothing
-    lies beside the image of a lens whose whole field is in it.
+    The canvas extends the image as a larger sensor would, within the lens's field: it is empty
+    beside the image of a lens whose whole field is in the image.
 
     Attributes:
-        x_px, y_px: Where the mask's first pixel lies in the image; may be negative.
-        mask: bool [h, w], tight around the silhouette; [0, 0] where nothing is in the canvas.
+        x_px, y_px: Image coordinates of the mask's first pixel; may be negative.
+        mask: bool [h, w], tight around the silhouette; [0, 0] = not in the canvas.
     """
 
     instance_id: int
@@ -96,14 +96,14 @@ class Silhouette:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SensorReading:
-    """What one sensor returned.
+    """Reading of one camera.
 
     Attributes:
-        channels: Arrays by channel, as listed at Channel.
-        silhouettes: By instance id; empty unless AMODAL was asked for.
-        time_s: The instant that depth, ids and boxes refer to; behind a rolling shutter, that of
-            the image's middle, while each row has its own (``camera.shutter``).
-        ev100: Exposure value that was set or metered; None where there is no photograph.
+        channels: Arrays by channel, as listed in Channel.
+        silhouettes: By instance id; empty unless AMODAL was requested.
+        time_s: The instant that depth, ids and boxes refer to; with a rolling shutter, that of the
+            image's middle row (see ``camera.shutter``).
+        ev100: Exposure value that was set or metered; None without a photograph.
     """
 
     sensor: str
@@ -144,7 +144,7 @@ return_count              how many returns its pulse has
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PointCloud:
-    """What one sweep of a laser scanner returned, in the order of firing.
+    """Points of one sweep of a laser scanner, in the order of firing.
 
     Attributes:
         points: Records of ``POINT`` [n].
@@ -164,7 +164,7 @@ class PointCloud:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Measurements:
-    """What a device measured: radar, inertial unit, satellite receiver, odometer, watcher.
+    """Measurements of a device: radar, IMU, GNSS receiver, odometer, event detector.
 
     Attributes:
         rows: Records [n] of
@@ -180,18 +180,18 @@ class Measurements:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LidarRays:
-    """The light that a laser scanner sends out; "lidar frame" is that of the scene's instant.
+    """Rays of a laser scanner; "lidar frame" is that of the scene's instant.
 
     Attributes:
         directions: Unit vectors in the lidar frame, float32 [n, 3].
-        divergence_rad: Full angle of a beam.
-        subrays: Rays that stand for one beam: 1, or 7, the axis and six around it.
-        range_max_m: Beyond it nothing is looked for.
-        origins_m: Where beams begin in the lidar frame, float32 [n, 3]; None = at its origin.
-        time_s: When beams leave, counted from the scene's instant, float32 [n]: they meet bodies
-            with tracks where these are then. None = all at that instant.
-        order: Numbers of the beams, int32 [n], so that those after each other go nearly the same
-            way: they are traced together. Changes nothing but speed; None = they do so already.
+        divergence_rad: Full divergence angle of a beam.
+        subrays: Rays per beam: 1, or 7, the axis and six around it.
+        range_max_m: Hits farther away are ignored.
+        origins_m: Origins of the beams in the lidar frame, float32 [n, 3]; None = its origin.
+        time_s: Emission times relative to the scene's instant, float32 [n]: bodies with
+            trajectories are hit where they are then. None = all 0.
+        order: Permutation of the beams, int32 [n], that makes neighbours nearly parallel, which
+            speeds up tracing; None = they already are.
     """
 
     directions: NDArray[np.float32]
@@ -205,13 +205,14 @@ class LidarRays:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SecondaryHits:
-    """What rays meet through panes of glass or by way of a mirror; arrays are [m].
+    """Hits of rays through panes of glass or by way of a mirror; arrays are [m].
 
     Attributes:
-        ray: Number of the ray: beam times subrays plus subray, int64; at most twice the same.
-        range_m, reflectance: As of LidarHits; the whole way, and what glass or mirror leave of it.
-        instance_id, category_id, surface: As of LidarHits. What a mirror shows has no ids, as it is
-            not where the point is.
+        ray: Index of the ray: beam times subrays plus subray, int64; each at most twice.
+        range_m, reflectance: As in LidarHits; length of the whole path, and the reflectance after
+            losses in glass or mirror.
+        instance_id, category_id, surface: As in LidarHits. Mirrored objects have no ids, as they
+            are not at the position of the point.
     """
 
     ray: NDArray[np.int64]
@@ -224,17 +225,17 @@ class SecondaryHits:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LidarHits:
-    """What the rays of beams hit first; arrays are [n, subrays].
+    """First hits of the rays of beams; arrays are [n, subrays].
 
     Attributes:
-        range_m: float32; inf where there is nothing.
-        reflectance: Of a white-to-black matte surface, seen square on, that would send as much
-            light back: incidence is in it already. Glossy and retro-reflecting surfaces exceed 1.
-            float32; 0 where there is nothing.
-        incidence_cos: Cosine of the angle to the surface's normal, float32; 0.
+        range_m: float32; inf = no hit.
+        reflectance: Reflectance of the matte surface, square on, that returns as much light: it
+            includes the angle of incidence. Glossy and retro-reflecting surfaces exceed 1.
+            float32; 0.
+        incidence_cos: Cosine of the angle of incidence, float32; 0.
         instance_id, category_id: uint16; 0.
-        surface: Number in ``gen_data.generator.core.asset_types.SURFACES``, uint8; 0.
-        detours: What some rays meet besides; None = nothing.
+        surface: Index in ``gen_data.generator.core.asset_types.SURFACES``, uint8; 0.
+        detours: Secondary hits; None = none.
     """
 
     range_m: NDArray[np.float32]
@@ -248,10 +249,10 @@ class LidarHits:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Capture:
-    """What all sensors saw at one instant, by sensor name.
+    """Readings of all sensors at one step, by sensor name.
 
-    Cameras read, lidars return clouds, other devices tables. A sensor slower than the sequence is
-    missing from the steps between.
+    Cameras have readings, lidars clouds, other devices tables. A sensor slower than the sequence is
+    missing in the steps between its readings.
     """
 
     readings: Mapping[str, SensorReading]

@@ -1,8 +1,8 @@
-"""From the plane around a point of the earth to latitude, longitude and altitude.
+"""Geodetic coordinates (WGS 84) of a local tangent plane.
 
-WGS 84 as of NIMA TR8350.2. The world is the plane that touches the ellipsoid's surroundings at the
-origin: X east, Y north, Z up. Geodetic coordinates by Bowring, "Transformation from spatial to
-geographical coordinates", Survey Review 23, 1976, iterated; exact to far below a micrometre here.
+WGS 84 as of NIMA TR8350.2. The world is the east-north-up frame at an origin: X east, Y north, Z
+up. Geodetic coordinates by Bowring, "Transformation from spatial to geographical coordinates",
+Survey Review 23, 1976, iterated; exact to far below a micrometre near the surface.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SECOND_ECCENTRICITY2 = ECCENTRICITY2 / (1.0 - ECCENTRICITY2)
 
 @dataclass(frozen=True, slots=True)
 class GeodeticOrigin:
-    """Where on the earth the world's origin is; altitude above the ellipsoid."""
+    """Geodetic coordinates of the world's origin; altitude above the ellipsoid."""
 
     latitude_deg: float
     longitude_deg: float

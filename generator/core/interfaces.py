@@ -1,17 +1,16 @@
-"""The seams: everything that the assembly, the runner and the pipeline use of a plug-in.
+"""Interfaces of plug-ins: all members that assembly, runner and pipeline use.
 
-How a plug-in is made
----------------------
-A plug-in is a class that is named in the ``TABLE`` of its package, or by an entry point of the
-group ``gen_data.<kind>``. Classes of the kinds ``element``, ``randomizer``, ``sensor``,
-``annotation``, ``exporter`` and ``renderer`` derive from
-``gen_data.generator.config.base_model.Strict``: their fields are the keys of their entry in YAML,
-and instances are made by validation of that entry. The field ``type`` is ``Literal["<name in the
-table>"]`` (``renderer`` instead of ``type`` for a renderer) with the name as its default. Instances
-are frozen, picklable, and made before any engine is opened, so loading their module imports no
-heavy library.
+Writing a plug-in
+-----------------
+A plug-in is a class listed in the ``TABLE`` of its package, or an entry point of the group
+``gen_data.<kind>``. Classes of the kinds ``element``, ``randomizer``, ``sensor``, ``annotation``,
+``exporter`` and ``renderer`` derive from ``gen_data.generator.config.base_model.Strict``: their
+fields are the keys of their entry in YAML, and instances are created by validating that entry. The
+field ``type`` is ``Literal["<name in the table>"]`` (``renderer`` instead of ``type`` for a
+renderer) with the name as its default. Instances are frozen, picklable, and created before any
+engine is opened, so importing their module must not import heavy libraries.
 
-Every member of a Protocol below is required. Bases supply those that few plug-ins need:
+Every member of a Protocol below is required. Base classes provide those that few plug-ins need:
 ``gen_data.randomizers.base.RandomizerBase``, ``gen_data.scene_templates.element.Element``,
 ``gen_data.generator.sensors.mounting.Mounted`` and ``Instrument``,
 ``gen_data.exporters.base.ExporterBase``. A class that lacks a member is refused when it is loaded.
@@ -19,8 +18,8 @@ Every member of a Protocol below is required. Bases supply those that few plug-i
 The kind ``asset_family`` differs: its entry points name instances of
 ``gen_data.generator.assets.procedural.family.Family``, ``TextureFamily`` or ``EnvironmentFamily``.
 
-Randomizers get no engine, annotators get no rng, exporters see one shard and compute ids instead
-of counting: forbidden operations are impossible, not merely discouraged.
+Forbidden operations are impossible by design: randomizers get no engine, annotators no rng, and
+exporters process one shard at a time and compute ids instead of counting.
 """
 
 from __future__ import annotations
@@ -60,7 +59,7 @@ from gen_data.generator.core.streams import Rng
 
 
 class Stage(str, Enum):
-    """When a randomizer runs."""
+    """Stage of the pipeline in which a randomizer runs."""
 
     BUILD = "scene"
     """Once per scene, before physics."""
@@ -69,14 +68,14 @@ class Stage(str, Enum):
 
 
 class AssetIndex(Protocol):
-    """What there is, without geometry."""
+    """Index of the assets, without geometry."""
 
     def get(self, asset_id: str) -> Asset:
-        """The entry of that id. Raises AssetError with the nearest ids if unknown."""
+        """The asset of that id. Raises AssetError with the nearest ids if unknown."""
         ...
 
     def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:
-        """All assets of the kind that carry every tag, sorted by id; may be empty."""
+        """All assets of a kind that have all tags, sorted by id; may be empty."""
         ...
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
@@ -100,15 +99,15 @@ class AssetIndex(Protocol):
         ...
 
     def stage(self, asset_id: str) -> StageModel:
-        """What a stage file holds. Raises AssetError if the asset is no stage."""
+        """Content of a stage file. Raises AssetError if the asset is no stage."""
         ...
 
 
 class AssetLibrary(AssetIndex, Protocol):
-    """The index, and the geometry behind it; everything is cached by content hash."""
+    """The index and the geometry of assets; everything is cached by content hash."""
 
     def __hash__(self) -> int:
-        """Of its identity: what is worked out from its geometry may be remembered with it."""
+        """Hash by identity, so that caches of derived geometry may use it as a key."""
         ...
 
     def mesh(self, asset_id: str) -> MeshData:
@@ -142,17 +141,17 @@ class Element(Protocol):
 
     @property
     def follows_others(self) -> bool:
-        """Whether it is added after the elements that do not, whatever the order of the lines.
+        """Whether it is added after all elements that do not follow others.
 
-        For groups of objects, which keep clear of everything that stands on their surfaces.
+        For groups of objects, which avoid everything on their surfaces.
         """
         ...
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """A new scene with this element at its nominal place.
+        """A new scene with this element at its nominal pose.
 
         Raises:
-            ConfigError: a relation names nothing, or cannot hold.
+            ConfigError: a relation refers to nothing, or cannot be satisfied.
         """
         ...
 
@@ -167,41 +166,41 @@ class Randomizer(Protocol):
 
     @property
     def stage(self) -> str:
-        """When it runs: the value of a Stage."""
+        """Stage in which it runs: the value of a Stage."""
         ...
 
     @property
     def motion_duration_s(self) -> float | None:
-        """How long the motion that it draws lasts, from time 0 [s]; None if it draws none.
+        """Duration of the motion that it draws, from time 0 [s]; None if it draws none.
 
-        Sequences that are longer are refused.
+        Longer sequences are refused.
         """
         ...
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
-        """Ids of the assets that only it may bring into a scene; they are part of the plan.
+        """Ids of assets that it may add to a scene, which become part of the plan.
 
-        Assets of nominal bodies and of object groups are known without it.
+        Assets of nominal bodies and of object groups need not be listed.
         """
         ...
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """A new scene; the given one stays as it is.
+        """Return a new scene; the given one is unchanged.
 
         Raises:
-            LayoutRejected: this draw cannot be carried out; the next attempt may.
-            ConfigError: no draw can.
+            LayoutRejected: this draw has no solution, but another attempt may have one.
+            ConfigError: no draw has a solution.
         """
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Settled:
-    """A scene at rest, or why it was refused.
+    """A settled scene, or the reason for its rejection.
 
     Attributes:
-        scene: All poses rounded and frozen; robot links placed.
-        rejection: None when the scene is good.
+        scene: With rounded poses and placed robot links.
+        rejection: None = the scene is valid.
     """
 
     scene: Scene
@@ -209,7 +208,7 @@ class Settled:
 
 
 class PhysicsEngine(Protocol):
-    """Settles bodies and moves arms. A pure function of the scene: no memory between calls."""
+    """Settles bodies and moves arms: a pure function of the scene, without state."""
 
     def __enter__(self) -> PhysicsEngine:
         """Start the engine."""
@@ -225,15 +224,15 @@ class PhysicsEngine(Protocol):
         ...
 
     def settle(self, scene: Scene) -> Settled:
-        """The scene at rest."""
+        """Settle a scene."""
         ...
 
 
 class Renderer(Protocol):
-    """Light and rays. A pure function of its arguments; it may cache assets."""
+    """Renders images and traces rays: a pure function of its arguments, except for caches."""
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
-        """Every requested channel of one camera, with the type and values listed at ``Channel``.
+        """Render the requested channels of one camera, with types and values as in ``Channel``.
 
         The reading's ``sensor`` is the camera's name. ``AMODAL`` fills its ``silhouettes`` instead
         of its ``channels``. Renderers end at ``RADIANCE``: cameras develop ``RGB`` from it and set
@@ -242,18 +241,18 @@ class Renderer(Protocol):
         ...
 
     def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
-        """The first surface on every ray of a laser scanner's beams, and how well it reflects."""
+        """Find the first surface on every ray of a laser scanner's beams, and its reflectance."""
         ...
 
 
 class RendererSettings(Protocol):
-    """The section ``render:`` as one renderer reads it: its plug-in class."""
+    """The section ``render:`` of a renderer's configuration: its plug-in class."""
 
     def open(self, assets: AssetLibrary) -> Renderer:
-        """A renderer with these settings.
+        """Open a renderer with these settings.
 
         Raises:
-            ConfigError: this machine cannot render so.
+            ConfigError: the settings are not available on this machine.
         """
         ...
 
@@ -271,20 +270,20 @@ class Modality(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class SensorInfo:
-    """Self-description of one sensor; the same for all scenes.
+    """Description of a sensor; the same for all scenes.
 
     Attributes:
         name: Instance name from the YAML.
         modality: The form of its readings.
-        kind: Of a device: ``Device.kind``, such as ``radar``; empty for the others.
-        channels: Of a camera: channels that are written as images, in the order of ``Channel``.
-        lens: Of a camera: model of its lens.
-        columns: Of a device: columns of its rows; the first is
+        kind: Devices: ``Device.kind``, such as ``radar``; empty for others.
+        channels: Cameras: channels written as images, in the order of ``Channel``.
+        lens: Cameras: model of the lens.
+        columns: Devices: columns of its rows; the first is
             ``gen_data.generator.core.measurement_dtypes.TIME``.
-        rate_hz: SensorReadings per second; None = one at every step. Cameras and laser scanners
-            read at most once per step.
-        time_offset_s: How much later than the step's instant it reads [s].
-        needs_clear_view: Whether a place inside the body that carries it is refused.
+        rate_hz: Readings per second; None = one per step. Cameras and laser scanners read at most
+            once per step.
+        time_offset_s: Delay of readings after the step's instant [s].
+        needs_clear_view: Whether a position inside the body that carries it is refused.
     """
 
     name: str
@@ -299,7 +298,7 @@ class SensorInfo:
 
 
 class Sensor(Protocol):
-    """Image formation."""
+    """Reads a scene."""
 
     @property
     def name(self) -> str:
@@ -307,37 +306,37 @@ class Sensor(Protocol):
         ...
 
     def describe(self) -> SensorInfo:
-        """What the rest of the program has to know of it."""
+        """Description of the sensor for the rest of the program."""
         ...
 
     def mount(self, scene: Scene) -> Scene:
-        """The scene with the sensor's nominal camera, lidar or device in it, by its name.
+        """Add the sensor's nominal camera, lidar or device to a scene, under its name.
 
         Raises:
-            ConfigError: the scene lacks what it is mounted on, or its rate does not fit.
+            ConfigError: its rig or camera does not exist, or its rate does not fit the sequence.
         """
         ...
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> SensorReading | PointCloud | Measurements:
-        """One reading, of the type that its modality names.
+        """Capture one reading, of the type of its modality.
 
         Args:
             scene: At the instant of the reading.
-            renderer: To see the scene with.
-            channels: Needed by annotators, besides the sensor's own.
+            renderer: Renders the scene.
+            channels: Required by annotators, besides the sensor's own.
             rng: Stream of this sensor at this step.
 
         Raises:
-            SampleError: a randomizer made the sensor unfit.
+            SampleError: a randomizer gave the sensor invalid parameters.
         """
         ...
 
 
 @runtime_checkable
 class Annotator(Protocol):
-    """Truth computed from Scene and SensorReading, one object at a time. No randomness."""
+    """Annotates one object at a time, from Scene and SensorReading, without randomness."""
 
     @property
     def channels(self) -> frozenset[Channel]:
@@ -351,7 +350,7 @@ class Annotator(Protocol):
 
 @runtime_checkable
 class ImageAnnotator(Protocol):
-    """Truth about an image as a whole: what is no single object's. No randomness."""
+    """Annotates an image as a whole, without randomness."""
 
     @property
     def channels(self) -> frozenset[Channel]:
@@ -367,7 +366,7 @@ class ImageAnnotator(Protocol):
 
 @runtime_checkable
 class FrameAnnotator(Protocol):
-    """Truth about a sample as a whole. No randomness."""
+    """Annotates a sample as a whole, without randomness."""
 
     @property
     def channels(self) -> frozenset[Channel]:
@@ -380,10 +379,10 @@ class FrameAnnotator(Protocol):
         """The truth with this annotator's fields filled in.
 
         Args:
-            scenes: The scene at the sample's instant by ``""``, and by the name of every laser
-                scanner that has read the scene at the instant of its reading.
+            scenes: ``""``: the scene at the sample's instant; by the name of every laser scanner
+                with a reading: the scene at the instant of that reading.
             assets: Geometry.
-            truth: So far.
+            truth: Annotations so far.
         """
         ...
 
@@ -397,14 +396,14 @@ It fills in its own fields of the truth and leaves the rest as it is; it changes
 
 @dataclass(frozen=True, slots=True)
 class DatasetInfo:
-    """Facts about the data set as a whole, for exporters.
+    """Properties of the data set as a whole, for exporters.
 
     Attributes:
         categories: Names; category id ``k`` is ``categories[k - 1]``.
         sensors: Every sensor, sorted by name.
         depth_scale_m: Metres per unit of the 16-bit depth images.
-        steps_per_scene: Instants of one view: the length of a sequence.
-        step_s: Time between them.
+        steps_per_scene: Length of a sequence: instants per view.
+        step_s: Time between them [s].
     """
 
     name: str
@@ -420,22 +419,22 @@ class DatasetInfo:
     @property
     def cameras(self) -> tuple[str, ...]:
         """Names of the cameras, sorted."""
-        return tuple(s.name for s in self._of(Modality.CAMERA))
+        return tuple(s.name for s in self._with_modality(Modality.CAMERA))
 
     @property
     def lidars(self) -> tuple[str, ...]:
         """Names of the laser scanners, sorted."""
-        return tuple(s.name for s in self._of(Modality.LIDAR))
+        return tuple(s.name for s in self._with_modality(Modality.LIDAR))
 
     @property
     def devices(self) -> Mapping[str, str]:
         """``{sensor: kind}`` of all other sensors, sorted by name."""
-        return {s.name: s.kind for s in self._of(Modality.DEVICE)}
+        return {s.name: s.kind for s in self._with_modality(Modality.DEVICE)}
 
     @property
     def media(self) -> Mapping[str, tuple[Channel, ...]]:
         """``{camera: channels written as images}``."""
-        return {s.name: s.channels for s in self._of(Modality.CAMERA)}
+        return {s.name: s.channels for s in self._with_modality(Modality.CAMERA)}
 
     def sensor(self, name: str) -> SensorInfo:
         """The sensor of that name. Raises KeyError if there is none."""
@@ -444,42 +443,42 @@ class DatasetInfo:
                 return sensor
         raise KeyError(name)
 
-    def _of(self, modality: Modality) -> list[SensorInfo]:
+    def _with_modality(self, modality: Modality) -> list[SensorInfo]:
         found = [s for s in self.sensors if s.modality is modality]
         return sorted(found, key=lambda s: s.name)
 
 
 class Exporter(Protocol):
-    """One output format, written shard by shard.
+    """An output format, written shard by shard.
 
-    The images of a sample are already in the shard folder at ``media_path(...)`` when
-    ``write_shard`` sees it: an exporter adds its labels and, in ``finalize``, links images.
+    The images of samples are already in the shard folder, at ``media_path(...)``, when
+    ``write_shard`` is called: an exporter adds labels and, in ``finalize``, links images.
     """
 
     @property
     def type(self) -> str:
-        """Its name in the table: the folder that ``finalize`` writes."""
+        """Its name in the table, and of the folder that ``finalize`` writes."""
         ...
 
     @property
     def needs(self) -> frozenset[str]:
-        """Names of the annotators whose fields it reads."""
+        """Names of the annotators it depends on."""
         ...
 
     def check(self, info: DatasetInfo) -> None:
         """Refuse a data set that the format cannot hold.
 
         Raises:
-            ConfigError: naming what it lacks, before anything is made.
+            ConfigError: the data set lacks something, which the message names.
         """
         ...
 
     def with_assets(self, assets: AssetLibrary) -> Exporter:
-        """The exporter that writes; a format that holds geometry keeps the library."""
+        """The exporter with access to the library, for formats with geometry."""
         ...
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write this format's labels of one shard. Every file name depends on indices only."""
+        """Write the labels of one shard; file names depend on indices only."""
         ...
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
@@ -488,15 +487,15 @@ class Exporter(Protocol):
 
 
 def media_path(shard_dir: Path, sensor: str, channel: Channel, index: int) -> Path:
-    """Where the image of one channel of one sample lies."""
+    """Path of the image of one channel of one sample."""
     return shard_dir / sensor / channel.value / f"{index:09d}.png"
 
 
 def cloud_path(shard_dir: Path, sensor: str, index: int) -> Path:
-    """Where the points of one sweep lie: a NumPy file with an array of ``POINT`` records."""
+    """Path of the points of one sweep: a NumPy file with an array of ``POINT`` records."""
     return shard_dir / sensor / "points" / f"{index:09d}.npy"
 
 
 def table_path(shard_dir: Path, sensor: str, index: int) -> Path:
-    """Where the rows of one reading lie: a NumPy file of ``core.measurement_dtypes`` records."""
+    """Path of the rows of one reading: a NumPy file of ``core.measurement_dtypes`` records."""
     return shard_dir / sensor / "rows" / f"{index:09d}.npy"

@@ -42,7 +42,7 @@ class Intrinsics:
         """Square pixels, centred principal point, horizontal field of view ``hfov_rad``.
 
         Raises:
-            ValueError: the lens shows no such field.
+            ValueError: the lens's field is narrower.
         """
         # tan() differs in its last bit between processors: keep it on a decimal grid.
         focal_px = round(0.5 * width_px / lens.radius(0.5 * hfov_rad), 6)
@@ -65,12 +65,12 @@ class Intrinsics:
     def project(self, p_camera_m: Array) -> Array:
         """Image coordinates [px], shape [..., 2], of points in the camera frame, shape [..., 3].
 
-        Points that the lens does not show have no image and come back as NaN: those with z <= 0
-        before a pinhole, those outside the field of view of any other lens.
+        NaN for points without an image: those with z <= 0 for a pinhole, those outside the field of
+        view for any other lens.
         """
         p = np.asarray(p_camera_m, dtype=np.float64)
         if not self.straight:
-            return self.lens.image_of(p) * (self.fx_px, self.fy_px) + (self.cx_px, self.cy_px)
+            return self.lens.project(p) * (self.fx_px, self.fy_px) + (self.cx_px, self.cy_px)
         z = np.where(p[..., 2] > 0, p[..., 2], np.nan)
         u = self.fx_px * p[..., 0] / z + self.cx_px
         v = self.fy_px * p[..., 1] / z + self.cy_px
@@ -82,12 +82,12 @@ class Intrinsics:
         The inverse of ``project`` to less than 1e-6 px; NaN for points outside the lens's field.
         """
         points = np.asarray(points_px, dtype=np.float64) - (self.cx_px, self.cy_px)
-        return self.lens.directions_of(points / (self.fx_px, self.fy_px))
+        return self.lens.unproject(points / (self.fx_px, self.fy_px))
 
     def pixel_rays(self) -> Array:
         """Unit directions through all pixel centres, shape [height, width, 3]; NaN for none.
 
-        Those of the last few cameras are remembered: the array cannot be written to.
+        The array is cached and read-only.
         """
         return _pixel_rays(self)
 
@@ -98,7 +98,7 @@ class Intrinsics:
             z_depth_m: Distance along the optical axis [m], shape [height, width]; inf = nothing.
 
         Returns:
-            Points; rows of pixels that saw nothing are NaN.
+            Points; NaN for pixels without depth.
         """
         z = np.where(np.isfinite(z_depth_m), z_depth_m, np.nan).astype(np.float64)
         if not self.straight:
@@ -112,9 +112,9 @@ class Intrinsics:
         return np.stack([x, y, z], axis=-1)
 
     def folds_over(self) -> bool:
-        """Whether the lens's polynomials fold over inside the image; then it is no lens.
+        """Whether the lens's polynomial folds over inside the image, which makes it invalid.
 
-        Dark corners, beyond a field that ends before the fold, are none.
+        Black corners outside a field that ends before the fold are valid.
         """
         if not self.lens.coefficients:
             return False

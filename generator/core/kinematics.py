@@ -1,6 +1,6 @@
-"""Where a robot's links are: forward kinematics, and the bodies that show them.
+"""Forward kinematics of robots, and the bodies of their links.
 
-Only ``+ - * / sqrt`` and the C library's sine and cosine, on plain floats.
+Uses only ``+ - * / sqrt`` and the C library's sine and cosine, on plain floats.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from gen_data.generator.core.scene import Articulation, Body
 from gen_data.generator.core.se3 import SE3
 
 POSITION_DECIMALS = 6
-"""Joint positions leave physics on this decimal grid [rad or m]."""
+"""Decimals of joint positions [rad or m] that physics returns."""
 
 
 def link_poses(robot: RobotModel, T_world_base: SE3, positions: Sequence[float]) -> dict[str, SE3]:
@@ -49,10 +49,10 @@ def joint_transform(joint: Joint, position: float) -> SE3:
 def make_link_bodies(
     articulation: Articulation, robot: RobotModel, parts: tuple[str, ...]
 ) -> tuple[Body, ...]:
-    """The bodies that show a robot at ``articulation.joint_positions``, one per visible link.
+    """The bodies of a robot's visible links at ``articulation.joint_positions``.
 
     Args:
-        articulation: Where the robot stands and how its joints are.
+        articulation: Pose of the robot's base and joint positions.
         robot: Its model.
         parts: ``Instance.parts`` of the robot; a link that is not listed has part id 0.
     """
@@ -74,17 +74,17 @@ def make_link_bodies(
 
 
 def round_positions(positions: Sequence[float]) -> tuple[float, ...]:
-    """Joint positions on the decimal grid that collision checks and labels share."""
+    """Round joint positions, so that collision checks and labels use the same values."""
     return tuple(round(value, POSITION_DECIMALS) + 0.0 for value in positions)
 
 
 def is_arm_joint(joint: Joint, robot: RobotModel) -> bool:
-    """Whether a goal gives a position for it: neither a finger nor one that follows another."""
+    """Whether goals set a joint's position: it is neither a finger nor mimics another joint."""
     return joint.movable and not joint.mimic and joint.name not in _finger_names(robot)
 
 
 def leader_of(joint: Joint, joints: Sequence[Joint]) -> tuple[Joint, float, float]:
-    """The joint that decides a joint's position, through any number of ``mimic`` steps.
+    """The joint that determines a joint's position, through any number of ``mimic`` steps.
 
     Args:
         joint: Any joint.
@@ -92,11 +92,11 @@ def leader_of(joint: Joint, joints: Sequence[Joint]) -> tuple[Joint, float, floa
 
     Returns:
         Leader, multiplier and offset: ``position = multiplier * leader's position + offset``
-        [rad or m]. A joint that follows none is its own leader, with 1 and 0.
+        [rad or m]. A joint without ``mimic`` is its own leader, with 1 and 0.
 
     Raises:
-        ValueError: if a joint that is followed does not exist or is fixed, or if joints follow
-            one another in a circle.
+        ValueError: a mimicked joint does not exist or is fixed, or joints mimic one another in a
+            circle.
     """
     named = {other.name: other for other in joints} if joint.mimic else {}
     leader, multiplier, offset = joint, 1.0, 0.0
@@ -118,15 +118,15 @@ def leader_of(joint: Joint, joints: Sequence[Joint]) -> tuple[Joint, float, floa
 
 
 def position_limits(joint: Joint, robot: RobotModel) -> tuple[float, float]:
-    """Positions of a joint at which it and all that follow it are within their limits.
+    """Positions of a joint that keep it and all joints that mimic it within their limits.
 
     Args:
-        joint: One that follows no other.
+        joint: A joint without ``mimic``.
         robot: Its robot.
 
     Returns:
-        Lowest and highest position [rad or m]; the lowest is above the highest where no position
-        suits all. A continuous joint that none follows has -pi and pi.
+        Lowest and highest position [rad or m]; lowest > highest if no position satisfies all. A
+        continuous joint that no other mimics has -pi and pi.
     """
     low, high = (-math.pi, math.pi) if joint.kind == "continuous" else (joint.lower, joint.upper)
     for other in robot.movable:
@@ -139,11 +139,11 @@ def position_limits(joint: Joint, robot: RobotModel) -> tuple[float, float]:
 
 
 def positions_of(joints: Sequence[Joint], given: Mapping[str, float]) -> tuple[float, ...]:
-    """Positions of all movable joints, those that follow others included, in their order.
+    """Positions of all movable joints in order, including those that mimic others.
 
     Args:
         joints: All joints of a robot.
-        given: Position of every movable joint that follows no other, by name [rad or m].
+        given: Position of every movable joint without ``mimic``, by name [rad or m].
     """
     positions = []
     for joint in (j for j in joints if j.movable):
@@ -206,7 +206,7 @@ def is_within_limits(robot: RobotModel, positions: Sequence[float]) -> bool:
 
 
 def rigid_group(robot: RobotModel, link: str) -> frozenset[str]:
-    """The link and all others that no joint motion can move against it."""
+    """The link and all links that are rigidly connected to it."""
     root_of: dict[str, str] = {robot.links[0]: robot.links[0]}
     for joint in robot.joints:
         root_of[joint.child] = joint.child if joint.movable else root_of[joint.parent]
@@ -214,7 +214,7 @@ def rigid_group(robot: RobotModel, link: str) -> frozenset[str]:
 
 
 def finger_links(robot: RobotModel) -> tuple[str, ...]:
-    """Links that move with the gripper's joints, in order; empty without a gripper."""
+    """Links moved by the gripper's joints, in order; empty without a gripper."""
     moving: dict[str, None] = {}
     fingers = _finger_names(robot)
     for joint in robot.joints:

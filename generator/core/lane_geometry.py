@@ -1,4 +1,4 @@
-"""Places along lanes, and the lines at their sides."""
+"""Geometry of lanes: poses along the centre line, and borders."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gen_data.generator.core.se3 import SE3, Array, Vec3
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
 MEETING_M = 0.25
-"""Borders whose ends are nearer than this are one."""
+"""Borders with ends nearer to each other than this are the same."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class LaneLine:
 
     @property
     def length_m(self) -> float:
-        """Of the whole lane."""
+        """Length of the lane."""
         return self.at_m[-1]
 
     def pose(self, at_m: float, left_m: float = 0.0) -> SE3:
@@ -89,8 +89,8 @@ class LaneBorder:
 
     Attributes:
         name: Lane and side that it belongs to: ``main/forward0:left``.
-        kind: ``lane``: between lanes that run the same way; ``road``: between such that do not;
-            ``edge``: nothing drives beyond it.
+        kind: ``lane``: between lanes of the same direction; ``road``: between lanes of opposite
+            directions; ``edge``: the edge of the carriageway.
         points_m: World, on the ground, in the direction of travel of the lane it is named by.
     """
 

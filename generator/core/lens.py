@@ -1,4 +1,4 @@
-"""Lens models: from directions to the plane at focal length 1, and back.
+"""Lens models: projection of directions to the plane at focal length 1, and its inverse.
 
 ====================  =============================================================================
 model                 image of a direction (x, y, z); coefficients
@@ -10,8 +10,8 @@ model                 image of a direction (x, y, z); coefficients
 ``equirectangular``   longitude ``atan2(x, z)`` and latitude ``atan2(y, hypot(x, z))``; none
 ====================  =============================================================================
 
-Polynomials fold over: from some angle on, the image of what lies farther out moves back inwards.
-What is farther out than that has no image here, as glass would show none.
+Polynomials fold over: beyond some angle, images move back inwards. Directions beyond that angle
+have no image here, as in a real lens.
 
 Sources: Brown, "Decentering distortion of lenses", Photogrammetric Engineering 32, 1966; Kannala
 and Brandt, "A generic camera model and calibration method for conventional, wide-angle, and
@@ -47,17 +47,17 @@ _SAMPLES = 1025
 _ITERATIONS_MAX = 64
 _PRECISION = 1e-14
 _MISSED = 1e-11
-"""How far a solution's image may be from where it should be, at focal length 1."""
+"""Largest error of an inverse, as a distance on the plane at focal length 1."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lens:
-    """How directions become points of an image.
+    """A lens: a projection model with its coefficients and field of view.
 
     Attributes:
         model: As in the table above.
-        coefficients: In the order of ``COEFFICIENTS``, all of them.
-        half_field_rad: Angle to the axis beyond which the lens shows nothing; pi = its model's end.
+        coefficients: All of ``COEFFICIENTS``, in that order.
+        half_field_rad: Largest angle to the axis with an image; pi = the end of the model.
     """
 
     model: LensModel = "pinhole"
@@ -65,10 +65,10 @@ class Lens:
     half_field_rad: float = math.pi
 
     def __post_init__(self) -> None:
-        """Refuse a wrong number of coefficients, and a field where the model has none.
+        """Validate the coefficients and the field.
 
         Raises:
-            ValueError: then.
+            ValueError: a wrong number of coefficients, or a field for a model without one.
         """
         names = COEFFICIENTS[self.model]
         if len(self.coefficients) != len(names):
@@ -81,7 +81,7 @@ class Lens:
 
     @property
     def folds(self) -> bool:
-        """Whether it folds over within its field, rather than showing all of it."""
+        """Whether its polynomial folds over within its field."""
         if not self.coefficients:
             return False
         whole = self.model == "brown_conrady" and self.half_field_rad >= 0.5 * math.pi
@@ -89,12 +89,12 @@ class Lens:
         return _profile(self).folds or (whole and any(self.coefficients[2:4]))
 
     def radius(self, angle_rad: float) -> float:
-        """Distance from the axis, on the plane, of what is seen at an angle to it.
+        """Distance from the axis, on the plane, of the image of an angle to the axis.
 
-        Tangential terms are left out, and so is the end of its field.
+        Tangential terms and the limit of the field are ignored.
 
         Raises:
-            ValueError: the model has no image of what is seen at that angle.
+            ValueError: the model has no image at that angle.
         """
         if self.model == "equirectangular":
             return angle_rad
@@ -111,11 +111,11 @@ class Lens:
             f"axis: its model ends at {math.degrees(end_rad):.4g} degrees"
         )
 
-    def image_of(self, directions: Array) -> Array:
-        """Points of the plane, shape [..., 2]; NaN for what has no image.
+    def project(self, directions: Array) -> Array:
+        """Project directions to the plane, [..., 2]; NaN for directions without an image.
 
         Args:
-            directions: Camera frame, of any length but 0, shape [..., 3].
+            directions: Camera frame, of any length but 0, [..., 3].
         """
         x, y, z = np.moveaxis(np.asarray(directions, dtype=np.float64), -1, 0)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -127,15 +127,15 @@ class Lens:
                 return _fisheye_image(self, x, y, z)
             front = np.where(z > 0, z, np.nan)
             plane = np.stack([x / front, y / front], axis=-1)
-            return plane if self.model == "pinhole" else _bent(self, plane)
+            return plane if self.model == "pinhole" else _distort(self, plane)
 
-    def directions_of(self, points: Array) -> Array:
-        """Unit directions, camera frame, shape [..., 3]; NaN for points that show nothing.
+    def unproject(self, points: Array) -> Array:
+        """Unit directions of points, camera frame, [..., 3]; NaN for points outside the field.
 
-        The inverse of ``image_of``, to about 1e-13.
+        The inverse of ``project``, to about 1e-13.
 
         Args:
-            points: On the plane, shape [..., 2].
+            points: On the plane, [..., 2].
         """
         points = np.asarray(points, dtype=np.float64)
         flat = points.reshape(-1, 2)
@@ -144,7 +144,7 @@ class Lens:
         elif self.model == "kannala_brandt":
             directions = _fisheye_directions(self, flat)
         else:
-            plane = flat if self.model == "pinhole" else _straightened(self, flat)
+            plane = flat if self.model == "pinhole" else _undistort(self, flat)
             directions = np.column_stack([plane, np.ones(len(plane))])
             directions /= np.sqrt((directions * directions).sum(axis=1))[:, None]
         return directions.reshape(*points.shape[:-1], 3)
@@ -155,13 +155,13 @@ PINHOLE = Lens()
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Profile:
-    """The rising part of a radial function.
+    """The monotonic part of a radial function.
 
     Attributes:
         arguments: From 0 to the end: tangents of angles (Brown-Conrady) or angles.
-        radii: Of their images, strictly rising.
+        radii: Radii of their images, strictly increasing.
         end_rad: Angle at the end.
-        folds: Whether the lens folds over there, or ends for another reason.
+        folds: Whether it ends because the polynomial folds over.
     """
 
     arguments: Array
@@ -172,12 +172,12 @@ class _Profile:
 
 @lru_cache(maxsize=256)
 def _profile(lens: Lens) -> _Profile:
-    """The rising part of a lens that has coefficients."""
+    """The monotonic part of a lens with coefficients."""
     plane = lens.model == "brown_conrady"
     end_rad = min(lens.half_field_rad, math.atan(_PLANE_MAX)) if plane else lens.half_field_rad
     fold_rad = _first_fold(lens, end_rad)
     if fold_rad is not None:
-        # A grain before, where the radius still rises.
+        # Slightly before the fold, where the radius still rises.
         end_rad = fold_rad * (1.0 - 1e-9)
     angles = np.linspace(0.0, end_rad, _SAMPLES)
     arguments = np.tan(angles) if plane else angles
@@ -207,7 +207,7 @@ def _first_fold(lens: Lens, end_rad: float) -> float | None:
 
 
 def _radial(lens: Lens, u: Array) -> tuple[Array, Array, Array]:
-    """Radius of the image, its derivative, and the divisor, which must be positive."""
+    """Radius of the image, its derivative, and the denominator, which must be positive."""
     s = u * u
     if lens.model == "kannala_brandt":
         k1, k2, k3, k4 = lens.coefficients
@@ -223,10 +223,10 @@ def _radial(lens: Lens, u: Array) -> tuple[Array, Array, Array]:
     return u * over / under, slope, under
 
 
-def _argument_of(lens: Lens, radii: Array) -> Array:
-    """The argument whose image has that radius, shape [n]; NaN beyond the end.
+def _invert_radial(lens: Lens, radii: Array) -> Array:
+    """The arguments whose images have these radii, [n]; NaN beyond the end.
 
-    Newton's method between bounds: a step that leaves them is replaced by halving.
+    Newton's method within bounds: a step that leaves them is replaced by bisection.
     """
     profile = _profile(lens)
     within = radii <= profile.radii[-1]
@@ -254,7 +254,7 @@ def _fisheye_image(lens: Lens, x: Array, y: Array, z: Array) -> Array:
     across = np.sqrt(x * x + y * y)
     angle = np.arctan2(across, z)
     angle = np.where(angle <= _profile(lens).end_rad, angle, np.nan)
-    # On the axis the angle is that of every azimuth; behind it there is no telling which.
+    # On the axis the image is the centre; exactly behind, the azimuth is undefined.
     stretch = _radial(lens, angle)[0] / np.where(across > 0, across, np.nan)
     stretch = np.where((across == 0) & (z > 0), 0.0, stretch)
     return np.stack([x * stretch, y * stretch], axis=-1)
@@ -263,7 +263,7 @@ def _fisheye_image(lens: Lens, x: Array, y: Array, z: Array) -> Array:
 def _fisheye_directions(lens: Lens, points: Array) -> Array:
     x, y = points.T
     radius = np.sqrt(x * x + y * y)
-    angle = _argument_of(lens, radius)
+    angle = _invert_radial(lens, radius)
     # sin(a) / r goes to 1 at the centre.
     share = np.where(radius > 0, np.sin(angle) / np.where(radius > 0, radius, 1.0), 1.0)
     return np.column_stack([x * share, y * share, np.cos(angle)])
@@ -279,20 +279,20 @@ def _globe(points: Array) -> Array:
     )
 
 
-def _bent(lens: Lens, plane: Array) -> Array:
+def _distort(lens: Lens, plane: Array) -> Array:
     """Brown and Conrady's distortion of points of the plane; NaN where it folds over."""
     x, y = plane[..., 0], plane[..., 1]
     radius = np.sqrt(x * x + y * y)
     inside = np.where(radius <= _profile(lens).arguments[-1], 1.0, np.nan)
-    bent, jacobian = _bending(lens, x * inside, y * inside)
+    bent, jacobian = _distort_with_jacobian(lens, x * inside, y * inside)
     upright = jacobian[0] * jacobian[3] - jacobian[1] * jacobian[2] > 0.0
     return np.where(upright[..., None], np.stack(bent, axis=-1), np.nan)
 
 
-def _bending(
+def _distort_with_jacobian(
     lens: Lens, x: Array, y: Array
 ) -> tuple[tuple[Array, Array], tuple[Array, Array, Array, Array]]:
-    """Bent coordinates of points, and their derivatives by x and y, rows first."""
+    """Distorted coordinates of points, and the Jacobian by rows: xx, xy, yx, yy."""
     _, _, p1, p2, *_ = lens.coefficients
     s = x * x + y * y
     r = np.sqrt(s)
@@ -309,28 +309,29 @@ def _bending(
     return (bent_x, bent_y), (xx, xy, xy, yy)
 
 
-def _straightened(lens: Lens, points: Array) -> Array:
-    """The inverse of ``_bent``, shape [n, 2]."""
+def _undistort(lens: Lens, points: Array) -> Array:
+    """The inverse of ``_distort``, [n, 2]; NaN for points without an inverse."""
     radius = np.sqrt((points * points).sum(axis=1))
     end = float(_profile(lens).radii[-1])
     tangential = any(lens.coefficients[2:4])
-    # Tangential terms move the rim: what is a little beyond it may still have an inverse.
+    # Tangential terms shift the rim: points slightly beyond it may still have an inverse.
     start = np.minimum(radius, end * (1.0 - 1e-6)) if tangential else radius
-    stretch = np.where(radius > 0, _argument_of(lens, start) / np.where(radius > 0, radius, 1), 1.0)
+    safe = np.where(radius > 0, radius, 1)
+    stretch = np.where(radius > 0, _invert_radial(lens, start) / safe, 1.0)
     plane = points * stretch[:, None]
-    return _refined(lens, plane, points) if tangential else plane
+    return _refine_inverse(lens, plane, points) if tangential else plane
 
 
-def _refined(lens: Lens, plane: Array, target: Array) -> Array:
-    """Newton's method in both coordinates; steps that do not come nearer are halved.
+def _refine_inverse(lens: Lens, plane: Array, target: Array) -> Array:
+    """Invert the distortion by Newton's method; steps that increase the error are halved.
 
     Args:
         lens: With tangential terms.
-        plane: Where to begin, shape [n, 2].
-        target: Bent points, shape [n, 2].
+        plane: Start values, [n, 2].
+        target: Distorted points, [n, 2].
 
     Returns:
-        Where the target is met, shape [n, 2]; NaN where it is not.
+        Undistorted points, [n, 2]; NaN where the iteration fails.
     """
     miss, step = _newton_step(lens, plane, target)
     pace = np.ones(len(plane))
@@ -348,8 +349,8 @@ def _refined(lens: Lens, plane: Array, target: Array) -> Array:
 
 
 def _newton_step(lens: Lens, plane: Array, target: Array) -> tuple[Array, Array]:
-    """How far images are from the target, inf where the lens has none, and a way back, [n, 2]."""
-    bent, (xx, xy, yx, yy) = _bending(lens, plane[:, 0], plane[:, 1])
+    """Error of points, [n], inf outside the lens's field, and the Newton step, [n, 2]."""
+    bent, (xx, xy, yx, yy) = _distort_with_jacobian(lens, plane[:, 0], plane[:, 1])
     ex, ey = bent[0] - target[:, 0], bent[1] - target[:, 1]
     determinant = xx * yy - xy * yx
     end = float(_profile(lens).arguments[-1])

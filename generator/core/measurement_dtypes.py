@@ -1,7 +1,7 @@
-"""What devices report, column by column: the types of ``Table.rows``.
+"""Columns of devices' measurements: the dtypes of ``Measurements.rows``.
 
-Every table has a ``time_s``: seconds from the beginning of the sequence. Axes are the device's own,
-X forward, Y left, Z up, unless the name says otherwise.
+Every table has a ``time_s``, in seconds from the beginning of the sequence. Axes are those of the
+device, X forward, Y left, Z up, unless the name says otherwise.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 TIME_DECIMALS = 9
-"""Instants are on a grid that does not depend on how they were added up."""
+"""Decimals of instants: sums of different terms give the same instant."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Members of object groups: how they enter a scene, leave it, and get their instance ids."""
+"""Members of object groups: adding them to a scene, removing them, and their instance ids."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from gen_data.generator.core.se3 import SE3
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """One thing of a group, before it has a name and an instance id.
+    """A member of a group, before it has a name and an instance id.
 
     Attributes:
         asset: Mesh asset id.
         scale: Uniform factor on the mesh.
-        collides: Whether physics sees it.
+        collides: Whether it collides in physics.
     """
 
     asset: str

@@ -1,7 +1,7 @@
-"""How things move: poses at even steps of time, what lies between them, and sudden changes.
+"""Motion: trajectories of bodies and joints, twists, and instantaneous changes of state.
 
-Only ``+ - * / sqrt`` and no transcendental function decide a pose, so that it has the same bits on
-every processor.
+Poses are computed with ``+ - * / sqrt`` only, without transcendental functions, so that they have
+the same bits on every processor.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from gen_data.generator.core.se3 import (
 
 @dataclass(frozen=True, slots=True)
 class Twist:
-    """How a frame moves at one instant; world axes.
+    """Velocity, acceleration and angular velocity of a frame at one instant, world axes.
 
     Attributes:
-        velocity_m_s, acceleration_m_s2: Of its origin.
-        angular_velocity_rad_s: Of its axes.
+        velocity_m_s, acceleration_m_s2: Of the frame's origin.
+        angular_velocity_rad_s: Of the frame.
     """
 
     velocity_m_s: Vec3 = (0.0, 0.0, 0.0)
@@ -38,7 +38,7 @@ class Twist:
     angular_velocity_rad_s: Vec3 = (0.0, 0.0, 0.0)
 
     def seen_along(self, T_world_frame: SE3) -> Twist:
-        """The same motion along the axes of a frame."""
+        """The same motion, expressed in the axes of another frame."""
         w, x, y, z = T_world_frame.quaternion_wxyz
         inverse = (w, -x, -y, -z)
         return Twist(
@@ -53,11 +53,11 @@ STILL = Twist()
 
 @dataclass(frozen=True, slots=True)
 class Trajectory:
-    """The way of one body through time.
+    """Trajectory of one body: poses at equal time steps, interpolated.
 
-    Positions between knots lie on cubic Hermite curves with the slopes of Catmull and Rom (1974),
-    so that velocity has no jumps; rotations are interpolated linearly and normalised. Before the
-    first and after the last knot the body stands still.
+    Positions follow cubic Hermite curves with the slopes of Catmull and Rom (1974), so that
+    velocity is continuous; rotations are interpolated linearly and normalised. Before the first and
+    after the last knot the body is at rest.
 
     Attributes:
         body: Name of the body.
@@ -72,10 +72,10 @@ class Trajectory:
     start_s: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no way.
+        """Validate the knots.
 
         Raises:
-            ValueError: fewer than two knots, or no step.
+            ValueError: fewer than two knots, or a step of 0 or less.
         """
         if len(self.knots) < 2 or not self.step_s > 0.0:
             raise ValueError(f"the track of '{self.body}' needs two knots and a step above 0 s")
@@ -86,7 +86,7 @@ class Trajectory:
         return self.start_s + (len(self.knots) - 1) * self.step_s
 
     def pose(self, time_s: float) -> SE3:
-        """``T_world_body`` at one instant."""
+        """``T_world_body`` at an instant."""
         k, f = self._place(time_s)
         if f == 0.0:
             return self.knots[k]
@@ -98,7 +98,7 @@ class Trajectory:
             f * f * (3.0 - 2.0 * f),
             f * f * (f - 1.0),
         )
-        return SE3(self._weighted(k, weights), self._turned(k, f))
+        return SE3(self._combine(k, weights), self._interpolate_rotation(k, f))
 
     def poses(self, times_s: NDArray[np.floating]) -> tuple[Array, Array]:
         """Rotation matrices [n, 3, 3] and translations [n, 3] at several instants, as ``pose``."""
@@ -106,7 +106,7 @@ class Trajectory:
         return rotations[0], translations[0]
 
     def twist(self, time_s: float) -> Twist:
-        """How the body moves at one instant; nothing moves outside the knots."""
+        """Twist of the body at an instant; ``STILL`` outside the knots."""
         if not self.start_s <= time_s <= self.end_s:
             return STILL
         k, f = self._place(time_s)
@@ -119,21 +119,21 @@ class Trajectory:
         )
         bend = (12.0 * f - 6.0, 6.0 * f - 4.0, 6.0 - 12.0 * f, 6.0 * f - 2.0)
         return Twist(
-            self._weighted(k, tuple(w / h for w in slope)),
-            self._weighted(k, tuple(w / (h * h) for w in bend)),
+            self._combine(k, tuple(w / h for w in slope)),
+            self._combine(k, tuple(w / (h * h) for w in bend)),
             _angular_velocity(self.knots[k], self.knots[k + 1], h),
         )
 
     def _place(self, time_s: float) -> tuple[int, float]:
-        """Number of the knot before an instant, and the share of the step that has passed."""
+        """Index of the knot before an instant, and the elapsed share of the step in [0, 1]."""
         last = len(self.knots) - 2
-        # A grid that does not depend on how an instant was added up.
+        # Rounded, so that instants summed in different ways give the same pose.
         steps = round((time_s - self.start_s) / self.step_s, 9)
         k = min(max(math.floor(steps), 0), last)
         return k, min(max(steps - k, 0.0), 1.0)
 
-    def _weighted(self, k: int, weights: tuple[float, ...]) -> Vec3:
-        """A combination of two knots' positions and of the slopes there, per step."""
+    def _combine(self, k: int, weights: tuple[float, ...]) -> Vec3:
+        """Weighted sum of position and slope at knot k and at the next one."""
         a, b = self.knots[k].translation_m, self.knots[k + 1].translation_m
         from_, to = self._slope(k), self._slope(k + 1)
         x, y, z = (
@@ -143,13 +143,13 @@ class Trajectory:
         return (x, y, z)
 
     def _slope(self, k: int) -> Vec3:
-        """Way per step at a knot; one-sided at the ends."""
+        """Displacement per step at a knot; one-sided at the ends."""
         before, after = max(k - 1, 0), min(k + 1, len(self.knots) - 1)
         a, b = self.knots[before].translation_m, self.knots[after].translation_m
         span = after - before
         return ((b[0] - a[0]) / span, (b[1] - a[1]) / span, (b[2] - a[2]) / span)
 
-    def _turned(self, k: int, f: float) -> tuple[float, float, float, float]:
+    def _interpolate_rotation(self, k: int, f: float) -> tuple[float, float, float, float]:
         a, b = self.knots[k].quaternion_wxyz, self.knots[k + 1].quaternion_wxyz
         sign = 1.0 if sum(p * q for p, q in zip(a, b, strict=True)) >= 0.0 else -1.0
         w, x, y, z = ((1.0 - f) * p + f * sign * q for p, q in zip(a, b, strict=True))
@@ -160,7 +160,7 @@ class Trajectory:
 def interpolate_poses(
     tracks: Sequence[Trajectory], times_s: NDArray[np.floating]
 ) -> tuple[Array, Array]:
-    """Where bodies are at several instants, as ``Track.pose``.
+    """Poses of several bodies at several instants, as ``Trajectory.pose``.
 
     Returns:
         Rotation matrices [tracks, n, 3, 3] and translations [tracks, n, 3].
@@ -172,7 +172,7 @@ def interpolate_poses(
     for i, track in enumerate(tracks):
         grids.setdefault((track.start_s, track.step_s, len(track.knots)), []).append(i)
     for (start_s, step_s, _), members in grids.items():
-        # The grid of ``Track._place``: as good as round(), which takes one number at a time.
+        # The rounding of ``Trajectory._place``, vectorised.
         steps = np.rint((times - start_s) / step_s * 1e9) / 1e9
         knots = [tracks[i].knots for i in members]
         rotations[members], translations[members] = _between(knots, steps)
@@ -180,7 +180,7 @@ def interpolate_poses(
 
 
 def _between(ways: Sequence[tuple[SE3, ...]], steps: Array) -> tuple[Array, Array]:
-    """Rotation matrices and translations between the knots of ways with equally many."""
+    """Interpolate several trajectories with equal numbers of knots, as ``interpolate_poses``."""
     last = len(ways[0]) - 1
     k = np.clip(np.floor(steps), 0, last - 1).astype(np.intp)
     f = np.clip(steps - k, 0.0, 1.0)[:, None]
@@ -208,7 +208,7 @@ def _between(ways: Sequence[tuple[SE3, ...]], steps: Array) -> tuple[Array, Arra
 
 @dataclass(frozen=True, slots=True)
 class JointTrajectory:
-    """The joint positions of a robot through time; linear between knots.
+    """Trajectory of a robot's joint positions, linear between knots.
 
     Attributes:
         step_s: Time between knots.
@@ -221,7 +221,7 @@ class JointTrajectory:
     start_s: float = 0.0
 
     def positions(self, time_s: float) -> tuple[float, ...]:
-        """Positions at one instant; those of the first or last knot outside their time."""
+        """Positions at an instant; constant before the first and after the last knot."""
         last = len(self.knots) - 1
         steps = min(max(round((time_s - self.start_s) / self.step_s, 9), 0.0), float(last))
         k = min(math.floor(steps), last - 1) if last else 0
@@ -234,14 +234,14 @@ class JointTrajectory:
 
 @dataclass(frozen=True, slots=True)
 class StateChange:
-    """What a body is like from an instant on: a lamp that lights, the next step of a walk.
+    """Change of a body's appearance at an instant: a lamp switches on, a walk takes a step.
 
     Attributes:
-        time_s: From when on; until the next change of the same body.
+        time_s: Instant of the change; it lasts until the next change of the same body.
         body: Name of the body.
-        asset: Its mesh asset; empty = as before.
-        materials: One per mesh slot; empty = as before.
-        attributes: Facts about its instance that change, ``(name, value)``.
+        asset: New mesh asset; empty = unchanged.
+        materials: One per mesh slot; empty = unchanged.
+        attributes: Changed attributes of its instance, ``(name, value)``.
     """
 
     time_s: float

@@ -1,4 +1,4 @@
-"""From what lamps are sold by to what they do: lumens, candelas, lux."""
+"""Conversion of photometric quantities of lights: luminous flux, intensity, illuminance."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from gen_data.generator.core.scene import Light
 
 
 def flux_to_intensity_cd(light: Light, flux_lm: float) -> float:
-    """Luminous intensity [cd] of a light that sends out a luminous flux.
+    """Luminous intensity [cd] of a light with a luminous flux.
 
-    A ball sends it everywhere, a panel into the half space before it by Lambert's law, a spot into
-    its cone: evenly up to ``even`` of its half angle, and then fading to nothing, by a step that is
-    symmetric in the cosine, so that half of what lies between counts.
+    A sphere emits in all directions, a panel into its front half space by Lambert's law, a spot
+    into its cone: uniformly up to ``even`` of its half angle, then fading to 0 by a smooth step
+    that is symmetric in the cosine, so that half of the solid angle in between counts.
 
     Args:
         light: Of any kind but sun.
-        flux_lm: Of all its light.
+        flux_lm: Total luminous flux.
 
     Raises:
         ValueError: a sun has no flux.
@@ -35,12 +35,12 @@ def flux_to_intensity_cd(light: Light, flux_lm: float) -> float:
 
 
 def illuminance_to_intensity_cd(light: Light, lux: float, distance_m: float) -> float:
-    """Luminous intensity [cd] with which a light gives an illuminance straight before it.
+    """Luminous intensity [cd] that causes an illuminance on the light's axis.
 
     Args:
         light: Of any kind but sun.
-        lux: On a surface that faces the light's centre.
-        distance_m: From the centre; panels are turned to the surface.
+        lux: Illuminance of a surface that faces the light's centre.
+        distance_m: From the centre; panels face the surface.
 
     Sources: the inverse square law; for panels, Howell, "A catalog of radiation heat transfer
     configuration factors", 1982 (a disk and a rectangle before a parallel element).
@@ -60,10 +60,10 @@ def illuminance_to_intensity_cd(light: Light, lux: float, distance_m: float) -> 
 
 
 def luminance_cd_m2(light: Light) -> float:
-    """Of a panel's front.
+    """Luminance of a panel's front [cd/m^2].
 
     Raises:
-        ValueError: the light is no panel.
+        ValueError: the light is not a panel.
     """
     match light.kind:
         case "rectangle":
@@ -75,5 +75,5 @@ def luminance_cd_m2(light: Light) -> float:
 
 
 def scale_to_flux(light: Light, flux_lm: float) -> Light:
-    """The light with the intensity that belongs to a luminous flux."""
+    """The light with the intensity of a luminous flux."""
     return replace(light, intensity_cd=round(flux_to_intensity_cd(light, flux_lm), 4))

@@ -1,4 +1,4 @@
-"""Points before a rolling shutter: each is where it is when the row that shows it is exposed."""
+"""Projection with a rolling shutter: every point at the instant of the row that shows it."""
 
 from __future__ import annotations
 
@@ -8,32 +8,33 @@ from numpy.typing import NDArray
 from gen_data.generator.core.scene import Camera, Instance, Scene
 from gen_data.generator.core.se3 import IDENTITY, SE3, Array
 
-_LOOKS = 5
-"""Where a point is decides when it is seen, and that where it is: errors shrink by the speed of
-its image over that of the rows, a factor of ten or more, with every look."""
+_ITERATIONS = 5
+"""The row of a point depends on its instant and vice versa. Fixed-point iteration shrinks the error
+by the speed of the image over that of the readout, a factor of ten or more, each time."""
 
 
 def project_rolling_shutter(
     scene: Scene, camera: Camera, points_m: Array, instance: Instance | None = None
 ) -> tuple[Array, Array]:
-    """Where points are when the camera sees them, camera frame [m] [n, 3], and in the image [n, 2].
+    """Project points at the instants of the rows that show them.
 
     Args:
         scene: At the image's instant.
-        camera: Of the scene, or its equal.
-        points_m: In the instance's frame, or fixed in the world, shape [n, 3].
-        instance: What carries the points; None = the world.
+        camera: A camera of the scene, or one equal to it.
+        points_m: In the instance's frame, or in the world, [n, 3].
+        instance: The instance that carries the points; None = they are fixed in the world.
 
     Returns:
-        NaN in the image for points that the lens does not show.
+        Points in the camera frame of their instant [m], [n, 3], and their image coordinates [px],
+        [n, 2]; NaN for points outside the lens's field.
     """
     shutter, lens = camera.shutter, camera.intrinsics
     p_frame = np.asarray(points_m, np.float64)
     delays_s = np.zeros(len(p_frame))
-    for _ in range(_LOOKS if shutter.rolls else 1):
+    for _ in range(_ITERATIONS if shutter.rolls else 1):
         p_world = p_frame
         if instance is not None:
-            carrier = _carrier_of(scene, instance)
+            carrier = _find_carrier(scene, instance)
             R, t = _poses(scene, carrier, instance.T_world_instance, IDENTITY, delays_s)
             p_world = np.einsum("nij,nj->ni", R, p_frame, optimize=False) + t
         R, t = _camera_poses(scene, camera, delays_s)
@@ -47,7 +48,7 @@ def project_rolling_shutter(
 def world_points(
     scene: Scene, camera: Camera, p_camera_m: Array, rows: NDArray[np.integer]
 ) -> Array:
-    """Where in the world points are that pixels of some rows show, [n, 3].
+    """World coordinates [m] of points that are visible in some rows, [n, 3].
 
     Args:
         scene: At the image's instant.
@@ -63,8 +64,8 @@ def world_points(
     return placed
 
 
-def _carrier_of(scene: Scene, instance: Instance) -> str:
-    """The body whose frame the instance's is; empty for robots, which stand on their bases."""
+def _find_carrier(scene: Scene, instance: Instance) -> str:
+    """Name of the body that defines an instance's frame; empty for robots, whose base is fixed."""
     if any(a.instance_id == instance.instance_id for a in scene.articulations):
         return ""
     own = (body.name for body in scene.bodies if body.instance_id == instance.instance_id)
@@ -82,14 +83,14 @@ def _camera_poses(scene: Scene, camera: Camera, delays_s: Array) -> tuple[Array,
 def _poses(
     scene: Scene, body: str, at_rest: SE3, T_body_frame: SE3, delays_s: Array
 ) -> tuple[Array, Array]:
-    """Rotations [n, 3, 3] and origins [n, 3] in the world of a frame on a body, at instants.
+    """World rotations [n, 3, 3] and origins [n, 3] of a frame on a body, at several instants.
 
     Args:
-        scene: The instant that delays count from.
-        body: What carries the frame.
-        at_rest: The frame's pose if that does not move.
-        T_body_frame: Where the frame is on it.
-        delays_s: Shape [n].
+        scene: At the instant that delays refer to.
+        body: Name of the body that carries the frame.
+        at_rest: Pose of the frame if the body does not move.
+        T_body_frame: Pose of the frame on the body.
+        delays_s: Instants relative to the scene's, [n].
     """
     track = scene.track(body) if body else None
     n = len(delays_s)

@@ -1,4 +1,4 @@
-"""XML from strangers: bounded, and without document types, so that no entity is ever expanded."""
+"""Safe parsing of untrusted XML: bounded in size, without document types or entities."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ MAX_DEPTH = 64
 
 
 class PlacedElement(Element):
-    """An element that knows where it begins in its file, counted from 1."""
+    """An element with its line and column in the file, counted from 1."""
 
     line: int
     column: int
 
 
-def place_of(element: Element) -> str:
-    """``:line:column`` of an element that ``parse_xml`` made; empty for any other."""
+def format_position(element: Element) -> str:
+    """``:line:column`` of an element from ``parse_xml``; empty for any other."""
     return f":{element.line}:{element.column}" if isinstance(element, PlacedElement) else ""
 
 
 def parse_xml(data: bytes, place: str, root_tag: str, kind: str, max_elements: int) -> Element:
-    """The root element of a document.
+    """Parse a document and return its root element.
 
     Args:
-        data: The file.
-        place: What error messages call it.
-        root_tag: What its root must be.
-        kind: What such a file is called.
-        max_elements: More are refused.
+        data: Content of the file.
+        place: Name of the file in error messages.
+        root_tag: Required tag of the root.
+        kind: Name of this kind of file in error messages.
+        max_elements: Documents with more elements are refused.
 
     Raises:
-        AssetError: if it is malformed, too large or deep, or declares a document type.
+        AssetError: it is malformed, too large or deep, or declares a document type.
     """
     builder = TreeBuilder(element_factory=PlacedElement)
     parser = expat.ParserCreate()

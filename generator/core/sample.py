@@ -1,4 +1,4 @@
-"""Sample ``i`` of a data set: a Capture, the truth about it, and where it came from."""
+"""Samples of a data set: readings, their annotations, and the scene they come from."""
 
 from __future__ import annotations
 
@@ -50,10 +50,10 @@ class KeypointTruth:
 
 @dataclass(frozen=True, slots=True)
 class MotionTruth:
-    """How an instance moves over the ground, in the axes of several frames.
+    """Motion of an instance over the ground, in the axes of several frames.
 
-    All three tell the same motion, that of the instance's frame against the world: the camera's and
-    the ego's own motion are not taken away from it.
+    All three are the motion of the instance's frame relative to the world: the motion of camera and
+    ego is not subtracted.
 
     Attributes:
         ego: None in a scene without a rig.
@@ -72,7 +72,7 @@ class MotionTruth:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ObjectTruth:
-    """Everything that is known about one instance in one image.
+    """All annotations of one instance in one image.
 
     A field is None when its annotator was not asked for.
 

@@ -1,8 +1,8 @@
 """Scene: the complete, frozen description of one world.
 
-No engine handle, no distribution, nothing unresolved. World frame: right-handed, Z up, metres,
-seconds, radians. Every template element becomes bodies, lights and labels here; nothing downstream
-knows the element types.
+It contains no engine handles, distributions or unresolved references. World frame: right-handed, Z
+up, metres, seconds, radians. Template elements become bodies, lights and labels; nothing downstream
+depends on the types of elements.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LampKind = Literal["sphere", "spot", PanelKind]
 LightKind = Literal["sphere", "spot", "sun", PanelKind]
 PANEL_KINDS: tuple[PanelKind, ...] = get_args(PanelKind)
 LIGHT_KINDS: tuple[LightKind, ...] = get_args(LightKind)
-"""On the device, a kind is its number in this list."""
+"""On the device, kinds are represented by their index in this list."""
 LaneKind = Literal[
     "driving", "parking", "bicycle", "sidewalk", "crosswalk", "verge", "furniture", "frontage"
 ]
@@ -32,20 +32,20 @@ LaneKind = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Instance:
-    """One labelled thing: what an instance id stands for.
+    """One labelled object.
 
     Attributes:
-        instance_id: From 1; 0 means nothing.
+        instance_id: From 1; 0 = none.
         category_id: From 1, index into the data set's sorted category names; 0 = no category.
-        annotated: Whether labels are written for it. Distractors and furniture keep their
-            instance id in the masks and have no annotation.
+        annotated: Whether it is annotated. Distractors and furniture have an instance id in the id
+            images and no annotation.
         parts: Names of its parts; part id ``k`` is ``parts[k - 1]``. Robots: their links.
         T_world_instance: Pose of the instance frame (a body's own frame; a robot's base).
         box_min_m, box_max_m: Tight bounds of the visual geometry in the instance frame [m].
         subcategory: A finer name than the category; may be empty.
-        attributes: Further facts that labels carry, ``(name, value)``, sorted by name.
+        attributes: Further attributes in labels, ``(name, value)``, sorted by name.
         keypoints: Named points in the instance frame, in the order of their skeleton.
-        twist: How its frame moves.
+        twist: Motion of its frame.
     """
 
     instance_id: int
@@ -73,10 +73,10 @@ class Body:
         asset: Mesh asset id.
         scale: Uniform factor on the mesh.
         instance_id: The instance it belongs to; 0 = unlabelled background.
-        part_id: From 1 within its instance; 0 = the whole.
-        group: Name of the object group it was placed by; empty = none.
-        motion: ``dynamic`` bodies fall; ``kinematic`` ones are placed by a robot.
-        collides: Whether physics sees it.
+        part_id: From 1 within its instance; 0 = no part.
+        group: Name of the object group it belongs to; empty = none.
+        motion: ``dynamic`` bodies fall; ``kinematic`` ones are posed by a robot.
+        collides: Whether it collides in physics.
         materials: One per mesh slot; empty = the asset's own.
     """
 
@@ -97,14 +97,14 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class SupportSurface:
-    """A horizontal rectangle that things can stand on.
+    """A horizontal rectangle that objects can stand on.
 
     Attributes:
         body: Name of the body it belongs to.
         T_world_surface: Centre of the rectangle, Z = its normal.
         size_m: Extent along the surface's X and Y.
         clearance_m: Free height above it.
-        walled: Enclosed at the sides: things dropped in it cannot leave it.
+        walled: Enclosed at the sides: objects dropped into it cannot leave.
     """
 
     name: str
@@ -117,21 +117,21 @@ class SupportSurface:
 
 @dataclass(frozen=True, slots=True)
 class Lane:
-    """A strip along which things move or stand; streets are made of them.
+    """A strip of a street along which objects move or stand.
 
     Attributes:
         kind: ``driving``, ``parking``, ``bicycle``; ``sidewalk`` and ``crosswalk`` for people;
             ``verge`` for plants, ``furniture`` for lamps and bins, ``frontage`` for the line of
-            house fronts: its left side is the street's.
+            house fronts, with the street on its left.
         center_m: Points of the centre line, world, in the direction of travel, at most 2 m apart
-            where it bends; Z is the height of the ground.
+            in bends; Z is the height of the ground.
         width_m: Across the centre line.
         road: Name of the template element it belongs to.
-        successors: Names of the lanes that go on where it ends.
-        left, right: Names of the lanes beside it that run the same way; empty = none.
-        speed_m_s: Usual speed; 0 = things stand.
+        successors: Names of the lanes that continue at its end.
+        left, right: Names of the adjacent lanes of the same direction; empty = none.
+        speed_m_s: Usual speed; 0 = for standing objects.
         junction: Whether it crosses a junction, where nothing may stop.
-        bank: How much its left side is higher than its right one, per metre of width.
+        bank: Rise from its right to its left side, per metre of width.
     """
 
     name: str
@@ -149,14 +149,14 @@ class Lane:
 
 @dataclass(frozen=True, slots=True)
 class ObjectGroup:
-    """What a template asked to be placed on surfaces or along lanes.
+    """A group of objects to place on surfaces or along lanes.
 
     Attributes:
-        surfaces: Names of the surfaces it is spread over.
-        lanes: Kinds of the lanes it is spread over (placement ``along``).
-        facing: Where its members' fronts point on lanes: ``along`` the lane, or to its ``left``.
-        assets: Ids of the assets it may draw from, sorted.
-        keep_out: Discs ``(x, y, radius)`` [m], world, where nothing is put (the arm's base).
+        surfaces: Names of the surfaces to place them on.
+        lanes: Kinds of the lanes to place them on (placement ``along``).
+        facing: Direction of fronts on lanes: ``along`` the lane, or to its ``left``.
+        assets: Ids of the assets to draw from, sorted.
+        keep_out: Discs ``(x, y, radius)`` [m], world, to keep free (the arm's base).
     """
 
     name: str
@@ -172,29 +172,29 @@ class ObjectGroup:
 
 @dataclass(frozen=True, slots=True)
 class ArmGoal:
-    """What the arm should do; drawn by a randomizer, made true by physics.
+    """A goal of an arm, drawn by a randomizer and accomplished by physics.
 
     Physics takes the first candidate that is within limits and free of collision.
 
     Attributes:
         kind: ``joints``: candidates are joint positions. ``reach``: candidates are poses of the
-            grasp frame in the world. ``hold``: like reach, with ``held`` between the fingers.
-            Only on a way: ``grasp`` takes up one of ``objects`` from where it rests, ``place``
-            puts down what is held.
+            grasp frame in the world. ``hold``: like reach, with ``grasped_object`` between the
+            fingers. In tasks only: ``grasp`` picks up one of ``objects``, ``place`` puts the held
+            object down.
         joint_candidates: One tuple per candidate [rad or m], arm joints in order.
         pose_candidates: ``T_world_grasp`` per candidate; for ``place``, a point on a surface and
-            a turn about Z that the object makes from how it lay or is held.
-        opening: Gripper opening in [0, 1]; ignored for ``hold``, ``grasp`` and ``place``.
-        held: Name of the body that is held.
+            a rotation about Z of the object from its former pose at rest.
+        gripper_opening: In [0, 1]; ignored for ``hold``, ``grasp`` and ``place``.
+        grasped_object: Name of the body to hold; empty = none.
         objects: Names of the bodies that may be grasped, the preferred one first.
-        speed: Share of the joints' speed limits that the way there may use.
+        speed: Share of the joints' speed limits to use.
     """
 
     kind: Literal["joints", "reach", "hold", "grasp", "place"]
     joint_candidates: tuple[tuple[float, ...], ...] = ()
     pose_candidates: tuple[SE3, ...] = ()
-    opening: float = 1.0
-    held: str = ""
+    gripper_opening: float = 1.0
+    grasped_object: str = ""
     objects: tuple[str, ...] = ()
     speed: float = 0.5
 
@@ -205,11 +205,11 @@ class Articulation:
 
     Attributes:
         joint_positions: One per movable joint, in the robot model's order [rad or m].
-        goal: What it does before anything moves.
-        workspace_m: Low and high corner [m], world, where its hand may be sent.
-        way: What it does from then on, one after the other: ``joints``, ``reach``, ``grasp``
+        goal: Its goal at time 0; None = its joint positions.
+        workspace_m: Low and high corner [m] of the targets of its hand, world.
+        task: Its goals from time 0 on, one after the other: ``joints``, ``reach``, ``grasp``
             and ``place``.
-        joint_track: How its joints move; None = they stand still.
+        joint_track: Trajectory of its joints; None = they do not move.
     """
 
     name: str
@@ -219,7 +219,7 @@ class Articulation:
     joint_positions: tuple[float, ...]
     goal: ArmGoal | None = None
     workspace_m: tuple[Vec3, Vec3] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    way: tuple[ArmGoal, ...] = ()
+    task: tuple[ArmGoal, ...] = ()
     joint_track: JointTrajectory | None = None
 
 
@@ -228,24 +228,23 @@ class Light:
     """A light source.
 
     Attributes:
-        kind: ``sphere`` radiates evenly from a ball; ``spot`` does so within a cone; ``sun`` is
-            at infinity; ``rectangle`` and ``disk`` are panels with one side that is equally bright
-            from everywhere before it.
+        kind: ``sphere`` radiates uniformly in all directions, ``spot`` within a cone; ``sun`` is
+            at infinity; ``rectangle`` and ``disk`` are one-sided Lambertian panels.
         position_m: Centre, world [m] (all but sun).
         direction: Unit vector in which the light travels (spot, sun); a panel's normal.
         color: Linear RGB with luminance 1.
         intensity_cd: Luminous intensity [cd] (all but sun); of panels, along their normal: their
             luminance times their area.
         illuminance_lux: On a surface that faces it [lx] (sun).
-        radius_m: Of the ball or the disk: its softness (sphere, spot, disk).
+        radius_m: Radius of the emitter, which makes shadows soft (sphere, spot, disk).
         size_m: Of the rectangle, along ``side`` and across it.
-        side: Unit vector along the rectangle's first side, at right angles to ``direction``.
-        angular_radius_rad: Of the disc in the sky (sun).
-        cone_rad: Half angle at which a spot has faded to nothing.
-        even: Share of the cone within which a spot is even; outside it fades.
-        cutoff: Of a spot that is a dipped headlight: slope below its level direction at which its
-            light ends; 0 = round about its direction.
-        body: Name of the body it moves with; empty = none.
+        side: Unit vector along the rectangle's first side, perpendicular to ``direction``.
+        angular_radius_rad: Angular radius of the sun's disc.
+        cone_rad: Half angle at which a spot has faded to 0.
+        even: Share of the cone within which a spot is uniform; outside it fades.
+        cutoff: Slope of the cut-off below the horizon of a spot that is a dipped headlight; 0 =
+            rotationally symmetric.
+        body: Name of the body that carries it; empty = none.
     """
 
     name: str
@@ -273,7 +272,7 @@ class Environment:
         image: Environment id of the library.
         luminance_cd_m2: Mean luminance over the sphere.
         yaw_rad: Rotation about world Z.
-        visible: Whether pixels that hit nothing show it; else they are black.
+        visible: Whether it is visible as background; else the background is black.
     """
 
     image: str = "environment/neutral?seed=0"
@@ -284,18 +283,18 @@ class Environment:
 
 @dataclass(frozen=True, slots=True)
 class Weather:
-    """What the air and the ground are like. The sun is a Light, the sky an Environment.
+    """State of air and ground. The sun is a Light, the sky an Environment.
 
     Attributes:
         fog_extinction_per_m: At the ground; the meteorological range is ``3.912 /`` it
             (Koschmieder 1924, 2 % contrast).
-        fog_height_m: Height over which fog thins by a factor of e; 0 = evenly thick.
-        rain_mm_h, snow_mm_h: Falling now (snow as the water it melts to).
-        wetness: How wet surfaces open to the sky are, 0 dry to 1 soaked.
+        fog_height_m: Scale height: fog thins by a factor of e per this height; 0 = uniform.
+        rain_mm_h, snow_mm_h: Rates of precipitation (snow as water equivalent).
+        wetness: Wetness of surfaces open to the sky, from 0 = dry to 1 = soaked.
         puddles: Share of level ground under standing water.
         snow_cover: Share of upward surfaces that lies under snow.
         lens_drops: Share of the image behind drops on the lens.
-        seed: Of the patterns of puddles, patches, streaks, flakes and drops.
+        seed: Seed of the patterns of puddles, patches, streaks, flakes and drops.
     """
 
     fog_extinction_per_m: float = 0.0
@@ -314,8 +313,8 @@ class Rig:
     """A frame that sensors are mounted on: the ego vehicle's, a robot's wrist.
 
     Attributes:
-        body: Name of the body it rides on.
-        T_body_rig: Where it is on the body. X forward, Y left, Z up.
+        body: Name of the body that carries it.
+        T_body_rig: Pose on the body. X forward, Y left, Z up.
     """
 
     name: str
@@ -331,9 +330,9 @@ class Camera:
         name: The sensor's name in the YAML.
         T_world_camera: Camera frame: X right, Y down, Z forward. Follows the rig if it has one.
         ev100: Fixed exposure value at ISO 100; None = exposed automatically.
-        rig: Name of the rig it is mounted on; empty = it stands in the world by itself.
-        T_rig_camera: Where it is on its rig.
-        shutter: When its rows are exposed, around the scene's instant.
+        rig: Name of the rig it is mounted on; empty = fixed in the world.
+        T_rig_camera: Pose on the rig.
+        shutter: Exposure of its rows around the scene's instant.
     """
 
     name: str
@@ -347,17 +346,17 @@ class Camera:
 
 @dataclass(frozen=True, slots=True)
 class Lidar:
-    """A laser scanner on a rig, or on that of a camera.
+    """A laser scanner on a rig, or at a camera.
 
     Attributes:
         name: The sensor's name in the YAML.
-        camera: Name of the camera it rides with; empty = it is on ``rig``.
-        T_rig_lidar: Where it is on the rig. Both frames are X forward, Y left, Z up; the origin of
-            a camera's rig is the camera's centre, its X axis the camera's optical axis.
-        T_world_lidar: Its pose; follows the rig.
-        model: What it is, for the labels: ``HDL-64E``.
-        rig: Name of its rig; empty = it rides with ``camera``.
-        sweep_s: How long a sweep takes; the scene's instant is its middle.
+        camera: Name of the camera it is mounted at; empty = it is on ``rig``.
+        T_rig_lidar: Pose on the rig. Both frames are X forward, Y left, Z up; the origin of a
+            camera's rig is the camera's centre, its X axis the camera's optical axis.
+        T_world_lidar: Pose, derived from the rig's.
+        model: Name of the device in labels, such as ``HDL-64E``.
+        rig: Name of its rig; empty = it is mounted at ``camera``.
+        sweep_s: Duration of a sweep; the scene's instant is its middle.
     """
 
     name: str
@@ -371,17 +370,17 @@ class Lidar:
 
 @dataclass(frozen=True, slots=True)
 class Device:
-    """Any other sensor on a rig: radar, inertial unit, satellite receiver, odometer, watcher.
+    """Any other sensor on a rig: radar, IMU, GNSS receiver, odometer, event detector or camera.
 
     Attributes:
         name: The sensor's name in the YAML.
-        kind: The modality: ``radar``, ``imu``, ``gnss``, ``odometer``, ``watcher``,
+        kind: ``radar``, ``imu``, ``gnss``, ``odometer``, ``watcher`` (event detector) or
             ``event_camera``.
-        rig: Name of its rig; empty = it rides with ``camera``.
-        T_rig_device: Where it is on the rig. X forward, Y left, Z up.
-        T_world_device: Its pose; follows the rig.
-        model: What it is, for the labels.
-        camera: Name of the camera it looks through; empty = none.
+        rig: Name of its rig; empty = it is mounted at ``camera``.
+        T_rig_device: Pose on the rig. X forward, Y left, Z up.
+        T_world_device: Pose, derived from the rig's.
+        model: Name of the device in labels.
+        camera: Name of the camera it is mounted at; empty = none.
     """
 
     name: str
@@ -395,7 +394,7 @@ class Device:
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """What cameras look at: a box in the world around the things of interest."""
+    """The region of interest for cameras: a box in the world."""
 
     center_m: Vec3 = (0.0, 0.0, 0.0)
     size_m: Vec3 = (1.0, 1.0, 0.4)
@@ -408,7 +407,7 @@ class StagePiece:
     Attributes:
         name: Unique in the stage.
         asset: Id of its mesh.
-        T_stage_piece: Where the mesh is in the stage.
+        T_stage_piece: Pose of the mesh in the stage.
         thing: Name of the labelled prim that it belongs to; empty = none.
         category: The label of that prim.
     """
@@ -422,7 +421,7 @@ class StagePiece:
 
 @dataclass(frozen=True, slots=True)
 class StageModel:
-    """A world that somebody has built elsewhere, in its own frame: metres, Z up.
+    """An imported world in its own frame: metres, Z up.
 
     Attributes:
         cameras: Names and ``T_stage_camera``.
@@ -438,14 +437,13 @@ class Scene:
     """One world. Change it with ``dataclasses.replace``.
 
     Attributes:
-        interior_m: Low and high corner of the space in which cameras and lights may be; a room's
-            inner walls.
-        lanes: Where things may move or stand, in a street.
-        shared: Values that several draws have in common, ``(name, value)``, sorted by name.
-        time_s: The instant it is shown at; 0 = when it was built.
+        interior_m: Low and high corner of the space for cameras and lights; a room's inner walls.
+        lanes: Lanes of a street.
+        shared: Shared values, ``(name, value)``, sorted by name.
+        time_s: The scene's instant; 0 = as built.
         step_s: Time between the instants of its sequence.
-        tracks: How bodies move; at most one per body.
-        changes: What changes at once, in order of time.
+        tracks: Trajectories of bodies; at most one per body.
+        changes: Changes of state, in order of time.
     """
 
     template: str
@@ -495,7 +493,7 @@ class Scene:
         return _named(self.rigs, name)
 
     def track(self, body: str) -> Trajectory | None:
-        """The track of that body; None if it stands still."""
+        """The trajectory of that body; None if it does not move."""
         return next((track for track in self.tracks if track.body == body), None)
 
     def rig_pose(self, name: str) -> SE3:
@@ -511,7 +509,7 @@ class Scene:
         raise KeyError(instance_id)
 
     def with_bodies(self, *changed: Body) -> Scene:
-        """The scene with bodies of the same names exchanged."""
+        """The scene with bodies replaced by those of the same name."""
         by_name = {body.name: body for body in changed}
         return replace(self, bodies=tuple(by_name.get(b.name, b) for b in self.bodies))
 

@@ -1,4 +1,4 @@
-"""The same world at another instant."""
+"""Scenes at other instants."""
 
 from __future__ import annotations
 
@@ -27,23 +27,24 @@ EGO = "ego"
 
 
 def scene_at(scene: Scene, time_s: float) -> Scene:
-    """The scene at another instant: what has a track, and all that rides with it, has moved.
+    """The scene at another instant.
 
-    Bodies, joints, lights, rigs, sensors and the frames of instances follow; so do the changes
-    that have happened by then. Changes are looked up from the beginning of time, so that the way
-    there does not matter; a body whose first change lies ahead keeps what it has.
+    Moves bodies, joints, lights, rigs, sensors and the frames of instances along the trajectories,
+    and applies the state changes up to then. Changes are accumulated from time 0, so that the
+    result does not depend on the scene's current instant; a body keeps its state until its first
+    change.
 
-    Boxes of instances of several bodies (robots) stay as they are, since their size takes geometry:
-    scenes for sensors and labels come from ``gen_data.generator.pipeline.finalize_scene.Timeline``.
+    Boxes of instances with several bodies (robots) are not updated, as that takes geometry: scenes
+    for sensors and labels come from ``gen_data.generator.pipeline.finalize_scene.Timeline``.
     """
     if time_s == scene.time_s:
         return scene
     if not (scene.tracks or scene.changes):
         return place_sensors(replace(scene, time_s=time_s))
     tracks = {track.body: track for track in scene.tracks}
-    changes = _in_force(scene.changes, time_s)
+    changes = _accumulate_changes(scene.changes, time_s)
     bodies = tuple(
-        _changed(
+        _apply_change(
             replace(body, T_world_body=tracks[body.name].pose(time_s).rounded())
             if body.name in tracks
             else body,
@@ -72,7 +73,7 @@ def scene_at(scene: Scene, time_s: float) -> Scene:
 
 
 def place_sensors(scene: Scene) -> Scene:
-    """The scene with every sensor where its rig or camera carries it, on files' decimal grid."""
+    """The scene with the poses of all sensors on their rigs or cameras, rounded as in files."""
     scene = replace(scene, cameras=tuple(_placed_camera(scene, c) for c in scene.cameras))
     return replace(
         scene,
@@ -82,7 +83,7 @@ def place_sensors(scene: Scene) -> Scene:
 
 
 def add_twists(scene: Scene) -> Scene:
-    """The scene with every instance's motion at the scene's instant."""
+    """The scene with the twists of all instances at the scene's instant."""
     tracks = {track.body: track for track in scene.tracks}
     if not tracks:
         return scene
@@ -93,16 +94,16 @@ def add_twists(scene: Scene) -> Scene:
         if body.name in tracks and body.instance_id not in rooted
     }
     twists = {k: track.twist(scene.time_s) for k, track in carriers.items()}
-    return replace(scene, instances=tuple(_moving(i, twists) for i in scene.instances))
+    return replace(scene, instances=tuple(_set_twist(i, twists) for i in scene.instances))
 
 
-def _moving(instance: Instance, twists: Mapping[int, Twist]) -> Instance:
+def _set_twist(instance: Instance, twists: Mapping[int, Twist]) -> Instance:
     twist = twists.get(instance.instance_id, STILL)
     return instance if twist == instance.twist else replace(instance, twist=twist)
 
 
 def ego_rig(scene: Scene, name: str = "") -> Rig | None:
-    """The rig of that name; by default the one called ``ego``, else the first; None if none."""
+    """The rig of that name; by default ``ego``, else the first one; None if there is none."""
     by_name = {rig.name: rig for rig in reversed(scene.rigs)}
     if name:
         return by_name.get(name)
@@ -110,7 +111,7 @@ def ego_rig(scene: Scene, name: str = "") -> Rig | None:
 
 
 def rig_twist(scene: Scene, rig: Rig) -> Twist:
-    """How a rig moves at the scene's instant: its origin, by the track of the body it rides on."""
+    """Twist of a rig at the scene's instant, from the trajectory of the body that carries it."""
     track = scene.track(rig.body)
     if track is None:
         return STILL
@@ -131,8 +132,8 @@ def _sum(a: Vec3, b: Vec3) -> Vec3:
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
-def _in_force(changes: tuple[StateChange, ...], time_s: float) -> dict[str, StateChange]:
-    """By body, the sum of all its changes so far."""
+def _accumulate_changes(changes: tuple[StateChange, ...], time_s: float) -> dict[str, StateChange]:
+    """``{body: all its changes up to an instant, combined}``."""
     sums: dict[str, StateChange] = {}
     for change in changes:
         if change.time_s > time_s + 1e-9:
@@ -151,7 +152,7 @@ def _in_force(changes: tuple[StateChange, ...], time_s: float) -> dict[str, Stat
     return sums
 
 
-def _changed(body: Body, change: StateChange | None) -> Body:
+def _apply_change(body: Body, change: StateChange | None) -> Body:
     if change is None:
         return body
     return replace(
@@ -162,7 +163,7 @@ def _changed(body: Body, change: StateChange | None) -> Body:
 def _moved_instances(
     scene: Scene, bodies: tuple[Body, ...], changes: dict[str, StateChange], time_s: float
 ) -> tuple[Instance, ...]:
-    """Instances with the frames and facts of their first bodies."""
+    """Instances with the frames of their first bodies and the attributes of all."""
     rooted = {a.instance_id for a in scene.articulations}
     first: dict[int, Body] = {}
     facts: dict[int, dict[str, str]] = {}

@@ -1,4 +1,4 @@
-"""When the rows of an image are exposed."""
+"""Exposure time and rolling shutter: exposure intervals of the rows of an image."""
 
 from __future__ import annotations
 
@@ -12,17 +12,16 @@ from gen_data.generator.core.se3 import Array
 
 @dataclass(frozen=True, slots=True)
 class Shutter:
-    """How long every row of an image is exposed, and which row when.
+    """Exposure of the rows of an image.
 
-    The instant of an image is the middle of the exposure of its middle. With a rolling shutter,
-    the point ``(u, v)`` of the image is exposed around ``readout_s * (v / height - 0.5)`` from it,
-    where ``v`` is that of the row's centre.
+    The instant of an image is the middle of the exposure of its middle row. With a rolling shutter,
+    a row with its centre at ``v`` is exposed around ``readout_s * (v / height - 0.5)`` from it.
 
     Attributes:
-        exposure_s: How long every row is exposed; 0 = an instant.
-        readout_s: From the exposure of the image's upper edge to that of its lower one; negative
-            where the lower edge comes first, 0 = all rows at once (a global shutter).
-        samples: Instants that an exposure is the mean of, at most.
+        exposure_s: Exposure time of every row; 0 = an instant.
+        readout_s: Time from the exposure of the image's upper edge to that of its lower edge;
+            negative if the lower edge comes first, 0 = a global shutter.
+        samples: Largest number of instants averaged into an exposure.
     """
 
     exposure_s: float = 0.0
@@ -40,14 +39,14 @@ class Shutter:
         return self.readout_s != 0.0
 
     def delay_s(self, v_px: Any, height_px: int) -> Any:
-        """How much later than the image's instant a place of it is exposed [s], as ``v_px``."""
+        """Delay of the exposure of image coordinate ``v_px`` after the image's instant [s]."""
         return self.readout_s * (v_px / height_px - 0.5)
 
     def row_delays_s(self, height_px: int) -> Array:
-        """The same for the centres of all rows, shape [height]."""
+        """Delays of the centres of all rows [s], [height]."""
         delays: Array = self.delay_s(np.arange(height_px) + 0.5, height_px)
         return delays
 
 
 INSTANT = Shutter()
-"""All at once."""
+"""A global shutter with an instantaneous exposure."""

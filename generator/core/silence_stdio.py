@@ -1,4 +1,4 @@
-"""Keeping native libraries from writing where only the command line may."""
+"""Silences native libraries, which may not write to the command line's output."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from contextlib import contextmanager
 
 @contextmanager
 def silence_stdio() -> Iterator[None]:
-    """Drop what native code prints on standard output and standard error.
+    """Discard the output of native code on standard output and standard error.
 
-    Some libraries greet on import, or warn about hardware that nobody asked for, past Python's
-    own streams; exceptions still tell of real faults.
+    Some libraries print a banner on import, or warn about missing hardware, bypassing Python's
+    streams. Exceptions are not affected.
     """
     sys.stdout.flush()
     sys.stderr.flush()

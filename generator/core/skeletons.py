@@ -1,4 +1,4 @@
-"""Which keypoints belong together, in which order, and which of them bones join."""
+"""Skeletons: order of keypoints, and the bones between them."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ class Skeleton:
     bones: tuple[tuple[int, int], ...] = ()
 
 
-def _joined(names: str, bones: str) -> Skeleton:
+def _parse_skeleton(names: str, bones: str) -> Skeleton:
     listed = tuple(names.split())
     pairs = (bone.split("-") for bone in bones.split())
     return Skeleton(listed, tuple((listed.index(a), listed.index(b)) for a, b in pairs))
 
 
-PERSON = _joined(
+PERSON = _parse_skeleton(
     "nose left_eye right_eye left_ear right_ear left_shoulder right_shoulder left_elbow "
     "right_elbow left_wrist right_wrist left_hip right_hip left_knee right_knee left_ankle "
     "right_ankle",
@@ -33,7 +33,7 @@ PERSON = _joined(
 )
 """The 17 points and 19 bones of COCO's category ``person`` (person_keypoints_val2017.json)."""
 
-VEHICLE = _joined(
+VEHICLE = _parse_skeleton(
     "wheel_front_left wheel_front_right wheel_rear_left wheel_rear_right headlight_left "
     "headlight_right taillight_left taillight_right",
     "wheel_front_left-wheel_front_right wheel_rear_left-wheel_rear_right "
@@ -43,24 +43,24 @@ VEHICLE = _joined(
     "wheel_rear_left-taillight_left wheel_rear_right-taillight_right",
 )
 
-TWO_WHEELER = _joined(
+TWO_WHEELER = _parse_skeleton(
     "wheel_front wheel_rear headlight taillight",
     "wheel_front-wheel_rear wheel_front-headlight wheel_rear-taillight",
 )
 
-CYCLIST = _joined(
+CYCLIST = _parse_skeleton(
     " ".join(PERSON.names + TWO_WHEELER.names),
     " ".join(f"{s.names[a]}-{s.names[b]}" for s in (PERSON, TWO_WHEELER) for a, b in s.bones),
 )
-"""A rider and what is ridden."""
+"""A rider with a two-wheeler."""
 
 KNOWN = (PERSON, VEHICLE, TWO_WHEELER, CYCLIST)
 
 
 def find_skeleton(names: Iterable[str]) -> Skeleton:
-    """The first known skeleton that has all the names; else just the names, in their order.
+    """The first known skeleton with all names; else a skeleton of the names without bones.
 
-    A category's points are thus the same in every data set, even where one of them never occurs.
+    A category's keypoints are thus the same in all data sets, even if some never occur.
     """
     listed = tuple(dict.fromkeys(names))
     for skeleton in KNOWN:

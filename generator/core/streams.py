@@ -1,7 +1,7 @@
-"""Random streams: stateless, keyed by what draws, never by when it draws.
+"""Random streams: stateless, keyed by name and independent of the order of draws.
 
-A stream's key is a digest of (seed, scene, view, step, attempt, name). Adding, removing or
-reordering whatever draws leaves every other stream as it was, and any sample can be made alone.
+The key of a stream is a digest of (seed, scene, view, step, attempt, name). Adding, removing or
+reordering plug-ins changes no other stream, and any sample can be generated on its own.
 Counter-based generator: Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC 2011.
 """
 
@@ -14,12 +14,12 @@ import numpy as np
 
 
 class Rng(np.random.Generator):
-    """A numpy generator that also knows what it draws for.
+    """A numpy generator with the key of its stream.
 
     Attributes:
         index: Scene index for draws that all views share, else the number of the view in the
-            data set. What a ``sequence`` in YAML steps by, so that no distribution needs a memory.
-        name: What draws from it.
+            data set. Index of a ``sequence`` in YAML, which makes distributions stateless.
+        name: Name of the stream.
         streams: The family it belongs to.
     """
 
@@ -28,10 +28,10 @@ class Rng(np.random.Generator):
     streams: Streams
 
     def of_sequence(self) -> Rng:
-        """A new stream of the same name that all instants of the sequence share.
+        """A new stream of the same name that is the same at all steps of the sequence.
 
-        What goes on from one instant to the next, like the bias of a gyroscope, is drawn from it
-        anew at every instant, from the beginning of the sequence.
+        Processes that continue from step to step, like the bias of a gyroscope, are redrawn from it
+        at every step, from the beginning of the sequence.
         """
         return replace(self.streams, step=0).rng(f"{self.name}/sequence")
 
@@ -45,8 +45,8 @@ class Streams:
         scene: Scene index.
         view: View index within the scene, or -1 for draws that all views of a scene share.
         attempt: Number of the attempt, from 0.
-        index: What ``Rng.index`` will be.
-        step: Instant of a sequence, for draws that differ from one to the next.
+        index: Value of ``Rng.index``.
+        step: Step of a sequence, for draws that differ between steps.
     """
 
     seed: int
@@ -57,7 +57,7 @@ class Streams:
     step: int = 0
 
     def rng(self, name: str) -> Rng:
-        """The generator of everything that ``name`` draws."""
+        """The generator of the stream ``name``."""
         view = f"{self.view}.{self.step}" if self.step else str(self.view)
         text = "\0".join((str(self.seed), str(self.scene), view, str(self.attempt), name))
         key = blake2b(text.encode(), digest_size=16).digest()

@@ -1,4 +1,4 @@
-"""Things come to rest, arms obey. A pure function of the Scene: no memory between calls."""
+"""Physics: objects settle and arms accomplish their goals; a pure function of the Scene."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["PhysicsConfig", "open_engine"]
 
 
 def open_engine(assets: AssetLibrary, config: PhysicsConfig) -> BulletEngine:
-    """The physics engine, to be used as a context manager."""
+    """Open the physics engine, to be used as a context manager."""
     from gen_data.generator.physics.engine import BulletEngine
 
     return BulletEngine(assets, config)

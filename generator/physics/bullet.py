@@ -1,7 +1,7 @@
-"""The only module that knows pybullet: bodies by name, poses of their own frames, plain verbs.
+"""A wrapper of pybullet: rigid bodies by name, with poses of their own frames.
 
-pybullet's conventions stay in here: quaternions with the scalar last, body numbers, and poses of
-the centre of mass.
+The only module that imports pybullet. It hides pybullet's conventions: quaternions with the scalar
+last, body numbers, and poses of the centre of mass.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from gen_data.generator.core.se3 import SE3, Array, Vec3
 from gen_data.generator.core.silence_stdio import silence_stdio
 from gen_data.generator.physics.collision_shapes import CollisionShape, scale_step
 
-with silence_stdio():  # it tells when it was built
+with silence_stdio():  # it prints its build time
     import pybullet
 
 GRAVITY_M_S2 = 9.81
 
 _ANGULAR_DAMPING = 0.5
 _ROLLING_FRICTION_SHARE = 0.1
-"""Rolling friction over an object's smallest half extent: balls and cans come to a halt within a
-few turns, and nothing can rest visibly out of balance."""
+"""Rolling friction over an object's smallest half extent: balls and cans stop within a few turns,
+too little for anything to rest visibly out of balance."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -37,10 +37,10 @@ class _Solid:
 
 
 class World:
-    """One simulated world; owns a pybullet connection. Empty after ``reset``, whatever was before.
+    """A simulated world, which owns a pybullet connection; ``reset`` must be called first.
 
-    All bodies are single rigid bodies ("maximal coordinates"): their contact solver pushes
-    overlapping bodies apart without giving them speed.
+    All bodies are single rigid bodies ("maximal coordinates"), whose contact solver separates
+    overlapping bodies without giving them speed.
     """
 
     def __init__(self, time_step_s: float, solver_iterations: int) -> None:
@@ -59,18 +59,18 @@ class World:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of all bodies, in the order in which they came."""
+        """Names of all bodies, in the order in which they were added."""
         return tuple(self._solids)
 
     def close(self) -> None:
-        """Give the connection and the scratch files back; doing it twice is allowed."""
+        """Close the connection and delete scratch files; may be called twice."""
         if self._client >= 0:
             pybullet.disconnect(physicsClientId=self._client)
             shutil.rmtree(self._folder, ignore_errors=True)
         self._client = -1
 
     def reset(self) -> None:
-        """An empty world with the same parameters."""
+        """Remove all bodies and restore the parameters."""
         self._solids, self._names, self._bounds = {}, {}, {}
         pybullet.resetSimulation(physicsClientId=self._client)
         pybullet.setGravity(0.0, 0.0, -GRAVITY_M_S2, physicsClientId=self._client)
@@ -87,7 +87,7 @@ class World:
         friction: float = 0.6,
         restitution: float = 0.05,
     ) -> None:
-        """Put a body into the world; without mass it never moves by itself."""
+        """Add a body; a body with mass 0 is static."""
         x, y, z = shape.center_of_mass_m
         T_body_center = SE3((x * scale, y * scale, z * scale))
         position, orientation = _bullet_pose(T_world_body @ T_body_center)
@@ -118,14 +118,14 @@ class World:
         self._names[number] = name
 
     def remove(self, name: str) -> None:
-        """Take a body out of the world."""
+        """Remove a body."""
         solid = self._solids.pop(name)
         del self._names[solid.number]
         self._bounds.pop(name, None)
         pybullet.removeBody(solid.number, physicsClientId=self._client)
 
     def ignore(self, name: str, others: Iterable[str]) -> None:
-        """Let a body pass through some others."""
+        """Disable collisions of a body with others."""
         number = self._solids[name].number
         for other in others:
             pybullet.setCollisionFilterPair(
@@ -133,7 +133,7 @@ class World:
             )
 
     def place(self, name: str, T_world_body: SE3) -> None:
-        """Put a body elsewhere, at rest."""
+        """Move a body to a pose, at rest."""
         solid = self._solids[name]
         position, orientation = _bullet_pose(T_world_body @ solid.T_body_center)
         pybullet.resetBasePositionAndOrientation(
@@ -154,7 +154,7 @@ class World:
         return self._bounds[name]
 
     def gap_m(self, one: str, other: str, limit_m: float) -> float:
-        """Distance between two bodies [m]; negative where they overlap, at most ``limit_m``."""
+        """Distance between two bodies [m]: negative if they overlap, at most ``limit_m``."""
         (low, high), (other_low, other_high) = self.bounds_m(one), self.bounds_m(other)
         if (low > other_high + limit_m).any() or (other_low > high + limit_m).any():
             return limit_m
@@ -167,20 +167,20 @@ class World:
         return min((float(point[8]) for point in points), default=limit_m)
 
     def step(self, count: int) -> None:
-        """Let time pass by ``count`` steps."""
+        """Simulate ``count`` steps."""
         for _ in range(count):
             pybullet.stepSimulation(physicsClientId=self._client)
         self._bounds = {}
 
     def speed(self, name: str) -> tuple[float, float]:
-        """Speed [m/s] and spin [rad/s] of a body."""
+        """Linear [m/s] and angular speed [rad/s] of a body."""
         linear, angular = pybullet.getBaseVelocity(
             self._solids[name].number, physicsClientId=self._client
         )
         return math.dist(linear, (0.0, 0.0, 0.0)), math.dist(angular, (0.0, 0.0, 0.0))
 
     def contacts(self) -> list[tuple[str, str, float]]:
-        """All pairs that touch, with their gap [m]: negative where they overlap."""
+        """All pairs of bodies in contact and their gap [m], negative if they overlap."""
         pybullet.performCollisionDetection(physicsClientId=self._client)
         points = pybullet.getContactPoints(physicsClientId=self._client)
         return [(self._names[p[1]], self._names[p[2]], float(p[8])) for p in points]
@@ -201,8 +201,8 @@ class World:
                     physicsClientId=self._client,
                 )
             )
-        # Several hulls in one body can only be handed over as a file. The engine remembers files
-        # by name for the life of the process: the name is the content.
+        # pybullet takes compounds of hulls only from files, and caches files by name for the life
+        # of the process: hence names by content.
         step = scale_step(scale)
         path = self._folder / f"{shape.key}_{step}.obj"
         if not path.exists():

@@ -1,8 +1,8 @@
-"""Collision geometry prepared for the engine: boxes where exact, else hulls with room for a shell.
+"""Collision geometry for the engine: boxes where they are exact, else shrunken convex hulls.
 
-Bullet keeps a shell of fixed thickness (its collision margin) around every hull. Each hull is
-therefore made smaller by just that: shell and hull together end where the mesh does, and nothing
-floats above its support.
+Bullet adds a collision margin of fixed thickness around every hull. Hulls are therefore shrunk by
+that thickness: hull and margin together end where the mesh does, and nothing floats above its
+support.
 """
 
 from __future__ import annotations
@@ -25,18 +25,18 @@ if TYPE_CHECKING:
     from scipy.spatial import ConvexHull
 
 SHELL_M = 0.001
-"""Bullet's own thickness for hulls; parts of a compound cannot have another."""
+"""Bullet's collision margin of hulls, which is fixed for parts of a compound."""
 
 _SHELL_SHARE_MAX = 0.4
-"""Of a part's smallest width: a hull never shrinks to nothing."""
+"""Largest shrinkage over a part's smallest width, so that no hull vanishes."""
 _RETREAT_MAX = 1.75
-"""Just above the square root of 3, of a box's corner. Sharper tips move less than their faces ask
-for: better a gap of less than half a shell than a tip that sinks in by several.
+"""Just above the square root of 3 of a box's corner. Sharper tips move less than their faces
+require: a gap of less than half a margin is better than a tip that sinks in by several.
 """
 _SCALE_STEP = 1.05
-"""Hulls are shrunk for the nearest of these steps of scale: 25 micrometres at most are missing."""
+"""Hulls are shrunk for scale rounded to a power of this: an error of at most 25 micrometres."""
 _BOXES_MAX = 16
-"""Primitives that pybullet takes in one compound."""
+"""Most primitives in one compound of pybullet."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +45,8 @@ class Hull:
 
     Attributes:
         vertices_m: float64 [n, 3].
-        retreats: How each vertex moves per metre by which all faces move inward, [n, 3].
-        width_m: Smallest distance between parallel planes on both sides, over all faces.
+        retreats: Motion of each vertex per metre by which all faces move inward, [n, 3].
+        width_m: Smallest extent along the normal of a face.
     """
 
     vertices_m: Array
@@ -54,7 +54,7 @@ class Hull:
     width_m: float
 
     def shrunken(self, depth_m: float) -> Array:
-        """Vertices with all faces moved inward by a depth, less for thin parts."""
+        """Vertices [n, 3] with all faces moved inward by a depth, less for thin parts."""
         return self.vertices_m + min(depth_m, _SHELL_SHARE_MAX * self.width_m) * self.retreats
 
 
@@ -64,9 +64,9 @@ class CollisionShape:
 
     Attributes:
         hulls: About the centre of mass.
-        center_of_mass_m: In the asset's frame; of a solid of even density.
-        boxes: ``(centre, half extents)`` of every part, about the centre of mass, where all
-            parts are upright boxes and few; else empty.
+        center_of_mass_m: In the asset's frame, for uniform density.
+        boxes: ``(centre, half extents)`` of every part about the centre of mass, if all parts are
+            axis-aligned boxes and at most ``_BOXES_MAX``; else empty.
     """
 
     hulls: tuple[Hull, ...]
@@ -80,7 +80,7 @@ class CollisionShape:
 
     @cached_property
     def half_extents_m(self) -> Array:
-        """Of the bounding box, [3]."""
+        """Half extents of the bounding box, [3]."""
         half: Array = 0.5 * (self.vertices_m.max(axis=0) - self.vertices_m.min(axis=0))
         return half
 
@@ -99,7 +99,7 @@ class CollisionShape:
             lines.append(f"o part{number}")
             points = hull.shrunken(SHELL_M / _SCALE_STEP**step)
             lines += [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in points]
-            # The engine builds the hull of whatever points the faces name.
+            # The engine computes the hull of all points that the faces refer to.
             last = first + len(points) - 1
             lines += [
                 f"f {k} {min(k + 1, last)} {min(k + 2, last)}" for k in range(first, last + 1, 3)
@@ -114,16 +114,16 @@ class CollisionShape:
 
 
 def scale_step(scale: float) -> int:
-    """Number of the step of scale that is nearest to a scale; 0 for scale 1."""
+    """Exponent of the power of ``_SCALE_STEP`` nearest to a scale; 0 for scale 1."""
     return round(math.log(scale) / math.log(_SCALE_STEP))
 
 
 def collision_shape(parts: ConvexParts) -> CollisionShape:
-    """The shape of an asset's convex parts."""
+    """The collision shape of an asset's convex parts."""
     measured = _measure(parts.parts_m)
     volumes_m3 = np.array([part.volume_m3 for part in measured])
     middles = np.stack([part.center_m for part in measured])
-    # Parts that are all flat have no volume; then every part weighs the same.
+    # Flat parts have no volume: if all are flat, they weigh the same.
     weights = volumes_m3 if volumes_m3.sum() > 0.0 else np.ones(len(measured))
     center = (weights[:, None] * middles).sum(axis=0) / weights.sum()
     x, y, z = (round(float(v), 9) for v in center)
@@ -138,11 +138,11 @@ def collision_shape(parts: ConvexParts) -> CollisionShape:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Part:
-    """One convex part as it was given, measured.
+    """Measures of one convex part.
 
     Attributes:
-        vertices_m, retreats, width_m: As a Hull's, in the asset's frame.
-        center_m: Of mass, [3].
+        vertices_m, retreats, width_m: As in Hull, in the asset's frame.
+        center_m: Centre of mass, [3].
     """
 
     vertices_m: Array
@@ -153,13 +153,13 @@ class _Part:
 
 
 def _measure(parts_m: Sequence[Array]) -> list[_Part]:
-    """Hulls of parts: all faces of all parts at once, for numpy's overhead is most of the work."""
+    """Measure convex parts: all faces at once, as numpy's overhead per part would dominate."""
     from scipy.spatial import ConvexHull, QhullError
 
     middles = [points.mean(axis=0) for points in parts_m]
     hulls: dict[int, ConvexHull] = {}
     for k, part in enumerate(parts_m):
-        # Flat parts have nothing to shrink and no weight.
+        # qhull refuses flat parts; they cannot shrink and have no weight.
         with contextlib.suppress(QhullError):
             hulls[k] = ConvexHull(part - middles[k])
     measured = [
@@ -192,23 +192,23 @@ def _measure(parts_m: Sequence[Array]) -> list[_Part]:
 
 
 def _width_m(hull: ConvexHull) -> float:
-    """Smallest distance between a face and the vertex farthest behind it."""
+    """Smallest distance [m] between a face and the vertex farthest behind it."""
     depths = np.einsum("kf,kn->fn", hull.equations[:, :3].T, hull.points.T, optimize=False)
     return float((depths.max(axis=1) - depths.min(axis=1)).min())
 
 
 def _retreats(normals: Array, faces: NDArray[Any], points: int) -> Array:
-    """Where vertices go when their faces move inward by one: ``n . x = -1``, by least squares.
+    """Motion of vertices whose faces move inward by one: ``n . x = -1``, by least squares.
 
-    A trace of damping picks the shortest answer where all faces of a vertex lie in one plane.
+    A little damping selects the shortest solution where all faces of a vertex are coplanar.
 
     Args:
-        normals: Of the faces, shape [f, 3].
-        faces: Their corners, shape [f, 3].
-        points: Number of points, those on no face included.
+        normals: Of the faces, [f, 3].
+        faces: Indices of their corners, [f, 3].
+        points: Number of points, including those on no face.
 
     Returns:
-        Shape [points, 3].
+        float64 [points, 3].
     """
     corners = faces.T.reshape(-1)
     nx, ny, nz = normals.T
@@ -236,7 +236,7 @@ def _retreats(normals: Array, faces: NDArray[Any], points: int) -> Array:
 
 
 def _dot(a: Array, b: Array) -> Array:
-    # Coordinate by coordinate: summing over a short last axis takes several times as long.
+    # By coordinate: several times as fast as a sum over a short last axis.
     product: Array = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
     return product
 
@@ -248,7 +248,7 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _as_box(points: Array) -> tuple[Vec3, Vec3] | None:
-    """Centre and half extents of a hull whose vertices are the corners of an upright box."""
+    """Centre and half extents of a hull that is an axis-aligned box; None for any other."""
     if len(points) != 8:
         return None
     low, high = points.min(axis=0), points.max(axis=0)

@@ -1,4 +1,4 @@
-"""BulletEngine: a Scene in, the same Scene at rest out."""
+"""The physics engine: settles objects and plans the motion of arms in a Scene."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from gen_data.generator.physics.placement_surfaces import candidate_surfaces
 from gen_data.generator.physics.settling import Settling
 
 _DENSITY_KG_M3 = 300.0
-"""Of the bounding box of a thing whose mass is unknown: household things are mostly hollow."""
+"""Mass over bounding box for bodies without a mass: household objects are mostly hollow."""
 
 
 class BulletEngine:
-    """Settles scenes. What it keeps between calls are assets, never a world.
+    """Settles scenes with Bullet; only collision shapes of assets are kept between calls.
 
     Args:
-        assets: Where collision geometry and robots come from.
+        assets: Source of collision geometry and robots.
         config: Times, thresholds and accuracy.
     """
 
@@ -37,7 +37,7 @@ class BulletEngine:
         self._shapes: dict[str, CollisionShape] = {}
 
     def __enter__(self) -> BulletEngine:
-        """Ready to settle."""
+        """Return the engine, ready to settle."""
         return self
 
     def __exit__(
@@ -46,19 +46,21 @@ class BulletEngine:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Give the engine's connection back."""
+        """Close the engine's connection."""
         self._world.close()
 
     def settle(self, scene: Scene) -> Settled:
-        """The scene at rest; a refused scene comes back as it was.
+        """Settle a scene; a rejected scene is returned unchanged.
 
-        Goals stay in the scene as the record of what was asked; joint positions and poses tell
-        what was done. Objects fall after the arms have taken their stances, around them.
+        Arms are posed first, then objects fall around them. Goals stay in the scene as a record;
+        joint positions and poses hold the result.
 
         Raises:
             AssetError: an asset has no collision geometry, or is no robot.
         """
-        held = {a.goal.held for a in scene.articulations if a.goal and a.goal.kind == "hold"}
+        held = {
+            a.goal.grasped_object for a in scene.articulations if a.goal and a.goal.kind == "hold"
+        }
         falling = [b for b in _solids(scene) if b.motion == "dynamic" and b.name not in held]
         fixed = [b.name for b in _solids(scene) if b.motion != "dynamic" and b.name not in held]
         if not falling and not scene.articulations:
@@ -67,19 +69,19 @@ class BulletEngine:
         for body in _solids(scene):
             self._add(body, body in falling)
 
-        obeyed = self._solve_goals(scene, fixed, _resting_bodies(scene, falling))
-        if isinstance(obeyed, Rejection):
-            return Settled(scene, obeyed)
+        arms = self._solve_goals(scene, fixed, _resting_bodies(scene, falling))
+        if isinstance(arms, Rejection):
+            return Settled(scene, arms)
         surfaces = {body.name: candidate_surfaces(scene, body) for body in falling}
-        arms = [name for name in self._world.names if name not in fixed and name not in surfaces]
-        rejection = Settling(self._world, falling, surfaces, self._config).settle(fixed, arms)
+        links = [name for name in self._world.names if name not in fixed and name not in surfaces]
+        rejection = Settling(self._world, falling, surfaces, self._config).settle(fixed, links)
         if rejection is not None:
             return Settled(scene, rejection)
-        settled = self._frozen(scene, falling, tuple(stance for _, stance in obeyed))
-        moved = self._add_arm_tracks(settled, fixed, [body.name for body in falling], obeyed)
-        if isinstance(moved, Rejection):
-            return Settled(scene, moved)
-        return Settled(moved)
+        settled = self._update_poses(scene, falling, [state for _, state in arms])
+        planned = self._add_arm_tracks(settled, fixed, [body.name for body in falling], arms)
+        if isinstance(planned, Rejection):
+            return Settled(scene, planned)
+        return Settled(planned)
 
     def _add(self, body: Body, falls: bool) -> None:
         shape = self._shape(body.asset)
@@ -102,54 +104,54 @@ class BulletEngine:
     def _solve_goals(
         self, scene: Scene, fixed: list[str], placed: list[str]
     ) -> list[tuple[Arm, ArmState]] | Rejection:
-        """Each arm and what it does; arms avoid those before them."""
-        obeyed: list[tuple[Arm, ArmState]] = []
+        """Each arm with its solved state; arms avoid those before them."""
+        arms: list[tuple[Arm, ArmState]] = []
         obstacles = list(fixed)
         for articulation in scene.articulations:
             robot = self._assets.robot(articulation.asset)
             shapes = {link: self._shape(asset) for link, asset in robot.collisions.items()}
             arm = Arm(articulation, robot, shapes, self._world)
-            stance = arm.obey(obstacles, placed)
-            if isinstance(stance, Rejection):
-                return stance
-            obeyed.append((arm, stance))
+            state = arm.solve(obstacles, placed)
+            if isinstance(state, Rejection):
+                return state
+            arms.append((arm, state))
             obstacles += arm.bodies
-            if articulation.goal and stance.T_world_held is not None:
-                obstacles.append(articulation.goal.held)
-        return obeyed
+            if articulation.goal and state.T_world_held is not None:
+                obstacles.append(articulation.goal.grasped_object)
+        return arms
 
     def _add_arm_tracks(
         self,
         scene: Scene,
         fixed: list[str],
         fallen: list[str],
-        obeyed: list[tuple[Arm, ArmState]],
+        arms: list[tuple[Arm, ArmState]],
     ) -> Scene | Rejection:
-        """The scene with the tracks of arms that have a way, and of what they carry.
+        """The scene with trajectories of arms with tasks, and of the bodies they carry.
 
-        Arms move in turn, each when those before it have come to rest.
+        Arms move one after the other, each when those before it have come to rest.
         """
-        if not any(arm.articulation.way for arm, _ in obeyed):
+        if not any(arm.articulation.task for arm, _ in arms):
             return scene
         held = [
-            arm.articulation.goal.held
-            for arm, stance in obeyed
-            if arm.articulation.goal and stance.T_world_held is not None
+            arm.articulation.goal.grasped_object
+            for arm, state in arms
+            if arm.articulation.goal and state.T_world_held is not None
         ]
         resting = {name: scene.body(name).T_world_body for name in (*fallen, *held)}
         recording = TrajectoryRecording(dict(resting))
-        for arm, stance in obeyed:
-            if not arm.articulation.way:
+        for arm, state in arms:
+            if not arm.articulation.task:
                 continue
-            others = [name for other, _ in obeyed if other is not arm for name in other.bodies]
-            way = TaskPlanner(arm, stance, self._world, [*fixed, *others], resting, scene.surfaces)
-            legs = way.legs()
-            if isinstance(legs, Rejection):
-                return legs
-            resting = way.resting
-            recording.add(
-                arm, legs, [link for link in arm.robot.links if link in arm.robot.visuals]
-            )
+            others = [name for other, _ in arms if other is not arm for name in other.bodies]
+            obstacles = [*fixed, *others]
+            planner = TaskPlanner(arm, state, self._world, obstacles, resting, scene.surfaces)
+            plan = planner.plan()
+            if isinstance(plan, Rejection):
+                return plan
+            resting = planner.resting
+            parts = [link for link in arm.robot.links if link in arm.robot.visuals]
+            recording.add(arm, plan.legs, parts)
         return replace(
             scene,
             tracks=(*scene.tracks, *recording.tracks()),
@@ -159,26 +161,26 @@ class BulletEngine:
             ),
         )
 
-    def _frozen(self, scene: Scene, fallen: list[Body], stances: tuple[ArmState, ...]) -> Scene:
-        """The scene with what the world and the arms came to."""
+    def _update_poses(self, scene: Scene, fallen: list[Body], states: list[ArmState]) -> Scene:
+        """The scene with the final poses of fallen bodies and the solved states of arms."""
         poses = {body.name: self._world.pose(body.name).rounded() for body in fallen}
         bodies = {
             body.name: replace(body, T_world_body=poses[body.name]) if body.name in poses else body
             for body in scene.bodies
         }
         articulations = []
-        for articulation, stance in zip(scene.articulations, stances, strict=True):
-            moved = replace(articulation, joint_positions=stance.positions)
+        for articulation, state in zip(scene.articulations, states, strict=True):
+            moved = replace(articulation, joint_positions=state.positions)
             articulations.append(moved)
             for link in self._links(scene, moved):
                 shown = bodies.get(link.name, link)
                 bodies[link.name] = replace(
                     shown, T_world_body=link.T_world_body, motion="kinematic", collides=False
                 )
-            if articulation.goal and stance.T_world_held is not None:
-                name = articulation.goal.held
+            if articulation.goal and state.T_world_held is not None:
+                name = articulation.goal.grasped_object
                 bodies[name] = replace(
-                    bodies[name], T_world_body=stance.T_world_held, motion="kinematic"
+                    bodies[name], T_world_body=state.T_world_held, motion="kinematic"
                 )
         return replace(scene, bodies=tuple(bodies.values()), articulations=tuple(articulations))
 
@@ -190,12 +192,12 @@ class BulletEngine:
 
 
 def _solids(scene: Scene) -> list[Body]:
-    """Bodies that physics sees; a robot's links take part by their robot's own geometry."""
+    """Bodies that collide, without links of robots, whose geometry comes from their robot."""
     prefixes = tuple(f"{articulation.name}/" for articulation in scene.articulations)
     return [b for b in scene.bodies if b.collides and not b.name.startswith(prefixes)]
 
 
 def _resting_bodies(scene: Scene, falling: list[Body]) -> list[str]:
-    """Dynamic bodies that already lie about where they will rest: an arm must avoid them."""
+    """Names of dynamic bodies that start near their resting pose, which arms must avoid."""
     dropped = {group.name for group in scene.groups if group.placement == "drop"}
     return [body.name for body in falling if body.group not in dropped]

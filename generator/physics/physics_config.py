@@ -1,4 +1,4 @@
-"""What a user may change about physics."""
+"""The section ``physics:`` of a configuration."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from gen_data.generator.config.base_model import Strict
 
 
 class PhysicsConfig(Strict):
-    """Settling: how long, how exactly, and when a layout is refused."""
+    """Settling: times, accuracy, and thresholds for rejecting a layout."""
 
     time_step_s: float = Field(
         1.0 / 240.0, gt=0.0, le=1.0 / 60.0, description="Simulated time per step [s]."

@@ -1,4 +1,4 @@
-"""What things are meant to rest on, and the invisible walls that keep them there meanwhile."""
+"""Surfaces that bodies are to rest on, and invisible guard walls around them."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from gen_data.generator.core.se3 import SE3, Array
 from gen_data.generator.physics.collision_shapes import CollisionShape, collision_shape
 
 _SINK_M = 0.02
-"""How far below a surface a body on it may reach: more than any contact error."""
+"""Tolerance of a body's bottom below its surface: more than any contact error."""
 _WALL_THICKNESS_M = 1.0
 _WALL_BELOW_M = 0.5
 _WALL_ABOVE_M = 5.0
 
 
 def candidate_surfaces(scene: Scene, body: Body) -> tuple[SupportSurface, ...]:
-    """Surfaces that a body may end on: its group's, or all where it has no group."""
+    """Surfaces that a body may rest on: those of its group, or all if it has none."""
     for group in scene.groups:
         if group.name == body.group:
             return tuple(s for s in scene.surfaces if s.name in group.surfaces)
@@ -29,19 +29,19 @@ def candidate_surfaces(scene: Scene, body: Body) -> tuple[SupportSurface, ...]:
 def home_surface(
     surfaces: Iterable[SupportSurface], low_m: Array, high_m: Array
 ) -> SupportSurface | None:
-    """The surface that a body with these bounds will land on: the nearest one below it."""
+    """The nearest surface below a body with these bounds; None if there is none."""
     below = [s for s in surfaces if _holds(s, low_m, high_m, slack_m=0.0)]
     return max(below, key=lambda s: s.T_world_surface.translation_m[2], default=None)
 
 
 def is_supported(surfaces: Iterable[SupportSurface], low_m: Array, high_m: Array) -> bool:
-    """Whether a body with these bounds lies over one of the surfaces, give or take its own size."""
+    """Whether a body with these bounds is above a surface extended by the body's size."""
     size_m = float((high_m - low_m).max())
     return any(_holds(s, low_m, high_m, slack_m=size_m) for s in surfaces)
 
 
 def is_within(surfaces: Iterable[SupportSurface], low_m: Array, high_m: Array) -> bool:
-    """Whether a body with these bounds lies over one of the surfaces with all of its footprint."""
+    """Whether the whole footprint of a body with these bounds is above one surface."""
     corners = [(x, y) for x in (low_m[0], high_m[0]) for y in (low_m[1], high_m[1])]
     bottom = float(low_m[2])
     return any(
@@ -54,7 +54,7 @@ def is_within(surfaces: Iterable[SupportSurface], low_m: Array, high_m: Array) -
 
 
 def guard_walls(surface: SupportSurface) -> list[tuple[CollisionShape, SE3]]:
-    """Four walls around an open surface; none around a walled one."""
+    """Shapes and poses of four walls around an open surface; [] for a walled one."""
     if surface.walled:
         return []
     half_x, half_y = (0.5 * size for size in surface.size_m)
@@ -81,7 +81,7 @@ def _box(half_x: float, half_y: float) -> CollisionShape:
 
 
 def _holds(surface: SupportSurface, low_m: Array, high_m: Array, slack_m: float) -> bool:
-    """Whether the bounds' centre is over the rectangle and their bottom not below it."""
+    """Whether the centre of bounds is within the rectangle and their bottom not below it."""
     center = 0.5 * (low_m + high_m)
     x, y, _ = surface.T_world_surface.inverse().apply(center)
     height = float(low_m[2]) - surface.T_world_surface.translation_m[2]

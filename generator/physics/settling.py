@@ -1,4 +1,4 @@
-"""From bodies in the air to bodies at rest, or to the reason why not."""
+"""Settling: lets bodies fall until they rest, or rejects the layout with a reason."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ _RELEASE_GAP_M = 0.002
 _TOUCH_M = 0.001
 _ATTEMPTS_MAX = 4
 _LOST_M = 0.3
-"""This far below its lowest surface an object is not waited for any longer."""
+"""An object this far below its lowest surface is lost."""
 
 
 class Settling:
-    """Bodies that fall in a world where everything else stands still.
+    """Lets bodies fall in a world where everything else is static.
 
     Args:
-        world: With all bodies in it.
+        world: Contains all bodies.
         falling: The bodies that fall.
-        surfaces: ``{body: surfaces that it may end on}``; where there are none, anywhere is fine.
+        surfaces: ``{body: surfaces it may rest on}``; a body without surfaces may rest anywhere.
         config: Times and thresholds.
     """
 
@@ -42,7 +42,7 @@ class Settling:
         self._world = world
         self._config = config
         self._surfaces = surfaces
-        # Lowest first, so that each is lowered onto what lies below it; ties stay in order.
+        # Lowest first, so that each is lowered onto those below it; the sort is stable.
         self._falling = sorted(falling, key=lambda body: float(world.bounds_m(body.name)[0][2]))
         self._homes = {
             body.name: home_surface(surfaces[body.name], *world.bounds_m(body.name))
@@ -50,10 +50,10 @@ class Settling:
         }
 
     def settle(self, fixed: Sequence[str], arms: Sequence[str]) -> Rejection | None:
-        """Let everything fall and come to rest; None when all is well.
+        """Simulate until all bodies rest; None = success, else the reason.
 
-        With guard walls, what falls off nevertheless is dropped again, nearer to the middle of
-        its surface, a few times.
+        With guard walls, bodies that still fall off are dropped again a few times, each time
+        nearer to the middle of their surface.
         """
         loose = self._falling
         for attempt in range(_ATTEMPTS_MAX if self._config.guard_walls else 1):
@@ -70,7 +70,7 @@ class Settling:
         return self._fell_off() if loose else self._find_rejection()
 
     def _restart(self, body: Body, pull: float) -> None:
-        """Put a body where it started, moved towards the middle of its surface by a share."""
+        """Put a body at its initial pose, moved by a share towards the middle of its surface."""
         home = self._homes[body.name]
         x, y, z = body.T_world_body.translation_m
         if home is not None:
@@ -79,7 +79,7 @@ class Settling:
         self._world.place(body.name, SE3((x, y, z), body.T_world_body.quaternion_wxyz))
 
     def _rest_guarded(self) -> bool:
-        """Whether all comes to rest: first inside guard walls, then without what it leans on."""
+        """Whether all bodies come to rest inside guard walls, and again after their removal."""
         guards = self._guards() if self._config.guard_walls else []
         rests = self._come_to_rest()
         leaning = any(
@@ -91,7 +91,7 @@ class Settling:
         return self._come_to_rest() if rests and leaning else rests
 
     def _lower(self, loose: Sequence[Body], fixed: Sequence[str], arms: Sequence[str]) -> None:
-        """Bring each body to just above what is below it: a short fall stays where it lands."""
+        """Lower each body to just above the next obstacle: short falls hardly scatter objects."""
         names = [body.name for body in loose]
         movable = [*arms, *(b.name for b in self._falling if b.name not in names)]
         for name in names:
@@ -102,7 +102,7 @@ class Settling:
             movable.append(name)
 
     def _lift_clear(self, name: str, others: Sequence[str], home: SupportSurface) -> None:
-        """Raise a body that starts inside others until it is free, as far as there is room."""
+        """Raise a body that overlaps others until it is free or reaches the ceiling."""
         below = self._below(name, others)
         ceiling = home.T_world_surface.translation_m[2] + home.clearance_m
         for _ in range(_LIFTS_MAX):
@@ -113,7 +113,7 @@ class Settling:
             self._shift(name, rise)
 
     def _sink(self, name: str, others: Sequence[str], home: SupportSurface) -> None:
-        """Conservative advancement: moving by the gap can never pass through anything."""
+        """Lower a body by conservative advancement: a motion by the gap never tunnels."""
         below = self._below(name, others)
         for _ in range(_LOWERINGS_MAX):
             low, _high = self._world.bounds_m(name)
@@ -124,33 +124,33 @@ class Settling:
             self._shift(name, 0.5 * _RELEASE_GAP_M - gap)
 
     def _below(self, name: str, others: Sequence[str]) -> list[str]:
-        """Those of the others that a vertical motion of the body may meet."""
+        """The others whose footprint overlaps the body's."""
         low, high = self._world.bounds_m(name)
-        met = []
+        below = []
         for other in others:
             other_low, other_high = self._world.bounds_m(other)
             if (low[:2] <= other_high[:2]).all() and (other_low[:2] <= high[:2]).all():
-                met.append(other)
-        return met
+                below.append(other)
+        return below
 
     def _shift(self, name: str, rise_m: float) -> None:
         self._world.place(name, SE3((0.0, 0.0, rise_m)) @ self._world.pose(name))
 
     def _guards(self) -> list[str]:
-        """Put walls around every surface that something will land on."""
+        """Add walls around every surface that a body will land on; their names."""
         names = []
         homes = {home.name: home for home in self._homes.values() if home is not None}
         for home in homes.values():
-            strangers = [name for name, other in self._homes.items() if other is not home]
+            unrelated = [name for name, other in self._homes.items() if other is not home]
             for number, (shape, pose) in enumerate(guard_walls(home)):
                 name = f"guard/{home.name}/{number}"
                 self._world.add(name, shape, pose, friction=0.0, restitution=0.0)
-                self._world.ignore(name, strangers)
+                self._world.ignore(name, unrelated)
                 names.append(name)
         return names
 
     def _come_to_rest(self) -> bool:
-        """Let time pass until nothing moves or something is lost; False when time is up first."""
+        """Simulate until all bodies rest or one is lost; False if time runs out first."""
         config = self._config
         steps = max(1, round(_CHECK_EVERY_S / config.time_step_s))
         elapsed_s, calm_s = 0.0, 0.0

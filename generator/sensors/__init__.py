@@ -1,4 +1,4 @@
-"""Sensors: how a scene becomes readings."""
+"""Sensors: cameras, laser scanners, radars and other devices that read a scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Makes of devices as data: one YAML file each, with its sources."""
+"""Device presets: one YAML file per make, with its sources."""
 
 from __future__ import annotations
 
@@ -18,40 +18,40 @@ M = TypeVar("M", bound=Strict)
 
 @cache
 def preset_names(package: str) -> tuple[str, ...]:
-    """Names of all makes that lie in a package, sorted."""
+    """Names of all presets in a package, sorted."""
     return tuple(sorted(path.stem for path in Path(str(files(package))).glob("*.yaml")))
 
 
 def preset_path(package: str, name: str) -> Path:
-    """The file of a make."""
+    """Path of a preset's file."""
     return Path(str(files(package))) / f"{name}.yaml"
 
 
 @cache
 def load_preset(package: str, name: str, kind: type[M]) -> M:
-    """The make of that name.
+    """Read and validate a preset.
 
     Raises:
-        ConfigError: there is no such file, or something in it is wrong.
+        ConfigError: there is no such file, or it is invalid.
     """
     known = preset_names(package)
     if name not in known:
         raise ConfigError(
-            f"there is no '{name}' among {package}; expected one of {', '.join(known)}"
+            f"{package} has no preset '{name}'; expected one of {', '.join(known)}"
             f"{did_you_mean(name, known)}"
         )
     problems = Problems()
-    made = validate(load_yaml(preset_path(package, name)), kind, problems)
+    preset = validate(load_yaml(preset_path(package, name)), kind, problems)
     problems.raise_if_any()
-    assert made is not None
-    return made
+    assert preset is not None
+    return preset
 
 
 def check_preset(package: str, name: str) -> str:
-    """The name, for validators.
+    """Return the name of an existing preset; for validators.
 
     Raises:
-        ValueError: there is no such make.
+        ValueError: there is no such preset.
     """
     known = preset_names(package)
     if name not in known:

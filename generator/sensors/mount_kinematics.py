@@ -1,4 +1,4 @@
-"""How a device moves with the body that carries it."""
+"""Motion of a device with the body that carries it."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from gen_data.generator.core.se3 import SE3, Array
 
 @dataclass(frozen=True, slots=True)
 class MountMotion:
-    """The way of a device through time.
+    """Motion of a device on a body.
 
     Attributes:
-        track: Of the body that carries it; None = it stands still.
-        T_world_body: Where that body is at the scene's instant.
-        T_body_device: Where the device is on it.
+        track: Trajectory of the body; None = it does not move.
+        T_world_body: Pose of the body at the scene's instant.
+        T_body_device: Pose of the device on the body.
     """
 
     track: Trajectory | None
@@ -26,12 +26,12 @@ class MountMotion:
     T_body_device: SE3
 
     def pose(self, time_s: float) -> SE3:
-        """``T_world_device`` at one instant."""
+        """``T_world_device`` at an instant."""
         carrier = self.T_world_body if self.track is None else self.track.pose(time_s)
         return carrier @ self.T_body_device
 
     def velocity_m_s(self, time_s: float) -> Array:
-        """Of the device's origin at one instant, world axes, [3]."""
+        """Velocity of the device's origin at an instant, world axes, [3]."""
         twist = self.twist(time_s)
         if self.track is None:
             return np.zeros(3)
@@ -39,20 +39,19 @@ class MountMotion:
         return np.asarray(velocity_at(twist, lever_m))
 
     def twist(self, time_s: float) -> Twist:
-        """Of the body that carries it, at one instant."""
+        """Twist of the body at an instant."""
         return STILL if self.track is None else self.track.twist(time_s)
 
-    def felt(self, time_s: float) -> tuple[SE3, Array, Array]:
-        """What an inertial unit feels: its pose, its acceleration and its angular velocity.
+    def inertial_motion(self, time_s: float) -> tuple[SE3, Array, Array]:
+        """Pose, acceleration and angular velocity of the device at an instant.
 
-        Both are means over a knot of the track before and after the instant, the bandwidth that a
-        way between knots has: the second difference of positions, and half the turn between the
-        neighbours. Near the ends of the track, where knots have but one neighbour, they stay what
-        they were, in the device's axes, two knots from the end.
+        Acceleration and angular velocity are central differences over one step of the trajectory,
+        which is the bandwidth of an interpolated trajectory. Within two steps of its ends, where
+        neighbours are missing, they keep the values of two steps from the end, device axes.
 
         Returns:
             ``T_world_device``; acceleration [m/s^2] and angular velocity [rad/s] in the device's
-            axes.
+            axes, [3] each; 0 outside the trajectory.
         """
         track = self.track
         pose = self.pose(time_s)
@@ -73,7 +72,7 @@ class MountMotion:
 
 
 def mount_motion(scene: Scene, device: str) -> MountMotion:
-    """How that device of the scene moves; KeyError if there is none."""
+    """Motion of the device of that name; KeyError if the scene has none."""
     mounted = scene.device(device)
     rig = scene.rig(mounted.rig)
     body = scene.body(rig.body)
@@ -83,14 +82,14 @@ def mount_motion(scene: Scene, device: str) -> MountMotion:
 
 
 def velocity_at(twist: Twist, lever_m: Array) -> Array:
-    """Velocity of points that move with a frame, [..., 3]; ``lever_m`` from its origin."""
+    """Velocity [m/s] of points at ``lever_m`` from the origin of a moving frame, [..., 3]."""
     omega = np.asarray(twist.angular_velocity_rad_s)
     velocity: Array = np.asarray(twist.velocity_m_s) + np.cross(omega, lever_m)
     return velocity
 
 
 def rotation_vector(turn: SE3) -> Array:
-    """Axis times angle of a rotation, [3]."""
+    """Axis times angle [rad] of a rotation, [3]."""
     w, x, y, z = turn.quaternion_wxyz
     sign = 1.0 if w >= 0.0 else -1.0
     axis = sign * np.array([x, y, z])
@@ -100,7 +99,7 @@ def rotation_vector(turn: SE3) -> Array:
 
 
 def remove_carrier(scene: Scene, rig: str) -> Scene:
-    """The scene without the thing that the rig is on: devices see out of it."""
+    """The scene without the body that carries a rig, so that it does not occlude devices."""
     carrier = scene.body(scene.rig(rig).body)
     own = carrier.instance_id
     bodies = tuple(

@@ -1,4 +1,4 @@
-"""Where a sensor is mounted, and how often it reads."""
+"""Mounting of sensors on rigs and cameras, and their rates."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from gen_data.generator.core.scene_time import RIG_AXES
 from gen_data.generator.core.se3 import SE3, Array
 
 BURIED_M = 0.05
-"""Sensors may sink in as deep as this: they are bolted on, and bounds are not the hull."""
+"""Allowed depth of a sensor inside its body's bounding box, which is larger than the body."""
 
 
 class Mounted(Strict):
-    """A sensor that may be on a rig.
+    """Base of sensors that may be mounted on a rig.
 
     Attributes:
-        rig: Name of the rig it is on: an ego vehicle's, an arm's wrist; empty = none.
-        offset_m: On the rig: forward, left, up.
-        yaw_deg, pitch_deg, roll_deg: Turn to the left, then upwards, then clockwise as seen from
-            behind, from the rig's forward axis.
-        rate_hz: Readings per second; null = one at every step.
-        time_offset_s: It reads this much later than the step's instant; what it saw then, and the
-            labels of that, belong to the step.
-        inside: Whether it may be inside the body that its rig is on.
+        rig: Name of the rig it is mounted on: an ego vehicle's, an arm's wrist; empty = none.
+        offset_m: Position on the rig: forward, left, up.
+        yaw_deg, pitch_deg, roll_deg: Rotation from the rig's forward axis: to the left, then
+            upwards, then clockwise as seen from behind.
+        rate_hz: Readings per second; null = one per step.
+        time_offset_s: Delay of its readings after the step's instant; the reading and its labels
+            belong to the step.
+        inside: Whether it may be inside the body that carries its rig.
     """
 
     rig: str = ""
@@ -48,15 +48,18 @@ class Mounted(Strict):
 
     @property
     def T_rig_sensor(self) -> SE3:  # noqa: N802
-        """Its pose on the rig; both frames are X forward, Y left, Z up."""
-        pitch, roll = -0.5 * math.radians(self.pitch_deg), 0.5 * math.radians(self.roll_deg)
-        upwards = SE3((0.0, 0.0, 0.0), (math.cos(pitch), 0.0, math.sin(pitch), 0.0))
-        leaning = SE3((0.0, 0.0, 0.0), (math.cos(roll), math.sin(roll), 0.0, 0.0))
-        turned = SE3.about_z(math.radians(self.yaw_deg), self.offset_m)
-        return (turned @ upwards @ leaning).rounded()
+        """Pose on the rig; both frames are X forward, Y left, Z up."""
+        half_pitch, half_roll = (
+            -0.5 * math.radians(self.pitch_deg),
+            0.5 * math.radians(self.roll_deg),
+        )
+        pitch = SE3((0.0, 0.0, 0.0), (math.cos(half_pitch), 0.0, math.sin(half_pitch), 0.0))
+        roll = SE3((0.0, 0.0, 0.0), (math.cos(half_roll), math.sin(half_roll), 0.0, 0.0))
+        yaw = SE3.about_z(math.radians(self.yaw_deg), self.offset_m)
+        return (yaw @ pitch @ roll).rounded()
 
     def _camera_info(self, name: str, channels: tuple[Channel, ...], lens: LensModel) -> SensorInfo:
-        """Self-description of a camera that writes these channels."""
+        """Description of a camera that writes these channels."""
         return SensorInfo(
             name,
             Modality.CAMERA,
@@ -68,7 +71,7 @@ class Mounted(Strict):
         )
 
     def _device_info(self, name: str, kind: str, needs_clear_view: bool = False) -> SensorInfo:
-        """Self-description of a device of one of the kinds of ``TABLE_COLUMNS``."""
+        """Description of a device of one of the kinds in ``TABLE_COLUMNS``."""
         return SensorInfo(
             name,
             Modality.DEVICE,
@@ -81,12 +84,13 @@ class Mounted(Strict):
 
 
 class Instrument(Mounted):
-    """A sensor on a rig that reports rows of a table.
+    """Base of sensors on a rig that report rows of a table.
 
     Attributes:
-        name: What files call it.
-        rig: Name of the rig it is on.
-        rate_hz: Readings per second, a whole number per step, or of steps; null = one per step.
+        name: Its name in files.
+        rig: Name of the rig it is mounted on.
+        rate_hz: Readings per second: a whole number per step, or one every few whole steps; null
+            = one per step.
     """
 
     kind: ClassVar[str]
@@ -95,18 +99,18 @@ class Instrument(Mounted):
 
     @property
     def device_model(self) -> str:
-        """What it is, for the labels; empty = nothing in particular."""
+        """Name of the device's model in labels; empty = none."""
         return ""
 
     def describe(self) -> SensorInfo:
-        """A device with the columns of its kind."""
+        """Describe a device with the columns of its kind."""
         return self._device_info(self.name, self.kind)
 
     def mount(self, scene: Scene) -> Scene:
-        """The scene with this device on its rig.
+        """Add this device to its rig.
 
         Raises:
-            ConfigError: there is no such rig, or its rate does not fit the sequence.
+            ConfigError: the rig does not exist, or the rate does not fit the sequence.
         """
         rig = check_rig(scene, self.name, self.rig)
         check_rate(self.name, self.rate_hz, scene.step_s)
@@ -115,27 +119,27 @@ class Instrument(Mounted):
 
 
 def check_rig(scene: Scene, sensor: str, rig: str) -> str:
-    """The rig's name, if the scene has it.
+    """Return the name of an existing rig.
 
     Raises:
-        ConfigError: it has not.
+        ConfigError: the scene has no such rig.
     """
     known = [r.name for r in scene.rigs]
     if rig not in known:
         raise ConfigError(
-            f"sensor '{sensor}': there is no rig '{rig}'; there is {', '.join(known) or 'none'}"
-            + did_you_mean(rig, known)
+            f"sensor '{sensor}': the scene has no rig '{rig}'; its rigs: "
+            f"{', '.join(known) or 'none'}{did_you_mean(rig, known)}"
         )
     return rig
 
 
-def with_lidar(scene: Scene, sensor: Mounted, lidar: Lidar) -> Scene:
-    """The scene with a scanner on its sensor's rig, or else on that of its camera.
+def add_lidar(scene: Scene, sensor: Mounted, lidar: Lidar) -> Scene:
+    """Add a scanner on its sensor's rig, or at its camera if the sensor has no rig.
 
     Args:
         scene: With all sensors that are listed before this one.
-        sensor: Whose mounting it is.
-        lidar: Names the camera that it rides with where there is no rig.
+        sensor: The sensor's mounting.
+        lidar: Names the camera to mount it at if there is no rig.
 
     Raises:
         ConfigError: the scene has no such rig or camera.
@@ -143,42 +147,42 @@ def with_lidar(scene: Scene, sensor: Mounted, lidar: Lidar) -> Scene:
     if sensor.rig:
         rig = check_rig(scene, lidar.name, sensor.rig)
         return replace(scene, lidars=(*scene.lidars, replace(lidar, camera="", rig=rig)))
-    known_camera(scene, lidar.name, lidar.camera)
+    find_camera(scene, lidar.name, lidar.camera)
     return replace(scene, lidars=(*scene.lidars, lidar))
 
 
-def known_camera(scene: Scene, sensor: str, camera: str) -> Camera:
-    """The camera of that name, if the scene has it.
+def find_camera(scene: Scene, sensor: str, camera: str) -> Camera:
+    """The camera of that name.
 
     Raises:
-        ConfigError: it has not.
+        ConfigError: the scene has no such camera.
     """
     known = {c.name: c for c in scene.cameras}
     if camera not in known:
         raise ConfigError(
-            f"sensor '{sensor}': camera '{camera}' is no camera listed before it; there"
-            f" is {', '.join(known) or 'none'}{did_you_mean(camera, known)}"
+            f"sensor '{sensor}': no camera '{camera}' is listed before it; cameras listed so far: "
+            f"{', '.join(known) or 'none'}{did_you_mean(camera, known)}"
         )
     return known[camera]
 
 
 def check_not_buried(scene: Scene, name: str, assets: AssetIndex) -> None:
-    """Refuse a sensor inside the body that carries it, where it sees nothing else.
+    """Refuse a sensor on a rig inside the body that carries the rig, which would occlude it.
 
-    Inside is the space within the body's bounding box, more than ``BURIED_M`` from its faces.
+    Inside means in the body's bounding box, more than ``BURIED_M`` from its faces.
 
     Args:
-        scene: With the sensor mounted; without a rig, anything goes.
+        scene: With the sensor mounted.
         name: Of the sensor.
-        assets: For the body's bounds.
+        assets: Source of the body's bounds.
 
     Raises:
-        ConfigError: it is inside.
+        ConfigError: the sensor is inside.
     """
-    on_rig, T_rig_sensor = mounted_at(scene, name)
-    if not on_rig:
+    rig_name, T_rig_sensor = find_mounting(scene, name)
+    if not rig_name:
         return
-    rig = scene.rig(on_rig)
+    rig = scene.rig(rig_name)
     body = scene.body(rig.body)
     low_m, high_m = assets.bounds_m(body.asset)
     place_m = (rig.T_body_rig @ T_rig_sensor).translation_m
@@ -190,13 +194,13 @@ def check_not_buried(scene: Scene, name: str, assets: AssetIndex) -> None:
         top_m = body.scale * high_m[2] - rig.T_body_rig.translation_m[2]
         raise ConfigError(
             f"sensor '{name}': offset_m is {depth_m:.2f} m inside '{rig.body}', which carries rig"
-            f" '{rig.name}'; move it out (its top is at {top_m:.2f} m on the rig), or say"
+            f" '{rig.name}'; move it out (the body's top is at {top_m:.2f} m on the rig), or set"
             " inside: true"
         )
 
 
-def mounted_at(scene: Scene, name: str) -> tuple[str, SE3]:
-    """Rig and pose on it of a camera, laser scanner or device; an empty name for no rig.
+def find_mounting(scene: Scene, name: str) -> tuple[str, SE3]:
+    """Rig of a camera, laser scanner or device, and its pose on it; empty name = no rig.
 
     Raises:
         KeyError: the scene has no sensor of that name.
@@ -214,10 +218,10 @@ def mounted_at(scene: Scene, name: str) -> tuple[str, SE3]:
 
 
 def stride(sensor: str, rate_hz: float | None, step_s: float) -> int:
-    """Every how many steps a sensor reads that is no faster than the sequence.
+    """Steps from one reading to the next of a sensor that is not faster than the sequence.
 
     Raises:
-        ConfigError: its period is no whole number of steps.
+        ConfigError: the period is not a whole number of steps.
     """
     if rate_hz is None:
         return 1
@@ -232,7 +236,7 @@ def stride(sensor: str, rate_hz: float | None, step_s: float) -> int:
 
 
 def within_steps(rate_hz: float | None, step_s: float) -> bool:
-    """Whether a sensor reads more often than the sequence steps."""
+    """Whether a sensor reads several times per step."""
     return rate_hz is not None and rate_hz * step_s > 1.0 + 1e-6
 
 
@@ -240,7 +244,7 @@ def check_rate(sensor: str, rate_hz: float | None, step_s: float) -> None:
     """Refuse a rate that does not fit the steps of the sequence.
 
     Raises:
-        ConfigError: neither a whole number of readings per step nor of steps per reading.
+        ConfigError: it is neither a whole number of readings per step nor of steps per reading.
     """
     if rate_hz is None or not within_steps(rate_hz, step_s):
         stride(sensor, rate_hz, step_s)
@@ -254,7 +258,10 @@ def check_rate(sensor: str, rate_hz: float | None, step_s: float) -> None:
 
 
 def reading_times(scene: Scene, rate_hz: float | None) -> Array:
-    """Instants of the readings of the step that ends now; at time 0 there is but one."""
+    """Instants [s] of the readings in the step that ends at the scene's instant, [n].
+
+    A single one at time 0.
+    """
     step_s = scene.step_s
     if scene.time_s <= 0.0 or rate_hz is None or not within_steps(rate_hz, step_s):
         return np.array([scene.time_s])
@@ -264,6 +271,6 @@ def reading_times(scene: Scene, rate_hz: float | None) -> Array:
 
 
 def window_s(scene: Scene, rate_hz: float | None) -> tuple[float, float]:
-    """The time that a reading now looks back on: a step, or the time since the last reading."""
+    """Start and end [s] of the interval that a reading covers: a step, or a longer period."""
     period_s = max(scene.step_s, 1.0 / rate_hz if rate_hz else 0.0)
     return max(round(scene.time_s - period_s, TIME_DECIMALS), 0.0), scene.time_s

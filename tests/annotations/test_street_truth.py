@@ -228,7 +228,7 @@ def test_a_map_needs_a_rig() -> None:
     """One clear error that tells what to add."""
     scene = replace(street(), rigs=(), cameras=(), lidars=())
 
-    with pytest.raises(ConfigError, match="no rig to look down on; add an element 'ego'"):
+    with pytest.raises(ConfigError, match="no rig to centre the map on; add an element 'ego'"):
         annotate_ego({"": scene}, [BevMap()], library())
 
 

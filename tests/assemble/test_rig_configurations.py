@@ -79,7 +79,7 @@ def test_nuscenes_cameras_are_released_as_the_scanner_passes_them() -> None:
 @pytest.mark.parametrize("name", ["kitti_rig", "nuscenes_rig", "carla_table"])
 def test_a_sensor_on_a_rig_that_is_not_there_is_refused(name: str) -> None:
     """Before anything is drawn."""
-    with pytest.raises(ConfigError, match=r"there is no rig 'eg'; there is ego .*'ego'"):
+    with pytest.raises(ConfigError, match=r"the scene has no rig 'eg'; its rigs: ego .*'ego'"):
         rig_scene(name, "sensors[0].rig=eg")
 
 

@@ -84,7 +84,7 @@ def test_joints_goal_takes_the_first_candidate_that_works(engine: BulletEngine) 
     beyond = (0.0, -0.4, 0.0, 1.0, 0.0, 1.9, 0.0)
     into_table = (0.0, 1.6, 0.0, -0.6, 0.0, 1.9, 0.0)
     good = (0.3, -0.4, 0.0, -2.2, 0.0, 1.9, 0.78539816339)
-    goal = ArmGoal("joints", joint_candidates=(beyond, into_table, good), opening=0.25)
+    goal = ArmGoal("joints", joint_candidates=(beyond, into_table, good), gripper_opening=0.25)
 
     settled = engine.settle(armed(table_scene(), goal))
 
@@ -121,7 +121,7 @@ def test_an_arm_folded_into_itself_is_refused(engine: BulletEngine) -> None:
 def test_reach_puts_the_grasp_frame_where_it_was_asked(engine: BulletEngine) -> None:
     """Within 1 mm and half a degree, fingers as far open as asked."""
     target = above_table(0.1, 0.15, 0.3, yaw_rad=0.4)
-    goal = ArmGoal("reach", pose_candidates=(target,), opening=0.5)
+    goal = ArmGoal("reach", pose_candidates=(target,), gripper_opening=0.5)
 
     settled = engine.settle(armed(table_scene(), goal))
 
@@ -170,7 +170,7 @@ HELD = {
 
 def holding(asset: str, *candidates: SE3) -> Scene:
     """A Panda that is to hold a thing which lies on the table for now."""
-    goal = ArmGoal("hold", pose_candidates=candidates, held="it")
+    goal = ArmGoal("hold", pose_candidates=candidates, grasped_object="it")
     return armed(table_scene(thing("it", asset, x=0.3), placement="scatter"), goal)
 
 

@@ -38,7 +38,7 @@ def engine() -> Iterator[BulletEngine]:
 def going(scene: Scene, *way: ArmGoal, start: ArmGoal | None = START) -> Scene:
     """The scene with a Panda that stands over the table and then passes a way."""
     scene = armed(scene, start)
-    arm = replace(scene.articulations[0], way=way)
+    arm = replace(scene.articulations[0], task=way)
     return replace(scene, articulations=(arm,))
 
 
@@ -224,7 +224,7 @@ def test_a_way_through_the_table_names_it(engine: BulletEngine) -> None:
     settled = engine.settle(going(table_scene(), *way))
 
     assert settled.rejection is not None
-    assert settled.rejection.reason == "arm 'arm' hits 'table' at goal 2 of its way"
+    assert settled.rejection.reason == "arm 'arm', goal 2 of its task: it hits 'table'"
     assert settled.scene.tracks == ()
 
 
@@ -259,7 +259,7 @@ def test_what_leans_on_others_is_left_alone(engine: BulletEngine) -> None:
     settled = engine.settle(going(scene, ArmGoal("grasp", objects=("low", "high"))))
 
     assert settled.rejection is not None
-    assert "finds nothing" in settled.rejection.reason
+    assert "no listed object lies free" in settled.rejection.reason
 
 
 def test_what_is_too_wide_is_passed_over_for_the_next(engine: BulletEngine) -> None:
@@ -283,7 +283,7 @@ def test_a_place_without_room_is_passed_over_for_the_next(engine: BulletEngine) 
     scene = pick_and_place()
     spots = (spot(0.1, 0.395), spot(0.12, -0.05), spot(0.0, -0.25))
     place = ArmGoal("place", pose_candidates=spots)
-    arm = replace(scene.articulations[0], way=(scene.articulations[0].way[0], place))
+    arm = replace(scene.articulations[0], task=(scene.articulations[0].task[0], place))
 
     settled = engine.settle(replace(scene, articulations=(arm,)))
 
@@ -295,7 +295,7 @@ def test_a_place_without_room_is_passed_over_for_the_next(engine: BulletEngine) 
 
 def test_what_is_held_from_the_beginning_is_put_down_upright(engine: BulletEngine) -> None:
     """A can in the hand at time 0 stands on the table at the end."""
-    hold = ArmGoal("hold", pose_candidates=(above_table(0.1, 0.0, 0.35),), held="it")
+    hold = ArmGoal("hold", pose_candidates=(above_table(0.1, 0.0, 0.35),), grasped_object="it")
     place = ArmGoal("place", pose_candidates=(spot(0.1, 0.15),))
     scene = table_scene(thing("it", "cylinder 0.025 0.08", x=0.3), placement="scatter")
 
@@ -319,7 +319,7 @@ def test_two_arms_move_in_turn(engine: BulletEngine) -> None:
     goals = [ArmGoal("reach", pose_candidates=(above_table(x, -0.25, 0.3),)) for x in (0.3, 0.2)]
     start = replace(arm, goal=ArmGoal("reach", pose_candidates=(above_table(-0.1, 0.2, 0.35),)))
     other = replace(
-        arm, name="other", instance_id=8, T_world_base=opposite, goal=goals[0], way=(goals[1],)
+        arm, name="other", instance_id=8, T_world_base=opposite, goal=goals[0], task=(goals[1],)
     )
 
     settled = engine.settle(replace(scene, articulations=(start, other)))

@@ -50,7 +50,7 @@ def test_the_robots_box_follows_its_arm_and_what_is_carried_follows_the_hand(
     assert len(boxes) > 5
     assert len(bases) == 1
     assert len(moved) == 1
-    assert moved[0] in sequence[0].scene.articulations[0].way[0].objects
+    assert moved[0] in sequence[0].scene.articulations[0].task[0].objects
 
 
 def _boxes(sample: Sample) -> list[object]:

@@ -137,7 +137,7 @@ def test_streams_of_a_sequence_are_the_same_at_every_step() -> None:
 def test_configurations_without_the_rig_are_told_so() -> None:
     """Before anything is made."""
     spec = load_config("tabletop.yaml", overrides=("sensors=[{type: radar}]", "exporters=[]"))
-    with pytest.raises(ConfigError, match="there is no rig 'ego'; there is arm_wrist"):
+    with pytest.raises(ConfigError, match="the scene has no rig 'ego'; its rigs: arm_wrist"):
         open_pipeline(spec)
 
 

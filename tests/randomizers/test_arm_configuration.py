@@ -69,7 +69,9 @@ def test_hand_is_sent_into_the_workspace_pointing_down() -> None:
 
 def test_only_what_fits_between_the_fingers_is_held() -> None:
     """The gripper opens 8 cm: a ball of 20 cm and a bottle of 8 cm stay where they are."""
-    held = {goal("hold", "ball", "bottle", "brick", scene_index=k).held for k in range(20)}
+    held = {
+        goal("hold", "ball", "bottle", "brick", scene_index=k).grasped_object for k in range(20)
+    }
 
     assert held == {"clutter/2"}
     assert goal("hold", "ball", "brick").kind == "hold"
@@ -77,7 +79,9 @@ def test_only_what_fits_between_the_fingers_is_held() -> None:
 
 def test_every_object_that_fits_is_held_at_times() -> None:
     """Objects are chosen, not the first one."""
-    held = {goal("hold", "brick", "can?seed=0", "odd", scene_index=k).held for k in range(30)}
+    held = {
+        goal("hold", "brick", "can?seed=0", "odd", scene_index=k).grasped_object for k in range(30)
+    }
 
     assert held == {"clutter/0", "clutter/1", "clutter/2"}
 
@@ -87,7 +91,7 @@ def test_arm_reaches_where_there_is_nothing_to_hold() -> None:
     for objects in ((), ("ball",)):
         drawn = goal("hold", *objects)
 
-        assert (drawn.kind, drawn.held) == ("reach", "")
+        assert (drawn.kind, drawn.grasped_object) == ("reach", "")
         assert drawn.pose_candidates
 
 
@@ -103,7 +107,9 @@ def test_arm_without_a_gripper_moves_its_joints() -> None:
 
 def test_gripper_opens_by_the_drawn_share() -> None:
     """In [0, 1], whatever the mode."""
-    openings = [goal("joints", scene_index=k, opening=Uniform(0.3, 0.5)).opening for k in range(9)]
+    openings = [
+        goal("joints", scene_index=k, opening=Uniform(0.3, 0.5)).gripper_opening for k in range(9)
+    ]
 
     assert all(0.3 <= opening <= 0.5 for opening in openings)
     assert len(set(openings)) == 9

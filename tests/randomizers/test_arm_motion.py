@@ -42,7 +42,7 @@ def scene(*objects: str, goal: ArmGoal | None = None) -> Scene:
 def drawn(on: Scene, **given: object) -> tuple[ArmGoal, ...]:
     """The way that is drawn for the arm."""
     motion = ArmMotion(name="motion", **given)  # type: ignore[arg-type]
-    return motion(on, FakeAssets(), rng_of("motion")).articulations[0].way
+    return motion(on, FakeAssets(), rng_of("motion")).articulations[0].task
 
 
 def test_pick_and_place_takes_what_fits_and_puts_it_on_the_table() -> None:
@@ -63,7 +63,7 @@ def test_pick_and_place_takes_what_fits_and_puts_it_on_the_table() -> None:
 
 def test_what_the_arm_holds_is_put_down_first() -> None:
     """Then the next thing is taken, and it is another one."""
-    hold = ArmGoal("hold", pose_candidates=(SE3(),), held="clutter/0")
+    hold = ArmGoal("hold", pose_candidates=(SE3(),), grasped_object="clutter/0")
 
     way = drawn(scene("brick", "brick", goal=hold), count=2)
 
@@ -95,7 +95,7 @@ def test_a_given_way_is_taken_as_it_stands() -> None:
     )
 
     assert way[0].joint_candidates[0] == pytest.approx((math.pi / 18, -math.pi / 2), abs=1e-6)
-    assert way[0].opening == 0.5
+    assert way[0].gripper_opening == 0.5
     pose = way[1].pose_candidates[0]
     assert pose.translation_m == (0.1, 0.2, 1.0)
     np.testing.assert_allclose(pose.rotate(np.array([0, 0, 1.0])), [0, 0, -1], atol=1e-7)

@@ -20,7 +20,7 @@ from gen_data.generator.core.asset_types import Material, TextureData
 from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.renderers.warp.scene.environment_maps import texel_directions
-from gen_data.generator.sensors.camera.exposure import metered_ev100, saturation_cd_m2
+from gen_data.generator.sensors.camera.exposure import meter_ev100, saturation_cd_m2
 from gen_data.generator.sensors.camera.tone import display_values
 from tests.renderers.fake_library import (
     DARK,
@@ -288,7 +288,7 @@ def flip_of(reference: np.ndarray, image: np.ndarray) -> float:
     """Mean FLIP (Andersson et al. 2020) of two radiance images, exposed alike."""
     import flip_evaluator
 
-    white = saturation_cd_m2(metered_ev100(reference.astype(np.float32)))
+    white = saturation_cd_m2(meter_ev100(reference.astype(np.float32)))
     shown = [
         display_values(light / white, "srgb").astype(np.float32) for light in (reference, image)
     ]

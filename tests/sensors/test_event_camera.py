@@ -223,9 +223,9 @@ def test_it_may_share_the_place_of_a_camera() -> None:
 
 def test_missing_cameras_and_rigs_are_told() -> None:
     """By name."""
-    with pytest.raises(ConfigError, match="camera 'color' is no camera listed before it"):
+    with pytest.raises(ConfigError, match="no camera 'color' is listed before it"):
         EventCamera().mount(world())
-    with pytest.raises(ConfigError, match="there is no rig 'wrist'"):
+    with pytest.raises(ConfigError, match="the scene has no rig 'wrist'"):
         EventCamera(rig="wrist").mount(world())
 
 

@@ -13,7 +13,7 @@ from gen_data.generator.core.measurement_dtypes import LIGHT_STATES, OCCURRENCES
 from gen_data.generator.core.scene import Body, Lane, Rig
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.sensors.events.event_detector import EventDetector
-from gen_data.generator.sensors.events.obb_queries import ahead_m, find_obstacles, is_touching
+from gen_data.generator.sensors.events.obb_queries import find_obstacles, gap_ahead_m, is_touching
 from tests.sensors.streetcar import (
     PERSON_M,
     WALL_M,
@@ -135,7 +135,7 @@ def test_obstacle_that_only_reaches_into_the_way_counts_from_where_it_does() -> 
     crossing = thing(2, "beam", "building", SE3((12.0, 0.0, 0.0)) @ SE3.about_z(math.pi / 4), beam)
     own, its = find_obstacles(world(straight((0.0, 0.0), (0.0, 0.0)), [crossing]))
 
-    assert ahead_m(own, its, 0.0) == pytest.approx(12.0 - 0.9 - 2.2, abs=5e-3)
+    assert gap_ahead_m(own, its, 0.0) == pytest.approx(12.0 - 0.9 - 2.2, abs=5e-3)
 
 
 def test_far_obstacles_are_not_reported() -> None:

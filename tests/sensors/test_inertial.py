@@ -132,7 +132,7 @@ def test_white_noise_has_the_density_of_the_data_sheet() -> None:
     ("fields", "words"),
     [
         ({"rate_hz": 33.0}, "rate_hz 33 does not fit step_s 0.1"),
-        ({"rig": "egg"}, "there is no rig 'egg'; there is ego"),
+        ({"rig": "egg"}, "the scene has no rig 'egg'; its rigs: ego"),
     ],
 )
 def test_what_does_not_fit_the_scene_is_told(fields: dict, words: str) -> None:

@@ -124,9 +124,9 @@ def test_a_camera_that_does_not_fit_is_refused() -> None:
     """None of that name, or with an image that is smaller than the stride."""
     world = scene(Intrinsics.from_hfov(64, 48, 1.2))
 
-    with pytest.raises(ConfigError, match=r"camera 'colour' .*; there is color"):
+    with pytest.raises(ConfigError, match=r"no camera 'colour' .*listed so far: color"):
         PseudoLidar(camera="colour").mount(world)
     with pytest.raises(ConfigError, match=r"stride_px 49 .*'color', 64 x 48 px"):
         PseudoLidar(stride_px=49).mount(world)
-    with pytest.raises(ConfigError, match="listed before it; there is none"):
+    with pytest.raises(ConfigError, match="listed before it; cameras listed so far: none"):
         PseudoLidar().mount(replace(world, cameras=()))

@@ -19,7 +19,7 @@ from gen_data.generator.sensors.radar.cross_section import (
     cross_section_m2,
     silhouette_m2,
 )
-from gen_data.generator.sensors.radar.radar_sensor import MAKES, Radar, RadarModel
+from gen_data.generator.sensors.radar.radar_sensor import PRESETS, Radar, RadarModel
 from tests.sensors.streetcar import (
     PERSON_M,
     WALL_M,
@@ -279,10 +279,10 @@ def test_a_reading_made_again_has_the_same_bytes() -> None:
     assert reading(Radar(**AHEAD), scene, 3, 1).rows.tobytes() != rows.tobytes()  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("name", preset_names(MAKES))
+@pytest.mark.parametrize("name", preset_names(PRESETS))
 def test_every_make_is_complete(name: str) -> None:
     """Its looks cover what they say, and reach where they report."""
-    make = load_preset(MAKES, name, RadarModel)
+    make = load_preset(PRESETS, name, RadarModel)
     for look in make.looks:
         assert 0.0 < look.range_m[0] < look.range_m[1] <= max(r for _, r in look.reach_m)
         assert look.spacing_deg[0] < min(size for _, size in look.resolution.azimuth_deg)

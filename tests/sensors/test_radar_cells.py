@@ -15,9 +15,9 @@ from gen_data.generator.sensors.radar.radar_detection import (
     make_cells,
     merge_echoes,
 )
-from gen_data.generator.sensors.radar.radar_sensor import MAKES, RadarModel
+from gen_data.generator.sensors.radar.radar_sensor import PRESETS, RadarModel
 
-NEAR = load_preset(MAKES, "ARS408-21", RadarModel).looks[0]
+NEAR = load_preset(PRESETS, "ARS408-21", RadarModel).looks[0]
 
 
 def rays(

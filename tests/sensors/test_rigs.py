@@ -75,7 +75,7 @@ def test_turns_are_left_then_up_then_clockwise() -> None:
 @pytest.mark.parametrize("sensor", [RgbCamera(rig="egg"), LidarSensor(rig="egg")])
 def test_a_sensor_on_an_unknown_rig_is_refused(sensor: Any) -> None:
     """Naming the sensor, what there is, and what was meant."""
-    with pytest.raises(ConfigError, match=r"there is no rig 'egg'; there is ego .*'ego'"):
+    with pytest.raises(ConfigError, match=r"the scene has no rig 'egg'; its rigs: ego .*'ego'"):
         driven(sensor)
 
 

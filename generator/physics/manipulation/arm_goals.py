@@ -1,9 +1,10 @@
-"""Arms obey: from the candidates of a goal to the first stance that is reachable and free."""
+"""Goals of arms: the first candidate that is reachable and free of collision."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 
@@ -25,18 +26,22 @@ from gen_data.generator.physics.collision_shapes import CollisionShape
 from gen_data.generator.physics.manipulation.grasping import Grasp, Hand
 from gen_data.generator.physics.manipulation.inverse_kinematics import make_chain, solve_all
 
-COLLIDES = "arm collides"
-CANNOT_REACH = "arm cannot reach"
-DOES_NOT_FIT = "object does not fit the gripper"
+
+class Failure(Enum):
+    """Why a candidate of a goal fails: the later the check, the earlier in this list."""
+
+    COLLIDES = "arm collides"
+    DOES_NOT_FIT = "object does not fit the gripper"
+    CANNOT_REACH = "arm cannot reach"
 
 
 @dataclass(frozen=True, slots=True)
 class ArmState:
-    """What an arm ends up doing.
+    """Configuration of an arm.
 
     Attributes:
         positions: One per movable joint, rounded [rad or m].
-        T_world_held: Pose of the held body; None where nothing is held.
+        T_world_held: Pose of the held body; None if the arm holds nothing.
     """
 
     positions: tuple[float, ...]
@@ -44,7 +49,7 @@ class ArmState:
 
 
 class Arm:
-    """A robot that stands in a world: its links are bodies ``<articulation>/<link>``."""
+    """A robot in a world; its links are the bodies ``<articulation>/<link>``."""
 
     def __init__(
         self,
@@ -67,7 +72,7 @@ class Arm:
 
     @property
     def bodies(self) -> list[str]:
-        """Names of all its links in the world."""
+        """Names of the bodies of all its links."""
         return [self.body(link) for link in self._links]
 
     @property
@@ -77,73 +82,73 @@ class Arm:
 
     @property
     def robot(self) -> RobotModel:
-        """Its model."""
+        """The robot's model."""
         return self._robot
 
     @property
     def links(self) -> list[str]:
-        """Links that collide."""
+        """Links with collision geometry."""
         return self._links
 
     @property
     def moving(self) -> list[str]:
-        """Links that collide and can move."""
+        """Links with collision geometry that can move."""
         return self._moving
 
     def radius_m(self, link: str) -> float:
-        """Of the ball around a link's origin that holds its collision geometry."""
+        """Radius of a link's collision geometry about the link's origin."""
         shape = self._shapes[link]
         points = shape.vertices_m + np.array(shape.center_of_mass_m)
         return float(np.sqrt((points * points).sum(axis=1).max()))
 
     def body(self, link: str) -> str:
-        """Name of a link in the world."""
+        """Name of a link's body."""
         return f"{self._articulation.name}/{link}"
 
     def show(self, positions: Sequence[float]) -> None:
-        """Put the links in the world where these joint positions have them."""
+        """Pose the links in the world at these joint positions [rad or m]."""
         poses = link_poses(self._robot, self._articulation.T_world_base, positions)
         for link in self._moving:
             self._world.place(self.body(link), poses[link])
 
     def grasp_pose(self, positions: Sequence[float]) -> SE3:
-        """``T_world_grasp`` at these joint positions; of the root link without a gripper."""
+        """``T_world_grasp`` at these joint positions; ``T_world_root`` without a gripper."""
         poses = link_poses(self._robot, self._articulation.T_world_base, positions)
         gripper = self._robot.gripper
         if gripper is None:
             return poses[self._robot.links[0]]
         return poses[gripper.link] @ gripper.T_link_grasp
 
-    def obey(self, fixed: Sequence[str], placed: Sequence[str]) -> ArmState | Rejection:
-        """Take the first candidate that works and stay there.
+    def solve(self, fixed: Sequence[str], placed: Sequence[str]) -> ArmState | Rejection:
+        """Solve the articulation's goal: pose the arm at the first candidate without collision.
 
         Args:
-            fixed: Bodies that never move.
-            placed: Dynamic bodies that already lie where they belong.
+            fixed: Names of bodies that never move.
+            placed: Names of dynamic bodies that are already at rest.
         """
         goal = self._articulation.goal
         if goal is None:
-            stance = ArmState(round_positions(self._articulation.joint_positions))
-            self._take(stance, "")
-            hit = self._hits(self._moving, fixed)
-            return self._rejection(COLLIDES, goal) if hit else stance
-        obstacles = [name for name in (*fixed, *placed) if name != goal.held]
-        failures = {CANNOT_REACH}
-        for candidate in self._stances(goal):
-            if isinstance(candidate, str):
+            state = ArmState(round_positions(self._articulation.joint_positions))
+            self._show_state(state, "")
+            collides = self._touches_any(self._moving, fixed)
+            return self._reject(Failure.COLLIDES, goal) if collides else state
+        obstacles = [name for name in (*fixed, *placed) if name != goal.grasped_object]
+        failures = {Failure.CANNOT_REACH}
+        for candidate in self._candidates(goal):
+            if isinstance(candidate, Failure):
                 failures.add(candidate)
                 continue
-            self._take(candidate, goal.held)
-            if not self._collides(obstacles, goal.held):
+            self._show_state(candidate, goal.grasped_object)
+            if not self._collides(obstacles, goal.grasped_object):
                 return candidate
-            failures.add(COLLIDES)
-        furthest = next(f for f in (COLLIDES, DOES_NOT_FIT, CANNOT_REACH) if f in failures)
-        return self._rejection(furthest, goal)
+            failures.add(Failure.COLLIDES)
+        # The candidate that got farthest says most about what to change.
+        return self._reject(next(f for f in Failure if f in failures), goal)
 
-    def _stances(self, goal: ArmGoal) -> Iterator[ArmState | str]:
-        """Candidates in order, or why one of them is none."""
+    def _candidates(self, goal: ArmGoal) -> Iterator[ArmState | Failure]:
+        """Candidates in order, or why one of them fails before collisions are checked."""
         if goal.kind == "joints":
-            yield from self._joint_stances(goal)
+            yield from self._joint_candidates(goal)
             return
         gripper = self._robot.gripper
         if gripper is None:
@@ -152,15 +157,19 @@ class Arm:
         hand = Hand(self._robot, gripper, self._world, self.body) if goal.kind == "hold" else None
         T_base_world = self._articulation.T_world_base.inverse()
         for T_world_grasp in goal.pose_candidates:
-            grasp = hand.grasp(goal.held, T_world_grasp) if hand else Grasp(goal.opening)
+            grasp = (
+                hand.grasp(goal.grasped_object, T_world_grasp)
+                if hand
+                else Grasp(goal.gripper_opening)
+            )
             if grasp is None:
-                yield DOES_NOT_FIT
+                yield Failure.DOES_NOT_FIT
                 continue
             for arm_positions in solve_all(chain, T_base_world @ T_world_grasp):
                 positions = all_positions(self._robot, arm_positions, grasp.opening)
                 yield ArmState(positions, self._held_pose(positions, grasp))
 
-    def _joint_stances(self, goal: ArmGoal) -> Iterator[ArmState | str]:
+    def _joint_candidates(self, goal: ArmGoal) -> Iterator[ArmState | Failure]:
         count = sum(is_arm_joint(joint, self._robot) for joint in self._robot.movable)
         for candidate in goal.joint_candidates:
             if len(candidate) != count:
@@ -168,48 +177,48 @@ class Arm:
                     f"{self._articulation.name}: a joint candidate has {len(candidate)} "
                     f"positions, the arm has {count} joints"
                 )
-            positions = all_positions(self._robot, candidate, goal.opening)
+            positions = all_positions(self._robot, candidate, goal.gripper_opening)
             ok = is_within_limits(self._robot, positions)
-            yield ArmState(positions) if ok else CANNOT_REACH
+            yield ArmState(positions) if ok else Failure.CANNOT_REACH
 
     def _held_pose(self, positions: tuple[float, ...], grasp: Grasp) -> SE3 | None:
         if grasp.T_grasp_held is None:
             return None
         return (self.grasp_pose(positions) @ grasp.T_grasp_held).rounded()
 
-    def _take(self, stance: ArmState, held: str) -> None:
-        self.show(stance.positions)
-        if stance.T_world_held is not None:
-            self._world.place(held, stance.T_world_held)
+    def _show_state(self, state: ArmState, held: str) -> None:
+        self.show(state.positions)
+        if state.T_world_held is not None:
+            self._world.place(held, state.T_world_held)
 
     def _collides(self, obstacles: Sequence[str], held: str) -> bool:
-        if self._hits(self._moving, obstacles):
+        if self._touches_any(self._moving, obstacles):
             return True
         if held:
             palm = [link for link in self._links if link not in self._fingers]
-            if self._hits(palm, [held]) or self._touch(held, obstacles):
+            if self._touches_any(palm, [held]) or self._touches(held, obstacles):
                 return True
-        return self._hits_itself()
+        return self._collides_with_itself()
 
-    def _hits_itself(self) -> bool:
+    def _collides_with_itself(self) -> bool:
         allowed = self._robot.no_collide
         return any(
             (one, other) not in allowed
             and (other, one) not in allowed
-            and self._touch(self.body(one), [self.body(other)])
+            and self._touches(self.body(one), [self.body(other)])
             for k, one in enumerate(self._links)
             for other in self._links[k + 1 :]
         )
 
-    def _hits(self, links: Sequence[str], others: Sequence[str]) -> bool:
-        return any(self._touch(self.body(link), others) for link in links)
+    def _touches_any(self, links: Sequence[str], others: Sequence[str]) -> bool:
+        return any(self._touches(self.body(link), others) for link in links)
 
-    def _touch(self, name: str, others: Sequence[str]) -> bool:
+    def _touches(self, name: str, others: Sequence[str]) -> bool:
         return any(self._world.gap_m(name, other, limit_m=0.0) < 0.0 for other in others)
 
-    def _rejection(self, reason: str, goal: ArmGoal | None) -> Rejection:
+    def _reject(self, failure: Failure, goal: ArmGoal | None) -> Rejection:
         name = self._articulation.name
-        if reason == DOES_NOT_FIT:
+        if failure is Failure.DOES_NOT_FIT:
             remedy = f"let arm '{name}' hold smaller objects, or lower their scale"
         elif goal is None:
             remedy = f"move robot '{name}' (at_m) or give it other joint positions"
@@ -218,4 +227,4 @@ class Arm:
                 f"more candidates for arm '{name}', a smaller workspace, "
                 "or fewer objects around it (count)"
             )
-        return Rejection(reason, remedy)
+        return Rejection(failure.value, remedy)

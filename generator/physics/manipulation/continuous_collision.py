@@ -1,7 +1,7 @@
-"""What an arm hits on a leg of its way, found by conservative advancement.
+"""Continuous collision detection for the legs of an arm, by conservative advancement.
 
-Between two looks nothing moves farther than the gap that was measured, so that nothing can be
-passed through (Mirtich, Impulse-based dynamic simulation of rigid body systems, 1996, chapter 2).
+Between two checks no point moves farther than the smallest measured gap, so that no contact can be
+skipped (Mirtich, Impulse-based dynamic simulation of rigid body systems, 1996, chapter 2).
 """
 
 from __future__ import annotations
@@ -18,27 +18,27 @@ from gen_data.generator.physics.manipulation.arm_goals import Arm
 from gen_data.generator.physics.manipulation.joint_trajectories import Held, Leg
 
 CLEARANCE_M = 0.003
-"""Distance that an arm keeps from everything where it is free to choose its way."""
+"""Default distance between an arm and its obstacles."""
 ITSELF = "itself"
 
-_LOOK_M = 0.1
-"""How far ahead gaps are measured."""
-_FINE_M = 0.002
-"""Where things are nearer than this, looks are this far apart."""
+_GAP_LIMIT_M = 0.1
+"""Gaps are measured up to this."""
+_ADVANCE_MIN_M = 0.002
+"""Least motion between two checks: bounds their number near contact."""
 _SUPPORT_M = 0.001
-"""What is held may overlap the surface it stands on by this much, as it does at rest."""
+"""Allowed overlap of a held body and its support: as deep as bodies at rest overlap."""
 _TOUCH_M = 0.0002
-"""Overlap that is put down to rounding."""
+"""Overlap attributed to rounding."""
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
-    """What an arm may hit.
+class Obstacles:
+    """Bodies that an arm must not hit.
 
     Attributes:
         fixed: Names of bodies that never move.
-        loose: Names of bodies that lie around.
-        clearance_m: Distance that is kept from all of them; 0 = they may be touched.
+        loose: Names of movable bodies at rest.
+        clearance_m: Distance to keep from all of them; 0 = contact is allowed.
     """
 
     fixed: Sequence[str]
@@ -47,18 +47,35 @@ class Surroundings:
 
 
 @dataclass(frozen=True, slots=True)
+class Collision:
+    """The first collision on a leg.
+
+    Attributes:
+        obstacle: Name of the body that is hit; ``ITSELF`` for a link of the same arm.
+    """
+
+    obstacle: str
+
+
+@dataclass(frozen=True, slots=True)
 class _Pair:
-    """Two bodies that must not come nearer than a gap, and how far they move against each other."""
+    """Two bodies to keep apart.
+
+    Attributes:
+        gap_min_m: A smaller gap is a collision.
+        travel_m: Upper bound of their relative motion over the whole leg.
+        obstacle: As in ``Collision``.
+    """
 
     one: str
     other: str
     gap_min_m: float
     travel_m: float
-    named: str
+    obstacle: str
 
 
 class CollisionSweep:
-    """The moving links of an arm, and what it holds, on their way through a world."""
+    """Moves the links of an arm, and the body it holds, along legs and finds collisions."""
 
     def __init__(self, arm: Arm, world: World) -> None:
         self._arm = arm
@@ -71,82 +88,93 @@ class CollisionSweep:
         holding = rigid_group(arm.robot, self._hand) if gripper else frozenset()
         self._holding = holding | set(finger_links(arm.robot))
 
-    def hit(self, leg: Leg, around: Surroundings) -> str:
-        """Name of what is hit first; empty if the way is free."""
-        self.show(leg, 0.0)
-        pairs = list(self._pairs(leg, around))
+    def first_collision(self, leg: Leg, obstacles: Obstacles) -> Collision | None:
+        """The first collision along a leg; None if it is free."""
+        self._show(leg, 0.0)
+        pairs = list(self._pairs(leg, obstacles))
         share = 0.0
         while True:
-            self.show(leg, share)
+            self._show(leg, share)
             advance = 1.0
             for pair in pairs:
-                spare_m = self._world.gap_m(pair.one, pair.other, _LOOK_M) - pair.gap_min_m
+                spare_m = self._world.gap_m(pair.one, pair.other, _GAP_LIMIT_M) - pair.gap_min_m
                 if spare_m < 0.0:
-                    return pair.named
+                    return Collision(pair.obstacle)
                 if pair.travel_m > 0.0:
-                    advance = min(advance, max(spare_m, _FINE_M) / pair.travel_m)
+                    advance = min(advance, max(spare_m, _ADVANCE_MIN_M) / pair.travel_m)
             if share >= 1.0:
-                return ""
+                return None
             share = min(1.0, share + advance)
 
-    def show(self, leg: Leg, share: float) -> None:
-        """Put the arm, and what it holds, where they are after a share of a leg."""
+    def _show(self, leg: Leg, share: float) -> None:
+        """Pose the arm and the held body after a share of a leg in [0, 1]."""
         positions = leg.at(share)
         self._arm.show(positions)
         if leg.held is not None:
             pose = self._arm.grasp_pose(positions) @ leg.held.T_grasp_held
             self._world.place(leg.held.body, pose)
 
-    def _pairs(self, leg: Leg, around: Surroundings) -> Iterator[_Pair]:
+    def _pairs(self, leg: Leg, obstacles: Obstacles) -> Iterator[_Pair]:
+        """All pairs of bodies that may collide on a leg."""
         changes = {
             joint.name: abs(b - a)
             for joint, a, b in zip(self._arm.robot.movable, leg.start, leg.end, strict=True)
         }
-        least_m = around.clearance_m - _TOUCH_M
+        gap_min_m = obstacles.clearance_m - _TOUCH_M
         for link in self._arm.moving:
             travel_m = self._travel_m(link, self._radii_m[link], changes)
-            for other in (*around.fixed, *around.loose):
-                yield _Pair(self._arm.body(link), other, least_m, travel_m, other)
-        yield from self._own_pairs(changes)
+            for other in (*obstacles.fixed, *obstacles.loose):
+                yield _Pair(self._arm.body(link), other, gap_min_m, travel_m, other)
+        yield from self._link_pairs(changes)
         if leg.held is not None:
-            yield from self._held_pairs(leg.held, around, changes)
+            yield from self._held_pairs(leg.held, obstacles, changes)
 
-    def _own_pairs(self, changes: Mapping[str, float]) -> Iterator[_Pair]:
+    def _link_pairs(self, changes: Mapping[str, float]) -> Iterator[_Pair]:
+        """Pairs of links of the arm that move relative to each other."""
         allowed = self._arm.robot.no_collide
         links = self._arm.links
         for k, one in enumerate(links):
             for other in links[k + 1 :]:
                 if (one, other) in allowed or (other, one) in allowed:
                     continue
-                apart = {
+                # Joints that move both links do not change the distance between them.
+                relative = {
                     name: change
                     for name, change in changes.items()
                     if (name in self._levers[one]) != (name in self._levers[other])
                 }
-                travel_m = self._travel_m(one, self._radii_m[one], apart)
-                travel_m += self._travel_m(other, self._radii_m[other], apart)
+                travel_m = self._travel_m(one, self._radii_m[one], relative)
+                travel_m += self._travel_m(other, self._radii_m[other], relative)
                 if travel_m > 0.0:
                     a, b = self._arm.body(one), self._arm.body(other)
                     yield _Pair(a, b, -_TOUCH_M, travel_m, ITSELF)
 
     def _held_pairs(
-        self, held: Held, around: Surroundings, changes: Mapping[str, float]
+        self, held: Held, obstacles: Obstacles, changes: Mapping[str, float]
     ) -> Iterator[_Pair]:
+        """Pairs of the held body with obstacles and with links that it is not held by."""
         low, high = self._world.bounds_m(held.body)
         hand = self._world.pose(self._arm.body(self._hand)).translation_m
         far = np.maximum(np.abs(low - hand), np.abs(high - hand))
         travel_m = self._travel_m(self._hand, float(np.sqrt((far * far).sum())), changes)
-        standing_m = around.clearance_m if around.clearance_m > 0.0 else -_SUPPORT_M
-        for other in around.fixed:
-            yield _Pair(held.body, other, standing_m - _TOUCH_M, travel_m, other)
-        for other in around.loose:
-            yield _Pair(held.body, other, around.clearance_m - _TOUCH_M, travel_m, other)
+        clearance_m = obstacles.clearance_m
+        to_support_m = clearance_m if clearance_m > 0.0 else -_SUPPORT_M
+        for other in obstacles.fixed:
+            yield _Pair(held.body, other, to_support_m - _TOUCH_M, travel_m, other)
+        for other in obstacles.loose:
+            yield _Pair(held.body, other, clearance_m - _TOUCH_M, travel_m, other)
         for link in self._arm.links:
             if link not in self._holding:
                 yield _Pair(held.body, self._arm.body(link), -_TOUCH_M, travel_m, ITSELF)
 
     def _travel_m(self, link: str, radius_m: float, changes: Mapping[str, float]) -> float:
-        """A length that no point within a radius of a link's origin exceeds on its way."""
+        """Upper bound of the motion of all points within a radius of a link's origin.
+
+        Args:
+            link: The link.
+            radius_m: Of a ball around the link's origin.
+            changes: ``{joint: |change of position|}`` over the leg [rad or m].
+        """
         return sum(
             changes[name] * (1.0 if name in self._prismatic else lever_m + radius_m)
             for name, lever_m in self._levers[link].items()
@@ -155,7 +183,7 @@ class CollisionSweep:
 
 
 def _levers(robot: RobotModel) -> dict[str, dict[str, float]]:
-    """Per link, the joints that move it, and how far its origin can be from each of them [m]."""
+    """``{link: {joint that moves it: largest distance of its origin from the joint [m]}}``."""
     levers: dict[str, dict[str, float]] = {robot.links[0]: {}}
     for joint in robot.joints:
         offset = joint.T_parent_joint.translation_m

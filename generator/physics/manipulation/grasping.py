@@ -1,4 +1,4 @@
-"""How an object lies between the fingers of a gripper."""
+"""Grasps: the pose of an object between the fingers of a gripper, and their opening."""
 
 from __future__ import annotations
 
@@ -14,24 +14,31 @@ from gen_data.generator.physics.bullet import World
 
 _PALM_GAP_M = 0.002
 _PAD_GAP_M = 0.002
-"""Both fingers must come this near to what lies between them."""
+"""Both fingers must come this near to the object between them."""
 _BISECTIONS = 14
 """Halvings of the opening: a stroke of 8 cm is closed to within 5 micrometres."""
 
 _UPRIGHT_AXES: tuple[Vec3, ...] = ((0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0))
-"""Where the object's Z may point in the grasp frame: back into the hand, or to one of its sides."""
+"""Directions of the object's Z in the grasp frame: back into the hand, or to one of its sides."""
 
 
 @dataclass(frozen=True, slots=True)
 class Grasp:
-    """A gripper opening in [0, 1] and, where something is held, its pose in the grasp frame."""
+    """A gripper opening in [0, 1] and the held object's pose in the grasp frame; None = empty."""
 
     opening: float
     T_grasp_held: SE3 | None = None
 
 
 class Hand:
-    """The gripper of a robot whose links are in a world."""
+    """The gripper of a robot in a world.
+
+    Args:
+        robot: The robot's model.
+        gripper: Its gripper.
+        world: Has a body for every link.
+        body: Name of a link's body.
+    """
 
     def __init__(
         self, robot: RobotModel, gripper: Gripper, world: World, body: Callable[[str], str]
@@ -49,16 +56,16 @@ class Hand:
         self._known: dict[tuple[str, Vec3], Grasp | None] = {}
 
     def grasp(self, held: str, T_world_grasp: SE3) -> Grasp | None:
-        """The held body as upright as the hand allows, fingers closed; None if it does not fit."""
+        """The grasp that holds a body as upright as the hand allows; None if it does not fit."""
         up = max(_UPRIGHT_AXES, key=lambda axis: float(T_world_grasp.rotate(np.array(axis))[2]))
         if (held, up) not in self._known:
             self._known[held, up] = self._close_fingers(held, up)
         return self._known[held, up]
 
-    def grasp_as_it_lies(self, held: str, T_grasp_held: SE3) -> Grasp | None:
-        """Fingers closed on a body with its pose in the grasp frame given, but for Y.
+    def grasp_in_place(self, held: str, T_grasp_held: SE3) -> Grasp | None:
+        """The grasp of a body at a given pose in the grasp frame, centred along Y.
 
-        None if open fingers would cut into it, or if closed ones would touch it on one side only.
+        None if the open fingers penetrate it, or the closed ones touch it on one side only.
         """
         self._pose_hand(1.0)
         self._world.place(held, T_grasp_held)
@@ -73,12 +80,12 @@ class Hand:
         return Grasp(opening, pose)
 
     def palm_height_m(self) -> float:
-        """How far behind the grasp frame's origin the hand without its fingers ends."""
+        """Distance from the palm forward to the grasp frame's origin."""
         self._pose_hand(1.0)
         return -self._palm_z_m() - _PALM_GAP_M
 
     def tip_depth_m(self) -> float:
-        """How far before the grasp frame's origin the fingers end."""
+        """Distance from the grasp frame's origin forward to the finger tips."""
         self._pose_hand(1.0)
         return max(
             (float(self._world.bounds_m(self._body(f))[1][2]) for f in self._fingers), default=0.0
@@ -100,7 +107,7 @@ class Hand:
         return None if opening <= 0.0 else Grasp(opening, pose)
 
     def _narrowest(self, held: str) -> float:
-        """The smallest opening at which no finger cuts into the object; 0 if none ever does."""
+        """The smallest opening at which no finger penetrates the object; 0 if none ever does."""
         if self._clear(held, 0.0):
             return 0.0
         touching, free = 0.0, 1.0
@@ -110,7 +117,7 @@ class Hand:
         return free
 
     def _center_pose(self, held: str, pose: SE3) -> SE3:
-        """The pose shifted along Y so that two opposite fingers are equally far."""
+        """The pose shifted along Y to the middle between two opposite fingers."""
         if len(self._fingers) != 2:
             return pose
         one, other = sorted(self._fingers, key=lambda link: self._middle(link)[1])
@@ -128,7 +135,7 @@ class Hand:
         )
 
     def _pose_hand(self, opening: float) -> None:
-        """Put hand and fingers where the grasp frame is the world's."""
+        """Place hand and fingers so that the grasp frame coincides with the world frame."""
         gripper = self._gripper
         positions = all_positions(self._robot, self._arm_home, opening)
         poses = link_poses(self._robot, SE3(), positions)
@@ -137,7 +144,7 @@ class Hand:
             self._world.place(self._body(link), T_grasp_base @ poses[link])
 
     def _palm_z_m(self) -> float:
-        """How far the hand without fingers reaches along the grasp frame's Z."""
+        """Largest coordinate of the palm along the grasp frame's Z."""
         return max(
             (float(self._world.bounds_m(self._body(link))[1][2]) for link in self._palm),
             default=-np.inf,
@@ -153,10 +160,10 @@ def _between_fingers(low_m: Array, high_m: Array, up: Vec3, palm_z_m: float) -> 
     """``T_grasp_held``: narrow side along Y, centre at the origin or just clear of the palm.
 
     Args:
-        low_m: Low corner of the object in its own frame.
-        high_m: High corner.
+        low_m: Low corner of the object in its own frame, [3].
+        high_m: High corner, [3].
         up: The object's Z in the grasp frame.
-        palm_z_m: Where the hand ends, along the grasp frame's Z.
+        palm_z_m: Front of the palm along the grasp frame's Z.
     """
     half, center = 0.5 * (high_m - low_m), 0.5 * (high_m + low_m)
     across = np.array([0.0, 1.0, 0.0])

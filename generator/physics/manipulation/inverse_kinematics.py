@@ -1,9 +1,9 @@
-"""Inverse kinematics without memory: damped least squares from stated starts.
+"""Stateless inverse kinematics: damped least squares from a fixed sequence of starts.
 
 Sources: Sugihara, "Solvability-unconcerned inverse kinematics by the Levenberg-Marquardt method",
 IEEE Trans. Robotics 27(5), 2011, for the damping; Roberts, "The unreasonable effectiveness of
-quasirandom sequences", 2018, for the starts. Plain floats: at six by seven numbers numpy is
-slower, and a fixed order of sums gives the same bits everywhere.
+quasirandom sequences", 2018, for the starts. Plain floats: numpy is slower on matrices of six by
+seven, and a fixed order of summation gives the same bits on every processor.
 """
 
 from __future__ import annotations
@@ -25,32 +25,32 @@ POSITION_TOLERANCE_M = 1e-3
 ANGLE_TOLERANCE_RAD = math.radians(0.5)
 
 EXACT = 0.01
-"""Share of the tolerances within which a hand takes hold of what already lies somewhere."""
+"""Share of the tolerances for grasping a body in place."""
 
 _ITERATIONS_MAX = 40
 _STARTS_MAX = 6
 _LENGTH_M_PER_RAD = 0.25
-"""A radian counts as much as this distance: the lever of a hand."""
+"""Weight of angles against distances: about the length of a hand."""
 _DAMPING = 1e-5
 _STEP_MAX = 0.6
-"""Largest change of a joint in one iteration [rad or m]; linearisation is void beyond."""
+"""Largest change of a joint in one iteration [rad or m]; beyond it linearisation fails."""
 
 Row = list[float]
 
 
 @dataclass(frozen=True, slots=True)
 class Chain:
-    """The joints from a robot's base to its grasp frame that arm joints move, others folded in.
+    """The joints from a robot's base to its grasp frame; fixed joints are part of the offsets.
 
     Attributes:
-        joints: Base first, those that mimic an arm joint included.
-        offsets: Pose of each joint frame in the previous joint's child at position 0.
-        drives: Per joint which of the solved joints moves it, with which multiplier and offset.
+        joints: From the base on, including those that mimic an arm joint.
+        offsets: Pose of each joint frame in the previous joint's child link.
+        drives: Per joint: index into ``solved`` of the joint that drives it, multiplier, offset.
         T_last_grasp: Grasp frame in the last joint's child link.
-        solved: The arm joints whose positions are sought.
+        solved: The arm joints to solve for.
         limits: Lowest and highest position of each of them [rad or m].
-        indices: Position of each of them among the robot's arm joints.
-        rest: A position per arm joint of the robot, used for those off the chain.
+        indices: Index of each of them among the robot's arm joints.
+        rest: A position per arm joint of the robot, for joints off the chain.
     """
 
     joints: tuple[Joint, ...]
@@ -64,7 +64,7 @@ class Chain:
 
     @property
     def reach_m(self) -> float:
-        """A distance from the base that the grasp frame never exceeds."""
+        """Upper bound of the distance between the base and the grasp frame."""
         travel = sum(max(abs(j.lower), abs(j.upper)) for j in self.joints if j.kind == "prismatic")
         offsets = (*self.offsets, self.T_last_grasp)
         return travel + sum(math.dist(o.translation_m, (0.0, 0.0, 0.0)) for o in offsets)
@@ -79,21 +79,21 @@ def make_chain(robot: RobotModel, gripper: Gripper) -> Chain:
         path.insert(0, by_child[link])
         link = by_child[link].parent
     arm = [joint for joint in robot.movable if is_arm_joint(joint, robot)]
-    joints, offsets, driven, pending = [], [], [], SE3()
+    joints, offsets, drives, pending = [], [], [], SE3()
     for joint in path:
         pending = pending @ joint.T_parent_joint
         leader, multiplier, offset = leader_of(joint, robot.joints)
         if leader in arm:
             joints.append(joint)
             offsets.append(pending)
-            driven.append((leader, multiplier, offset))
+            drives.append((leader, multiplier, offset))
             pending = SE3()
     homes = dict(zip((j.name for j in robot.movable), robot.home, strict=True))
-    solved = tuple(dict.fromkeys(leader for leader, _, _ in driven))
+    solved = tuple(dict.fromkeys(leader for leader, _, _ in drives))
     return Chain(
         joints=tuple(joints),
         offsets=tuple(offsets),
-        drives=tuple((solved.index(leader), m, offset) for leader, m, offset in driven),
+        drives=tuple((solved.index(leader), m, offset) for leader, m, offset in drives),
         T_last_grasp=pending @ gripper.T_link_grasp,
         solved=solved,
         limits=tuple(position_limits(joint, robot) for joint in solved),
@@ -103,9 +103,9 @@ def make_chain(robot: RobotModel, gripper: Gripper) -> Chain:
 
 
 def solve_all(chain: Chain, T_base_grasp: SE3) -> Iterator[tuple[float, ...]]:
-    """Arm positions that put the grasp frame at a pose, each from another start, home first.
+    """Yield arm positions that put the grasp frame at a pose, one per start, home first.
 
-    A start that leads nowhere yields nothing; neighbouring starts may lead to the same solution.
+    A start that does not converge yields nothing; several starts may yield the same solution.
     """
     if math.dist(T_base_grasp.translation_m, (0.0, 0.0, 0.0)) > chain.reach_m:
         return
@@ -118,13 +118,13 @@ def solve_all(chain: Chain, T_base_grasp: SE3) -> Iterator[tuple[float, ...]]:
 def solve_near(
     chain: Chain, T_base_grasp: SE3, positions: Sequence[float], share: float = EXACT
 ) -> tuple[float, ...] | None:
-    """Arm positions that put the grasp frame at a pose, sought from others; None if none is near.
+    """Arm positions that put the grasp frame at a pose, from a given start; None without solution.
 
     Args:
         chain: The arm.
         T_base_grasp: The pose.
-        positions: Where to begin, one per arm joint.
-        share: Of the tolerances, that may be left.
+        positions: The start, one per arm joint [rad or m].
+        share: Share of the tolerances that the solution must meet.
     """
     found = solve(chain, T_base_grasp, [positions[index] for index in chain.indices], share)
     return None if found is None else _complete_positions(chain, found, positions)
@@ -133,7 +133,7 @@ def solve_near(
 def solve(
     chain: Chain, T_base_grasp: SE3, start: Sequence[float], share: float = 1.0
 ) -> tuple[float, ...] | None:
-    """Positions of the solved joints within limits, or None where the descent does not arrive."""
+    """Positions of the solved joints within their limits; None if the descent fails to converge."""
     positions = list(start)
     for _ in range(_ITERATIONS_MAX):
         pose, columns = _jacobian(chain, positions)
@@ -147,7 +147,7 @@ def solve(
 def _complete_positions(
     chain: Chain, found: Sequence[float], others: Sequence[float]
 ) -> tuple[float, ...]:
-    """The arm's positions: those found, and for joints off the chain the others."""
+    """Positions of all arm joints: ``found`` on the chain, ``others`` off it."""
     positions = list(others)
     for index, value in zip(chain.indices, found, strict=True):
         positions[index] = value
@@ -155,7 +155,7 @@ def _complete_positions(
 
 
 def _start(chain: Chain, number: int) -> list[float]:
-    """Home, then the middle and an even, never repeating spread over the middle of all ranges."""
+    """Start 0 is home, start 1 mid-range; the rest spread quasirandomly over the inner ranges."""
     if number == 0:
         return [chain.rest[index] for index in chain.indices]
     ratio = _spread_ratio(len(chain.solved))
@@ -177,7 +177,7 @@ def _spread_ratio(dimensions: int) -> float:
 
 
 def _jacobian(chain: Chain, positions: Sequence[float]) -> tuple[SE3, list[Row]]:
-    """``T_base_grasp``, and its motion per solved joint: three linear parts, three angular."""
+    """``T_base_grasp``, and its derivative by each solved joint: 3 linear, 3 weighted angular."""
     pose = SE3()
     frames: list[tuple[Vec3, Vec3]] = []
     for joint, frame, drive in zip(chain.joints, chain.offsets, chain.drives, strict=True):
@@ -204,7 +204,7 @@ def _jacobian(chain: Chain, positions: Sequence[float]) -> tuple[SE3, list[Row]]
 
 
 def _error(target: SE3, pose: SE3) -> Row:
-    """What is missing to the target: metres, and weighted ``2 sin(angle / 2)`` about each axis."""
+    """Difference to the target: metres, and weighted ``2 sin(angle / 2)`` about each axis, [6]."""
     tx, ty, tz = target.translation_m
     px, py, pz = pose.translation_m
     tw, tqx, tqy, tqz = target.quaternion_wxyz
@@ -230,7 +230,7 @@ def _is_reached(error: Row, share: float) -> bool:
 
 
 def _step(chain: Chain, positions: Row, columns: list[Row], error: Row) -> None:
-    """One damped step within the limits; joints that would leave theirs stand still."""
+    """Take one damped step in place; joints that would leave their limits are held."""
     damping = 0.5 * sum(e * e for e in error) * 1e-2 + _DAMPING
     free = list(range(len(chain.solved)))
     for _ in range(2):
@@ -249,7 +249,7 @@ def _step(chain: Chain, positions: Row, columns: list[Row], error: Row) -> None:
 
 
 def _pushes_out(chain: Chain, k: int, position: float, wanted: float) -> bool:
-    """Whether a step takes the k-th solved joint further out of its limits."""
+    """Whether a step takes the k-th solved joint farther beyond its limits."""
     if chain.solved[k].kind == "continuous":
         return False
     lower, upper = chain.limits[k]

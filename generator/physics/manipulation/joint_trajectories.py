@@ -1,6 +1,6 @@
-"""Joint positions over time: straight legs in joint space, each from rest to rest.
+"""Joint trajectories: straight legs in joint space, each from rest to rest.
 
-A leg runs through ``start + s(t / T) * (end - start)`` with ``s = 10 x^3 - 15 x^4 + 6 x^5``.
+A leg follows ``start + s(t / T) * (end - start)`` with ``s = 10 x^3 - 15 x^4 + 6 x^5``.
 Speed and acceleration vanish at both ends; their peaks are 15/8 of the mean speed and 10/sqrt(3)
 of ``(end - start) / T^2`` (Biagiotti & Melchiorri, Trajectory Planning for Automatic Machines and
 Robots, 2008, section 2.1.7).
@@ -23,25 +23,25 @@ _PEAK_SPEED = 15.0 / 8.0
 _PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)
 _SPEED_RAD_S = 1.5
 _SPEED_M_S = 0.1
-"""Of joints whose description gives no limit: slower than any arm in the catalogue."""
+"""Speeds of joints without a limit in their description: slower than any arm in the catalogue."""
 _SPEED_CAP_RAD_S = math.pi
-"""Of turning joints: the limit of a UR5e and an xArm. Some descriptions name 10 rad/s for want of
-a figure."""
+"""Cap for revolute joints: the limit of a UR5e and an xArm. Some descriptions state 10 rad/s as a
+placeholder."""
 _SPEED_UP_S = 0.25
-"""In which a joint reaches its full speed; URDF knows no acceleration. A Panda's own limits
-(7.5 to 20 rad/s^2 at 2.2 to 2.6 rad/s) are reached in 0.13 to 0.29 s."""
+"""Time in which a joint reaches its full speed, as URDF has no limit of acceleration. A Panda with
+its own limits (7.5 to 20 rad/s^2 at 2.2 to 2.6 rad/s) takes 0.13 to 0.29 s."""
 _STEPS_MIN = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Held:
-    """What a hand holds.
+    """A body in the hand.
 
     Attributes:
-        body: Name of the body.
-        T_grasp_held: Where it is in the grasp frame.
-        T_surface_rest: How it stands on a level surface below it, X and Y aside.
-        opening: Of the gripper around it, in [0, 1].
+        body: Its name.
+        T_grasp_held: Its pose in the grasp frame.
+        T_surface_rest: Its pose at rest on a level surface; X and Y are 0.
+        opening: Opening of the gripper around it, in [0, 1].
     """
 
     body: str
@@ -52,12 +52,12 @@ class Held:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """A straight way in joint space, from rest to rest.
+    """A straight path in joint space, from rest to rest.
 
     Attributes:
         start, end: One position per movable joint [rad or m].
-        duration_s: A whole number of steps; 0 = not yet known.
-        held: What moves along with the hand; None = nothing.
+        duration_s: A multiple of ``STEP_S``; 0 = not yet timed.
+        held: The body that moves with the hand; None = the hand is empty.
     """
 
     start: tuple[float, ...]
@@ -66,14 +66,14 @@ class Leg:
     held: Held | None = None
 
     def at(self, share: float) -> tuple[float, ...]:
-        """Positions after a share of the way."""
+        """Positions after a share of the path in [0, 1]."""
         return round_positions(
             [a + share * (b - a) for a, b in zip(self.start, self.end, strict=True)]
         )
 
 
 def smooth_step(share: float) -> float:
-    """Share of the way after a share of the time: the quintic from rest to rest."""
+    """Share of the path after a share of the time: the quintic from rest to rest."""
     return share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
 
 
@@ -90,19 +90,19 @@ def acceleration_max(joint: Joint) -> float:
 
 
 def time_leg(leg: Leg, robot: RobotModel, speed: float) -> Leg:
-    """The leg with the shortest duration that keeps to a share of every joint's limits."""
+    """The leg with the shortest duration that stays within a share of all joints' limits."""
     longest_s = 0.0
     for joint, a, b in zip(robot.movable, leg.start, leg.end, strict=True):
-        way = abs(b - a)
-        by_speed_s = _PEAK_SPEED * way / (speed * speed_max(joint))
+        change = abs(b - a)
+        by_speed_s = _PEAK_SPEED * change / (speed * speed_max(joint))
         limit = speed * acceleration_max(joint)
-        longest_s = max(longest_s, by_speed_s, math.sqrt(_PEAK_ACCELERATION * way / limit))
+        longest_s = max(longest_s, by_speed_s, math.sqrt(_PEAK_ACCELERATION * change / limit))
     steps = max(_STEPS_MIN, math.ceil(longest_s / STEP_S - 1e-9))
     return replace(leg, duration_s=round(steps * STEP_S, 6))
 
 
-def sample_times(legs: Sequence[Leg]) -> list[tuple[Leg, tuple[float, ...]]]:
-    """The legs' positions every step, with the leg that leads there; the beginning counts once."""
+def sample_positions(legs: Sequence[Leg]) -> list[tuple[Leg, tuple[float, ...]]]:
+    """Positions every ``STEP_S`` along timed legs, each with its leg; the start comes first."""
     knots = [(legs[0], legs[0].start)] if legs else []
     for leg in legs:
         count = round(leg.duration_s / STEP_S)

@@ -1,9 +1,10 @@
-"""Arms on their way: from goals to legs that are within reach and hit nothing."""
+"""Task planning of one arm: from its goals to legs that are reachable and free of collision."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from gen_data.generator.core.errors import Rejection
 from gen_data.generator.core.kinematics import all_positions, gripper_opening, is_within_limits
@@ -11,60 +12,71 @@ from gen_data.generator.core.scene import ArmGoal, SupportSurface
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.physics.bullet import World
 from gen_data.generator.physics.manipulation.arm_goals import Arm, ArmState
-from gen_data.generator.physics.manipulation.continuous_collision import Surroundings
+from gen_data.generator.physics.manipulation.continuous_collision import (
+    ITSELF,
+    Collision,
+    Obstacles,
+)
 from gen_data.generator.physics.manipulation.grasping import Grasp, Hand
 from gen_data.generator.physics.manipulation.joint_trajectories import Held, Leg, time_leg
 from gen_data.generator.physics.manipulation.motion_planner import MotionPlanner, Positions
 from gen_data.generator.physics.placement_surfaces import home_surface, is_within
 
-CANNOT_REACH = "cannot get to its goal"
-NOTHING_TO_GRASP = "finds nothing that lies free and fits between its fingers"
-NOTHING_HELD = "holds nothing that it could put down"
-NO_PLACE = "has no free place for what it holds"
+CANNOT_REACH = "its pose or joint positions are out of reach"
+NOTHING_TO_GRASP = "no listed object lies free and fits between the fingers"
+NOTHING_HELD = "the gripper holds nothing to place"
+NO_PLACE = "no candidate is a free and stable place for the held object"
 
 _APPROACH_M = 0.10
-"""Of the straight way along the fingers, to what is grasped and from it."""
+"""Length of the straight approach along the fingers, and of the retreat."""
 _YAWS = 12
 _NARROW = 1.15
-"""Hands take things across sides at most this much wider than the narrowest."""
-_TAKES_MAX = 8
-_SPOTS_AT_ONCE = 3
-_PUTS_MAX = 4
-_ENDS_MAX = 3
+"""Grasps at most this much wider than the narrowest one are tried."""
+_GRASPS_MAX = 8
+_SPOTS_PER_BATCH = 3
+_RELEASES_MAX = 4
+_CONFIGURATIONS_MAX = 3
 _FLOOR_GAP_M = 0.004
-"""Between the finger tips and the ground of what they grasp."""
+"""Between the finger tips and the ground below a grasped object."""
 _APART_M = 0.001
-"""What is nearer to its neighbours than this may lean on them or carry them."""
-_STANDS_M = 0.002
-"""Largest gap between a thing and what it stands on."""
-_STAY_STEPS = 60
-_STAY_M = 0.002
-"""A thing that is put down must not move farther than this while simulated for so many steps."""
-_TURNED = SE3(quaternion_wxyz=(0.0, 0.0, 0.0, 1.0))
-"""The same grip with the fingers exchanged."""
+"""Objects nearer to each other than this may lean on or carry each other."""
+_SUPPORT_GAP_M = 0.002
+"""Largest gap between an object and the body that supports it."""
+_STABLE_STEPS = 60
+_STABLE_M = 0.002
+"""A stable object moves no farther than this in so many simulated steps."""
+_HALF_TURN = SE3(quaternion_wxyz=(0.0, 0.0, 0.0, 1.0))
+"""The same grasp with the fingers exchanged."""
 _FLIP = SE3(quaternion_wxyz=(0.0, 1.0, 0.0, 0.0))
 
 
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Timed legs that accomplish all goals of an arm, in order; () for an arm without a task."""
+
+    legs: tuple[Leg, ...]
+
+
 class TaskPlanner:
-    """One arm that passes its goals in turn, in a world where everything else rests.
+    """Plans the task of one arm in a world where everything else is at rest.
 
     Args:
         arm: The robot, in the world.
-        stance: What it does at the beginning.
-        world: Where it moves.
+        state: Its state at the beginning.
+        world: The world it moves in.
         fixed: Names of bodies that never move, and of other arms' links.
-        resting: ``{name: T_world_body}`` of everything that lies around.
-        surfaces: What things may stand on.
+        resting: ``{name: T_world_body}`` of all movable bodies at rest.
+        surfaces: Surfaces that objects may be placed on.
 
     Attributes:
-        positions: Of all joints after the legs so far.
-        resting: Where things lie after the legs so far; what is held is not among them.
+        positions: Of all joints after the legs planned so far.
+        resting: Poses of bodies after the legs planned so far, without the held one.
     """
 
     def __init__(
         self,
         arm: Arm,
-        stance: ArmState,
+        state: ArmState,
         world: World,
         fixed: Sequence[str],
         resting: Mapping[str, SE3],
@@ -74,235 +86,244 @@ class TaskPlanner:
         self._world = world
         self._fixed = list(fixed)
         self._surfaces = surfaces
-        self._router = MotionPlanner(arm, world)
+        self._motion = MotionPlanner(arm, world)
         gripper = arm.robot.gripper
         self._hand = Hand(arm.robot, gripper, world, arm.body) if gripper else None
-        self.positions = stance.positions
+        self.positions = state.positions
         self.resting = dict(resting)
         goal = arm.articulation.goal
-        held = goal.held if goal and stance.T_world_held is not None else ""
-        self._held = self._held_upright(held, stance) if held else None
+        held = goal.grasped_object if goal and state.T_world_held is not None else ""
+        self._held = self._initial_held(held, state) if held else None
         self.resting.pop(held, None)
 
-    def legs(self) -> list[Leg] | Rejection:
-        """All legs, timed, or why there are none."""
+    def plan(self) -> Plan | Rejection:
+        """The legs to all goals, or the reason why one of them cannot be accomplished."""
         legs: list[Leg] = []
-        for number, goal in enumerate(self._arm.articulation.way, 1):
-            self._restore()
-            found = self._plan_goal(goal)
-            if isinstance(found, str):
-                return self._rejection(found, number)
-            legs += [time_leg(leg, self._arm.robot, goal.speed) for leg in found]
+        for number, goal in enumerate(self._arm.articulation.task, 1):
+            self._restore_world()
+            planned = self._plan_goal(goal, number)
+            if isinstance(planned, Rejection):
+                return planned
+            legs += [time_leg(leg, self._arm.robot, goal.speed) for leg in planned]
             self.positions = legs[-1].end
-        self._restore()
-        return legs
+        self._restore_world()
+        return Plan(tuple(legs))
 
-    def _plan_goal(self, goal: ArmGoal) -> list[Leg] | str:
-        """Legs to a goal, not yet timed, or why it cannot be had."""
+    def _plan_goal(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
+        """Untimed legs to one goal."""
         if goal.kind == "grasp":
-            return self._plan_pick(goal)
+            return self._plan_grasp(goal, number)
         if goal.kind == "place":
-            return self._plan_place(goal)
-        hits: dict[str, None] = {}
-        for end in self._ends(goal):
-            route = self._route(end)
-            if not isinstance(route, str):
-                return route
-            hits[route] = None
-        return _what_hits(hits, CANNOT_REACH)
+            return self._plan_place(goal, number)
+        collisions: list[Collision] = []
+        for end in self._goal_configurations(goal):
+            path = self._plan_path(end)
+            if not isinstance(path, Collision):
+                return path
+            collisions.append(path)
+        return self._reject(collisions, CANNOT_REACH, number)
 
-    def _ends(self, goal: ArmGoal) -> Iterator[Positions]:
+    def _goal_configurations(self, goal: ArmGoal) -> Iterator[Positions]:
         """Configurations at a goal, in the order of its candidates."""
-        opening = self._held.opening if self._held else goal.opening
+        opening = self._held.opening if self._held else goal.gripper_opening
         for candidate in goal.joint_candidates:
             positions = all_positions(self._arm.robot, candidate, opening)
             if is_within_limits(self._arm.robot, positions):
                 yield positions
         for pose in goal.pose_candidates:
-            found = self._router.configurations(pose, self.positions, opening)
-            yield from found[:_ENDS_MAX]
+            found = self._motion.configurations(pose, self.positions, opening)
+            yield from found[:_CONFIGURATIONS_MAX]
 
-    def _route(self, end: Positions) -> list[Leg] | str:
-        self._restore()
-        around = Surroundings(self._fixed, list(self.resting))
-        return self._router.route(self.positions, end, self._held, around)
+    def _plan_path(self, end: Positions) -> list[Leg] | Collision:
+        """Legs from the current configuration to another, clear of all resting bodies."""
+        self._restore_world()
+        obstacles = Obstacles(self._fixed, list(self.resting))
+        return self._motion.plan(self.positions, end, self._held, obstacles)
 
-    # Picking up.
+    # Grasping.
 
-    def _plan_pick(self, goal: ArmGoal) -> list[Leg] | str:
-        """Legs that end with one of the objects lifted."""
+    def _plan_grasp(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
+        """Legs that grasp and lift one of the goal's objects."""
         if self._hand is None or self._held is not None:
-            return NOTHING_TO_GRASP
-        hits: dict[str, None] = {}
+            return self._reject([], NOTHING_TO_GRASP, number)
+        collisions: list[Collision] = []
         for body in goal.objects:
             rest = self._rest_on_surface(body)
             if rest is None:
                 continue
-            for held, closed, lifted in self._takes(self._grips(self._hand, body), body, rest):
-                legs = self._pick(held, closed, lifted)
-                if not isinstance(legs, str):
-                    self._held = held
+            for candidate in self._grasp_candidates(
+                self._find_grasps(self._hand, body), body, rest
+            ):
+                legs = self._plan_lift(*candidate)
+                if not isinstance(legs, Collision):
+                    self._held = candidate[0]
                     del self.resting[body]
                     return legs
-                hits[legs] = None
-        return _what_hits(hits, NOTHING_TO_GRASP)
+                collisions.append(legs)
+        return self._reject(collisions, NOTHING_TO_GRASP, number)
 
-    def _takes(
-        self, grips: list[Grasp], body: str, rest: SE3
+    def _grasp_candidates(
+        self, grasps: list[Grasp], body: str, rest: SE3
     ) -> list[tuple[Held, Positions, Positions]]:
-        """Configurations at and above the narrowest grips, those soonest reached first."""
-        found = []
-        for grip in grips:
-            if grip.T_grasp_held is None or grip.opening > _NARROW * grips[0].opening:
+        """The narrowest grasps with configurations at and above them, least effort first."""
+        candidates = []
+        for grasp in grasps:
+            if grasp.T_grasp_held is None or grasp.opening > _NARROW * grasps[0].opening:
                 continue
-            for turn in (SE3(), _TURNED):
-                held = Held(body, turn @ grip.T_grasp_held, rest, grip.opening)
-                found += [(held, *stop) for stop in self._stops(held, self.resting[body])]
-        found.sort(key=lambda take: self._effort_s(*take[1:]))
-        return found[:_TAKES_MAX]
+            for turn in (SE3(), _HALF_TURN):
+                held = Held(body, turn @ grasp.T_grasp_held, rest, grasp.opening)
+                pairs = self._approach_pairs(held, self.resting[body])
+                candidates += [(held, *pair) for pair in pairs]
+        candidates.sort(key=lambda candidate: self._effort_s(*candidate[1:]))
+        return candidates[:_GRASPS_MAX]
 
-    def _grips(self, hand: Hand, body: str) -> list[Grasp]:
-        """Ways to hold a body as it lies, from above, across its narrow sides first."""
+    def _find_grasps(self, hand: Hand, body: str) -> list[Grasp]:
+        """Grasps of a resting body from above, the narrowest first."""
         T_world_held = self.resting[body]
         low, high = self._world.bounds_m(body)
         x, y = (float(v) for v in 0.5 * (low + high)[:2])
         bottom, top = float(low[2]), float(high[2])
         height = max(0.5 * (bottom + top), top - hand.palm_height_m())
         height = max(height, bottom + hand.tip_depth_m() + _FLOOR_GAP_M)
-        found = []
+        grasps = []
         for k in range(_YAWS):
             yaw = SE3.about_z(math.pi * k / _YAWS, (x, y, height))
-            grasp = hand.grasp_as_it_lies(body, (yaw @ _FLIP).inverse() @ T_world_held)
+            grasp = hand.grasp_in_place(body, (yaw @ _FLIP).inverse() @ T_world_held)
             if grasp is not None:
-                found.append(grasp)
-        self._restore()
-        return sorted(found, key=lambda grasp: grasp.opening)
+                grasps.append(grasp)
+        self._restore_world()
+        return sorted(grasps, key=lambda grasp: grasp.opening)
 
-    def _pick(self, held: Held, closed: Positions, lifted: Positions) -> list[Leg] | str:
-        """Open, come, close, lift; or what is hit."""
-        router = self._router
-        above, around = router.opened(lifted, 1.0), router.opened(closed, 1.0)
-        come, lift = Leg(above, around), Leg(closed, lifted, held=held)
-        self._restore()
-        hit = router.hit(come, self._touching()) or router.hit(lift, self._touching(held.body))
-        route = hit or self._route(above)
-        return route if isinstance(route, str) else [*route, come, Leg(around, closed), lift]
+    def _plan_lift(self, held: Held, closed: Positions, lifted: Positions) -> list[Leg] | Collision:
+        """Legs that open the gripper, approach, close and lift."""
+        motion = self._motion
+        above, around = motion.with_opening(lifted, 1.0), motion.with_opening(closed, 1.0)
+        approach, lift = Leg(above, around), Leg(closed, lifted, held=held)
+        self._restore_world()
+        collision = motion.first_collision(approach, self._contact_allowed())
+        collision = collision or motion.first_collision(lift, self._contact_allowed(held.body))
+        path = collision or self._plan_path(above)
+        return path if isinstance(path, Collision) else [*path, approach, Leg(around, closed), lift]
 
     def _rest_on_surface(self, body: str) -> SE3 | None:
-        """How a body stands on its surface; None if it stands on, leans on or carries others."""
+        """``T_surface_rest`` of a body that rests on a surface alone; None if it is not alone."""
         if body not in self.resting:
             return None
         pose = self.resting[body]
         surface = home_surface(self._surfaces, *self._world.bounds_m(body))
-        if surface is None or not self._stands(body):
+        if surface is None or not self._is_supported_by_fixed(body):
             return None
         height = pose.translation_m[2] - surface.T_world_surface.translation_m[2]
         return SE3((0.0, 0.0, height), pose.quaternion_wxyz)
 
-    # Putting down.
+    # Placing.
 
-    def _plan_place(self, goal: ArmGoal) -> list[Leg] | str:
-        """Legs that end with the empty hand above what was put down."""
+    def _plan_place(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
+        """Legs that place the held object and leave the open hand above it."""
         held = self._held
         if held is None:
-            return NOTHING_HELD
-        hits: dict[str, None] = {}
-        for T_world_rest, closed, above in self._spots(held, goal.pose_candidates):
+            return self._reject([], NOTHING_HELD, number)
+        collisions: list[Collision] = []
+        for T_world_rest, closed, above in self._place_candidates(held, goal.pose_candidates):
             legs = self._plan_release(held, T_world_rest, closed, above)
-            if not isinstance(legs, str):
+            if not isinstance(legs, Collision):
                 self.resting[held.body] = T_world_rest.rounded()
                 self._held = None
                 return legs
-            hits[legs] = None
-        return _what_hits(hits, NO_PLACE)
+            collisions.append(legs)
+        return self._reject(collisions, NO_PLACE, number)
 
-    def _spots(
+    def _place_candidates(
         self, held: Held, candidates: Sequence[SE3]
     ) -> Iterator[tuple[SE3, Positions, Positions]]:
-        """Where a body can be left, and configurations there and above, soonest reached first.
+        """Stable poses of the held body with configurations at and above them.
 
-        Candidates are looked at a few at a time, so that the first ones are preferred.
+        Candidates are examined in batches, so that early ones are preferred; least effort comes
+        first within a batch.
         """
-        for first in range(0, len(candidates), _SPOTS_AT_ONCE):
+        for first in range(0, len(candidates), _SPOTS_PER_BATCH):
             found = []
-            for spot in candidates[first : first + _SPOTS_AT_ONCE]:
+            for spot in candidates[first : first + _SPOTS_PER_BATCH]:
                 T_world_rest = spot @ held.T_surface_rest
-                if self._stays(held.body, T_world_rest):
-                    found += [(T_world_rest, *stop) for stop in self._stops(held, T_world_rest)]
-            found.sort(key=lambda stop: self._effort_s(*stop[1:]))
-            yield from found[:_PUTS_MAX]
+                if self._is_stable(held.body, T_world_rest):
+                    pairs = self._approach_pairs(held, T_world_rest)
+                    found += [(T_world_rest, *pair) for pair in pairs]
+            found.sort(key=lambda candidate: self._effort_s(*candidate[1:]))
+            yield from found[:_RELEASES_MAX]
 
     def _plan_release(
         self, held: Held, T_world_rest: SE3, closed: Positions, above: Positions
-    ) -> list[Leg] | str:
-        """Lower, open, leave; or what is hit."""
-        router = self._router
-        opened, away = router.opened(closed, 1.0), router.opened(above, 1.0)
+    ) -> list[Leg] | Collision:
+        """Legs that lower the held body, open the gripper and retreat."""
+        motion = self._motion
+        opened, away = motion.with_opening(closed, 1.0), motion.with_opening(above, 1.0)
         lower = Leg(above, closed, held=held)
-        release, leave = Leg(closed, opened), Leg(opened, away)
-        self._restore()
-        hit = router.hit(lower, self._touching())
+        release, retreat = Leg(closed, opened), Leg(opened, away)
+        self._restore_world()
+        collision = motion.first_collision(lower, self._contact_allowed())
         self._world.place(held.body, T_world_rest)
-        hit = hit or router.hit(release, self._touching(held.body))
-        hit = hit or router.hit(leave, self._touching(held.body))
-        route = hit or self._route(above)
-        return route if isinstance(route, str) else [*route, lower, release, leave]
+        for leg in (release, retreat):
+            collision = collision or motion.first_collision(leg, self._contact_allowed(held.body))
+        path = collision or self._plan_path(above)
+        return path if isinstance(path, Collision) else [*path, lower, release, retreat]
 
-    def _stays(self, body: str, T_world_rest: SE3) -> bool:
-        """Whether a body can be left at a pose: on a surface, apart from others, and at rest."""
-        self._restore()
+    def _is_stable(self, body: str, T_world_rest: SE3) -> bool:
+        """Whether a body stays at a pose: on a surface, apart from others, and at rest."""
+        self._restore_world()
         self._arm.show(self.positions)
         self._world.place(body, T_world_rest)
-        if not self._stands(body) or not is_within(self._surfaces, *self._world.bounds_m(body)):
+        if not self._is_supported_by_fixed(body) or not is_within(
+            self._surfaces, *self._world.bounds_m(body)
+        ):
             return False
-        self._world.step(_STAY_STEPS)
+        self._world.step(_STABLE_STEPS)
         moved_m = math.dist(self._world.pose(body).translation_m, T_world_rest.translation_m)
-        self._restore()
-        return moved_m < _STAY_M
+        self._restore_world()
+        return moved_m < _STABLE_M
 
-    # What all of them need.
+    # Shared by both.
 
-    def _stops(self, held: Held, T_world_held: SE3) -> list[tuple[Positions, Positions]]:
-        """Configurations with the fingers around a body, and drawn back from it."""
+    def _approach_pairs(self, held: Held, T_world_held: SE3) -> list[tuple[Positions, Positions]]:
+        """Pairs of configurations: with the fingers around a body, and retreated from it."""
         T_world_grasp = T_world_held @ held.T_grasp_held.inverse()
-        drawn_back = T_world_grasp @ SE3((0.0, 0.0, -_APPROACH_M))
-        stops = []
-        for closed in self._router.configurations(T_world_grasp, self.positions, held.opening):
-            above = self._router.near(drawn_back, closed)
+        retreated = T_world_grasp @ SE3((0.0, 0.0, -_APPROACH_M))
+        pairs = []
+        for closed in self._motion.configurations(T_world_grasp, self.positions, held.opening):
+            above = self._motion.nearest_configuration(retreated, closed)
             if above is not None:
-                stops.append((closed, above))
-        return stops
+                pairs.append((closed, above))
+        return pairs
 
     def _effort_s(self, closed: Positions, above: Positions) -> float:
-        effort_s = self._router.effort_s
+        effort_s = self._motion.effort_s
         return effort_s(self.positions, above) + 2.0 * effort_s(above, closed)
 
-    def _touching(self, body: str = "") -> Surroundings:
-        """Everything may be touched; a body that is taken up or was put down counts besides."""
+    def _contact_allowed(self, body: str = "") -> Obstacles:
+        """All obstacles without clearance; ``body``: the one that is grasped or was placed."""
         loose = [name for name in self.resting if name != body]
         if body and self._held is not None:
             loose.append(body)
-        return Surroundings(self._fixed, loose, clearance_m=0.0)
+        return Obstacles(self._fixed, loose, clearance_m=0.0)
 
-    def _stands(self, body: str) -> bool:
-        """Whether a body touches what is fixed and nothing that is loose."""
+    def _is_supported_by_fixed(self, body: str) -> bool:
+        """Whether a body touches a fixed body and no loose one."""
         others = [name for name in self.resting if name != body]
         apart = all(self._world.gap_m(body, o, _APART_M) >= _APART_M for o in others)
         return apart and any(
-            self._world.gap_m(body, name, _STANDS_M) < _STANDS_M for name in self._fixed
+            self._world.gap_m(body, name, _SUPPORT_GAP_M) < _SUPPORT_GAP_M for name in self._fixed
         )
 
-    def _held_upright(self, body: str, stance: ArmState) -> Held:
-        """What the arm holds from the beginning; put down, it stands upright."""
-        assert stance.T_world_held is not None
+    def _initial_held(self, body: str, state: ArmState) -> Held:
+        """The body that the arm holds from the beginning; it will be placed upright."""
+        assert state.T_world_held is not None
         self._world.place(body, SE3())
         bottom = float(self._world.bounds_m(body)[0][2])
-        T_grasp_held = self._arm.grasp_pose(stance.positions).inverse() @ stance.T_world_held
-        opening = gripper_opening(self._arm.robot, stance.positions)
+        T_grasp_held = self._arm.grasp_pose(state.positions).inverse() @ state.T_world_held
+        opening = gripper_opening(self._arm.robot, state.positions)
         return Held(body, T_grasp_held, SE3((0.0, 0.0, -bottom)), opening)
 
-    def _restore(self) -> None:
-        """Put everything back where it is."""
+    def _restore_world(self) -> None:
+        """Put the arm and all bodies back to where the legs planned so far leave them."""
         for name, pose in self.resting.items():
             self._world.place(name, pose)
         self._arm.show(self.positions)
@@ -310,17 +331,14 @@ class TaskPlanner:
             pose = self._arm.grasp_pose(self.positions) @ self._held.T_grasp_held
             self._world.place(self._held.body, pose)
 
-    def _rejection(self, why: str, number: int) -> Rejection:
+    def _reject(self, collisions: Sequence[Collision], otherwise: str, number: int) -> Rejection:
+        """The first collision as the reason; ``otherwise`` if there was none."""
+        reason = otherwise
+        if collisions:
+            obstacle = collisions[0].obstacle
+            reason = "it hits " + (obstacle if obstacle == ITSELF else f"'{obstacle}'")
         name = self._arm.articulation.name
         return Rejection(
-            f"arm '{name}' {why} at goal {number} of its way",
+            f"arm '{name}', goal {number} of its task: {reason}",
             f"other goals or more candidates for arm '{name}', or fewer objects around it (count)",
         )
-
-
-def _what_hits(hits: Mapping[str, None], otherwise: str) -> str:
-    """The first thing that was hit, else the reason given."""
-    named = [hit for hit in hits if hit != CANNOT_REACH]
-    if named:
-        return f"hits {named[0]}" if named[0] == "itself" else f"hits '{named[0]}'"
-    return CANNOT_REACH if hits else otherwise

@@ -1,4 +1,4 @@
-"""Where an arm may go: configurations for a pose of its hand, and free ways between them."""
+"""Motion planning: configurations that reach a pose, and collision-free paths between them."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.generator.physics.bullet import World
 from gen_data.generator.physics.manipulation.arm_goals import Arm
 from gen_data.generator.physics.manipulation.continuous_collision import (
+    Collision,
     CollisionSweep,
-    Surroundings,
+    Obstacles,
 )
 from gen_data.generator.physics.manipulation.inverse_kinematics import (
     EXACT,
@@ -25,13 +26,13 @@ from gen_data.generator.physics.manipulation.joint_trajectories import Held, Leg
 Positions = tuple[float, ...]
 
 _SOLUTIONS_MAX = 4
-_LED_STEPS = 5
+_GUIDE_STEPS = 5
 _RISES_M = (0.10, 0.20, 0.35)
-"""Of the hand on its detours, above the higher end of a way."""
+"""Heights of the hand on detours, above the higher end of the path."""
 
 
 class MotionPlanner:
-    """Finds configurations of an arm and ways between them that hit nothing."""
+    """Finds configurations of an arm and collision-free paths between them."""
 
     def __init__(self, arm: Arm, world: World) -> None:
         self._arm = arm
@@ -41,14 +42,14 @@ class MotionPlanner:
         self._T_base_world = arm.articulation.T_world_base.inverse()
         self._is_arm = [is_arm_joint(joint, arm.robot) for joint in arm.robot.movable]
 
-    def opened(self, positions: Sequence[float], opening: float) -> Positions:
-        """The same positions with another opening of the gripper."""
-        return all_positions(self._robot, self._of_arm(positions), opening)
+    def with_opening(self, positions: Sequence[float], opening: float) -> Positions:
+        """The same configuration of the arm with another opening of the gripper in [0, 1]."""
+        return all_positions(self._robot, self._arm_positions(positions), opening)
 
     def configurations(
         self, T_world_grasp: SE3, start: Positions, opening: float
     ) -> list[Positions]:
-        """Positions that put the hand at a pose, those soonest reached first; may be empty."""
+        """Positions that put the grasp frame at a pose, least effort first; may be empty."""
         if self._chain is None:
             return []
         target = self._T_base_world @ T_world_grasp
@@ -63,56 +64,55 @@ class MotionPlanner:
                 found[round_positions(all_positions(self._robot, exact, opening))] = None
         return sorted(found, key=lambda end: self.effort_s(start, end))
 
-    def near(self, T_world_grasp: SE3, positions: Positions) -> Positions | None:
-        """The same configuration with the hand at a pose that is near, or None."""
+    def nearest_configuration(self, T_world_grasp: SE3, positions: Positions) -> Positions | None:
+        """The solution for a pose that descent from ``positions`` finds; None if it finds none."""
         if self._chain is None:
             return None
         target = self._T_base_world @ T_world_grasp
-        exact = solve_near(self._chain, target, self._of_arm(positions), EXACT)
+        exact = solve_near(self._chain, target, self._arm_positions(positions), EXACT)
         if exact is None:
             return None
-        moved = iter(exact)
+        remaining = iter(exact)
         return round_positions(
             [
-                next(moved) if is_arm else position
+                next(remaining) if is_arm else position
                 for is_arm, position in zip(self._is_arm, positions, strict=True)
             ]
         )
 
     def effort_s(self, start: Positions, end: Positions) -> float:
-        """Time that the slowest joint needs at full speed, and a little for each of the others."""
+        """Time of the slowest joint at full speed, plus a tenth of the sum over all joints [s]."""
         times = [
             abs(b - a) / speed_max(joint)
             for joint, a, b in zip(self._robot.movable, start, end, strict=True)
         ]
         return max(times) + 0.1 * sum(times)
 
-    def hit(self, leg: Leg, around: Surroundings) -> str:
-        """Name of what a leg hits first; empty if it is free."""
-        return self._sweep.hit(leg, around)
+    def first_collision(self, leg: Leg, obstacles: Obstacles) -> Collision | None:
+        """The first collision along a leg; None if it is free."""
+        return self._sweep.first_collision(leg, obstacles)
 
-    def route(
-        self, start: Positions, end: Positions, held: Held | None, around: Surroundings
-    ) -> list[Leg] | str:
-        """Free legs from one configuration to another, or what the straight way hits."""
+    def plan(
+        self, start: Positions, end: Positions, held: Held | None, obstacles: Obstacles
+    ) -> list[Leg] | Collision:
+        """Free legs from one configuration to another, or the collision on the direct leg."""
         direct = Leg(start, end, held=held)
-        hit = self.hit(direct, around)
-        if not hit:
+        collision = self.first_collision(direct, obstacles)
+        if collision is None:
             return [direct]
-        for middle in self._detours(start, end):
-            stops = [start, *middle, end]
-            legs = [Leg(a, b, held=held) for a, b in pairwise(stops)]
-            if not any(self.hit(leg, around) for leg in legs):
+        for via in self._detours(start, end):
+            legs = [Leg(a, b, held=held) for a, b in pairwise([start, *via, end])]
+            if not any(self.first_collision(leg, obstacles) for leg in legs):
                 return legs
-        return hit
+        return collision
 
     def _detours(self, start: Positions, end: Positions) -> Iterator[list[Positions]]:
-        """Configurations to pass through: the hand raised over both ends, then home."""
+        """Lists of via points: the hand raised over both ends, then the home configuration."""
         one, other = self._arm.grasp_pose(start), self._arm.grasp_pose(end)
         top_m = max(one.translation_m[2], other.translation_m[2])
         for rise_m in _RISES_M:
-            first = self.near(_at_height(one, top_m + rise_m), start)
-            last = self.near(_at_height(other, top_m + rise_m), end)
+            first = self.nearest_configuration(_at_height(one, top_m + rise_m), start)
+            last = self.nearest_configuration(_at_height(other, top_m + rise_m), end)
             if first is not None and last is not None:
                 yield [first, last]
         home = [
@@ -122,16 +122,20 @@ class MotionPlanner:
         yield [round_positions(home)]
 
     def _follow_hand(self, T_world_grasp: SE3, start: Positions) -> list[float]:
-        """Arm positions near a pose that a hand led there from a start ends with."""
+        """Arm positions near a pose, by following a straight motion of the hand from a start.
+
+        They stay in the start's branch of solutions, which makes for a short path.
+        """
         assert self._chain is not None
-        way = Trajectory("hand", 1.0, (self._arm.grasp_pose(start), T_world_grasp))
-        positions = self._of_arm(start)
-        for k in range(1, _LED_STEPS):
-            target = self._T_base_world @ way.pose(k / _LED_STEPS)
+        motion = Trajectory("hand", 1.0, (self._arm.grasp_pose(start), T_world_grasp))
+        positions = self._arm_positions(start)
+        for k in range(1, _GUIDE_STEPS):
+            target = self._T_base_world @ motion.pose(k / _GUIDE_STEPS)
             positions = list(solve_near(self._chain, target, positions, 1.0) or positions)
         return positions
 
-    def _of_arm(self, positions: Sequence[float]) -> list[float]:
+    def _arm_positions(self, positions: Sequence[float]) -> list[float]:
+        """Positions of the arm joints among those of all movable joints."""
         return [p for p, is_arm in zip(positions, self._is_arm, strict=True) if is_arm]
 
 

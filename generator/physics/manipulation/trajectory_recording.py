@@ -1,4 +1,4 @@
-"""From legs to tracks: where every body is at even steps of time, while arms move in turn."""
+"""Trajectories of bodies from the legs of arms, sampled at even steps of time."""
 
 from __future__ import annotations
 
@@ -8,14 +8,21 @@ from gen_data.generator.core.kinematics import link_poses
 from gen_data.generator.core.motion import JointTrajectory, Trajectory
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.physics.manipulation.arm_goals import Arm
-from gen_data.generator.physics.manipulation.joint_trajectories import STEP_S, Leg, sample_times
+from gen_data.generator.physics.manipulation.joint_trajectories import (
+    STEP_S,
+    Leg,
+    sample_positions,
+)
 
 
 class TrajectoryRecording:
-    """Poses of everything that moves, knot by knot; the first knot is at time 0.
+    """Records the poses of all moving bodies, knot by knot; the first knot is at time 0.
 
     Args:
-        resting: ``{name: T_world_body}`` of what may be moved, at time 0.
+        resting: ``{name: T_world_body}`` of all movable bodies at time 0.
+
+    Attributes:
+        joint_tracks: ``{articulation: trajectory of its joints}``.
     """
 
     def __init__(self, resting: dict[str, SE3]) -> None:
@@ -26,14 +33,14 @@ class TrajectoryRecording:
         self.joint_tracks: dict[str, JointTrajectory] = {}
 
     def add(self, arm: Arm, legs: Sequence[Leg], parts: Sequence[str]) -> None:
-        """An arm passes its legs, after all that was added before.
+        """Record the legs of an arm after everything recorded so far.
 
         Args:
             arm: The robot.
-            legs: Timed.
-            parts: The links that have a body in the scene.
+            legs: Timed legs.
+            parts: Links with a body in the scene.
         """
-        knots = sample_times(legs)
+        knots = sample_positions(legs)
         if not knots:
             return
         start = self._knot
@@ -51,7 +58,7 @@ class TrajectoryRecording:
         )
 
     def tracks(self) -> tuple[Trajectory, ...]:
-        """One track per body that moved; each body is at rest before and after its own."""
+        """One trajectory per body that moved; each body is at rest before and after its own."""
         return tuple(
             Trajectory(body, STEP_S, tuple(poses), round(self._starts[body] * STEP_S, 6))
             for body, poses in self._poses.items()
@@ -59,11 +66,12 @@ class TrajectoryRecording:
         )
 
     def _add_knot(self, body: str, number: int, pose: SE3) -> None:
-        """The pose of a body at a knot; since its last knot, or the one before, it has rested."""
+        """Record the pose of a body at a knot; it was at rest since its previous knot."""
         if body not in self._poses:
-            rested = body in self._resting and number > 0
-            self._starts[body] = number - 1 if rested else number
-            self._poses[body] = [self._resting[body]] if rested else []
+            # A body that was at rest gets a knot there, one step before it starts to move.
+            at_rest = body in self._resting and number > 0
+            self._starts[body] = number - 1 if at_rest else number
+            self._poses[body] = [self._resting[body]] if at_rest else []
         poses = self._poses[body]
         missing = number - self._starts[body] - len(poses)
         if missing >= 0:

@@ -1,4 +1,4 @@
-"""Exposure: what a camera's meter says, and the time and gain by which it is reached."""
+"""Exposure: metering, and the exposure time and gain that achieve an exposure value."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.se3 import Array
 
 _MIDDLE_GREY = 0.18
-# A 30th of a second at f/1.4 and ISO 3200, to snow in the sun: beyond, an automatic exposure stays
-# where it is, so that night stays night.
+# From 1/30 s at f/1.4 and ISO 3200 to sunlit snow. Automatic exposure stops there, so that night
+# scenes stay dark.
 _EV100_RANGE = (1.0, 17.0)
 _METERED_EVERY = 4
 
 
 class ExposureControl(Strict):
-    """How an image sensor's exposure is reached: long first, then with gain.
+    """Limits of exposure control: the time is lengthened first, then the gain raised.
 
     Attributes:
         f_number: Of the aperture.
-        time_s: Shortest and longest exposure.
-        iso: Base and highest speed.
+        time_s: Shortest and longest exposure time.
+        iso: Base and highest ISO speed.
     """
 
     f_number: float = Field(2.0, ge=0.7, le=64)
@@ -43,12 +43,12 @@ class ExposureControl(Strict):
 
 @dataclass(frozen=True, slots=True)
 class ExposureSettings:
-    """How a photograph is exposed.
+    """Exposure of a photograph.
 
     Attributes:
-        time_s: How long.
+        time_s: Exposure time.
         gain: ISO over base ISO.
-        ev100: Exposure value at ISO 100 that this amounts to.
+        ev100: Resulting exposure value at ISO 100.
     """
 
     time_s: float
@@ -64,7 +64,7 @@ def saturation_cd_m2(ev100: float) -> float:
     return float(1.2 * 2.0**ev100)
 
 
-def metered_ev100(radiance: Float32) -> float:
+def meter_ev100(radiance: Float32) -> float:
     """The exposure value that puts the centre-weighted log-average luminance at middle grey.
 
     Source: Reinhard et al., "Photographic tone reproduction for digital images", 2002.
@@ -78,19 +78,19 @@ def metered_ev100(radiance: Float32) -> float:
     brightest = float(levels.max(initial=0.0))
     if brightest <= 0.0:
         return _EV100_RANGE[0]
-    # Black pixels (a missing background) say nothing about the light. A lamp in the picture is no
-    # measure of black.
+    # Black pixels (a missing background) are left out. "Black" is relative to a quantile, as the
+    # maximum would depend on lamps in the image.
     bright = float(np.quantile(levels[levels > 0.0], 0.95))
     counted = levels > 1e-4 * bright
     logs = np.log2(levels[counted])
     average = float((logs * weights[counted]).sum() / weights[counted].sum())
     ev100 = average - math.log2(1.2 * _MIDDLE_GREY)
-    # On a grid, so that the last bit of a logarithm is never seen.
+    # On a grid, as the last bit of a logarithm differs between processors.
     return round(min(max(ev100, _EV100_RANGE[0]), _EV100_RANGE[1]) * 256.0) / 256.0
 
 
 def exposure_settings(ev100: float, control: ExposureControl) -> ExposureSettings:
-    """The exposure nearest to an exposure value: time first, then gain, within what there is.
+    """The exposure nearest to an exposure value within the limits: time first, then gain.
 
     ``2^EV100 = N^2 / t * 100 / ISO`` (ISO 12232).
     """

@@ -1,4 +1,4 @@
-"""Lens flare: ghosts, which are reflections between the surfaces of a lens."""
+"""Lens flare: ghosts by reflections between the surfaces of a lens."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ _GHOSTS = (
     (-0.8, 0.05, (1.0, 0.5, 0.5)),
     (0.5, 0.03, (0.5, 0.6, 1.0)),
 )
-"""Ghosts of a bright spot: place on the line through the centre, radius over width, tint."""
+"""Ghosts: position of the spot scaled about the image's centre, radius over width, tint."""
 
 
 def add_flare(image: Float32, share: float, white: float) -> Float32:
-    """The image with ghosts of light far beyond white, mirrored about the centre of the image.
+    """Add ghosts of light far beyond white, on a line through the centre of the image.
 
     Args:
         image: Linear, float32 [h, w, 3].
-        share: Of the light beyond white that returns as ghosts.
+        share: Share of the light beyond white that returns as ghosts.
         white: The value that saturates the sensor.
     """
     beyond = np.maximum(image - 4.0 * white, 0.0)
@@ -37,7 +37,7 @@ def add_flare(image: Float32, share: float, white: float) -> Float32:
                 [0.0, place, (1.0 - place) * 0.5 * (height - 1)],
             ]
         )
-        # Shrunk images gather the light of what they shrink.
+        # Shrinking averages the light of the pixels that it merges.
         ghost = cv2.warpAffine(beyond, shift, (width, height), flags=cv2.INTER_AREA)
         ghost = _gaussian(ghost, radius * width)
         out += share * place * place * ghost * np.asarray(tint, np.float32)
@@ -45,7 +45,7 @@ def add_flare(image: Float32, share: float, white: float) -> Float32:
 
 
 def _gaussian(image: Float32, sigma_px: float) -> Float32:
-    """A wide blur at a coarse scale: smooth images need few pixels."""
+    """Blur an image by a wide Gaussian at reduced resolution, which suffices for smooth images."""
     halvings = max(0, int(math.log2(max(sigma_px, 1.0) / 2.0)))
     small = image
     for _ in range(halvings):

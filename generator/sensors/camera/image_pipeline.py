@@ -1,4 +1,4 @@
-"""The image pipeline: every stage from radiance to the bytes of a photograph, in order."""
+"""Image pipeline: all stages from radiance to the bytes of a photograph, in order."""
 
 from __future__ import annotations
 
@@ -29,27 +29,26 @@ from gen_data.generator.sensors.camera.exposure import (
     ExposureControl,
     ExposureSettings,
     exposure_settings,
-    metered_ev100,
+    meter_ev100,
     saturation_cd_m2,
 )
 from gen_data.generator.sensors.camera.flare import add_flare
 from gen_data.generator.sensors.camera.glare import add_glare
 from gen_data.generator.sensors.camera.image_sensor import ImageSensor, expose, filter_at, mosaic
-from gen_data.generator.sensors.camera.jpeg import through_jpeg
 from gen_data.generator.sensors.camera.lens_drops import lens_drops, refract_in_drops
 from gen_data.generator.sensors.camera.presets import camera_preset
-from gen_data.generator.sensors.camera.tone import Tone, display_values, to_bytes, toned_bytes
+from gen_data.generator.sensors.camera.tone import Tone, display_values, to_bytes, tone_to_bytes
 
 NONE = Constant(0.0)
 Row = tuple[float, float, float]
 
 
 class Focus(Strict):
-    """A lens that is sharp at one distance only.
+    """Focus of a lens with a finite depth of field.
 
     Attributes:
-        distance_m: Where it is sharp; null = at the depth in the middle of the image.
-        pixel_um: Size of a photosite: with the focal length in pixels it gives that of the lens.
+        distance_m: Focus distance; null = the median depth in the middle of the image.
+        pixel_um: Pixel pitch, which converts the focal length from pixels to metres.
     """
 
     distance_m: Positive | None = None
@@ -57,36 +56,35 @@ class Focus(Strict):
 
 
 class ImagePipeline(Strict):
-    """How a photograph comes about; a stage that is left out does nothing.
+    """Stages from radiance to a photograph; a stage that is left out has no effect.
 
     Attributes:
-        preset: A camera of ``generator/sensors/camera/presets``, whose values hold where none is
-            given; ``ideal`` has an exposure and a tone curve, and no errors of lens or sensor.
-        focus: Depth of field.
+        preset: A camera of ``generator/sensors/camera/presets``, which provides defaults for all
+            other keys; ``ideal`` has an exposure and a tone curve, and no errors.
+        focus: Depth of field; null = everything is sharp.
         flare: Share of the light far beyond white that returns as ghosts.
         glare: Share of all light that the lens scatters around its source; 0.02 suits a clean
             lens, 0.1 a dirty one.
-        chromatic_aberration_px: Between red and blue images and the green one, at the corners.
-        natural_vignetting: Whether light falls off with the angle to the axis: with the fourth
-            power of its cosine, and as ``fisheye_pupil`` says before a fisheye.
-        fisheye_pupil: Power of the cosine by which a fisheye's pupil is foreshortened: 0 turns to
-            the light, 1 is flat.
-        vignetting: Share of the light that the barrel takes at the corners.
+        chromatic_aberration_px: Shift of red and blue against green at the corners.
+        natural_vignetting: Whether illumination falls with the angle to the axis: with the fourth
+            power of its cosine, for fisheyes as ``fisheye_pupil`` defines.
+        fisheye_pupil: Power of the cosine of a fisheye's pupil: 0 turns to the light, 1 is flat.
+        vignetting: Share of the light that the barrel blocks at the corners.
         exposure_compensation_ev: Added to the exposure, in stops; positive is brighter.
         exposure_error_ev: Error of metering, in stops; positive is brighter.
-        exposure_control: Aperture, times and gains of an image sensor; without one, every exposure
-            is reached.
+        exposure_control: Limits of aperture, time and gain of an image sensor; without a sensor
+            every exposure is possible.
         image_sensor: The sensor; null = an ideal one.
-        color_matrix: Rows of linear sRGB from white-balanced raw colours; rows sum to 1.
-        white_balance: Share of the light's colour that is taken out, by the grey-world assumption.
+        color_matrix: Matrix from white-balanced raw colours to linear sRGB; rows sum to 1.
+        white_balance: Share of the illuminant's colour to correct, by the grey-world assumption.
         warmth_ev: Error of the white balance: red over blue, in stops.
-        demosaic: Method.
-        saturation: Factor on colour.
-        tone: Curve, see ``generator/sensors/camera/tone.py``; ``log`` is for sensors of several
-            exposures.
+        demosaic: Method of demosaicing.
+        saturation: Factor on saturation.
+        tone: Tone curve, see ``generator/sensors/camera/tone.py``; ``log`` is for sensors with
+            several exposures.
         sharpening: Amount of unsharp masking.
-        sharpening_px: Its radius.
-        jpeg_quality: Of compression, 1 to 100; null = none.
+        sharpening_px: Radius of unsharp masking.
+        jpeg_quality: Quality of compression, 1 to 100; null = none.
     """
 
     former_keys: ClassVar[Mapping[str, str]] = {
@@ -120,12 +118,12 @@ class ImagePipeline(Strict):
     @model_validator(mode="before")
     @classmethod
     def _with_preset(cls, given: Any) -> Any:
-        """The preset's values below those that are given."""
+        """Complete the given values from the preset."""
         if not isinstance(given, Mapping):
             return given
         preset = given.get("preset", "ideal")
         below = camera_preset(preset) if isinstance(preset, str) else {}
-        return _with_tuples(_merged(below, given))
+        return _lists_to_tuples(_merge_presets(below, given))
 
     @model_validator(mode="after")
     def _keeps_grey(self) -> ImagePipeline:
@@ -137,22 +135,22 @@ class ImagePipeline(Strict):
 
     @property
     def headroom(self) -> float:
-        """Of the sensor: the largest value that it reads, where 1 saturates one exposure."""
+        """Largest value of the sensor, where 1 saturates a single exposure."""
         sensor = self.image_sensor
         return 1.0 if sensor is None else sensor.exposure_ratio ** (sensor.exposures - 1)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Shot:
-    """One photograph, as its stages know it.
+    """Inputs that all stages of a photograph share.
 
     Attributes:
         pipeline: The camera's configuration.
-        camera: Where it is, and its lens.
+        camera: Pose and lens.
         radiance: As rendered, float32 [h, w, 3].
-        weather: Drops on the lens.
-        depth_m: Along the optical axis or, before a lens that is no pinhole, along the ray [h, w];
-            inf = nothing. None where no stage reads it.
+        weather: Source of drops on the lens.
+        depth_m: [h, w], along the optical axis for pinholes, else along the ray; inf = nothing.
+            None if no stage needs it.
         exposure: As set or metered.
         rng: Draws parameters and noise.
     """
@@ -181,7 +179,7 @@ class Light:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Photograph:
-    """An image as a camera writes it.
+    """An image as a camera outputs it.
 
     Attributes:
         rgb: sRGB, uint8 [h, w, 3].
@@ -200,11 +198,11 @@ def capture_photograph(
     pipeline: ImagePipeline,
     rng: Rng,
 ) -> SensorReading:
-    """The renderer's channels of a camera and, if RGB is asked for, its photograph."""
+    """Render the channels of a camera and, if RGB is among them, develop its photograph."""
     if Channel.RGB not in channels:
         return renderer.render(scene, camera, channels)
     needed = (channels - {Channel.RGB}) | {Channel.RADIANCE}
-    # Wide lenses see what has no depth along the axis, and are focused at a distance.
+    # Points beside a wide lens have no depth along its axis: it is focused by range.
     depth = Channel.Z_DEPTH if camera.intrinsics.straight else Channel.RANGE
     if pipeline.focus is not None:
         needed = needed | {depth}
@@ -224,17 +222,17 @@ def develop(
     pipeline: ImagePipeline,
     rng: Rng,
 ) -> Photograph:
-    """The photograph of an image of radiance: metering, then all of ``STAGES`` in order.
+    """Develop a photograph: meter the exposure, then apply all of ``STAGES`` in order.
 
     Args:
         radiance: Linear Rec. 709 colours [cd/m^2], float32 [h, w, 3].
-        depth_m: As of ``Shot``; read only where the pipeline has a focus.
-        camera: Its lens, and its exposure value where that is fixed.
-        weather: Drops on the lens.
+        depth_m: As in ``Shot``; needed only by a pipeline with a focus.
+        camera: Lens, and exposure value if that is fixed.
+        weather: Source of drops on the lens.
         pipeline: The camera's configuration.
         rng: Draws parameters and noise.
     """
-    ev100 = metered_ev100(radiance) if camera.ev100 is None else camera.ev100
+    ev100 = meter_ev100(radiance) if camera.ev100 is None else camera.ev100
     wanted = ev100 - pipeline.exposure_compensation_ev.draw(rng)
     wanted -= pipeline.exposure_error_ev.draw(rng)
     exposure = ExposureSettings(0.0, 1.0, wanted)
@@ -247,7 +245,7 @@ def develop(
     return Photograph(_compress(_tone(light, shot), shot), ev100)
 
 
-def _wet_lens(light: Light, shot: Shot) -> Light:
+def _lens_drops(light: Light, shot: Shot) -> Light:
     drops = lens_drops(shot.weather, shot.camera)
     return replace(light, values=refract_in_drops(light.values, drops)) if len(drops) else light
 
@@ -264,7 +262,7 @@ def _defocus(light: Light, shot: Shot) -> Light:
         shot.depth_m, max(focus_m, 2.0 * focal_m), focal_m,
         shot.pipeline.exposure_control.f_number, focus.pixel_um * 1e-6,
     )  # fmt: skip
-    return replace(light, values=optics.defocused(light.values, radius_px))
+    return replace(light, values=optics.defocus(light.values, radius_px))
 
 
 def _flare(light: Light, shot: Shot) -> Light:
@@ -283,12 +281,12 @@ def _chromatic_aberration(light: Light, shot: Shot) -> Light:
     corner_px = shot.pipeline.chromatic_aberration_px.draw(shot.rng)
     if corner_px == 0.0:
         return light
-    return replace(light, values=optics.with_chromatic_aberration(light.values, corner_px))
+    return replace(light, values=optics.apply_chromatic_aberration(light.values, corner_px))
 
 
 def _vignetting(light: Light, shot: Shot) -> Light:
     loss = shot.pipeline.vignetting.draw(shot.rng)
-    values = optics.vignetted(light.values, loss) if loss > 0.0 else light.values
+    values = optics.apply_vignetting(light.values, loss) if loss > 0.0 else light.values
     if shot.pipeline.natural_vignetting:
         falloff = optics.natural_falloff(shot.camera.intrinsics, shot.pipeline.fisheye_pupil)
         values = values * falloff[..., None]
@@ -296,7 +294,7 @@ def _vignetting(light: Light, shot: Shot) -> Light:
 
 
 def _image_circle(light: Light, shot: Shot) -> Light:
-    """No light where the lens shows nothing; what spreads, spreads beyond."""
+    """Black out pixels outside the lens's field, into which earlier stages spread light."""
     lens = shot.camera.intrinsics
     if lens.straight or light.values is shot.radiance:
         return light
@@ -305,7 +303,7 @@ def _image_circle(light: Light, shot: Shot) -> Light:
 
 
 def _image_sensor(light: Light, shot: Shot) -> Light:
-    """Numbers of the sensor, white-balanced and demosaiced, as linear sRGB in which 1 is white."""
+    """Linear sRGB with white 1, from the sensor's values: white balance, then demosaicing."""
     pipeline, sensor = shot.pipeline, shot.pipeline.image_sensor
     if sensor is None:
         return _white_balance(light, shot)
@@ -318,12 +316,12 @@ def _image_sensor(light: Light, shot: Shot) -> Light:
         gains = isp.white_balance_gains(image, share, warmth_ev)
         raw = raw * gains[filter_at(sensor.pattern, *raw.shape)]
     white = 2.0 * pipeline.headroom
-    image = isp.demosaiced(raw, sensor.pattern, pipeline.demosaic, white)
+    image = isp.demosaic(raw, sensor.pattern, pipeline.demosaic, white)
     return Light(image @ srgb_from_camera.T, 1.0)
 
 
 def _white_balance(light: Light, shot: Shot) -> Light:
-    """The white balance of an ideal sensor, in the camera's colours."""
+    """White balance of an ideal sensor, in the camera's colour space."""
     pipeline = shot.pipeline
     share, warmth_ev = pipeline.white_balance.draw(shot.rng), pipeline.warmth_ev.draw(shot.rng)
     if share == 0.0 and warmth_ev == 0.0:
@@ -336,13 +334,17 @@ def _white_balance(light: Light, shot: Shot) -> Light:
 
 def _saturation(light: Light, shot: Shot) -> Light:
     factor = shot.pipeline.saturation.draw(shot.rng)
-    return light if factor == 1.0 else replace(light, values=isp.saturated(light.values, factor))
+    return (
+        light
+        if factor == 1.0
+        else replace(light, values=isp.scale_saturation(light.values, factor))
+    )
 
 
 Stage = Callable[[Light, Shot], Light]
 
 STAGES: tuple[Stage, ...] = (
-    _wet_lens,
+    _lens_drops,
     _defocus,
     _flare,
     _glare,
@@ -356,22 +358,22 @@ STAGES: tuple[Stage, ...] = (
 
 
 def _tone(light: Light, shot: Shot) -> NDArray[np.uint8]:
-    """Bytes; sharpening is done on display values."""
+    """Apply sharpening, on display values, and the tone curve."""
     pipeline, scale = shot.pipeline, 1.0 / light.white
     amount = pipeline.sharpening.draw(shot.rng)
     if amount <= 0.0:
-        return toned_bytes(light.values, scale, pipeline.tone, pipeline.headroom)
+        return tone_to_bytes(light.values, scale, pipeline.tone, pipeline.headroom)
     display = display_values(light.values * np.float32(scale), pipeline.tone, pipeline.headroom)
-    return to_bytes(isp.sharpened(display, amount, pipeline.sharpening_px))
+    return to_bytes(isp.sharpen(display, amount, pipeline.sharpening_px))
 
 
 def _compress(image: NDArray[np.uint8], shot: Shot) -> NDArray[np.uint8]:
     quality = shot.pipeline.jpeg_quality
-    return image if quality is None else through_jpeg(image, round(quality.draw(shot.rng)))
+    return image if quality is None else isp.compress_jpeg(image, round(quality.draw(shot.rng)))
 
 
 def _color_matrices(pipeline: ImagePipeline) -> tuple[Float32, Float32]:
-    """Camera colours from linear sRGB, and back, float32 [3, 3]."""
+    """Matrices from linear sRGB to camera colours and back, float32 [3, 3] each."""
     if pipeline.color_matrix is None:
         return np.eye(3, dtype=np.float32), np.eye(3, dtype=np.float32)
     back = np.array(pipeline.color_matrix)
@@ -379,26 +381,26 @@ def _color_matrices(pipeline: ImagePipeline) -> tuple[Float32, Float32]:
 
 
 def _centre_m(depth_m: NDArray[np.floating]) -> float:
-    """Median depth of the middle ninth of an image; 1 km where nothing is there."""
+    """Median depth of the middle ninth of an image; 1 km if it is empty."""
     height, width = depth_m.shape
     middle = depth_m[height // 3 : height - height // 3, width // 3 : width - width // 3]
     there = middle[np.isfinite(middle)]
     return float(np.median(there)) if len(there) else 1000.0
 
 
-def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of both, the upper ones first; mappings that name models are merged within."""
+def _merge_presets(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """Merge values over those of a preset; sub-models are merged key by key."""
     merged = dict(below)
     for key, value in above.items():
         under = merged.get(key)
         both = isinstance(value, Mapping) and isinstance(under, Mapping)
         inner = both and key in ("focus", "exposure_control", "image_sensor")
-        merged[key] = _merged(under, value) if inner else value  # type: ignore[arg-type]
+        merged[key] = _merge_presets(under, value) if inner else value  # type: ignore[arg-type]
     return merged
 
 
-def _with_tuples(value: Any) -> Any:
-    """YAML knows only lists; what passes through Python must say what it means."""
+def _lists_to_tuples(value: Any) -> Any:
+    """Replace lists, as YAML has them, by tuples, as strict validation requires them."""
     if isinstance(value, Mapping):
-        return {key: _with_tuples(item) for key, item in value.items()}
-    return tuple(map(_with_tuples, value)) if isinstance(value, list) else value
+        return {key: _lists_to_tuples(item) for key, item in value.items()}
+    return tuple(map(_lists_to_tuples, value)) if isinstance(value, list) else value

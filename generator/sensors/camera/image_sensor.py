@@ -1,4 +1,4 @@
-"""The image sensor: from light to numbers, with the noise of photons, pixels and reading.
+"""Image sensor: digital numbers from light, with photon, pixel and read noise.
 
 The model is that of EMVA standard 1288: electrons are Poisson around light times response plus dark
 current times time; a gain, read noise and a converter of so many bits follow.
@@ -28,21 +28,20 @@ Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class ImageSensor(Strict):
-    """An image sensor's data sheet.
+    """Data sheet of an image sensor.
 
     Attributes:
-        pattern: Colours of its filters, first row then second; ``mono`` = none.
-        full_well_e: Electrons that saturate a photosite at base gain.
-        read_noise_e: Standard deviation of a reading of nothing, at base gain.
-        read_noise_high_e: The same at the highest gain; between them it falls with the gain.
-        dark_current_e_s: Electrons per second that come without light.
-        prnu: Standard deviation of the photosites' response about 1.
-        dsnu_e: Standard deviation of the photosites' dark level.
-        hot_pixels: Share of photosites with two hundred times the dark current.
-        bits: Of the converter.
-        exposures: Readings at falling exposure that are joined to one of high range.
-        exposure_ratio: Between one of them and the next.
-        device_seed: Which piece of its kind: its fixed pattern.
+        pattern: Colour filter array, first row then second; ``mono`` = no filters.
+        full_well_e: Full-well capacity at base gain [electrons].
+        read_noise_e: Standard deviation of the read noise [electrons].
+        dark_current_e_s: Dark current [electrons per second].
+        prnu: Photo-response non-uniformity: standard deviation of the gain of pixels about 1.
+        dsnu_e: Dark-signal non-uniformity: standard deviation of the offset [electrons].
+        hot_pixels: Share of pixels with two hundred times the dark current.
+        bits: Resolution of the analogue-digital converter.
+        exposures: Number of exposures merged into one of high dynamic range.
+        exposure_ratio: Ratio of each exposure to the next shorter one.
+        device_seed: Seed of the fixed pattern: one per individual device.
     """
 
     pattern: Pattern = "rggb"
@@ -59,11 +58,11 @@ class ImageSensor(Strict):
 
 
 def mosaic(image: Float32, pattern: Pattern) -> Float32:
-    """What photosites behind their filters receive, float32 [h, w].
+    """Light on pixels behind their colour filters, float32 [h, w].
 
     Args:
         image: Linear response of the three filters, float32 [h, w, 3].
-        pattern: Filters; ``mono`` takes luminance.
+        pattern: Colour filter array; ``mono`` takes luminance.
     """
     if pattern == "mono":
         return np.asarray(luminance(image), np.float32)
@@ -74,7 +73,7 @@ def mosaic(image: Float32, pattern: Pattern) -> Float32:
 
 
 def filter_at(pattern: Pattern, height: int, width: int) -> NDArray[np.intp]:
-    """Number of the colour of every photosite's filter [h, w]; 1 everywhere for ``mono``."""
+    """Channel of every pixel's filter, [h, w]; 1 everywhere for ``mono``."""
     filters = np.ones((height, width), np.intp)
     if pattern != "mono":
         for k, channel in enumerate(_FILTERS[pattern]):
@@ -83,34 +82,36 @@ def filter_at(pattern: Pattern, height: int, width: int) -> NDArray[np.intp]:
 
 
 def expose(light: Float32, gain: float, time_s: float, sensor: ImageSensor, rng: Rng) -> Float32:
-    """Numbers of the converter for light on the photosites, float32 [h, w]; 1 = saturated.
+    """Digital values of an exposure, float32 [h, w]; 1 = saturated.
 
     Args:
-        light: 1 saturates the photosites at this gain; any range.
+        light: Light on pixels; 1 saturates them at this gain; any range.
         gain: ISO over base ISO, 1 or more: the well is used up to ``full_well_e / gain``.
-        time_s: How long it is exposed.
-        sensor: Its data sheet.
+        time_s: Exposure time.
+        sensor: Data sheet.
         rng: Draws the noise.
 
     Returns:
-        Linear values from 0; above 1 only where several exposures are joined.
+        Linear values from 0; above 1 only with several exposures.
     """
-    joined = _reading(light, gain, time_s, sensor, rng)
+    merged = _expose_once(light, gain, time_s, sensor, rng)
     reach = 1.0
     for _ in range(1, sensor.exposures):
         reach *= sensor.exposure_ratio
-        shorter = _reading(light / reach, gain, time_s / reach, sensor, rng)
-        # A photosite that is nearly full is read from the next shorter exposure.
-        joined = np.where(joined >= 0.95 * reach / sensor.exposure_ratio, shorter * reach, joined)
-    return joined.astype(np.float32)
+        shorter = _expose_once(light / reach, gain, time_s / reach, sensor, rng)
+        # Nearly saturated pixels take their value from the next shorter exposure.
+        merged = np.where(merged >= 0.95 * reach / sensor.exposure_ratio, shorter * reach, merged)
+    return merged.astype(np.float32)
 
 
-def _reading(light: Float32, gain: float, time_s: float, sensor: ImageSensor, rng: Rng) -> Float32:
+def _expose_once(
+    light: Float32, gain: float, time_s: float, sensor: ImageSensor, rng: Rng
+) -> Float32:
     well_e = sensor.full_well_e / gain
     response, offset_e, dark = _fixed_pattern(light.shape, sensor)
     dark_e = sensor.dark_current_e_s.draw(rng) * time_s
+    # Beyond eight full wells all pixels saturate: the bound keeps the Poisson draw cheap.
     mean_e = np.clip(light, 0.0, 8.0) * response * well_e + dark_e * dark
-    # A photosite that light overfills eight times over is as full as one that it fills.
     electrons = rng.poisson(mean_e).astype(np.float32)
     noise = rng.standard_normal(light.shape, dtype=np.float32)
     level = electrons + sensor.read_noise_e.draw(rng) * noise + offset_e - dark_e
@@ -120,7 +121,7 @@ def _reading(light: Float32, gain: float, time_s: float, sensor: ImageSensor, rn
 
 @lru_cache(maxsize=8)
 def _fixed_pattern(shape: tuple[int, int], sensor: ImageSensor) -> tuple[Float32, Float32, Float32]:
-    """Response, dark level [e] and dark current over its mean of every photosite: one device's."""
+    """Gain, offset [e] and relative dark current of every pixel of one device, [h, w] each."""
     rng = Streams(seed=sensor.device_seed, scene=0).rng("photosites")
     response = 1.0 + sensor.prnu * rng.standard_normal(shape, dtype=np.float32)
     offset_e = sensor.dsnu_e * rng.standard_normal(shape, dtype=np.float32)

@@ -1,4 +1,4 @@
-"""The image signal processor: from the image sensor's numbers to colours."""
+"""Image signal processor: demosaicing, white balance, saturation, sharpening and JPEG."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Literal
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.colorimetry import luminance
@@ -13,19 +14,19 @@ from gen_data.generator.sensors.camera.image_sensor import Pattern
 
 Demosaic = Literal["bilinear", "edge_aware"]
 
-# OpenCV names a pattern after the second row's second and third photosites.
+# OpenCV names a pattern after the second and third pixels of the second row.
 _BAYER = {"rggb": "BG", "bggr": "RG", "grbg": "GB", "gbrg": "GR"}
 _DEPTH = 65_535.0
 
 
-def demosaiced(raw: Float32, pattern: Pattern, method: Demosaic, white: float) -> Float32:
-    """Three colours at every photosite, float32 [h, w, 3].
+def demosaic(raw: Float32, pattern: Pattern, method: Demosaic, white: float) -> Float32:
+    """Interpolate three colours at every pixel, float32 [h, w, 3].
 
     Args:
         raw: Linear values [h, w].
-        pattern: Filters of the photosites.
+        pattern: Colour filter array.
         method: Of interpolation.
-        white: Largest value that is kept.
+        white: Larger values are clipped.
     """
     if pattern == "mono":
         return np.asarray(np.repeat(raw[..., None], 3, axis=-1), np.float32)
@@ -38,8 +39,8 @@ def demosaiced(raw: Float32, pattern: Pattern, method: Demosaic, white: float) -
 def grey_world_gains(image: Float32) -> Float32:
     """Factors on red, green and blue that make the mean of an image grey, float32 [3].
 
-    Clipped pixels say nothing. Buchsbaum, "A spatial processor model for object colour
-    perception", 1980.
+    Clipped pixels are left out; 1 if hardly any other is left. Source: Buchsbaum, "A spatial
+    processor model for object colour perception", 1980.
 
     Args:
         image: Linear; 1 saturates.
@@ -53,11 +54,11 @@ def grey_world_gains(image: Float32) -> Float32:
 
 
 def white_balance_gains(image: Float32, share: float, warmth_ev: float) -> Float32:
-    """Factors on red, green and blue, float32 [3]; green is the measure.
+    """Factors on red, green and blue relative to green, float32 [3].
 
     Args:
         image: Linear; 1 saturates.
-        share: Of the light's colour that is taken out, by the grey-world assumption.
+        share: Share of the illuminant's colour to correct, by the grey-world assumption.
         warmth_ev: Error: red over blue, in stops.
     """
     gains = np.ones(3, np.float32)
@@ -67,14 +68,28 @@ def white_balance_gains(image: Float32, share: float, warmth_ev: float) -> Float
     return np.asarray(gains * error, np.float32)
 
 
-def saturated(image: Float32, factor: float) -> Float32:
-    """Colours as many times as far from grey of the same luminance."""
+def scale_saturation(image: Float32, factor: float) -> Float32:
+    """Scale the difference of colours from grey of the same luminance."""
     grey = luminance(image)[..., None]
     colors: Float32 = grey + np.float32(factor) * (image - grey)
     return colors
 
 
-def sharpened(display: Float32, amount: float, radius_px: float) -> Float32:
-    """Unsharp masking of display values."""
+def sharpen(display: Float32, amount: float, radius_px: float) -> Float32:
+    """Sharpen display values in [0, 1] by unsharp masking."""
     blurred = cv2.GaussianBlur(display, (0, 0), radius_px)
     return np.asarray(np.clip(display + amount * (display - blurred), 0.0, 1.0), np.float32)
+
+
+def compress_jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
+    """Encode and decode an image as JPEG, uint8 [h, w, 3].
+
+    Args:
+        image: sRGB, uint8 [h, w, 3].
+        quality: Quality of libjpeg, 1 to 100.
+    """
+    ok, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
+    assert ok, "the JPEG encoder takes any RGB image"
+    decoded = cv2.imdecode(data, cv2.IMREAD_COLOR)
+    assert decoded is not None, "encoded bytes can be decoded"
+    return np.ascontiguousarray(decoded[..., ::-1], np.uint8)

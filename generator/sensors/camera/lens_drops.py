@@ -1,4 +1,4 @@
-"""Water drops on the lens: each shows the scene small, upside down and blurred."""
+"""Water drops on the lens, each with a small, inverted, blurred image of the scene."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from gen_data.generator.core.streams import Streams
 from gen_data.generator.sensors.camera.pyramid import blur, halve
 
 _RADII = (0.004, 0.022)
-"""Of drops, over the image's width."""
+"""Smallest and largest radius of drops over the image's width."""
 _COUNT_MAX = 400
 _REACH = 1.4
-"""Beyond so many radii there is nothing of a drop, however its outline wobbles."""
+"""Largest extent of a drop's irregular outline over its radius."""
 _HALVINGS = 3
 
 
 def lens_drops(weather: Weather, camera: Camera) -> Array:
-    """Drops as (x, y, radius) [px] and a shape's seed, shape [n, 4]; Poisson in number."""
+    """Drops as (x, y, radius) [px] and seed of the shape, [n, 4]; their number is Poisson."""
     k = camera.intrinsics
     if weather.lens_drops <= 0.0:
         return np.zeros((0, 4))
     rng = Streams(seed=weather.seed, scene=0).rng(f"lens {camera.name}")
     low, high = (share * k.width_px for share in _RADII)
-    # Radii are log-uniform: the mean of their squares in closed form.
+    # Expected area of a drop: radii are log-uniform, so the mean square has a closed form.
     area = math.pi * 0.9 * (high**2 - low**2) / (2.0 * math.log(high / low))
     share = min(weather.lens_drops, 0.6)
     expected = -math.log(1.0 - share) * k.width_px * k.height_px / area
@@ -39,11 +39,11 @@ def lens_drops(weather: Weather, camera: Camera) -> Array:
 
 
 def refract_in_drops(image: Float32, drops: Array) -> Float32:
-    """The image through drops on the glass, float32 [h, w, 3]; the later over the earlier.
+    """Draw drops over an image in order, float32 [h, w, 3].
 
     Args:
         image: Linear, without drops.
-        drops: As of ``lens_drops``.
+        drops: As returned by ``lens_drops``.
     """
     height, width = image.shape[:2]
     small = blur(halve(image, _HALVINGS))
@@ -53,11 +53,11 @@ def refract_in_drops(image: Float32, drops: Array) -> Float32:
         columns = _span(x_px, radius_px, width)
         x = ((columns + 0.5 - x_px) / radius_px)[None, :]
         y = ((rows + 0.5 - y_px) / radius_px)[:, None]
-        # Outlines wobble; drops hang a little.
+        # Irregular outlines, elongated vertically because drops hang (0.8).
         wobble = 1.0 + 0.22 * _value_noise(1.3 * x + 7.0, 1.3 * y + 7.0, int(seed))
         off = np.sqrt(x * x + 0.8 * y * y) * wobble
         cover = _smoothstep(1.0, 0.78, off)
-        # A drop is a lens of some ninety degrees; towards its rim it bends more.
+        # A drop acts as a wide-angle lens of about 90 degrees, stronger towards its rim.
         bend = 0.30 + 0.12 * off * off
         u = 0.5 + 0.5 * (x_px / width - 0.5) - bend * x
         v = 0.5 + 0.5 * (y_px / height - 0.5) - bend * y
@@ -69,14 +69,14 @@ def refract_in_drops(image: Float32, drops: Array) -> Float32:
 
 
 def _span(center_px: float, radius_px: float, size: int) -> NDArray[np.int64]:
-    """Rows or columns of the image that a drop may reach."""
+    """Rows or columns of the image that a drop may cover."""
     first = math.floor(center_px - _REACH * radius_px)
     end = math.ceil(center_px + _REACH * radius_px)
     return np.arange(max(first, 0), min(end, size))
 
 
 def _bilinear_at(image: Float32, u: Array, v: Array) -> Array:
-    """Values of an image at places in [0, 1] x [0, 1], shape [..., 3]."""
+    """Bilinear samples of an image at coordinates in [0, 1] x [0, 1], [..., 3]."""
     height, width = image.shape[:2]
     x, y = np.clip(u, 0.0, 1.0) * (width - 1), np.clip(v, 0.0, 1.0) * (height - 1)
     i = np.clip(y.astype(np.int64), 0, max(height - 2, 0))
@@ -98,13 +98,13 @@ def _value_noise(x: Array, y: Array, seed: int) -> Array:
     """Smooth noise with one lump per unit, in [-1, 1]; shapes are broadcast."""
     i, j = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     u, v = _smoothstep(0.0, 1.0, x - i), _smoothstep(0.0, 1.0, y - j)
-    low = _hashed(i, j, seed) * (1.0 - u) + _hashed(i + 1, j, seed) * u
-    high = _hashed(i, j + 1, seed) * (1.0 - u) + _hashed(i + 1, j + 1, seed) * u
+    low = _hash(i, j, seed) * (1.0 - u) + _hash(i + 1, j, seed) * u
+    high = _hash(i, j + 1, seed) * (1.0 - u) + _hash(i + 1, j + 1, seed) * u
     return np.asarray(2.0 * (low * (1.0 - v) + high * v) - 1.0)
 
 
-def _hashed(x: NDArray[np.int64], y: NDArray[np.int64], seed: int) -> Array:
-    """A number in [0, 1) for each place of a lattice.
+def _hash(x: NDArray[np.int64], y: NDArray[np.int64], seed: int) -> Array:
+    """A hash in [0, 1) of lattice coordinates.
 
     Source: Jarzynski and Olano, "Hash functions for GPU rendering", JCGT 2020 (pcg).
     """

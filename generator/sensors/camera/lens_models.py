@@ -1,4 +1,4 @@
-"""Lenses of cameras, as a configuration names them."""
+"""Lens models in a camera's configuration."""
 
 from __future__ import annotations
 
@@ -16,23 +16,24 @@ FieldDeg = Annotated[float, Field(gt=0, le=360)]
 
 
 class Pinhole(Strict):
-    """No distortion: straight edges have straight images."""
+    """A pinhole: no distortion."""
 
     model: Literal["pinhole"] = "pinhole"
 
     def lens(self) -> Lens:
-        """What the renderer knows it as."""
+        """The lens as renderers use it."""
         return PINHOLE
 
 
 class BrownConrady(Strict):
-    """A usual lens: OpenCV's rational model, with its names and signs.
+    """A lens with OpenCV's rational distortion model, with its names and signs.
 
     Attributes:
-        k1, k2, k3: Radial terms: k1 < 0 is barrel distortion.
-        k4, k5, k6: Those of the divisor.
+        k1, k2, k3: Radial terms of the numerator; k1 < 0 is barrel distortion.
+        k4, k5, k6: Radial terms of the denominator.
         p1, p2: Tangential terms.
-        field_deg: Full angle beyond which it shows nothing; null = all the model holds for.
+        field_deg: Full field of view, outside which the image is black; null = the whole range in
+            which the model is valid.
     """
 
     model: Literal["brown_conrady"]
@@ -47,16 +48,17 @@ class BrownConrady(Strict):
     field_deg: FieldDeg | None = None
 
     def lens(self) -> Lens:
-        """What the renderer knows it as."""
+        """The lens as renderers use it."""
         return _polynomial(self)
 
 
 class KannalaBrandt(Strict):
-    """A fisheye: OpenCV's model, with its names; all coefficients 0 is an equidistant lens.
+    """A fisheye with OpenCV's model and names; all coefficients 0 is an equidistant lens.
 
     Attributes:
         k1, k2, k3, k4: Of the third, fifth, seventh and ninth power of the angle to the axis.
-        field_deg: Full angle beyond which it shows nothing; null = all the model holds for.
+        field_deg: Full field of view, outside which the image is black; null = the whole range in
+            which the model is valid.
     """
 
     model: Literal["kannala_brandt"]
@@ -67,24 +69,24 @@ class KannalaBrandt(Strict):
     field_deg: FieldDeg | None = None
 
     def lens(self) -> Lens:
-        """What the renderer knows it as."""
+        """The lens as renderers use it."""
         return _polynomial(self)
 
 
 class Equirectangular(Strict):
-    """A panorama: columns are longitudes, rows latitudes; hfov_deg 360 and 2:1 show everything."""
+    """A panorama: columns are longitudes, rows latitudes; hfov_deg 360 and 2:1 is a full sphere."""
 
     model: Literal["equirectangular"]
 
     def lens(self) -> Lens:
-        """What the renderer knows it as."""
+        """The lens as renderers use it."""
         return Lens("equirectangular")
 
 
-class Published(Strict):
-    """A calibration of a real camera, scaled to the width of the image and cut to its height.
+class CalibratedLens(Strict):
+    """The calibration of a real camera, scaled to the image's width and cropped to its height.
 
-    It has its own field of view: hfov_deg is not given beside it.
+    It defines the field of view: hfov_deg must be left out.
 
     Attributes:
         camera: kitti_raw_02, the left colour camera of KITTI's raw recordings; euroc_cam0; or
@@ -95,33 +97,33 @@ class Published(Strict):
     camera: Literal["euroc_cam0", "kitti_raw_02", "tum_vi_cam0"]
 
     def intrinsics(self, width_px: int, height_px: int) -> Intrinsics:
-        """The camera at that size."""
+        """Intrinsics at an image size."""
         known = CALIBRATIONS[self.camera]
         scale = width_px / known.size_px[0]
-        cut_px = 0.5 * (height_px - scale * known.size_px[1])
+        crop_px = 0.5 * (height_px - scale * known.size_px[1])
         return Intrinsics(
             width_px,
             height_px,
             fx_px=round(scale * known.fx_px, 6),
             fy_px=round(scale * known.fy_px, 6),
             cx_px=round(scale * (known.cx_px + 0.5), 6),
-            cy_px=round(scale * (known.cy_px + 0.5) + cut_px, 6),
+            cy_px=round(scale * (known.cy_px + 0.5) + crop_px, 6),
             lens=known.lens,
         )
 
 
 LensConfig = Annotated[
-    Pinhole | BrownConrady | KannalaBrandt | Equirectangular | Published,
+    Pinhole | BrownConrady | KannalaBrandt | Equirectangular | CalibratedLens,
     Field(discriminator="model"),
 ]
 
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """Intrinsics as published: pixel centres at whole numbers.
+    """Published intrinsics, with pixel centres at integers.
 
     Attributes:
-        source: Where.
+        source: Publication or file.
     """
 
     size_px: tuple[int, int]
@@ -179,7 +181,7 @@ CALIBRATIONS: dict[str, Calibration] = {
         "degrees",
     ),
 }
-"""By the name that a configuration has for them."""
+"""Calibrations by their name in configurations."""
 
 
 def _polynomial(config: BrownConrady | KannalaBrandt) -> Lens:

@@ -1,4 +1,4 @@
-"""What a lens does to an image of luminance: float32 [h, w, 3], linear, any unit."""
+"""Lens effects on linear images, float32 [h, w, 3] of any unit."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.se3 import Array
 
 _BLUR_LEVELS = (0.0, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0)
-"""Radii of the layers between which a defocused image is composed [px]."""
+"""Radii of the layers that a defocused image is composed of [px]."""
 
 
 def blur_radius_px(
     z_m: NDArray[np.floating], focus_m: float, focal_m: float, f_number: float, pitch_m: float
 ) -> Float32:
-    """Radius of the circle of confusion of a thin lens [px], signed: negative before the focus.
+    """Signed radius of the circle of confusion of a thin lens [px]; negative before the focus.
 
     ``c = (f^2 / N) |z - s| / (z (s - f))``; see Potmesil and Chakravarty, "A lens and aperture
-    camera model for synthetic image generation", SIGGRAPH 1981. ``z`` of infinity is allowed.
+    camera model for synthetic image generation", SIGGRAPH 1981. ``z`` may be infinite.
     """
     inverse = np.where(np.isfinite(z_m), 1.0 / np.maximum(z_m, 1e-3), 0.0)
     diameter_m = focal_m * focal_m / f_number / (focus_m - focal_m) * (1.0 - focus_m * inverse)
     return np.asarray(0.5 * diameter_m / pitch_m, np.float32)
 
 
-def defocused(image: Float32, radius_px: Float32) -> Float32:
-    """The image with every point spread over its circle of confusion.
+def defocus(image: Float32, radius_px: Float32) -> Float32:
+    """Blur every point of an image over its circle of confusion.
 
-    Layers of like radius are blurred and laid over each other from far to near, so that what is
-    sharp does not bleed into what is blurred behind it. After Kraus and Strengert, "Depth-of-field
-    rendering by pyramidal image processing", Eurographics 2007.
+    Layers of similar radius are blurred and composited from far to near, so that sharp foreground
+    does not bleed into blurred background. After Kraus and Strengert, "Depth-of-field rendering by
+    pyramidal image processing", Eurographics 2007.
     """
     levels = np.asarray(_BLUR_LEVELS, np.float32)
     level = np.searchsorted(0.5 * (levels[1:] + levels[:-1]), np.abs(radius_px))
@@ -53,13 +53,13 @@ def defocused(image: Float32, radius_px: Float32) -> Float32:
     return np.asarray(out / np.maximum(weight, 1e-4)[..., None], np.float32)
 
 
-def vignetted(image: Float32, corner_loss: float) -> Float32:
-    """Darker towards the corners, where the barrel takes light away.
+def apply_vignetting(image: Float32, corner_loss: float) -> Float32:
+    """Darken an image towards its corners by mechanical vignetting.
 
     Args:
-        image: What to darken.
-        corner_loss: Share that is lost at the corners, growing with the square of the distance
-            (Goldman, "Vignette and exposure calibration and compensation", 2010).
+        image: Linear image.
+        corner_loss: Share of light lost at the corners; the loss grows with the square of the
+            distance (Goldman, "Vignette and exposure calibration and compensation", 2010).
     """
     height, width = image.shape[:2]
     x = np.arange(width, dtype=np.float32) + np.float32(0.5 - 0.5 * width)
@@ -70,18 +70,18 @@ def vignetted(image: Float32, corner_loss: float) -> Float32:
 
 
 def natural_falloff(camera: Intrinsics, pupil_power: float) -> Float32:
-    """Light at every pixel for the same luminance everywhere, float32 [h, w]; 1 on the axis.
+    """Relative illumination of every pixel, float32 [h, w]: 1 on the axis, 0 outside the field.
 
-    A flat pupil is foreshortened by the cosine of the angle to the axis, and a plane image
-    stretched by its third power: together the fourth power, of the angle of the pixel's own ray.
-    A fisheye squeezes its edge, r(theta), and so makes it brighter: what remains is the pupil's
-    power of the cosine times ``sin(theta) / (r r')``, 2 / pi at 90 degrees if r is theta.
-    Panoramas are made of many images, and even. 0 where the lens shows nothing.
+    Rectilinear lenses follow the fourth power of the cosine of the ray's angle to the axis: one
+    power for the foreshortened pupil, three for the stretched image. A fisheye compresses its edge,
+    r(theta), which brightens it: the pupil's power of the cosine times ``sin(theta) / (r r')``,
+    2 / pi at 90 degrees for r = theta. Panoramas, stitched from many images, are uniform.
 
     Args:
-        camera: Lens and all.
-        pupil_power: Of a fisheye's pupil: 1 is flat, 0 turns to the light, as most of them do
-            (Kumler and Bauer, "Fish-eye lens designs and their relative performance", 2000).
+        camera: Intrinsics with the lens.
+        pupil_power: Power of the cosine for a fisheye's pupil: 1 is flat, 0 turns to the light, as
+            in most designs (Kumler and Bauer, "Fish-eye lens designs and their relative
+            performance", 2000).
     """
     model = camera.lens.model
     if model == "equirectangular":
@@ -95,12 +95,12 @@ def natural_falloff(camera: Intrinsics, pupil_power: float) -> Float32:
     if model == "brown_conrady":
         falloff = np.maximum(cosine, 0.0) ** 4
     else:
-        falloff = _squeezed(cosine, camera.lens.coefficients)
+        falloff = _fisheye_gain(cosine, camera.lens.coefficients)
         falloff = falloff * np.maximum(cosine, 0.0) ** pupil_power if pupil_power > 0 else falloff
     return np.asarray(np.nan_to_num(falloff, nan=0.0), np.float32)
 
 
-def _squeezed(cosine: Array, coefficients: Sequence[float]) -> Array:
+def _fisheye_gain(cosine: Array, coefficients: Sequence[float]) -> Array:
     """``sin(theta) / (r r')`` for Kannala and Brandt's ``r = theta + k1 theta^3 + ...``."""
     theta = np.arccos(np.clip(cosine, -1.0, 1.0))
     square = theta * theta
@@ -109,12 +109,13 @@ def _squeezed(cosine: Array, coefficients: Sequence[float]) -> Array:
         ratio = ratio + coefficient * power
         slope = slope + (2 * k + 1) * coefficient * power
         power = power * square
-    squeezed: Array = np.sinc(theta / np.pi) / (ratio * slope)
-    return squeezed
+    # sin(theta) / (r r') with r = theta * ratio; numpy's sinc(x) is sin(pi x) / (pi x).
+    gain: Array = np.sinc(theta / np.pi) / (ratio * slope)
+    return gain
 
 
-def with_chromatic_aberration(image: Float32, corner_px: float) -> Float32:
-    """Red images are larger and blue ones smaller, by so many pixels at the corner (lateral)."""
+def apply_chromatic_aberration(image: Float32, corner_px: float) -> Float32:
+    """Scale red up and blue down by ``corner_px`` at the corners: lateral chromatic aberration."""
     height, width = image.shape[:2]
     share = corner_px / (0.5 * math.hypot(width, height))
     out = image.copy()
@@ -136,7 +137,7 @@ def with_chromatic_aberration(image: Float32, corner_px: float) -> Float32:
 
 
 def _disc(radius_px: float) -> Float32:
-    """A disc of uniform weight that sums to 1, anti-aliased at its rim."""
+    """Uniform disc kernel that sums to 1, with an anti-aliased rim."""
     reach = math.ceil(radius_px)
     y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1].astype(np.float32)
     disc = np.clip(radius_px + 0.5 - np.hypot(x, y), 0.0, 1.0)

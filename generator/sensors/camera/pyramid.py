@@ -1,7 +1,7 @@
-"""Images at coarser scales: halving, blurring, enlarging; float32 [h, w, 3].
+"""Image pyramids: halving, blurring, enlarging of float32 [h, w, 3].
 
-Plain sums and products, which every processor rounds alike: what is made of them does not depend on
-the machine.
+Only sums and products, which all processors round alike, so that results do not depend on the
+machine.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from gen_data.generator.core.asset_types import Float32
 
 
 def halve(image: Float32, times: int) -> Float32:
-    """Means over squares of ``2 ** times`` pixels; the image is continued by its edges."""
+    """Average squares of ``2 ** times`` pixels; edges are replicated."""
     for _ in range(times):
         image = np.pad(image, ((0, image.shape[0] % 2), (0, image.shape[1] % 2), (0, 0)), "edge")
         rows = image[0::2] + image[1::2]
@@ -22,7 +22,7 @@ def halve(image: Float32, times: int) -> Float32:
 
 
 def blur(image: Float32) -> Float32:
-    """Convolution with [1 2 1] / 4 in both directions; the image is continued by its edges."""
+    """Convolve with [1 2 1] / 4 in both directions; edges are replicated."""
     for axis in (0, 1):
         n = image.shape[axis]
         at = np.arange(n)
@@ -33,7 +33,7 @@ def blur(image: Float32) -> Float32:
 
 
 def enlarge(image: Float32, height: int, width: int, factor: int) -> Float32:
-    """Bilinear, so that pixel centres stay where they were."""
+    """Enlarge an image bilinearly, aligned by pixel centres, to [height, width, 3]."""
     for axis, size in ((0, height), (1, width)):
         first, after, part = bilinear(size, factor, image.shape[axis])
         part = part[:, None, None] if axis == 0 else part[None, :, None]
@@ -44,11 +44,11 @@ def enlarge(image: Float32, height: int, width: int, factor: int) -> Float32:
 def bilinear(
     size: int, factor: int, coarse: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Float32]:
-    """Where pixels lie in an image that is coarser by a factor, along one axis.
+    """Indices and weights of bilinear interpolation in a coarser image, along one axis.
 
     Args:
         size: Number of pixels.
-        factor: How many of them there are to a coarse pixel.
+        factor: Pixels per coarse pixel.
         coarse: Number of coarse pixels.
 
     Returns:

@@ -1,4 +1,4 @@
-"""A camera with every label channel."""
+"""Camera with photographs and all label channels."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from gen_data.generator.core.shutter import INSTANT, Shutter
 from gen_data.generator.core.stereo import baseline_m, disparity_px, is_seen_by_both
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
-from gen_data.generator.sensors.camera.lens_models import LensConfig, Pinhole, Published
+from gen_data.generator.sensors.camera.lens_models import CalibratedLens, LensConfig, Pinhole
 from gen_data.generator.sensors.camera.shutter import ExposureTime, RollingShutter, make_shutter
 from gen_data.generator.sensors.mounting import Mounted, check_rig
 
@@ -45,7 +45,7 @@ Image = Literal[
 """Channels that can be written as images; see ``gen_data.generator.core.capture.Channel``."""
 
 PAIRED = frozenset({Channel.DISPARITY, Channel.DISPARITY_VISIBLE})
-"""Channels that take a second camera."""
+"""Channels that need a second camera."""
 
 SidePx = Annotated[int, Field(ge=8, le=8192)]
 
@@ -55,28 +55,27 @@ NOMINAL_ELEVATION_RAD = math.radians(35.0)
 
 
 class RgbCamera(Mounted):
-    """A camera, by default without distortion; its pose and lens are varied by randomizers.
+    """A camera, by default without distortion; randomizers vary its pose and lens.
 
     Attributes:
-        name: What labels, files and randomizers call it.
+        name: Its name in labels, files and randomizers.
         size_px: Width and height of its images.
         hfov_deg: Nominal horizontal field of view, along the middle row; tangential terms are
-            left out, and what is dark beyond a lens's field counts.
-        lens: How directions become image points: a pinhole; brown_conrady, OpenCV's usual model
-            with k1 to k6, p1 and p2; kannala_brandt, its fisheye with k1 to k4; both with
-            field_deg, the full angle beyond which they show nothing; equirectangular, a panorama;
-            or calibrated, a known ``camera`` with its own field of view: kitti_raw_02, euroc_cam0
-            or tum_vi_cam0.
-        channels: What is written as images.
-        ev100: Fixed exposure value at ISO 100; left out, it meters for itself.
-        exposure: How long its images are exposed; null = an instant. Their labels are those of the
-            middle of the exposure, which is the instant of the step.
-        rolling_shutter: How its rows are read one after the other; null = all at once. Labels in
-            the image, keypoints included, are those of each row's instant; labels in space those of
-            the middle row's, which is the instant of the step.
+            left out, and black pixels outside a lens's field count.
+        lens: Projection: a pinhole; brown_conrady, OpenCV's standard model with k1 to k6, p1 and
+            p2; kannala_brandt, its fisheye with k1 to k4; both with field_deg, the full field of
+            view outside which images are black; equirectangular, a panorama; or calibrated, a
+            known ``camera`` with its own field of view: kitti_raw_02, euroc_cam0 or tum_vi_cam0.
+        channels: Channels to write as images.
+        ev100: Fixed exposure value at ISO 100; null = metered.
+        exposure: Exposure time; null = an instant. Labels refer to the middle of the exposure,
+            which is the instant of the step.
+        rolling_shutter: Rows are read one after the other; null = all at once. Labels in the
+            image, including keypoints, refer to the instant of their row, labels in space to that
+            of the middle row, which is the instant of the step.
         image_pipeline: From radiance to photographs: lens, exposure, sensor, tone, JPEG.
-        stereo_with: For its channels ``disparity`` and ``disparity_visible``: name of the camera
-            to its right that makes a rectified pair with it.
+        stereo_with: For the channels ``disparity`` and ``disparity_visible``: name of the camera
+            to its right that forms a rectified pair with it.
     """
 
     former_keys: ClassVar[Mapping[str, str]] = {"formation": "image_pipeline"}
@@ -107,13 +106,13 @@ class RgbCamera(Mounted):
                 f"hfov_deg {self.hfov_deg:g} is too wide for a pinhole; expected at most "
                 f"{PINHOLE_MAX_DEG:g}, or another lens, such as {{model: kannala_brandt}}"
             )
-        if isinstance(self.lens, Published) and "hfov_deg" in self.model_fields_set:
+        if isinstance(self.lens, CalibratedLens) and "hfov_deg" in self.model_fields_set:
             raise ValueError("a calibrated lens has its own field of view: leave out hfov_deg")
         if self.intrinsics().folds_over():
             raise ValueError(
-                f"lens {self.lens.model}: its polynomial folds over inside the image, where no "
-                "lens does; check the signs and size of its coefficients, make hfov_deg smaller, "
-                "or end its field before with field_deg"
+                f"lens {self.lens.model}: its polynomial folds over inside the image; check the "
+                "signs and magnitudes of its coefficients, reduce hfov_deg, or limit its field "
+                "with field_deg"
             )
         return self
 
@@ -121,25 +120,25 @@ class RgbCamera(Mounted):
         """Nominal intrinsics.
 
         Raises:
-            ValueError: the lens does not show as wide a field as ``hfov_deg``.
+            ValueError: the lens's field is narrower than ``hfov_deg``.
         """
         width_px, height_px = self.size_px
-        if isinstance(self.lens, Published):
+        if isinstance(self.lens, CalibratedLens):
             return self.lens.intrinsics(width_px, height_px)
         hfov_rad = math.radians(self.hfov_deg)
         return Intrinsics.from_hfov(width_px, height_px, hfov_rad, self.lens.lens())
 
     @property
     def media(self) -> tuple[Channel, ...]:
-        """Channels that are written as images, in a fixed order."""
+        """Channels to write as images, in the order of ``Channel``."""
         return tuple(channel for channel in Channel if channel in self.channels)
 
     def describe(self) -> SensorInfo:
-        """A camera with the channels that it writes."""
+        """Describe a camera with the channels that it writes."""
         return self._camera_info(self.name, self.media, self.intrinsics().lens.model)
 
     def mount(self, scene: Scene) -> Scene:
-        """The scene with this camera in it, looking at the scene's focus; as it is if it was."""
+        """Add this camera, on its rig or looking at the scene's focus, unless it exists."""
         shutter = make_shutter(self.exposure, self.rolling_shutter)
         return add_camera(
             scene, self.name, self, self.intrinsics(), ev100=self.ev100, shutter=shutter
@@ -148,17 +147,17 @@ class RgbCamera(Mounted):
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> SensorReading:
-        """Its own channels and those asked for; only RGB passes through its image pipeline.
+        """Capture its own channels and the requested ones; RGB passes the image pipeline.
 
         Raises:
-            SampleError: it makes no rectified pair with the camera it should.
+            SampleError: it forms no rectified pair with ``stereo_with``.
         """
-        asked = channels | set(self.media)
-        if self.stereo_with and PAIRED & asked:
-            below = (asked - PAIRED) | {Channel.Z_DEPTH}
-            reading = self._capture(scene, renderer, below, rng)
-            return self._with_disparity(scene, renderer, reading)
-        return self._capture(scene, renderer, asked, rng)
+        requested = channels | set(self.media)
+        if self.stereo_with and PAIRED & requested:
+            mono = (requested - PAIRED) | {Channel.Z_DEPTH}
+            reading = self._capture(scene, renderer, mono, rng)
+            return self._add_disparity(scene, renderer, reading)
+        return self._capture(scene, renderer, requested, rng)
 
     def _capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
@@ -166,33 +165,33 @@ class RgbCamera(Mounted):
         camera = scene.camera(self.name)
         return capture_photograph(scene, renderer, camera, channels, self.image_pipeline, rng)
 
-    def _with_disparity(
-        self, scene: Scene, renderer: Renderer, seen: SensorReading
+    def _add_disparity(
+        self, scene: Scene, renderer: Renderer, reading: SensorReading
     ) -> SensorReading:
-        """The reading with disparities to the camera on its right."""
+        """Add disparities to the camera on the right to a reading."""
         known = {camera.name: camera for camera in scene.cameras}
         if self.stereo_with not in known:
             raise ConfigError(
-                f"sensor '{self.name}': stereo_with: there is no camera '{self.stereo_with}'; there"
-                f" is {', '.join(known)}{did_you_mean(self.stereo_with, known)}"
+                f"sensor '{self.name}': stereo_with: there is no camera '{self.stereo_with}'; "
+                f"expected one of {', '.join(known)}{did_you_mean(self.stereo_with, known)}"
             )
         left, right = known[self.name], known[self.stereo_with]
         try:
             scale = left.intrinsics.fx_px * baseline_m(left, right)
         except ValueError as error:
             raise SampleError(
-                f"sensors '{left.name}' and '{right.name}' are no rectified pair: {error}; put them"
-                " on one rig with the same size, field of view, lens and angles, the right one"
-                " beside the left, and let no randomizer vary only one of them"
+                f"sensors '{left.name}' and '{right.name}' are no rectified pair: {error}; mount"
+                " them on one rig with the same size, field of view, lens and angles, the right one"
+                " beside the left, and vary neither alone by a randomizer"
             ) from error
-        there = renderer.render(scene, right, frozenset({Channel.Z_DEPTH}))
-        here_px = disparity_px(seen.channels[Channel.Z_DEPTH], scale)
-        visible = is_seen_by_both(here_px, disparity_px(there.channels[Channel.Z_DEPTH], scale))
+        other = renderer.render(scene, right, frozenset({Channel.Z_DEPTH}))
+        left_px = disparity_px(reading.channels[Channel.Z_DEPTH], scale)
+        visible = is_seen_by_both(left_px, disparity_px(other.channels[Channel.Z_DEPTH], scale))
         pair = {
-            Channel.DISPARITY: here_px,
-            Channel.DISPARITY_VISIBLE: np.where(visible, here_px, np.float32(0.0)),
+            Channel.DISPARITY: left_px,
+            Channel.DISPARITY_VISIBLE: np.where(visible, left_px, np.float32(0.0)),
         }
-        return replace(seen, channels={**seen.channels, **pair})
+        return replace(reading, channels={**reading.channels, **pair})
 
 
 def add_camera(
@@ -204,7 +203,7 @@ def add_camera(
     ev100: float | None = None,
     shutter: Shutter = INSTANT,
 ) -> Scene:
-    """The scene with a camera on its rig, or looking at the scene's focus; as it is if it was.
+    """Add a camera on its rig, or looking at the scene's focus, unless one of its name exists.
 
     Raises:
         ConfigError: the scene has no such rig.
@@ -222,7 +221,7 @@ def add_camera(
 
 
 def _narrower_half_rad(intrinsics: Intrinsics) -> float:
-    """Half the field of view along the image's shorter side."""
+    """Half the field of view along the image's shorter side, at most pi / 2."""
     narrower_px = 0.5 * min(intrinsics.width_px, intrinsics.height_px)
     if intrinsics.straight:
         return math.atan(narrower_px / intrinsics.fx_px)
@@ -232,7 +231,7 @@ def _narrower_half_rad(intrinsics: Intrinsics) -> float:
 
 
 def _nominal_pose(focus: Region, half_angle_rad: float) -> SE3:
-    """``T_world_camera`` from which the whole focus is in view."""
+    """``T_world_camera`` with the whole focus in view."""
     radius_m = 0.5 * math.hypot(*focus.size_m)
     distance_m = radius_m / math.sin(min(half_angle_rad, math.radians(45.0)))
     level_m = distance_m * math.cos(NOMINAL_ELEVATION_RAD)

@@ -1,4 +1,4 @@
-"""How long a camera's rows are exposed, and which when."""
+"""Exposure time and rolling shutter in a camera's configuration."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from gen_data.generator.core.shutter import INSTANT, Shutter
 
 
 class ExposureTime(Strict):
-    """How long images are exposed: what moves meanwhile is blurred.
+    """Exposure time, which blurs moving objects.
 
-    Brightness does not depend on it: ``ev100`` or the camera's meter decide that.
+    Brightness does not depend on it, but on ``ev100`` or the camera's meter.
 
     Attributes:
         time_s: Exposure time.
-        samples: Most instants that an image is the mean of; fewer are rendered where nothing moves
-            as far as 0.3 px per sample, and one where nothing moves at all.
+        samples: Largest number of instants averaged into an image; fewer are rendered where
+            nothing moves by 0.3 px per sample, and one where nothing moves.
     """
 
     time_s: float = Field(gt=0, le=10)
@@ -26,11 +26,11 @@ class ExposureTime(Strict):
 
 
 class RollingShutter(Strict):
-    """Rows that are exposed one after the other: what moves sideways leans.
+    """Rows exposed one after the other, which skews moving objects.
 
     Attributes:
-        readout_s: From the exposure of the first row to that of the row after the last.
-        direction: Where rows are read to; ``down`` begins with the topmost.
+        readout_s: Time from the exposure of the first row to one row after the last.
+        direction: Direction of the readout; ``down`` begins with the topmost row.
     """
 
     readout_s: float = Field(gt=0, le=10)
@@ -38,7 +38,7 @@ class RollingShutter(Strict):
 
 
 def make_shutter(exposure: ExposureTime | None, rolling: RollingShutter | None) -> Shutter:
-    """What a camera's settings amount to."""
+    """The shutter of a camera with these settings."""
     if exposure is None and rolling is None:
         return INSTANT
     readout_s = 0.0 if rolling is None else rolling.readout_s

@@ -1,4 +1,4 @@
-"""Tone curves: from linear values, where 1 saturates, to the display.
+"""Tone curves: display values from linear ones, of which 1 saturates.
 
 =========  ==============================================================================
 filmic     slight toe, straight mid-tones, exponential shoulder to 1: Uchimura, "HDR
@@ -32,7 +32,7 @@ Tone = Literal["filmic", "knee", "log", "srgb", "linear"]
 Real = TypeVar("Real", bound=np.floating[Any])
 
 _LOG_SLOPE = 8.0
-"""Of ``log`` at black, before it is scaled so that its white is 1."""
+"""Slope of ``log`` at black, before it is scaled to reach 1 at white."""
 _MANTISSA_BITS = 10
 _DROPPED_BITS = 23 - _MANTISSA_BITS
 _ROWS_AT_ONCE = 32
@@ -66,7 +66,7 @@ def log(value: NDArray[Real], white: float) -> NDArray[Real]:
 
 
 def display_values(value: NDArray[Real], tone: Tone, white: float = 1.0) -> NDArray[Real]:
-    """Display values [0, 1] of linear ones; shape and type stay.
+    """Display values [0, 1] of linear ones, of the same shape and type.
 
     Args:
         value: Linear; 1 saturates for all curves but ``log``.
@@ -85,26 +85,27 @@ def display_values(value: NDArray[Real], tone: Tone, white: float = 1.0) -> NDAr
 
 
 def to_bytes(display: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Display values [0, 1] as bytes."""
+    """Quantise display values [0, 1] to bytes."""
     return np.asarray(np.floor(np.clip(display, 0.0, 1.0) * 255.0 + 0.5), np.uint8)
 
 
-def toned_bytes(image: Float32, scale: float, tone: Tone, white: float = 1.0) -> NDArray[np.uint8]:
-    """Bytes of linear values, uint8 of the same shape, by a table.
+def tone_to_bytes(
+    image: Float32, scale: float, tone: Tone, white: float = 1.0
+) -> NDArray[np.uint8]:
+    """Bytes of linear values, uint8 of the same shape, by a lookup table.
+
+    Equals ``to_bytes(display_values(...))`` of values rounded to ten bits of mantissa: an error of
+    at most a tenth of a byte before rounding.
 
     Args:
         image: float32 [h, w, 3].
-        scale: Factor after which 1 saturates.
+        scale: Factor on the image, after which 1 saturates.
         tone: Curve.
-        white: As of ``display_values``.
-
-    Returns:
-        What ``to_bytes(display_values(...))`` returns for values rounded to ten bits of mantissa:
-        within a tenth of a byte.
+        white: As in ``display_values``.
     """
     table, factor = _byte_table(tone, white), np.float32(scale)
     out = np.zeros(image.shape, np.uint8)
-    # In bands that fit the processor's cache.
+    # In bands that fit into the processor's cache.
     for top in range(0, len(image), _ROWS_AT_ONCE):
         rows = slice(top, top + _ROWS_AT_ONCE)
         # Sign, exponent and leading bits of the mantissa are the index: negative values clip to 0.
@@ -115,7 +116,7 @@ def toned_bytes(image: Float32, scale: float, tone: Tone, white: float = 1.0) ->
 
 @lru_cache(maxsize=8)
 def _byte_table(tone: Tone, white: float) -> NDArray[np.uint8]:
-    """Bytes of all positive float32, by their leading bits."""
+    """Bytes of all positive float32, indexed by their leading bits."""
     infinity = int(np.float32(np.inf).view(np.int32)) >> _DROPPED_BITS
     middle = (np.arange(infinity, dtype=np.int32) << _DROPPED_BITS) + (1 << (_DROPPED_BITS - 1))
     values: Array = middle.view(np.float32).astype(np.float64)

@@ -1,1 +1,1 @@
-"""Depth cameras: one file per principle, and devices as data, one YAML file each with sources."""
+"""Depth cameras: one module per principle, one YAML file with sources per device."""

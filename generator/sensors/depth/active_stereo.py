@@ -1,10 +1,10 @@
-"""Two infrared cameras and a dot projector, as in RealSense D400: depth by matching blocks.
+"""Active stereo: two infrared cameras and a dot projector, as in RealSense D400.
 
-Nothing is modelled but the images: what surrounding light shows, the projector's dots by the place
-of each point, shot and read noise, 8 bits. Fattened edges, holes and wrong matches come out of the
-matching itself: semi-global, Hirschmueller, "Stereo Processing by Semiglobal Matching and Mutual
-Information", TPAMI 2008, in OpenCV's form with a left-right check. What devices do: Keselman et
-al., "Intel RealSense Stereoscopic Depth Cameras", CVPR Workshops 2017.
+Only the images are modelled: ambient light, the projected dots, shot and read noise, 8 bits.
+Fattened edges, holes and wrong matches result from the matching itself: semi-global matching
+(Hirschmueller, "Stereo Processing by Semiglobal Matching and Mutual Information", TPAMI 2008) as
+implemented in OpenCV, with a left-right check. Design of devices: Keselman et al., "Intel RealSense
+Stereoscopic Depth Cameras", CVPR Workshops 2017.
 """
 
 from __future__ import annotations
@@ -27,28 +27,28 @@ from gen_data.generator.sensors.depth.view import Measured, View
 UInt8 = NDArray[np.uint8]
 
 BITS = 4
-"""Binary places of OpenCV's disparities."""
+"""Fractional bits of OpenCV's disparities."""
 SMOOTHING_PX = 1.0
-"""Of images whose gradients are taken."""
+"""Standard deviation of the blur before gradients are computed."""
 WHITE, WHITE_QUANTILE = 200.0, 0.98
-"""The exposure puts the brightest fiftieth of the image here."""
+"""Auto-exposure maps this quantile of an image to this value."""
 
 
 class ActiveStereo(Strict):
     """Block matching between two infrared cameras, helped by projected dots.
 
     Attributes:
-        baseline_m: From the left camera, whose depth is reported, to the right one.
+        baseline_m: From the left camera, which reports depth, to the right one.
         projector_m: From the left camera to the projector between them.
-        projector_cd: Its intensity, in the units in which surrounding light is given; 0 = none.
-        dots: Its pattern.
-        nearest_m: Larger disparities are not looked for.
-        block_px: Width of the blocks that are matched; odd.
-        smoothness: Factor on what changes of disparity cost.
-        uniqueness_pct: The best match has to be better by this than any other.
+        projector_cd: Intensity of the projector, on the scale of ambient light; 0 = no projector.
+        dots: Pattern of the projector.
+        nearest_m: Nearest depth that is searched.
+        block_px: Width of the matched blocks; odd.
+        smoothness: Factor on the penalties for changes of disparity.
+        uniqueness_pct: Margin by which the best match must beat all others.
         check_px: Largest difference between left-right and right-left disparities; -1 = unchecked.
-        speckle_px: Smaller patches are taken for wrong; 0 = none is.
-        steps_per_px: Disparities are whole multiples of a pixel over this.
+        speckle_px: Smaller patches of disparity are removed; 0 = none.
+        steps_per_px: Steps of disparity per pixel.
         full_well: Electrons of a white pixel.
         read_noise: Of a pixel [electrons].
     """
@@ -69,23 +69,23 @@ class ActiveStereo(Strict):
     read_noise: float = Field(6.0, ge=0)
 
     def measure(self, view: View, rng: Rng) -> Measured:
-        """The depth image and the left infrared image of a view."""
+        """Measure the depth image and the left infrared image of a view."""
         lights = [self._light(view, right_m) for right_m in (0.0, self.baseline_m)]
         white = max(float(np.quantile(lights[0], WHITE_QUANTILE)), 1e-6)
-        left, right = (self._photo(light / np.float32(white), rng) for light in lights)
+        left, right = (self._expose(light / np.float32(white), rng) for light in lights)
         focal_baseline = view.focal_px * self.baseline_m
         most_px = math.ceil(focal_baseline / self.nearest_m / 16.0) * 16
-        disparity = self._matched(left, right, most_px)
+        disparity = self._match(left, right, most_px)
         z_m = np.where(disparity > 0.0, focal_baseline / np.maximum(disparity, 1e-3), np.inf)
         return Measured(z_m.astype(np.float32), left.astype(np.uint16))
 
     def _light(self, view: View, right_m: float) -> Float32:
-        """Luminance that one camera sees, dots included."""
+        """Luminance in the image of one camera, including the dots, float32 [h, w]."""
         light = view.luminance_cd_m2(right_m)
         if self.projector_cd == 0.0:
             return light
-        met = view.lit(right_m)
-        z_m, range_m = met.z_m[..., 0], met.range_m[..., 0]
+        hits = view.trace(right_m)
+        z_m, range_m = hits.z_m[..., 0], hits.range_m[..., 0]
         away_m = self.projector_m - right_m
         points = view.camera.intrinsics.unproject(z_m)
         there = np.isfinite(z_m)
@@ -99,17 +99,17 @@ class ActiveStereo(Strict):
             depths_m = (z_m, view.z_depth_m(self.projector_m))
             pair_px = (disparity_px(depth_m, focal_baseline) for depth_m in depths_m)
             lux *= is_seen_by_both(*pair_px, beyond=True)
-        return np.asarray(light + lux * met.reflectance[..., 0] / np.float32(np.pi), np.float32)
+        return np.asarray(light + lux * hits.reflectance[..., 0] / np.float32(np.pi), np.float32)
 
-    def _photo(self, exposed: Float32, rng: Rng) -> UInt8:
-        """Eight bits of an image in which 1 is ``WHITE``."""
+    def _expose(self, exposed: Float32, rng: Rng) -> UInt8:
+        """Eight-bit image with noise; input of 1 becomes ``WHITE``."""
         electrons = np.minimum(exposed * np.float32(WHITE / 255.0), 1.0) * self.full_well
         noise = rng.standard_normal(exposed.shape, dtype=np.float32)
         electrons = electrons + np.sqrt(electrons + self.read_noise**2) * noise
         steps = np.rint(electrons * (255.0 / self.full_well))
         return np.asarray(np.clip(steps, 0, 255), np.uint8)
 
-    def _matched(self, left: UInt8, right: UInt8, most_px: int) -> Float32:
+    def _match(self, left: UInt8, right: UInt8, most_px: int) -> Float32:
         """Disparities of the left image, float32 [h, w]; 0 = none."""
         block = self.block_px | 1
         cost = self.smoothness * block * block
@@ -126,7 +126,7 @@ class ActiveStereo(Strict):
             speckleRange=2,
             mode=cv2.STEREO_SGBM_MODE_SGBM,
         )
-        # OpenCV leaves out columns whose farthest match lies outside: it is given more of them.
+        # OpenCV skips columns whose farthest match lies outside: the images are padded.
         wide = [
             cv2.copyMakeBorder(i, 0, 0, most_px, 0, cv2.BORDER_REPLICATE) for i in (left, right)
         ]
@@ -139,14 +139,15 @@ class ActiveStereo(Strict):
 
 
 def refine_disparity(left: UInt8, right: UInt8, found: Float32, block_px: int) -> Float32:
-    """Disparities to a small part of a pixel, float32 [h, w]; 0 = none.
+    """Refine disparities to subpixel accuracy, float32 [h, w]; 0 = none.
 
-    Lucas and Kanade, "An Iterative Image Registration Technique", IJCAI 1981: the shift under which
-    blocks differ least, with the gradients of both images, from where semi-global matching ended,
-    whose own parabolas lean towards whole pixels. Twice: from whole pixels, then from halves.
+    Lucas and Kanade, "An Iterative Image Registration Technique", IJCAI 1981: the shift with the
+    smallest difference between blocks, by the gradients of both images, starting from semi-global
+    matching, whose parabola fit is biased towards whole pixels. Two passes: from whole pixels, then
+    from halves.
     """
-    here = _smoothed(left)
-    there = _smoothed(right)
+    here = _smooth(left)
+    there = _smooth(right)
     between = 0.5 * (there + np.pad(there, ((0, 0), (1, 0)), mode="edge")[:, :-1])
     fine = found
     for images in ((there,), (there, between)):
@@ -160,13 +161,13 @@ def refine_disparity(left: UInt8, right: UInt8, found: Float32, block_px: int) -
             image = images[step % per_px][window]
             by = step // per_px
             moved = np.pad(image, ((0, 0), (by, 0)), mode="edge")[:, : image.shape[1]]
-            shift[window] += at[window] * _shift(here[window], moved, block_px)
+            shift[window] += at[window] * _find_shift(here[window], moved, block_px)
         fine = np.where(found > 0.0, start / np.float32(per_px) + shift, np.float32(0.0))
     return np.asarray(np.where(np.abs(fine - found) <= 1.0, fine, found), np.float32)
 
 
-def _shift(here: Float32, there: Float32, block_px: int) -> Float32:
-    """By how much blocks of the second image have to move to the right, at most a pixel."""
+def _find_shift(here: Float32, there: Float32, block_px: int) -> Float32:
+    """Shift to the right that aligns blocks of the second image, at most a pixel."""
     slope = 0.5 * (_slope(here) + _slope(there))
     size = (block_px, block_px)
     pull = cv2.boxFilter(slope * (there - here), -1, size, normalize=False)
@@ -180,5 +181,5 @@ def _slope(image: Float32) -> Float32:
     return np.asarray(0.5 * (wide[:, 2:] - wide[:, :-2]), np.float32)
 
 
-def _smoothed(image: UInt8) -> Float32:
+def _smooth(image: UInt8) -> Float32:
     return np.asarray(cv2.GaussianBlur(image.astype(np.float32), (0, 0), SMOOTHING_PX), np.float32)

@@ -1,4 +1,4 @@
-"""A depth camera: what a device reports, beside the truth."""
+"""Depth camera: measured depth and infrared images, beside the true ones."""
 
 from __future__ import annotations
 
@@ -39,20 +39,20 @@ DepthImage = Literal[
     Channel.CATEGORY,
     Channel.OBJECT_COORDINATES,
 ]
-"""Channels that can be written as images; all but the first two are the truth."""
+"""Channels that can be written as images; all but the first two are ground truth."""
 
 
 class DepthCamera(Mounted):
-    """A depth camera; its pose is varied by randomizers like that of any camera.
+    """A depth camera; randomizers vary its pose as that of any camera.
 
-    ``measured_depth`` is what the device reports; ``depth`` and all labels are the truth.
+    ``measured_depth`` is the device's output; ``depth`` and all labels are ground truth.
 
     Attributes:
-        name: What labels, files and randomizers call it.
-        model: A file of ``generator/sensors/depth``, or the values of one.
+        name: Its name in labels, files and randomizers.
+        model: A file of ``generator/sensors/depth``, or the content of one.
         size_px: Width and height of its images; null = the model's.
         hfov_deg: Horizontal field of view; null = the model's.
-        channels: What is written as images.
+        channels: Channels to write as images.
     """
 
     type: Literal["depth_camera"] = "depth_camera"
@@ -71,13 +71,13 @@ class DepthCamera(Mounted):
 
     @property
     def device(self) -> DepthModel:
-        """Its data sheet."""
+        """The data sheet."""
         model = self.model
         return load_preset(MODELS, model, DepthModel) if isinstance(model, str) else model
 
     @property
     def media(self) -> tuple[Channel, ...]:
-        """Channels that are written as images, in a fixed order."""
+        """Channels to write as images, in the order of ``Channel``."""
         return tuple(channel for channel in Channel if channel in self.channels)
 
     def intrinsics(self) -> Intrinsics:
@@ -88,11 +88,11 @@ class DepthCamera(Mounted):
         return Intrinsics.from_hfov(width_px, height_px, math.radians(hfov_deg))
 
     def describe(self) -> SensorInfo:
-        """A camera with the channels that it writes."""
+        """Describe a camera with the channels that it writes."""
         return self._camera_info(self.name, self.media, self.intrinsics().lens.model)
 
     def mount(self, scene: Scene) -> Scene:
-        """The scene with this camera in it, looking at the scene's focus; as it is if it was.
+        """Add this camera, on its rig or looking at the scene's focus, unless it exists.
 
         Raises:
             ConfigError: the scene has no such rig.
@@ -102,21 +102,21 @@ class DepthCamera(Mounted):
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> SensorReading:
-        """Its own channels and those asked for; labels are the truth.
+        """Capture its own channels and the requested ones; labels are ground truth.
 
         Raises:
-            SampleError: a randomizer gave it another lens than a pinhole.
+            SampleError: a randomizer gave it a lens other than a pinhole.
         """
-        asked = channels | set(self.media)
+        requested = channels | set(self.media)
         camera = scene.camera(self.name)
         if not camera.intrinsics.straight:
             raise SampleError(
                 f"sensor '{self.name}': a depth camera is a pinhole, got the lens "
-                f"{camera.intrinsics.lens.model}; leave it out of what randomizers change"
+                f"{camera.intrinsics.lens.model}; exclude it from randomizers of lenses"
             )
-        seen = capture_photograph(scene, renderer, camera, asked - OWN, IDEAL, rng)
-        if not OWN & asked:
-            return seen
+        reading = capture_photograph(scene, renderer, camera, requested - OWN, IDEAL, rng)
+        if not OWN & requested:
+            return reading
         device = self.device
         measured = device.principle.measure(View(scene, renderer, camera), rng)
         low_m, high_m = device.range_m
@@ -125,5 +125,5 @@ class DepthCamera(Mounted):
             Channel.MEASURED_DEPTH: np.where(within, measured.z_m, np.float32(np.inf)),
             Channel.INFRARED: measured.infrared,
         }
-        kept = {channel: image for channel, image in own.items() if channel in asked}
-        return replace(seen, channels={**seen.channels, **kept})
+        kept = {channel: image for channel, image in own.items() if channel in requested}
+        return replace(reading, channels={**reading.channels, **kept})

@@ -1,4 +1,4 @@
-"""A depth camera's data sheet."""
+"""Data sheet of a depth camera."""
 
 from __future__ import annotations
 
@@ -18,27 +18,27 @@ SidePx = Annotated[int, Field(ge=8, le=4096)]
 
 
 class Ideal(Strict):
-    """No error at all."""
+    """Depth without errors."""
 
     kind: Literal["ideal"] = "ideal"
 
     def measure(self, view: View, rng: Rng) -> Measured:
-        """The true depth; the infrared image is that of a lamp beside the lens, 1000 at 1 m."""
+        """Measure true depth; white surfaces have an infrared value of 1000 at 1 m."""
         del rng
-        met = view.lit()
-        signal = 1000.0 * met.reflectance[..., 0] / np.square(met.range_m[..., 0])
+        hits = view.trace()
+        signal = 1000.0 * hits.reflectance[..., 0] / np.square(hits.range_m[..., 0])
         infrared = np.rint(np.clip(signal, 0, 65_535)).astype(np.uint16)
         return Measured(view.z_depth_m(0.0), infrared)
 
 
 class DepthModel(Strict):
-    """What a depth camera is.
+    """Data sheet of a depth camera.
 
     Attributes:
         size_px: Width and height of its images.
         hfov_deg: Horizontal field of view.
-        range_m: Least and largest depth it reports.
-        principle: How it measures: ``ideal``, ``structured_light``, ``active_stereo`` or
+        range_m: Smallest and largest reported depth.
+        principle: Principle of measurement: ``ideal``, ``structured_light``, ``active_stereo`` or
             ``time_of_flight``.
     """
 

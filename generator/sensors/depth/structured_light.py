@@ -1,14 +1,14 @@
-"""A projector of known dots and one camera, as in the first Kinect: depth by triangulation.
+"""Structured light: a dot projector and one camera, as in the first Kinect.
 
-* **Shadow**: what the projector does not see has no dots.
+* **Shadow**: surfaces occluded from the projector have no dots.
 * **Noise**: Nguyen, Izadi and Lovell, "Modeling Kinect Sensor Noise for Improved 3D Reconstruction
   and Tracking", 3DIMPVT 2012, axial and lateral, by distance and angle. They measured the device's
-  output, so what quantisation adds is taken off the axial noise.
+  output, so the variance of quantisation is subtracted from that of the axial noise.
 * **Quantisation**: disparities are whole multiples of 1/8 px (Khoshelham and Oude Elberink,
   "Accuracy and Resolution of Kinect Depth Data for Indoor Mapping Applications", Sensors 2012).
-* **Lost edges and thin things**: dots are recognised by a window of 9 x 9 px (ibid.), which has to
-  show one surface by a good part.
-* **Holes** where too little light returns, where glints blind the camera, and at grazing angles.
+* **Lost edges and thin objects**: dots are recognised by a window of 9 x 9 px (ibid.), a large part
+  of which must show one surface.
+* **Holes** where too little light returns, where glints saturate the camera, and at grazing angles.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.stereo import disparity_px, is_seen_by_both
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.depth.dot_pattern import Dots
-from gen_data.generator.sensors.depth.view import Lit, Measured, View, smooth_noise
+from gen_data.generator.sensors.depth.view import Hits, Measured, View, smooth_noise
 from gen_data.generator.sensors.lidar.scan_pattern import Sensitivity
 
 Mask = NDArray[np.bool_]
 
 STEEP_RAD = math.radians(85.0)
-"""The formulas have a pole at a right angle."""
+"""Bound of angles: the formulas have a pole at a right angle."""
 WINDOW_RADIUS_PX, WINDOW_STEP_PX = 4, 2
 SAME_PX = 1.0
 """Disparities in a window that differ by less belong to one surface."""
 NOISE_PX = 0.8
-"""How far the noise of a pixel reaches its neighbours: their windows overlap."""
+"""Correlation length of noise: windows of neighbouring pixels overlap."""
 SIGNAL_SPREAD = 0.2
-"""Relative, of the light that a window receives: speckle."""
+"""Relative standard deviation of received light by speckle."""
 INFRARED_BITS = 10
 
 
@@ -46,14 +46,14 @@ class StructuredLight(Strict):
     """Triangulation between a dot projector and one camera.
 
     Attributes:
-        baseline_m: The projector is this far to the camera's right; negative = to its left.
-        step_px: Disparities are whole multiples of it; 0 = any.
+        baseline_m: From the camera to the projector, to the right; negative = to the left.
+        step_px: Quantisation of disparities; 0 = none.
         noise: Factor on the published noise.
-        seen: The darkest matte surface, square on, that it recognises at a distance.
-        blinded: The nearest such surface that does not blind it.
-        grazing_deg: Surfaces that lean away farther have no depth.
-        window_share: Share of the window that has to show one surface, lit.
-        dots: The pattern in its infrared image.
+        seen: The darkest matte surface, square on, that is recognised at a distance.
+        blinded: The nearest such surface that does not saturate the camera.
+        grazing_deg: Largest angle of incidence with a depth.
+        window_share: Share of the window that must show one illuminated surface.
+        dots: Pattern in the infrared image.
     """
 
     kind: Literal["structured_light"]
@@ -67,33 +67,34 @@ class StructuredLight(Strict):
     dots: Dots = Dots()
 
     def measure(self, view: View, rng: Rng) -> Measured:
-        """The depth and infrared images of a view."""
-        met = view.lit()
-        z_m = met.z_m[..., 0]
+        """Measure the depth and infrared images of a view."""
+        hits = view.trace()
+        z_m = hits.z_m[..., 0]
         lateral, axial, speckle = (smooth_noise(rng, z_m.shape, NOISE_PX) for _ in range(3))
-        infrared = self._infrared(view, met)
+        infrared = self._infrared(view, hits)
         if self.baseline_m == 0.0:
             lit = np.isfinite(z_m)
         else:
             focal_baseline = view.focal_px * self.baseline_m
             there_m = view.z_depth_m(self.baseline_m)
             here_px, there_px = (disparity_px(d, focal_baseline) for d in (z_m, there_m))
-            lit = is_seen_by_both(here_px, there_px, beyond=True) & self._recognised(here_px)
-        signal = met.reflectance[..., 0] / np.square(met.range_m[..., 0])
-        answered = self._answers(signal * (1.0 + SIGNAL_SPREAD * speckle))
-        angle = np.arccos(np.clip(met.cosine[..., 0], 0.0, 1.0))
-        kept = lit & answered & (angle < math.radians(self.grazing_deg))
-        place = _displaced(z_m.shape, self.noise * lateral_noise_px(angle) * lateral, rng)
-        measured_m = self._triangulated(z_m[place], angle[place], axial, view.focal_px)
+            lit = is_seen_by_both(here_px, there_px, beyond=True) & self._is_recognised(here_px)
+        signal = hits.reflectance[..., 0] / np.square(hits.range_m[..., 0])
+        exposed = self._is_well_exposed(signal * (1.0 + SIGNAL_SPREAD * speckle))
+        angle = np.arccos(np.clip(hits.cosine[..., 0], 0.0, 1.0))
+        kept = lit & exposed & (angle < math.radians(self.grazing_deg))
+        place = _displace(z_m.shape, self.noise * lateral_noise_px(angle) * lateral, rng)
+        measured_m = self._triangulate(z_m[place], angle[place], axial, view.focal_px)
         return Measured(np.where(kept & kept[place], measured_m, np.float32(np.inf)), infrared)
 
-    def _answers(self, signal: Float32) -> Mask:
+    def _is_well_exposed(self, signal: Float32) -> Mask:
+        """Whether dots are neither too dark nor saturated, bool [h, w]."""
         low = self.seen.reflectance / self.seen.range_m**2
         high = self.blinded.reflectance / self.blinded.range_m**2
         return np.asarray((signal >= low) & (signal <= high))
 
-    def _recognised(self, here_px: Float32) -> Mask:
-        """Whether enough of the window around each pixel shows the same surface."""
+    def _is_recognised(self, here_px: Float32) -> Mask:
+        """Whether enough of the window around each pixel shows the same surface, bool [h, w]."""
         height, width = here_px.shape
         reach, step = WINDOW_RADIUS_PX, WINDOW_STEP_PX
         wide = np.pad(here_px, reach, mode="edge")
@@ -105,8 +106,8 @@ class StructuredLight(Strict):
                 same += np.abs(other - here_px) < SAME_PX
         return np.asarray(same >= self.window_share * len(shifts) ** 2)
 
-    def _triangulated(self, z_m: Float32, angle: Float32, noise: Float32, f_px: float) -> Float32:
-        """Depths with axial noise, on the device's steps."""
+    def _triangulate(self, z_m: Float32, angle: Float32, noise: Float32, f_px: float) -> Float32:
+        """Depths with axial noise, quantised in disparity."""
         per_px = f_px * abs(self.baseline_m)
         there = np.isfinite(z_m)
         z = np.where(there, z_m, np.float32(1.0))
@@ -119,14 +120,14 @@ class StructuredLight(Strict):
         steps = np.maximum(np.rint(per_px / noisy_m / self.step_px), 1.0)
         return np.asarray(np.where(there, per_px / (steps * self.step_px), np.inf), np.float32)
 
-    def _infrared(self, view: View, met: Lit) -> NDArray[np.uint16]:
-        """What the camera sees of the dots; white is what blinds it, dots are brighter."""
-        points = view.camera.intrinsics.unproject(met.z_m[..., 0])
+    def _infrared(self, view: View, hits: Hits) -> NDArray[np.uint16]:
+        """Infrared image of the dots; the light that saturates the camera is white on average."""
+        points = view.camera.intrinsics.unproject(hits.z_m[..., 0])
         x = (points[..., 0] - self.baseline_m) / points[..., 2]
         y = points[..., 1] / points[..., 2]
         there = np.isfinite(x)
         dots = self.dots.at(*(np.where(there, t, 0.0).astype(np.float32) for t in (x, y)))
-        signal = met.reflectance[..., 0] / np.square(met.range_m[..., 0])
+        signal = hits.reflectance[..., 0] / np.square(hits.range_m[..., 0])
         white = self.blinded.reflectance / self.blinded.range_m**2
         most = 2**INFRARED_BITS - 1
         return np.asarray(np.rint(np.clip(dots * signal / white, 0, 1) * most), np.uint16)
@@ -146,10 +147,10 @@ def lateral_noise_px(angle_rad: Float32) -> Float32:
     return np.asarray(0.8 + 0.035 * angle / (0.5 * np.pi - angle), np.float32)
 
 
-def _displaced(
+def _displace(
     shape: tuple[int, int], along_px: Float32, rng: Rng
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Rows and columns of the pixels whose dots each pixel takes for its own."""
+    """Rows and columns of the pixels whose dots each pixel measures instead of its own."""
     down_px = smooth_noise(rng, shape, NOISE_PX) * np.abs(along_px).mean()
     rows, columns = np.indices(shape)
     return (

@@ -1,16 +1,16 @@
-"""Modulated light and four correlations per pixel, as in the second Kinect: depth by phase.
+"""Continuous-wave time of flight, as in the second Kinect: depth from the phase of modulated light.
 
 * **Phase**: four samples a quarter period apart; their noise is that of the electrons they count
   (Lange and Seitz, "Solid-state time-of-flight range camera", IEEE JQE 2001):
   ``sigma = L / (2 pi) * sqrt(samples' variance / 2) / amplitude``, L the unambiguous range.
-* **Flying pixels**: what lies in a pixel's footprint is added up as phasors.
-* **Wrap-around**: distances are modulo ``c / (2 f)``; several frequencies reach as far as their
-  greatest common divisor, by the wrap count on which they agree best (as in Jaremo Lawin et al.,
-  "Efficient multi-frequency phase unwrapping using kernel density estimation", ECCV 2016, without
-  their spatial propagation). Where they do not agree there is a hole.
-* **Multi-path**: light that comes by way of what is nearby, added as one low-passed bounce, after
-  Fuchs, "Multipath Interference Compensation in Time-of-Flight Camera Images", ICPR 2010: it is
-  proportional to the surface's reflectance and has travelled farther.
+* **Flying pixels**: surfaces in a pixel's footprint add up as phasors.
+* **Wrap-around**: distances are ambiguous modulo ``c / (2 f)``; several frequencies extend this to
+  that of their greatest common divisor, by the wrap count on which they agree best (as in Jaremo
+  Lawin et al., "Efficient multi-frequency phase unwrapping using kernel density estimation", ECCV
+  2016, without their spatial propagation). Disagreement leaves a hole.
+* **Multi-path**: light by way of nearby surfaces, added as one low-passed bounce, after Fuchs,
+  "Multipath Interference Compensation in Time-of-Flight Camera Images", ICPR 2010: proportional to
+  the surface's reflectance, with a longer path.
 * **Holes** where too little light returns and where pixels overflow.
 """
 
@@ -27,11 +27,11 @@ from pydantic import Field
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.depth.view import Lit, Measured, View
+from gen_data.generator.sensors.depth.view import Hits, Measured, View
 
 LIGHT_M_S = 299_792_458.0
 SUBRAYS = 7
-"""Rays that stand for a pixel's footprint."""
+"""Rays that sample a pixel's footprint."""
 TURN = 2.0 * math.pi
 
 Complex = NDArray[np.complex64]
@@ -42,17 +42,17 @@ class TimeOfFlight(Strict):
     """Continuous-wave time of flight.
 
     Attributes:
-        modulation_mhz: Frequencies, the highest last.
-        electrons: Amplitude that a white matte surface, square on, makes at 1 m.
+        modulation_mhz: Modulation frequencies, the highest last.
+        electrons: Amplitude of a white matte surface, square on, at 1 m.
         contrast: Amplitude over offset of a correlation.
-        ambient: Electrons that other light adds to each sample.
-        read_noise: Standard deviation of reading a sample [electrons].
-        full_well: Samples beyond it are saturated [electrons].
-        least: Weaker amplitudes are holes [electrons].
-        disagreement_rad: Frequencies whose phases disagree by more, root mean square, leave a hole.
-        bounce: Share of the light around it that a white surface gets by way of its surroundings.
-        bounce_deg: How far surroundings reach, as a standard deviation.
-        flying: Whether a pixel has a footprint; costs seven rays instead of one.
+        ambient: Electrons per sample by ambient light.
+        read_noise: Standard deviation of the read noise of a sample [electrons].
+        full_well: Larger samples are saturated [electrons].
+        least: Smaller amplitudes are holes [electrons].
+        disagreement_rad: Largest root mean square disagreement of phases; more leaves a hole.
+        bounce: Share of the surrounding light that a white surface receives indirectly.
+        bounce_deg: Extent of the surroundings, as a standard deviation.
+        flying: Whether pixels have a footprint; costs seven rays instead of one.
     """
 
     kind: Literal["time_of_flight"]
@@ -70,17 +70,17 @@ class TimeOfFlight(Strict):
 
     @property
     def ambiguity_m(self) -> float:
-        """Distances are known modulo this."""
+        """Unambiguous range: distances are known modulo this."""
         return LIGHT_M_S / (2e6 * math.gcd(*self.modulation_mhz))
 
     def measure(self, view: View, rng: Rng) -> Measured:
-        """The depth and infrared images of a view."""
-        met = view.lit(subrays=SUBRAYS if self.flying else 1)
+        """Measure the depth and infrared images of a view."""
+        hits = view.trace(subrays=SUBRAYS if self.flying else 1)
         sigma_px = view.focal_px * math.radians(self.bounce_deg)
-        phases, amplitude = [], np.zeros(met.range_m.shape[:2], np.float32)
+        phases, amplitude = [], np.zeros(hits.range_m.shape[:2], np.float32)
         ok = np.ones(amplitude.shape, bool)
         for mhz in self.modulation_mhz:
-            phasor = self._phasor(met, mhz, sigma_px, view.focal_px)
+            phasor = self._phasor(hits, mhz, sigma_px, view.focal_px)
             samples = self._samples(phasor, rng)
             ok &= samples.max(axis=0) < self.full_well
             cosine, sine = samples[0] - samples[2], samples[3] - samples[1]
@@ -93,21 +93,21 @@ class TimeOfFlight(Strict):
         infrared = np.rint(np.clip(amplitude, 0, 65_535)).astype(np.uint16)
         return Measured(np.asarray(z_m, np.float32), infrared)
 
-    def _phasor(self, met: Lit, mhz: int, sigma_px: float, focal_px: float) -> Complex:
-        """Light that a pixel receives, amplitude [electrons] and phase, complex64 [h, w]."""
-        there = np.isfinite(met.range_m)
-        range_m = np.where(there, met.range_m, np.float32(1.0))
-        strength = np.float32(self.electrons) * met.reflectance / np.square(range_m)
+    def _phasor(self, hits: Hits, mhz: int, sigma_px: float, focal_px: float) -> Complex:
+        """Amplitude [electrons] and phase of the light on each pixel, complex64 [h, w]."""
+        there = np.isfinite(hits.range_m)
+        range_m = np.where(there, hits.range_m, np.float32(1.0))
+        strength = np.float32(self.electrons) * hits.reflectance / np.square(range_m)
         strength = np.where(there, strength, np.float32(0.0))
         per_m = _phase_per_m(mhz)
         direct = (strength * np.exp(1j * per_m * range_m)).mean(axis=-1)
         if self.bounce == 0.0:
             return np.asarray(direct, np.complex64)
-        # On the way to where it is scattered the light has gone half of the phase of its echo.
+        # Light that reaches the surroundings has half of the phase of its echo.
         half = (strength * np.exp(0.5j * per_m * range_m)).mean(axis=-1)
-        around = _blurred(half.real, sigma_px) + 1j * _blurred(half.imag, sigma_px)
+        around = _low_pass(half.real, sigma_px) + 1j * _low_pass(half.imag, sigma_px)
         near_m = range_m.min(axis=-1)
-        reflectance = met.reflectance.mean(axis=-1)
+        reflectance = hits.reflectance.mean(axis=-1)
         detour_m = near_m * np.float32(1.0 + sigma_px / focal_px)
         bounced = self.bounce * reflectance * around * np.exp(0.5j * per_m * detour_m)
         return np.asarray(direct + bounced, np.complex64)
@@ -123,7 +123,7 @@ class TimeOfFlight(Strict):
 
 
 def unwrap_phases(phases: Float32, modulation_mhz: tuple[int, ...]) -> tuple[Float32, Float32]:
-    """Distances on which phases agree best, and how much they disagree, root mean square [rad].
+    """Distances [m] on which phases agree best, and their root mean square disagreement [rad].
 
     Args:
         phases: In [0, 2 pi), one image per frequency, [n, h, w].
@@ -154,8 +154,8 @@ def _phase_per_m(mhz: int) -> float:
     return 2.0 * TURN * mhz * 1e6 / LIGHT_M_S
 
 
-def _blurred(image: NDArray[Any], sigma_px: float) -> Float32:
-    """Low-passed, by way of a smaller image where much is averaged."""
+def _low_pass(image: NDArray[Any], sigma_px: float) -> Float32:
+    """Blur an image by a Gaussian, at reduced resolution where it is wide."""
     height, width = image.shape
     factor = max(1, int(sigma_px / 3.0))
     size = (max(width // factor, 1), max(height // factor, 1))

@@ -1,4 +1,4 @@
-"""What a depth camera has to work with: the scene from its own place and from beside it."""
+"""Views of a scene by a depth camera: from its own position and from beside it."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from gen_data.generator.core.streams import Rng
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Measured:
-    """What a device reports.
+    """Images of a depth camera.
 
     Attributes:
-        z_m: Depth along the optical axis, float32 [h, w]; inf = a hole.
-        infrared: The image of its own light, uint16 [h, w].
+        z_m: Measured depth along the optical axis, float32 [h, w]; inf = a hole.
+        infrared: Infrared image of its own light, uint16 [h, w].
     """
 
     z_m: Float32
@@ -31,13 +31,13 @@ class Measured:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Lit:
-    """What the rays through pixels meet, under light from where they start.
+class Hits:
+    """First hits of the rays through pixels, lit from the rays' origin; [h, w, subrays].
 
     Attributes:
-        range_m: Along the ray, [h, w, subrays]; inf.
+        range_m: Along the ray; inf = no hit.
         z_m: Along the optical axis; inf.
-        reflectance: As of ``LidarHits``: in the infrared, incidence included; 0.
+        reflectance: As in ``LidarHits``: infrared, including incidence; 0.
         cosine: Of the angle of incidence; 0.
     """
 
@@ -49,7 +49,7 @@ class Lit:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class View:
-    """A scene, and the camera that the depth is reported for."""
+    """A scene and the camera whose depth is measured."""
 
     scene: Scene
     renderer: Renderer
@@ -61,44 +61,44 @@ class View:
         return self.camera.intrinsics.fx_px
 
     def beside(self, right_m: float) -> Camera:
-        """The same camera, moved to its right."""
+        """The same camera, shifted to its right."""
         pose = self.camera.T_world_camera @ SE3((right_m, 0.0, 0.0))
         return replace(self.camera, T_world_camera=pose)
 
-    def lit(self, right_m: float = 0.0, subrays: int = 1) -> Lit:
-        """What its pixels meet.
+    def trace(self, right_m: float = 0.0, subrays: int = 1) -> Hits:
+        """Trace the rays through all pixels.
 
         Args:
-            right_m: Place of eye and lamp, to the right of the camera.
-            subrays: 1, or 7 that are spread over a pixel's footprint.
+            right_m: Position of eye and light source, to the right of the camera.
+            subrays: 1, or 7 spread over a pixel's footprint.
         """
         lens = self.camera.intrinsics
         shape = (lens.height_px, lens.width_px)
         rays = np.nan_to_num(lens.pixel_rays()).reshape(-1, 3).astype(np.float32)
         pose = self.beside(right_m).T_world_camera
         beams = LidarRays(rays, 1.0 / lens.fx_px, subrays, np.inf)
-        seen = self.renderer.scan(self.scene, Lidar(self.camera.name, "", SE3(), pose), beams)
+        hits = self.renderer.scan(self.scene, Lidar(self.camera.name, "", SE3(), pose), beams)
         shape3 = (*shape, subrays)
-        z_m = seen.range_m * rays[:, 2:]
-        images = (seen.range_m, z_m, seen.reflectance, seen.incidence_cos)
-        return Lit(*(np.asarray(image, np.float32).reshape(shape3) for image in images))
+        z_m = hits.range_m * rays[:, 2:]
+        images = (hits.range_m, z_m, hits.reflectance, hits.incidence_cos)
+        return Hits(*(np.asarray(image, np.float32).reshape(shape3) for image in images))
 
     def z_depth_m(self, right_m: float) -> Float32:
-        """Depth image from beside the camera, float32 [h, w]; inf."""
+        """Depth image from beside the camera, float32 [h, w]; inf = nothing."""
         seen = self.renderer.render(self.scene, self.beside(right_m), frozenset({Channel.Z_DEPTH}))
         return np.asarray(seen.channels[Channel.Z_DEPTH], np.float32)
 
     def luminance_cd_m2(self, right_m: float) -> Float32:
-        """What the surrounding light makes of the scene, float32 [h, w]."""
+        """Luminance of the scene in ambient light, float32 [h, w]."""
         seen = self.renderer.render(self.scene, self.beside(right_m), frozenset({Channel.RADIANCE}))
         return luminance(np.asarray(seen.channels[Channel.RADIANCE], np.float32))
 
 
 def smooth_noise(rng: Rng, shape: tuple[int, int], sigma_px: float) -> Float32:
-    """Gaussian noise of variance 1 whose neighbours resemble each other, float32 [h, w]."""
+    """Gaussian noise of variance 1 with correlated neighbours, float32 [h, w]."""
     reach = int(np.ceil(3.0 * sigma_px))
     height, width = shape
-    # Drawn beyond the image, so that its rim is like the rest of it.
+    # Drawn beyond the image, so that statistics are the same at its border.
     white = rng.standard_normal((height + 2 * reach, width + 2 * reach), dtype=np.float32)
     weights = cv2.getGaussianKernel(2 * reach + 1, sigma_px)
     weights = weights / np.sqrt(np.sum(weights**2))

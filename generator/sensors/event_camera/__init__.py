@@ -1,1 +1,1 @@
-"""Event cameras: the sensor and its pixels."""
+"""Event camera: the sensor and the model of its pixels."""

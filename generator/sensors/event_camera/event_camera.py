@@ -1,4 +1,4 @@
-"""An event camera: where and when pixels become brighter or darker."""
+"""Event camera: time, pixel and polarity of changes of brightness."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from gen_data.generator.sensors.mounting import (
     Mounted,
     check_rate,
     check_rig,
-    known_camera,
+    find_camera,
     window_s,
 )
 
@@ -42,21 +42,22 @@ CHANNELS = frozenset({Channel.RADIANCE, Channel.INSTANCE})
 class EventCamera(Mounted):
     """An event camera: time, pixel and polarity of every change of brightness since the last step.
 
-    It sees luminance, unexposed and in full precision. Several images are rendered per step: choose
-    small ones.
+    Events come from luminance in full precision, without exposure. Several images are rendered per
+    step: choose small ones.
 
     Attributes:
-        name: What files call it.
-        camera: Without a rig: name of the camera whose place and axis it shares, listed before it.
+        name: Its name in files.
+        camera: Without a rig: name of a camera listed before it, whose position and axis it
+            shares.
         size_px: Width and height.
         hfov_deg: Horizontal field of view.
-        frames_per_step: Images from one reading to the next, between which brightness changes
-            evenly; things should move by about a pixel from one to the next.
-        threshold: Change of the logarithm of intensity that makes an event.
-        threshold_spread: Its standard deviation over the pixels.
-        refractory_s: Time for which a pixel is silent after an event.
-        leak_hz: Events per pixel and second that leakage makes, all brighter.
-        shot_noise_hz: Events per pixel and second that noise makes in the dark.
+        frames_per_step: Images from one reading to the next; brightness is interpolated between
+            them, so objects should move by about a pixel from one to the next.
+        threshold: Change of the logarithm of intensity that triggers an event.
+        threshold_spread: Standard deviation of the threshold over the pixels.
+        refractory_s: Dead time of a pixel after an event.
+        leak_hz: Rate of events by leakage, per pixel; all are positive.
+        shot_noise_hz: Rate of noise events in the dark, per pixel.
     """
 
     type: Literal["event_camera"] = "event_camera"
@@ -72,11 +73,11 @@ class EventCamera(Mounted):
     shot_noise_hz: float = Field(0.5, ge=0, le=1000)
 
     def describe(self) -> SensorInfo:
-        """A device that sees nothing from inside the body that carries it."""
+        """Describe a device whose view its carrier may occlude."""
         return self._device_info(self.name, KIND, needs_clear_view=not self.inside)
 
     def mount(self, scene: Scene) -> Scene:
-        """The scene with this device on its rig, or at its camera.
+        """Add this device to its rig, or to its camera.
 
         Raises:
             ConfigError: the scene has no such rig or camera, or the rate does not fit.
@@ -84,7 +85,7 @@ class EventCamera(Mounted):
         check_rate(self.name, self.rate_hz, scene.step_s)
         rig = check_rig(scene, self.name, self.rig) if self.rig else ""
         if not rig:
-            known_camera(scene, self.name, self.camera)
+            find_camera(scene, self.name, self.camera)
         device = Device(
             self.name,
             KIND,
@@ -97,20 +98,21 @@ class EventCamera(Mounted):
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Measurements:
-        """Events since the last reading, by time; none at time 0."""
+        """Detect the events since the last reading, sorted by time; none at time 0."""
         del channels
         start_s, end_s = window_s(scene, self.rate_hz)
         device = scene.device(self.name)
         if end_s <= start_s:
             return Measurements(self.name, device, table_rows("event_camera", 0), scene.time_s)
         times_s = start_s + (end_s - start_s) * np.linspace(0.0, 1.0, self.frames_per_step + 1)
-        luminances, shown = self._frames(scene, times_s, renderer)
+        luminances, ids = self._render_frames(scene, times_s, renderer)
         width_px, height_px = self.size_px
         shape = (height_px, width_px)
-        pixels = Pixels.drawn(shape, self.threshold, self.threshold_spread, rng.of_sequence())
-        told = signal_events([pixels.levels(log_response(image)) for image in luminances], times_s)
+        pixels = Pixels.draw(shape, self.threshold, self.threshold_spread, rng.of_sequence())
+        levels = [pixels.levels(log_response(image)) for image in luminances]
+        signal = signal_events(levels, times_s)
         noise = noise_events(luminances[-1], start_s, end_s, self.leak_hz, self.shot_noise_hz, rng)
-        events = apply_refractory_period(Events.joined([told, noise]), self.refractory_s)
+        events = apply_refractory_period(Events.merge([signal, noise]), self.refractory_s)
         frame = np.rint((events.time_s - start_s) / (times_s[1] - start_s)).astype(np.int64)
         rows = table_rows(
             "event_camera",
@@ -119,38 +121,38 @@ class EventCamera(Mounted):
             x_px=events.pixel % width_px,
             y_px=events.pixel // width_px,
             polarity=events.polarity,
-            instance_id=shown.reshape(len(times_s), -1)[frame, events.pixel],
+            instance_id=ids.reshape(len(times_s), -1)[frame, events.pixel],
         )
         return Measurements(self.name, device, rows, scene.time_s)
 
-    def _frames(
+    def _render_frames(
         self, scene: Scene, times_s: Array, renderer: Renderer
     ) -> tuple[list[Array], np.ndarray]:
-        """Luminance, and instance ids [frames, h, w], at each of several instants.
+        """Luminance [h, w] at each instant, and instance ids [frames, h, w].
 
-        Nothing is rendered again while nothing moves.
+        A frame that equals the one before is not rendered again.
         """
         width_px, height_px = self.size_px
         lens = Intrinsics.from_hfov(width_px, height_px, math.radians(self.hfov_deg))
         luminances: list[Array] = []
-        shown: list[np.ndarray] = []
+        ids: list[np.ndarray] = []
         before: Scene | None = None
         for time_s in times_s:
             then = scene_at(scene, float(time_s))
-            if before is not None and _looks_alike(before, then, self.name):
+            if before is not None and _is_same_view(before, then, self.name):
                 luminances.append(luminances[-1])
-                shown.append(shown[-1])
+                ids.append(ids[-1])
                 continue
             pose = then.device(self.name).T_world_device @ RIG_AXES.inverse()
-            seen = renderer.render(then, Camera(self.name, pose, lens), CHANNELS)
-            luminances.append(luminance(seen.channels[Channel.RADIANCE].astype(np.float64)))
-            shown.append(seen.channels[Channel.INSTANCE])
+            images = renderer.render(then, Camera(self.name, pose, lens), CHANNELS).channels
+            luminances.append(luminance(images[Channel.RADIANCE].astype(np.float64)))
+            ids.append(images[Channel.INSTANCE])
             before = then
-        return luminances, np.stack(shown)
+        return luminances, np.stack(ids)
 
 
-def _looks_alike(one: Scene, other: Scene, device: str) -> bool:
-    """Whether a device sees the same at two instants of a scene."""
+def _is_same_view(one: Scene, other: Scene, device: str) -> bool:
+    """Whether a device's view is the same at two instants of a scene."""
     falling = one.weather.rain_mm_h > 0.0 or one.weather.snow_mm_h > 0.0
     still = one.device(device) == other.device(device) and one.lights == other.lights
     return still and not falling and one.bodies == other.bodies

@@ -1,1 +1,1 @@
-"""Events of traffic and manipulation: collisions, lane crossings, obstacles."""
+"""Event detectors: collisions, lane invasions, obstacles, traffic lights, proximity."""

@@ -1,7 +1,7 @@
-"""What happens to the thing that carries it, from the truth: collisions, lines crossed, and more.
+"""Event detector: collisions, lane invasions and other events of its carrier, from ground truth.
 
-The occurrences are those of CARLA's collision, lane invasion and obstacle detectors and of
-CoppeliaSim's proximity sensors. They are facts about boxes and lanes, not measurements: no noise.
+The events are those of CARLA's collision, lane invasion and obstacle detectors and of CoppeliaSim's
+proximity sensors. They are computed from boxes and lanes, without noise.
 """
 
 from __future__ import annotations
@@ -32,37 +32,37 @@ from gen_data.generator.sensors.events.lane_queries import (
 )
 from gen_data.generator.sensors.events.obb_queries import (
     OrientedObstacle,
-    ahead_m,
     distance_m,
     find_obstacles,
+    gap_ahead_m,
+    is_below,
     is_touching,
-    project_to_ground,
 )
 from gen_data.generator.sensors.mounting import Instrument, window_s
 
 Occurrence = Literal["collision", "lane_invasion", "obstacle", "traffic_light", "proximity"]
 EVERYTHING: tuple[Occurrence, ...] = get_args(Occurrence)
 Row = tuple[float, int, int, float]
-"""Time, kind, other instance, value."""
+"""Time [s], number of the event, id of the other instance, value."""
 
-FASTEST_M_S = 150.0
-"""Nothing comes nearer more quickly."""
+CLOSING_SPEED_MAX_M_S = 150.0
+"""Bound for culling: no object approaches faster."""
 LOW_M = 0.2
-"""What is lower is no obstacle to something that stands on the same ground."""
+"""Objects lower than this above the carrier's ground are no obstacles."""
 
 
 class EventDetector(Instrument):
-    """What happens to its carrier: collisions, lines crossed, obstacles, lights, things near.
+    """Detects events of its carrier: collisions, lane invasions, obstacles, lights, proximity.
 
-    Collisions and crossed lines are reported when they begin; the others at every reading for
-    which they hold. Lanes outside junctions are taken to have lines on both sides.
+    Collisions and lane invasions are reported when they begin, the others at every reading while
+    they last. All lanes outside junctions count as having lines on both sides.
 
     Attributes:
-        events: What is reported.
-        obstacle_m: An obstacle straight ahead is reported when it is nearer than this.
-        light_m: A traffic light is reported when its stop line is nearer than this.
-        proximity_m: The nearest thing is reported when it is nearer to the device than this.
-        resolution_s: Between the instants at which collisions and lines are looked for.
+        events: Events to report.
+        obstacle_m: Largest distance of an obstacle straight ahead.
+        light_m: Largest distance of a traffic light's stop line.
+        proximity_m: Largest distance between the device and the nearest object.
+        resolution_s: Time between checks for collisions and lane invasions.
     """
 
     kind: ClassVar[str] = "watcher"
@@ -77,19 +77,19 @@ class EventDetector(Instrument):
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Measurements:
-        """What happened since the last reading.
+        """Report the events since the last reading.
 
         Raises:
-            SampleError: its carrier has no box.
+            SampleError: the carrier has no box.
         """
         del renderer, channels, rng
-        own, others = self._company(scene)
-        times_s = self._instants(scene)
+        own, others = self._find_boxes(scene)
+        times_s = self._check_times(scene)
         rows: list[Row] = []
         if "collision" in self.events:
             rows += _collisions(own, others, times_s)
         if "lane_invasion" in self.events:
-            rows += _invasions(scene, own, times_s)
+            rows += _lane_invasions(scene, own, times_s)
         if "obstacle" in self.events:
             rows += self._obstacle(scene, own, others)
         if "traffic_light" in self.events:
@@ -98,21 +98,21 @@ class EventDetector(Instrument):
             rows += self._proximity(scene, others)
         return Measurements(self.name, scene.device(self.name), _table(rows), scene.time_s)
 
-    def _company(self, scene: Scene) -> tuple[OrientedObstacle, list[OrientedObstacle]]:
-        """The box that carries it, and all it might meet."""
+    def _find_boxes(self, scene: Scene) -> tuple[OrientedObstacle, list[OrientedObstacle]]:
+        """The carrier's box, and the boxes of all possible obstacles."""
         body = scene.body(scene.rig(self.rig).body)
-        things = {thing.instance.instance_id: thing for thing in find_obstacles(scene)}
-        own = things.pop(body.instance_id, None)
+        boxes = {box.instance.instance_id: box for box in find_obstacles(scene)}
+        own = boxes.pop(body.instance_id, None)
         if own is None:
             raise SampleError(
                 f"sensor '{self.name}': '{body.name}', which carries rig '{self.rig}', has no box;"
-                " watch from a rig on a labelled thing"
+                " mount it on the rig of a labelled object"
             )
         now_s = scene.time_s
-        return own, [t for t in things.values() if not project_to_ground(own, t, now_s, LOW_M)]
+        return own, [b for b in boxes.values() if not is_below(own, b, now_s, LOW_M)]
 
-    def _instants(self, scene: Scene) -> Array:
-        """Instants from the last reading to this one; the same from whichever side one comes."""
+    def _check_times(self, scene: Scene) -> Array:
+        """Instants [s] of checks from the last reading to this one, both included, [n]."""
         start_s, end_s = window_s(scene, self.rate_hz)
         parts = max(math.ceil((end_s - start_s) / self.resolution_s - 1e-9), 1)
         if end_s <= 0.0:
@@ -122,48 +122,48 @@ class EventDetector(Instrument):
     def _obstacle(
         self, scene: Scene, own: OrientedObstacle, others: list[OrientedObstacle]
     ) -> list[Row]:
-        """The nearest thing straight ahead."""
+        """The nearest obstacle straight ahead."""
         now_s = scene.time_s
-        gaps = [(ahead_m(own, t, now_s), t.instance.instance_id) for t in others]
-        return _nearest("obstacle", now_s, gaps, self.obstacle_m)
+        gaps = [(gap_ahead_m(own, b, now_s), b.instance.instance_id) for b in others]
+        return _report_nearest("obstacle", now_s, gaps, self.obstacle_m)
 
     def _proximity(self, scene: Scene, others: list[OrientedObstacle]) -> list[Row]:
-        """The thing nearest to the device."""
+        """The object nearest to the device."""
         now_s = scene.time_s
-        place = np.asarray(scene.device(self.name).T_world_device.translation_m)
-        gaps = [(distance_m(t, place, now_s), t.instance.instance_id) for t in others]
-        return _nearest("proximity", now_s, gaps, self.proximity_m)
+        position = np.asarray(scene.device(self.name).T_world_device.translation_m)
+        gaps = [(distance_m(b, position, now_s), b.instance.instance_id) for b in others]
+        return _report_nearest("proximity", now_s, gaps, self.proximity_m)
 
     def _light(self, scene: Scene, own: OrientedObstacle) -> list[Row]:
-        """State of the light that the carrier has to mind."""
+        """State of the traffic light of the carrier's lane."""
         light = governing_light(scene, own.box(scene.time_s), self.light_m)
         if light is None:
             return []
         state = dict(light.attributes)["state"]
-        shown = LIGHT_STATES.index(state) if state in LIGHT_STATES else 0
+        number = LIGHT_STATES.index(state) if state in LIGHT_STATES else 0
         kind = OCCURRENCES.index("traffic_light")
-        return [(scene.time_s, kind, light.instance_id, float(shown))]
+        return [(scene.time_s, kind, light.instance_id, float(number))]
 
 
 def _collisions(own: OrientedObstacle, others: list[OrientedObstacle], times_s: Array) -> list[Row]:
-    """Every beginning of a touch, with the speed against each other."""
+    """Beginnings of contacts, with the relative speed [m/s]."""
     kind = OCCURRENCES.index("collision")
     rows: list[Row] = []
-    moves_m = FASTEST_M_S * float(times_s[-1] - times_s[0])
+    travel_max_m = CLOSING_SPEED_MAX_M_S * float(times_s[-1] - times_s[0])
     here = np.asarray(own.box(float(times_s[-1])).translation_m)
     for other in others:
-        if distance_m(other, here, float(times_s[-1])) > own.radius_m + moves_m:
+        if distance_m(other, here, float(times_s[-1])) > own.radius_m + travel_max_m:
             continue
-        for k in _beginnings(np.array([is_touching(own, other, float(t)) for t in times_s])):
+        for k in _rising_edges(np.array([is_touching(own, other, float(t)) for t in times_s])):
             mine, its = own.twist(float(times_s[k])), other.twist(float(times_s[k]))
-            closing = np.subtract(its.velocity_m_s, mine.velocity_m_s)
-            speed_m_s = float(np.sqrt(closing @ closing))
+            relative = np.subtract(its.velocity_m_s, mine.velocity_m_s)
+            speed_m_s = float(np.sqrt(relative @ relative))
             rows.append((float(times_s[k]), kind, other.instance.instance_id, speed_m_s))
     return rows
 
 
-def _invasions(scene: Scene, own: OrientedObstacle, times_s: Array) -> list[Row]:
-    """Every line that comes under the carrier, and on which side of it."""
+def _lane_invasions(scene: Scene, own: OrientedObstacle, times_s: Array) -> list[Row]:
+    """Beginnings of lines below the carrier: 1 for its left half, -1 for its right one."""
     pieces = lane_border_pieces(scene)
     near_m = own.radius_m + 100.0
     middle = np.array(own.box(float(times_s[-1])).translation_m[:2])
@@ -172,22 +172,24 @@ def _invasions(scene: Scene, own: OrientedObstacle, times_s: Array) -> list[Row]
         return []
     under = np.array([is_crossed(pieces, own.box(float(t)), own.half_m) for t in times_s])
     kind = OCCURRENCES.index("lane_invasion")
-    # A line that comes under it from one side stays under it until it is out on the other.
+    # A crossed line passes from one half to the other: both halves together make it one event.
     return [
         (float(times_s[k]), kind, 0, 1.0 if under[k, 0] else -1.0)
-        for k in _beginnings(under[:, 0] | under[:, 1])
+        for k in _rising_edges(under[:, 0] | under[:, 1])
     ]
 
 
-def _beginnings(held: NDArray[np.bool_]) -> list[int]:
-    """Instants at which something holds that did not before; the first counts at time 0 only."""
-    if len(held) == 1:
-        return [0] if held[0] else []
-    return [int(k) + 1 for k in np.flatnonzero(held[1:] & ~held[:-1])]
+def _rising_edges(flags: NDArray[np.bool_]) -> list[int]:
+    """Indices at which a flag becomes set; a single flag, at time 0, counts if it is set."""
+    if len(flags) == 1:
+        return [0] if flags[0] else []
+    return [int(k) + 1 for k in np.flatnonzero(flags[1:] & ~flags[:-1])]
 
 
-def _nearest(kind: str, time_s: float, gaps: list[tuple[float, int]], limit_m: float) -> list[Row]:
-    """The nearest of several things, if it is within a limit."""
+def _report_nearest(
+    kind: str, time_s: float, gaps: list[tuple[float, int]], limit_m: float
+) -> list[Row]:
+    """One row for the nearest of (gap [m], instance id), if it is within a limit."""
     gap_m, instance_id = min(gaps, default=(math.inf, 0))
     if gap_m >= limit_m:
         return []
@@ -195,7 +197,7 @@ def _nearest(kind: str, time_s: float, gaps: list[tuple[float, int]], limit_m: f
 
 
 def _table(rows: list[Row]) -> NDArray[np.void]:
-    """Rows in order of time, kind and instance."""
+    """Rows sorted by time, event and instance."""
     columns = np.array(sorted(rows), dtype=np.float64).reshape(-1, 4).T
     names = tuple(column.name for column in WATCHER)
     return table_rows("watcher", len(rows), **dict(zip(names, columns, strict=True)))

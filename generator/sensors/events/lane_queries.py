@@ -1,4 +1,4 @@
-"""Lines beside lanes, and what stands over them."""
+"""Queries of lanes: border lines under a footprint, and the traffic light of a lane."""
 
 from __future__ import annotations
 
@@ -9,74 +9,75 @@ from gen_data.generator.core.scene import Instance, Lane, Scene
 from gen_data.generator.core.se3 import SE3, Array
 
 SIGNAL_M = 15.0
-"""A light belongs to a lane that ends no farther from it than this."""
-OPPOSITE = -np.sqrt(0.5)
-"""Cosine of the most that a light may be turned away from those who come."""
+"""Largest distance between a traffic light and the end of its lane."""
+FACING_COSINE_MAX = -np.sqrt(0.5)
+"""Largest cosine between a light's front and the direction of its lane: 45 degrees off."""
 
 
 def lane_border_pieces(scene: Scene) -> Array:
-    """Pieces of the lines on both sides of driving lanes outside junctions, [n, 2, 2], world."""
+    """Segments of the lines on both sides of driving lanes outside junctions, world, [n, 2, 2]."""
     pieces = [
         line
         for lane in scene.lanes
         if lane.kind == "driving" and not lane.junction
-        for line in _sides(lane)
+        for line in _side_segments(lane)
     ]
     return np.concatenate(pieces) if pieces else np.zeros((0, 2, 2))
 
 
 def is_crossed(pieces: Array, T_world_box: SE3, half_m: tuple[float, float, float]) -> Array:
-    """Whether a line lies under the left and under the right half of a footprint, bool [2].
+    """Whether a line lies under the left and the right half of a footprint, bool [2].
 
     Args:
-        pieces: As of ``lane_border_pieces``.
-        T_world_box: Middle of the box whose footprint it is.
-        half_m: Half its edges.
+        pieces: As returned by ``lane_border_pieces``.
+        T_world_box: Pose of the box.
+        half_m: Half extents of the box.
     """
     forward = T_world_box.rotation()[:2, 0]
     forward = forward / np.sqrt(forward @ forward)
     axes = np.stack([forward, np.array([-forward[1], forward[0]])])
     local = (pieces - np.array(T_world_box.translation_m[:2])) @ axes.T
-    start, way = local[:, 0], local[:, 1] - local[:, 0]
-    way = np.where(np.abs(way) < 1e-12, 1e-12, way)
+    start, span = local[:, 0], local[:, 1] - local[:, 0]
+    # Slab test of segments against the footprint; the epsilon avoids 0 / 0 for parallel ones.
+    span = np.where(np.abs(span) < 1e-12, 1e-12, span)
     bounds = np.array([half_m[0], half_m[1]])
-    times = np.stack([(-bounds - start) / way, (bounds - start) / way])
+    times = np.stack([(-bounds - start) / span, (bounds - start) / span])
     enter = np.maximum(times.min(axis=0).max(axis=1), 0.0)
     leave = np.minimum(times.max(axis=0).min(axis=1), 1.0)
     under = enter <= leave
-    aside = (start + 0.5 * (enter + leave)[:, None] * way)[under, 1]
+    aside = (start + 0.5 * (enter + leave)[:, None] * span)[under, 1]
     return np.array([bool((aside >= 0.0).any()), bool((aside < 0.0).any())])
 
 
 def governing_light(scene: Scene, T_world_box: SE3, within_m: float) -> Instance | None:
-    """The traffic light at the end of the lane that a box is on; None if there is none.
+    """The traffic light of the lane that a box is on; None if there is none.
 
-    It stands near the lane's end, shows a state to those who come along the lane, and lies no
-    farther ahead than ``within_m``.
+    It is the nearest light to the lane's end that has a state and faces the lane's traffic; the
+    end must be within ``within_m`` of the box, along the lane.
     """
-    found = _lane_under(scene, T_world_box)
+    found = _find_lane(scene, T_world_box)
     if found is None:
         return None
     line, at_m = found
     if line.length_m - at_m > within_m:
         return None
     end = line.pose(line.length_m)
-    direction, place = end.rotation()[:2, 0], np.array(end.translation_m[:2])
+    direction, position = end.rotation()[:2, 0], np.array(end.translation_m[:2])
     lights = []
     for instance in scene.instances:
         state = dict(instance.attributes).get("state", "")
         if instance.category != "traffic_light" or instance.subcategory == "pedestrian":
             continue
         front = instance.T_world_instance.rotation()[:2, 0]
-        gap = np.array(instance.T_world_instance.translation_m[:2]) - place
+        gap = np.array(instance.T_world_instance.translation_m[:2]) - position
         away_m = float(np.sqrt(gap @ gap))
-        if state and away_m < SIGNAL_M and float(front @ direction) < OPPOSITE:
+        if state and away_m < SIGNAL_M and float(front @ direction) < FACING_COSINE_MAX:
             lights.append((away_m, instance.instance_id, instance))
     return min(lights, key=lambda light: light[:2])[2] if lights else None
 
 
-def _sides(lane: Lane) -> tuple[Array, Array]:
-    """Pieces of the left and the right border of a lane, [n, 2, 2] each."""
+def _side_segments(lane: Lane) -> tuple[Array, Array]:
+    """Segments of the left and the right border of a lane, [n, 2, 2] each."""
     centre = np.asarray(lane.center_m, dtype=np.float64)[:, :2]
     along = np.gradient(centre, axis=0)
     along /= np.sqrt(np.sum(along**2, axis=1, keepdims=True))
@@ -86,22 +87,22 @@ def _sides(lane: Lane) -> tuple[Array, Array]:
     return one, other
 
 
-def _lane_under(scene: Scene, T_world_box: SE3) -> tuple[LaneLine, float] | None:
-    """The driving lane whose centre line is nearest, run its way, and how far along it."""
-    place = np.array(T_world_box.translation_m[:2])
+def _find_lane(scene: Scene, T_world_box: SE3) -> tuple[LaneLine, float] | None:
+    """The nearest driving lane below a box with its heading, and the arc length [m] on it."""
+    position = np.array(T_world_box.translation_m[:2])
     heading = T_world_box.rotation()[:2, 0]
     best: tuple[float, Lane, float] | None = None
     for lane in scene.lanes:
         if lane.kind != "driving" or lane.junction:
             continue
         centre = np.asarray(lane.center_m, dtype=np.float64)[:, :2]
-        way = np.diff(centre, axis=0)
-        share = np.sum((place - centre[:-1]) * way, axis=1) / np.sum(way**2, axis=1)
-        gaps = place - centre[:-1] - np.clip(share, 0.0, 1.0)[:, None] * way
+        span = np.diff(centre, axis=0)
+        share = np.sum((position - centre[:-1]) * span, axis=1) / np.sum(span**2, axis=1)
+        gaps = position - centre[:-1] - np.clip(share, 0.0, 1.0)[:, None] * span
         distances = np.sqrt(np.sum(gaps**2, axis=1))
         k = int(distances.argmin())
-        beyond = (k == len(way) - 1 and share[k] > 1.0) or (k == 0 and share[k] < 0.0)
-        if beyond or distances[k] > 0.5 * lane.width_m or way[k] @ heading <= 0.0:
+        beyond = (k == len(span) - 1 and share[k] > 1.0) or (k == 0 and share[k] < 0.0)
+        if beyond or distances[k] > 0.5 * lane.width_m or span[k] @ heading <= 0.0:
             continue
         if best is None or distances[k] < best[0]:
             at_m = LaneLine(lane).at_m

@@ -1,4 +1,4 @@
-"""Boxes that move: whether they touch, how far ahead they are, how near."""
+"""Queries of moving oriented boxes: contact, gap ahead, distance."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from gen_data.generator.core.scene import Instance, Scene
 from gen_data.generator.core.se3 import SE3, Array
 
 STEMS = ("pole", "street_light", "traffic_light", "traffic_sign", "tree", "utility_pole")
-"""Categories whose box is mostly air: a stem stands for them."""
+"""Categories with mostly empty boxes: only their stem counts."""
 STEM_M = 0.2
 """Half the width of a stem."""
 
 
 @dataclass(frozen=True, slots=True)
 class OrientedObstacle:
-    """An instance as a box that may move.
+    """The oriented box of an instance, which may move.
 
     Attributes:
-        track: Of the body that carries it; None = it stands still.
-        T_world_instance: Where it is at the scene's instant.
-        T_instance_box: The middle of its box.
-        half_m: Half the edges of its box.
+        track: Trajectory of its first body; None = it does not move.
+        T_world_instance: Pose of the instance at the scene's instant.
+        T_instance_box: Pose of the box, its origin in the middle.
+        half_m: Half extents of the box.
     """
 
     instance: Instance
@@ -35,22 +35,22 @@ class OrientedObstacle:
     half_m: tuple[float, float, float]
 
     def box(self, time_s: float) -> SE3:
-        """``T_world_box`` at one instant."""
+        """``T_world_box`` at an instant."""
         place = self.T_world_instance if self.track is None else self.track.pose(time_s)
         return place @ self.T_instance_box
 
     def twist(self, time_s: float) -> Twist:
-        """How it moves at one instant."""
+        """Twist of the instance's frame at an instant."""
         return STILL if self.track is None else self.track.twist(time_s)
 
     @property
     def radius_m(self) -> float:
-        """Of the ball around its box."""
+        """Radius of the box's circumscribed sphere."""
         return float(np.sqrt(np.sum(np.square(self.half_m))))
 
 
 def find_obstacles(scene: Scene) -> tuple[OrientedObstacle, ...]:
-    """Every instance that has a box, in order of id."""
+    """Boxes of all instances that have one, in order of id."""
     tracks = {track.body: track for track in scene.tracks}
     rooted = {a.instance_id for a in scene.articulations}
     carriers: dict[int, Trajectory] = {}
@@ -58,26 +58,26 @@ def find_obstacles(scene: Scene) -> tuple[OrientedObstacle, ...]:
         if body.name in tracks and body.instance_id not in rooted:
             carriers.setdefault(body.instance_id, tracks[body.name])
     ordered = sorted(scene.instances, key=lambda instance: instance.instance_id)
-    things = (_thing(instance, carriers.get(instance.instance_id)) for instance in ordered)
-    return tuple(thing for thing in things if min(thing.half_m) > 0.0)
+    boxes = (_make_obstacle(instance, carriers.get(instance.instance_id)) for instance in ordered)
+    return tuple(box for box in boxes if min(box.half_m) > 0.0)
 
 
 def is_touching(one: OrientedObstacle, other: OrientedObstacle, time_s: float) -> bool:
-    """Whether two boxes have a point in common at one instant."""
+    """Whether two boxes have a point in common at an instant."""
     return boxes_touch(one.box(time_s), one.half_m, other.box(time_s), other.half_m)
 
 
-def distance_m(thing: OrientedObstacle, point_m: Array, time_s: float) -> float:
-    """From a point of the world to the nearest of its box; 0 inside."""
-    local = thing.box(time_s).inverse().apply(point_m)
-    outside = np.maximum(np.abs(local) - np.array(thing.half_m), 0.0)
+def distance_m(box: OrientedObstacle, point_m: Array, time_s: float) -> float:
+    """Distance between a point of the world and a box at an instant; 0 inside."""
+    local = box.box(time_s).inverse().apply(point_m)
+    outside = np.maximum(np.abs(local) - np.array(box.half_m), 0.0)
     return float(np.sqrt(outside @ outside))
 
 
-def ahead_m(own: OrientedObstacle, other: OrientedObstacle, time_s: float) -> float:
-    """How far one's front may go straight on until it meets another; inf if it passes.
+def gap_ahead_m(own: OrientedObstacle, other: OrientedObstacle, time_s: float) -> float:
+    """Distance straight ahead from a box's front to another box at an instant.
 
-    Both as they are at the instant, in the plane; 0 where they overlap.
+    In the plane of the first box; 0 where they overlap, inf where the straight path misses.
     """
     T_own_other = own.box(time_s).inverse() @ other.box(time_s)
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
@@ -85,23 +85,23 @@ def ahead_m(own: OrientedObstacle, other: OrientedObstacle, time_s: float) -> fl
     length, width, height = own.half_m
     if corners[:, 2].min() > height or corners[:, 2].max() < -height:
         return np.inf
-    outline = corners[[0, 2, 6, 4], :2] if _upright(T_own_other) else _hull(corners[:, :2])
-    inside = _clipped(_clipped(outline, 1.0, width), -1.0, width)
+    outline = corners[[0, 2, 6, 4], :2] if _is_upright(T_own_other) else _hull(corners[:, :2])
+    inside = _clip_side(_clip_side(outline, 1.0, width), -1.0, width)
     if len(inside) == 0 or inside[:, 0].max() < -length:
         return np.inf
     return max(float(inside[:, 0].min()) - length, 0.0)
 
 
-def project_to_ground(
+def is_below(
     own: OrientedObstacle, other: OrientedObstacle, time_s: float, clearance_m: float
 ) -> bool:
-    """Whether a thing is so low that one drives over it or stands on it."""
+    """Whether another box is so low that a box stands on it or passes over it."""
     top_m = other.box(time_s).translation_m[2] + _height_m(other, time_s)
     bottom_m = own.box(time_s).translation_m[2] - _height_m(own, time_s)
     return top_m < bottom_m + clearance_m
 
 
-def _thing(instance: Instance, track: Trajectory | None) -> OrientedObstacle:
+def _make_obstacle(instance: Instance, track: Trajectory | None) -> OrientedObstacle:
     low, high = np.asarray(instance.box_min_m), np.asarray(instance.box_max_m)
     half, middle = 0.5 * (high - low), 0.5 * (low + high)
     if instance.category in STEMS:
@@ -111,14 +111,14 @@ def _thing(instance: Instance, track: Trajectory | None) -> OrientedObstacle:
     return OrientedObstacle(instance, track, instance.T_world_instance, SE3((x, y, z)), (a, b, c))
 
 
-def _height_m(thing: OrientedObstacle, time_s: float) -> float:
-    """Half of its extent along world Z."""
-    return float(np.abs(thing.box(time_s).rotation()[2]) @ np.array(thing.half_m))
+def _height_m(box: OrientedObstacle, time_s: float) -> float:
+    """Half the extent of a box along world Z."""
+    return float(np.abs(box.box(time_s).rotation()[2]) @ np.array(box.half_m))
 
 
-def _upright(turn: SE3) -> bool:
-    """Whether two boxes share their vertical."""
-    _, x, y, _ = turn.quaternion_wxyz
+def _is_upright(rotation: SE3) -> bool:
+    """Whether a rotation is about Z alone."""
+    _, x, y, _ = rotation.quaternion_wxyz
     return abs(x) < 1e-6 and abs(y) < 1e-6
 
 
@@ -141,8 +141,8 @@ def _left_turn(a: Array, b: Array, c: Array) -> float:
     return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
 
 
-def _clipped(outline: Array, side: float, width_m: float) -> Array:
-    """The part of a convex outline on one side of a line along X (Sutherland and Hodgman 1974)."""
+def _clip_side(outline: Array, side: float, width_m: float) -> Array:
+    """Clip a convex outline to ``side * y <= width_m`` (Sutherland and Hodgman 1974)."""
     kept: list[Array] = []
     for k in range(len(outline)):
         a, b = outline[k - 1], outline[k]

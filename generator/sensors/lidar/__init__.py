@@ -1,1 +1,1 @@
-"""Laser scanners: scan pattern, detection, atmosphere, and devices as data."""
+"""Laser scanners: scan patterns, detection, atmosphere, motion distortion, presets."""

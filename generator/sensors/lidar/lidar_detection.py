@@ -1,8 +1,8 @@
-"""From what rays hit to what a laser scanner reports.
+"""Detection of laser returns: from hits of rays to reported points.
 
-The light that comes back is ``reflectance / range^2 * exp(-2 * optical depth)`` (the lidar equation
-of an extended target; Wandinger, "Introduction to Lidar", 2005). A scanner's sensitivity sets the
-unit: 1 is the light that answers half of the time.
+Received light is ``reflectance / range^2 * exp(-2 * optical depth)`` (the lidar equation of an
+extended target; Wandinger, "Introduction to Lidar", 2005). The scanner's sensitivity sets its unit:
+light of 1 is detected half of the time.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ UInt8 = NDArray[np.uint8]
 LABELS = ("instance_id", "category_id", "surface")
 FIELDS = ("range_m", "reflectance", *LABELS)
 DETOURS_MAX = 2
-"""Of one ray: through glass, and by a mirror."""
+"""Secondary hits of one ray: through glass, and by a mirror."""
 Kept = Literal["strongest", "last", "dual"]
 
 STEEPNESS = 6.0
-"""From 10 % to 90 % answers takes 2 dB of light: noise of the detector around its threshold."""
+"""Exponent of the detection curve: 10 % to 90 % detections span about 3 dB of light."""
 
 RETRO_MAX = 800.0
 """Reflectance of the brightest signs, white matte = 1, reported as 1 (ASTM D4956 type III)."""
@@ -36,13 +36,13 @@ RETRO_MAX = 800.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Pulses:
-    """What may come back of each pulse; arrays are [pulses, candidates].
+    """Candidate returns of each pulse; arrays are [pulses, candidates].
 
     Attributes:
-        range_m: inf where there is nothing.
-        light: Received, in units of what answers half of the time; 0.
-        reflectance: As a compensated device sees it, incidence and air included; 0.
-        instance_id, category_id, surface: As of LidarHits; air has no ids.
+        range_m: inf = no return.
+        light: Received light; 1 is detected half of the time; 0.
+        reflectance: After range compensation, including incidence and attenuation; 0.
+        instance_id, category_id, surface: As in LidarHits; air has no ids.
     """
 
     range_m: Float32
@@ -54,10 +54,10 @@ class Pulses:
 
 
 def make_pulses(echoes: LidarHits, model: LidarModel, keep: Kept = "dual") -> Pulses:
-    """The peaks in the light that comes back to a scanner.
+    """Find the peaks in the received light of each pulse.
 
-    One per beam of a single ray, unless glass or mirrors show it more and more than the strongest
-    is kept; else as many as there are rays.
+    One candidate per beam of a single ray, and more with glass or mirrors unless only the strongest
+    return is kept; for beams of several rays, one per ray.
     """
     fields = {name: getattr(echoes, name) for name in FIELDS}
     rays = echoes.range_m.shape[1]
@@ -65,21 +65,21 @@ def make_pulses(echoes: LidarHits, model: LidarModel, keep: Kept = "dual") -> Pu
         light = received_light(echoes.reflectance, echoes.range_m, model)
         pulses = Pulses(echoes.range_m, light, *(fields[name] for name in FIELDS[1:]))
     else:
-        pulses = _merged(fields, rays, model)
+        pulses = _merge_peaks(fields, rays, model)
     if echoes.detours is None:
         return pulses
     pulses = Pulses(*(getattr(pulses, name).copy() for name in Pulses.__slots__))
     if rays == 1 and keep != "strongest":
-        none = {name: _nothing(name, fields[name], DETOURS_MAX) for name in FIELDS}
+        none = {name: _empty_field(name, fields[name], DETOURS_MAX) for name in FIELDS}
         dark: Float32 = np.zeros(none["range_m"].shape, np.float32)
         more = Pulses(none["range_m"], dark, *(none[name] for name in FIELDS[1:]))
         pulses = join_pulses(pulses, more)
-    _put_detours(pulses, fields, echoes.detours, model)
+    _add_secondary_hits(pulses, fields, echoes.detours, model)
     return pulses
 
 
 def received_light(reflectance: Float32, range_m: Float32, model: LidarModel) -> Float32:
-    """Light from a reflectance at a range through clear air; 0 where there is nothing."""
+    """Light received from a reflectance at a range through clear air; 0 without reflectance."""
     reach = np.float32(model.seen.range_m)
     near = reach / np.maximum(range_m, np.float32(1e-3))
     light: Float32 = reflectance * (near * near) * np.float32(1.0 / model.seen.reflectance)
@@ -87,7 +87,7 @@ def received_light(reflectance: Float32, range_m: Float32, model: LidarModel) ->
 
 
 def join_pulses(pulses: Pulses, more: Pulses) -> Pulses:
-    """Candidates of both, side by side."""
+    """Concatenate the candidates of both."""
     return Pulses(
         *(
             np.concatenate([getattr(pulses, name), getattr(more, name)], axis=1)
@@ -97,26 +97,27 @@ def join_pulses(pulses: Pulses, more: Pulses) -> Pulses:
 
 
 def is_detected(pulses: Pulses, rng: Rng) -> NDArray[np.bool_]:
-    """Which candidates the detector notices: of light L, ``L^k / (1 + L^k)``."""
+    """Draw whether each candidate is detected: for light L with ``p = L^k / (1 + L^k)``."""
     draw = rng.random(pulses.light.shape, dtype=np.float32)
-    strong = np.minimum(pulses.light, np.float32(100.0)) ** np.float32(STEEPNESS)
-    noticed: NDArray[np.bool_] = draw * (1.0 + strong) < strong
-    return noticed
+    # The bound avoids overflow of the power; there p is 1 to float precision.
+    odds = np.minimum(pulses.light, np.float32(100.0)) ** np.float32(STEEPNESS)
+    detected: NDArray[np.bool_] = draw * (1.0 + odds) < odds
+    return detected
 
 
 def select_returns(
-    pulses: Pulses, noticed: NDArray[np.bool_], keep: Kept
+    pulses: Pulses, detected: NDArray[np.bool_], keep: Kept
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Pulse and candidate of every return that is reported, nearest first within a pulse.
+    """Pulse and candidate of every reported return, [n] each, nearest first within a pulse.
 
-    ``dual`` reports the strongest and the last return; the second strongest where both are one.
+    ``dual`` reports the strongest and the last return, or the second strongest if these coincide.
     """
-    light = np.where(noticed, pulses.light, np.float32(-1.0))
+    light = np.where(detected, pulses.light, np.float32(-1.0))
     if light.shape[1] == 1:
-        (rows,) = np.nonzero(noticed[:, 0])
+        (rows,) = np.nonzero(detected[:, 0])
         return rows, np.zeros_like(rows)
     every = np.arange(len(light))
-    far = np.where(noticed, pulses.range_m, np.float32(-1.0))
+    far = np.where(detected, pulses.range_m, np.float32(-1.0))
     strongest, last = light.argmax(axis=1), far.argmax(axis=1)
     chosen = np.zeros(light.shape, np.bool_)
     if keep != "last":
@@ -128,41 +129,41 @@ def select_returns(
         others[every, strongest] = -1.0
         second = np.where(strongest == last, others.argmax(axis=1), last)
         chosen[every, second] = True
-    ranges_m = np.where(chosen & noticed, pulses.range_m, np.float32(np.inf))
+    ranges_m = np.where(chosen & detected, pulses.range_m, np.float32(np.inf))
     order = np.argsort(ranges_m, axis=1, kind="stable")
     rows, ranks = np.nonzero(np.isfinite(np.take_along_axis(ranges_m, order, axis=1)))
     return rows, order[rows, ranks]
 
 
 def report_intensity(reflectance: Float32, model: LidarModel) -> Float32:
-    """What the device says of a reflectance, [0, 1].
+    """Intensity in [0, 1] that the device reports for a reflectance.
 
-    Up to white it is in proportion; retro-reflectors share what is left by the logarithm.
+    Proportional up to white, then logarithmic for retro-reflectors.
     """
     white = np.float32(model.white_intensity)
     above = np.log(np.maximum(reflectance, np.float32(1.0))) / np.float32(np.log(RETRO_MAX))
-    told = white * np.minimum(reflectance, np.float32(1.0)) + (1 - white) * np.minimum(
+    intensity = white * np.minimum(reflectance, np.float32(1.0)) + (1 - white) * np.minimum(
         above, np.float32(1.0)
     )
-    return np.asarray(told, dtype=np.float32)
+    return np.asarray(intensity, dtype=np.float32)
 
 
-def _nothing(name: str, like: NDArray[Any], candidates: int) -> NDArray[Any]:
-    """What a field of echoes says of nothing, for as many pulses."""
+def _empty_field(name: str, like: NDArray[Any], candidates: int) -> NDArray[Any]:
+    """A field of candidates without a return, [pulses, candidates]."""
     return np.full((len(like), candidates), np.inf if name == "range_m" else 0, like.dtype)
 
 
-def _put_detours(
+def _add_secondary_hits(
     pulses: Pulses, fields: Mapping[str, NDArray[Any]], detours: SecondaryHits, model: LidarModel
 ) -> None:
-    """Merge what rays met besides into the peaks of their beams, in place; the strongest stay."""
+    """Merge secondary hits into the peaks of their beams, in place; the strongest peaks remain."""
     rays = fields["range_m"].shape[1]
     rivals = np.arange(len(detours.ray))
     if pulses.light.shape[1] == 1:
-        rivals = _rivals(pulses, detours, model)
+        rivals = _relevant_hits(pulses, detours, model)
     order = rivals[np.argsort(detours.ray[rivals], kind="stable")]
     ray = detours.ray[order]
-    # A ray's second detour, if it has two, goes into a slot of its own.
+    # The second hit of a ray, if it has two, goes into a slot of its own.
     again = (np.diff(ray, prepend=-1) == 0).astype(np.int64)
     rows, place = np.unique(ray // rays, return_inverse=True)
     slot = rays * (1 + again) + ray % rays
@@ -172,17 +173,17 @@ def _put_detours(
         further = np.full((len(rows), DETOURS_MAX * rays), nothing, fields[name].dtype)
         wide[name] = np.concatenate([fields[name][rows], further], axis=1)
         wide[name][place, slot] = getattr(detours, name)[order]
-    peaks = _merged(wide, rays, model)
+    peaks = _merge_peaks(wide, rays, model)
     best = np.argsort(-peaks.light, axis=1, kind="stable")[:, : pulses.light.shape[1]]
     for name in Pulses.__slots__:
         getattr(pulses, name)[rows] = np.take_along_axis(getattr(peaks, name), best, axis=1)
 
 
-def _rivals(pulses: Pulses, detours: SecondaryHits, model: LidarModel) -> NDArray[np.intp]:
-    """Detours of the single rays whose strongest peak may change: most are far fainter than it."""
+def _relevant_hits(pulses: Pulses, detours: SecondaryHits, model: LidarModel) -> NDArray[np.intp]:
+    """Indices of secondary hits that may change the strongest peak of their ray; most are faint."""
     ray = detours.ray
     light = received_light(detours.reflectance, detours.range_m, model)
-    # Two that run into one have at most twice the light of one; a hair for what is rounded.
+    # Two merged hits have at most twice the light of one; 1.001 allows for rounding.
     strong = (DETOURS_MAX * 1.001) * light >= pulses.light[ray, 0]
     near = detours.range_m - pulses.range_m[ray, 0] <= 1.001 * model.pulse_m
     changed: NDArray[np.bool_] = np.zeros(len(pulses.light), np.bool_)
@@ -190,13 +191,13 @@ def _rivals(pulses: Pulses, detours: SecondaryHits, model: LidarModel) -> NDArra
     return np.flatnonzero(changed[ray])
 
 
-def _merged(fields: Mapping[str, NDArray[Any]], rays: int, model: LidarModel) -> Pulses:
-    """Ends of one beam's rays that are close to each other are one peak; [pulses, ends].
+def _merge_peaks(fields: Mapping[str, NDArray[Any]], rays: int, model: LidarModel) -> Pulses:
+    """Merge hits of a beam's rays that are closer than a pulse into peaks, [pulses, hits].
 
-    A peak has the range and the labels of the ray in it that sends the most light.
+    A peak has the range and the labels of its brightest hit.
 
     Args:
-        fields: Of echoes, [pulses, ends].
+        fields: Of hits, [pulses, hits].
         rays: Rays per beam, each with an equal share of its light.
         model: Of the scanner.
     """
@@ -228,8 +229,8 @@ def _merged(fields: Mapping[str, NDArray[Any]], rays: int, model: LidarModel) ->
     return merged
 
 
-def is_beyond_reach(pulses: Pulses, model: LidarModel) -> Pulses:
-    """The pulses with no light from outside the range that the device reports."""
+def clip_range(pulses: Pulses, model: LidarModel) -> Pulses:
+    """Remove the light of candidates outside the range that the device reports."""
     low, high = (np.float32(limit) for limit in model.range_m)
     inside = (pulses.range_m >= low) & (pulses.range_m <= high)
     return replace(pulses, light=np.where(inside, pulses.light, np.float32(0.0)))

@@ -1,4 +1,4 @@
-"""A laser scanner on the rig of a camera."""
+"""Laser scanner on a rig or beside a camera."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from gen_data.generator.sensors.lidar.lidar_detection import (
     Pulses,
     UInt8,
     UInt16,
-    is_beyond_reach,
+    clip_range,
     is_detected,
     make_pulses,
     report_intensity,
@@ -36,10 +36,10 @@ from gen_data.generator.sensors.lidar.lidar_detection import (
 from gen_data.generator.sensors.lidar.motion_distortion import SweepPulses, fire_pulses
 from gen_data.generator.sensors.lidar.presets import lidar_model, model_names
 from gen_data.generator.sensors.lidar.scan_pattern import LidarModel, Sweep, make_sweep
-from gen_data.generator.sensors.mounting import Mounted, with_lidar
+from gen_data.generator.sensors.mounting import Mounted, add_lidar
 
 SUBRAYS = 7
-"""Rays that stand for a beam with a width."""
+"""Rays that sample a beam with divergence."""
 
 CLEAR = Weather()
 
@@ -54,29 +54,28 @@ BEAMS_SCHEMA = {
         {"type": "array", "items": {"type": "array", "items": {"type": "number"}}},
     ]
 }
-"""A file takes the list's place before it is read: see ``datasheets``."""
+"""A file name is replaced by the file's content before validation: see ``datasheets``."""
 
 
 class LidarSensor(Mounted):
-    """A laser scanner on a rig, or on that of the camera it is mounted beside.
+    """A laser scanner on a rig, or mounted beside a camera.
 
     Attributes:
-        name: What labels and files call it.
-        model: A file of ``generator/sensors/lidar/presets``, or one of the user's own like them:
-            ``./my_lidar.yaml``, looked for beside the configuration.
-        beams: Other lasers than the model's: elevation and azimuth offset to the left of each
+        name: Its name in labels and files.
+        model: A file of ``generator/sensors/lidar/presets``, or a data sheet of the same layout
+            beside the configuration: ``./my_lidar.yaml``.
+        beams: Replaces the model's lasers: elevation and azimuth offset to the left of each
             [deg], or the name of a CSV file with the columns ``elevation_deg`` and
-            ``azimuth_offset_deg``. Pulses per second stay those of the model.
-        rotation_hz: Sweeps per second; null = the model's. Pulses per second stay those of the
-            model.
-        camera: Without a rig: name of the camera it rides with, which is listed before it. The
-            rig is then at the camera's centre and looks along its axis.
-        returns: Which return of a pulse is reported; ``dual`` reports two.
-        divergence: Whether beams have a width; costs seven rays instead of one.
+            ``azimuth_offset_deg``. The model's pulses per second remain.
+        rotation_hz: Sweeps per second; null = the model's. The model's pulses per second remain.
+        camera: Without a rig: name of a camera listed before it; the rig is then at the camera's
+            centre, along its axis.
+        returns: Return of a pulse to report; ``dual`` reports two.
+        divergence: Whether beams diverge; costs seven rays instead of one.
         ideal: No noise, no missed return, no weather: every hit within range.
-        motion_distortion: How the scanner's motion during a sweep shows. ``raw``: points are in
+        motion_distortion: Effect of the scanner's motion during a sweep. ``raw``: points are in
             the lidar frame of each pulse's own instant. ``deskewed``: in that of the sweep's
-            middle, as in KITTI's files; moving objects are where each pulse met them. ``none``:
+            middle, as in KITTI's files; moving objects are where each pulse hit them. ``none``:
             all pulses leave in the middle of the sweep.
     """
 
@@ -103,14 +102,14 @@ class LidarSensor(Mounted):
 
     @property
     def device(self) -> LidarModel:
-        """Its data sheet."""
+        """The data sheet, with the settings of this sensor."""
         model = lidar_model(self.model) if isinstance(self.model, str) else self.model
         if self.rotation_hz is not None:
             model = model.model_copy(update={"rotation_hz": self.rotation_hz})
         return model.with_beams(self.beams) if self.beams else model
 
     def describe(self) -> SensorInfo:
-        """A laser scanner."""
+        """Describe a laser scanner."""
         return SensorInfo(
             self.name,
             Modality.LIDAR,
@@ -120,7 +119,7 @@ class LidarSensor(Mounted):
         )
 
     def mount(self, scene: Scene) -> Scene:
-        """The scene with this scanner on its rig.
+        """Add this scanner to its rig, or to its camera.
 
         Raises:
             ConfigError: the scene has no such rig or camera.
@@ -128,12 +127,12 @@ class LidarSensor(Mounted):
         name = self.model if isinstance(self.model, str) else self.model.name
         sweep_s = round(1.0 / self.device.rotation_hz, 9)
         lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=name, sweep_s=sweep_s)
-        return with_lidar(scene, self, lidar)
+        return add_lidar(scene, self, lidar)
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> PointCloud:
-        """One sweep."""
+        """Capture one sweep."""
         del channels
         model = self.device
         lidar = scene.lidar(self.name)
@@ -153,21 +152,20 @@ class LidarSensor(Mounted):
         pulses = make_pulses(renderer.scan(scene, lidar, beams), model, self.returns)
         weather = CLEAR if self.ideal else scene.weather
         if weather != CLEAR:
-            pulses = _through_air(pulses, weather, model, lidar, shots, rng)
-        pulses = is_beyond_reach(pulses, model)
-        noticed = pulses.light > 0.0 if self.ideal else is_detected(pulses, rng)
-        rows, picks = select_returns(pulses, noticed, self.returns)
-        found = Found.of(pulses, rows, picks)
+            pulses = _apply_weather(pulses, weather, model, lidar, shots, rng)
+        pulses = clip_range(pulses, model)
+        detected = pulses.light > 0.0 if self.ideal else is_detected(pulses, rng)
+        returns = Returns.select(pulses, *select_returns(pulses, detected, self.returns))
         if not self.ideal:
-            found = _noisy(found, model, weather, rng)
-        seen_from = SweepPulses(sweep.directions) if self.motion_distortion == "raw" else shots
-        points = _points(found, seen_from, sweep, model)
+            returns = _add_range_noise(returns, model, weather, rng)
+        frames = SweepPulses(sweep.directions) if self.motion_distortion == "raw" else shots
+        points = _make_points(returns, frames, sweep, model)
         return PointCloud(self.name, lidar, points, scene.time_s)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Found:
-    """The returns that are reported, arrays [n]; ``row`` is the number of their pulse."""
+class Returns:
+    """Reported returns, arrays [n]; ``row`` is the number of their pulse."""
 
     row: NDArray[np.intp]
     range_m: Float32
@@ -177,8 +175,8 @@ class Found:
     surface: UInt8
 
     @classmethod
-    def of(cls, pulses: Pulses, rows: NDArray[np.intp], picks: NDArray[np.intp]) -> Found:
-        """These candidates of these pulses."""
+    def select(cls, pulses: Pulses, rows: NDArray[np.intp], picks: NDArray[np.intp]) -> Returns:
+        """Select candidate ``picks[k]`` of pulse ``rows[k]``."""
         which = rows * pulses.light.shape[1] + picks
         return cls(
             rows,
@@ -190,10 +188,10 @@ class Found:
         )
 
 
-def _through_air(
+def _apply_weather(
     pulses: Pulses, weather: Weather, model: LidarModel, lidar: Lidar, shots: SweepPulses, rng: Rng
 ) -> Pulses:
-    """The pulses after fog, rain and snow, and what these send back themselves."""
+    """Attenuate pulses by fog, rain and snow, and add their returns."""
     height_m = lidar.T_world_lidar.translation_m[2]
     up = shots.directions @ lidar.T_world_lidar.rotation()[2].astype(np.float32)
     finite = np.where(np.isfinite(pulses.range_m), pulses.range_m, np.float32(model.range_m[1]))
@@ -201,27 +199,29 @@ def _through_air(
     return add_atmosphere(attenuate(pulses, depth), weather, model, height_m, rng)
 
 
-def _noisy(found: Found, model: LidarModel, weather: Weather, rng: Rng) -> Found:
-    """Ranges with the noise and on the steps of the device."""
-    spread_m = np.float32(model.range_noise_m) + rain_noise_m(weather.rain_mm_h, found.range_m)
-    noise = rng.standard_normal(len(found.range_m), dtype=np.float32)
-    range_m = np.clip(found.range_m + spread_m * noise, *model.range_m)
+def _add_range_noise(returns: Returns, model: LidarModel, weather: Weather, rng: Rng) -> Returns:
+    """Add the device's noise and quantisation to ranges."""
+    spread_m = np.float32(model.range_noise_m) + rain_noise_m(weather.rain_mm_h, returns.range_m)
+    noise = rng.standard_normal(len(returns.range_m), dtype=np.float32)
+    range_m = np.clip(returns.range_m + spread_m * noise, *model.range_m)
     if model.range_step_m > 0.0:
         range_m = np.rint(range_m / model.range_step_m) * model.range_step_m
-    return replace(found, range_m=range_m.astype(np.float32))
+    return replace(returns, range_m=range_m.astype(np.float32))
 
 
-def _points(found: Found, shots: SweepPulses, sweep: Sweep, model: LidarModel) -> NDArray[np.void]:
-    """Records of ``POINT``; returns of a pulse follow each other, nearest first."""
-    rows = found.row
+def _make_points(
+    returns: Returns, shots: SweepPulses, sweep: Sweep, model: LidarModel
+) -> NDArray[np.void]:
+    """Records of ``POINT`` [n]; returns of one pulse are adjacent, nearest first."""
+    rows = returns.row
     points: NDArray[Any] = np.zeros(len(rows), POINT)
-    points["position_m"] = shots.points_m(rows, found.range_m)
-    points["intensity"] = report_intensity(found.reflectance, model)
+    points["position_m"] = shots.points_m(rows, returns.range_m)
+    points["intensity"] = report_intensity(returns.reflectance, model)
     points["time_s"] = sweep.time_s.take(rows)
     points["ring"] = sweep.ring.take(rows)
     points["return_number"] = points["return_count"] = 1
     for name in LABELS:
-        points[name] = getattr(found, name)
+        points[name] = getattr(returns, name)
     if (np.diff(rows) > 0).all():
         return points
     per_pulse = np.bincount(rows, minlength=len(sweep.ring))

@@ -1,7 +1,7 @@
-"""Where a laser scanner is while it sweeps.
+"""Motion distortion: poses of a laser scanner during its sweep.
 
-The scene's instant is the middle of the sweep: a turning scanner then looks straight ahead, as when
-KITTI's triggers its cameras (Geiger et al., "Vision meets Robotics", 2013).
+The scene's instant is the middle of the sweep, when a rotating scanner faces straight ahead, as
+KITTI's does when it triggers the cameras (Geiger et al., "Vision meets Robotics", 2013).
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ class SweepPulses:
 
     Attributes:
         directions: Unit vectors, float32 [n, 3].
-        origins_m: Where they leave, float32 [n, 3]; None = at the frame's origin.
-        time_s: When they leave, from the scene's instant on, float32 [n]; None = all at it.
+        origins_m: Origins of the pulses, float32 [n, 3]; None = the frame's origin.
+        time_s: Emission times relative to the scene's instant, float32 [n]; None = all 0.
     """
 
     directions: Float32
@@ -33,8 +33,8 @@ class SweepPulses:
     time_s: Float32 | None = None
 
     def points_m(self, rows: NDArray[np.intp], range_m: Float32) -> Float32:
-        """Points [m] on some pulses, float32 [k, 3]."""
-        # take() and in place: half the time of indexing and a sum.
+        """Points [m] at ranges on pulses ``rows``, float32 [k, 3]."""
+        # take() and operations in place take half the time of indexing and a sum.
         points: Float32 = self.directions.take(rows, axis=0)
         points *= range_m[:, None]
         if self.origins_m is not None:
@@ -43,7 +43,7 @@ class SweepPulses:
 
 
 def fire_pulses(scene: Scene, lidar: Lidar, sweep: Sweep) -> SweepPulses:
-    """The pulses of a sweep whose scanner rides on what moves.
+    """The pulses of a sweep from a scanner that may move.
 
     Args:
         scene: At the instant of the sweep's middle.
@@ -70,24 +70,24 @@ def fire_pulses(scene: Scene, lidar: Lidar, sweep: Sweep) -> SweepPulses:
         return SweepPulses(sweep.directions, None, time_s)
     count = np.diff(np.append(np.flatnonzero(fresh), len(fresh)))
     return SweepPulses(
-        _turned(R_lidar_shot, sweep.directions, count),
+        _rotate_runs(R_lidar_shot, sweep.directions, count),
         t_lidar_shot.astype(np.float32).repeat(count, axis=0),
         time_s,
     )
 
 
-def _turned(R: Float32, vectors: Float32, count: NDArray[np.intp]) -> Float32:
-    """Vectors [n, 3] after rotations [m, 3, 3], each of which turns the next ``count`` of them."""
-    turned = np.zeros_like(vectors)
+def _rotate_runs(R: Float32, vectors: Float32, count: NDArray[np.intp]) -> Float32:
+    """Rotate vectors [n, 3]: rotation k of [m, 3, 3] applies to the next ``count[k]`` of them."""
+    rotated = np.zeros_like(vectors)
     for i in range(3):
-        # Coordinate by coordinate: four times as fast as a sum over the short last axis.
+        # By coordinate: four times as fast as a sum over the short last axis.
         for j in range(3):
-            turned[:, i] += R[:, i, j].repeat(count) * vectors[:, j]
-    return turned
+            rotated[:, i] += R[:, i, j].repeat(count) * vectors[:, j]
+    return rotated
 
 
 def carrier(scene: Scene, lidar: Lidar) -> tuple[str, SE3]:
-    """Name of the body that a scanner rides on, and ``T_body_lidar``; empty = it stands still."""
+    """Name of the body that carries a scanner, and ``T_body_lidar``; empty name = none."""
     if lidar.rig:
         rig = scene.rig(lidar.rig)
         return rig.body, rig.T_body_rig @ lidar.T_rig_lidar

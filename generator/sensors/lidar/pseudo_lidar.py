@@ -21,7 +21,7 @@ from gen_data.generator.core.scene import Lidar, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.shutter import INSTANT
 from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.mounting import Mounted, known_camera, with_lidar
+from gen_data.generator.sensors.mounting import Mounted, add_lidar, find_camera
 
 CHANNELS = frozenset({Channel.RANGE, Channel.INSTANCE, Channel.CATEGORY})
 
@@ -29,18 +29,18 @@ CHANNELS = frozenset({Channel.RANGE, Channel.INSTANCE, Channel.CATEGORY})
 class PseudoLidar(Mounted):
     """Points of a camera's depth image: one pixel of each ``stride_px`` x ``stride_px``.
 
-    A point is where the ray through the middle of its pixel first meets a surface, at the instant
-    of the reading and without noise; its intensity is 0, its ring the row of its pixel among those
-    that are taken. The first pixel of each axis is number ``stride_px // 2``.
+    A point is the first hit of the ray through its pixel's centre, at the instant of the reading
+    and without noise. Its intensity is 0, its ring the row of its pixel among the selected ones.
+    The first pixel of each axis is number ``stride_px // 2``.
 
     Attributes:
-        name: What labels and files call it.
-        camera: Name of the camera whose pixels these are, which is listed before it. Without a
-            rig, points are in a frame that moves with that camera and looks along its axis.
-        offset_m: Of the frame of the points, from the camera's centre, or on the rig: forward,
-            left, up. Above the camera as a laser scanner is, so that readers of KITTI's format
-            find the ground below the origin.
-        stride_px: Distance of the pixels that are taken, in both axes.
+        name: Its name in labels and files.
+        camera: Name of a camera listed before it, whose depth it takes. Without a rig, points are
+            in a frame that moves with that camera and points along its axis.
+        offset_m: Origin of the points' frame, from the camera's centre or on the rig: forward,
+            left, up. Above the camera by default, like a laser scanner, so that readers of KITTI's
+            format find the ground below the origin.
+        stride_px: Distance between selected pixels, in both axes.
         range_max_m: Points farther away from the camera are left out.
     """
 
@@ -52,7 +52,7 @@ class PseudoLidar(Mounted):
     range_max_m: float = Field(120.0, gt=0, le=10_000)
 
     def describe(self) -> SensorInfo:
-        """A laser scanner, as far as formats are concerned."""
+        """Describe a laser scanner, as which exporters treat it."""
         return SensorInfo(
             self.name,
             Modality.LIDAR,
@@ -61,28 +61,28 @@ class PseudoLidar(Mounted):
         )
 
     def mount(self, scene: Scene) -> Scene:
-        """The scene with the frame of these points in it.
+        """Add the frame of the points to the scene.
 
         Raises:
-            ConfigError: the scene has no such rig or camera, or no pixel is taken of its image.
+            ConfigError: the scene has no such rig or camera, or no pixel of its image is selected.
         """
         lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=self.type)
-        image = known_camera(scene, self.name, self.camera).intrinsics
+        image = find_camera(scene, self.name, self.camera).intrinsics
         if self.stride_px > min(image.width_px, image.height_px):
             raise ConfigError(
                 f"sensor '{self.name}': stride_px {self.stride_px} is larger than the image of "
                 f"camera '{self.camera}', {image.width_px} x {image.height_px} px"
             )
-        return with_lidar(scene, self, lidar)
+        return add_lidar(scene, self, lidar)
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> PointCloud:
-        """The points at the scene's instant, row by row of the image."""
+        """Capture the points at the scene's instant, row by row of the image."""
         del channels, rng
         lidar, camera = scene.lidar(self.name), scene.camera(self.camera)
         intrinsics = every_nth_pixel(camera.intrinsics, self.stride_px)
-        # All rows at one instant, as the cloud has but one pose.
+        # All rows at one instant, as a cloud has a single pose.
         coarse = replace(camera, intrinsics=intrinsics, shutter=INSTANT)
         seen = renderer.render(scene, coarse, CHANNELS).channels
         rows, columns = np.nonzero(seen[Channel.RANGE] <= self.range_max_m)
@@ -99,10 +99,10 @@ class PseudoLidar(Mounted):
 
 
 def every_nth_pixel(camera: Intrinsics, stride_px: int) -> Intrinsics:
-    """The camera whose pixel centres are every n-th ones of another's, from ``n // 2`` on.
+    """Intrinsics whose pixel centres are every n-th one of another camera's, from ``n // 2`` on.
 
-    Its image costs a share of ``1 / n^2`` of the other's, and shows the same at these pixels: a
-    label is decided by the ray through a pixel's centre alone.
+    Labels depend only on the ray through a pixel's centre: the smaller image has the same values at
+    ``1 / n^2`` of the cost.
     """
     first = stride_px // 2
     return replace(

@@ -1,7 +1,7 @@
-"""What a laser scanner is, and where it sends its pulses during one sweep.
+"""Data sheets of laser scanners, and the directions of their pulses during a sweep.
 
-Frame: X forward, Y left, Z up. A turning scanner starts behind itself and turns clockwise seen from
-above, so that it looks ahead in the middle of its sweep.
+Frame: X forward, Y left, Z up. A rotating scanner starts facing backwards and turns clockwise seen
+from above, so that it faces ahead in the middle of its sweep.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Hertz = Annotated[float, Field(gt=0, le=10_000)]
 
 
 class Block(Strict):
-    """Lasers at even steps of elevation, first and last included."""
+    """Lasers at equal steps of elevation, including first and last."""
 
     first: float = Field(ge=-90, le=90)
     last: float = Field(ge=-90, le=90)
@@ -30,37 +30,38 @@ class Block(Strict):
 
 
 class Prisms(Strict):
-    """Two wedge prisms that turn one behind the other; each tilts the beam."""
+    """Two rotating wedge prisms, one behind the other; each tilts the beam."""
 
     tilt_deg: tuple[float, float]
     rotation_hz: tuple[float, float]
 
 
 class Sensitivity(Strict):
-    """A matte surface, square on, that answers half of the time: how sensitive a scanner is."""
+    """A device's sensitivity: the matte surface, square on, that it detects half of the time."""
 
     reflectance: float = Field(gt=0, le=1)
     range_m: float = Field(gt=0)
 
 
 class LidarModel(Strict):
-    """A laser scanner's data sheet.
+    """Data sheet of a laser scanner.
 
     Attributes:
-        name: What labels call it; empty = the file it is in.
-        elevations_deg: Blocks of lasers, from the top; none for a rosette.
-        azimuth_offsets_deg: Of the lasers to the left, repeated down the table.
-        prisms: What draws a rosette; none for a scanner that turns.
+        name: Its name in labels; empty = the name of its file.
+        elevations_deg: Blocks of lasers, from the top; none for a rosette scanner.
+        azimuth_offsets_deg: Offsets of the lasers to the left, repeated down the table.
+        prisms: Prisms of a rosette scanner; none for a rotating one.
         rotation_hz: Sweeps per second.
-        points_per_second: Pulses, all lasers together.
-        range_m: Least and largest range.
-        range_noise_m: Standard deviation.
-        range_step_m: Ranges are whole multiples of it; 0 = any.
-        divergence_mrad: Full angle of a beam.
-        pulse_m: Returns of one pulse that are closer than this run into one.
-        wavelength_nm: Of the light.
-        seen: How sensitive it is.
-        white_intensity: Reported for a white matte surface, of 1; above it are retro-reflectors.
+        points_per_second: Pulses per second of all lasers together.
+        range_m: Smallest and largest range.
+        range_noise_m: Standard deviation of ranges.
+        range_step_m: Quantisation of ranges; 0 = none.
+        divergence_mrad: Full divergence angle of a beam.
+        pulse_m: Returns of one pulse that are closer than this merge.
+        wavelength_nm: Of the laser.
+        seen: Sensitivity.
+        white_intensity: Intensity in [0, 1] reported for a white matte surface; values above are
+            for retro-reflectors.
     """
 
     name: str = ""
@@ -88,7 +89,7 @@ class LidarModel(Strict):
         return self
 
     def with_beams(self, beams: Sequence[tuple[float, float]]) -> LidarModel:
-        """The same device with other lasers: (elevation, azimuth offset) in degrees, any order."""
+        """The same device with other lasers: (elevation, azimuth offset) [deg] in any order."""
         sorted_ = sorted(beams, key=lambda beam: -beam[0])
         blocks = tuple(Block(first=up, last=up, count=1) for up, _ in sorted_)
         offsets = tuple(left for _, left in sorted_)
@@ -96,7 +97,7 @@ class LidarModel(Strict):
         return self.model_copy(update=changed)
 
     def elevations_rad(self) -> NDArray[np.float64]:
-        """Elevation of every laser, the highest first [rings]; empty for a rosette."""
+        """Elevation of every laser, the highest first, [rings]; empty for a rosette scanner."""
         blocks = [np.linspace(b.first, b.last, b.count) for b in self.elevations_deg]
         return np.asarray(np.radians(np.concatenate([np.zeros(0), *blocks])), np.float64)
 
@@ -109,7 +110,7 @@ class Sweep:
         directions: Unit vectors in the lidar frame, float32 [n, 3].
         ring: Row of the table, uint16 [n].
         time_s: From the start of the sweep, float32 [n].
-        order: As of Beams.
+        order: As in LidarRays.
     """
 
     directions: NDArray[np.float32]
@@ -119,30 +120,30 @@ class Sweep:
 
 
 TILE = (32, 4)
-"""Columns and rings whose pulses are neighbours in a sweep's order."""
+"""Columns and rings of a tile; the pulses of a tile are adjacent in a sweep's order."""
 
 
 def make_sweep(model: LidarModel, start_s: float) -> Sweep:
     """One sweep of a scanner.
 
     Args:
-        model: What it is.
-        start_s: When it starts; matters to rosettes only, which never repeat.
+        model: Data sheet.
+        start_s: Start of the sweep; affects only rosettes, which never repeat.
     """
-    return _turn(model) if model.prisms is None else _rosette(model, model.prisms, start_s)
+    return _rotation(model) if model.prisms is None else _rosette(model, model.prisms, start_s)
 
 
 @lru_cache(maxsize=8)
-def _turn(model: LidarModel) -> Sweep:
-    """The same at every turn, and therefore not to be written to."""
+def _rotation(model: LidarModel) -> Sweep:
+    """One rotation; its arrays are cached and read-only."""
     elevation = model.elevations_rad()
     rings = len(elevation)
     columns = max(1, round(model.points_per_second / (model.rotation_hz * rings)))
     offset = np.zeros(rings)
     if model.azimuth_offsets_deg:
         offset = np.radians(np.resize(np.asarray(model.azimuth_offsets_deg), rings))
-    turned = (np.arange(columns) + 0.5) / columns
-    azimuth = math.pi * (1.0 - 2.0 * turned)[:, None] + offset
+    phase = (np.arange(columns) + 0.5) / columns
+    azimuth = math.pi * (1.0 - 2.0 * phase)[:, None] + offset
     level = np.cos(elevation)
     directions = np.stack(
         [
@@ -152,21 +153,21 @@ def _turn(model: LidarModel) -> Sweep:
         ],
         axis=-1,
     )
-    time_s = np.broadcast_to((turned / model.rotation_hz)[:, None], azimuth.shape)
+    time_s = np.broadcast_to((phase / model.rotation_hz)[:, None], azimuth.shape)
     ring = np.broadcast_to(np.arange(rings), azimuth.shape)
     fields = (
         directions.reshape(-1, 3).astype(np.float32),
         ring.reshape(-1).astype(np.uint16),
         time_s.reshape(-1).astype(np.float32),
-        _tiled(azimuth),
+        _tile_order(azimuth),
     )
     for field in fields:
         field.setflags(write=False)
     return Sweep(*fields)
 
 
-def _tiled(azimuth: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Pulses of azimuths [columns, rings] tile by tile."""
+def _tile_order(azimuth: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Indices of pulses with azimuths [columns, rings], tile by tile: nearby rays trace faster."""
     columns, rings = azimuth.shape
     column = np.floor((0.5 - azimuth / (2.0 * math.pi)) * columns).astype(np.int64) % columns
     ring = np.broadcast_to(np.arange(rings), azimuth.shape)
@@ -175,7 +176,7 @@ def _tiled(azimuth: NDArray[np.float64]) -> NDArray[np.int32]:
 
 
 def _rosette(model: LidarModel, prisms: Prisms, start_s: float) -> Sweep:
-    """Tilts of two turning prisms add up (small wedges, first order)."""
+    """One sweep of a rosette: the tilts of two rotating prisms add up (first order)."""
     count = max(1, round(model.points_per_second / model.rotation_hz))
     time_s = np.arange(count) / model.points_per_second
     left, up = np.zeros(count), np.zeros(count)

@@ -1,1 +1,1 @@
-"""Inertial units, satellite receivers and odometers, and devices as data."""
+"""Inertial measurement units, GNSS receivers and odometers, with presets of devices."""

@@ -1,9 +1,22 @@
-"""A satellite receiver: where it is on the earth, how fast it goes, and how sure it is.
+"""GNSS receiver: geodetic position, velocity and their accuracy.
+
+Example, for a scene with a rig ``ego``::
+
+    sensors:
+      - type: gnss
+        name: gps
+        rig: ego
+        model: ZED-F9P
+        rate_hz: 10
+
+``sample.measurements["gps"]`` then holds the fixes since the last step, with the fields ``time_s``,
+``latitude_deg``, ``longitude_deg``, ``altitude_m``, ``velocity_east_m_s`` ...,
+``horizontal_sigma_m``, ``vertical_sigma_m``, ``satellites`` and ``quality`` (as in NMEA GGA).
+Positions and velocities are NaN without a fix.
 
 Errors are white noise and a first-order Gauss-Markov process (Brown and Hwang, "Introduction to
-Random Signals and Applied Kalman Filtering"), made larger by the geometry of the satellites that
-nothing hides, in proportion to the dilution of precision (Langley, "Dilution of Precision", GPS
-World 1999).
+Random Signals and Applied Kalman Filtering"), scaled by the dilution of precision of the visible
+satellites (Langley, "Dilution of Precision", GPS World 1999).
 """
 
 from __future__ import annotations
@@ -29,32 +42,37 @@ from gen_data.generator.sensors.device_presets import check_preset, load_preset
 from gen_data.generator.sensors.mount_kinematics import MountMotion, mount_motion, remove_carrier
 from gen_data.generator.sensors.mounting import Instrument, reading_times
 
-MAKES = "gen_data.generator.sensors.navigation.gnss_presets"
-SKY_M = 1000.0
-"""Nothing farther away hides a satellite."""
-NEEDED = 4
-"""Satellites without which there is no fix: three coordinates and the clock."""
+PRESETS = "gen_data.generator.sensors.navigation.gnss_presets"
+OCCLUSION_RANGE_M = 1000.0
+"""Objects farther away occlude no satellite."""
+SATELLITES_MIN = 4
+"""Satellites needed for a fix: three coordinates and the receiver's clock."""
 DILUTION_MAX = 20.0
-"""Fixes of worse geometry are not reported."""
+"""Fixes with a larger dilution of precision are not reported."""
 
 Degrees = Annotated[float, Field(ge=-180, le=180)]
 
 
 class Spread(Strict):
-    """Standard deviations of one axis under an open sky: white, and slowly wandering."""
+    """Standard deviations of the error of one axis under an open sky.
+
+    Attributes:
+        white_m: White noise.
+        slow_m: Gauss-Markov process.
+    """
 
     white_m: float = Field(ge=0)
     slow_m: float = Field(ge=0)
 
 
 class GnssModel(Strict):
-    """A make of receiver, and the corrections it gets.
+    """Data sheet of a receiver with its source of corrections.
 
     Attributes:
-        quality: Of its fixes, as in NMEA GGA: 1 alone, 2 differential, 4 RTK, 5 RTK float.
+        quality: Fix quality as in NMEA GGA: 1 standalone, 2 differential, 4 RTK, 5 RTK float.
         horizontal, vertical: Errors of position, per axis.
-        correlation_s: Time after which slow errors have lost all but 1/e of their memory.
-        velocity_m_s: Error of velocity, per axis.
+        correlation_s: Correlation time of slow errors, after which 1/e of an error remains.
+        velocity_m_s: Standard deviation of velocity, per axis.
     """
 
     quality: Literal[1, 2, 4, 5]
@@ -65,22 +83,22 @@ class GnssModel(Strict):
 
 
 class Gnss(Instrument):
-    """A satellite receiver: where it is on the earth, and how fast; worse where the sky is hidden.
+    """A GNSS receiver: position and velocity, less accurate where objects occlude the sky.
 
     Attributes:
         model: ``standalone``, ``ZED-F9P`` or ``RT3003``; a file of
             ``generator/sensors/navigation/gnss_presets``.
         origin_deg: Latitude and longitude of the world's origin; its X axis points east.
-        origin_altitude_m: Of the world's origin, above the ellipsoid.
-        satellites: Above the horizon; drawn anew for every sequence.
-        mask_deg: Satellites lower than this are not used.
+        origin_altitude_m: Altitude of the world's origin above the ellipsoid.
+        satellites: Number of satellites above the mask; their directions are drawn per sequence.
+        mask_deg: Elevation mask: satellites lower than this are not used.
         noise: Factor on the model's errors; 0 = an ideal device.
     """
 
     kind: ClassVar[str] = "gnss"
     type: Literal["gnss"] = "gnss"
     name: str = Field("gnss", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
-    model: Annotated[str, AfterValidator(lambda name: check_preset(MAKES, name))] = "standalone"
+    model: Annotated[str, AfterValidator(lambda name: check_preset(PRESETS, name))] = "standalone"
     origin_deg: tuple[Annotated[float, Field(ge=-89, le=89)], Degrees] = (49.0114, 8.4244)
     origin_altitude_m: float = Field(115.0, ge=-1000, le=20_000)
     satellites: int = Field(12, ge=4, le=60)
@@ -89,116 +107,121 @@ class Gnss(Instrument):
 
     @property
     def device_model(self) -> str:
-        """What it is, for the labels."""
+        """Name of the preset."""
         return self.model
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Measurements:
-        """The fixes since the last step."""
+        """Read the fixes at the instants since the last step."""
         del channels
         times_s = reading_times(scene, self.rate_hz)
         shared = rng.of_sequence()
-        sky = _constellation(self.satellites, math.radians(self.mask_deg), shared)
-        ride = mount_motion(scene, self.name)
-        seen = np.stack([_in_sight(scene, self.rig, ride, t, sky, renderer) for t in times_s])
-        fixes = _fixes(sky, seen)
-        make = load_preset(MAKES, self.model, GnssModel)
+        sky = _draw_constellation(self.satellites, math.radians(self.mask_deg), shared)
+        motion = mount_motion(scene, self.name)
+        visible = np.stack(
+            [_is_visible(scene, self.rig, motion, t, sky, renderer) for t in times_s]
+        )
+        fixes = _compute_fixes(sky, visible)
+        model = load_preset(PRESETS, self.model, GnssModel)
         rate_hz = self.rate_hz or 1.0 / scene.step_s
-        slow = _slow(times_s, rate_hz, make.correlation_s, shared)
-        columns = self._columns(make, ride, times_s, fixes, slow, rng)
+        slow = _draw_slow_errors(times_s, rate_hz, model.correlation_s, shared)
+        columns = self._columns(model, motion, times_s, fixes, slow, rng)
         rows = table_rows("gnss", len(times_s), time_s=times_s, **columns)
         return Measurements(self.name, scene.device(self.name), rows, scene.time_s)
 
     def _columns(
         self,
-        make: GnssModel,
-        ride: MountMotion,
+        model: GnssModel,
+        motion: MountMotion,
         times_s: Array,
         fixes: Fixes,
         slow: Array,
         rng: Rng,
     ) -> dict[str, Array]:
-        """Positions and velocities with their errors; NaN without a fix."""
-        across, up = make.horizontal, make.vertical
+        """Positions and velocities with errors, by column; NaN without a fix."""
+        across, up = model.horizontal, model.vertical
         growth = self.noise * np.stack([fixes.horizontal, fixes.horizontal, fixes.vertical], axis=1)
         white = np.array([across.white_m, across.white_m, up.white_m])
-        slowly = np.array([across.slow_m, across.slow_m, up.slow_m])
-        errors_m = growth * (white * rng.standard_normal(slow.shape) + slowly * slow)
-        places_m = np.array([ride.pose(float(t)).translation_m for t in times_s])
+        slow_scale = np.array([across.slow_m, across.slow_m, up.slow_m])
+        errors_m = growth * (white * rng.standard_normal(slow.shape) + slow_scale * slow)
+        positions_m = np.array([motion.pose(float(t)).translation_m for t in times_s])
         origin = GeodeticOrigin(*self.origin_deg, self.origin_altitude_m)
-        there = np.round(to_geodetic(places_m + errors_m, origin), 10)
-        speeds = np.array([ride.velocity_m_s(float(t)) for t in times_s])
-        speeds += growth * make.velocity_m_s * rng.standard_normal(slow.shape)
-        sigma_m = growth[:, 1:] * np.hypot(white, slowly)[1:]
+        geodetic = np.round(to_geodetic(positions_m + errors_m, origin), 10)
+        velocities = np.array([motion.velocity_m_s(float(t)) for t in times_s])
+        velocities += growth * model.velocity_m_s * rng.standard_normal(slow.shape)
+        sigma_m = growth[:, 1:] * np.hypot(white, slow_scale)[1:]
         columns = {
-            "latitude_deg": there[:, 0],
-            "longitude_deg": there[:, 1],
-            "altitude_m": np.round(there[:, 2], 6),
-            "velocity_east_m_s": speeds[:, 0],
-            "velocity_north_m_s": speeds[:, 1],
-            "velocity_up_m_s": speeds[:, 2],
+            "latitude_deg": geodetic[:, 0],
+            "longitude_deg": geodetic[:, 1],
+            "altitude_m": np.round(geodetic[:, 2], 6),
+            "velocity_east_m_s": velocities[:, 0],
+            "velocity_north_m_s": velocities[:, 1],
+            "velocity_up_m_s": velocities[:, 2],
             "horizontal_sigma_m": sigma_m[:, 0],
             "vertical_sigma_m": sigma_m[:, 1],
         }
-        columns = {name: np.where(fixes.good, v, np.nan) for name, v in columns.items()}
-        quality = np.where(fixes.good, make.quality, 0)
+        columns = {name: np.where(fixes.valid, v, np.nan) for name, v in columns.items()}
+        quality = np.where(fixes.valid, model.quality, 0)
         return {**columns, "satellites": fixes.satellites, "quality": quality}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fixes:
-    """What geometry allows at each reading, arrays [n].
+    """Geometry of the visible satellites at each reading, arrays [n].
 
     Attributes:
-        satellites: In sight.
-        good: Whether there is a fix.
-        horizontal, vertical: Dilution of precision, in units of that under the open sky; 1 where
-            there is no fix.
+        satellites: Number of visible satellites.
+        valid: Whether there is a fix.
+        horizontal, vertical: Dilution of precision relative to that of the open sky; 1 without a
+            fix.
     """
 
     satellites: NDArray[np.intp]
-    good: NDArray[np.bool_]
+    valid: NDArray[np.bool_]
     horizontal: Array
     vertical: Array
 
 
-def _constellation(count: int, mask_rad: float, rng: Rng) -> Array:
-    """Directions towards satellites, even over the sky above the mask, [n, 3]."""
+def _draw_constellation(count: int, mask_rad: float, rng: Rng) -> Array:
+    """Unit directions of satellites, uniform over the sky above the mask, world, [n, 3]."""
     up = rng.uniform(math.sin(mask_rad), 1.0, count)
     azimuth = rng.uniform(0.0, 2.0 * math.pi, count)
     level = np.sqrt(1.0 - up * up)
     return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), up], axis=1)
 
 
-def _in_sight(
-    scene: Scene, rig: str, ride: MountMotion, time_s: float, sky: Array, renderer: Renderer
+def _is_visible(
+    scene: Scene, rig: str, motion: MountMotion, time_s: float, sky: Array, renderer: Renderer
 ) -> NDArray[np.bool_]:
-    """Which satellites nothing hides, [satellites]."""
-    place = SE3(ride.pose(time_s).translation_m)
+    """Whether each satellite is visible from the antenna, [satellites]."""
+    antenna = Lidar("antenna", "", T_world_lidar=SE3(motion.pose(time_s).translation_m))
     around = remove_carrier(scene_at(scene, float(time_s)), rig)
-    beams = LidarRays(sky.astype(np.float32), 0.0, 1, SKY_M)
-    echoes = renderer.scan(around, Lidar("antenna", "", T_world_lidar=place), beams)
-    free: NDArray[np.bool_] = ~np.isfinite(echoes.range_m[:, 0])
-    return free
+    rays = LidarRays(sky.astype(np.float32), 0.0, 1, OCCLUSION_RANGE_M)
+    visible: NDArray[np.bool_] = ~np.isfinite(renderer.scan(around, antenna, rays).range_m[:, 0])
+    return visible
 
 
-def _fixes(sky: Array, seen: NDArray[np.bool_]) -> Fixes:
-    """What the satellites in sight allow; ``seen`` is [n, satellites]."""
+def _compute_fixes(sky: Array, visible: NDArray[np.bool_]) -> Fixes:
+    """Fixes from directions of satellites and their visibility [n, satellites]."""
     open_sky = _dilution(sky)
-    ratios, good = np.ones((len(seen), 2)), np.zeros(len(seen), np.bool_)
-    for k, free in enumerate(seen):
-        if free.sum() < NEEDED:
+    ratios, valid = np.ones((len(visible), 2)), np.zeros(len(visible), np.bool_)
+    for k, satellites in enumerate(visible):
+        if satellites.sum() < SATELLITES_MIN:
             continue
-        found = _dilution(sky[free])
-        good[k] = bool(np.all(found < DILUTION_MAX))
-        if good[k]:
-            ratios[k] = np.round(found / open_sky, 6)
-    return Fixes(seen.sum(axis=1), good, ratios[:, 0], ratios[:, 1])
+        dilution = _dilution(sky[satellites])
+        valid[k] = bool(np.all(dilution < DILUTION_MAX))
+        if valid[k]:
+            ratios[k] = np.round(dilution / open_sky, 6)
+    return Fixes(visible.sum(axis=1), valid, ratios[:, 0], ratios[:, 1])
 
 
 def _dilution(sky: Array) -> Array:
-    """Horizontal and vertical dilution of precision of satellites in these directions, [2]."""
+    """Horizontal and vertical dilution of precision of satellites, [2]; inf if they are degenerate.
+
+    Square roots of the diagonal of ``(G^T G)^-1``, where a row of G is a negated direction and 1
+    for the clock (Langley 1999).
+    """
     design = np.column_stack([-sky, np.ones(len(sky))])
     normal = np.einsum("ni,nj->ij", design, design, optimize=False)
     if abs(float(np.linalg.det(normal))) < 1e-9:
@@ -208,10 +231,10 @@ def _dilution(sky: Array) -> Array:
     return dilution
 
 
-def _slow(times_s: Array, rate_hz: float, correlation_s: float, shared: Rng) -> Array:
-    """A Gauss-Markov process of deviation 1 at each reading, [n, 3].
+def _draw_slow_errors(times_s: Array, rate_hz: float, correlation_s: float, shared: Rng) -> Array:
+    """A Gauss-Markov process of standard deviation 1 at each reading, [n, 3].
 
-    It is drawn from time 0 at every step, so that any instant can be made alone.
+    It is drawn from time 0 at every step, so that each step can be generated on its own.
     """
     last = round(float(times_s[-1]) * rate_hz)
     kept = math.exp(-1.0 / (rate_hz * correlation_s))

@@ -1,9 +1,22 @@
-"""An inertial unit: specific force and angular rate.
+"""Inertial measurement unit (IMU): accelerometer and gyroscope.
 
-The errors of each axis are a bias that is there when it is switched on, a random walk of the bias,
-and white noise, the three terms by which data sheets and calibrations describe them (IEEE Std 952;
-Woodman, "An introduction to inertial navigation", 2007). White noise of density ``n`` read at rate
-``f`` has a deviation of ``n sqrt(f)``; a walk of density ``w`` grows by ``w / sqrt(f)`` a reading.
+Example, for a scene with a rig ``ego``::
+
+    sensors:
+      - type: imu
+        name: imu
+        rig: ego
+        model: ADIS16448
+        rate_hz: 100
+
+``sample.measurements["imu"]`` then holds the readings since the last step, with the fields
+``time_s``, ``force_x_m_s2`` ... ``force_z_m_s2`` (specific force) and ``rate_x_rad_s`` ...
+``rate_z_rad_s`` (angular rate), axes X forward, Y left, Z up. At rest ``force_z_m_s2`` is 9.8.
+
+The errors of each axis are a turn-on bias, a random walk of the bias, and white noise, the terms
+of data sheets and calibrations (IEEE Std 952; Woodman, "An introduction to inertial navigation",
+2007). White noise of density ``n`` sampled at rate ``f`` has standard deviation ``n sqrt(f)``; a
+random walk of density ``w`` has increments of ``w / sqrt(f)``.
 """
 
 from __future__ import annotations
@@ -25,19 +38,19 @@ from gen_data.generator.sensors.device_presets import check_preset, load_preset
 from gen_data.generator.sensors.mount_kinematics import mount_motion
 from gen_data.generator.sensors.mounting import Instrument, reading_times
 
-MAKES = "gen_data.generator.sensors.navigation.imu_presets"
+PRESETS = "gen_data.generator.sensors.navigation.imu_presets"
 GRAVITY_M_S2 = 9.80665
 AXES = tuple(column.name for column in IMU[1:])
 
 
 class Errors(Strict):
-    """How the three axes of an accelerometer [m/s^2] or a gyroscope [rad/s] err.
+    """Errors of the axes of an accelerometer (unit m/s^2) or a gyroscope (unit rad/s).
 
     Attributes:
         noise: Density of the white noise, unit per root hertz.
-        bias: Standard deviation of the bias when it is switched on.
+        bias: Standard deviation of the turn-on bias.
         bias_random_walk: Density of the bias's random walk, unit per second and root hertz.
-        full_scale: The largest value that it can tell.
+        full_scale: Largest value that it reports.
     """
 
     noise: float = Field(ge=0)
@@ -47,14 +60,14 @@ class Errors(Strict):
 
 
 class ImuModel(Strict):
-    """A make of inertial unit."""
+    """Data sheet of an IMU."""
 
     accelerometer: Errors
     gyroscope: Errors
 
 
 class Imu(Instrument):
-    """An inertial unit: specific force and angular rate, several readings per step.
+    """An IMU: specific force and angular rate, several readings per step.
 
     Attributes:
         model: ``RT3003``, ``ADIS16448`` or ``BMI088``; a file of
@@ -65,60 +78,61 @@ class Imu(Instrument):
     kind: ClassVar[str] = "imu"
     type: Literal["imu"] = "imu"
     name: str = Field("imu", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
-    model: Annotated[str, AfterValidator(lambda name: check_preset(MAKES, name))] = "RT3003"
+    model: Annotated[str, AfterValidator(lambda name: check_preset(PRESETS, name))] = "RT3003"
     rate_hz: float | None = Field(100.0, gt=0, le=10_000)
     noise: float = Field(1.0, ge=0)
 
     @property
     def device_model(self) -> str:
-        """What it is, for the labels."""
+        """Name of the preset."""
         return self.model
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Measurements:
-        """The readings since the last step."""
+        """Read force and rate at the instants since the last step."""
         del renderer, channels
         times_s = reading_times(scene, self.rate_hz)
-        true = _felt(scene, self.name, times_s)
-        make = load_preset(MAKES, self.model, ImuModel)
+        truth = _true_readings(scene, self.name, times_s)
+        model = load_preset(PRESETS, self.model, ImuModel)
         rate_hz = self.rate_hz or 1.0 / scene.step_s
-        read = true + self.noise * _errors(make, times_s, rate_hz, rng)
+        readings = truth + self.noise * _draw_errors(model, times_s, rate_hz, rng)
         if self.noise > 0.0:
-            limits = _of_axes(make, "full_scale")
-            read = np.clip(read, -limits, limits)
-        columns = dict(zip(AXES, np.round(read, 9).T, strict=True))
+            limits = _per_axis(model, "full_scale")
+            readings = np.clip(readings, -limits, limits)
+        columns = dict(zip(AXES, np.round(readings, 9).T, strict=True))
         rows = table_rows("imu", len(times_s), time_s=times_s, **columns)
         return Measurements(self.name, scene.device(self.name), rows, scene.time_s)
 
 
-def _felt(scene: Scene, name: str, times_s: Array) -> Array:
-    """True specific force and angular rate in the device's axes, [n, 6]."""
-    ride = mount_motion(scene, name)
-    felt = []
+def _true_readings(scene: Scene, name: str, times_s: Array) -> Array:
+    """Specific force and angular rate without errors, device axes, [n, 6]."""
+    motion = mount_motion(scene, name)
+    readings = []
     for time_s in times_s:
-        T_world_device, acceleration, rate = ride.felt(float(time_s))
+        T_world_device, acceleration, rate = motion.inertial_motion(float(time_s))
+        # Specific force is acceleration minus gravity, which points down.
         upward = T_world_device.inverse().rotate(np.array([0.0, 0.0, GRAVITY_M_S2]))
-        felt.append(np.concatenate([acceleration + upward, rate]))
-    return np.array(felt)
+        readings.append(np.concatenate([acceleration + upward, rate]))
+    return np.array(readings)
 
 
-def _errors(make: ImuModel, times_s: Array, rate_hz: float, rng: Rng) -> Array:
-    """What is added to the truth, [n, 6]: bias, its walk since time 0, and white noise.
+def _draw_errors(model: ImuModel, times_s: Array, rate_hz: float, rng: Rng) -> Array:
+    """Bias, its random walk since time 0, and white noise, [n, 6].
 
-    The walk is drawn from the beginning at every step, so that any instant can be made alone.
+    The walk is drawn from time 0 at every step, so that each step can be generated on its own.
     """
     shared = rng.of_sequence()
-    bias = _of_axes(make, "bias") * shared.standard_normal(6)
+    bias = _per_axis(model, "bias") * shared.standard_normal(6)
     last = round(float(times_s[-1]) * rate_hz)
-    walked = np.cumsum(shared.standard_normal((last + 1, 6)), axis=0)
+    walks = np.cumsum(shared.standard_normal((last + 1, 6)), axis=0)
     rows = np.rint(times_s * rate_hz).astype(int)
-    walk = _of_axes(make, "bias_random_walk") / math.sqrt(rate_hz) * walked[rows]
-    white = _of_axes(make, "noise") * math.sqrt(rate_hz) * rng.standard_normal((len(times_s), 6))
+    walk = _per_axis(model, "bias_random_walk") / math.sqrt(rate_hz) * walks[rows]
+    white = _per_axis(model, "noise") * math.sqrt(rate_hz) * rng.standard_normal((len(times_s), 6))
     errors: Array = bias + walk + white
     return errors
 
 
-def _of_axes(make: ImuModel, field: str) -> Array:
-    """A figure of both triads, by axis, [6]."""
-    return np.repeat([getattr(make.accelerometer, field), getattr(make.gyroscope, field)], 3)
+def _per_axis(model: ImuModel, field: str) -> Array:
+    """A value of the data sheet for each axis: three of force, three of rate, [6]."""
+    return np.repeat([getattr(model.accelerometer, field), getattr(model.gyroscope, field)], 3)

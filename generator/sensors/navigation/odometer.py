@@ -1,8 +1,19 @@
-"""What the wheels tell: distance, speed, yaw rate and steering.
+"""Wheel odometer: distance, speed, yaw rate, steering angle and wheel speeds.
 
-Mounted at the middle of the rear axle. Wheels roll without slipping, and the front wheels point
-across the line to the centre of the turn (Ackermann); the steering angle is that of the bicycle
-model, ``atan(wheelbase * yaw rate / speed)``.
+Example, for a scene with a rig ``ego`` at the middle of the rear axle::
+
+    sensors:
+      - type: odometer
+        name: wheels
+        rig: ego
+        rate_hz: 50
+
+``sample.measurements["wheels"]`` then holds the readings since the last step, with the fields
+``time_s``, ``distance_m``, ``speed_m_s``, ``yaw_rate_rad_s``, ``steering_rad`` and the rim speeds
+``wheel_rear_left_m_s`` ... ``wheel_front_right_m_s``.
+
+Wheels roll without slip, with Ackermann geometry at the front; the steering angle is that of the
+bicycle model, ``atan(wheelbase * yaw rate / speed)``.
 """
 
 from __future__ import annotations
@@ -22,20 +33,20 @@ from gen_data.generator.sensors.mount_kinematics import MountMotion, mount_motio
 from gen_data.generator.sensors.mounting import Instrument, reading_times
 
 WALKING_M_S = 0.5
-"""Below it a turn says nothing about the front wheels."""
-PARTS = 4
-"""Chords per reading by which distance is measured."""
+"""Below this speed the steering angle is not observable and reported as 0."""
+CHORDS = 4
+"""Chords per reading that approximate the driven curve."""
 
 
 class Odometer(Instrument):
-    """Wheels and yaw rate: distance, speed, steering, and the speed of every wheel.
+    """A wheel odometer: distance, speed, yaw rate, steering angle and the speed of every wheel.
 
     Attributes:
-        wheelbase_m: From the rear axle, where it is mounted, to the front axle.
-        track_m: From left to right wheels.
-        scale_error: Standard deviation of the share by which all speeds and distances are wrong:
-            tyres that are worn or soft; drawn once per sequence.
-        distance_step_m: Way per pulse of the wheels' encoder; 0 = exact.
+        wheelbase_m: Distance from the rear axle, where it is mounted, to the front axle.
+        track_m: Distance between left and right wheels.
+        scale_error: Standard deviation of the relative error of all speeds and distances, caused
+            by worn or soft tyres; drawn once per sequence.
+        distance_step_m: Distance per pulse of the wheels' encoder; 0 = exact.
         speed_noise_m_s, yaw_rate_noise_rad_s, steering_noise_rad: Standard deviations of white
             noise.
         yaw_rate_bias_rad_s: Standard deviation of a bias that is drawn once per sequence.
@@ -56,15 +67,17 @@ class Odometer(Instrument):
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Measurements:
-        """The readings since the last step."""
+        """Read the odometer at the instants since the last step."""
         del renderer, channels
         times_s = reading_times(scene, self.rate_hz)
-        ride = mount_motion(scene, self.name)
+        motion = mount_motion(scene, self.name)
         scale, bias = rng.of_sequence().standard_normal(2)
         scale, bias = 1.0 + self.scale_error * scale, self.yaw_rate_bias_rad_s * bias
-        speeds, rates = _forward(ride, times_s)
-        distance_m = scale * _travelled(ride, times_s, self.rate_hz or 1.0 / scene.step_s)
+        speeds, rates = _speeds_and_yaw_rates(motion, times_s)
+        rate_hz = self.rate_hz or 1.0 / scene.step_s
+        distance_m = scale * _measure_distance_m(motion, times_s, rate_hz)
         if self.distance_step_m > 0.0:
+            # The offset keeps a distance that ends on a pulse from being rounded below it.
             distance_m = np.floor(distance_m / self.distance_step_m + 1e-6) * self.distance_step_m
         noise = rng.standard_normal((7, len(times_s)))
         wheels = scale * self._wheels(speeds, rates) + self.speed_noise_m_s * noise[3:]
@@ -82,39 +95,42 @@ class Odometer(Instrument):
         return Measurements(self.name, scene.device(self.name), rows, scene.time_s)
 
     def _steering(self, speeds: Array, rates: Array) -> Array:
-        """Angle of the front wheels, [n]."""
+        """Steering angle of the bicycle model [rad], [n]."""
         rolling = np.abs(speeds) > WALKING_M_S
         curvature = np.divide(rates, speeds, out=np.zeros_like(rates), where=rolling)
         return np.arctan(self.wheelbase_m * curvature)
 
     def _wheels(self, speeds: Array, rates: Array) -> Array:
-        """Speeds of the rims: rear left and right, front left and right, [4, n]."""
+        """Rim speeds [m/s]: rear left and right, front left and right, [4, n]."""
         half = 0.5 * self.track_m * rates
         rear = np.stack([speeds - half, speeds + half])
         front = np.copysign(np.hypot(rear, self.wheelbase_m * rates), rear)
         return np.concatenate([rear, front])
 
 
-def _forward(ride: MountMotion, times_s: Array) -> tuple[Array, Array]:
-    """Speed forward and rate of turning to the left, [n] each."""
+def _speeds_and_yaw_rates(motion: MountMotion, times_s: Array) -> tuple[Array, Array]:
+    """Forward speed [m/s] and yaw rate to the left [rad/s], [n] each."""
     speeds, rates = [], []
     for time_s in times_s:
-        axes = ride.pose(float(time_s)).inverse()
-        speeds.append(axes.rotate(ride.velocity_m_s(float(time_s)))[0])
-        turning = np.asarray(ride.twist(float(time_s)).angular_velocity_rad_s)
-        rates.append(axes.rotate(turning)[2])
+        axes = motion.pose(float(time_s)).inverse()
+        speeds.append(axes.rotate(motion.velocity_m_s(float(time_s)))[0])
+        angular_velocity = np.asarray(motion.twist(float(time_s)).angular_velocity_rad_s)
+        rates.append(axes.rotate(angular_velocity)[2])
     return np.array(speeds), np.array(rates)
 
 
-def _travelled(ride: MountMotion, times_s: Array, rate_hz: float) -> Array:
-    """Way since time 0, backwards counted down, [n]; measured anew at every step."""
-    count = round(float(times_s[-1]) * rate_hz) * PARTS
-    poses = [ride.pose(k / (rate_hz * PARTS)) for k in range(count + 1)]
+def _measure_distance_m(motion: MountMotion, times_s: Array, rate_hz: float) -> Array:
+    """Signed distance travelled since time 0, [n]; reversing counts down.
+
+    Measured from time 0 at every step, so that each step can be generated on its own.
+    """
+    count = round(float(times_s[-1]) * rate_hz) * CHORDS
+    poses = [motion.pose(k / (rate_hz * CHORDS)) for k in range(count + 1)]
     places_m = np.array([pose.translation_m for pose in poses])
     forward = np.array([pose.rotation()[:, 0] for pose in poses])
     steps = np.diff(places_m, axis=0)
     lengths_m = np.sqrt(np.sum(steps**2, axis=1))
     signed = np.copysign(lengths_m, np.sum(steps * forward[:-1], axis=1))
-    way_m = np.concatenate([[0.0], np.cumsum(signed)])
-    rows = [round(float(t) * rate_hz) * PARTS for t in times_s]
-    return way_m[rows]
+    distance_m = np.concatenate([[0.0], np.cumsum(signed)])
+    rows = [round(float(t) * rate_hz) * CHORDS for t in times_s]
+    return distance_m[rows]

@@ -1,1 +1,1 @@
-"""Radars: detections, cross sections, and devices as data."""
+"""Radars: detection, radar cross sections, presets of devices."""

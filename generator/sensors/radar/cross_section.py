@@ -1,6 +1,6 @@
-"""How much things send back to a radar at 77 GHz.
+"""Radar cross sections (RCS) at 77 GHz.
 
-Road users are known by their radar cross section (RCS), whose mean depends on what they are:
+The mean RCS of road users depends on their category:
 
 * **pedestrians** -8 dBsm (Yamada, Tanaka and Nishikawa, "Radar cross section for pedestrian in
   76 GHz band", EuMC 2005; within 2 dB in Fortuny-Guasch and Chareau, EUR 25762, 2013);
@@ -10,11 +10,11 @@ Road users are known by their radar cross section (RCS), whose mean depends on w
   backscattering at 77 GHz for automotive radar", EuCAP 2016);
 * others are round figures between and beyond these, in order of size.
 
-Everything else sends back by area: a patch whose normal is turned by ``t`` from the radar has an
-RCS of ``gamma * cos(t)`` per area (Barton, "Radar System Analysis and Modeling", 2005, for ground),
-so that the solid angle it fills says all. Values of gamma are round: smooth road -28 dB, plants
--14 dB (Ulaby and Dobson, "Handbook of Radar Scattering Statistics for Terrain", 1989), masonry
--8 dB, metal sheet and posts 0 dB.
+The RCS of everything else is proportional to its area: ``gamma * cos(t)`` per area of a patch whose
+normal is at an angle ``t`` to the radar (Barton, "Radar System Analysis and Modeling", 2005, for
+ground), which is ``gamma`` per area perpendicular to the ray. Values of gamma are round figures:
+smooth road -28 dB, plants -14 dB (Ulaby and Dobson, "Handbook of Radar Scattering Statistics for
+Terrain", 1989), masonry -8 dB, metal sheet and posts 0 dB.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ from gen_data.generator.core.se3 import Array
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A kind of road user.
+    """Radar cross section of a category of road users.
 
     Attributes:
-        mean_dbsm: Radar cross section, averaged over all sides.
-        swing_db: How much more it has square on to a side, and less across a corner.
-        fill: Share of its box's silhouette that it fills.
+        mean_dbsm: RCS, averaged over all aspect angles.
+        swing_db: Excess square on to a side, and deficit across a corner.
+        fill: Share of the box's silhouette that the object fills.
     """
 
     mean_dbsm: float
@@ -67,7 +67,7 @@ TARGETS = {
 METAL = frozenset(
     {"barrier", "bollard", "fence", "street_light", "traffic_light", "traffic_sign", "pole"}
 )
-"""Categories that are sheet metal and posts."""
+"""Categories made of sheet metal and posts."""
 
 GAMMA_DB = {
     "": -10.0,
@@ -97,7 +97,7 @@ METAL_DB = 0.0
 
 
 def cross_section_m2(target: Target, instance: Instance, towards_radar: Array) -> float:
-    """Mean radar cross section of a road user, seen from a direction (unit, world)."""
+    """Mean RCS [m^2] of a road user seen from a direction (unit, world)."""
     x, y, _ = instance.T_world_instance.inverse().rotate(towards_radar)
     level2 = float(x * x + y * y)
     # The cosine of four times the azimuth, without the angle.
@@ -106,14 +106,19 @@ def cross_section_m2(target: Target, instance: Instance, towards_radar: Array) -
 
 
 def silhouette_m2(instance: Instance, towards_radar: Array) -> float:
-    """Area of a box's outline, seen from a direction (unit, world)."""
+    """Area [m^2] of a box's silhouette seen from a direction (unit, world)."""
     a, b, c = np.subtract(instance.box_max_m, instance.box_min_m)
     x, y, z = np.abs(instance.T_world_instance.inverse().rotate(towards_radar))
     return float(x * b * c + y * a * c + z * a * b)
 
 
 def area_factor(category: str, surface: NDArray[np.uint8]) -> Array:
-    """RCS per area that faces the radar, for rays that hit one category, [n]."""
+    """RCS per perpendicular area, for rays that hit one category, [n].
+
+    Args:
+        category: Of the object; empty = unlabelled.
+        surface: Numbers in ``SURFACES``, uint8 [n].
+    """
     if category in METAL:
         return np.full(len(surface), 10.0 ** (0.1 * METAL_DB))
     table = np.array([GAMMA_DB[name] for name in SURFACES])

@@ -1,10 +1,10 @@
-"""Cells of range, angle and velocity, and the peaks in them that a radar reports.
+"""Radar detection: resolution cells of range, angle and velocity, and the peaks among them.
 
-What falls into one cell cannot be told apart. Cells are not independent: the response of a radar to
-one point is wider than a cell, and its detector reports local maxima only (Richards, "Fundamentals
-of Radar Signal Processing", 2nd ed., 2014, chapter 6). So every cell goes to the strongest of its
-neighbours, that one to the strongest of its own, and so on; cells that end at the same peak are one
-detection, of the sum of their power and in the middle of it.
+Echoes in one cell are not resolved. Cells are not independent: the response to a point is wider
+than a cell, and detectors report local maxima only (Richards, "Fundamentals of Radar Signal
+Processing", 2nd ed., 2014, chapter 6). Every cell is therefore assigned to its strongest neighbour,
+that one to its own, and so on; all cells that end at the same peak form one detection with the sum
+of their power, at its centroid.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.se3 import Array
 
 Curve = tuple[tuple[float, float], ...]
-"""Pairs of azimuth [deg] and value; between them lines, the same on both sides."""
+"""Pairs of azimuth [deg] and value, linearly interpolated, symmetric about 0."""
 
 
 class Fineness(Strict):
-    """Resolutions or deviations of the four quantities; elevation 0 = not measured."""
+    """Resolutions or standard deviations of the four quantities; elevation 0 = not measured."""
 
     range_m: float = Field(gt=0)
     velocity_m_s: float = Field(gt=0)
@@ -38,13 +38,13 @@ class Look(Strict):
     """One of the scans that make up a reading.
 
     Attributes:
-        azimuth_deg: To either side.
-        elevation_deg: Upward and downward.
-        range_m: Nearest and farthest that it reports.
+        azimuth_deg: Half of the horizontal field of view.
+        elevation_deg: Half of the vertical field of view.
+        range_m: Smallest and largest reported range.
         resolution: Sizes of cells.
         noise: Standard deviations.
         reach_m: Range at which the reference target is detected half of the time, by azimuth.
-        spacing_deg: Between rays, across and upward.
+        spacing_deg: Between rays, horizontally and vertically.
     """
 
     azimuth_deg: float = Field(gt=0, le=90)
@@ -58,7 +58,7 @@ class Look(Strict):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Echo:
-    """What rays, cells or detections send back; arrays [n]. ``origin`` as in the table."""
+    """Echoes of rays, cells or detections; arrays [n]. ``origin`` as in the column of RADAR."""
 
     range_m: Array
     azimuth_rad: Array
@@ -69,12 +69,12 @@ class Echo:
     instance_id: NDArray[np.int64]
     origin: NDArray[np.int64]
 
-    def taken(self, which: NDArray[np.intp] | NDArray[np.bool_]) -> Echo:
-        """Some of them, in that order."""
+    def take(self, which: NDArray[np.intp] | NDArray[np.bool_]) -> Echo:
+        """Select echoes by index or mask."""
         return replace(self, **{name: getattr(self, name)[which] for name in Echo.__slots__})
 
-    def and_more(self, others: Sequence[Echo]) -> Echo:
-        """These and all of others, one after the other."""
+    def append(self, others: Sequence[Echo]) -> Echo:
+        """Concatenate these echoes and others."""
         every = (self, *others)
         return replace(
             self,
@@ -84,14 +84,14 @@ class Echo:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Cells:
-    """Echoes by cell; ``keys`` [n, 4] are whole numbers: range, azimuth, elevation, velocity."""
+    """Echoes by cell; ``keys`` [n, 4] are indices of range, azimuth, elevation and velocity."""
 
     echo: Echo
     keys: NDArray[np.int64]
 
 
 def make_cells(lit: Echo, look: Look) -> Cells:
-    """Rays that fall into one cell as one echo; its labels are those of the strongest ray."""
+    """Merge the echoes of rays by cell; labels are those of the strongest ray."""
     fine = look.resolution
     upward = math.radians(fine.elevation_deg)
     bins = (
@@ -107,11 +107,11 @@ def make_cells(lit: Echo, look: Look) -> Cells:
 
 
 def find_peaks(cells: Cells, power: Array) -> NDArray[np.int64]:
-    """For every cell the number of the peak that it belongs to, from 0, [n].
+    """Index of the peak that each cell belongs to, from 0, [n].
 
     Args:
-        cells: Where they are.
-        power: Of each, [n].
+        cells: The cells.
+        power: Of each cell, [n].
     """
     count = len(power)
     if count == 0:
@@ -133,7 +133,10 @@ def find_peaks(cells: Cells, power: Array) -> NDArray[np.int64]:
 
 
 def merge_echoes(echo: Echo, group: NDArray[np.int64], power: Array) -> Echo:
-    """One echo per group: sums of cross section and signal, means by power, strongest labels."""
+    """Merge echoes by group: RCS and signal add up, the rest are power-weighted means.
+
+    Labels are those of the strongest echo.
+    """
     count = int(group.max()) + 1 if len(group) else 0
     total = np.bincount(group, power, count)
 
@@ -155,16 +158,16 @@ def merge_echoes(echo: Echo, group: NDArray[np.int64], power: Array) -> Echo:
     )
 
 
-def along(curve: Curve, azimuth_rad: Array) -> Array:
+def interpolate_curve(curve: Curve, azimuth_rad: Array) -> Array:
     """Values of a curve at azimuths, [n]."""
     at_deg, values = np.array(curve).T
     return np.asarray(np.interp(np.abs(np.degrees(azimuth_rad)), at_deg, values))
 
 
 def _azimuth_bins(size_deg: Curve, azimuth_rad: Array) -> Array:
-    """Azimuth in units of cells whose size changes with it."""
+    """Azimuth in units of cells whose size depends on it: the integral of 1 / size."""
     azimuth_deg = np.linspace(0.0, 90.0, 901)
-    per_deg = 1.0 / along(size_deg, np.radians(azimuth_deg))
+    per_deg = 1.0 / interpolate_curve(size_deg, np.radians(azimuth_deg))
     sums = np.concatenate([[0.0], np.cumsum(0.5 * (per_deg[1:] + per_deg[:-1]) * 0.1)])
     bins = np.interp(np.abs(np.degrees(azimuth_rad)), azimuth_deg, sums)
     return np.asarray(np.copysign(bins, azimuth_rad))

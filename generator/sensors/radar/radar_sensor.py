@@ -1,15 +1,14 @@
-"""A radar: detections with range, angles, radial velocity and radar cross section.
+"""Radar: detections with range, angles, radial velocity and radar cross section (RCS).
 
-Rays through the world find what is lit, each standing for its solid angle. What falls into one
-cell of range, azimuth, elevation and velocity is one echo of the sum of its cross sections, which
-fluctuates from reading to reading (Swerling's first case): the signal in units of noise is
-exponential with mean ``1 + SNR``, a detection what exceeds ``-ln(p)`` for a probability ``p`` of
-false alarm, so that
+Rays sample the illuminated surfaces, each for its solid angle. All echoes in one cell of range,
+azimuth, elevation and velocity add up to one whose RCS fluctuates from reading to reading
+(Swerling's first case): the signal in units of noise is exponential with mean ``1 + SNR``, and a
+detection is a signal above ``-ln(p)`` for a probability ``p`` of false alarm, so that
 
     P(detection) = p^(1 / (1 + SNR)),    SNR ~ RCS / range^4
 
-(Skolnik, "Introduction to Radar Systems", 3rd ed., chapter 2). Rain dims by ITU-R P.838-3; fog does
-next to nothing at 77 GHz (ITU-R P.840). There is no multipath and no ambiguity of velocity.
+(Skolnik, "Introduction to Radar Systems", 3rd ed., chapter 2). Rain attenuates by ITU-R P.838-3;
+fog is negligible at 77 GHz (ITU-R P.840). Multipath and velocity ambiguity are not modelled.
 """
 
 from __future__ import annotations
@@ -41,29 +40,29 @@ from gen_data.generator.sensors.radar.cross_section import (
 from gen_data.generator.sensors.radar.radar_detection import (
     Echo,
     Look,
-    along,
     find_peaks,
+    interpolate_curve,
     make_cells,
     merge_echoes,
 )
 
-MAKES = "gen_data.generator.sensors.radar.presets"
+PRESETS = "gen_data.generator.sensors.radar.presets"
 FALSE_ALARM = 1e-6
 """Probability that noise alone exceeds the threshold in one cell."""
 THRESHOLD = -math.log(FALSE_ALARM)
 HALF_SNR = THRESHOLD / math.log(2.0) - 1.0
-"""Signal over noise of what is detected half of the time."""
+"""Signal-to-noise ratio that is detected half of the time."""
 
 
 class RadarModel(Strict):
-    """A make of radar.
+    """Data sheet of a radar.
 
     Attributes:
         looks: Its scans.
-        reference_dbsm: Radar cross section of the target that ``reach_m`` is about.
-        least_dbsm: Weaker echoes are held back, as devices do to keep the road out.
-        velocity_m_s: Fastest approaching (negative) and receding.
-        detections_max: The strongest of a reading are kept.
+        reference_dbsm: RCS of the reference target of ``reach_m``.
+        least_dbsm: Weaker echoes are suppressed, as devices do to exclude the road.
+        velocity_m_s: Highest approaching (negative) and receding speed.
+        detections_max: Only this many of the strongest detections are reported.
         rain: k and alpha of the specific attenuation ``k R^alpha`` [dB/km], R in mm/h.
     """
 
@@ -76,73 +75,74 @@ class RadarModel(Strict):
 
 
 class Radar(Instrument):
-    """A radar: range, angles, radial velocity and radar cross section of what it detects.
+    """A radar: range, angles, radial velocity and radar cross section of detections.
 
     Attributes:
         model: ``ARS408-21`` or ``imaging``; a file of ``generator/sensors/radar/presets``.
-        false_alarms: Mean number of detections of nothing, per reading.
+        false_alarms: Mean number of false alarms per reading.
         noise: Factor on the model's errors; 0 = an ideal device: no errors, no fluctuation, no
-            false alarms, and whatever is detected half of the time is detected always.
+            false alarms, and a fixed threshold where the probability of detection is one half.
     """
 
     kind: ClassVar[str] = "radar"
     type: Literal["radar"] = "radar"
     name: str = Field("radar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
-    model: Annotated[str, AfterValidator(lambda name: check_preset(MAKES, name))] = "ARS408-21"
+    model: Annotated[str, AfterValidator(lambda name: check_preset(PRESETS, name))] = "ARS408-21"
     false_alarms: float = Field(1.0, ge=0, le=1000)
     noise: float = Field(1.0, ge=0)
 
     @property
     def device_model(self) -> str:
-        """What it is, for the labels."""
+        """Name of the preset."""
         return self.model
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Measurements:
-        """The detections of one reading, nearest first."""
+        """Measure the detections of one reading, nearest first."""
         del channels
-        make = load_preset(MAKES, self.model, RadarModel)
-        found = [self._looked(look, make, scene, renderer, rng) for look in make.looks]
-        joined = found[0].and_more(found[1:])
-        strongest = np.argsort(-joined.snr, kind="stable")[: make.detections_max]
-        order = strongest[np.argsort(joined.range_m[strongest], kind="stable")]
-        return self._table(scene, joined.taken(order))
+        model = load_preset(PRESETS, self.model, RadarModel)
+        scans = [self._scan(look, model, scene, renderer, rng) for look in model.looks]
+        detections = scans[0].append(scans[1:])
+        strongest = np.argsort(-detections.snr, kind="stable")[: model.detections_max]
+        order = strongest[np.argsort(detections.range_m[strongest], kind="stable")]
+        return self._make_rows(scene, detections.take(order))
 
-    def _looked(
-        self, look: Look, make: RadarModel, scene: Scene, renderer: Renderer, rng: Rng
+    def _scan(
+        self, look: Look, model: RadarModel, scene: Scene, renderer: Renderer, rng: Rng
     ) -> Echo:
-        """What one scan detects, as measured."""
+        """The detections of one scan, with errors of measurement."""
         eye = scene.device(self.name).T_world_device
-        rays = _rays(look, rng)
+        rays = _make_rays(look, rng)
         beams = LidarRays(rays.directions.astype(np.float32), 0.0, 1, look.range_m[1])
         around = remove_carrier(scene, self.rig)
-        echoes = renderer.scan(around, Lidar(self.name, "", T_world_lidar=eye), beams)
-        lit = _lit(scene, self.name, rays, echoes)
-        cells = make_cells(lit.taken(lit.range_m >= look.range_m[0]), look)
-        gain = _gain(look, make, scene.weather.rain_mm_h, cells.echo)
+        hits = renderer.scan(around, Lidar(self.name, "", T_world_lidar=eye), beams)
+        echoes = _ray_echoes(scene, self.name, rays, hits)
+        cells = make_cells(echoes.take(echoes.range_m >= look.range_m[0]), look)
+        gain = _gain(look, model, scene.weather.rain_mm_h, cells.echo)
         signal = gain * cells.echo.rcs_m2
         ideal = self.noise == 0.0
         draws = np.ones(len(signal)) if ideal else rng.standard_exponential(len(signal))
         signal = signal * draws
         echo = replace(cells.echo, rcs_m2=cells.echo.rcs_m2 * draws, snr=signal)
         peak = find_peaks(cells, signal)
-        found = merge_echoes(echo, peak, signal)
-        strong = found.rcs_m2 >= 10.0 ** (0.1 * make.least_dbsm)
+        peaks = merge_echoes(echo, peak, signal)
+        strong = peaks.rcs_m2 >= 10.0 ** (0.1 * model.least_dbsm)
         if ideal:
-            return found.taken(strong & (found.snr >= HALF_SNR))
-        # Noise is added once, and together with the signal of a single cell it is one exponential.
-        heard = found.snr + draws[_firsts(peak, signal)]
-        found = replace(found, snr=heard - 1.0).taken(strong & (heard > THRESHOLD))
-        found = found.and_more([_false_alarms(look, make, self.false_alarms, rng)])
-        measured = _noisy(found, look, self.noise, rng)
-        gain = _gain(look, make, scene.weather.rain_mm_h, measured)
+            return peaks.take(strong & (peaks.snr >= HALF_SNR))
+        # Signal and noise of a single cell together are one exponential with mean 1 + SNR: the
+        # noise, added once per peak, is the draw of its strongest cell.
+        received = peaks.snr + draws[_strongest(peak, signal)]
+        found = replace(peaks, snr=received - 1.0).take(strong & (received > THRESHOLD))
+        found = found.append([_draw_false_alarms(look, model, self.false_alarms, rng)])
+        measured = _add_noise(found, look, self.noise, rng)
+        gain = _gain(look, model, scene.weather.rain_mm_h, measured)
         return replace(measured, rcs_m2=measured.snr / gain)
 
-    def _table(self, scene: Scene, found: Echo) -> Measurements:
-        """Rows of detections, with the radar's own motion taken out of the velocity."""
-        ride = mount_motion(scene, self.name)
-        own = ride.pose(scene.time_s).inverse().rotate(ride.velocity_m_s(scene.time_s))
+    def _make_rows(self, scene: Scene, found: Echo) -> Measurements:
+        """Rows of detections, with velocities also compensated for the radar's own motion."""
+        motion = mount_motion(scene, self.name)
+        own = motion.pose(scene.time_s).inverse().rotate(motion.velocity_m_s(scene.time_s))
         towards = _directions(found.azimuth_rad, found.elevation_rad)
         categories = {i.instance_id: i.category_id for i in scene.instances}
         rows = table_rows(
@@ -165,7 +165,7 @@ class Radar(Instrument):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Rays:
-    """A grid of directions, and the solid angle that each stands for; [n, 3] and [n]."""
+    """A grid of unit directions [n, 3] with their angles and solid angles [n], radar frame."""
 
     directions: Array
     azimuth_rad: Array
@@ -173,8 +173,8 @@ class Rays:
     solid_angle_sr: Array
 
 
-def _rays(look: Look, rng: Rng) -> Rays:
-    """A grid over the field of view, shifted anew at every reading within its spacing."""
+def _make_rays(look: Look, rng: Rng) -> Rays:
+    """A grid over the field of view with a random offset, against aliasing."""
     across, upward = (math.radians(step) for step in look.spacing_deg)
     shift = rng.uniform(0.0, 1.0, 2)
     half = math.radians(look.azimuth_deg), math.radians(look.elevation_deg)
@@ -193,26 +193,26 @@ def _directions(azimuth_rad: Array, elevation_rad: Array) -> Array:
     )
 
 
-def _lit(scene: Scene, radar: str, rays: Rays, echoes: LidarHits) -> Echo:
-    """What every ray that hits something sends back, before anything is measured."""
-    (hit,) = np.nonzero(np.isfinite(echoes.range_m[:, 0]))
-    range_m = echoes.range_m[hit, 0].astype(np.float64)
-    ids = echoes.instance_id[hit, 0].astype(np.int64)
-    ride = mount_motion(scene, radar)
+def _ray_echoes(scene: Scene, radar: str, rays: Rays, hits: LidarHits) -> Echo:
+    """Echoes of all rays that hit something, without errors of measurement."""
+    (hit,) = np.nonzero(np.isfinite(hits.range_m[:, 0]))
+    range_m = hits.range_m[hit, 0].astype(np.float64)
+    ids = hits.instance_id[hit, 0].astype(np.int64)
+    motion = mount_motion(scene, radar)
     eye = scene.device(radar).T_world_device
     towards = eye.rotate(rays.directions[hit])
-    places_m = towards * range_m[:, None] + np.asarray(eye.translation_m)
-    velocity = -np.broadcast_to(ride.velocity_m_s(scene.time_s), towards.shape)
+    points_m = towards * range_m[:, None] + np.asarray(eye.translation_m)
+    velocity = -np.broadcast_to(motion.velocity_m_s(scene.time_s), towards.shape)
     areas_m2 = rays.solid_angle_sr[hit] * range_m**2
-    surfaces = echoes.surface[hit, 0]
+    surfaces = hits.surface[hit, 0]
     rcs_m2 = areas_m2 * area_factor("", surfaces)
-    for thing in scene.instances:
-        (mine,) = np.nonzero(ids == thing.instance_id)
-        if len(mine) == 0:
+    for instance in scene.instances:
+        (own,) = np.nonzero(ids == instance.instance_id)
+        if len(own) == 0:
             continue
-        levers_m = places_m[mine] - np.asarray(thing.T_world_instance.translation_m)
-        velocity[mine] += velocity_at(thing.twist, levers_m)
-        rcs_m2[mine] = _of_thing(thing, areas_m2[mine], surfaces[mine], -towards[mine])
+        levers_m = points_m[own] - np.asarray(instance.T_world_instance.translation_m)
+        velocity[own] += velocity_at(instance.twist, levers_m)
+        rcs_m2[own] = _instance_rcs_m2(instance, areas_m2[own], surfaces[own], -towards[own])
     return Echo(
         range_m,
         rays.azimuth_rad[hit],
@@ -225,40 +225,40 @@ def _lit(scene: Scene, radar: str, rays: Rays, echoes: LidarHits) -> Echo:
     )
 
 
-def _of_thing(
-    thing: Instance, areas_m2: Array, surfaces: NDArray[np.uint8], towards_radar: Array
+def _instance_rcs_m2(
+    instance: Instance, areas_m2: Array, surfaces: NDArray[np.uint8], towards_radar: Array
 ) -> Array:
-    """Cross sections of the rays on one thing; a target's own is shared by the area in sight."""
-    target = TARGETS.get(thing.category)
+    """RCS of the rays on one instance, [n]; that of a target is divided by visible area."""
+    target = TARGETS.get(instance.category)
     if target is None:
-        return areas_m2 * area_factor(thing.category, surfaces)
+        return areas_m2 * area_factor(instance.category, surfaces)
     axis = towards_radar[len(towards_radar) // 2]
-    whole_m2 = max(target.fill * silhouette_m2(thing, axis), float(areas_m2.sum()))
-    return areas_m2 / whole_m2 * cross_section_m2(target, thing, axis)
+    whole_m2 = max(target.fill * silhouette_m2(instance, axis), float(areas_m2.sum()))
+    return areas_m2 / whole_m2 * cross_section_m2(target, instance, axis)
 
 
-def _firsts(group: NDArray[np.int64], power: Array) -> NDArray[np.intp]:
-    """The strongest member of every group."""
+def _strongest(group: NDArray[np.int64], power: Array) -> NDArray[np.intp]:
+    """Index of the strongest member of every group."""
     order = np.lexsort((-power, group))
     count = int(group.max()) + 1 if len(group) else 0
     firsts: NDArray[np.intp] = order[np.searchsorted(group[order], np.arange(count))]
     return firsts
 
 
-def _gain(look: Look, make: RadarModel, rain_mm_h: float, echo: Echo) -> Array:
-    """Signal over noise per square metre of cross section, [n]."""
-    reach_m = along(look.reach_m, echo.azimuth_rad)
-    reference_m2 = 10.0 ** (0.1 * make.reference_dbsm)
-    k, alpha = make.rain
+def _gain(look: Look, model: RadarModel, rain_mm_h: float, echo: Echo) -> Array:
+    """Signal-to-noise ratio per square metre of RCS, [n]."""
+    reach_m = interpolate_curve(look.reach_m, echo.azimuth_rad)
+    reference_m2 = 10.0 ** (0.1 * model.reference_dbsm)
+    k, alpha = model.rain
     loss_db = 2.0 * echo.range_m / 1000.0 * (k * rain_mm_h**alpha if rain_mm_h > 0.0 else 0.0)
     nearer: Array = reach_m / np.maximum(echo.range_m, 0.1)
     gain: Array = HALF_SNR / reference_m2 * nearer**4 * 10.0 ** (-0.1 * loss_db)
     return gain
 
 
-def _false_alarms(look: Look, make: RadarModel, mean: float, rng: Rng) -> Echo:
-    """Noise that exceeds the threshold, anywhere in the field of view; each look has its share."""
-    count = int(rng.poisson(mean / len(make.looks)))
+def _draw_false_alarms(look: Look, model: RadarModel, mean: float, rng: Rng) -> Echo:
+    """Noise above the threshold, uniform over the field of view; ``mean`` is for all looks."""
+    count = int(rng.poisson(mean / len(model.looks)))
     half = math.radians(look.azimuth_deg)
     upward = math.radians(look.elevation_deg) if look.resolution.elevation_deg else 0.0
     nothing = np.zeros(count, np.int64)
@@ -266,7 +266,7 @@ def _false_alarms(look: Look, make: RadarModel, mean: float, rng: Rng) -> Echo:
         rng.uniform(*look.range_m, count),
         rng.uniform(-half, half, count),
         rng.uniform(-upward, upward, count),
-        rng.uniform(*make.velocity_m_s, count),
+        rng.uniform(*model.velocity_m_s, count),
         np.zeros(count),
         THRESHOLD + rng.standard_exponential(count) - 1.0,
         nothing,
@@ -274,11 +274,11 @@ def _false_alarms(look: Look, make: RadarModel, mean: float, rng: Rng) -> Echo:
     )
 
 
-def _noisy(echo: Echo, look: Look, factor: float, rng: Rng) -> Echo:
-    """Detections with the errors of measurement."""
+def _add_noise(echo: Echo, look: Look, factor: float, rng: Rng) -> Echo:
+    """Add errors of measurement to detections."""
     draws = factor * rng.standard_normal((4, len(echo.range_m)))
     noise = look.noise
-    spread = np.radians(along(noise.azimuth_deg, echo.azimuth_rad))
+    spread = np.radians(interpolate_curve(noise.azimuth_deg, echo.azimuth_rad))
     return replace(
         echo,
         range_m=np.clip(echo.range_m + noise.range_m * draws[0], *look.range_m),

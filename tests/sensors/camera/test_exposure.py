@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.sensors.camera.exposure import metered_ev100, saturation_cd_m2
+from gen_data.generator.sensors.camera.exposure import meter_ev100, saturation_cd_m2
 
 
 def test_the_saturation_luminance_is_that_of_iso_12232() -> None:
@@ -20,7 +20,7 @@ def test_metering_puts_a_uniform_view_at_middle_grey(luminance: float) -> None:
     """Whatever the light, its log-average becomes 0.18 of white."""
     view = np.full((48, 64, 3), luminance, np.float32)
 
-    exposed = luminance / saturation_cd_m2(metered_ev100(view))
+    exposed = luminance / saturation_cd_m2(meter_ev100(view))
 
     assert exposed == pytest.approx(0.18, rel=0.002)
 
@@ -29,13 +29,13 @@ def test_metering_takes_the_logarithmic_mean_with_weight_in_the_centre() -> None
     """Two halves of 10 and 1000 cd/m^2 meter like 100; a lamp in the corner less than ahead."""
     view = np.full((64, 64, 3), 10.0, np.float32)
     view[:, 32:] = 1000.0
-    even = metered_ev100(np.full((64, 64, 3), 100.0, np.float32))
+    even = meter_ev100(np.full((64, 64, 3), 100.0, np.float32))
     corner, centre = (np.full((64, 64, 3), 10.0, np.float32) for _ in range(2))
     corner[:16, :16] = 1000.0
     centre[24:40, 24:40] = 1000.0
 
-    assert metered_ev100(view) == pytest.approx(even, abs=0.2)
-    assert metered_ev100(corner) < metered_ev100(centre)
+    assert meter_ev100(view) == pytest.approx(even, abs=0.2)
+    assert meter_ev100(corner) < meter_ev100(centre)
 
 
 def test_black_pixels_are_not_metered() -> None:
@@ -44,12 +44,12 @@ def test_black_pixels_are_not_metered() -> None:
     half = view.copy()
     half[:32] = 0.0
 
-    assert metered_ev100(half) == metered_ev100(view)
+    assert meter_ev100(half) == meter_ev100(view)
 
 
 def test_metering_of_darkness_is_finite() -> None:
     """A black view does not divide by zero: it is exposed as long as a camera can."""
-    assert metered_ev100(np.zeros((4, 4, 3), np.float32)) == 1.0
+    assert meter_ev100(np.zeros((4, 4, 3), np.float32)) == 1.0
 
 
 @pytest.mark.parametrize(("lux", "ev100"), [(2.5, 0.0), (2500.0, 9.966), (80_000.0, 14.966)])

@@ -61,7 +61,7 @@ class Rendering:
 def test_the_chain_has_the_order_of_a_camera() -> None:
     """Glass first, from its front to its barrel, then the sensor, then colours."""
     assert [stage.__name__.strip("_") for stage in STAGES] == [
-        "wet_lens", "defocus", "flare", "glare", "chromatic_aberration", "vignetting",
+        "lens_drops", "defocus", "flare", "glare", "chromatic_aberration", "vignetting",
         "image_circle", "image_sensor", "saturation",
     ]  # fmt: skip
 

@@ -12,7 +12,7 @@ from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.scene import Camera, Weather
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.streams import Streams
-from gen_data.generator.sensors.camera.glare import FACTOR, add_glare, scattered
+from gen_data.generator.sensors.camera.glare import FACTOR, add_glare, scatter
 from gen_data.generator.sensors.camera.lens_drops import lens_drops, refract_in_drops
 
 CAMERA = Camera("front", SE3(), Intrinsics(960, 640, 800.0, 800.0, 480.0, 320.0))
@@ -76,7 +76,7 @@ def test_glare_is_enlarged_bilinearly() -> None:
     for height, width in ((64, 96), (50, 67), (3, 9)):
         rng = Streams(seed=1, scene=0).rng("image")
         image = rng.uniform(0.0, 9.0, (height, width, 3)).astype(np.float32)
-        coarse = scattered(image) / 3.0
+        coarse = scatter(image) / 3.0
         size = (coarse.shape[1] * FACTOR, coarse.shape[0] * FACTOR)
         veil = cv2.resize(coarse, size, interpolation=cv2.INTER_LINEAR)[:height, :width]
 

@@ -21,7 +21,6 @@ from gen_data.generator.sensors.camera import isp, optics
 from gen_data.generator.sensors.camera.exposure import ExposureControl, exposure_settings
 from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, develop
 from gen_data.generator.sensors.camera.image_sensor import ImageSensor, Pattern, expose, mosaic
-from gen_data.generator.sensors.camera.jpeg import through_jpeg
 from gen_data.generator.sensors.camera.presets import camera_names
 from gen_data.generator.sensors.camera.tone import to_bytes
 
@@ -125,7 +124,7 @@ def test_hot_pixels_stay_where_they_are() -> None:
 def test_demosaicing_gives_flat_colours_back(pattern: Pattern, method: Any) -> None:
     """Each filter's colour is found again in its own channel."""
     raw = mosaic(flat(0.8, 0.4, 0.1), pattern)
-    image = isp.demosaiced(raw, pattern, method, 1.0)
+    image = isp.demosaic(raw, pattern, method, 1.0)
     np.testing.assert_allclose(image[4:-4, 4:-4], flat(0.8, 0.4, 0.1)[4:-4, 4:-4], atol=2e-4)
 
 
@@ -193,7 +192,7 @@ def test_what_a_lens_does_not_show_has_no_light_and_panoramas_are_even() -> None
 
 def test_corners_lose_the_share_that_was_asked_for() -> None:
     """Half the light at the very corner."""
-    dark = optics.vignetted(flat(1.0, 1.0, 1.0), 0.5)
+    dark = optics.apply_vignetting(flat(1.0, 1.0, 1.0), 0.5)
     assert dark[0, 0, 1] == pytest.approx(0.5, abs=0.03)
     assert dark[24, 32, 1] == pytest.approx(1.0, abs=0.001)
 
@@ -202,7 +201,7 @@ def test_red_is_larger_and_blue_smaller_by_the_asked_pixels_at_the_corner() -> N
     """A dot near the corner: the centroids of its colours move apart."""
     image = np.zeros((200, 200, 3), np.float32)
     image[180:183, 180:183] = 1.0
-    apart = optics.with_chromatic_aberration(image, 4.0)
+    apart = optics.apply_chromatic_aberration(image, 4.0)
     y, x = np.mgrid[0:200, 0:200]
     radius = [
         math.hypot(*(float((g * apart[..., c]).sum() / apart[..., c].sum()) - 99.5 for g in (x, y)))
@@ -227,8 +226,8 @@ def test_what_is_in_focus_stays_and_what_is_not_spreads() -> None:
     """A line at the focus keeps its pixels; a line behind it is spread over its circle."""
     image = np.zeros((60, 60, 3), np.float32)
     image[:, 30] = 1.0
-    sharp = optics.defocused(image, np.zeros((60, 60), np.float32))
-    soft = optics.defocused(image, np.full((60, 60), 6.0, np.float32))
+    sharp = optics.defocus(image, np.zeros((60, 60), np.float32))
+    soft = optics.defocus(image, np.full((60, 60), 6.0, np.float32))
     np.testing.assert_allclose(sharp, image, atol=1e-6)
     assert soft[30, 24, 0] > 0.01
     assert soft[30, 20, 0] == pytest.approx(0.0, abs=1e-6)
@@ -241,7 +240,7 @@ def test_a_sharp_foreground_does_not_bleed_into_a_blurred_background() -> None:
     image[:, :20] = 1.0
     radius = np.zeros((40, 40), np.float32)
     radius[:, 20:] = 10.0
-    soft = optics.defocused(image, radius)
+    soft = optics.defocus(image, radius)
     assert soft[20, 10, 0] == pytest.approx(1.0)
     assert soft[20, 25, 0] < 0.05
 
@@ -294,8 +293,8 @@ def test_compression_leaves_its_traces_and_little_else() -> None:
     ramp = np.linspace(0.2, 0.8, 64, dtype=np.float32)[:, None, None]
     noise = 0.05 * rng().standard_normal((64, 64, 1)).astype(np.float32)
     image = to_bytes(np.repeat(ramp + noise, 3, axis=2))
-    rough = through_jpeg(image, 30).astype(int) - image
-    fine = through_jpeg(image, 98).astype(int) - image
+    rough = isp.compress_jpeg(image, 30).astype(int) - image
+    fine = isp.compress_jpeg(image, 98).astype(int) - image
     assert np.abs(rough).mean() > 1.5 * np.abs(fine).mean() > 0.0
 
 

@@ -16,7 +16,7 @@ from gen_data.generator.sensors.camera.tone import (
     knee,
     log,
     to_bytes,
-    toned_bytes,
+    tone_to_bytes,
 )
 
 TONES: tuple[Tone, ...] = get_args(Tone)
@@ -91,7 +91,7 @@ def test_every_curve_rises_from_black_to_white(tone: Tone) -> None:
     values = np.concatenate([[-1.0, 0.0], np.geomspace(1e-6, 1e6, 2000), [np.inf]])
     image = np.repeat(values.astype(np.float32)[:, None, None], 3, axis=2)
 
-    levels = toned_bytes(image, 1.0, tone)[:, 0, 1].astype(int)
+    levels = tone_to_bytes(image, 1.0, tone)[:, 0, 1].astype(int)
 
     assert (levels[0], levels[1], levels[-1]) == (0, 0, 255)
     assert (np.diff(levels) >= 0).all()
@@ -103,7 +103,7 @@ def test_bytes_by_table_are_those_of_the_formula(tone: Tone) -> None:
     stream = Streams(seed=3, scene=0).rng("values")
     image = (2.0 ** stream.uniform(-10.0, 4.0, (101, 64, 3))).astype(np.float32)
 
-    table = toned_bytes(image, 0.5, tone, white=4.0).astype(int)
+    table = tone_to_bytes(image, 0.5, tone, white=4.0).astype(int)
     formula = to_bytes(display_values(0.5 * image.astype(np.float64), tone, white=4.0))
 
     assert np.abs(table - formula).max() <= 1
@@ -113,5 +113,5 @@ def test_bytes_by_table_are_those_of_the_formula(tone: Tone) -> None:
 def test_white_is_the_luminance_that_saturates() -> None:
     """A scale of 1 / 300 makes 300 cd/m^2 white, and 0.21404 of it half of sRGB's range."""
     image = np.array([300.0, 300.0 * 0.21404, 0.0], np.float32).reshape(1, 1, 3)
-    levels = toned_bytes(image, 1.0 / 300.0, "srgb").ravel()
+    levels = tone_to_bytes(image, 1.0 / 300.0, "srgb").ravel()
     np.testing.assert_allclose(levels, [255, 127.5, 0], atol=0.6)

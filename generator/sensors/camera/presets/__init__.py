@@ -1,4 +1,4 @@
-"""Cameras as data: one YAML file each, with the sources of its figures."""
+"""Camera presets: one YAML file each, with the sources of its values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Laser scanners as data: one YAML file each, with its sources."""
+"""Presets of laser scanners: one YAML file each, with its sources."""
 
 from __future__ import annotations
 
