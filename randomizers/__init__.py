@@ -1,4 +1,4 @@
-"""What varies from scene to scene and from view to view."""
+"""Randomizers: plug-ins that vary a scene from index to index, per scene or per view."""
 
 from __future__ import annotations
 

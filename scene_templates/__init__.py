@@ -1,4 +1,4 @@
-"""Declarative scenes: YAML templates, and the element types they are made of."""
+"""Scene templates: YAML files, and the element types that they consist of."""
 
 from __future__ import annotations
 

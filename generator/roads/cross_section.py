@@ -79,7 +79,7 @@ class RoadShape:
         """From the middle to where the carriageway's fall ends: parking strips are level."""
         return self.carriageway_m(side) - self.parking_m[side_index(side)]
 
-    def changed(self) -> dict[str, Any]:
+    def non_default(self) -> dict[str, Any]:
         """Fields that differ from their defaults."""
         pairs = ((f.name, getattr(self, f.name), f.default) for f in fields(self))
         return {name: value for name, value, default in pairs if value != default}

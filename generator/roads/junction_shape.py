@@ -87,7 +87,7 @@ class JunctionShape:
             (after - arm) % math.tau for arm, after in zip(arms, (*arms[1:], arms[0]), strict=True)
         )
 
-    def changed(self) -> dict[str, Any]:
+    def non_default(self) -> dict[str, Any]:
         """Fields that differ from their defaults."""
         pairs = ((f.name, getattr(self, f.name), f.default) for f in fields(self))
         return {name: value for name, value, default in pairs if value != default}

@@ -51,7 +51,7 @@ class ParkingShape:
         """Middle of an aisle."""
         return (number + 0.5) * self.module_m - 0.5 * self.width_m
 
-    def changed(self) -> dict[str, Any]:
+    def non_default(self) -> dict[str, Any]:
         """Fields that differ from their defaults."""
         pairs = ((f.name, getattr(self, f.name), f.default) for f in fields(self))
         return {name: value for name, value, default in pairs if value != default}

@@ -115,9 +115,9 @@ def test_what_has_no_place_is_one_clear_error(element: object, fact: str) -> Non
 def test_preferred_assets_replace_others_category_by_category() -> None:
     """Street lights are taken, since nothing of their category is preferred; benches all are."""
     choice = AssetChoice(ids=("bench", "street_light"), prefer=("bench",))
-    chosen = choice.resolved(library(), "field")
-    everything = AssetChoice(ids=("bench", "street_light")).resolved(library(), "field")
+    chosen = choice.resolve(library(), "field")
+    everything = AssetChoice(ids=("bench", "street_light")).resolve(library(), "field")
 
     assert chosen == everything
-    trees = AssetChoice(tags=("tree",), prefer=("birch",)).resolved(library(), "field")
+    trees = AssetChoice(tags=("tree",), prefer=("birch",)).resolve(library(), "field")
     assert trees and all(asset.startswith("tree/birch") for asset in trees)
