@@ -107,7 +107,7 @@ class Kitti(ExporterBase):
     low_px: int = Field(10, ge=2)
     """Objects with fewer visible pixel rows than this become DontCare."""
     lidar: str = ""
-    """Sensor of the points, ``lidar`` or ``pseudo_lidar``; empty = the first one by name, if any."""
+    """Sensor of the points, lidar or pseudo_lidar; empty = the first one by name, if any."""
 
     @property
     def needs(self) -> frozenset[str]:
