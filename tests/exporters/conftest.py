@@ -42,6 +42,7 @@ from gen_data.generator.core.scene import Body, Camera, Device, Instance, Lidar,
 from gen_data.generator.core.scene_time import RIG_AXES, add_twists, place_sensors, scene_at
 from gen_data.generator.core.se3 import SE3, Array, look_at
 from gen_data.generator.runner.shard import drop_pixels
+from tests.exporters.drives import drive_info
 
 CATEGORIES = ("car", "crate", "pedestrian")
 MEDIA = (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY)
@@ -455,3 +456,30 @@ class World:
 def world() -> World:
     """Seven frames of a street in three shards; two splits; frame 3 is empty."""
     return World()
+
+
+@pytest.fixture(scope="session")
+def samples(world: Any) -> Any:
+    """Two sequences of four steps in three shards: both are cut."""
+    return world.drive()
+
+
+@pytest.fixture(scope="session")
+def slow(world: Any) -> Any:
+    """The same; the right camera and the scanner read at every second step."""
+    return world.drive({"right": 2, "top": 2})
+
+
+@pytest.fixture(scope="session")
+def exported(world: Any, samples: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Exports once per exporter and remembers the folder."""
+    folders: dict[str, Path] = {}
+
+    def export(exporter: Any) -> Path:
+        key = repr(exporter)
+        if key not in folders:
+            folder = tmp_path_factory.mktemp(exporter.type)
+            folders[key] = world.export(exporter, drive_info(world), samples, folder)
+        return folders[key]
+
+    return export

@@ -113,8 +113,8 @@ def test_geometry_and_labels_are_left_alone(
 @pytest.mark.parametrize(
     "randomizer",
     [
-        Textures(name="t", textures=("brick_wall", "wood")),
-        Backdrop(name="b", floor=("wood",), walls=("brick_wall",)),
+        Textures(name="t", textures=("masonry", "wood")),
+        Backdrop(name="b", floor=("wood",), walls=("masonry",)),
     ],
     ids=lambda randomizer: randomizer.type,
 )
@@ -123,7 +123,9 @@ def test_a_plan_lists_the_texture_files_of_a_user_but_not_generated_textures(
 ) -> None:
     """The release of gen-data identifies the textures that it generates."""
     Image.new("RGB", (4, 4)).save(tmp_path / "brick_wall.png")
-    (tmp_path / "textures.yaml").write_text("brick_wall: {type: texture}\n")
+    (tmp_path / "assets.yaml").write_text(
+        "textures:\n  - {id: brick_wall, file: brick_wall.png, tags: [masonry]}\n"
+    )
 
     assert randomizer.possible_assets(open_library([tmp_path])) == ("user/brick_wall",)
 

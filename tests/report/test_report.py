@@ -113,7 +113,7 @@ def test_kittis_files_are_read_where_there_is_no_coco(tmp_path: Path) -> None:
 
 def test_a_folder_without_labels_is_refused(tmp_path: Path) -> None:
     """With the remedy."""
-    with pytest.raises(StorageError, match=r"no labels here.*exported as coco or kitti"):
+    with pytest.raises(StorageError, match=r"there are no labels.*exported as coco or kitti"):
         list(read_records(tmp_path))
 
 
