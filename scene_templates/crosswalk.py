@@ -10,7 +10,7 @@ from pydantic import Field
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Lane, Scene
-from gen_data.generator.roads.cross_section import height_m
+from gen_data.generator.roads.cross_section import height_m, non_default_fields
 from gen_data.generator.roads.lane_graph import world_points
 from gen_data.scene_templates.element import Element, parametric_id
 from gen_data.scene_templates.road import add_street, find_road
@@ -42,7 +42,7 @@ class Crosswalk(Element):
         looks = {name: parameters[name] for name in ("seed", "wear") if name in parameters}
         asset = parametric_id(
             "crosswalk",
-            **shape.non_default(),
+            **non_default_fields(shape),
             **looks,
             station_m=self.station_m,
             width_m=self.width_m,

@@ -58,11 +58,16 @@ class PlacedElement(Element):
 
     def pose(self, scene: Scene) -> SE3:
         """``T_world_element``: origin on the support, Z up."""
-        x, y, *lift = self.at_m
-        local = SE3.about_z(math.radians(self.yaw_deg), (x, y, lift[0] if lift else 0.0))
+        local = level_pose(self.at_m, self.yaw_deg)
         if not self.on:
             return local
         return find_surfaces(scene, self.on, f"elements.{self.name}.on")[0].T_world_surface @ local
+
+
+def level_pose(at_m: tuple[float, float] | tuple[float, float, float], yaw_deg: float) -> SE3:
+    """Pose with Z up at a position, whose height defaults to 0, rotated about the vertical."""
+    x, y, *height = at_m
+    return SE3.about_z(math.radians(yaw_deg), (x, y, height[0] if height else 0.0))
 
 
 def find_surfaces(scene: Scene, name: str, field: str) -> tuple[SupportSurface, ...]:

@@ -12,8 +12,9 @@ from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import SE3
+from gen_data.generator.roads.cross_section import non_default_fields
 from gen_data.generator.roads.junction_shape import ABSENT, JunctionShape, junction_lanes
-from gen_data.scene_templates.element import Element, parametric_id
+from gen_data.scene_templates.element import Element, level_pose, parametric_id
 from gen_data.scene_templates.road import RoadSurface, add_street, find_port
 
 
@@ -61,7 +62,7 @@ class Junction(RoadSurface, Element):
         pose = self._find_pose(scene, shape)
         given: dict[str, Any] = {} if self.crossings == "zebra" else {"crossings": self.crossings}
         asset = parametric_id(
-            "junction", **shape.non_default(), **given, **self.surface_parameters()
+            "junction", **non_default_fields(shape), **given, **self.surface_parameters()
         )
         lanes = junction_lanes(shape, self.name, pose, self.speed_m_s, self.crossings != "none")
         return add_street(scene, assets, self.name, asset, pose, lanes)
@@ -96,8 +97,7 @@ class Junction(RoadSurface, Element):
 
     def _find_pose(self, scene: Scene, shape: JunctionShape) -> SE3:
         if not self.after:
-            x, y, *lift = self.at_m
-            return SE3.about_z(math.radians(self.yaw_deg), (x, y, lift[0] if lift else 0.0))
+            return level_pose(self.at_m, self.yaw_deg)
         if 180.0 not in self.arms_deg:
             raise ConfigError(
                 f"elements.{self.name}.after: no arm points at the road; expected 180 in arms_deg"

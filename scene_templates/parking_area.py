@@ -8,6 +8,7 @@ from pydantic import Field
 
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
+from gen_data.generator.roads.cross_section import non_default_fields
 from gen_data.generator.roads.parking_shape import ParkingShape, parking_lanes
 from gen_data.scene_templates.element import PlacedElement, parametric_id
 from gen_data.scene_templates.road import RoadSurface, add_street
@@ -33,7 +34,8 @@ class ParkingArea(RoadSurface, PlacedElement):
         """Add the surface as background; every bay is a lane."""
         shape = ParkingShape(self.bays, self.aisles, self.bay_m, self.aisle_m)
         pose = self.pose(scene)
-        asset = parametric_id("parking_area", **shape.non_default(), **self.surface_parameters())
+        parameters = non_default_fields(shape) | self.surface_parameters()
+        asset = parametric_id("parking_area", **parameters)
         return add_street(
             scene, assets, self.name, asset, pose, parking_lanes(shape, self.name, pose)
         )

@@ -15,10 +15,10 @@ from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Lane, Scene
 from gen_data.generator.core.se3 import SE3
-from gen_data.generator.roads.cross_section import RoadShape
+from gen_data.generator.roads.cross_section import RoadShape, non_default_fields
 from gen_data.generator.roads.junction_shape import JunctionShape, arm_pose
 from gen_data.generator.roads.lane_graph import link_lanes, road_lanes
-from gen_data.scene_templates.element import Element, add_static, parametric_id
+from gen_data.scene_templates.element import Element, add_static, level_pose, parametric_id
 
 T = TypeVar("T")
 Width = float
@@ -118,7 +118,8 @@ class Road(RoadSurface, Element):
             "apron_m": (self.apron_m, 6.0),
         }
         given = {name: value for name, (value, default) in options.items() if value != default}
-        asset = parametric_id("road", **shape.non_default(), **given, **self.surface_parameters())
+        given |= non_default_fields(shape) | self.surface_parameters()
+        asset = parametric_id("road", **given)
         return add_street(
             scene,
             assets,
@@ -151,8 +152,7 @@ class Road(RoadSurface, Element):
     def _find_pose(self, scene: Scene) -> SE3:
         if self.after:
             return find_port(scene, self.after, f"elements.{self.name}.after")
-        x, y, *lift = self.at_m
-        return SE3.about_z(math.radians(self.yaw_deg), (x, y, lift[0] if lift else 0.0))
+        return level_pose(self.at_m, self.yaw_deg)
 
 
 def check_widths(where: str, shape: RoadShape) -> None:

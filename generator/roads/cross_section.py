@@ -79,11 +79,6 @@ class RoadShape:
         """Distance from the middle to the end of the cross slope; parking strips are level."""
         return self.carriageway_m(side) - self.parking_m[side_index(side)]
 
-    def non_default(self) -> dict[str, Any]:
-        """Fields that differ from their defaults."""
-        pairs = ((f.name, getattr(self, f.name), f.default) for f in fields(self))
-        return {name: value for name, value, default in pairs if value != default}
-
 
 @dataclass(frozen=True, slots=True)
 class Strip:
@@ -158,6 +153,12 @@ def height_m(shape: RoadShape, t_m: Array) -> Array:
         here = (t_m >= 0.0) if side > 0 else (t_m < 0.0)
         heights[here] = np.interp(np.abs(t_m[here]), at, z)
     return heights
+
+
+def non_default_fields(shape: Any) -> dict[str, Any]:
+    """Fields of a dataclass instance that differ from their defaults."""
+    pairs = ((f.name, getattr(shape, f.name), f.default) for f in fields(shape))
+    return {name: value for name, value, default in pairs if value != default}
 
 
 def side_index(side: int) -> int:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -86,11 +85,6 @@ class JunctionShape:
         return tuple(
             (after - arm) % math.tau for arm, after in zip(arms, (*arms[1:], arms[0]), strict=True)
         )
-
-    def non_default(self) -> dict[str, Any]:
-        """Fields that differ from their defaults."""
-        pairs = ((f.name, getattr(self, f.name), f.default) for f in fields(self))
-        return {name: value for name, value, default in pairs if value != default}
 
 
 def corner(shape: JunctionShape, number: int, offset_m: float) -> Array:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -50,11 +49,6 @@ class ParkingShape:
     def aisle_y_m(self, number: int) -> float:
         """Y coordinate of an aisle's middle."""
         return (number + 0.5) * self.module_m - 0.5 * self.width_m
-
-    def non_default(self) -> dict[str, Any]:
-        """Fields that differ from their defaults."""
-        pairs = ((f.name, getattr(self, f.name), f.default) for f in fields(self))
-        return {name: value for name, value, default in pairs if value != default}
 
 
 def parking_lanes(shape: ParkingShape, name: str, T_world_area: SE3) -> tuple[Lane, ...]:

@@ -1,4 +1,4 @@
-"""A hand-made data set: boxes and ellipsoids on a ground plane, ray-cast in a few lines of numpy.
+"""A small data set: boxes and ellipsoids on a ground plane, ray-cast with numpy.
 
 Independent of every renderer of the project, so that what exporters write can be held against
 geometry.
@@ -76,7 +76,7 @@ KEYPOINTS = {
 def instance(
     number: int, category: str, x_m: float, y_m: float, yaw_rad: float, shape: str = "box"
 ) -> Instance:
-    """A thing that stands on the ground at (x, y); ``shape`` is ``box`` or ``ellipsoid``."""
+    """An object on the ground at (x, y); ``shape`` is ``box`` or ``ellipsoid``."""
     length, width, height = SIZES_M[category]
     return Instance(
         instance_id=number,
@@ -146,7 +146,7 @@ def _ground_depth(rays: Array, camera: Camera) -> Array:
 
 
 def _hit(rays: Array, thing: Instance, camera: Camera) -> Array:
-    """Depth at which each ray enters the thing; inf where it misses."""
+    """Depth at which each ray enters the object; inf where it misses."""
     low, high = np.array(thing.box_min_m), np.array(thing.box_max_m)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     T_instance_camera = thing.T_world_instance.inverse() @ camera.T_world_camera
@@ -229,7 +229,7 @@ SPEED_M_S, TURN_RAD_S, STEP_S = 10.0, 0.2, 0.1
 
 
 def ego_pose(time_s: float) -> SE3:
-    """Where the ego is after a time: on its circle, headed along it."""
+    """Pose of the ego vehicle after a time: on its circle, headed along it."""
     angle, radius_m = TURN_RAD_S * time_s, SPEED_M_S / TURN_RAD_S
     place = (radius_m * math.sin(angle), radius_m * (1.0 - math.cos(angle)), 0.0)
     return SE3.about_z(angle, place)
