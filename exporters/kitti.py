@@ -139,7 +139,7 @@ class Kitti(ExporterBase):
             if camera not in sample.truth:
                 continue
             truth = sample.truth[camera]
-            frame = _frame(sample.index)
+            frame = _frame_name(sample.index)
             unseen: frozenset[int] = frozenset()
             T_camera_velo = self._velodyne_pose(info, sample)
             calib = calib_text(truth.camera.intrinsics, T_camera_velo)
@@ -162,7 +162,7 @@ class Kitti(ExporterBase):
         for shard_dir in shard_dirs:
             for line in (shard_dir / self.type / "frames.txt").read_text("utf-8").splitlines():
                 index, split = line.split(" ", 1)
-                frames_of.setdefault(split, []).append(_frame(int(index)))
+                frames_of.setdefault(split, []).append(_frame_name(int(index)))
                 for source, target in self._links(info, camera, shard_dir, int(index)):
                     link_or_copy(source, dataset_dir / "training" / target)
         for split, frames in frames_of.items():
@@ -187,7 +187,7 @@ class Kitti(ExporterBase):
         self, info: DatasetInfo, camera: str, shard_dir: Path, index: int
     ) -> list[tuple[Path, str]]:
         """Files of one frame, each with its path below ``training``."""
-        frame = _frame(index)
+        frame = _frame_name(index)
         names = [f"label_2/{frame}.txt", f"calib/{frame}.txt"]
         if has_scans(shard_dir, self._lidar(info), index):
             names += [f"velodyne/{frame}.bin", f"velodyne_labels/{frame}.label"]
@@ -422,7 +422,7 @@ def _join_words(name: str) -> str:
     return "_".join(name.split())
 
 
-def _frame(index: int) -> str:
+def _frame_name(index: int) -> str:
     return f"{index:06d}"
 
 

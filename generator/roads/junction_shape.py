@@ -177,13 +177,13 @@ def junction_lanes(
         Lane(
             f"{name}/{i}to{j}_{k}",
             "driving",
-            _world(_turn(shape, i, j, k), shape, T_world_junction),
+            _to_world(_turn_path(shape, i, j, k), shape, T_world_junction),
             shape.lane_width_m,
             road=name,
             speed_m_s=speed_m_s,
             junction=True,
         )
-        for i, j, k in _turns(shape)
+        for i, j, k in _list_turns(shape)
     ]
     inner = KERB_WIDTH_M + shape.beside_m
     into = inner + min(FURNITURE_M, 0.5 * shape.sidewalk_m)
@@ -211,14 +211,14 @@ def _crosswalk(shape: JunctionShape, name: str, number: int, T_world_junction: S
     return Lane(
         f"{name}/crosswalk{number}",
         "crosswalk",
-        _world(line, shape, T_world_junction),
+        _to_world(line, shape, T_world_junction),
         CROSSWALK_M[1] - CROSSWALK_M[0],
         road=name,
         junction=True,
     )
 
 
-def _turns(shape: JunctionShape) -> list[tuple[int, int, int]]:
+def _list_turns(shape: JunctionShape) -> list[tuple[int, int, int]]:
     """Arms and lane of every turn: the outer lane turns to its side, the inner one across."""
     arms = shape.arms_rad()
     turns = []
@@ -232,13 +232,13 @@ def _turns(shape: JunctionShape) -> list[tuple[int, int, int]]:
     return turns
 
 
-def _turn(shape: JunctionShape, start: int, end: int, lane: int) -> Array:
+def _turn_path(shape: JunctionShape, start: int, end: int, lane: int) -> Array:
     """Path [n, 2] from the end of one arm to another: a cubic close to a circular arc."""
     away = (lane + 0.5) * shape.lane_width_m * (1.0 if shape.traffic == "right" else -1.0)
     arms = shape.arms_rad()
     a = _on_arm(arms[start], shape.reach_m(), away)
     b = _on_arm(arms[end], shape.reach_m(), -away)
-    inward, outward = -_along(arms[start]), _along(arms[end])
+    inward, outward = -_direction(arms[start]), _direction(arms[end])
     turn = math.remainder(arms[end] - arms[start] - math.pi, math.tau)
     chord = math.hypot(*(b - a))
     # Bezier handles of a circular arc: 4/3 tan(turn / 4) times the radius.
@@ -250,13 +250,13 @@ def _turn(shape: JunctionShape, start: int, end: int, lane: int) -> Array:
     return path
 
 
-def _world(
+def _to_world(
     line: Array, shape: JunctionShape, T_world_junction: SE3
 ) -> tuple[tuple[float, float, float], ...]:
     return world_points(np.column_stack([line, make_fan(shape).height_m(line)]), T_world_junction)
 
 
-def _along(arm_rad: float) -> Array:
+def _direction(arm_rad: float) -> Array:
     return np.array([math.cos(arm_rad), math.sin(arm_rad)])
 
 
@@ -265,5 +265,5 @@ def _left_of(arm_rad: float) -> Array:
 
 
 def _on_arm(arm_rad: float, r_m: float, t_m: float) -> Array:
-    point: Array = r_m * _along(arm_rad) + t_m * _left_of(arm_rad)
+    point: Array = r_m * _direction(arm_rad) + t_m * _left_of(arm_rad)
     return point

@@ -60,12 +60,12 @@ def make_upright_trajectories(
 def _quaternions(ahead: Array, climb: Array) -> Array:
     """Unit quaternions [..., 4] of a yaw, then a pitch upwards, without trigonometric functions."""
     c, s = ahead[..., 0], ahead[..., 1]
-    w, z = _half(c, s)
-    up_w, up_y = _half(np.sqrt(1.0 - climb * climb), -climb)
+    w, z = _half_angle(c, s)
+    up_w, up_y = _half_angle(np.sqrt(1.0 - climb * climb), -climb)
     return np.stack([w * up_w, -z * up_y, w * up_y, z * up_w], axis=-1)
 
 
-def _half(c: Array, s: Array) -> tuple[Array, Array]:
+def _half_angle(c: Array, s: Array) -> tuple[Array, Array]:
     """Cosine (not negative) and sine of half an angle."""
     # Divide by the larger of the two roots: the other one may vanish.
     cosine, sine = np.sqrt(np.maximum(0.5 + 0.5 * c, 0.0)), np.sqrt(np.maximum(0.5 - 0.5 * c, 0.0))

@@ -65,7 +65,7 @@ def find_overlaps(
     for k, one in enumerate(names):
         for other in names[k + 1 :]:
             apart_m = 0.5 * (widths_m[one] + widths_m[other]) + spare_m
-            overlap = _overlap(sampled[one], sampled[other], apart_m)
+            overlap = _find_overlap(sampled[one], sampled[other], apart_m)
             if overlap is not None:
                 found[one, other] = overlap
                 found[other, one] = Overlap(overlap.kind, overlap.other_m, overlap.own_m)
@@ -82,7 +82,7 @@ def crosswalk_zones(
         found = [
             zone
             for walk in sorted(crosswalks.lines)
-            if (zone := _zone(line, crosswalks.lines[walk])) is not None
+            if (zone := _find_zone(line, crosswalks.lines[walk])) is not None
         ]
         if found:
             made[name] = tuple(sorted(found, key=lambda zone: zone.enter_m))
@@ -104,7 +104,7 @@ def _sample(line: LaneLine) -> tuple[Array, Array]:
     return at, np.stack([np.interp(at, line.at_m, points[:, k]) for k in range(2)], axis=1)
 
 
-def _overlap(
+def _find_overlap(
     one: tuple[Array, Array], other: tuple[Array, Array], apart_m: float
 ) -> Overlap | None:
     (at_a, a), (at_b, b) = one, other
@@ -126,7 +126,7 @@ def _overlap(
     )
 
 
-def _zone(line: LaneLine, crosswalk: LaneLine) -> Zone | None:
+def _find_zone(line: LaneLine, crosswalk: LaneLine) -> Zone | None:
     """Intersection of a driving lane and a crosswalk's centre line; None without one."""
     lane = crosswalk.lane
     if abs(lane.center_m[0][2] - line.lane.center_m[0][2]) > 3.0:

@@ -42,7 +42,7 @@ class LaneGraph:
             for after in line.lane.successors:
                 before.setdefault(after, []).append(name)
         names = sorted(lines, key=lambda name: (lines[name].lane.junction, name))
-        pieces = [_pieces(lines[name], k) for k, name in enumerate(names)]
+        pieces = [_segments(lines[name], k) for k, name in enumerate(names)]
         return cls(
             lines,
             {name: tuple(sorted(found)) for name, found in before.items()},
@@ -97,11 +97,11 @@ class Route:
 
 def project_on_lane(line: LaneLine, x_m: float, y_m: float) -> LanePosition:
     """Nearest position on one lane to a point."""
-    _, at_m, left_m, away_m = _nearest(_pieces(line, 0), x_m, y_m)
+    _, at_m, left_m, away_m = _nearest(_segments(line, 0), x_m, y_m)
     return LanePosition(line.lane.name, at_m, left_m, away_m)
 
 
-def _pieces(line: LaneLine, number: int) -> Array:
+def _segments(line: LaneLine, number: int) -> Array:
     points = np.asarray(line.lane.center_m)[:, :2]
     at = np.asarray(line.at_m[:-1])
     return np.column_stack([points[:-1], np.diff(points, axis=0), at, np.full(len(at), number)])

@@ -97,7 +97,7 @@ def make_walk_network(sidewalks: LaneGraph, crosswalks: LaneGraph, obstacles: Ar
     for name in sorted(crosswalks.lines):
         points = crosswalks.lines[name].lane.center_m
         for begins, end, inner in ((True, points[0], points[1]), (False, points[-1], points[-2])):
-            join = _join(sidewalks, name, begins, end, inner)
+            join = _find_join(sidewalks, name, begins, end, inner)
             if join is not None:
                 joins.setdefault(join.sidewalk, []).append(join)
     return WalkNetwork(
@@ -105,14 +105,14 @@ def make_walk_network(sidewalks: LaneGraph, crosswalks: LaneGraph, obstacles: Ar
         crosswalks,
         {name: tuple(sorted(found, key=lambda j: j.at_m)) for name, found in joins.items()},
         {
-            name: _room(line, obstacles)
+            name: _lateral_bounds(line, obstacles)
             for graph in (sidewalks, crosswalks)
             for name, line in sorted(graph.lines.items())
         },
     )
 
 
-def _join(
+def _find_join(
     sidewalks: LaneGraph, crosswalk: str, begins: bool, end: Vec3, inner: Vec3
 ) -> Join | None:
     span = math.dist(end[:2], inner[:2])
@@ -123,7 +123,7 @@ def _join(
     return Join(place.lane, place.at_m, crosswalk, begins)
 
 
-def _room(line: LaneLine, boxes: Array) -> tuple[Array, Array, Array]:
+def _lateral_bounds(line: LaneLine, boxes: Array) -> tuple[Array, Array, Array]:
     """Lateral bounds on a lane: people pass obstacles on the wider side."""
     count = max(2, math.ceil(line.length_m / GRID_M) + 1)
     at = np.linspace(0.0, line.length_m, count)
@@ -196,18 +196,18 @@ def draw_path(
     if lane in walks.crosswalks.lines:
         whole = walks.crosswalks.lines[lane]
         goal = whole.length_m if forward else 0.0
-        _along(line, walks, whole, at_m, goal)
+        _append_lane(line, walks, whole, at_m, goal)
         passages.append(Passage(lane, 0.0, line.length_m, forward, whole.length_m))
         place = _leave_crosswalk(line, walks, lane, forward, rng)
     else:
         place = (lane, at_m, forward)
     while place is not None and line.length_m < length_m:
         left_m = length_m - line.length_m
-        place = _onward(line, walks, place, left_m, crossing, passages, rng)
-    return _path(line, passages, length_m)
+        place = _append_next(line, walks, place, left_m, crossing, passages, rng)
+    return _resample_path(line, passages, length_m)
 
 
-def _onward(
+def _append_next(
     line: _Line,
     walks: WalkNetwork,
     place: tuple[str, float, bool],
@@ -223,12 +223,12 @@ def _onward(
     for join in joins if forward else reversed(joins):
         gone = join.at_m - at_m if forward else at_m - join.at_m
         if 0.5 < gone < left_m and float(rng.uniform()) < crossing:
-            _along(line, walks, here, at_m, join.at_m)
+            _append_lane(line, walks, here, at_m, join.at_m)
             return _cross_road(line, walks, join, passages, rng)
     if left_m < (here.length_m - at_m if forward else at_m):
-        _along(line, walks, here, at_m, at_m + left_m if forward else at_m - left_m)
+        _append_lane(line, walks, here, at_m, at_m + left_m if forward else at_m - left_m)
         return None
-    _along(line, walks, here, at_m, here.length_m if forward else 0.0)
+    _append_lane(line, walks, here, at_m, here.length_m if forward else 0.0)
     if forward:
         ways = walks.sidewalks.successors(name)
     else:
@@ -246,9 +246,9 @@ def _cross_road(
     whole = walks.crosswalks.lines[join.crosswalk]
     start = 0.0 if join.begins else whole.length_m
     kerb = whole.pose(start).translation_m
-    _over_kerb(line, line.points[-1], kerb)
+    _append_kerb(line, line.points[-1], kerb)
     from_m = line.length_m
-    _along(line, walks, whole, start, whole.length_m - start)
+    _append_lane(line, walks, whole, start, whole.length_m - start)
     passages.append(Passage(join.crosswalk, from_m, line.length_m, join.begins, whole.length_m))
     return _leave_crosswalk(line, walks, join.crosswalk, join.begins, rng)
 
@@ -261,12 +261,14 @@ def _leave_crosswalk(
         for join in joins:
             if join.crosswalk == crosswalk and join.begins != forward:
                 place = walks.sidewalks.lines[join.sidewalk].pose(join.at_m).translation_m
-                _over_kerb(line, line.points[-1], place)
+                _append_kerb(line, line.points[-1], place)
                 return join.sidewalk, join.at_m, bool(rng.uniform() < 0.5)
     return None
 
 
-def _along(line: _Line, walks: WalkNetwork, lane: LaneLine, start_m: float, end_m: float) -> None:
+def _append_lane(
+    line: _Line, walks: WalkNetwork, lane: LaneLine, start_m: float, end_m: float
+) -> None:
     """Append a section of a lane, backwards if it ends before it starts."""
     way = 1.0 if end_m >= start_m else -1.0
     at, right, left = walks.room[lane.lane.name]
@@ -279,7 +281,7 @@ def _along(line: _Line, walks: WalkNetwork, lane: LaneLine, start_m: float, end_
         line.add(lane.pose(s).translation_m, low, high)
 
 
-def _over_kerb(line: _Line, start: Vec3, end: Vec3) -> None:
+def _append_kerb(line: _Line, start: Vec3, end: Vec3) -> None:
     """Append the path between a sidewalk and the end of a crosswalk, with the step at the kerb.
 
     The ground between falls gently towards the kerb, to 0.7 of the sidewalk's height over the road.
@@ -295,7 +297,7 @@ def _over_kerb(line: _Line, start: Vec3, end: Vec3) -> None:
     line.add(end, -0.5, 0.5)
 
 
-def _path(line: _Line, passages: Sequence[Passage], length_m: float) -> Path:
+def _resample_path(line: _Line, passages: Sequence[Passage], length_m: float) -> Path:
     """Resample the path at even stations; it ends where nobody fits."""
     points = np.array(line.points)
     if len(points) == 1:
@@ -310,7 +312,7 @@ def _path(line: _Line, passages: Sequence[Passage], length_m: float) -> Path:
     blocked = np.flatnonzero(right[k] > left[k])
     if len(blocked):
         end_m = min(end_m, max(GRID_M * float(blocked[0]) - 1.0, 0.0))
-    low, high = _ease(right[k]), -_ease(-left[k])
+    low, high = _limit_slope(right[k]), -_limit_slope(-left[k])
     low, high = np.minimum(low, np.maximum(high, right[k])), np.maximum(high, right[k])
     return Path(
         np.stack([np.interp(grid, at, points[:, c]) for c in range(3)], axis=1),
@@ -321,7 +323,7 @@ def _path(line: _Line, passages: Sequence[Passage], length_m: float) -> Path:
     )
 
 
-def _ease(least_m: Array) -> Array:
+def _limit_slope(least_m: Array) -> Array:
     """Limit the slope of lower bounds along a path to that of stepping aside."""
     eased: Array = least_m.copy()
     for k in range(1, len(eased)):

@@ -108,7 +108,7 @@ class Pedestrians:
         self.walked_m, self.at_m = np.zeros(n), np.zeros(n)
         self.off_m = np.array([w.left_m for w in self.walkers])
         self.height_m = self._lines[:, 0, 2].copy()
-        self.obstacles = _within_reach(self.obstacles, self._lines)
+        self.obstacles = _select_near_boxes(self.obstacles, self._lines)
         self._asks = [False] * n
         self._let = [
             sum(p.from_m < 0.05 for p in path.passages) if path is not None else 0 for path in paths
@@ -151,7 +151,7 @@ class Pedestrians:
         to = target - self.xy_m
         away = np.sqrt(to[:, 0] * to[:, 0] + to[:, 1] * to[:, 1])
         way = normalize(to)
-        push, limit = self._others(way)
+        push, limit = self._avoid_people(way)
         limit = np.minimum(limit, self._sidestep(push, rows, k, step_s))
         goal = np.minimum(np.minimum(self._wanted, limit), room_m / 0.5)
         change = np.clip(goal - self.speed_m_s, -3.0 * CHANGE_M_S2 * step_s, CHANGE_M_S2 * step_s)
@@ -160,7 +160,7 @@ class Pedestrians:
 
     def _advance(self, way: Array, away: Array, step_s: float) -> None:
         """Move everybody whose way is free, and turn them to their walking direction."""
-        moves = self._around(way * (self.speed_m_s * step_s)[:, None])
+        moves = self._avoid_obstacles(way * (self.speed_m_s * step_s)[:, None])
         delta = self.xy_m[None] - self.xy_m[:, None]
         before = delta[..., 0] * delta[..., 0] + delta[..., 1] * delta[..., 1]
         after = delta - moves[:, None]
@@ -185,7 +185,7 @@ class Pedestrians:
         a, b = self._lines[rows, k, 2], self._lines[rows, k + 1, 2]
         self.height_m = a + np.minimum(f, 1.0) * (b - a)
 
-    def _around(self, moves: Array) -> Array:
+    def _avoid_obstacles(self, moves: Array) -> Array:
         """Remove the component of each move [n, 2] that leads into the nearest obstacle."""
         if not len(self.obstacles):
             return moves
@@ -230,7 +230,7 @@ class Pedestrians:
         needed_s = (length_m + 1.5) / (HURRY * max(float(self._wanted[k]), 0.5))
         return approach.red_left_s(time_s) > needed_s
 
-    def _others(self, way: Array) -> tuple[Array, Array]:
+    def _avoid_people(self, way: Array) -> tuple[Array, Array]:
         """Avoidance of other people: side to step to [n], and largest speed [n]."""
         rel = self.xy_m[None] - self.xy_m[:, None]
         x = rel[..., 0] * way[:, :1] + rel[..., 1] * way[:, 1:]
@@ -260,7 +260,7 @@ class Pedestrians:
         return np.where(np.abs(self.off_m - aim) > TIGHT_M, SLOW_M_S, np.inf)
 
 
-def _within_reach(boxes: Array, lines: Array) -> Array:
+def _select_near_boxes(boxes: Array, lines: Array) -> Array:
     """Select the boxes near any path [n, m, 3]."""
     if not len(lines) or not len(boxes):
         return np.zeros((0, 6))

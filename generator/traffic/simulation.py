@@ -116,13 +116,13 @@ def _collect_motion(
         )
     else:
         station, speed, acceleration = (np.stack(column) for column in zip(*cars, strict=True))
-        axle, ahead, rise = _poses(fleet, station[kept])
+        axle, ahead, rise = _vehicle_poses(fleet, station[kept])
     return SimulatedMotion(
         axle, ahead, rise, station, speed, acceleration, feet, look[kept], walked, pace
     )
 
 
-def _poses(fleet: Vehicles, station_m: Array) -> tuple[Array, Array, Array]:
+def _vehicle_poses(fleet: Vehicles, station_m: Array) -> tuple[Array, Array, Array]:
     """Compute rear axles [t, n, 3], directions [t, n, 2] and rises [t, n] at stations [t, n]."""
     along = (station_m - fleet.first_m) / STATION_M
     xy, ahead = fleet.courses.poses(along)

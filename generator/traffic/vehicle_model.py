@@ -53,7 +53,7 @@ class CrossingPedestrian:
 
 
 @dataclass(frozen=True, slots=True)
-class _Comer:
+class _Approaching:
     """A vehicle that approaches a junction and may not yet enter it.
 
     Attributes:
@@ -101,11 +101,11 @@ class VehicleModel:
     def settle(self, crossers: Sequence[CrossingPedestrian]) -> None:
         """Lower the speeds at time 0 so that comfortable braking suffices."""
         fleet = self.fleet
-        stops = self._stops(0.0, crossers)
+        stops = self._find_stops(0.0, crossers)
         room = np.maximum(stops - self.station_m - fleet.front_m - BEFORE_LINE_M, 0.0)
         speed = np.minimum(self.speed_m_s, np.sqrt(2.0 * EASY_M_S2 * np.minimum(room, 1e4)))
         for _ in range(len(speed)):
-            gap, leader = self._leaders(speed)
+            gap, leader = self._find_leaders(speed)
             behind = equilibrium_speed(fleet.drivers, gap, speed)
             free = np.maximum(np.minimum(gap, 1e4) - fleet.drivers.standstill_m, 0.0)
             lower = np.minimum(behind, np.sqrt(leader * leader + 2.0 * EASY_M_S2 * free))
@@ -117,8 +117,8 @@ class VehicleModel:
     def step(self, time_s: float, step_s: float, crossers: Sequence[CrossingPedestrian]) -> None:
         """Advance by one step with constant accelerations; speeds stay at or above 0."""
         fleet, drivers, v = self.fleet, self.fleet.drivers, self.speed_m_s
-        gap, leader = self._leaders(v)
-        stops = self._stops(time_s, crossers, gap, leader)
+        gap, leader = self._find_leaders(v)
+        stops = self._find_stops(time_s, crossers, gap, leader)
         to_stop = stops - self.station_m - fleet.front_m + drivers.standstill_m - BEFORE_LINE_M
         taken = np.maximum(
             interaction(drivers, v, gap, leader),
@@ -156,7 +156,7 @@ class VehicleModel:
         allowed: Array = self.fleet.allowed_m_s[np.arange(len(k)), k]
         return allowed
 
-    def _leaders(self, speed_m_s: Array) -> tuple[Array, Array]:
+    def _find_leaders(self, speed_m_s: Array) -> tuple[Array, Array]:
         """Gaps to the leaders [n], ``inf`` = none, and their speeds [n]."""
         fleet = self.fleet
         if not len(speed_m_s):
@@ -174,7 +174,7 @@ class VehicleModel:
         gap = gaps[np.arange(len(who)), who]
         return gap, np.where(gap < np.inf, speed_m_s[who], 0.0)
 
-    def _stops(
+    def _find_stops(
         self,
         time_s: float,
         crossers: Sequence[CrossingPedestrian],
@@ -183,25 +183,29 @@ class VehicleModel:
     ) -> Array:
         """Stations of the next stops [n]; ``inf`` = none. Lets vehicles into junctions."""
         stops: Array = self.fleet.end_m.copy()
-        comers = self._comers(time_s, stops)
-        for comer in comers:
-            i = comer.number
+        approaching = self._find_approaching(time_s, stops)
+        for own in approaching:
+            i = own.number
             full = (
                 gap_m is not None
                 and leader_m_s is not None
-                and self._is_full(comer, float(gap_m[i]), float(leader_m_s[i]))
+                and self._is_full(own, float(gap_m[i]), float(leader_m_s[i]))
             )
-            if full or any(self._yields(comer, other) for other in comers) or self._is_taken(comer):
-                stops[i] = min(stops[i], comer.entry.at_m)
+            if (
+                full
+                or any(self._must_yield(own, other) for other in approaching)
+                or self._is_taken(own)
+            ):
+                stops[i] = min(stops[i], own.entry.at_m)
             else:
                 self.entered[i] += 1
         if crossers:
             self._stop_for_people(crossers, stops)
         return stops
 
-    def _comers(self, time_s: float, stops: Array) -> list[_Comer]:
+    def _find_approaching(self, time_s: float, stops: Array) -> list[_Approaching]:
         """Vehicles that approach a junction without a red light, by time of arrival."""
-        comers = []
+        approaching = []
         for i, entries in enumerate(self.fleet.entries):
             self._revoke_entry(i, time_s)
             if self.entered[i] >= len(entries):
@@ -214,8 +218,8 @@ class VehicleModel:
             if self._is_red(entry, left, v, time_s):
                 stops[i] = min(stops[i], entry.at_m)
                 continue
-            comers.append(_Comer(i, entry, max(left, 0.0) / max(v, 2.0)))
-        return sorted(comers, key=lambda comer: (comer.after_s, comer.number))
+            approaching.append(_Approaching(i, entry, max(left, 0.0) / max(v, 2.0)))
+        return sorted(approaching, key=lambda own: (own.after_s, own.number))
 
     def _revoke_entry(self, i: int, time_s: float) -> None:
         """Revoke the permission of a vehicle that can still stop when the light changes."""
@@ -236,13 +240,13 @@ class VehicleModel:
             return speed_m_s * speed_m_s <= 2.0 * CAN_STOP_M_S2 * max(left_m, 0.0)
         return state != "green"
 
-    def _is_taken(self, comer: _Comer) -> bool:
+    def _is_taken(self, own: _Approaching) -> bool:
         """Whether a vehicle is on, or may enter, a lane that crosses or joins its own."""
         for k, entries in enumerate(self.fleet.entries):
-            if k == comer.number:
+            if k == own.number:
                 continue
             for entry in entries[: self.entered[k]]:
-                overlap = self.fleet.overlaps.get((entry.lane, comer.entry.lane))
+                overlap = self.fleet.overlaps.get((entry.lane, own.entry.lane))
                 if overlap is None or overlap.kind == "part":
                     continue
                 rear = float(self.station_m[k]) - self.fleet.vehicles[k].rear_m
@@ -250,14 +254,14 @@ class VehicleModel:
                     return True
         return False
 
-    def _is_full(self, comer: _Comer, gap_m: float, leader_m_s: float) -> bool:
+    def _is_full(self, own: _Approaching, gap_m: float, leader_m_s: float) -> bool:
         """Whether there is no room beyond the junction; vehicles do not stop inside it."""
-        vehicle = self.fleet.vehicles[comer.number]
-        front = float(self.station_m[comer.number]) + vehicle.front_m
-        needed = comer.entry.leave_m + vehicle.front_m + vehicle.rear_m + 2.0
+        vehicle = self.fleet.vehicles[own.number]
+        front = float(self.station_m[own.number]) + vehicle.front_m
+        needed = own.entry.leave_m + vehicle.front_m + vehicle.rear_m + 2.0
         return leader_m_s < 2.0 and front + gap_m < needed
 
-    def _yields(self, own: _Comer, other: _Comer) -> bool:
+    def _must_yield(self, own: _Approaching, other: _Approaching) -> bool:
         """Whether another vehicle has the right of way and arrives too early to go first."""
         if own.number == other.number:
             return False
@@ -276,7 +280,7 @@ class VehicleModel:
             return (waited[1], -other.number) > (waited[0], -own.number)
         return self._is_second(own, other)
 
-    def _is_second(self, own: _Comer, other: _Comer) -> bool:
+    def _is_second(self, own: _Approaching, other: _Approaching) -> bool:
         """Whether the other goes first: straight before oncoming turns, by arrival, from the right.
 
         Vehicles from the same lane follow each other and are never compared.

@@ -175,7 +175,7 @@ def make_vehicles(
         to_m=high,
         end_m=np.minimum(
             np.array([v.route.end_m if v.route.dead_end else np.inf for v in vehicles]),
-            [_free_m(v, courses, k, obstacles) for k, v in enumerate(vehicles)],
+            [_free_station_m(v, courses, k, obstacles) for k, v in enumerate(vehicles)],
         ),
         entries=tuple(_entries(graph, v.route) for v in vehicles),
         zones=tuple(_zones(v.route, walked) for v in vehicles),
@@ -192,7 +192,7 @@ def limit_braking(limits: Array) -> None:
         limits[:, k] = np.minimum(limits[:, k], reachable)
 
 
-def _free_m(vehicle: Vehicle, courses: Courses, k: int, obstacles: Array) -> float:
+def _free_station_m(vehicle: Vehicle, courses: Courses, k: int, obstacles: Array) -> float:
     """Station at which a vehicle's front has to stop for obstacles; ``inf`` = none."""
     xy, ahead = courses.xy_m[k], courses.ahead[k]
     half = np.array([0.5 * (vehicle.front_m + vehicle.rear_m), 0.5 * vehicle.width_m])
