@@ -8,7 +8,7 @@ from gen_data.generator.core.plugins import PluginTable
 TABLE = PluginTable[Randomizer](
     "randomizer",
     {
-        "lane_objects": "gen_data.randomizers.along:Along",
+        "lane_objects": "gen_data.randomizers.lane_objects:LaneObjects",
         "arm_configuration": "gen_data.randomizers.arm_configuration:ArmConfiguration",
         "arm_motion": "gen_data.randomizers.arm_motion:ArmMotion",
         "backdrop": "gen_data.randomizers.backdrop:Backdrop",

@@ -29,7 +29,7 @@ from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.free_space import Footprint, Ground, make_ground
 
 COUNT_MAX = 2000
-"""Largest count of the template's ``along`` element."""
+"""Largest count of the template's ``lane_objects`` element."""
 PER_LANE_MAX = 20_000
 """Largest number of places along one lane: one every 50 cm for 10 km."""
 SCALE = Bounds(0.001, 1000.0)
@@ -38,7 +38,7 @@ SCATTER_TRIES = 20
 """Attempts to find a free place for one scattered object."""
 
 
-class Along(RandomizerBase):
+class LaneObjects(RandomizerBase):
     """Replaces the members of a template's ``lane_objects`` group by drawn ones.
 
     Objects and gaps alternate along every lane of the group's kinds; objects that would overlap

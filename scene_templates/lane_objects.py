@@ -16,7 +16,7 @@ from gen_data.scene_templates.element import Element
 from gen_data.scene_templates.objects import AssetChoice
 
 
-class Along(Element):
+class LaneObjects(Element):
     """Objects along lanes; the ``lane_objects`` randomizer of the same name draws them.
 
     Attributes:
