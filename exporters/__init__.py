@@ -1,8 +1,7 @@
-"""Output formats: each is one file and one line in this table.
+"""Output formats: one file and one line in this table each.
 
-An exporter adds labels to a shard whose images are already written
-(``gen_data.exporters.image_files``) and, in the end, merges all shards into the format's own
-layout; images are hard-linked, never copied twice.
+An exporter adds labels to shards, after ``gen_data.exporters.image_files`` has written their
+images. At the end it merges all shards into the layout of its format; images are hard links.
 """
 
 from __future__ import annotations

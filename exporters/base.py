@@ -1,4 +1,4 @@
-"""Defaults of the members of ``Exporter`` that not every format needs."""
+"""Base class of exporters, with defaults for the optional members of ``Exporter``."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ E = TypeVar("E", bound="ExporterBase")
 
 
 class ExporterBase(Strict):
-    """An exporter that reads no annotator's fields, holds any data set and needs no geometry."""
+    """An exporter that needs no annotator and no geometry, and accepts any data set."""
 
     @property
     def needs(self) -> frozenset[str]:
-        """Names of the annotators whose fields it reads."""
+        """Names of the annotators that it reads."""
         return frozenset()
 
     def check(self, info: DatasetInfo) -> None:
-        """Refuse a data set that the format cannot hold.
+        """Reject a data set that the format cannot represent.
 
         Raises:
-            ConfigError: naming what it lacks.
+            ConfigError: the text names the missing sensor or channel.
         """
         del info
 
     def with_assets(self: E, assets: AssetLibrary) -> E:
-        """The exporter that writes; a format that holds geometry keeps the library."""
+        """Return the exporter for writing; formats with geometry keep the library."""
         del assets
         return self

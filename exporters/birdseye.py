@@ -1,4 +1,4 @@
-"""What surrounds the ego, from above: layers as images, lanes and boxes as JSON.
+"""Bird's-eye views around the ego vehicle: layers as images, lanes and boxes as JSON.
 
 ::
 
@@ -7,7 +7,7 @@
     frames.jsonl             one line per sample
     lanes/<camera>.jsonl     one line per image, in TuSimple's form
 
-The ego is in the middle of every image and looks up: the centre of pixel (row r, column c) of n x n
+The ego is in the middle of every image and faces up: the centre of pixel (row r, column c) of n x n
 is at ``x = (n / 2 - r - 0.5) px_m`` ahead and ``y = (n / 2 - c - 0.5) px_m`` to the left, in the
 frame ``T_world_map``, which is level and has its origin at the ego's rig.
 
@@ -20,8 +20,8 @@ frame; ``boxes3d``: by frame, ``ego`` and each laser scanner's, ``instance_id``,
 scene.
 
 A line of ``lanes/<camera>.jsonl``: ``raw_file``, ``h_samples`` (image rows) and ``lanes``: per line
-the columns at those rows, -2 where there is none, as TuSimple's benchmark has it (pixel centres are
-whole numbers there: ours less 0.5); and ``borders``, the points as they are, with ``visible``.
+the columns at those rows, -2 for none, as in TuSimple's benchmark (its pixel centres are integers:
+0.5 less than ours); and ``borders``, the exact points, with ``visible``.
 
 References: the map expansion of nuScenes (Caesar et al., CVPR 2020); Philion and Fidler, "Lift,
 Splat, Shoot", ECCV 2020; TuSimple lane detection benchmark, 2017.
@@ -39,6 +39,7 @@ import numpy as np
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.png import RowFilter, encode_png
+from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.lane_geometry import LaneBorder
@@ -48,10 +49,10 @@ from gen_data.generator.core.serialization import canonical_json
 
 FRAMES, LANES = "frames.jsonl", "lanes"
 ROWS_PX = 10
-"""Between the image rows at which TuSimple lists columns."""
+"""Spacing of the image rows at which TuSimple lists columns."""
 ABSENT = -2
 MARGIN = 1.2
-"""Borders are listed as far as this many times the map's reach."""
+"""Borders are listed up to this multiple of the map's reach."""
 DECIMALS = 4
 
 
@@ -62,14 +63,14 @@ class Birdseye(ExporterBase):
 
     @property
     def needs(self) -> frozenset[str]:
-        """Annotators whose fields it reads."""
+        """Names of the annotators that it reads."""
         return frozenset({"bev_map", "boxes3d", "lanes"})
 
     def check(self, info: DatasetInfo) -> None:
-        """Every data set has what it takes; a scene without a rig is refused by ``bev_map``."""
+        """Accept any data set; the annotator ``bev_map`` rejects scenes without a rig."""
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write the layers of each sample, and a line about it and each of its images."""
+        """Write the layers of each sample, a line for it, and a line for each of its images."""
         folder = shard_dir / self.type
         frames: list[str] = []
         images: dict[str, list[str]] = {sensor: [] for sensor in info.cameras}
@@ -84,9 +85,9 @@ class Birdseye(ExporterBase):
             frames.append(canonical_json(_frame(sample, truth, truth.birdseye)) + "\n")
             for sensor in (s for s in info.cameras if s in sample.truth):
                 images[sensor].append(canonical_json(_image(sample, sensor)) + "\n")
-        _write_lines(folder / FRAMES, frames)
+        write_text(folder / FRAMES, "".join(frames))
         for sensor, lines in images.items():
-            _write_lines(folder / LANES / f"{sensor}.jsonl", lines)
+            write_text(folder / LANES / f"{sensor}.jsonl", "".join(lines))
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link the layers of all shards, given in index order, and join their lines."""
@@ -96,7 +97,8 @@ class Birdseye(ExporterBase):
                 for path in sorted(layer.iterdir()):
                     link_or_copy(path, dataset_dir / layer.name / path.name)
         for name in (FRAMES, *(f"{LANES}/{sensor}.jsonl" for sensor in info.cameras)):
-            _write_lines(dataset_dir / name, ((f / name).read_text("utf-8") for f in folders))
+            lines = "".join((folder / name).read_text("utf-8") for folder in folders)
+            write_text(dataset_dir / name, lines)
 
 
 def _frame(sample: Sample, truth: EgoTruth, birdseye: BirdseyeMap) -> dict[str, Any]:
@@ -123,7 +125,7 @@ def _frame(sample: Sample, truth: EgoTruth, birdseye: BirdseyeMap) -> dict[str, 
 def _borders(
     borders: Iterable[LaneBorder], birdseye: BirdseyeMap, reach_m: float
 ) -> Iterator[dict[str, Any]]:
-    """The stretches of borders that are on the map or near it, in its frame."""
+    """Sections of borders on or near the map, in its frame."""
     T_map_world = birdseye.T_world_map.inverse()
     for border in borders:
         line = T_map_world.apply(np.asarray(border.points_m))
@@ -173,9 +175,9 @@ def _image(sample: Sample, sensor: str) -> dict[str, Any]:
 
 
 def columns_at(border: BorderTruth, rows: Sequence[int]) -> list[float]:
-    """Columns at which a line crosses image rows, pixel centres at whole numbers; -2 = nowhere.
+    """Columns at which a line crosses image rows, with integer pixel centres; -2 = no crossing.
 
-    A line that crosses a row more than once is listed where it does so nearest to its start.
+    Of several crossings of a row, the one nearest to the start of the line is listed.
     """
     u, v = (np.array([point[k] for point in border.points_px]) - 0.5 for k in (0, 1))
     columns: list[float] = []
@@ -188,8 +190,3 @@ def columns_at(border: BorderTruth, rows: Sequence[int]) -> list[float]:
         share = (row - v[k]) / (v[k + 1] - v[k]) if v[k + 1] != v[k] else 0.0
         columns.append(round(float(u[k] + share * (u[k + 1] - u[k])), 2) + 0.0)
     return columns
-
-
-def _write_lines(path: Path, lines: Iterable[str]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("".join(lines), encoding="utf-8", newline="\n")

@@ -1,31 +1,30 @@
-"""COCO instances and keypoints, with 3D boxes, poses, visibility and facts as extra keys.
+"""COCO instances and keypoints, with 3D boxes, poses, visibility and attributes as extra keys.
 
 ::
 
-    annotations/instances_<split>.json              a split without images has no file
-    annotations/<category>_keypoints_<split>.json   where the annotation keypoints is made
+    annotations/instances_<split>.json              none for a split without images
+    annotations/<category>_keypoints_<split>.json   if the annotation keypoints is enabled
     <split>/000000012_color.png             images{file_name}; one name per sample and sensor
     <channel>/<split>/000000012_color.png   the other images of the data set: depth, instance, ...
 
-COCOeval compares keypoints of one skeleton at a time, so each category that has any gets a file
-of its own: ``person_keypoints_train.json`` is what COCO's own is. It lists all images, and of
-objects those of its category, with ``keypoints`` and ``num_keypoints`` (0 where an object has no
-keypoints); its category has ``keypoints`` and the 1-based ``skeleton``.
+COCOeval compares keypoints of one skeleton at a time, so each category with keypoints has its own
+file, such as COCO's ``person_keypoints_train.json``. It lists all images and the objects of its
+category, with ``keypoints`` and ``num_keypoints`` (0 if an object has no keypoints); the category
+has ``keypoints`` and the 1-based ``skeleton``.
 
-Every annotation has COCO's own keys, and ``attributes``: the object's name, asset, subcategory
-and whatever else its asset says. Images have ``attributes`` too, the values that the draws of
-their scene had in common, and ``weather``, as far as it is not zero. Further keys appear as far
-as their annotations are made:
+Every annotation has COCO's own keys, and ``attributes``: the object's name, asset, subcategory and
+the attributes of its asset. Images have ``attributes`` too, the shared values of their scene, and
+the values of ``weather`` other than zero. Annotators that are enabled add these keys:
 
 ``amodal_bbox``, ``amodal_segmentation``
     The whole silhouette. The box may leave the image, the mask is clipped to it.
 ``visible_fraction``, ``occlusion``, ``truncation``
-    Shares in [0, 1]: visible pixels of the silhouette; hidden ones of what is inside the image;
-    silhouette pixels outside the image.
+    Fractions in [0, 1]: visible pixels of the silhouette; hidden pixels of its part inside the
+    image; silhouette pixels outside the image.
 ``box3d``
     Camera frame: ``center_m``, full ``size_m``, ``quaternion_wxyz``.
 ``T_camera_object``
-    Pose of the object's own frame, 4 x 4, rows first.
+    Pose of the object's own frame, 4 x 4, row by row.
 ``part_px``
     Visible pixels by part.
 ``motion``
@@ -34,28 +33,29 @@ as their annotations are made:
 ``keypoints_camera_m``
     In keypoint files: by name, positions in the camera frame.
 
-Where views are sequences of several instants, images also have ``sequence_id``, ``frame_id`` (the
-instant's number in its sequence, from 0) and ``time_s``, and annotations have ``track_id``: the
-same for one object in all images of its sequence, whatever the camera, and unique in the data set.
+If views are sequences of several instants, images also have ``sequence_id``, ``frame_id`` (number
+of the instant in its sequence, from 0) and ``time_s``, and annotations have ``track_id``: the same
+for one object in all images of its sequence, of all cameras, and unique in the data set.
 
-Images have ``K`` and, where their camera is no pinhole, ``lens``: its ``model`` (one of those in
-``gen_data.generator.core.lens``), the ``distortion`` that ``K`` maps on, which is OpenCV's vector,
-with the names of its ``coefficients``, and ``half_field_rad``, the angle to the axis where the
-image ends.
+Images have ``K`` and, unless their camera is a pinhole, ``lens``: its ``model`` (one of those in
+``gen_data.generator.core.lens``), OpenCV's ``distortion`` vector with the names of its
+``coefficients``, to be applied before ``K``, and ``half_field_rad``, the angle to the axis at which
+the image ends.
 
-Images whose camera has a shutter have ``exposure_s``, how long a row is exposed, and ``readout_s``,
-from the exposure of the upper edge to that of the lower one (negative = upwards, 0 = at once): row
-``v`` is exposed around ``readout_s * ((v + 0.5) / height - 0.5)`` after the image's instant. Masks,
-boxes and keypoints are those of rows' instants, everything in three dimensions that of the image's.
+Images of a camera with a shutter have ``exposure_s``, the exposure time of a row, and
+``readout_s``, the time from the exposure of the upper edge to that of the lower edge (negative =
+upwards, 0 = global shutter): row ``v`` is exposed around ``readout_s * ((v + 0.5) / height - 0.5)``
+after the image's instant. Masks, boxes and keypoints refer to the instants of their rows, all 3D
+values to the instant of the image.
 
-Images have ``lane_borders``, lists of image points in the direction of travel and whether each is
-visible (0 = hidden), and ``free_space``, run-length encoded, as far as these are made.
+If enabled, images have ``lane_borders``, lists of image points in the direction of travel with
+their visibility (0 = hidden), and ``free_space``, run-length encoded.
 
 Camera frames are X right, Y down, Z forward. ``K`` is for image coordinates in which pixel ``i``
 covers ``[i, i + 1)``, as COCO's boxes do; OpenCV's principal point is 0.5 px less.
 
-References: https://cocodataset.org/#format-data and pycocotools, whose COCOeval reads annotation
-id 0 as "no match": ids begin at 1.
+References: https://cocodataset.org/#format-data and pycocotools. Its COCOeval treats annotation
+id 0 as "no match", so ids start at 1.
 """
 
 from __future__ import annotations
@@ -94,7 +94,7 @@ from gen_data.generator.core.shutter import Shutter
 from gen_data.generator.core.skeletons import Skeleton, find_skeleton
 
 DECIMALS = 9
-"""Of metres, matrices and shares: far below what anyone can measure, and short to write."""
+"""Decimals of metres, matrices and fractions: far below any measurement error."""
 
 
 class Coco(ExporterBase):
@@ -102,20 +102,20 @@ class Coco(ExporterBase):
 
     type: Literal["coco"] = "coco"
     segmentation: Literal["rle", "none"] = "rle"
-    """Visible masks, run-length encoded; or boxes only."""
+    """Run-length encoded visible masks, or no masks."""
     amodal: bool = True
-    """Also write box and, where the annotation amodal_masks is made, mask of the silhouette."""
+    """Also write the box of the silhouette and, with the annotation amodal_masks, its mask."""
 
     @property
     def needs(self) -> frozenset[str]:
-        """Annotators whose fields it cannot do without."""
+        """Names of the annotators that it requires."""
         return frozenset({"instance_masks", "boxes2d"} if self.amodal else {"instance_masks"})
 
     def check(self, info: DatasetInfo) -> None:
-        """Refuse a data set that this format cannot hold.
+        """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: if no sensor writes the rgb channel.
+            ConfigError: no sensor writes the rgb channel.
         """
         if not rgb_cameras(info):
             raise ConfigError(
@@ -127,7 +127,7 @@ class Coco(ExporterBase):
         """Write one JSON line per image and per annotation, by split.
 
         Raises:
-            ConfigError: if no sensor writes the rgb channel.
+            ConfigError: no sensor writes the rgb channel.
         """
         self.check(info)
         rows: dict[str, list[dict[str, Any]]] = {}
@@ -203,11 +203,11 @@ class Coco(ExporterBase):
         if self.amodal and thing.amodal_mask is not None:
             mask = thing.amodal_mask
             row["amodal_segmentation"] = encode_rle(mask, camera.height_px, camera.width_px)
-        return row | _optional(thing)
+        return row | _optional_keys(thing)
 
 
-def _optional(thing: ObjectTruth) -> dict[str, Any]:
-    """The keys of annotations that were made; none for the others."""
+def _optional_keys(thing: ObjectTruth) -> dict[str, Any]:
+    """Keys of the enabled annotations of an object."""
     keys: dict[str, Any] = {
         name: round(share, DECIMALS)
         for name in ("visible_fraction", "occlusion", "truncation")
@@ -225,7 +225,7 @@ def _optional(thing: ObjectTruth) -> dict[str, Any]:
 
 
 def motion_facts(motion: MotionTruth) -> dict[str, Any]:
-    """How an object moves, by the frame along whose axes the numbers are."""
+    """Motion of an object, along the axes of each frame."""
     frames = {"world": motion.world, "camera": motion.camera, "ego": motion.ego}
     facts: dict[str, Any] = {
         name: {f.name: _round_values(getattr(twist, f.name)) for f in fields(Twist)}
@@ -235,8 +235,8 @@ def motion_facts(motion: MotionTruth) -> dict[str, Any]:
     return {**facts, "speed_m_s": round(motion.speed_m_s, DECIMALS)}
 
 
-def _of_image(truth: ImageTruth, camera: Intrinsics) -> dict[str, Any]:
-    """The keys of annotations of the image as a whole; none for those that were not made."""
+def _image_keys(truth: ImageTruth, camera: Intrinsics) -> dict[str, Any]:
+    """Keys of the enabled annotations of the whole image."""
     keys: dict[str, Any] = {}
     if truth.borders is not None:
         keys["lane_borders"] = [
@@ -273,7 +273,7 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "T_world_camera": _rows(camera.T_world_camera.matrix()),
         "attributes": dict(sample.scene.shared),
         "weather": _weather(sample.scene.weather),
-    } | _of_image(sample.truth[sensor], camera.intrinsics)
+    } | _image_keys(sample.truth[sensor], camera.intrinsics)
     if info.steps_per_scene > 1:
         row["sequence_id"] = sequence_number(info, sample.index)
         row["frame_id"] = sample.index % info.steps_per_scene
@@ -282,7 +282,7 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
 
 
 def _lens(lens: Lens) -> dict[str, Any]:
-    """Nothing for a pinhole."""
+    """Key of a lens; empty for a pinhole."""
     if lens.model == "pinhole":
         return {}
     names = COEFFICIENTS[lens.model]
@@ -294,14 +294,14 @@ def _lens(lens: Lens) -> dict[str, Any]:
 
 
 def _shutter(shutter: Shutter) -> dict[str, Any]:
-    """Nothing for one that opens for an instant only."""
+    """Keys of a shutter; empty for an instantaneous one."""
     if not shutter.open_s > 0.0:
         return {}
     return {"exposure_s": shutter.exposure_s, "readout_s": shutter.readout_s}
 
 
 def _weather(weather: Weather) -> dict[str, float]:
-    """What of it is not zero; the seed of its patterns is no fact about the image."""
+    """Values other than zero, without the seed of the patterns."""
     values = ((f.name, getattr(weather, f.name)) for f in fields(weather) if f.name != "seed")
     return {name: round(value, DECIMALS) for name, value in values if value}
 
@@ -314,7 +314,7 @@ def _facts(instance: Instance) -> dict[str, str]:
 
 
 def _named_points(points: Sequence[KeypointTruth]) -> dict[str, Any]:
-    """As fragments hold them; what a category's points are is known when all shards are."""
+    """Keypoints as in fragments; a category's skeleton is known only after all shards."""
     return {
         "points": [
             [p.name, *(round(x, 3) for x in p.image_px), p.visibility, _round_values(p.position_m)]
@@ -324,7 +324,7 @@ def _named_points(points: Sequence[KeypointTruth]) -> dict[str, Any]:
 
 
 def _skeletons(fragments: Sequence[Path]) -> dict[int, Skeleton]:
-    """Skeletons by id of the categories that have keypoints, in order of the ids."""
+    """Find the skeletons of the categories with keypoints, by category id in order."""
     names: dict[int, dict[str, None]] = {}
     for fragment in fragments:
         for path in sorted(fragment.glob("*.keypoints.*.jsonl")):
@@ -335,7 +335,7 @@ def _skeletons(fragments: Sequence[Path]) -> dict[int, Skeleton]:
 
 
 def _keypoint_rows(lines: Iterable[str], skeleton: Skeleton) -> Iterator[str]:
-    """Annotations with the points of the whole skeleton, absent ones as COCO's (0, 0, 0)."""
+    """Complete annotations to the whole skeleton; absent points are COCO's (0, 0, 0)."""
     for line in lines:
         row = json.loads(line)
         points = {name: (u, v, seen, place) for name, u, v, seen, place in row.pop("points")}
@@ -407,7 +407,7 @@ def _join_fragments(fragments: Sequence[Path], name: str) -> Iterator[str]:
 
 
 def _lines(path: Path) -> Iterator[str]:
-    """Lines of a fragment without their line ends; none where a shard has no such split."""
+    """Lines of a fragment without line ends; none if the shard lacks the split."""
     if path.exists():
         with path.open(encoding="utf-8", newline="\n") as file:
             for line in file:

@@ -1,4 +1,4 @@
-"""PNG files of the image channels: what is written, exactly, and with which encoder settings.
+"""PNG files of the image channels: their pixel values and encoder settings.
 
 ====================  =====================  =====================================================
 channel               PNG                    value; value for "nothing"
@@ -22,8 +22,8 @@ scene_flow            16-bit RGB             ``round(metres / depth_scale_m) + 3
                                              (0, 0, 0) = nothing, or beyond 32767 units
 ====================  =====================  =====================================================
 
-Rows are filtered by what lies to the left, ids by what lies above, and compressed at the level
-where more milliseconds stop saving bytes.
+Filters predict from the left pixel, for ids from the pixel above. Compression uses the highest
+level that still reduces the size noticeably for its time.
 """
 
 from __future__ import annotations
@@ -53,10 +53,10 @@ DEPTH_UNITS_MAX = 65_535
 
 FLOW_UNITS_PER_PX = 64
 SIGNED_ZERO = 32_768
-"""Value of 0 in 16-bit images of what may be negative."""
+"""Value of 0 in 16-bit images of signed quantities."""
 
 NO_NORMAL = 128
-"""Value of all three components in images of normals where there is no surface."""
+"""Value of all three components in images of normals without a surface."""
 
 ENCODING = {
     Channel.RGB: (RowFilter.SUB, 1),
@@ -81,14 +81,14 @@ ENCODING = {
 
 
 def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
-    """Write every image channel of a sample that the data set keeps to its ``media_path``.
+    """Write every exported image channel of a sample to its ``media_path``.
 
-    Laser scans go to their ``cloud_path``, rows of devices to their ``table_path``. A sensor that
-    does not read at this sample has no file.
+    Laser scans go to their ``cloud_path``, rows of devices to their ``table_path``. A sensor
+    without a reading at this sample has no file.
 
     Raises:
-        ConfigError: if a channel is no image.
-        SampleError: if a depth is negative or NaN.
+        ConfigError: a channel is no image.
+        SampleError: a depth is negative or NaN.
     """
     for sensor in info.cameras:
         reading = sample.capture.readings.get(sensor)
@@ -107,57 +107,57 @@ def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
 
 
 def encode_channel(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> bytes:
-    """The PNG file of one channel, as the table at the top of this module says.
+    """Encode one channel as PNG; see the table at the top of this module.
 
     Args:
-        channel: What the image shows.
+        channel: Channel of the image.
         image: As listed at ``Channel``.
         depth_scale_m: Metres per unit of depth and range images.
 
     Raises:
-        ConfigError: if the channel is no image.
-        SampleError: if a depth is negative or NaN.
+        ConfigError: the channel is no image.
+        SampleError: a depth is negative or NaN.
     """
     if channel not in ENCODING:
         known = ", ".join(c.value for c in ENCODING)
         raise ConfigError(f"channel '{channel.value}' cannot be written as an image; use {known}")
     row_filter, level = ENCODING[channel]
-    return encode_png(_pixels(channel, image, depth_scale_m), row_filter, level)
+    return encode_png(_encode_pixels(channel, image, depth_scale_m), row_filter, level)
 
 
 def read_image(path: Path, channel: Channel, depth_scale_m: float) -> NDArray[Any]:
-    """One channel as a sensor saw it, from its PNG (rounded): the inverse of ``encode_channel``.
+    """Read one channel from its PNG (rounded): the inverse of ``encode_channel``.
 
     Args:
-        path: Of the file.
-        channel: What the image shows.
+        path: PNG file.
+        channel: Channel of the image.
         depth_scale_m: Metres per unit of depth and range images.
 
     Returns:
-        The array as listed at ``Channel``; its values for "nothing" are restored.
+        Array as listed at ``Channel``, including its values for "nothing".
 
     Raises:
         StorageError: the file is missing or no PNG.
     """
     pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
     if pixels is None:
-        raise StorageError(f"{path}: missing or no PNG file; make the data set again")
+        raise StorageError(f"{path}: missing or no PNG file; generate the data set again")
     if pixels.ndim == 3:
         pixels = np.ascontiguousarray(pixels[..., ::-1])
-    return _values(channel, pixels, depth_scale_m)
+    return _decode_pixels(channel, pixels, depth_scale_m)
 
 
-def _values(channel: Channel, pixels: NDArray[Any], depth_scale_m: float) -> NDArray[Any]:
-    """Physical values of the pixels of a PNG."""
+def _decode_pixels(channel: Channel, pixels: NDArray[Any], depth_scale_m: float) -> NDArray[Any]:
+    """Convert the pixels of a PNG to physical values."""
     match channel:
         case Channel.Z_DEPTH | Channel.RANGE | Channel.MEASURED_DEPTH:
             return np.where(pixels > 0, pixels * depth_scale_m, np.inf).astype(np.float32)
         case Channel.DISPARITY | Channel.DISPARITY_VISIBLE:
             return np.asarray(pixels / 256.0, np.float32)
         case Channel.FLOW_FORWARD | Channel.FLOW_BACKWARD:
-            return _signed_values(pixels, 1.0 / FLOW_UNITS_PER_PX)[..., :2]
+            return _decode_signed(pixels, 1.0 / FLOW_UNITS_PER_PX)[..., :2]
         case Channel.SCENE_FLOW:
-            return _signed_values(pixels, depth_scale_m)
+            return _decode_signed(pixels, depth_scale_m)
         case Channel.FLOW_OCCLUDED_FORWARD | Channel.FLOW_OCCLUDED_BACKWARD:
             return np.asarray(pixels > 0, np.uint8)
         case Channel.NORMALS:
@@ -171,8 +171,8 @@ def _values(channel: Channel, pixels: NDArray[Any], depth_scale_m: float) -> NDA
             return pixels
 
 
-def _signed_values(pixels: NDArray[Any], unit: float) -> NDArray[np.float32]:
-    """The inverse of ``_signed_units``: NaN where all three values are 0."""
+def _decode_signed(pixels: NDArray[Any], unit: float) -> NDArray[np.float32]:
+    """Invert ``_signed_units``: NaN where all three values are 0."""
     values = (pixels.astype(np.float64) - SIGNED_ZERO) * unit
     return np.where((pixels == 0).all(axis=-1, keepdims=True), np.nan, values).astype(np.float32)
 
@@ -181,7 +181,7 @@ def depth_units(depth_m: NDArray[np.floating], depth_scale_m: float) -> UInt16:
     """Depth in units of ``depth_scale_m``, half to even; 0 = nothing or out of range.
 
     Raises:
-        SampleError: if a depth is negative or NaN.
+        SampleError: a depth is negative or NaN.
     """
     if not (depth_m >= 0).all():
         raise SampleError("a depth image holds a negative number or NaN; 'nothing' must be inf")
@@ -194,7 +194,7 @@ def depth_units(depth_m: NDArray[np.floating], depth_scale_m: float) -> UInt16:
 def disparity_units(disparity_px: NDArray[np.floating]) -> UInt16:
     """Disparity in 1/256 px, half to even; 0 = nothing or out of range.
 
-    A disparity that would round to 0 becomes 1: it is there.
+    A positive disparity that would round to 0 becomes 1, as 0 means nothing.
     """
     units = np.rint(disparity_px * 256.0)
     units = np.where(disparity_px > 0.0, np.maximum(units, 1.0), 0.0)
@@ -202,24 +202,24 @@ def disparity_units(disparity_px: NDArray[np.floating]) -> UInt16:
 
 
 def flow_units(flow_px: NDArray[np.floating]) -> UInt16:
-    """Flow in 1/64 px from 32768, and 1 where there is any, uint16 [h, w, 3]; else 0."""
+    """Flow in 1/64 px, offset by 32768, and a 1, uint16 [h, w, 3]; all 0 without flow."""
     units = _signed_units(flow_px, 1.0 / FLOW_UNITS_PER_PX)
     valid = (units > 0).any(axis=-1, keepdims=True)
     return np.concatenate([units, valid.astype(np.uint16)], axis=-1)
 
 
 def _signed_units(values: NDArray[np.floating], unit: float) -> UInt16:
-    """Vectors [..., n] in units from 32768, half to even; all 0 for NaN or out of range."""
+    """Vectors [..., n] in units, offset by 32768, half to even; all 0 for NaN or out of range."""
     units = np.rint(np.divide(values, unit, dtype=np.float64))
-    # NaN compares false.
+    # NaN compares false, so it becomes 0.
     known = (np.abs(units) < SIGNED_ZERO).all(axis=-1, keepdims=True)
     return np.where(known, units + SIGNED_ZERO, 0.0).astype(np.uint16)
 
 
 def link_or_copy(source: Path, target: Path) -> None:
-    """Give a file a second name, as a hard link where the file system allows it.
+    """Link a file to a second path, or copy it if the file system has no hard links.
 
-    The target's folder is made where it is missing; the target must not exist.
+    Creates the target's folder; the target itself must not exist.
     """
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -230,7 +230,7 @@ def link_or_copy(source: Path, target: Path) -> None:
         shutil.copyfile(source, target)
 
 
-def _pixels(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> NDArray[Any]:
+def _encode_pixels(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> NDArray[Any]:
     convert: dict[Channel, Callable[[], NDArray[Any]]] = {
         Channel.RGB: lambda: image,
         Channel.Z_DEPTH: lambda: depth_units(image, depth_scale_m),

@@ -18,21 +18,21 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
 * **Image boxes** bound the projection of the 3D box, as KITTI's own do (frame 000001's car, 1.67 m
   wide at 46.7 m, is labelled 27 pixels wide: 721 x 1.67 / 44.9); ``boxes: tight`` writes the tight
   box of the visible pixels, which COCO has.
-* **Things far off** are not labelled: KITTI's annotators saw what the laser scanner saw. They
-  become ``DontCare`` regions; so does what has no laser point, in rain or behind others.
-* **Truncation** is the share of that projection outside the image, or, of tight boxes, the share of
-  the silhouette.
+* **Distant objects** are not labelled, as KITTI's annotators worked on laser scans. They become
+  ``DontCare`` regions; so do objects without laser points, in rain or behind others.
+* **Truncation** is the fraction of that projection outside the image; for tight boxes, of the
+  silhouette.
 * **Points** are those of the data set's laser scanner, or of its ``pseudo_lidar``; without either
-  there is no velodyne folder, which some readers ask for.
-* **Point labels** are not KITTI's; they keep its rule that an object is what lies in its box. A
-  pulse that an object reflected has no row where noise, or the object's own way between the pulse
-  and the instant of its box, took it more than 3 cm out of the box; what lies as deep inside has
-  the row whatever it is: the road between the wheels, where the box of a car on a cambered street
-  reaches below it. What reflected each pulse is in the lower half.
+  there is no velodyne folder, which some readers require.
+* **Point labels** are an extension. They follow KITTI's rule that an object is the content of its
+  box: a point of an object has no row if noise, or the object's motion between the pulse and the
+  instant of its box, moved it more than 3 cm out of the box; every point as deep inside has the
+  row, even of the road between the wheels, where the box of a car on a cambered street reaches
+  below the surface. The lower half is the category that reflected the pulse.
 * **Location** is the centre of the box's bottom face (largest y) in the rectified camera frame,
   which is the camera frame itself: ``R0_rect`` is the identity and ``P0 = P1 = P2 = P3``.
 
-Readers take ``calib`` by line number and need all printed digits of a rotation.
+Readers index ``calib`` by line number and need all printed digits of a rotation.
 """
 
 from __future__ import annotations
@@ -70,11 +70,11 @@ OFFICIAL_TYPES = {
     "cyclist": "Cyclist",
     "tram": "Tram",
 }
-"""KITTI's types by our category names. Every other category is ``Misc``: buses, motorcycles and
-bicycles without riders too, for which KITTI has no type."""
+"""KITTI's types by category. All other categories are ``Misc``, including buses, motorcycles and
+bicycles without riders, for which KITTI has no type."""
 
 SITTING = frozenset({"sit", "sitting"})
-"""Values of a person's attribute ``pose`` that make it ``Person_sitting``."""
+"""Values of the attribute ``pose`` that turn a person into ``Person_sitting``."""
 
 SPLITS = ("train", "val", "test")
 
@@ -84,12 +84,12 @@ T_CAMERA_FORWARD = np.array([[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0,
 """Calibration without a scanner, [3, 4]: scanner axes (X forward, Y left, Z up) at the camera."""
 
 NEAR_M = 0.05
-"""Boxes that come nearer than this depth are not projected."""
+"""Boxes with a corner nearer than this depth are not projected."""
 
 PARTLY_OCCLUDED = 0.1
-"""Hidden share of the silhouette above which ``occluded`` is 1."""
+"""Hidden fraction of the silhouette above which ``occluded`` is 1."""
 LARGELY_OCCLUDED = 0.5
-"""Hidden share of the silhouette above which ``occluded`` is 2."""
+"""Hidden fraction of the silhouette above which ``occluded`` is 2."""
 
 
 class Kitti(ExporterBase):
@@ -99,24 +99,23 @@ class Kitti(ExporterBase):
     camera: str = ""
     """Sensor that becomes camera 2; empty = the first one, by name, with the rgb channel."""
     types: Literal["official", "category"] = "official"
-    """KITTI's own eight types, or category names as they are (blanks become underscores)."""
+    """KITTI's eight types, or the data set's category names (blanks become underscores)."""
     boxes: Literal["projected", "tight"] = "projected"
     """Image boxes: around the projected 3D box, or around the visible pixels."""
     far_m: float = Field(80.0, gt=0)
-    """What is farther than this along the optical axis becomes DontCare."""
+    """Objects farther than this along the optical axis become DontCare."""
     low_px: int = Field(10, ge=2)
-    """What has fewer visible pixel rows than this becomes DontCare."""
+    """Objects with fewer visible pixel rows than this become DontCare."""
     lidar: str = ""
-    """Sensor whose points these are, a ``lidar`` or ``pseudo_lidar``; empty = the first one by
-    name, if there is one."""
+    """Sensor of the points, lidar or pseudo_lidar; empty = the first one by name, if any."""
 
     @property
     def needs(self) -> frozenset[str]:
-        """Annotators whose fields it reads."""
+        """Names of the annotators that it reads."""
         return frozenset({"boxes3d", "visibility"})
 
     def check(self, info: DatasetInfo) -> None:
-        """Refuse a data set that this format cannot hold.
+        """Reject a data set that this format cannot represent.
 
         Raises:
             ConfigError: no such camera or lidar, the camera is no pinhole or does not write the
@@ -127,7 +126,7 @@ class Kitti(ExporterBase):
         check_frame_names(info, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write label, calibration and points of each sample, and which split it belongs to.
+        """Write label, calibration, points and split of each sample.
 
         Raises:
             ConfigError: see ``check``.
@@ -140,7 +139,7 @@ class Kitti(ExporterBase):
             if camera not in sample.truth:
                 continue
             truth = sample.truth[camera]
-            frame = _frame(sample.index)
+            frame = _frame_name(sample.index)
             unseen: frozenset[int] = frozenset()
             T_camera_velo = self._velodyne_pose(info, sample)
             calib = calib_text(truth.camera.intrinsics, T_camera_velo)
@@ -163,7 +162,7 @@ class Kitti(ExporterBase):
         for shard_dir in shard_dirs:
             for line in (shard_dir / self.type / "frames.txt").read_text("utf-8").splitlines():
                 index, split = line.split(" ", 1)
-                frames_of.setdefault(split, []).append(_frame(int(index)))
+                frames_of.setdefault(split, []).append(_frame_name(int(index)))
                 for source, target in self._links(info, camera, shard_dir, int(index)):
                     link_or_copy(source, dataset_dir / "training" / target)
         for split, frames in frames_of.items():
@@ -178,7 +177,7 @@ class Kitti(ExporterBase):
         return laser_scanner(info, self.lidar, self.type)
 
     def _velodyne_pose(self, info: DatasetInfo, sample: Sample) -> Array:
-        """Points of the velodyne folder to the camera frame, [3, 4]."""
+        """``T_camera_velo`` of the velodyne folder's points, [3, 4]."""
         lidar = self._lidar(info)
         if lidar:
             return T_camera_lidar(sample, self._camera(info), lidar)[:3]
@@ -187,10 +186,9 @@ class Kitti(ExporterBase):
     def _links(
         self, info: DatasetInfo, camera: str, shard_dir: Path, index: int
     ) -> list[tuple[Path, str]]:
-        """Files of one frame, each with its place under ``training``."""
-        frame = _frame(index)
+        """Files of one frame, each with its path below ``training``."""
+        frame = _frame_name(index)
         names = [f"label_2/{frame}.txt", f"calib/{frame}.txt"]
-
         if has_scans(shard_dir, self._lidar(info), index):
             names += [f"velodyne/{frame}.bin", f"velodyne_labels/{frame}.label"]
         links = [(shard_dir / self.type / name, name) for name in names]
@@ -217,38 +215,38 @@ class Kitti(ExporterBase):
 
 
 class LabelStyle(Protocol):
-    """What decides how an object is labelled; see the fields of ``Kitti``."""
+    """Options of the labels; see the fields of ``Kitti``."""
 
     @property
     def types(self) -> Literal["official", "category"]:
-        """Whose names of types."""
+        """Naming of the types."""
         ...
 
     @property
     def boxes(self) -> Literal["projected", "tight"]:
-        """What image boxes are around."""
+        """Content of the image boxes."""
         ...
 
     @property
     def far_m(self) -> float:
-        """Beyond it things are DontCare."""
+        """Depth beyond which objects are DontCare."""
         ...
 
     @property
     def low_px(self) -> int:
-        """Below it things are DontCare."""
+        """Visible rows below which objects are DontCare."""
         ...
 
 
 def label_text(truth: ImageTruth, style: LabelStyle, unseen: frozenset[int] = frozenset()) -> str:
-    """The lines of one label file; DontCare rows last, as readers expect."""
+    """Format one label file; DontCare rows come last, as readers expect."""
     return "".join(f"{row}\n" for row, _ in label_rows(truth, style, unseen))
 
 
 def label_rows(
     truth: ImageTruth, style: LabelStyle, unseen: frozenset[int] = frozenset()
 ) -> list[tuple[str, int]]:
-    """Each row of a label file with its instance id; what is ``unseen`` is DontCare."""
+    """Rows of a label file with their instance ids; ``unseen`` instances are DontCare."""
     rows = []
     for thing in truth.objects:
         if thing.box is not None:
@@ -267,13 +265,13 @@ def point_members(
     style: LabelStyle,
     T_camera_velo: Array,
 ) -> tuple[NDArray[np.int64], frozenset[int]]:
-    """The instance that each point belongs to, and the labelled instances that have no point.
+    """Assign points to instances; also return the labelled instances without a point.
 
     Args:
-        points: Records of ``POINT``.
-        truth: Of the image; things that are DontCare keep the points that they reflect.
-        style: Of the labels.
-        T_camera_velo: Points to the camera frame, [3, 4].
+        points: Records of ``POINT`` [n].
+        truth: Truth of the image; DontCare objects keep the points that they reflect.
+        style: Options of the labels.
+        T_camera_velo: Transform of the points to the camera frame, [3, 4].
     """
     labelled = {i for row, i in label_rows(truth, style) if not row.startswith(DONT_CARE)}
     boxes = {
@@ -292,12 +290,12 @@ def point_members(
 def point_labels(
     points: NDArray[np.void], members: NDArray[np.int64], rows: Sequence[tuple[str, int]]
 ) -> NDArray[np.uint32]:
-    """Per point the category id of what reflected it, and in the upper half its row in label_2.
+    """Label each point: category id in the lower half, row in label_2 in the upper half.
 
     Args:
-        points: Records of ``POINT``.
-        members: As ``point_members`` says.
-        rows: As ``label_rows`` says; they are counted from 1, 0 = no row.
+        points: Records of ``POINT`` [n].
+        members: Result of ``point_members`` [n].
+        rows: Result of ``label_rows``; rows count from 1, 0 = no row.
     """
     table = np.zeros(1 + int(members.max(initial=0)), np.uint32)
     for number, (_, instance_id) in enumerate(rows, 1):
@@ -310,10 +308,10 @@ def point_labels(
 
 
 def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
-    """The fifteen columns of one visible object.
+    """Format the fifteen columns of one visible object.
 
-    A DontCare row where it is too far or too small for ``style``, less than two pixels wide, or
-    where its box reaches behind the camera: it has no projection that readers agree on.
+    The row is DontCare if the object is too far or too small for ``style``, less than two pixels
+    wide, or if its box reaches behind the camera: readers disagree about that projection.
     """
     assert thing.box is not None, "invisible objects are not listed"
     assert thing.box3d_camera is not None, "the annotation boxes3d is in `needs`"
@@ -345,13 +343,13 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
 
 
 def dont_care(box: BoxPx, camera: Intrinsics) -> str:
-    """The row of a region without a label."""
+    """Format the row of an unlabelled region."""
     corners = _format_corners(_widen(box, camera))
     return f"{DONT_CARE} -1 -1 -10 {corners} -1 -1 -1 -1000 -1000 -1000 -10"
 
 
 def projected_box(box: UprightBox, camera: Intrinsics) -> tuple[float, str]:
-    """Share of a box's image that is outside the picture, and what is inside.
+    """Truncation of a box's projection, and the columns of the part inside the image.
 
     The latter as left, top, right and bottom, with pixel centres at whole numbers.
     """
@@ -364,24 +362,24 @@ def projected_box(box: UprightBox, camera: Intrinsics) -> tuple[float, str]:
 
 
 def official_type(instance: Instance) -> str:
-    """The one of KITTI's eight types that an object is."""
+    """KITTI's type of an object, one of eight."""
     kind = OFFICIAL_TYPES.get(_join_words(instance.category.lower()), "Misc")
     sits = kind == "Pedestrian" and dict(instance.attributes).get("pose") in SITTING
     return "Person_sitting" if sits else kind
 
 
 def occlusion_level(occlusion: float) -> int:
-    """KITTI's 0 visible, 1 partly and 2 largely occluded, by hidden share."""
+    """KITTI's level 0 visible, 1 partly or 2 largely occluded, by hidden fraction."""
     return int(occlusion > PARTLY_OCCLUDED) + int(occlusion > LARGELY_OCCLUDED)
 
 
 def calib_text(camera: Intrinsics, T_camera_velo: Array = T_CAMERA_FORWARD) -> str:
-    """The seven lines of a calibration file, in the order in which readers count them."""
+    """Format the seven lines of a calibration file, in the order that readers expect."""
     return matrix_lines(calib_matrices(camera, T_camera_velo))
 
 
 def calib_matrices(camera: Intrinsics, T_camera_velo: Array) -> dict[str, Array]:
-    """The matrices of a calibration file by name; pixel centres at whole numbers."""
+    """Matrices of a calibration file by name; pixel centres are integers."""
     projection = np.zeros((3, 4))
     projection[:, :3] = camera.matrix()
     projection[:2, 2] -= 0.5
@@ -393,7 +391,7 @@ def calib_matrices(camera: Intrinsics, T_camera_velo: Array) -> dict[str, Array]
 
 
 def matrix_lines(rows: dict[str, Array]) -> str:
-    """``name: numbers``, row by row of each matrix, a line each."""
+    """Format matrices as lines of ``name: numbers``, row by row."""
     return "".join(
         f"{name}: " + " ".join(f"{value:.12e}" for value in matrix.ravel()) + "\n"
         for name, matrix in rows.items()
@@ -401,7 +399,7 @@ def matrix_lines(rows: dict[str, Array]) -> str:
 
 
 def _widen(box: BoxPx, camera: Intrinsics) -> BoxPx:
-    """At least two pixels wide and high, inside the image."""
+    """Widen a box to at least two pixels in each direction, inside the image."""
     x_min = max(min(box.x_min, camera.width_px - 2), 0)
     y_min = max(min(box.y_min, camera.height_px - 2), 0)
     return BoxPx(x_min, y_min, max(box.x_max, x_min + 2), max(box.y_max, y_min + 2))
@@ -412,7 +410,7 @@ def _format_corners(box: BoxPx) -> str:
 
 
 def _format_decimal(value: float) -> str:
-    # Micrometres: KITTI's own two decimals would be a fifth of a small object. No "-0.000000".
+    # Micrometres: with KITTI's own two decimals, small objects lose precision. No "-0.000000".
     return f"{round(value, 6) + 0.0:.6f}"
 
 
@@ -424,7 +422,7 @@ def _join_words(name: str) -> str:
     return "_".join(name.split())
 
 
-def _frame(index: int) -> str:
+def _frame_name(index: int) -> str:
     return f"{index:06d}"
 
 

@@ -1,4 +1,4 @@
-"""Boxes that turn about a camera's y axis only, and which laser points lie in them."""
+"""Boxes that rotate about a camera's y axis only, and the laser points in them."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.se3 import Array, Vec3
 
 BORDER_M = 0.029
-"""How far on the wrong side of a box's face a point may be: 3 cm, less rounding."""
+"""Tolerance of the tests for points in boxes: 3 cm, less rounding."""
 _ENDS = np.array([(i, j, k) for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (0.0, -1.0)])
 """Corners in units of length, width and height."""
 
 
 @dataclass(frozen=True, slots=True)
 class UprightBox:
-    """A box whose height is along the camera's y axis: what a KITTI label can say.
+    """A box whose height is along the camera's y axis, as in KITTI labels.
 
     Attributes:
         size_hwl_m: Extent along y, along the box's z, along the box's x.
@@ -42,7 +42,7 @@ class UprightBox:
         return np.asarray(self.bottom_m) + ends
 
     def depths_m(self, points_m: Array) -> Array:
-        """How deep points [n, 3] of the camera frame lie inside; negative outside."""
+        """Distance of points [n, 3], camera frame, to the nearest face [m]; negative outside."""
         height, width, length = self.size_hwl_m
         c, s = math.cos(self.heading_rad), math.sin(self.heading_rad)
         x, y, z = (points_m - self.bottom_m).T
@@ -54,9 +54,9 @@ class UprightBox:
 
 @lru_cache(1024)
 def upright_box(box: OrientedBox) -> UprightBox:
-    """The smallest upright box, headed like the object's x axis, around an oriented box.
+    """Compute the smallest upright box, with the heading of the object's x axis, around a box.
 
-    Where that axis is vertical, the heading is that of the y axis less a quarter turn.
+    If that axis is vertical, the heading is that of the y axis minus a quarter turn.
     """
     corners = box.corners()
     rotation = box.T_frame_box.rotation()
@@ -87,15 +87,15 @@ def upright_box(box: OrientedBox) -> UprightBox:
 def members_in_box(
     ids: NDArray[np.int64], p_camera: Array, boxes: Mapping[int, UprightBox]
 ) -> NDArray[np.int64]:
-    """The instance that each point belongs to: that of the box it lies in; 0 = none.
+    """Assign each point to the instance of the box that contains it; 0 = none.
 
-    An instance loses what it reflected and what lies more than ``BORDER_M`` outside its box, and
-    gains what is as deep inside and belongs to no other. Instances without a box keep their points.
+    An instance loses its points more than ``BORDER_M`` outside its box, and gains points at least
+    as deep inside that belong to no other box. Instances without a box keep their points.
 
     Args:
-        ids: What reflected each point [n].
-        p_camera: The points in the camera frame [n, 3].
-        boxes: By instance.
+        ids: Instance that reflected each point [n].
+        p_camera: Points in the camera frame [n, 3].
+        boxes: Boxes by instance.
     """
     members: NDArray[np.int64] = ids.copy()
     for instance_id, box in boxes.items():
@@ -104,7 +104,7 @@ def members_in_box(
     boxed = np.zeros(1 + max([0, *boxes, int(ids.max(initial=0))]), np.bool_)
     boxed[list(boxes)] = True
     free = np.flatnonzero(~boxed[members])
-    # Coordinate by coordinate, most of all points are settled by the first.
+    # Test coordinate by coordinate: the first one rejects most points.
     x, y, z = (p_camera[:, k].take(free) for k in range(3))
     for instance_id, box in boxes.items():
         reach_m, (x0, y0, z0) = math.hypot(*box.size_hwl_m), box.bottom_m

@@ -7,16 +7,16 @@
       image_02/data/0000000012.png          image_02/timestamps.txt     (03, and grey 00 and 01)
       velodyne_points/data/0000000012.bin   velodyne_points/timestamps{,_start,_end}.txt
       oxts/data/0000000012.txt              oxts/timestamps.txt, dataformat.txt
-      tracklet_labels.xml                   3D boxes of what image_02 sees
+      tracklet_labels.xml                   3D boxes of the objects in image_02
     drives.txt                              drive, split, first sample
 
-* A frame is an instant at which camera 02 reads; files of sensors that do not read then are absent,
+* A frame is an instant at which camera 02 reads; sensors that do not read then have no file,
   and line ``k`` of a ``timestamps.txt`` is the time of the ``k``-th file of its folder.
-* A date has one calibration. Where scenes differ in it (an extrinsic randomizer), each further one
+* A date has one calibration. If scenes differ in calibration (rig_calibration), each further one
   becomes the next date.
-* Cameras of a drive look the same way: the images are rectified. Reference is camera 00, or 02
-  where the data set has no grey one; a camera that is not there has the matrices of the reference.
-* Points, boxes and ``oxts`` are exact; each drive begins at noon. ``gen_data.exporters.oxts`` and
+* The cameras of a drive are parallel: the images are rectified. The reference is camera 00, or 02
+  without grey cameras; missing cameras have the matrices of the reference.
+* Points, boxes and ``oxts`` are exact; each drive starts at noon. ``gen_data.exporters.oxts`` and
   ``gen_data.exporters.tracklets`` describe their files.
 
 Reference: Geiger et al., "Vision meets Robotics: The KITTI Dataset", IJRR 2013.
@@ -74,16 +74,16 @@ DRIVES_MAX = 10_000
 """Drive numbers have four digits."""
 NOON_H = 12
 CALIB_TIME = "calib_time: 01-Jan-2000 00:00:00\n"
-"""Readers skip it, but expect it."""
+"""Line that readers expect, but skip."""
 GREY = ("00", "01")
 DATE_FORMAT = "%Y_%m_%d"
 Latitude = Annotated[float, Field(gt=-85, lt=85)]
 Longitude = Annotated[float, Field(ge=-180, le=180)]
 PARALLEL_RAD = 1e-4
-"""Rectified cameras differ in direction by less than this."""
+"""Largest angle between rectified cameras."""
 
 
-def _a_day(text: str) -> str:
+def _check_date(text: str) -> str:
     try:
         day = datetime.strptime(text, DATE_FORMAT)
     except ValueError as error:
@@ -97,33 +97,33 @@ class KittiRaw(ExporterBase):
     """KITTI raw data: cameras, laser scanner, navigation and tracklets of every sequence."""
 
     type: Literal["kitti_raw"] = "kitti_raw"
-    date: Annotated[str, AfterValidator(_a_day)] = "2011_09_26"
+    date: Annotated[str, AfterValidator(_check_date)] = "2011_09_26"
     """Day of the recordings, as year_month_day."""
     image_02: str = ""
-    """Sensor that is the left colour camera; empty = the one of that name, else the first one."""
+    """Left colour camera; empty = the sensor of that name, else the first camera."""
     image_03: str = ""
-    """The right colour camera; empty = the one of that name, if there is one."""
+    """Right colour camera; empty = the sensor of that name, if any."""
     image_00: str = ""
-    """The left grey camera, made grey from its colours; empty = the one of that name, if any."""
+    """Left grey camera, converted from rgb; empty = the sensor of that name, if any."""
     image_01: str = ""
-    """The right grey camera; empty = the one of that name, if any."""
+    """Right grey camera, converted from rgb; empty = the sensor of that name, if any."""
     lidar: str = ""
-    """The laser scanner; empty = the first one by name."""
+    """Laser scanner; empty = the first one by name."""
     oxts: str = ""
-    """Device whose place the navigation rows are of; empty = the rig itself."""
+    """Device whose pose the navigation rows give; empty = the rig itself."""
     origin_deg: tuple[Latitude, Longitude] = (49.01, 8.43)
     """Latitude and longitude of the world's origin."""
 
     @property
     def needs(self) -> frozenset[str]:
-        """Annotators whose fields it reads."""
+        """Names of the annotators that it reads."""
         return frozenset({"visibility"})
 
     def check(self, info: DatasetInfo) -> None:
-        """Refuse a data set that this format cannot hold.
+        """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: a sensor is not there, a camera is no pinhole, or there are too many
+            ConfigError: a sensor is missing, a camera is no pinhole, or there are too many
                 sequences.
         """
         self._cameras(info)
@@ -140,7 +140,7 @@ class KittiRaw(ExporterBase):
         check_sequence_count(info, DRIVES_MAX, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write points and grey images of each frame, and a line about it.
+        """Write points and grey images of each frame, and a line for it.
 
         Raises:
             ConfigError: see ``check``, or cameras that are not parallel.
@@ -155,7 +155,7 @@ class KittiRaw(ExporterBase):
         write_frames(shard_dir / self.type, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
-        """Lay out one drive per sequence; every distinct calibration has its date."""
+        """Write one drive per sequence; every distinct calibration has its own date."""
         dates: dict[str, str] = {}
         drives = []
         for number, frames in read_sequences(shard_dirs, self.type).items():
@@ -171,10 +171,10 @@ class KittiRaw(ExporterBase):
         write_text(dataset_dir / "drives.txt", "".join(drives))
 
     def _cameras(self, info: DatasetInfo) -> dict[str, str]:
-        """Sensors by KITTI's number, as far as they are there."""
+        """Existing sensors by KITTI's number."""
         known = rgb_cameras(info)
         asked = {
-            number: getattr(self, f"image_{number}") or _own(known, f"image_{number}")
+            number: getattr(self, f"image_{number}") or _if_known(known, f"image_{number}")
             for number in ("00", "01", "02", "03")
         }
         first = pinhole_camera(info, asked["02"], self.type)
@@ -222,20 +222,20 @@ class KittiRaw(ExporterBase):
     ) -> None:
         noon = datetime.strptime(date, DATE_FORMAT) + timedelta(hours=NOON_H)
 
-        def times(name: str, instants_s: Iterable[float]) -> None:
+        def write_times(name: str, instants_s: Iterable[float]) -> None:
             lines = (timestamp(noon, time_s) + "\n" for time_s in instants_s)
             write_text(folder / name, "".join(lines))
 
         for number, camera in self._cameras(info).items():
-            times(f"image_{number}/timestamps.txt", _instants(frames, number))
+            write_times(f"image_{number}/timestamps.txt", _instants(frames, number))
             for k, frame in enumerate(frames):
                 if number in frame.row["cameras"]:
                     target = folder / f"image_{number}/data/{k:010d}.png"
                     link_or_copy(self._image(frame, number, camera), target)
         scans = [frame.row["scan"] for frame in frames if frame.row["scan"]]
         for i, name in enumerate(("timestamps_start.txt", "timestamps.txt", "timestamps_end.txt")):
-            times(f"velodyne_points/{name}", (scan[i] for scan in scans))
-        times("oxts/timestamps.txt", (frame.row["time_s"] for frame in frames))
+            write_times(f"velodyne_points/{name}", (scan[i] for scan in scans))
+        write_times("oxts/timestamps.txt", (frame.row["time_s"] for frame in frames))
         write_text(folder / "oxts/dataformat.txt", COLUMNS)
         for k, frame in enumerate(frames):
             write_text(folder / f"oxts/data/{k:010d}.txt", frame.row["oxts"] + "\n")
@@ -254,7 +254,7 @@ class KittiRaw(ExporterBase):
 def calibration_texts(
     sample: Sample, cameras: Mapping[str, str], lidar: str, unit: Mount
 ) -> dict[str, str]:
-    """The three files of a date, by name."""
+    """Texts of the three calibration files of a date, by name."""
     scene = sample.scene
     reference = camera_mount(scene, cameras.get("00", cameras["02"]))
     scanner = lidar_mount(scene, lidar)
@@ -267,27 +267,24 @@ def calibration_texts(
 
 
 def sweep_times_s(points: NDArray[np.void], time_s: float) -> list[float]:
-    """Start, reference and end of a sweep.
-
-    A sweep that takes no time begins and ends when it is.
-    """
+    """Start, reference and end of a sweep [s]; all equal for an instantaneous sweep."""
     last_s = float(points["time_s"].max(initial=0.0))
     return [round(v, 9) for v in (time_s - 0.5 * last_s, time_s, time_s + 0.5 * last_s)]
 
 
 def luma(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Grey of an RGB image: the weights of Rec. ITU-R BT.601, in 65536ths."""
+    """Convert RGB to grey with the weights of Rec. ITU-R BT.601, in 65536ths."""
     weighted = image.astype(np.uint32) @ np.array([19_595, 38_470, 7_471], np.uint32)
     grey: NDArray[np.uint8] = ((weighted + 32_768) >> 16).astype(np.uint8)
     return grey
 
 
 def projection(camera: Intrinsics, shift_m: Vec3) -> Array:
-    """``P``, [3, 4], of a camera; pixel centres at whole numbers.
+    """Projection matrix ``P``, [3, 4], of a camera; pixel centres are integers.
 
     Args:
-        camera: Its intrinsics.
-        shift_m: Where the reference camera is, in the camera's frame.
+        camera: Intrinsics.
+        shift_m: Position of the reference camera in the camera's frame.
     """
     K = camera.matrix()
     K[:2, 2] -= 0.5
@@ -296,13 +293,13 @@ def projection(camera: Intrinsics, shift_m: Vec3) -> Array:
 
 
 def cameras_text(scene: Scene, cameras: Mapping[str, str], reference: Mount, exporter: str) -> str:
-    """The text of ``calib_cam_to_cam.txt``.
+    """Format ``calib_cam_to_cam.txt``.
 
     Args:
-        scene: At the instant of the images.
-        cameras: Sensors by KITTI's number; 02 is there.
-        reference: The camera whose frame poses refer to.
-        exporter: Who asks.
+        scene: Scene at the instant of the images.
+        cameras: Sensors by KITTI's number, including 02.
+        reference: Mount of the reference camera.
+        exporter: Name in the error text.
 
     Raises:
         ConfigError: the cameras are not parallel.
@@ -348,5 +345,5 @@ def _instants(frames: Sequence[Frame], number: str) -> list[float]:
     return [time_s for time_s in times if time_s is not None]
 
 
-def _own(known: Sequence[str], name: str) -> str:
+def _if_known(known: Sequence[str], name: str) -> str:
     return name if name in known else ""

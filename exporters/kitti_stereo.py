@@ -11,11 +11,11 @@
     training/calib_cam_to_cam/000012.txt
     ImageSets/{train,val,test}.txt      frame names             README.txt
 
-* **Disparities** are 16-bit grey PNG: pixels times 256, 0 = none. They are exact, of the pixel's
+* **Disparities** are 16-bit grey PNG: pixels times 256, 0 = none. They are exact at the pixel's
   centre; the point is in image_3 at x minus disparity.
-* **Flow** is 16-bit RGB PNG: 64 times the pixels to the right and down, plus 32768, then whether
-  there is any. Folders are there for the channels that the left camera writes.
-* **Frames** are named by sample; the next step is there where the sequence has one.
+* **Flow** is 16-bit RGB PNG: 64 times the pixels to the right and down, plus 32768; the third
+  channel is 1 if the flow is valid. There are folders for the channels that the left camera writes.
+* **Frames** are named by sample; the next step is present if the sequence has one.
 * **Calibration** is as in KITTI's raw data: ``P_rect_03`` has minus focal length times baseline.
 
 Reference: Menze and Geiger, "Object Scene Flow for Autonomous Vehicles", CVPR 2015; its devkit.
@@ -66,13 +66,8 @@ class KittiStereo(ExporterBase):
     right: str = ""
     """Sensor that is image_3; empty = the only other one that writes the rgb channel."""
 
-    @property
-    def needs(self) -> frozenset[str]:
-        """Annotators whose fields it reads: none."""
-        return frozenset()
-
     def check(self, info: DatasetInfo) -> None:
-        """Refuse a data set that this format cannot hold.
+        """Reject a data set that this format cannot represent.
 
         Raises:
             ConfigError: there is no pair of cameras, one is no pinhole, or there are too many
@@ -82,7 +77,7 @@ class KittiStereo(ExporterBase):
         check_frame_names(info, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write the calibration of each pair, and a line about it.
+        """Write the calibration of each pair, and a line for it.
 
         Raises:
             ConfigError: see ``check``, or the images are not rectified.
@@ -131,8 +126,8 @@ class KittiStereo(ExporterBase):
         right = self.right or (others[0] if len(others) == 1 else "")
         if right not in others:
             raise ConfigError(
-                f"exporter '{self.type}': right: '{right}' is no other camera that writes the rgb "
-                f"channel; expected one of: {', '.join(others) or 'none'}"
+                f"exporter '{self.type}': right: '{right}' is not another camera that writes the "
+                f"rgb channel; expected one of: {', '.join(others) or 'none'}"
             )
         return {
             "02": pinhole_camera(info, left, self.type),
@@ -145,7 +140,7 @@ class KittiStereo(ExporterBase):
             baseline_m(left, right)
         except ValueError as error:
             raise ConfigError(
-                f"exporter '{self.type}': cameras '{left.name}' and '{right.name}' are no "
+                f"exporter '{self.type}': cameras '{left.name}' and '{right.name}' are not a "
                 f"rectified pair: {error}"
             ) from error
         reference = camera_mount(sample.scene, left.name)
@@ -154,7 +149,7 @@ class KittiStereo(ExporterBase):
     def _links(
         self, info: DatasetInfo, pair: Mapping[str, str], frame: Frame, follower: Frame | None
     ) -> Iterator[tuple[Path, str]]:
-        """Files of one frame, each with its place under ``training``."""
+        """Yield the files of one frame, each with its path below ``training``."""
         name = f"{frame.index:06d}"
         calibration = f"calib_cam_to_cam/{name}.txt"
         yield frame.shard_dir / self.type / calibration, calibration
@@ -180,12 +175,12 @@ class KittiStereo(ExporterBase):
 
 
 def visible_flow(shard_dir: Path, camera: str, index: int) -> bytes:
-    """The PNG of a camera's flow without that of points which are hidden a step later.
+    """Encode a camera's flow without points that are hidden one step later.
 
     Args:
-        shard_dir: Where its images are.
-        camera: Which writes ``FLOWS``.
-        index: Of the sample.
+        shard_dir: Folder of the shard's images.
+        camera: Camera that writes ``FLOWS``.
+        index: Index of the sample.
     """
     flow, hidden = (
         cv2.imread(str(media_path(shard_dir, camera, channel, index)), cv2.IMREAD_UNCHANGED)

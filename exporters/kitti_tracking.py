@@ -1,4 +1,4 @@
-"""KITTI tracking: one sequence per view, labels with an identity that lasts.
+"""KITTI tracking: one sequence per view, labels with persistent ids.
 
 ::
 
@@ -8,11 +8,11 @@
     training/evaluate_tracking.seqmap.training   all sequences, with their number of frames
     training/evaluate_tracking.seqmap.train      those of one split: also val, test
 
-A frame is an instant at which camera 02 reads, numbered without gaps. Labels have 17 columns, one
-blank apart: ``frame track_id type truncated occluded alpha left top right bottom h w l x y z
-rotation_y``. They are those of the exporter ``kitti``, but ``track_id`` is the instance id (-1 for
-DontCare), ``truncated`` is 0, 1 or 2, and sitting people are ``Person``, as KITTI's evaluators
-spell it.
+A frame is an instant at which camera 02 reads, numbered without gaps. Labels have 17 columns,
+separated by blanks: ``frame track_id type truncated occluded alpha left top right bottom h w l x y
+z rotation_y``. They equal those of the exporter ``kitti``, but ``track_id`` is the instance id (-1
+for DontCare), ``truncated`` is 0, 1 or 2, and sitting people are ``Person``, as in KITTI's
+evaluation code.
 
 Reference: Geiger et al., "Are we ready for Autonomous Driving?", CVPR 2012, and the readme of the
 tracking development kit; TrackEval reads the folder ``training`` as it is.
@@ -56,7 +56,7 @@ from gen_data.generator.core.scene import Scene
 SEQUENCES_MAX = 10_000
 """Names of sequences have four digits."""
 SLIGHTLY_TRUNCATED, LARGELY_TRUNCATED = 0.15, 0.5
-"""Shares outside the image above which ``truncated`` is 1 and 2: KITTI's easy and hard limits."""
+"""Fractions outside above which ``truncated`` is 1 and 2: KITTI's easy and hard limits."""
 
 
 class KittiTracking(ExporterBase):
@@ -68,27 +68,27 @@ class KittiTracking(ExporterBase):
     right_camera: str = ""
     """Sensor that becomes camera 03; empty = none."""
     lidar: str = ""
-    """The laser scanner; empty = the first one by name, if there is one."""
+    """Laser scanner; empty = the first one by name, if any."""
     oxts: str = ""
-    """Device whose place the navigation rows are of; empty = the rig itself."""
+    """Device whose pose the navigation rows give; empty = the rig itself."""
     origin_deg: tuple[Latitude, Longitude] = (49.01, 8.43)
     """Latitude and longitude of the world's origin."""
     types: Literal["official", "category"] = "official"
-    """KITTI's own types, or category names as they are (blanks become underscores)."""
+    """KITTI's types, or the data set's category names (blanks become underscores)."""
     boxes: Literal["projected", "tight"] = "projected"
     """Image boxes: around the projected 3D box, or around the visible pixels."""
     far_m: float = Field(80.0, gt=0)
-    """What is farther than this along the optical axis becomes DontCare."""
+    """Objects farther than this along the optical axis become DontCare."""
     low_px: int = Field(10, ge=2)
-    """What has fewer visible pixel rows than this becomes DontCare."""
+    """Objects with fewer visible pixel rows than this become DontCare."""
 
     @property
     def needs(self) -> frozenset[str]:
-        """Annotators whose fields it reads."""
+        """Names of the annotators that it reads."""
         return frozenset({"boxes3d", "visibility"})
 
     def check(self, info: DatasetInfo) -> None:
-        """Refuse a data set that this format cannot hold.
+        """Reject a data set that this format cannot represent.
 
         Raises:
             ConfigError: a sensor is not there, a camera is no pinhole, or there are too many
@@ -99,7 +99,7 @@ class KittiTracking(ExporterBase):
         check_sequence_count(info, SEQUENCES_MAX, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write the points of each frame, and a line about it with its labels."""
+        """Write the points of each frame, and a line with its labels."""
         self.check(info)
         camera, lidar = self._cameras(info)["02"], laser_scanner(info, self.lidar, self.type)
         rows = []
@@ -166,7 +166,7 @@ class KittiTracking(ExporterBase):
 
 
 def tracking_label(row: str, thing: ObjectTruth) -> str:
-    """The columns behind the frame's number, of a row of ``label_2``."""
+    """Convert a row of ``label_2`` to the columns after the frame's number."""
     kind, _, *rest = row.split(" ")
     if kind == "DontCare":
         return f"-1 {row}"
@@ -177,14 +177,14 @@ def tracking_label(row: str, thing: ObjectTruth) -> str:
 
 
 def truncation_level(truncation: float) -> int:
-    """KITTI's 0, 1 or 2, by the share of the silhouette that lies outside the image."""
+    """KITTI's level 0, 1 or 2, by the fraction of the silhouette outside the image."""
     return int(truncation > SLIGHTLY_TRUNCATED) + int(truncation > LARGELY_TRUNCATED)
 
 
 def calib_text(scene: Scene, cameras: Mapping[str, str], lidar: str, unit: Mount) -> str:
-    """The seven lines of a sequence's calibration; camera 02 is the reference.
+    """Format the seven lines of a sequence's calibration; camera 02 is the reference.
 
-    Without a laser scanner, the camera's frame stands for the scanner's.
+    Without a laser scanner, the camera's frame takes the place of the scanner's.
     """
     reference = camera_mount(scene, cameras["02"])
     scanner = lidar_mount(scene, lidar) if lidar else reference

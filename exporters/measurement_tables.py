@@ -1,4 +1,4 @@
-"""What devices report, as tables: radar, inertial units, satellite receivers, odometers, watchers.
+"""Tables of measurements: radar, inertial units, satellite receivers, odometers, event detectors.
 
 ::
 
@@ -8,9 +8,9 @@
     <sensor>/poses.jsonl         a line per reading: index of the sample, sequence, time, the
                                  device's model, its pose on the rig and in the world
 
-Every row begins with the index of its sample; what follows is described in ``columns.json`` and at
-``gen_data.generator.core.measurement_dtypes``. Units are the ends of the names. ``nan`` is
-"nothing".
+Every row starts with the index of its sample; ``columns.json`` and
+``gen_data.generator.core.measurement_dtypes`` describe the other columns. Units are the ends of the
+names. ``nan`` is "nothing".
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Measurements
 from gen_data.generator.core.errors import ConfigError, StorageError
 from gen_data.generator.core.interfaces import DatasetInfo, SensorInfo, table_path
@@ -35,50 +36,43 @@ INDEX = "sample"
 
 
 class Tables(ExporterBase):
-    """Rows of every device that is no camera and no laser scanner, one file per sequence.
+    """Rows of every device except cameras and laser scanners, one file per sequence.
 
     Attributes:
-        format: ``csv`` for people and spreadsheets, ``npy`` for NumPy.
+        format: ``csv`` for spreadsheets, ``npy`` for NumPy.
     """
 
     type: Literal["tables"] = "tables"
     format: Literal["csv", "npy"] = "csv"
 
     def check(self, info: DatasetInfo) -> None:
-        """Refuse a data set without such a device.
+        """Reject a data set without such a device.
 
         Raises:
             ConfigError: there is none.
         """
         if not info.devices:
             raise ConfigError(
-                "exporter 'tables': there is no device that reports rows; add a sensor such as"
+                "exporter 'tables': no device writes rows; add a sensor such as"
                 f" {', '.join(sorted(TABLE_COLUMNS))}"
             )
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write where each device was when it read; its rows are in the shard already."""
+        """Write the pose of each device at its readings; the shard already contains the rows."""
         self.check(info)
         kept = list(samples)
         for sensor in info.devices:
-            folder = shard_dir / self.type / sensor
-            folder.mkdir(parents=True, exist_ok=True)
             read = [s for s in kept if table_path(shard_dir, sensor, s.index).exists()]
             lines = "".join(canonical_json(_pose(info, s, sensor)) + "\n" for s in read)
-            (folder / "poses.jsonl").write_text(lines, encoding="utf-8", newline="\n")
+            write_text(shard_dir / self.type / sensor / "poses.jsonl", lines)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Join the rows of every sequence."""
-        dataset_dir.mkdir(parents=True, exist_ok=True)
-        (dataset_dir / "columns.json").write_text(
-            canonical_json(_columns(info)) + "\n", encoding="utf-8", newline="\n"
-        )
+        write_text(dataset_dir / "columns.json", canonical_json(_columns(info)) + "\n")
         for sensor in info.devices:
             folder = dataset_dir / sensor
-            folder.mkdir(parents=True, exist_ok=True)
             poses = (d / self.type / sensor / "poses.jsonl" for d in shard_dirs)
-            lines = "".join(path.read_text("utf-8") for path in poses)
-            (folder / "poses.jsonl").write_text(lines, encoding="utf-8", newline="\n")
+            write_text(folder / "poses.jsonl", "".join(path.read_text("utf-8") for path in poses))
             for sequence, rows in _sequences(info, shard_dirs, sensor):
                 path = folder / f"{sequence:06d}.{self.format}"
                 path.write_bytes({"csv": csv_bytes, "npy": npy_bytes}[self.format](rows))
@@ -92,43 +86,45 @@ def write_table(table: Measurements, shard_dir: Path, index: int) -> None:
 
 
 def read_rows(path: Path, device: SensorInfo) -> NDArray[np.void]:
-    """Rows of one reading as they were written.
+    """Read the rows of one reading.
 
     Raises:
-        StorageError: if the file is missing or damaged.
+        StorageError: the file is missing or damaged.
     """
     try:
         rows: NDArray[np.void] = np.load(path, allow_pickle=False)
     except (OSError, ValueError) as error:
-        raise StorageError(f"{path}: cannot be read ({error}); make the data set again") from error
+        raise StorageError(
+            f"{path}: cannot be read ({error}); generate the data set again"
+        ) from error
     if rows.dtype != columns_dtype(device.columns):
         raise StorageError(
-            f"{path}: holds no rows of kind '{device.kind}'; make the data set again"
+            f"{path}: contains no rows of kind '{device.kind}'; generate the data set again"
         )
     return rows
 
 
 def npy_bytes(rows: NDArray[np.void]) -> bytes:
-    """A NumPy file, version 1."""
+    """Encode rows as a NumPy file, version 1."""
     file = BytesIO()
     np.lib.format.write_array(file, rows, version=(1, 0), allow_pickle=False)
     return file.getvalue()
 
 
 def csv_bytes(rows: NDArray[np.void]) -> bytes:
-    """A CSV file: single precision with 7 significant digits, double with all that matter."""
+    """Encode rows as CSV: single precision with 7 significant digits, double with all digits."""
     names = rows.dtype.names or ()
-    spelt = [_spelling(rows.dtype[name]) for name in names]
+    formats = [_choose_format(rows.dtype[name]) for name in names]
     lines = [",".join(names)]
     lines += [
-        ",".join([spell(value) for spell, value in zip(spelt, row, strict=True)])
+        ",".join([spell(value) for spell, value in zip(formats, row, strict=True)])
         for row in rows.tolist()
     ]
     return ("\n".join(lines) + "\n").encode("ascii")
 
 
-def _spelling(kind: np.dtype[Any]) -> Any:
-    """How a column's values are written."""
+def _choose_format(kind: np.dtype[Any]) -> Any:
+    """Function that formats the values of a column."""
     if kind.kind != "f":
         return str
     return repr if kind.itemsize == 8 else "{:.7g}".format
@@ -137,7 +133,7 @@ def _spelling(kind: np.dtype[Any]) -> Any:
 def _sequences(
     info: DatasetInfo, shard_dirs: Sequence[Path], sensor: str
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
-    """Number and rows of every sequence that the device read in, in order."""
+    """Yield number and rows of every sequence with readings of the device, in order."""
     parts: list[NDArray[Any]] = []
     current = -1
     for index, path in _readings(shard_dirs, sensor):
@@ -152,14 +148,14 @@ def _sequences(
 
 
 def _readings(shard_dirs: Sequence[Path], sensor: str) -> Iterator[tuple[int, Path]]:
-    """Index of the sample and file of every reading, in order."""
+    """Yield sample index and file of every reading, in order."""
     for shard_dir in shard_dirs:
         for path in sorted(table_path(shard_dir, sensor, 0).parent.glob("*.npy")):
             yield int(path.stem), path
 
 
 def _add_index(rows: NDArray[np.void], index: int) -> NDArray[Any]:
-    """The rows with the index of their sample before every other column."""
+    """Prepend the index of the sample to every row."""
     numbered: NDArray[Any] = np.zeros(len(rows), [(INDEX, "<u4"), *rows.dtype.descr])
     numbered[INDEX] = index
     for name in rows.dtype.names or ():

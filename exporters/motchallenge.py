@@ -4,16 +4,16 @@
 
     street-train/street-0003/seqinfo.ini        street-train/street-0003/img1/000001.png
     street-train/street-0003/gt/gt.txt          street-val/..., street-test/...
-    seqmaps/street-train.txt                    the sequences of a split, as TrackEval reads them
+    seqmaps/street-train.txt                    sequences of a split, for TrackEval
 
 Rows of ``gt.txt``: ``frame,id,left,top,width,height,flag,class,visibility``. Frames, ids and pixels
-begin at 1; ids are instance ids; ``flag`` is 1 for what is scored, which is pedestrians alone, as
-in MOT16. ``visibility`` is the visible share of the whole silhouette. A frame is an instant at
+start at 1; ids are instance ids; ``flag`` is 1 for scored objects, which are pedestrians only, as
+in MOT16. ``visibility`` is the visible fraction of the whole silhouette. A frame is an instant at
 which the camera reads.
 
-Reference: Milan et al., "MOT16: A Benchmark for Multi-Object Tracking", 2016, table 5 (classes); to
-it a static person (7) is one that sits or lies. Vans, trucks and buses are cars here; categories
-without a class have no rows.
+Reference: Milan et al., "MOT16: A Benchmark for Multi-Object Tracking", 2016, table 5 (classes);
+its static person (7) sits or lies. Vans, trucks and buses are cars here; categories without a class
+have no rows.
 """
 
 from __future__ import annotations
@@ -52,11 +52,11 @@ CLASSES = {
     "bicycle": BICYCLE,
     "motorcycle": MOTORBIKE,
 }
-"""MOT16's numbers by our category names."""
+"""MOT16's class numbers by category."""
 RIDDEN = frozenset({BICYCLE, MOTORBIKE})
 """Classes that become persons on vehicles by the attribute ``rider``."""
 STATIC_POSES = frozenset({"sit", "sitting", "lie", "lying"})
-"""Values of a person's attribute ``pose`` that make it a static person."""
+"""Values of the attribute ``pose`` that turn a person into a static person."""
 SEQUENCES_MAX = 10_000
 """Names of sequences have four digits."""
 
@@ -66,21 +66,21 @@ class MotChallenge(ExporterBase):
 
     type: Literal["motchallenge"] = "motchallenge"
     camera: str = ""
-    """Sensor whose images these are; empty = the first one, by name, with the rgb channel."""
+    """Sensor of the images; empty = the first one, by name, with the rgb channel."""
     boxes: Literal["visible", "whole"] = "visible"
-    """Around the visible pixels; or around the whole silhouette, as MOT16's annotators guessed it,
-    hidden parts and parts outside the image included."""
+    """Boxes around the visible pixels, or around the whole silhouette, including hidden parts and
+    parts outside the image, as MOT16's annotators estimated it."""
 
     @property
     def needs(self) -> frozenset[str]:
-        """Annotators whose fields it reads."""
+        """Names of the annotators that it reads."""
         return frozenset({"boxes2d", "visibility"})
 
     def check(self, info: DatasetInfo) -> None:
-        """Refuse a data set that this format cannot hold.
+        """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: the camera is not there, or there are too many sequences.
+            ConfigError: the camera is missing, or there are too many sequences.
         """
         rgb_camera(info, self.camera, self.type)
         check_sequence_count(info, SEQUENCES_MAX, self.type)
@@ -134,7 +134,7 @@ class MotChallenge(ExporterBase):
 
 
 def gt_columns(thing: ObjectTruth, boxes: Literal["visible", "whole"]) -> str:
-    """The eight columns behind the frame's number; empty for what has no row."""
+    """Format the eight columns after the frame's number; empty for objects without a row."""
     box = thing.box if boxes == "visible" else thing.amodal_box
     number = mot_class(thing.instance)
     if thing.box is None or box is None or not number:
@@ -147,7 +147,7 @@ def gt_columns(thing: ObjectTruth, boxes: Literal["visible", "whole"]) -> str:
 
 
 def mot_class(instance: Instance) -> int:
-    """MOT16's number of an object's class; 0 = none."""
+    """MOT16's class number of an object; 0 = none."""
     number = CLASSES.get("_".join(instance.category.lower().split()), 0)
     facts = dict(instance.attributes)
     if number == PEDESTRIAN and facts.get("pose") in STATIC_POSES:

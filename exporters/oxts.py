@@ -1,14 +1,14 @@
-"""KITTI's rows of navigation: where a rig is and how it moves, exactly.
+"""KITTI's navigation rows (OXTS): exact pose and motion of a rig.
 
 Thirty columns, as ``dataformat.txt`` of KITTI's raw data names them (Geiger et al., "Vision meets
 Robotics", IJRR 2013): ``lat lon alt roll pitch yaw vn ve vf vl vu ax ay az af al au wx wy wz wf wl
 wu pos_accuracy vel_accuracy navstat numsats posmode velmode orimode``.
 
 * World X is east, Y north, Z up; yaw 0 is east and grows to the left.
-* Latitude and longitude are those whose Mercator projection, as KITTI's devkit computes it on a
-  sphere of 6378137 m, gives our own coordinates back.
-* ``vf vl vu`` and the like are along the level heading, ``ax ay az`` along the sensor's own axes.
-  Accelerations are those that a sensor at rest has, too: gravity is in them, upwards.
+* Latitude and longitude invert the Mercator projection of KITTI's devkit, on a sphere of radius
+  6378137 m: the devkit recovers the world's coordinates.
+* ``vf vl vu`` and alike are along the horizontal heading, ``ax ay az`` along the sensor's axes.
+  Accelerations are specific forces: a sensor at rest measures gravity, upwards.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ wx wy wz:           angular rate about the unit's axes [rad/s]
 wf wl wu:           angular rate about the level axes [rad/s]
 pos_accuracy vel_accuracy navstat numsats posmode velmode orimode
 """
-"""What ``dataformat.txt`` says: the thirty columns in order."""
+"""Content of ``dataformat.txt``: the thirty columns in order."""
 
 EARTH_RADIUS_M = 6_378_137.0
 GRAVITY_M_S2 = 9.80665
@@ -47,20 +47,20 @@ EXACT = "0 0 4 12 6 6 6"
 
 @dataclass(frozen=True, slots=True)
 class RigMotion:
-    """Where a frame (X forward, Y left, Z up) is and how it moves; world axes."""
+    """Pose and motion of a frame (X forward, Y left, Z up), along world axes."""
 
     T_world_frame: SE3
     twist: Twist
 
 
 def navigation_mount(scene: Scene, name: str, carrier: str, exporter: str) -> Mount:
-    """What moves as the rows say: the device of that name, or the rig itself if it is empty.
+    """Mount of the navigation unit: the device of that name, or the rig itself if it is empty.
 
     Args:
-        scene: Has the devices.
-        name: Of a device.
-        carrier: Rig that is meant where no device is.
-        exporter: For the message.
+        scene: Scene with the devices.
+        name: Name of a device; empty = none.
+        carrier: Rig to use without a device.
+        exporter: Name in the error text.
 
     Raises:
         ConfigError: there is no such device.
@@ -78,7 +78,7 @@ def navigation_mount(scene: Scene, name: str, carrier: str, exporter: str) -> Mo
 
 
 def rig_motion(scene: Scene, mount: Mount) -> RigMotion:
-    """How what is mounted there moves: its rig's body along its track, and the lever arm to it."""
+    """Motion of a mount: that of its rig's body along its trajectory, plus the lever arm's part."""
     pose = mounted_pose(scene, mount)
     rig = next((rig for rig in scene.rigs if rig.name == mount.rig), None)
     track = scene.track(rig.body) if rig else None
@@ -97,10 +97,10 @@ def rig_motion(scene: Scene, mount: Mount) -> RigMotion:
 
 
 def oxts_row(motion: RigMotion, origin_deg: tuple[float, float]) -> str:
-    """The thirty columns, without a line end.
+    """Format the thirty columns, without a line end.
 
     Args:
-        motion: Of the unit.
+        motion: Motion of the unit.
         origin_deg: Latitude and longitude of the world's origin.
     """
     roll_rad, pitch_rad, yaw_rad = roll_pitch_yaw(motion.T_world_frame.rotation())
@@ -132,7 +132,7 @@ def roll_pitch_yaw(rotation: Array) -> tuple[float, float, float]:
 def _position(
     position_m: tuple[float, float, float], origin_deg: tuple[float, float]
 ) -> tuple[float, float, float]:
-    """Latitude and longitude [deg] and height [m]: the inverse of the devkit's projection."""
+    """Latitude and longitude [deg] and height [m], by the inverse of the devkit's projection."""
     latitude_deg, longitude_deg = origin_deg
     east_m, north_m, up_m = position_m
     radius_m = EARTH_RADIUS_M * math.cos(math.radians(latitude_deg))

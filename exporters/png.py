@@ -1,7 +1,7 @@
-"""PNG files, written quickly and with the same bytes on every machine.
+"""Fast PNG encoding with the same bytes on every machine.
 
-Rows are filtered by numpy and compressed by libdeflate, whose output depends on its version and
-the level only, never on the processor. Source: W3C, "Portable Network Graphics (PNG)
+NumPy filters the rows and libdeflate compresses them; its output depends only on its version and
+the level, never on the processor. Source: W3C, "Portable Network Graphics (PNG)
 Specification (Third Edition)", 2025, sections 5 (chunks) and 9 (filters).
 """
 
@@ -22,27 +22,27 @@ _GREY, _RGB = 0, 2
 
 
 class RowFilter(IntEnum):
-    """What is taken from each byte before compression; the numbers are PNG's own."""
+    """Predictor subtracted from each byte before compression; numbered as in PNG."""
 
     SUB = 1
-    """The byte of the same sample, one pixel to the left."""
+    """The corresponding byte of the pixel to the left."""
     UP = 2
     """The byte above."""
 
 
 def encode_png(pixels: NDArray[Any], row_filter: RowFilter, level: int) -> bytes:
-    """A grey or RGB image of 8 or 16 bits as a PNG file.
+    """Encode a grey or RGB image of 8 or 16 bits as a PNG file.
 
     Args:
         pixels: uint8 or uint16, shape [h, w] or [h, w, 3].
-        row_filter: Used for every row.
+        row_filter: Filter of every row.
         level: libdeflate's compression level, 1 (fastest) to 12.
 
     Raises:
-        ValueError: if the pixels are of another type or shape.
+        ValueError: the pixels have another type or shape.
     """
     if pixels.dtype not in (np.uint8, np.uint16) or pixels.shape[2:] not in ((), (3,)):
-        raise ValueError(f"no PNG of {pixels.dtype} pixels of shape {pixels.shape}")
+        raise ValueError(f"cannot write {pixels.dtype} pixels of shape {pixels.shape} as PNG")
     height, width = pixels.shape[:2]
     bit_depth = 8 * pixels.dtype.itemsize
     header = struct.pack(
@@ -55,7 +55,7 @@ def encode_png(pixels: NDArray[Any], row_filter: RowFilter, level: int) -> bytes
 
 
 def _filter_rows(pixels: NDArray[Any], row_filter: RowFilter) -> UInt8:
-    """Rows of bytes, most significant first, each behind the number of its filter."""
+    """Filter the big-endian bytes of each row, and prepend the number of the filter."""
     big_endian = pixels.astype(pixels.dtype.newbyteorder(">"), copy=False)
     rows = np.ascontiguousarray(big_endian).reshape(pixels.shape[0], -1).view(np.uint8)
     filtered = np.zeros((rows.shape[0], 1 + rows.shape[1]), np.uint8)

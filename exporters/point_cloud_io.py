@@ -1,4 +1,4 @@
-"""Laser scans on disk: one NumPy file of ``POINT`` records per sweep, written before any label.
+"""Laser scans on disk: one NumPy file of ``POINT`` records per sweep, written before labels.
 
 ``numpy.load`` reads them; every field is described at ``gen_data.generator.core.capture.POINT``.
 Exporters make their own files from these.
@@ -28,36 +28,38 @@ def write_cloud(cloud: PointCloud, shard_dir: Path, index: int) -> None:
 
 
 def scanner_at_sweep(sample: Sample, lidar: str) -> Lidar:
-    """A laser scanner at the instant of its sweep; as in the scene if it has not read."""
+    """Laser scanner at the instant of its sweep; the scene's if it has no reading."""
     cloud = sample.capture.clouds.get(lidar)
     return cloud.lidar if cloud is not None else sample.scene.lidar(lidar)
 
 
 def read_points(shard_dir: Path, sensor: str, index: int) -> NDArray[np.void]:
-    """Points of one sweep as they were written.
+    """Read the points of one sweep.
 
     Raises:
-        StorageError: if the file is missing or damaged.
+        StorageError: the file is missing or damaged.
     """
     path = cloud_path(shard_dir, sensor, index)
     try:
         points: NDArray[np.void] = np.load(path, allow_pickle=False)
     except (OSError, ValueError) as error:
-        raise StorageError(f"{path}: cannot be read ({error}); make the data set again") from error
+        raise StorageError(
+            f"{path}: cannot be read ({error}); generate the data set again"
+        ) from error
     if points.dtype != POINT:
-        raise StorageError(f"{path}: holds no laser points; make the data set again")
+        raise StorageError(f"{path}: contains no laser points; generate the data set again")
     return points
 
 
 def xyzi_bytes(points: NDArray[np.void]) -> bytes:
-    """KITTI's ``.bin``: little-endian float32 x, y, z, intensity, point by point."""
+    """Encode points as KITTI's ``.bin``: little-endian float32 x, y, z, intensity per point."""
     return np.column_stack([points["position_m"], points["intensity"]]).astype("<f4").tobytes()
 
 
 def T_camera_lidar(sample: Sample, camera: str, lidar: str) -> Array:  # noqa: N802
-    """Lidar coordinates to camera coordinates, 4 x 4.
+    """Transform from lidar to camera coordinates, 4 x 4.
 
-    On one rig it is what the rig says, whatever instants the two read at.
+    On a common rig it is the rig's calibration, at whatever instants the two read.
     """
     view, scanner = sample.truth[camera].camera, scanner_at_sweep(sample, lidar)
     if view.rig and view.rig == scanner.rig:

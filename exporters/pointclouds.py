@@ -1,4 +1,4 @@
-"""Point clouds for viewers and libraries: PLY or PCD, every field of every point.
+"""Point clouds for viewers and libraries: PLY or PCD files with every field.
 
 ::
 
@@ -6,8 +6,8 @@
     <lidar>/poses.jsonl      {"index", "T_world_lidar", "boxes": [3D boxes in the lidar frame]}
 
 Properties: ``x y z intensity time ring instance category surface return_number return_count``, as
-described at ``gen_data.generator.core.capture.POINT``. Both formats are read by Open3D, PCL,
-CloudCompare and MeshLab; those without a field skip it.
+described at ``gen_data.generator.core.capture.POINT``. Open3D, PCL, CloudCompare and MeshLab read
+both formats and skip unknown fields.
 
 References: Turk, "The PLY Polygon File Format", 1994; PCL, "The PCD file format".
 """
@@ -58,13 +58,8 @@ class PointClouds(ExporterBase):
     type: Literal["pointclouds"] = "pointclouds"
     format: Literal["ply", "pcd"] = "ply"
 
-    @property
-    def needs(self) -> frozenset[str]:
-        """Annotators whose fields it reads."""
-        return frozenset()
-
     def check(self, info: DatasetInfo) -> None:
-        """Refuse a data set without a laser scanner.
+        """Reject a data set without a laser scanner.
 
         Raises:
             ConfigError: there is none.
@@ -75,7 +70,7 @@ class PointClouds(ExporterBase):
             )
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write one file per sweep, and a line about where it was taken."""
+        """Write one file per sweep, and a line with its pose."""
         self.check(info)
         encoded = {"ply": ply_bytes, "pcd": pcd_bytes}[self.format]
         kept = list(samples)
@@ -116,7 +111,7 @@ def file_points(points: NDArray[np.void]) -> NDArray[np.void]:
 
 
 def ply_bytes(points: NDArray[np.void]) -> bytes:
-    """A binary PLY file of ``FILE_POINT`` records."""
+    """Encode ``FILE_POINT`` records as a binary PLY file."""
     properties = [f"property {PLY_TYPES[_kind(name)]} {name}" for name in FILE_POINT.names or ()]
     header = [
         "ply",
@@ -129,7 +124,7 @@ def ply_bytes(points: NDArray[np.void]) -> bytes:
 
 
 def pcd_bytes(points: NDArray[np.void]) -> bytes:
-    """A binary PCD 0.7 file of ``FILE_POINT`` records."""
+    """Encode ``FILE_POINT`` records as a binary PCD 0.7 file."""
     names = FILE_POINT.names or ()
     header = [
         "# .PCD v0.7 - Point Cloud Data file format",
@@ -148,7 +143,7 @@ def pcd_bytes(points: NDArray[np.void]) -> bytes:
 
 
 def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]]:
-    """Boxes of all annotated things in a laser scanner's frame at its sweep, by instance id."""
+    """Boxes of all annotated instances in a laser scanner's frame at its sweep, by id."""
     scene = sample.scene_of(lidar)
     T_lidar_world = scanner_at_sweep(sample, lidar).T_world_lidar.inverse()
     things = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)

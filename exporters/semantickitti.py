@@ -11,14 +11,14 @@
 
 Scans are numbered without gaps in the order of samples; ``scans.txt`` names their samples.
 
-* **Views of several instants** are a sequence each, by the number of the view in the data set.
-  Instance ids are those of the scene. What moves at the instant of a scan has a moving class.
-* **Views of one instant** are one sequence per split: train is 00, val 08, test 11, a sequence of
-  each official split, one sweep apart. Views of one scene share a world, and things keep their
-  instance id from scan to scan; the next scene begins elsewhere, with instance ids of its own.
+* **Views of several instants** are one sequence each, numbered by view. Instance ids are those of
+  the scene. Objects that move at the instant of a scan have a moving class.
+* **Views of one instant** form one sequence per split, one sweep apart: train is 00, val 08, test
+  11, each from the official split. Views of one scene share a world, and objects keep their
+  instance ids from scan to scan; the next scene is elsewhere and has its own instance ids.
 
-Reference: Behley et al., "SemanticKITTI", ICCV 2019, and semantic-kitti-api, whose classes and
-numbers these are. A van is a car there; a mast is a pole, also that of a sign or a light.
+Reference: Behley et al., "SemanticKITTI", ICCV 2019, and semantic-kitti-api, which define classes
+and numbers. Vans are cars there; masts are poles, also those of signs and lights.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ STUFF = {
     "traffic_sign": 80,
     "pole": 80,
 }
-"""Classes of scenery by category; everything else that has a category is other-object."""
+"""Classes of scenery by category; all other categories are other-object."""
 OF_SURFACE = {
     "air": 1,
     "mirrored": 1,
@@ -96,15 +96,14 @@ OF_SURFACE = {
     "leaf": 70,
     "bark": 71,
 }
-"""Classes by surface, for what has no category; air and what mirrors show are outliers."""
+"""Classes by surface, for points without a category; air and mirror images are outliers."""
 OTHER_OBJECT, OTHER_GROUND, SIGN, VEGETATION, TRUNK = 99, 49, 81, 70, 71
 RIDDEN = {"bicycle": 31, "motorcycle": 32}
-"""Classes of what has a rider, by its attribute ``rider``."""
+"""Classes of objects with a rider, by category."""
 MOVING = {10: 252, 11: 253, 30: 254, 31: 253, 32: 255, 15: 255, 16: 256, 13: 257, 18: 258}
-"""Classes of things that move by those of things that stand; a bicycle or motorcycle that moves by
-itself has no class but that of its riders."""
+"""Moving classes by static class; a moving bicycle or motorcycle has the class of its rider."""
 MOVING_M_S = 0.1
-"""What is faster than this moves."""
+"""Speed above which an object counts as moving."""
 SEQUENCES = {"train": 0, "val": 8, "test": 11}
 OFFICIAL_SPLITS = {"train": "train", "val": "valid", "test": "test"}
 SWEEP_S = 0.1
@@ -116,20 +115,15 @@ class SemanticKitti(ExporterBase):
 
     type: Literal["semantickitti"] = "semantickitti"
     lidar: str = ""
-    """Sensor whose scans these are; empty = the first one by name."""
+    """Sensor of the scans; empty = the first one by name."""
     camera: str = ""
     """Sensor that becomes camera 0; empty = the first one by name."""
 
-    @property
-    def needs(self) -> frozenset[str]:
-        """Annotators whose fields it reads."""
-        return frozenset()
-
     def check(self, info: DatasetInfo) -> None:
-        """Refuse a data set without the sensors that are named, or whose camera is no pinhole.
+        """Reject a data set without the sensors, or whose camera is no pinhole.
 
         Raises:
-            ConfigError: telling which.
+            ConfigError: a sensor is missing, or the camera is no pinhole.
         """
         for field, name, known in (
             ("lidar", self.lidar, info.lidars),
@@ -143,7 +137,7 @@ class SemanticKitti(ExporterBase):
         check_pinholes(info, [self.camera or info.cameras[0]], self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write points and labels of each sample, and a line about its scan."""
+        """Write points and labels of each sample, and a line for its scan."""
         self.check(info)
         lidar, camera = self.lidar or info.lidars[0], self.camera or info.cameras[0]
         folder = shard_dir / self.type
@@ -165,10 +159,10 @@ class SemanticKitti(ExporterBase):
         write_frames(folder, rows)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
-        """Number the scans of each sequence, and the things in them."""
+        """Number the scans of each sequence, and the instances in them."""
         sequences = read_sequences(shard_dirs, self.type)
         if info.steps_per_scene == 1:
-            sequences = _by_split(sequences)
+            sequences = _group_by_split(sequences)
         splits: dict[str, list[int]] = {}
         for number, scans in sequences.items():
             _write_sequence(info, scans, dataset_dir / f"sequences/{number:02d}")
@@ -178,7 +172,7 @@ class SemanticKitti(ExporterBase):
 
 
 def point_labels(points: NDArray[np.void], scene: Scene) -> NDArray[np.uint32]:
-    """Class in the lower and instance id in the upper half, little-endian uint32 [n]."""
+    """Label each point: class in the lower, instance id in the upper half; uint32 [n]."""
     top = max((i.instance_id for i in scene.instances), default=0)
     of_surface = np.array([OF_SURFACE.get(name, 0) for name in SURFACES], np.uint32)
     named = np.full(top + 1, OTHER_OBJECT, np.uint32)
@@ -211,8 +205,8 @@ def _calib(scene: Scene, camera: str, lidar: str) -> str:
     return matrix_lines(projections | {"Tr": calib["Tr_velo_to_cam"]})
 
 
-def _by_split(sequences: Mapping[int, Sequence[Frame]]) -> dict[int, list[Frame]]:
-    """Scans of views of one instant, together by split."""
+def _group_by_split(sequences: Mapping[int, Sequence[Frame]]) -> dict[int, list[Frame]]:
+    """Join the scans of views of one instant by split."""
     frames = [frame for scans in sequences.values() for frame in scans]
     together = {
         number: [frame for frame in frames if frame.row["split"] == split]
@@ -247,15 +241,15 @@ def _write_sequence(info: DatasetInfo, scans: Sequence[Frame], folder: Path) -> 
 def _renumber(
     labels: NDArray[np.uint32], scene: int, numbers: dict[tuple[int, int], int]
 ) -> NDArray[np.uint32]:
-    """Labels with instance ids that are unique in the sequence; ``numbers`` grows."""
+    """Make instance ids unique in the sequence; adds new ones to ``numbers``."""
     ids = labels >> np.uint32(16)
     table = np.zeros(int(ids.max(initial=0)) + 1, np.uint32)
     for old in np.unique(ids[ids > 0]):
         new = numbers.setdefault((scene, int(old)), len(numbers) + 1)
         if new > INSTANCES_MAX:
             raise ConfigError(
-                f"exporter 'semantickitti': a sequence holds {INSTANCES_MAX} instances at most; "
-                "make smaller data sets"
+                f"exporter 'semantickitti': a sequence holds at most {INSTANCES_MAX} instances; "
+                "generate smaller data sets"
             )
         table[old] = new
     renumbered: NDArray[np.uint32] = (labels & np.uint32(0xFFFF)) | (table[ids] << np.uint32(16))

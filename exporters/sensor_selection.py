@@ -1,4 +1,4 @@
-"""Which sensor of a data set a format is about."""
+"""Selection of the sensors that a format exports."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def rgb_cameras(info: DatasetInfo) -> tuple[str, ...]:
 
 
 def rgb_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
-    """The camera of that name; for an empty name the first that writes the rgb channel.
+    """Find the camera of a name; for an empty name the first with the rgb channel.
 
     Raises:
         ConfigError: there is none.
@@ -28,16 +28,16 @@ def rgb_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
     if wanted in known:
         return wanted
     raise ConfigError(
-        f"exporter '{exporter}': camera '{wanted}' is no sensor that writes the rgb channel; "
+        f"exporter '{exporter}': camera '{wanted}' does not write the rgb channel; "
         f"expected one of: {_join_names(known)}{did_you_mean(wanted, known)}"
     )
 
 
 def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> None:
-    """Refuse lenses that a format of rectified images cannot tell.
+    """Reject lenses that a format of rectified images cannot describe.
 
     Raises:
-        ConfigError: naming the first camera that is no pinhole.
+        ConfigError: a camera is no pinhole.
     """
     for camera in cameras:
         model = info.sensor(camera).lens
@@ -49,10 +49,10 @@ def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> 
 
 
 def pinhole_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
-    """The same for formats that can describe no other camera than a pinhole.
+    """Find a camera as ``rgb_camera`` does, for formats that describe pinholes only.
 
     Raises:
-        ConfigError: there is none, or it has another lens.
+        ConfigError: there is none, or it is no pinhole.
     """
     camera = rgb_camera(info, wanted, exporter)
     check_pinholes(info, [camera], exporter)
@@ -60,7 +60,7 @@ def pinhole_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
 
 
 def laser_scanner(info: DatasetInfo, wanted: str, exporter: str) -> str:
-    """The laser scanner of that name; for an empty name the first, or none, which is empty.
+    """Find the laser scanner of a name; for an empty name the first one, or empty if there is none.
 
     Raises:
         ConfigError: there is none of that name.
@@ -74,12 +74,12 @@ def laser_scanner(info: DatasetInfo, wanted: str, exporter: str) -> str:
 
 
 def has_scans(shard_dir: Path, lidar: str, index: int) -> bool:
-    """Whether a laser scanner read at a sample."""
+    """Whether a sample has a scan of a laser scanner."""
     return bool(lidar) and cloud_path(shard_dir, lidar, index).exists()
 
 
 def instant_s(sample: Sample, sensor: str) -> float:
-    """When a sensor read [s]; the sample's own instant where it did not."""
+    """Time of a sensor's reading [s]; the sample's own time if it did not read."""
     capture = sample.capture
     for seen in (capture.readings.get(sensor), capture.clouds.get(sensor)):
         if seen is not None:

@@ -1,9 +1,9 @@
-"""What formats of sequences have in common: frames that belong together, times, calibration.
+"""Helpers of formats with sequences: frames, times, calibration and file writing.
 
-A sequence is all instants of one view of one scene, number ``index // steps_per_scene`` of the data
-set. Its frames are the instants at which the camera (or scanner) that a format is about has read,
-numbered without gaps. A shard may end within a sequence: it holds a line of JSON per frame, and
-frames are numbered when all shards are merged.
+A sequence consists of all instants of one view of one scene; its number is ``index //
+steps_per_scene``. Its frames are the instants at which the format's camera (or scanner) reads,
+numbered without gaps. A shard may end within a sequence: it contains a JSON line per frame, and
+merging the shards numbers the frames.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ _FRAMES_MAX = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One frame as a shard holds it.
+    """One frame of a shard.
 
     Attributes:
-        shard_dir: Where its images and scans lie.
-        row: What the exporter wrote about it.
+        shard_dir: Folder of its images and scans.
+        row: The exporter's JSON line for it.
     """
 
     shard_dir: Path
@@ -41,7 +41,7 @@ class Frame:
 
     @property
     def index(self) -> int:
-        """Number of its sample."""
+        """Index of its sample."""
         return int(self.row["index"])
 
 
@@ -51,38 +51,38 @@ def sequence_number(info: DatasetInfo, index: int) -> int:
 
 
 def sequence_count(info: DatasetInfo) -> int:
-    """Number of sequences; the last one may be cut short."""
+    """Number of sequences; the last one may be incomplete."""
     return -(-info.n // info.steps_per_scene)
 
 
 def check_frame_names(info: DatasetInfo, exporter: str) -> None:
-    """Refuse a data set with more samples than names of six digits.
+    """Reject a data set with more samples than names of six digits.
 
     Raises:
-        ConfigError: it has.
+        ConfigError: there are too many samples.
     """
     if info.n > _FRAMES_MAX:
         raise ConfigError(
-            f"exporter '{exporter}': frame names have six digits, {info.n} samples do not fit; "
-            f"make at most {_FRAMES_MAX} samples"
+            f"exporter '{exporter}': frame names have six digits, but there are {info.n} samples; "
+            f"expected at most {_FRAMES_MAX}"
         )
 
 
 def check_sequence_count(info: DatasetInfo, limit: int, exporter: str) -> None:
-    """Refuse a data set with more sequences than a format has names for.
+    """Reject a data set with more sequences than a format has names for.
 
     Raises:
-        ConfigError: telling how many samples fit.
+        ConfigError: there are too many; the text gives the largest number of samples.
     """
     if sequence_count(info) > limit:
         raise ConfigError(
-            f"exporter '{exporter}': {sequence_count(info)} sequences do not fit, the format has "
-            f"names for {limit}; make at most {limit * info.steps_per_scene} samples"
+            f"exporter '{exporter}': the format has names for {limit} sequences, but there are "
+            f"{sequence_count(info)}; expected at most {limit * info.steps_per_scene} samples"
         )
 
 
 def frame_facts(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
-    """What every format's line says about a frame."""
+    """Keys of a frame's line that all formats have."""
     return {
         "index": sample.index,
         "sequence": sequence_number(info, sample.index),
@@ -97,7 +97,7 @@ def write_frames(folder: Path, rows: Iterable[Mapping[str, Any]]) -> None:
 
 
 def read_sequences(shard_dirs: Sequence[Path], exporter: str) -> dict[int, list[Frame]]:
-    """Frames by sequence, both in order."""
+    """Read the frames of all shards by sequence, both in order."""
     sequences: dict[int, list[Frame]] = {}
     for shard_dir in shard_dirs:
         with (shard_dir / exporter / FRAMES_NAME).open(encoding="utf-8") as lines:
@@ -108,24 +108,24 @@ def read_sequences(shard_dirs: Sequence[Path], exporter: str) -> dict[int, list[
 
 
 def frame_rate_hz(info: DatasetInfo, frames: Sequence[Frame]) -> float:
-    """Frames per second of a sequence; that of the steps where it has only one frame."""
+    """Frame rate of a sequence; the rate of the steps if it has only one frame."""
     steps = frames[1].row["step"] - frames[0].row["step"] if len(frames) > 1 else 1
     return round(1.0 / (steps * info.step_s), 6)
 
 
 def timestamp(start: datetime, time_s: float) -> str:
-    """``YYYY-MM-DD HH:MM:SS.nnnnnnnnn``: nine digits of a second, as KITTI writes times."""
+    """Format a time as KITTI does: ``YYYY-MM-DD HH:MM:SS.nnnnnnnnn``."""
     whole_s, nanoseconds = divmod(round(time_s * 1e9), 1_000_000_000)
     return f"{start + timedelta(seconds=whole_s):%Y-%m-%d %H:%M:%S}.{nanoseconds:09d}"
 
 
 @dataclass(frozen=True, slots=True)
 class Mount:
-    """Where a sensor is on what carries it; exact at all instants, unlike poses in the world.
+    """Pose of a sensor on its rig; exact at all instants, unlike poses in the world.
 
     Attributes:
-        rig: Name of the rig; of a camera that stands by itself, behind a slash.
-        T_rig_sensor: A camera's own axes, or X forward, Y left, Z up of any other sensor.
+        rig: Name of the rig; a slash and the camera's name for a camera without a rig.
+        T_rig_sensor: Camera axes for cameras; X forward, Y left, Z up for other sensors.
     """
 
     rig: str
@@ -133,7 +133,7 @@ class Mount:
 
 
 def camera_mount(scene: Scene, name: str) -> Mount:
-    """Of a camera; one that stands by itself carries a rig along its optical axis."""
+    """Mount of a camera; a camera without a rig is its own rig, along its optical axis."""
     camera = scene.camera(name)
     if camera.rig:
         return Mount(camera.rig, camera.T_rig_camera)
@@ -141,7 +141,7 @@ def camera_mount(scene: Scene, name: str) -> Mount:
 
 
 def lidar_mount(scene: Scene, name: str) -> Mount:
-    """Of a laser scanner."""
+    """Mount of a laser scanner."""
     lidar = scene.lidar(name)
     if lidar.rig:
         return Mount(lidar.rig, lidar.T_rig_lidar)
@@ -155,25 +155,25 @@ def mounted_pose(scene: Scene, mount: Mount) -> SE3:
 
 
 def relative_pose(scene: Scene, one: Mount, other: Mount) -> SE3:
-    """``T_one_other``: free of rounding in the world where both are on one rig."""
+    """``T_one_other``; independent of world poses, and their rounding, on a common rig."""
     if one.rig == other.rig:
         return (one.T_rig_sensor.inverse() @ other.T_rig_sensor).rounded(9)
     return (mounted_pose(scene, one).inverse() @ mounted_pose(scene, other)).rounded()
 
 
 def matrix_numbers(matrix: Array) -> str:
-    """Numbers of a matrix, row by row, with all the digits that readers need of a rotation."""
+    """Format a matrix row by row, with enough digits for rotations."""
     return " ".join(f"{float(value) + 0.0:.12e}" for value in matrix.ravel())
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write UTF-8 with Unix line ends; the folder is made where it is missing."""
+    """Write UTF-8 with Unix line ends; creates the folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
 def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file; the folder is made where it is missing."""
+    """Write a file; creates the folder."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(data)
 

@@ -1,12 +1,12 @@
 """``tracklet_labels.xml``: the 3D boxes of a recording of KITTI's raw data, object by object.
 
-A tracklet lasts from the first to the last frame in which its object is in the image; the boxes of
-frames in between, where it is hidden or outside, are known, too. Poses are in the frame of the
-laser scanner: the centre of the bottom face, and a turn about Z. A tracklet has one size, the
-largest its object has (people swing their arms).
+A tracklet spans the first to the last frame in which its object is visible; boxes of hidden frames
+in between are included. Poses are in the frame of the laser scanner: the centre of the bottom face,
+and the rotation about Z. A tracklet has one size, the largest of its object (people swing their
+arms).
 
-Reference: the element names and the numbers of states are those of KITTI's raw data development
-kit (``tracklets.h``), which reads the file by Boost.Serialization.
+Reference: element names and states follow KITTI's raw data development kit (``tracklets.h``), which
+reads the file with Boost.Serialization.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 
 INTERPOLATED, LABELLED = 1, 2
-"""States of a box: not seen in this frame; seen."""
+"""States of a box: not visible in this frame; visible."""
 OCCLUSION_UNSET = 255
 IN_IMAGE, TRUNCATED, OUT_OF_IMAGE, BEHIND_IMAGE = range(4)
 TRUNCATED_SHARE = 0.02
-"""Share of the silhouette outside the image from which a box counts as truncated."""
+"""Fraction of the silhouette outside the image above which a box counts as truncated."""
 
 _HEAD = """\
 <?xml version="1.0" encoding="UTF-8" standalone="yes" ?>
@@ -41,7 +41,7 @@ _UNKNOWN = "".join(
 
 
 def frame_boxes(sample: Sample, camera: str, lidar: str) -> list[dict[str, Any]]:
-    """Every annotated object of one frame, by instance id, as JSON."""
+    """Boxes of all annotated objects of one frame, by instance id, as JSON values."""
     truth = sample.truth[camera]
     seen = {thing.instance.instance_id: thing for thing in truth.objects}
     T_camera_lidar = truth.camera.T_world_camera.inverse() @ sample.scene.lidar(lidar).T_world_lidar
@@ -58,16 +58,16 @@ def frame_boxes(sample: Sample, camera: str, lidar: str) -> list[dict[str, Any]]
 
 
 def tracklets_text(frames: Sequence[Sequence[Mapping[str, Any]]]) -> str:
-    """The whole file.
+    """Format the file.
 
     Args:
-        frames: What ``frame_boxes`` gave, frame by frame.
+        frames: Results of ``frame_boxes``, frame by frame.
     """
     ways: dict[int, list[tuple[int, Mapping[str, Any]]]] = {}
     for number, boxes in enumerate(frames):
         for box in boxes:
             ways.setdefault(box["id"], []).append((number, box))
-    kept = [_while_seen(ways[key]) for key in sorted(ways)]
+    kept = [_trim_to_visible(ways[key]) for key in sorted(ways)]
     kept = [way for way in kept if way]
     body = "".join(_tracklet(way, first=k == 0) for k, way in enumerate(kept))
     count = f"<count>{len(kept)}</count>\n<item_version>1</item_version>\n"
@@ -75,16 +75,16 @@ def tracklets_text(frames: Sequence[Sequence[Mapping[str, Any]]]) -> str:
     return head + body + "</tracklets>\n</boost_serialization>\n"
 
 
-def _while_seen(
+def _trim_to_visible(
     way: Sequence[tuple[int, Mapping[str, Any]]],
 ) -> Sequence[tuple[int, Mapping[str, Any]]]:
-    """From the first to the last frame in which it is seen; empty if it never is."""
+    """Keep the first to the last visible frame; empty if there is none."""
     shown = [k for k, (_, box) in enumerate(way) if box["state"] == LABELLED]
     return way[shown[0] : shown[-1] + 1] if shown else ()
 
 
 def _tracklet(way: Sequence[tuple[int, Mapping[str, Any]]], *, first: bool) -> str:
-    # Boost writes the version of a class where it meets it first.
+    # Boost writes the version of a class at its first occurrence.
     marks = [
         f' class_id="{k}" tracking_level="0" version="{v}"' if first else ""
         for k, v in ((1, 1), (2, 0), (3, 2))
@@ -112,7 +112,7 @@ def _item(box: Mapping[str, Any], mark: str) -> str:
 
 
 def _pose(box: OrientedBox) -> list[float]:
-    """Centre of the bottom face and turn about Z, in the frame of the box's pose."""
+    """Centre of the bottom face and rotation about Z, in the frame of the box's pose."""
     rotation = box.T_frame_box.rotation()
     x, y, z = box.T_frame_box.apply(np.array([0.0, 0.0, -0.5 * box.size_m[2]]))
     yaw_rad = math.atan2(rotation[1, 0], rotation[0, 0])

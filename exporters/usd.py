@@ -1,4 +1,4 @@
-"""OpenUSD: the world that every view shows, as a stage.
+"""OpenUSD: the world of every view as a stage.
 
 ::
 
@@ -7,12 +7,11 @@
     textures/<texture>.png, environments/<sky>.hdr
     stages.jsonl        one line per stage: file, first sample, scene, view, split, steps
 
-What is in a stage and where: ``gen_data.generator.usd.stage_writer``. Metres, Z up; ``time code =
+See ``gen_data.generator.usd.stage_writer`` for the layout of a stage. Metres, Z up; ``time code =
 step``. Labels are ``UsdSemantics.LabelsAPI`` with the taxonomies ``category``, ``subcategory``
 (annotated instances) and ``instance_id`` (all, as in the masks). Cameras reproduce the intrinsics
-of pinholes to the last bits of a float; lights are photometric, in UsdLux's units. Triplanar
-mapping becomes a projection along each face's dominant axis; weather and the bending of lenses have
-no counterpart.
+of pinholes to float precision; lights are photometric, in UsdLux's units. Triplanar mapping becomes
+a projection along each face's dominant axis; weather and lens distortion have no counterpart.
 """
 
 from __future__ import annotations
@@ -49,7 +48,7 @@ class Usd(ExporterBase):
     """One OpenUSD stage per view, with meshes, materials, lights, cameras and labels.
 
     Attributes:
-        format: Of all layers: binary, or text.
+        format: File format of all layers: ``usdc`` binary, ``usda`` text.
     """
 
     type: Literal["usd"] = "usd"
@@ -58,14 +57,14 @@ class Usd(ExporterBase):
     _assets: AssetLibrary | None = PrivateAttr(None)
 
     def with_assets(self, assets: AssetLibrary) -> Usd:
-        """The exporter that takes meshes, textures and skies from a library."""
+        """Return the exporter with a library of meshes, textures and skies."""
         bound = self.model_copy()
         bound._assets = assets
         return bound
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write a stage for every sequence that begins in the shard, and what it refers to."""
-        assert self._assets is not None, "it writes only with_assets"
+        """Write a stage for every sequence that starts in the shard, and its shared files."""
+        assert self._assets is not None, "call with_assets first"
         folder = shard_dir / self.type
         shared = _SharedFiles(folder, self.format, self._assets)
         rows = []
@@ -80,13 +79,13 @@ class Usd(ExporterBase):
         write_text(folder / STAGES, "".join(canonical_json(row) + "\n" for row in rows))
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
-        """Link stages and what they share, and join the lines."""
+        """Link stages and shared files, and join the lines."""
         del info
         folders = [shard_dir / self.type for shard_dir in shard_dirs]
         for folder in folders:
             for path in sorted(p for p in folder.rglob("*") if p.is_file() and p.name != STAGES):
                 target = dataset_dir / path.relative_to(folder)
-                # Shards that share an asset hold the same bytes of it.
+                # A shared file has the same bytes in all shards.
                 if not target.exists():
                     link_or_copy(path, target)
         lines = "".join((folder / STAGES).read_text("utf-8") for folder in folders)
@@ -104,8 +103,8 @@ def _row(sample: Sample, name: str, steps: int) -> dict[str, Any]:
     }
 
 
-def _shares(images: TextureData) -> NDArray[np.uint8] | None:
-    """Occlusion in red and metallic in blue, as glTF has them; None where there is neither."""
+def _pack_shares(images: TextureData) -> NDArray[np.uint8] | None:
+    """Pack occlusion in red and metallic in blue, as glTF does; None without either."""
     if images.occlusion is None and images.metallic is None:
         return None
     full = np.full(images.albedo.shape[:2], 255, np.uint8)
@@ -114,14 +113,14 @@ def _shares(images: TextureData) -> NDArray[np.uint8] | None:
 
 
 class _SharedFiles:
-    """The files of one shard that stages share; each is written when it is first asked for."""
+    """Shared files of a shard's stages; each is written at its first use."""
 
     def __init__(self, folder: Path, suffix: str, assets: AssetLibrary) -> None:
         self._folder, self._suffix, self._assets = folder, suffix, assets
         self._written: dict[str, TextureFiles] = {}
 
     def files(self) -> StageFiles:
-        """They, as stages beside the folders of shared files refer to them."""
+        """Return functions that give paths relative to the stages, and write missing files."""
         return StageFiles(
             layer=lambda asset: f"./{self._layer(asset)}",
             textures=lambda texture: self._textures(texture, "./"),
@@ -144,7 +143,7 @@ class _SharedFiles:
                 self._image(f"{stem}.png", images.albedo),
                 self._image(f"{stem}.roughness.png", images.roughness),
                 self._image(f"{stem}.normal.png", images.normal),
-                self._image(f"{stem}.shares.png", _shares(images)),
+                self._image(f"{stem}.shares.png", _pack_shares(images)),
                 self._image(f"{stem}.emission.png", images.emission),
                 self._image(f"{stem}.alpha.png", images.alpha),
             )
@@ -152,7 +151,7 @@ class _SharedFiles:
         return TextureFiles(*(up + name if name else "" for name in names))
 
     def _image(self, name: str, pixels: NDArray[Any] | None) -> str:
-        """Name of an image, once it is written; empty if there is none."""
+        """Write an image and return its name; empty if there is none."""
         if pixels is None:
             return ""
         write_bytes(self._folder / name, encode_png(pixels, RowFilter.SUB, 2))
@@ -168,6 +167,6 @@ class _SharedFiles:
 
 
 def _file_name(identity: str) -> str:
-    """A file name that tells an id, and no other id has."""
+    """Readable file name of an id, unique by its digest."""
     digest = sha256(identity.encode()).hexdigest()[:10]
     return f"{re.sub(r'[^A-Za-z0-9]+', '_', identity)[:48].strip('_')}-{digest}"

@@ -1,4 +1,4 @@
-"""What varies from scene to scene and from view to view."""
+"""Randomizers: plug-ins that vary a scene from index to index, per scene or per view."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from gen_data.generator.core.plugins import PluginTable
 TABLE = PluginTable[Randomizer](
     "randomizer",
     {
-        "lane_objects": "gen_data.randomizers.along:Along",
+        "lane_objects": "gen_data.randomizers.lane_objects:LaneObjects",
         "arm_configuration": "gen_data.randomizers.arm_configuration:ArmConfiguration",
         "arm_motion": "gen_data.randomizers.arm_motion:ArmMotion",
         "backdrop": "gen_data.randomizers.backdrop:Backdrop",

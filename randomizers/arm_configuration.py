@@ -1,4 +1,4 @@
-"""What the robot arm does."""
+"""Initial goals of robot arms: joint positions, a pose to reach, or an object to hold."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from gen_data.randomizers.placement import half_extents_m
 
 MODES = ("joints", "reach", "hold")
 GRASP_MARGIN = 0.9
-"""An object is held only if it is narrower than this share of the gripper's stroke."""
+"""Widest object that a gripper holds, as a fraction of its stroke."""
 FLIP = SE3(quaternion_wxyz=(0.0, 1.0, 0.0, 0.0))
-"""Half a turn about X: a hand that points down."""
+"""Half a turn about X: the hand points down."""
 
 
 class ArmConfiguration(RandomizerBase):
-    """Draws a goal for every arm; physics takes the first candidate that is free of collision.
+    """Draws a goal for every arm; physics takes the first collision-free candidate.
 
     Attributes:
-        mode: joints: any configuration within the limits. reach: the hand over the workspace,
-            pointing down. hold: the same, with an object between the fingers; where no object fits
-            the gripper, the arm reaches.
-        candidates: How many are drawn.
-        range_share: Share of each joint's range that is used, around its middle.
-        tilt_deg: How far the hand leans from pointing straight down.
-        opening: Of the gripper; 0 is closed, 1 is open.
+        mode: joints: a configuration within the joint limits. reach: the hand above the workspace,
+            pointing down. hold: like reach, with an object between the fingers; falls back to
+            reach if no object fits the gripper.
+        candidates: Number of candidate goals to draw.
+        range_share: Fraction of each joint's range to use, around its middle.
+        tilt_deg: Tilt of the hand from straight down.
+        opening: Gripper opening: 0 closed, 1 fully open.
     """
 
     type: Literal["arm_configuration"] = "arm_configuration"
@@ -47,16 +47,16 @@ class ArmConfiguration(RandomizerBase):
     opening: UnitInterval = Uniform(0.0, 1.0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with a goal for every articulation."""
+        """Return the scene with a goal for every arm."""
         return replace(
             scene,
             articulations=tuple(
-                replace(arm, goal=self._goal(arm, scene, assets, rng))
+                replace(arm, goal=self._draw_goal(arm, scene, assets, rng))
                 for arm in scene.articulations
             ),
         )
 
-    def _goal(self, arm: Articulation, scene: Scene, assets: AssetIndex, rng: Rng) -> ArmGoal:
+    def _draw_goal(self, arm: Articulation, scene: Scene, assets: AssetIndex, rng: Rng) -> ArmGoal:
         mode = self.mode.draw(rng)
         if mode not in MODES:
             raise ConfigError(
@@ -65,21 +65,21 @@ class ArmConfiguration(RandomizerBase):
             )
         robot = assets.robot(arm.asset)
         opening = round(self.opening.draw(rng), 4)
-        held = _graspable(scene, robot, assets, rng) if mode == "hold" else ""
+        held = _draw_graspable(scene, robot, assets, rng) if mode == "hold" else ""
         if mode == "joints" or robot.gripper is None:
-            joints = tuple(self._joints(robot, rng) for _ in range(self.candidates))
+            joints = tuple(self._draw_joints(robot, rng) for _ in range(self.candidates))
             return ArmGoal("joints", joint_candidates=joints, gripper_opening=opening)
-        poses = tuple(hand_over(arm, self.tilt_deg, rng) for _ in range(self.candidates))
+        poses = tuple(draw_hand_pose(arm, self.tilt_deg, rng) for _ in range(self.candidates))
         if held:
             return ArmGoal(
                 "hold", pose_candidates=poses, gripper_opening=opening, grasped_object=held
             )
         return ArmGoal("reach", pose_candidates=poses, gripper_opening=opening)
 
-    def _joints(self, robot: RobotModel, rng: Rng) -> tuple[float, ...]:
-        return tuple(self._position(joint, rng) for joint in arm_joints(robot))
+    def _draw_joints(self, robot: RobotModel, rng: Rng) -> tuple[float, ...]:
+        return tuple(self._draw_position(joint, rng) for joint in arm_joints(robot))
 
-    def _position(self, joint: Joint, rng: Rng) -> float:
+    def _draw_position(self, joint: Joint, rng: Rng) -> float:
         low, high = joint.lower, joint.upper
         if joint.kind == "continuous":
             low, high = -math.pi, math.pi
@@ -87,8 +87,8 @@ class ArmConfiguration(RandomizerBase):
         return round(middle + half * float(rng.uniform(-1.0, 1.0)), 6)
 
 
-def hand_over(arm: Articulation, tilt_deg: NonNegative, rng: Rng) -> SE3:
-    """``T_world_grasp`` over an arm's workspace, pointing down but for a tilt in any direction."""
+def draw_hand_pose(arm: Articulation, tilt_deg: NonNegative, rng: Rng) -> SE3:
+    """Draw ``T_world_grasp`` in an arm's workspace, pointing down with a tilt in any direction."""
     low, high = arm.workspace_m
     x, y, z = (float(rng.uniform(a, b)) for a, b in zip(low, high, strict=True))
     tilt_rad = math.radians(tilt_deg.draw(rng))
@@ -100,13 +100,13 @@ def hand_over(arm: Articulation, tilt_deg: NonNegative, rng: Rng) -> SE3:
 def hand_pose(
     position_m: Vec3, yaw_rad: float, tilt_rad: float = 0.0, towards_rad: float = 0.0
 ) -> SE3:
-    """``T_world_grasp`` of a hand that points down.
+    """Compute ``T_world_grasp`` of a hand that points down.
 
     Args:
-        position_m: Where the grasp frame is.
-        yaw_rad: Turn about Z.
-        tilt_rad: How far the hand leans from the vertical.
-        towards_rad: Direction of the level axis about which it leans.
+        position_m: Origin of the grasp frame.
+        yaw_rad: Rotation about Z.
+        tilt_rad: Tilt of the hand from the vertical.
+        towards_rad: Direction of the horizontal axis of the tilt.
     """
     half = 0.5 * tilt_rad
     lean = SE3(
@@ -121,13 +121,13 @@ def hand_pose(
 
 
 def arm_joints(robot: RobotModel) -> tuple[Joint, ...]:
-    """Joints that a goal has a position for: no finger, none that follows another."""
+    """Joints that a goal sets: all movable ones except fingers and mimic joints."""
     fingers = robot.gripper.finger_joints if robot.gripper else ()
     return tuple(j for j in robot.movable if not j.mimic and j.name not in fingers)
 
 
-def _graspable(scene: Scene, robot: RobotModel, assets: AssetIndex, rng: Rng) -> str:
-    """Name of an object that fits between the fingers; empty if there is none."""
+def _draw_graspable(scene: Scene, robot: RobotModel, assets: AssetIndex, rng: Rng) -> str:
+    """Draw the name of an object that fits between the fingers; empty if there is none."""
     if robot.gripper is None:
         return ""
     limit_m = GRASP_MARGIN * robot.gripper.stroke_m
@@ -136,6 +136,6 @@ def _graspable(scene: Scene, robot: RobotModel, assets: AssetIndex, rng: Rng) ->
 
 
 def _width_m(body: Body, assets: AssetIndex) -> float:
-    """The smaller horizontal extent of an object that stands upright."""
+    """Smaller horizontal extent of an upright object."""
     half = half_extents_m(*assets.bounds_m(body.asset), body.scale)
     return 2.0 * min(half[0], half[1])

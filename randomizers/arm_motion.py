@@ -1,4 +1,4 @@
-"""What the robot arm does in the course of a sequence."""
+"""Motion of robot arms during a sequence."""
 
 from __future__ import annotations
 
@@ -22,31 +22,36 @@ from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import ArmGoal, Articulation, Body, Scene, SupportSurface
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.arm_configuration import GRASP_MARGIN, arm_joints, hand_over, hand_pose
+from gen_data.randomizers.arm_configuration import (
+    GRASP_MARGIN,
+    arm_joints,
+    draw_hand_pose,
+    hand_pose,
+)
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.placement import half_extents_m
 
 TASKS = ("pick_and_place", "reach")
 EDGE_M = 0.08
-"""Things are put down this far from the edges of a surface, or farther."""
+"""Smallest distance of a placed object from the edges of a surface."""
 CANDIDATES_MAX = 12
-"""Objects that are tried in turn."""
+"""Largest number of objects to try in turn."""
 
 Speed = Annotated[Scalar, Bounds(0.01, 1.0)]
 
 
 class Stop(Strict):
-    """One goal of a given way: exactly one of joints_deg, reach_m, grasp and place_m.
+    """One goal of an explicit way: exactly one of joints_deg, reach_m, grasp and place_m.
 
     Attributes:
-        joints_deg: Position of every arm joint; metres for joints that slide.
-        reach_m: Where the hand goes, in the world; it points down.
-        yaw_deg: Turn of the hand about Z, or of an object that is put down.
-        tilt_deg: How far the hand leans.
-        towards_deg: Direction of the level axis about which it leans.
-        opening: Of the gripper; 0 is closed, 1 is open.
-        grasp: Names of object groups; one of their members is lifted from above.
-        place_m: Where on a surface the object in the hand is put down, in the world.
+        joints_deg: Position of every arm joint; metres for prismatic joints.
+        reach_m: Target (x, y, z) of the hand in the world; the hand points down.
+        yaw_deg: Rotation about Z of the hand or of the placed object.
+        tilt_deg: Tilt of the hand from straight down.
+        towards_deg: Direction of the horizontal axis of the tilt.
+        opening: Gripper opening: 0 closed, 1 fully open.
+        grasp: Names of object groups; the arm lifts one of their members from above.
+        place_m: Point (x, y) in the world where the arm puts the object down, on a surface.
     """
 
     joints_deg: tuple[float, ...] | None = None
@@ -59,7 +64,7 @@ class Stop(Strict):
     place_m: tuple[float, float] | None = None
 
     @model_validator(mode="after")
-    def _one_thing(self) -> Stop:
+    def _has_one_goal(self) -> Stop:
         given = [v for v in (self.joints_deg, self.reach_m, self.grasp, self.place_m) if v]
         if len(given) != 1:
             raise ValueError("give exactly one of joints_deg, reach_m, grasp and place_m")
@@ -67,19 +72,19 @@ class Stop(Strict):
 
 
 class ArmMotion(RandomizerBase):
-    """Draws or states a way for every arm; physics finds trajectories that hit nothing.
+    """Draws a sequence of goals for every arm; physics plans collision-free trajectories.
 
-    It comes after arm_configuration, which draws where arms are at time 0.
+    List it after arm_configuration, which draws the arms' poses at time 0.
 
     Attributes:
-        task: pick_and_place: an object is lifted, carried and put down elsewhere. reach: the hand
-            visits poses over the workspace.
-        way: Goals in turn, instead of a task.
-        objects: Names of the object groups that are handled; empty = all.
-        count: How many objects are moved, or how many poses are visited.
-        candidates: How many places or poses are drawn for each.
-        tilt_deg: How far the hand leans from pointing straight down when it visits poses.
-        speed: Share of the joints' speed and acceleration limits that is used.
+        task: pick_and_place: the arm lifts an object, carries it and puts it down elsewhere.
+            reach: the hand visits poses above the workspace.
+        way: Explicit goals in order, instead of a task.
+        objects: Names of the object groups to handle; empty = all.
+        count: Number of objects to move, or of poses to visit.
+        candidates: Number of candidate places or poses to draw for each goal.
+        tilt_deg: Tilt of the hand from straight down when it visits poses.
+        speed: Fraction of the joints' speed and acceleration limits to use.
     """
 
     type: Literal["arm_motion"] = "arm_motion"
@@ -93,35 +98,37 @@ class ArmMotion(RandomizerBase):
     speed: Speed = Uniform(0.4, 0.7)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with a way for every articulation.
+        """Return the scene with a sequence of goals for every arm.
 
         Raises:
-            ConfigError: a task, group or surface that does not exist, or the wrong number of
-                joints.
+            ConfigError: a task, group or surface is unknown, or the number of joints is wrong.
         """
         return replace(
             scene,
             articulations=tuple(
-                replace(arm, task=self._way(arm, scene, assets, rng)) for arm in scene.articulations
+                replace(arm, task=self._draw_goals(arm, scene, assets, rng))
+                for arm in scene.articulations
             ),
         )
 
-    def _way(
+    def _draw_goals(
         self, arm: Articulation, scene: Scene, assets: AssetIndex, rng: Rng
     ) -> tuple[ArmGoal, ...]:
         speed = round(self.speed.draw(rng), 4)
         if self.way:
             goals = [
-                self._given(stop, f"randomizers.{self.name}.way[{k}]", arm, scene, assets, rng)
+                self._goal_at_stop(
+                    stop, f"randomizers.{self.name}.way[{k}]", arm, scene, assets, rng
+                )
                 for k, stop in enumerate(self.way)
             ]
-        elif self._task(rng) == "reach" or assets.robot(arm.asset).gripper is None:
-            goals = [self._visit(arm, assets, rng) for _ in range(self.count)]
+        elif self._draw_task(rng) == "reach" or assets.robot(arm.asset).gripper is None:
+            goals = [self._draw_reach_goal(arm, assets, rng) for _ in range(self.count)]
         else:
-            goals = self._errands(arm, scene, assets, rng)
+            goals = self._draw_pick_and_place(arm, scene, assets, rng)
         return tuple(replace(goal, speed=speed) for goal in goals)
 
-    def _task(self, rng: Rng) -> str:
+    def _draw_task(self, rng: Rng) -> str:
         task = self.task.draw(rng)
         if task not in TASKS:
             raise ConfigError(
@@ -130,10 +137,10 @@ class ArmMotion(RandomizerBase):
             )
         return task
 
-    def _visit(self, arm: Articulation, assets: AssetIndex, rng: Rng) -> ArmGoal:
+    def _draw_reach_goal(self, arm: Articulation, assets: AssetIndex, rng: Rng) -> ArmGoal:
         robot = assets.robot(arm.asset)
         if robot.gripper is not None:
-            poses = tuple(hand_over(arm, self.tilt_deg, rng) for _ in range(self.candidates))
+            poses = tuple(draw_hand_pose(arm, self.tilt_deg, rng) for _ in range(self.candidates))
             return ArmGoal("reach", pose_candidates=poses)
         candidates = tuple(
             tuple(round(float(rng.uniform(j.lower, j.upper)), 6) for j in arm_joints(robot))
@@ -141,20 +148,20 @@ class ArmMotion(RandomizerBase):
         )
         return ArmGoal("joints", joint_candidates=candidates)
 
-    def _errands(
+    def _draw_pick_and_place(
         self, arm: Articulation, scene: Scene, assets: AssetIndex, rng: Rng
     ) -> list[ArmGoal]:
-        """Objects lifted and put down; what the arm holds from the beginning comes first."""
+        """Alternate grasps and placements; an object held at time 0 is placed first."""
         holds = arm.goal is not None and arm.goal.kind == "hold"
         goals: list[ArmGoal] = []
         for number in range(self.count):
             if number > 0 or not holds:
-                names = self._graspable(arm, self.objects, scene, assets, rng)
+                names = self._draw_graspable(arm, self.objects, scene, assets, rng)
                 goals.append(ArmGoal("grasp", objects=names))
-            goals.append(ArmGoal("place", pose_candidates=self._spots(arm, scene, rng)))
+            goals.append(ArmGoal("place", pose_candidates=self._draw_placements(arm, scene, rng)))
         return goals
 
-    def _graspable(
+    def _draw_graspable(
         self,
         arm: Articulation,
         groups: tuple[str, ...],
@@ -162,7 +169,7 @@ class ArmMotion(RandomizerBase):
         assets: AssetIndex,
         rng: Rng,
     ) -> tuple[str, ...]:
-        """Names of objects with a side that fits between the fingers, in a drawn order."""
+        """Draw an order of the objects with a side that fits between the fingers."""
         gripper = assets.robot(arm.asset).gripper
         known = [group.name for group in scene.groups]
         for name in groups:
@@ -182,23 +189,23 @@ class ArmMotion(RandomizerBase):
         order = rng.permutation(len(fitting))
         return tuple(fitting[int(k)] for k in order)[:CANDIDATES_MAX]
 
-    def _spots(self, arm: Articulation, scene: Scene, rng: Rng) -> tuple[SE3, ...]:
-        """Points on the surfaces within an arm's reach, each with up to a quarter turn."""
+    def _draw_placements(self, arm: Articulation, scene: Scene, rng: Rng) -> tuple[SE3, ...]:
+        """Draw poses on the surfaces within an arm's reach, turned by up to a quarter turn."""
         wanted = self.objects or tuple(group.name for group in scene.groups)
         names = {s for group in scene.groups if group.name in wanted for s in group.surfaces}
         surfaces = [s for s in scene.surfaces if s.name in names and not s.walled]
         surfaces = surfaces or [s for s in scene.surfaces if s.name in names]
         if not surfaces:
             raise ConfigError(
-                f"randomizers.{self.name}: there is no surface to put things on; "
-                "name object groups that lie on one (objects)"
+                f"randomizers.{self.name}: there is no surface to put objects on; "
+                "list object groups that lie on one (objects)"
             )
         return tuple(
-            _spot(surfaces[int(rng.integers(len(surfaces)))], arm, rng)
+            _draw_placement(surfaces[int(rng.integers(len(surfaces)))], arm, rng)
             for _ in range(self.candidates)
         )
 
-    def _given(
+    def _goal_at_stop(
         self,
         stop: Stop,
         field: str,
@@ -208,10 +215,14 @@ class ArmMotion(RandomizerBase):
         rng: Rng,
     ) -> ArmGoal:
         if stop.grasp:
-            return ArmGoal("grasp", objects=self._graspable(arm, stop.grasp, scene, assets, rng))
+            return ArmGoal(
+                "grasp", objects=self._draw_graspable(arm, stop.grasp, scene, assets, rng)
+            )
         yaw_rad = math.radians(stop.yaw_deg)
         if stop.place_m:
-            return ArmGoal("place", pose_candidates=(_on_surface(stop, yaw_rad, scene, field),))
+            return ArmGoal(
+                "place", pose_candidates=(_pose_on_surface(stop, yaw_rad, scene, field),)
+            )
         if stop.reach_m:
             tilt_rad, towards_rad = math.radians(stop.tilt_deg), math.radians(stop.towards_deg)
             pose = hand_pose(stop.reach_m, yaw_rad, tilt_rad, towards_rad)
@@ -230,8 +241,8 @@ class ArmMotion(RandomizerBase):
         return ArmGoal("joints", joint_candidates=(positions,), gripper_opening=stop.opening)
 
 
-def _spot(surface: SupportSurface, arm: Articulation, rng: Rng) -> SE3:
-    """A point of a surface, away from its edges, moved to below the arm's workspace."""
+def _draw_placement(surface: SupportSurface, arm: Articulation, rng: Rng) -> SE3:
+    """Draw a pose on a surface, away from its edges, clamped to below the arm's workspace."""
     low, high = arm.workspace_m
     half_x, half_y = (max(0.0, 0.5 * size - EDGE_M) for size in surface.size_m)
     u, v = float(rng.uniform(-half_x, half_x)), float(rng.uniform(-half_y, half_y))
@@ -241,8 +252,8 @@ def _spot(surface: SupportSurface, arm: Articulation, rng: Rng) -> SE3:
     return (SE3((x, y, z)) @ yaw).rounded()
 
 
-def _on_surface(stop: Stop, yaw_rad: float, scene: Scene, field: str) -> SE3:
-    """The given point on the highest surface that is there."""
+def _pose_on_surface(stop: Stop, yaw_rad: float, scene: Scene, field: str) -> SE3:
+    """Pose at a stop's point on the highest surface below it."""
     assert stop.place_m is not None
     x, y = stop.place_m
     heights = []
@@ -259,5 +270,5 @@ def _on_surface(stop: Stop, yaw_rad: float, scene: Scene, field: str) -> SE3:
 
 
 def _narrowest_m(body: Body, assets: AssetIndex) -> float:
-    """The smallest extent of an object."""
+    """Smallest extent of an object."""
     return 2.0 * min(half_extents_m(*assets.bounds_m(body.asset), body.scale))

@@ -1,4 +1,4 @@
-"""Object groups of a template, and the assets that randomizers draw for them."""
+"""Draws of assets for the object groups of a template."""
 
 from __future__ import annotations
 
@@ -8,59 +8,51 @@ from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import ObjectGroup, Scene
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import choose
+from gen_data.randomizers.base import choose, pick_by_weight
 
 CategoryWeights = tuple[tuple[float, tuple[str, ...]], ...]
-"""Weight and assets of every category that may be drawn."""
+"""Weight and asset ids of every category with a weight above 0."""
 
 
-def find_group(scene: Scene, name: str, field: str) -> ObjectGroup:
-    """The object group of that name. Raises ConfigError if there is none."""
-    for group in scene.groups:
-        if group.name == name:
-            return group
-    known = [group.name for group in scene.groups]
-    raise ConfigError(
-        f"{field}: the template has no object group '{name}'; expected one of "
-        f"{', '.join(known)}{did_you_mean(name, known)}"
-    )
-
-
-def make_wheel(
-    group: ObjectGroup, assets: AssetIndex, weights: Mapping[str, float], field: str
-) -> CategoryWeights:
-    """The weighted categories of a group, and the assets of each.
+def find_weighted_group(
+    scene: Scene, assets: AssetIndex, name: str, weights: Mapping[str, float], field: str
+) -> tuple[ObjectGroup, CategoryWeights]:
+    """Find an object group and weigh the categories of its assets.
 
     Args:
-        group: Whose assets.
-        assets: The library.
-        weights: By category; 1 if not listed.
-        field: What messages call the weights.
+        scene: Scene with the groups.
+        assets: Library of the groups' assets.
+        name: Name of the group.
+        weights: Weight by category; 1 if not listed.
+        field: Path of the randomizer in error texts.
 
     Raises:
-        ConfigError: a weight is given to a category that the group lacks, or none is left.
+        ConfigError: the group or a category of the weights is unknown, or every weight is 0.
     """
+    group = next((group for group in scene.groups if group.name == name), None)
+    if group is None:
+        known = [group.name for group in scene.groups]
+        raise ConfigError(
+            f"{field}.group: the template has no object group '{name}'; expected one of "
+            f"{', '.join(known)}{did_you_mean(name, known)}"
+        )
     members: dict[str, list[str]] = {}
     for asset_id in group.assets:
         members.setdefault(assets.get(asset_id).category, []).append(asset_id)
-    for name in weights:
-        if name not in members:
+    for category in weights:
+        if category not in members:
             raise ConfigError(
-                f"{field}: the group has no category '{name}'; expected one of "
-                f"{', '.join(sorted(members))}{did_you_mean(name, sorted(members))}"
+                f"{field}.weights: the group has no category '{category}'; expected one of "
+                f"{', '.join(sorted(members))}{did_you_mean(category, sorted(members))}"
             )
     weighted = ((weights.get(name, 1.0), tuple(members[name])) for name in sorted(members))
     kept = tuple((weight, ids) for weight, ids in weighted if weight > 0.0)
     if not kept:
-        raise ConfigError(f"{field}: every weight is 0; expected one above 0")
-    return kept
+        raise ConfigError(f"{field}.weights: every weight is 0; expected one above 0")
+    return group, kept
 
 
-def draw_asset(wheel: CategoryWeights, rng: Rng) -> str:
-    """An asset of a category that is drawn in proportion to its weight."""
-    draw = float(rng.uniform()) * sum(weight for weight, _ in wheel)
-    for weight, ids in wheel:
-        draw -= weight
-        if draw < 0.0:
-            return choose(ids, rng)
-    return choose(wheel[-1][1], rng)
+def draw_asset(weights: CategoryWeights, rng: Rng) -> str:
+    """Draw a category in proportion to its weight, then one of its assets uniformly."""
+    index = pick_by_weight([weight for weight, _ in weights], float(rng.uniform()))
+    return choose(weights[index][1], rng)

@@ -1,4 +1,4 @@
-"""Floor, walls and ceiling; ground and studio backdrops."""
+"""Surfaces of the background: floors, walls, ground and studio backdrops."""
 
 from __future__ import annotations
 
@@ -19,22 +19,28 @@ from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase, body_materials, choose, find_textures
+from gen_data.randomizers.base import (
+    RandomizerBase,
+    body_materials,
+    choose,
+    find_texture_files,
+    find_textures,
+)
 from gen_data.randomizers.color_space import hsv_to_linear
 
 PAINT_ROUGHNESS = 0.85
 
 
 class Backdrop(RandomizerBase):
-    """Redecorates what stands behind: a room's floor, walls and ceiling, or a bare backdrop.
+    """Draws the surfaces of the background: floor and walls of a room, ground, or a backdrop.
 
     Attributes:
-        floor: Families or tags of textures for floors, ground and backdrops.
-        floor_scale_m: Length of one repeat on the floor.
-        walls: Families or tags of textures for walls that are not painted.
-        wall_scale_m: Length of one repeat on the walls.
+        floor: Families or tags of textures for floors and ground.
+        floor_scale_m: Size of one texture repeat on the floor.
+        walls: Families or tags of textures for unpainted walls.
+        wall_scale_m: Size of one texture repeat on the walls.
         painted: Whether walls are painted instead of textured.
-        hue, saturation, value: Of the paint.
+        hue, saturation, value: Colour of the paint (HSV in sRGB), also of studio backdrops.
     """
 
     type: Literal["backdrop"] = "backdrop"
@@ -47,21 +53,26 @@ class Backdrop(RandomizerBase):
     saturation: UnitInterval = Uniform(0.0, 0.35)
     value: UnitInterval = Uniform(0.55, 0.95)
 
+    def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
+        """Ids of the texture files to draw from."""
+        floors, walls = self._find_options(assets)
+        return find_texture_files(assets, (*floors, *walls))
+
     def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raises ConfigError if there is no texture of a name."""
+        """Raise ConfigError if a name matches no texture."""
         del scene
-        self._options(assets)
+        self._find_options(assets)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Every background body redecorated."""
-        floors, walls = self._options(assets)
+        """Return the scene with new materials on every background body."""
+        floors, walls = self._find_options(assets)
         background = [b for b in scene.bodies if b.instance_id == 0]
         return scene.with_bodies(
             *(self._redecorate(b, assets, floors, walls, rng) for b in background)
         )
 
-    def _options(self, assets: AssetIndex) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Ids of the textures of floors and of walls."""
+    def _find_options(self, assets: AssetIndex) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Ids of the textures for floors and for walls."""
         field = f"randomizers.{self.name}"
         return (
             find_textures(assets, self.floor, f"{field}.floor"),
@@ -76,8 +87,8 @@ class Backdrop(RandomizerBase):
         walls: tuple[str, ...],
         rng: Rng,
     ) -> Body:
-        ground = _covering(choose(floors, rng), self.floor_scale_m.draw(rng))
-        textured = _covering(choose(walls, rng), self.wall_scale_m.draw(rng))
+        ground = _textured_material(choose(floors, rng), self.floor_scale_m.draw(rng))
+        textured = _textured_material(choose(walls, rng), self.wall_scale_m.draw(rng))
         color = hsv_to_linear(self.hue.draw(rng), self.saturation.draw(rng), self.value.draw(rng))
         paint = Material(base_color=color, roughness=PAINT_ROUGHNESS)
         wall = paint if self.painted.draw(rng) else textured
@@ -89,7 +100,7 @@ class Backdrop(RandomizerBase):
         return replace(body, materials=tuple(materials))
 
 
-def _covering(texture: str, scale_m: float) -> Material:
+def _textured_material(texture: str, scale_m: float) -> Material:
     white = (1.0, 1.0, 1.0)
     return Material(
         base_color=white, roughness=1.0, texture=texture, texture_scale_m=round(scale_m, 4)

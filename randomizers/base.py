@@ -1,9 +1,9 @@
-"""What all randomizers share."""
+"""Base classes of randomizers, and helpers for materials and textures."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -15,6 +15,7 @@ from gen_data.generator.core.bounded_cache import ObjectCache
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
 
 _BY_WORD: ObjectCache[Mapping[str, tuple[str, ...]]] = ObjectCache(2)
@@ -24,8 +25,8 @@ class RandomizerBase(Strict):
     """Frozen parameters and one pure method.
 
     Attributes:
-        name: The key of its random stream: two of one type need two names.
-        stage: scene: drawn once, all views share it. view: drawn anew for every view.
+        name: Key of the random stream; unique within a configuration.
+        stage: scene: drawn once and shared by all views. view: drawn for every view.
     """
 
     name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
@@ -33,41 +34,40 @@ class RandomizerBase(Strict):
 
     @property
     def motion_duration_s(self) -> float | None:
-        """How long the motion that it draws lasts, from time 0 [s]; None if it draws none."""
+        """Duration of the motion it draws, from time 0 [s]; None if it draws no motion."""
         return None
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
-        """Ids of the assets that only it may bring into a scene; they are part of the plan."""
+        """Ids of the assets that only this randomizer can add to a scene; part of the plan."""
         del assets
         return ()
 
     def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Compare the names in its fields with a nominal scene and the library, before a run.
+        """Check the names in its fields against a nominal scene and the library, before a run.
 
         Raises:
-            ConfigError: a name stands for nothing; the text begins with
-                ``randomizers.<name>.<field>: ``.
+            ConfigError: a name is unknown; the text begins with ``randomizers.<name>.<field>: ``.
         """
 
     @abstractmethod
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """A new scene; the given one stays as it is."""
+        """Return a new scene; the one passed in is unchanged."""
 
 
-class LookRandomizer(RandomizerBase):
-    """A randomizer of surfaces: it looks at every material of its targets.
+class SurfaceRandomizer(RandomizerBase):
+    """Base of randomizers that change the materials of target bodies.
 
     Attributes:
-        targets: Names of object groups or bodies; empty = every object group.
+        targets: Names of object groups or bodies to change; empty = every object group.
     """
 
     targets: tuple[str, ...] = ()
 
-    def chosen(self, scene: Scene) -> Iterator[Body]:
-        """The bodies it looks at, in order.
+    def find_targets(self, scene: Scene) -> Iterator[Body]:
+        """Yield the target bodies in the scene's order.
 
         Raises:
-            ConfigError: a target names nothing.
+            ConfigError: a target is neither a group nor a body.
         """
         groups = {group.name for group in scene.groups}
         owners = {body.name.partition("/")[0] for body in scene.bodies}
@@ -85,12 +85,12 @@ class LookRandomizer(RandomizerBase):
 
 
 def body_materials(body: Body, assets: AssetIndex) -> tuple[Material, ...]:
-    """The materials a body shows: its own, else its asset's."""
+    """Materials of a body: its overrides if it has any, else its asset's."""
     return body.materials or assets.materials(body.asset)
 
 
 def set_materials(body: Body, assets: AssetIndex, change: Callable[[Material], Material]) -> Body:
-    """The body with every material changed that is not printed."""
+    """Return the body with every material changed except printed ones."""
     changed = tuple(
         material if material.printed else change(material)
         for material in body_materials(body, assets)
@@ -99,10 +99,10 @@ def set_materials(body: Body, assets: AssetIndex, change: Callable[[Material], M
 
 
 def find_textures(assets: AssetIndex, names: tuple[str, ...], field: str) -> tuple[str, ...]:
-    """Ids of all textures that carry any of these tags, or are of these families; sorted.
+    """Find all textures with any of these tags or families; sorted ids.
 
     Raises:
-        ConfigError: there is none for a name.
+        ConfigError: a name matches no texture.
     """
     textures = assets.find((), kind="texture")
     by_word = _BY_WORD.get(textures, lambda: _by_word(textures))
@@ -116,6 +116,15 @@ def find_textures(assets: AssetIndex, names: tuple[str, ...], field: str) -> tup
     return tuple(sorted({texture for name in names for texture in by_word[name]}))
 
 
+def find_texture_files(assets: AssetIndex, textures: tuple[str, ...]) -> tuple[str, ...]:
+    """Ids of the textures that are files of a user or a pack.
+
+    The release of gen-data identifies generated textures; a plan records hashes of files only.
+    """
+    files = {a.asset_id for a in assets.find((), kind="texture") if "procedural" not in a.tags}
+    return tuple(texture for texture in textures if texture in files)
+
+
 def _by_word(textures: tuple[Asset, ...]) -> Mapping[str, tuple[str, ...]]:
     """Ids of textures by tag and by family."""
     by_word: dict[str, list[str]] = {}
@@ -125,8 +134,35 @@ def _by_word(textures: tuple[Asset, ...]) -> Mapping[str, tuple[str, ...]]:
     return {word: tuple(ids) for word, ids in by_word.items()}
 
 
+def set_emission(body: Body, assets: AssetIndex, emission_cd_m2: Mapping[str, Vec3]) -> Body:
+    """Return the body with the emission of some roles replaced."""
+    slots = body_materials(body, assets)
+    return replace(
+        body,
+        materials=tuple(
+            replace(m, emission_cd_m2=emission_cd_m2.get(m.role, m.emission_cd_m2)) for m in slots
+        ),
+    )
+
+
+def scale_emission(color: Vec3, luminance_cd_m2: float) -> Vec3:
+    """Emission [cd/m^2] of a colour of luminance 1, rounded to three decimals."""
+    red, green, blue = (round(part * luminance_cd_m2, 3) for part in color)
+    return (red, green, blue)
+
+
+def pick_by_weight(weights: Sequence[float], draw: float) -> int:
+    """Index of one of several, in proportion to its weight, for a draw in [0, 1)."""
+    left = draw * sum(weights)
+    for k, weight in enumerate(weights):
+        left -= weight
+        if left < 0.0:
+            return k
+    return len(weights) - 1
+
+
 def choose(options: tuple[str, ...], rng: Rng) -> str:
-    """One of several, each as likely as the others."""
+    """Draw one option uniformly."""
     return options[int(rng.integers(len(options)))]
 
 

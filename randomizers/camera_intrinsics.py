@@ -1,4 +1,4 @@
-"""Lenses."""
+"""Field of view, principal point and distortion of cameras."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ PINHOLE_MAX_DEG = 170.0
 
 
 class Coefficients(Strict):
-    """Coefficients of a camera's lens; null = as its sensor says.
+    """Distortion coefficients of a camera's lens; null = value of the sensor.
 
     Attributes:
-        k1, k2, k3, k4, k5, k6: Radial terms, as the lens's model has them.
+        k1, k2, k3, k4, k5, k6: Radial terms, as far as the lens model has them.
         p1, p2: Tangential terms.
     """
 
@@ -41,10 +41,10 @@ class CameraIntrinsics(RandomizerBase):
     """Draws the field of view, the principal point and the distortion of cameras.
 
     Attributes:
-        camera: Name of a sensor; empty = every camera, each drawn for itself.
-        hfov_deg: Horizontal field of view; null = as its sensor says, with its principal point.
-        principal_offset_px: How far the principal point is from there, along each axis.
-        lens: Coefficients of the model of lens that the sensor has.
+        camera: Name of a sensor; empty = every camera, drawn independently.
+        hfov_deg: Horizontal field of view; null = field of view and principal point of the sensor.
+        principal_offset_px: Offset of the principal point along each axis.
+        lens: Distortion coefficients for the sensor's lens model.
     """
 
     type: Literal["camera_intrinsics"] = "camera_intrinsics"
@@ -55,11 +55,11 @@ class CameraIntrinsics(RandomizerBase):
     lens: Coefficients = Coefficients()
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with other lenses; the same models and image sizes.
+        """Return the scene with drawn lenses; lens models and image sizes stay.
 
         Raises:
-            ConfigError: there is no such camera, or its lens is of a model without what is drawn.
-            LayoutRejected: what was drawn is no lens: it folds over inside the image.
+            ConfigError: the camera is unknown, or its lens model lacks a drawn coefficient.
+            LayoutRejected: the drawn distortion folds over inside the image.
         """
         del assets
         known = [camera.name for camera in scene.cameras]
@@ -69,17 +69,17 @@ class CameraIntrinsics(RandomizerBase):
                 f"of {', '.join(known)}{did_you_mean(self.camera, known)}"
             )
         cameras = tuple(
-            self._with_lens(camera, rng) if self.camera in ("", camera.name) else camera
+            self._draw_intrinsics(camera, rng) if self.camera in ("", camera.name) else camera
             for camera in scene.cameras
         )
         return replace(scene, cameras=cameras)
 
-    def _with_lens(self, camera: Camera, rng: Rng) -> Camera:
+    def _draw_intrinsics(self, camera: Camera, rng: Rng) -> Camera:
         before = camera.intrinsics
-        self._require_fitting(camera)
+        self._check_lens_model(camera)
         hfov_deg = None if self.hfov_deg is None else self.hfov_deg.draw(rng)
         offset_x, offset_y = (self.principal_offset_px.draw(rng) for _ in range(2))
-        lens = self._lens(before.lens, rng)
+        lens = self._draw_lens(before.lens, rng)
         try:
             drawn = replace(before, lens=lens)
             if hfov_deg is not None:
@@ -96,14 +96,14 @@ class CameraIntrinsics(RandomizerBase):
             raise self._rejection()
         return replace(camera, intrinsics=drawn)
 
-    def _lens(self, before: Lens, rng: Rng) -> Lens:
+    def _draw_lens(self, before: Lens, rng: Rng) -> Lens:
         drawn = []
-        for name, usual in zip(COEFFICIENTS[before.model], before.coefficients, strict=True):
+        for name, default in zip(COEFFICIENTS[before.model], before.coefficients, strict=True):
             given: Scalar | None = getattr(self.lens, name)
-            drawn.append(usual if given is None else round(given.draw(rng), 9))
+            drawn.append(default if given is None else round(given.draw(rng), 9))
         return replace(before, coefficients=tuple(drawn))
 
-    def _require_fitting(self, camera: Camera) -> None:
+    def _check_lens_model(self, camera: Camera) -> None:
         lens = camera.intrinsics.lens
         given = [name for name, value in self.lens if value is not None]
         missing = [name for name in given if name not in COEFFICIENTS[lens.model]]
@@ -117,15 +117,15 @@ class CameraIntrinsics(RandomizerBase):
         widest_deg = 0.0 if self.hfov_deg is None else self.hfov_deg.support()[1]
         if lens.model == "pinhole" and widest_deg > PINHOLE_MAX_DEG:
             raise ConfigError(
-                f"randomizers.{self.name}.hfov_deg: {widest_deg:g} degrees are too wide for the "
+                f"randomizers.{self.name}.hfov_deg: {widest_deg:g} degrees is too wide for the "
                 f"pinhole of camera '{camera.name}'; expected at most {PINHOLE_MAX_DEG:g}"
             )
 
     def _rejection(self) -> LayoutRejected:
         return LayoutRejected(
             Rejection(
-                "the lens that was drawn folds over inside the image",
-                f"narrow hfov_deg or the coefficients of randomizers.{self.name}.lens, or end the "
-                "sensor's lens with field_deg",
+                "the distortion of the drawn lens folds over inside the image",
+                f"narrow hfov_deg or the coefficients of randomizers.{self.name}.lens, or limit "
+                "the sensor's lens with field_deg",
             )
         )

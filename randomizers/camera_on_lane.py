@@ -1,4 +1,4 @@
-"""Cameras that ride or stand on lanes: a dash camera, a pedestrian's, one on a pole."""
+"""Cameras on lanes: dash cameras, cameras of pedestrians, cameras on poles."""
 
 from __future__ import annotations
 
@@ -23,34 +23,32 @@ from gen_data.generator.core.lane_geometry import LaneLine
 from gen_data.generator.core.scene import Camera, LaneKind, Scene
 from gen_data.generator.core.se3 import SE3, look_at
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.base import RandomizerBase, pick_by_weight
 from gen_data.randomizers.daylight import is_dark
-from gen_data.randomizers.footprints import Footprint, Ground, make_ground
-from gen_data.randomizers.free_space_tests import is_clear
+from gen_data.randomizers.free_space import Footprint, Ground, is_clear, make_ground
 from gen_data.randomizers.vehicle_lights import dipped_beam
 
 TRIES = 64
 
 
 class CameraOnLane(RandomizerBase):
-    """Puts every camera that is on no rig over a lane, looking along it.
+    """Puts every camera that is not on a rig above a lane, looking along it.
 
     Attributes:
-        lanes: Kinds of the lanes it may be on.
-        roads: Names of the elements whose lanes it may be on; empty = all.
-        height_m: Over the ground.
-        lateral: Across the lane: -1 right edge, 0 middle, 1 left edge.
-        yaw_deg: Turn to the left of the lane's direction.
-        pitch_deg: Upwards.
-        roll_deg: Clockwise about the viewing direction.
-        reversed: Whether it looks back.
-        ahead_m: The lane goes on at least this far where it looks; halved for lanes that are
-            shorter than twice as long.
-        free_m: Length and width of the ground around it on which nothing stands: the vehicle it
-            rides on. The camera is at three tenths of the length from its front.
-        clearance_m: It keeps this far from every body.
-        beam_cd: In the dark, the vehicle it rides on lights the road with two dipped beams of this
-            luminous intensity; 0 = it has none.
+        lanes: Kinds of lanes to use.
+        roads: Names of the elements whose lanes to use; empty = all.
+        height_m: Height above the ground.
+        lateral: Position across the lane: -1 right edge, 0 middle, 1 left edge.
+        yaw_deg: Rotation to the left of the lane's direction.
+        pitch_deg: Upward tilt.
+        roll_deg: Clockwise rotation about the viewing direction.
+        reversed: Whether the camera looks against the lane's direction.
+        ahead_m: Smallest length of lane in the viewing direction; at most half of the lane.
+        free_m: Length and width of free ground around the camera, for the vehicle that carries
+            it; the camera is at 30 % of the length from the front.
+        clearance_m: Smallest distance to any body.
+        beam_cd: Luminous intensity of each of the carrier's two dipped beams, lit in the dark; 0 =
+            no beams.
     """
 
     type: Literal["camera_on_lane"] = "camera_on_lane"
@@ -69,10 +67,10 @@ class CameraOnLane(RandomizerBase):
     beam_cd: NonNegative = Constant(0.0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with all cameras without a rig at one place.
+        """Return the scene with all cameras without a rig at one pose.
 
         Raises:
-            ConfigError: there is no such lane.
+            ConfigError: the scene has no lane of these kinds and roads.
             LayoutRejected: no free place was found.
         """
         lines = [LaneLine(lane) for lane in scene.lanes if lane.kind in self.lanes]
@@ -90,20 +88,20 @@ class CameraOnLane(RandomizerBase):
         groups = {group.name for group in scene.groups}
         ground = make_ground((b for b in scene.bodies if b.group in groups), assets)
         for _ in range(TRIES):
-            pose = self._drawn(lines, ground, scene, assets, rng)
+            pose = self._draw_pose(lines, ground, scene, assets, rng)
             if pose is not None:
                 cameras = tuple(c if c.rig else _move_camera(c, pose[1]) for c in scene.cameras)
                 lit = replace(scene, cameras=cameras)
-                return self._with_beams(lit, pose[0], self.beam_cd.draw(rng))
+                return self._add_beams(lit, pose[0], self.beam_cd.draw(rng))
         remedy = f"other lanes, a smaller free_m, or less traffic (randomizers.{self.name})"
         raise LayoutRejected(Rejection("no free place for a camera on a lane", remedy))
 
-    def _drawn(
+    def _draw_pose(
         self, lines: list[LaneLine], ground: Ground, scene: Scene, assets: AssetIndex, rng: Rng
     ) -> tuple[SE3, SE3] | None:
-        """``T_world_rig`` on the ground and ``T_world_camera``; None where something stands."""
+        """Draw ``T_world_rig`` on the ground and ``T_world_camera``; None if not free."""
         weights = [line.length_m for line in lines]
-        line = lines[_pick_by_weight(weights, float(rng.uniform()))]
+        line = lines[pick_by_weight(weights, float(rng.uniform()))]
         turned = self.reversed.draw(rng)
         ahead_m = min(self.ahead_m, 0.5 * line.length_m)
         low, high = (ahead_m, line.length_m) if turned else (0.0, line.length_m - ahead_m)
@@ -129,8 +127,8 @@ class CameraOnLane(RandomizerBase):
         target = (T_world_turned @ SE3(ahead)).translation_m
         return T_world_rig, look_at(eye, target, roll)
 
-    def _with_beams(self, scene: Scene, T_world_rig: SE3, beam_cd: float) -> Scene:
-        """The scene with the vehicle's own headlights on, if it is dark."""
+    def _add_beams(self, scene: Scene, T_world_rig: SE3, beam_cd: float) -> Scene:
+        """Return the scene with the carrier's headlights on if it is dark."""
         if beam_cd == 0.0 or not is_dark(scene):
             return scene
         ahead_m = 0.3 * self.free_m[0]
@@ -139,16 +137,6 @@ class CameraOnLane(RandomizerBase):
             for side, y in (("left", 0.6), ("right", -0.6))
         )
         return replace(scene, lights=(*scene.lights, *beams))
-
-
-def _pick_by_weight(weights: list[float], draw: float) -> int:
-    """Index of one of several, in proportion to its weight."""
-    left = draw * sum(weights)
-    for k, weight in enumerate(weights):
-        left -= weight
-        if left < 0.0:
-            return k
-    return len(weights) - 1
 
 
 def _move_camera(camera: Camera, T_world_camera: SE3) -> Camera:

@@ -1,4 +1,4 @@
-"""Where cameras are and what they look at."""
+"""Camera poses on an orbit around the scene's focus."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from gen_data.generator.core.scene import Camera, Scene
 from gen_data.generator.core.se3 import look_at
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.free_space_tests import is_in_the_open
+from gen_data.randomizers.free_space import is_in_the_open
 
 TRIES = 48
 
 
 class CameraPose(RandomizerBase):
-    """An orbit around what the scene is about.
+    """Places cameras on an orbit around the scene's focus, aimed at it.
 
     Attributes:
-        camera: Name of a sensor; empty = every camera that is on no rig, each drawn for itself.
-        distance_m: From the point it looks at.
-        azimuth_deg: Around the vertical; 0 is the side of +X, 90 that of +Y.
-        elevation_deg: Height over the horizon.
-        jitter_m: The point it looks at lies this far from the focus at most, along each axis.
-        roll_deg: Turn about the viewing direction.
-        clearance_m: It keeps this far from every body.
+        camera: Name of a sensor; empty = every camera that is not on a rig, drawn independently.
+        distance_m: Distance to the look-at point.
+        azimuth_deg: Angle around the vertical: 0 is on the +X side, 90 on the +Y side.
+        elevation_deg: Angle above the horizon.
+        jitter_m: Largest offset of the look-at point from the focus, along each axis.
+        roll_deg: Rotation about the viewing direction.
+        clearance_m: Smallest distance to any body.
     """
 
     type: Literal["camera_pose"] = "camera_pose"
@@ -51,11 +51,16 @@ class CameraPose(RandomizerBase):
     clearance_m: float = Field(0.1, ge=0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with cameras elsewhere; none is inside a body or outside the room."""
+        """Return the scene with its cameras moved, all outside of bodies and inside the room.
+
+        Raises:
+            ConfigError: the camera is unknown or on a rig.
+            LayoutRejected: no free place was found.
+        """
         known = [camera.name for camera in scene.cameras if not camera.rig]
         if self.camera and self.camera not in known:
             raise ConfigError(
-                f"randomizers.{self.name}.camera: there is no camera '{self.camera}' off a rig; "
+                f"randomizers.{self.name}.camera: no camera '{self.camera}' without a rig; "
                 f"expected one of {', '.join(known) or 'none'}{did_you_mean(self.camera, known)}"
             )
         cameras = tuple(

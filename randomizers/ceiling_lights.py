@@ -1,4 +1,4 @@
-"""Panels under the ceiling of a room."""
+"""Light panels on the ceiling of a room."""
 
 from __future__ import annotations
 
@@ -31,19 +31,17 @@ from gen_data.randomizers.color_space import temperature_to_linear
 
 
 class CeilingLights(RandomizerBase):
-    """Hangs bright panels in a grid under the ceiling, in place of all lights.
-
-    They hang at the top of the space in which lights may be, and shine straight down.
+    """Replaces the lights by a grid of panels on the ceiling, all facing straight down.
 
     Attributes:
-        kind: rectangle or disk, all alike.
-        rows, columns: Of the grid, along Y and X of the room.
-        size_m: Sides of a rectangle along X and Y; a disk has the first for its diameter.
-        luminous_flux_lm: Of one panel; an office panel of 0.6 m by 0.6 m gives 4000 lm.
-        temperature_k: Of all panels.
-        broken: Whether a panel stays dark.
-        visible: Whether they are seen, in housings with a bright front.
-        keep_existing: Whether the lights that are there stay.
+        kind: Shape of all panels: rectangle or disk.
+        rows, columns: Size of the grid along Y and X of the room.
+        size_m: Sides of a rectangle along X and Y; the first is the diameter of a disk.
+        luminous_flux_lm: Flux of one panel; an office panel of 0.6 m by 0.6 m emits 4000 lm.
+        temperature_k: Colour temperature of all panels.
+        broken: Whether a panel is dark.
+        visible: Whether panels appear in images, as housings with a bright front.
+        keep_existing: Whether to keep the lights already in the scene.
     """
 
     type: Literal["ceiling_lights"] = "ceiling_lights"
@@ -58,15 +56,15 @@ class CeilingLights(RandomizerBase):
     keep_existing: bool = False
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene under other lights."""
+        """Return the scene with a grid of panels. Raises ConfigError if the kind is unknown."""
         scene = scene if self.keep_existing else remove_lights(scene)
-        kind = self._kind(rng)
+        kind = self._draw_kind(rng)
         rows, columns = self.rows.draw(rng), self.columns.draw(rng)
         color = temperature_to_linear(self.temperature_k.draw(rng))
         flux_lm = self.luminous_flux_lm.draw(rng)
         for k in range(rows * columns):
             at_m = _grid_point(scene, k // columns, k % columns, rows, columns)
-            light = replace(self._panel(f"{self.name}/{k}", kind, at_m), color=color)
+            light = replace(self._make_panel(f"{self.name}/{k}", kind, at_m), color=color)
             lit = 0.0 if self.broken.draw(rng) else flux_lm
             light = scale_to_flux(light, lit)
             if self.visible:
@@ -76,7 +74,7 @@ class CeilingLights(RandomizerBase):
                 scene = replace(scene, lights=(*scene.lights, light))
         return scene
 
-    def _kind(self, rng: Rng) -> LightKind:
+    def _draw_kind(self, rng: Rng) -> LightKind:
         drawn = self.kind.draw(rng)
         if drawn == "rectangle":
             return "rectangle"
@@ -87,7 +85,7 @@ class CeilingLights(RandomizerBase):
             f"{', '.join(PANEL_KINDS)}{did_you_mean(drawn, PANEL_KINDS)}"
         )
 
-    def _panel(self, name: str, kind: LightKind, at_m: Vec3) -> Light:
+    def _make_panel(self, name: str, kind: LightKind, at_m: Vec3) -> Light:
         return Light(
             name,
             kind,
@@ -99,7 +97,7 @@ class CeilingLights(RandomizerBase):
 
 
 def _grid_point(scene: Scene, row: int, column: int, rows: int, columns: int) -> Vec3:
-    """Middle of one of the equal fields into which the ceiling is cut."""
+    """Centre of a grid cell on the ceiling [m]."""
     (x0, y0, _), (x1, y1, z1) = scene.interior_m
     x = x0 + (x1 - x0) * (column + 0.5) / columns
     y = y0 + (y1 - y0) * (row + 0.5) / rows

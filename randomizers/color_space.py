@@ -1,4 +1,4 @@
-"""Colours that people name: hue, temperature."""
+"""Conversion of HSV colours and colour temperatures to linear RGB."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gen_data.generator.core.se3 import Vec3
 
 
 def hsv_to_linear(hue: float, saturation: float, value: float) -> Vec3:
-    """Linear RGB of a colour given as a painter's hue, saturation and value in sRGB."""
+    """Convert hue, saturation and value in sRGB, each in [0, 1], to linear RGB."""
     red, green, blue = colorsys.hsv_to_rgb(hue % 1.0, saturation, value)
     return (
         round(srgb_decode(red), 6),
@@ -41,7 +41,7 @@ def temperature_to_chromaticity(kelvin: float) -> tuple[float, float]:
 
 
 def temperature_to_linear(kelvin: float) -> Vec3:
-    """Linear sRGB with luminance 1 of a black body; what the gamut lacks is clipped at 0."""
+    """Linear sRGB with luminance 1 of a black body; negative components are clipped to 0."""
     x, y = temperature_to_chromaticity(kelvin)
     big_x, big_z = x / y, (1.0 - x - y) / y
     rgb = np.maximum((REC709_FROM_XYZ * (big_x, 1.0, big_z)).sum(axis=1), 0.0)

@@ -1,4 +1,4 @@
-"""Colour of objects."""
+"""Colours of objects."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import LookRandomizer, set_materials
+from gen_data.randomizers.base import SurfaceRandomizer, set_materials
 from gen_data.randomizers.color_space import hsv_to_linear
 
 
-class Colors(LookRandomizer):
-    """Paints objects in a drawn colour; what is printed stays as it is.
+class Colors(SurfaceRandomizer):
+    """Paints each object in one drawn colour; printed materials are unchanged.
 
     Attributes:
-        probability: That an object is painted; 1 = every one, 0.3 = about three in ten.
-        hue, saturation, value: Of the paint, as painters count them (HSV in sRGB).
+        probability: Probability that an object is painted.
+        hue, saturation, value: Colour of the paint (HSV in sRGB).
     """
 
     type: Literal["colors"] = "colors"
@@ -29,9 +29,9 @@ class Colors(LookRandomizer):
     value: UnitInterval = Uniform(0.25, 0.95)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """One colour per object; every material slot takes it."""
+        """Return the scene with one colour per object, in every material slot."""
         painted = []
-        for body in self.chosen(scene):
+        for body in self.find_targets(scene):
             if not self.probability.draw(rng):
                 continue
             color = hsv_to_linear(

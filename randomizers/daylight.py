@@ -1,4 +1,4 @@
-"""Sun and sky that belong together."""
+"""Sun and sky that match each other."""
 
 from __future__ import annotations
 
@@ -14,22 +14,23 @@ SUN = "sun"
 """Name of the sun among the lights."""
 _CLOUD_SEEDS = 4096
 _FAINTEST_LUX = 0.5
+"""A fainter sun is left out."""
 _SNOW_ALBEDO = 0.7
 _LAND_ALBEDO = 0.18
 
 
 @dataclass(frozen=True, slots=True)
 class Daylight:
-    """What the light outdoors depends on.
+    """Parameters of outdoor light.
 
     Attributes:
-        sun_altitude_deg: Over the horizon; negative at night.
-        sun_azimuth_deg: From +X towards +Y.
+        sun_altitude_deg: Angle above the horizon; negative at night.
+        sun_azimuth_deg: Direction from +X towards +Y.
         cloudiness: 0 clear, 0.5 broken clouds, 1 overcast.
-        turbidity: Of clear air: 2 very clear, 6 hazy.
-        seed: Of the clouds.
-        snow: Whether the land lies under snow.
-        model: Of the sky, as in ``gen_data.generator.assets.skies.sky.SkyModel``.
+        turbidity: Haze of clear air: 2 very clear, 6 hazy.
+        seed: Seed of the clouds.
+        snow: Whether snow covers the ground.
+        model: Sky model, as in ``gen_data.generator.assets.skies.sky.SkyModel``.
     """
 
     sun_altitude_deg: float
@@ -42,12 +43,12 @@ class Daylight:
 
 
 def draw_cloud_seed(rng: Rng) -> int:
-    """A seed for a sky's clouds."""
+    """Draw a seed for the clouds of a sky."""
     return int(rng.integers(_CLOUD_SEEDS))
 
 
 def set_daylight(scene: Scene, light: Daylight) -> Scene:
-    """The scene under that sun and sky; other suns are taken away, lamps stay."""
+    """Return the scene with its suns and environment replaced; lamps stay."""
     altitude_deg, cloudiness = round(light.sun_altitude_deg, 2), round(light.cloudiness, 3)
     turbidity = round(light.turbidity, 2)
     albedo = _SNOW_ALBEDO if light.snow else _LAND_ALBEDO
@@ -68,13 +69,13 @@ def set_daylight(scene: Scene, light: Daylight) -> Scene:
 
 
 def set_shared_values(scene: Scene, **values: float) -> Scene:
-    """The scene with values that later draws have in common with these."""
+    """Return the scene with values that later randomizers can read."""
     merged = {**dict(scene.shared), **values}
     return replace(scene, shared=tuple(sorted(merged.items())))
 
 
 def shared_number(scene: Scene, name: str) -> float | None:
-    """A shared value; None if nothing has been said about it."""
+    """Value shared by an earlier randomizer; None if it is missing or no number."""
     value = dict(scene.shared).get(name)
     return float(value) if isinstance(value, (int, float)) else None
 
@@ -109,5 +110,5 @@ def _sun(model: SkyModel, yaw_rad: float) -> tuple[Light, ...]:
 
 
 def _significant(value: float) -> float:
-    """Five digits: what is written down is what is rendered."""
+    """Round to five digits, so that the recorded value is the rendered one."""
     return float(f"{value:.5g}")

@@ -1,4 +1,4 @@
-"""Things that are in the way and have no label."""
+"""Unlabelled objects that occlude others."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from gen_data.randomizers.objects import COUNT_MAX, Objects
 
 
 class Distractors(Objects):
-    """Like ``objects``, for a group that the template does not annotate.
+    """Draws the objects of a group that the template does not annotate.
 
-    Distractors keep an instance id in the masks, so that what they hide counts as hidden.
+    Distractors have an instance id in the masks, so that occlusion by them is counted.
 
     Attributes:
         group: Name of the template's object group; empty = the randomizer's own name.
-        count: How many distractors.
+        count: Number of distractors.
     """
 
     type: Literal["distractors"] = "distractors"  # type: ignore[assignment]

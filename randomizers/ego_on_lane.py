@@ -1,4 +1,4 @@
-"""Where the vehicle that carries the sensors starts."""
+"""Start pose of the ego vehicle."""
 
 from __future__ import annotations
 
@@ -12,31 +12,29 @@ from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejectio
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.lane_geometry import LaneLine
 from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.traffic.axles import find_axles
 from gen_data.generator.traffic.lane_routes import LaneGraph, lanes_through_point
 from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.footprints import Footprint, make_ground
+from gen_data.randomizers.free_space import Footprint, make_ground
 
 TRIES = 32
 
 Stop = str | tuple[float, float]
-"""What a route leads through: a lane's name, or a point (x, y) [m]."""
+"""Stop of a route: a lane's name, or a point (x, y) [m]."""
 
 
 class EgoOnLane(RandomizerBase):
-    """Puts the ego vehicle on a driving lane; list it before the groups that stand along lanes.
+    """Puts the ego vehicle on a driving lane; list it before the lane_objects randomizers.
 
     Attributes:
         ego: Name of the template's ``ego`` element.
-        roads: Names of the elements on whose lanes it may be; empty = all.
-        route: It starts on the first of these lanes, or of these points (x, y) in metres; give the
-            same route to ``traffic_flow``. Empty = on any lane.
-        ahead_m: Its lane goes on at least this far before its front; halved for lanes that are
-            shorter than twice as long.
-        lateral_m: To the left of the lane's middle.
-        min_clearance_m: Nothing else is nearer than this.
+        roads: Names of the elements whose lanes to use; empty = all.
+        route: Lanes, or points (x, y) in metres; the vehicle starts on the first. Give
+            traffic_flow the same route. Empty = start on any lane.
+        ahead_m: Smallest length of lane ahead of the vehicle; at most half of the lane.
+        lateral_m: Offset to the left of the lane's centre line.
+        min_clearance_m: Smallest distance to any other object.
     """
 
     type: Literal["ego_on_lane"] = "ego_on_lane"
@@ -49,14 +47,14 @@ class EgoOnLane(RandomizerBase):
     min_clearance_m: float = Field(0.5, ge=0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with the ego vehicle somewhere else.
+        """Return the scene with the ego vehicle moved.
 
         Raises:
-            ConfigError: there is no such vehicle or lane, or the route is none.
+            ConfigError: the vehicle or a lane is unknown, or the route is not connected.
             LayoutRejected: no free place was found.
         """
         body = find_ego(scene, self.ego, f"randomizers.{self.name}.ego")
-        lines = self._lines(scene)
+        lines = self._select_lanes(scene)
         axles = find_axles(assets, body.asset, body.scale)
         roads = {lane.road for lane in scene.lanes}
         others = (
@@ -77,13 +75,13 @@ class EgoOnLane(RandomizerBase):
             at_m = axles.rear_m + share * (last_m - axles.rear_m)
             pose = (line.pose(at_m, left_m) @ axles.T_body_rear.inverse()).rounded()
             footprint = Footprint.of(pose, assets.bounds_m(body.asset), body.scale)
-            if ground.is_free(footprint.grown(self.min_clearance_m)):
-                return scene.with_bodies(_move_body(body, pose))
+            if ground.is_free(footprint.expand(self.min_clearance_m)):
+                return scene.with_bodies(replace(body, T_world_body=pose))
         remedy = f"other roads, a smaller ahead_m or min_clearance_m (randomizers.{self.name})"
         raise LayoutRejected(Rejection("no free place for the ego vehicle", remedy))
 
-    def _lines(self, scene: Scene) -> list[LaneLine]:
-        """The lanes that it may start on."""
+    def _select_lanes(self, scene: Scene) -> list[LaneLine]:
+        """Select the lanes to start on."""
         graph = LaneGraph.of(scene.lanes, "driving")
         if self.route:
             names = lanes_through_point(graph, self.route, f"randomizers.{self.name}.route")
@@ -103,10 +101,10 @@ class EgoOnLane(RandomizerBase):
 
 
 def find_ego(scene: Scene, name: str, field: str) -> Body:
-    """The body of an ego vehicle.
+    """Find the body of an ego vehicle.
 
     Raises:
-        ConfigError: the template has none of that name.
+        ConfigError: the template has no ego vehicle of that name.
     """
     known = [rig.name for rig in scene.rigs]
     if name not in known:
@@ -115,7 +113,3 @@ def find_ego(scene: Scene, name: str, field: str) -> Body:
             f"{', '.join(known) or 'none: list an element of type ego'}{did_you_mean(name, known)}"
         )
     return scene.body(scene.rig(name).body)
-
-
-def _move_body(body: Body, pose: SE3) -> Body:
-    return replace(body, T_world_body=pose)

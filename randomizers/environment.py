@@ -1,4 +1,4 @@
-"""Light from all around."""
+"""Environment maps."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from gen_data.randomizers.base import RandomizerBase, choose
 
 
 class EnvironmentLight(RandomizerBase):
-    """Draws the image that surrounds the scene, how bright it is, and how it is turned.
+    """Draws the environment map, its brightness and its orientation.
 
     Attributes:
-        images: Families or tags of environments: studio, indoor, overcast; empty = all.
+        images: Families or tags of environments, such as studio, indoor, overcast; empty = all.
         luminance_cd_m2: Mean luminance over the sphere.
-        yaw_deg: Turn about the vertical.
-        visible: Whether it is seen where nothing else is.
+        yaw_deg: Rotation about the vertical.
+        visible: Whether the map is visible as the background of images.
     """
 
     type: Literal["environment"] = "environment"
@@ -33,25 +33,25 @@ class EnvironmentLight(RandomizerBase):
     visible: bool = Field(True)
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
-        """The images it draws from."""
-        return self._options(assets)
+        """Ids of the environment maps to draw from."""
+        return self._find_options(assets)
 
     def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raises ConfigError if there is no environment of these names."""
+        """Raise ConfigError if no environment has one of the names."""
         del scene
-        self._options(assets)
+        self._find_options(assets)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene in another light."""
+        """Return the scene with a drawn environment map."""
         environment = Environment(
-            image=choose(self._options(assets), rng),
+            image=choose(self._find_options(assets), rng),
             luminance_cd_m2=round(self.luminance_cd_m2.draw(rng), 4),
             yaw_rad=round(math.radians(self.yaw_deg.draw(rng)), 6),
             visible=self.visible,
         )
         return replace(scene, environment=environment)
 
-    def _options(self, assets: AssetIndex) -> tuple[str, ...]:
+    def _find_options(self, assets: AssetIndex) -> tuple[str, ...]:
         every = assets.find((), kind="environment")
         fitting = tuple(
             a.asset_id

@@ -1,4 +1,4 @@
-"""How long the shutter is open."""
+"""Fixed exposure of cameras."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from gen_data.randomizers.base import RandomizerBase
 
 
 class Exposure(RandomizerBase):
-    """Fixes the exposure of every camera instead of leaving it to automatic metering.
+    """Draws a fixed exposure for every camera, in place of automatic metering.
 
     Attributes:
-        ev100: Exposure value at ISO 100; 7 suits a lit room, each step more halves the light.
+        ev100: Exposure value at ISO 100: about 7 in a lit room; each step up halves the exposure.
     """
 
     type: Literal["exposure"] = "exposure"
@@ -24,7 +24,7 @@ class Exposure(RandomizerBase):
     ev100: Scalar = Uniform(6.0, 8.5)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with cameras exposed otherwise."""
+        """Return the scene with drawn exposures."""
         del assets
         cameras = tuple(replace(c, ev100=round(self.ev100.draw(rng), 4)) for c in scene.cameras)
         return replace(scene, cameras=cameras)

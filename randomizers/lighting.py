@@ -1,4 +1,4 @@
-"""Lamps and the sun."""
+"""Lights aimed at the scene's focus: lamps, panels and suns."""
 
 from __future__ import annotations
 
@@ -35,34 +35,35 @@ from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.color_space import temperature_to_linear
-from gen_data.randomizers.free_space_tests import is_in_the_open, is_inside
+from gen_data.randomizers.free_space import is_in_the_open, is_inside
 
 TRIES = 24
 COUNT_MAX = 64
 """Shading time grows with every light."""
 MARGIN_M = 0.05
-"""A lamp keeps this far from bodies."""
+"""Smallest distance of a lamp from any body."""
 
 
 class Lighting(RandomizerBase):
-    """Draws all lights anew, each aimed at what the scene is about.
+    """Replaces the lights by drawn ones, each aimed at the scene's focus.
 
     Attributes:
-        count: How many lights.
-        kind: sphere, spot, sun; rectangle or disk: panels turned to the focus, such as softboxes.
-        illuminance_lux: Of all lights together, on a surface at the focus that faces them.
-        luminous_flux_lm: Of all lights together, instead of their illuminance; not for suns.
-        distance_m: From the focus; shortened where the room ends.
-        elevation_deg: Height over the horizon, seen from the focus.
-        azimuth_deg: Direction around the vertical, seen from the focus.
-        temperature_k: Colour temperature: 2700 is warm white, 6500 daylight.
-        radius_m: Of the luminous ball or disk: the larger, the softer its shadows.
+        count: Number of lights.
+        kind: sphere, spot or sun; rectangle or disk: a panel facing the focus, such as a softbox.
+        illuminance_lux: Illuminance from all lights together, on a surface at the focus that faces
+            them.
+        luminous_flux_lm: Flux of all lights together, instead of an illuminance; not for suns.
+        distance_m: Distance from the focus; shortened to stay inside the room.
+        elevation_deg: Angle above the horizon, seen from the focus.
+        azimuth_deg: Angle around the vertical, seen from the focus.
+        temperature_k: Colour temperature: 2700 warm white, 6500 daylight.
+        radius_m: Radius of a sphere or disk: the larger, the softer the shadows.
         width_m: Longer side of a rectangle.
-        panel_aspect: Its shorter side, over the longer one.
-        visible: Whether panels are seen, in housings with a bright front.
+        panel_aspect: Ratio of a rectangle's shorter side to its longer side.
+        visible: Whether panels appear in images, as housings with a bright front.
         cone_deg: Half angle of a spot.
-        angular_radius_deg: Of the sun's disc.
-        keep_existing: Whether the lights that are there stay.
+        angular_radius_deg: Angular radius of the sun's disc.
+        keep_existing: Whether to keep the lights already in the scene.
     """
 
     type: Literal["lighting"] = "lighting"
@@ -80,7 +81,6 @@ class Lighting(RandomizerBase):
     visible: bool = False
     cone_deg: Annotated[Scalar, Bounds(1, 90)] = Uniform(20.0, 40.0)
     angular_radius_deg: Annotated[Scalar, Bounds(0, 20)] = Constant(0.27)
-
     keep_existing: bool = False
 
     @model_validator(mode="after")
@@ -93,27 +93,34 @@ class Lighting(RandomizerBase):
         return self
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene under other lights; they share the light unevenly."""
+        """Return the scene with its lights replaced; the total is split unevenly between them.
+
+        Raises:
+            ConfigError: the kind is unknown, or a sun was given a flux.
+            LayoutRejected: no free place was found for a light.
+        """
         count = self.count.draw(rng)
         shares = [0.3 + float(rng.uniform()) for _ in range(count)]
         strength = self.illuminance_lux if self.luminous_flux_lm is None else self.luminous_flux_lm
         total = strength.draw(rng)
         scene = scene if self.keep_existing else remove_lights(scene)
         for k, share in enumerate(shares):
-            light = self._light(scene, assets, rng, f"{self.name}/{k}", total * share / sum(shares))
+            light = self._draw_light(
+                scene, assets, rng, f"{self.name}/{k}", total * share / sum(shares)
+            )
             if self.visible and light.kind in PANEL_KINDS:
                 materials = assets.materials(fixture_asset(light))
                 scene, light = add_fixture(scene, light, materials)
             scene = replace(scene, lights=(*scene.lights, light))
         return scene
 
-    def _light(
+    def _draw_light(
         self, scene: Scene, assets: AssetIndex, rng: Rng, name: str, strength: float
     ) -> Light:
-        light = Light(name, self._kind(rng))
+        light = Light(name, self._draw_kind(rng))
         light = replace(light, color=temperature_to_linear(self.temperature_k.draw(rng)))
         if light.kind == "sun":
-            up = self._direction(rng)
+            up = self._draw_direction(rng)
             return replace(
                 light,
                 direction=_round_vector((-up[0], -up[1], -up[2])),
@@ -121,14 +128,14 @@ class Lighting(RandomizerBase):
                 angular_radius_rad=round(math.radians(self.angular_radius_deg.draw(rng)), 6),
             )
         light, reach_m = self._draw_size(light, rng)
-        position = self._position(scene, assets, rng, reach_m + MARGIN_M)
+        position = self._draw_position(scene, assets, rng, reach_m + MARGIN_M)
         light = _aim(light, position, scene.focus.center_m)
         if light.kind not in PANEL_KINDS:
             light = replace(light, cone_rad=round(math.radians(self.cone_deg.draw(rng)), 6))
         return self._set_intensity(light, strength, math.dist(position, scene.focus.center_m))
 
     def _draw_size(self, light: Light, rng: Rng) -> tuple[Light, float]:
-        """The light with its size, and how far it reaches from its centre."""
+        """Draw a light's size; also return its largest extent from the centre [m]."""
         if light.kind != "rectangle":
             radius_m = round(self.radius_m.draw(rng), 4)
             return replace(light, radius_m=radius_m), radius_m
@@ -136,7 +143,7 @@ class Lighting(RandomizerBase):
         sides_m = round(longer_m, 4), round(longer_m * self.panel_aspect.draw(rng), 4)
         return replace(light, size_m=sides_m), 0.5 * math.hypot(*sides_m)
 
-    def _kind(self, rng: Rng) -> LightKind:
+    def _draw_kind(self, rng: Rng) -> LightKind:
         drawn = self.kind.draw(rng)
         kind = next((known for known in LIGHT_KINDS if known == drawn), None)
         if kind is None:
@@ -146,29 +153,29 @@ class Lighting(RandomizerBase):
             )
         if kind == "sun" and self.luminous_flux_lm is not None:
             raise ConfigError(
-                f"randomizers.{self.name}.luminous_flux_lm: a sun has no flux; give its "
-                "illuminance_lux, or another kind"
+                f"randomizers.{self.name}.luminous_flux_lm: a sun has no flux; give an "
+                "illuminance_lux or another kind"
             )
         return kind
 
     def _set_intensity(self, light: Light, strength: float, distance_m: float) -> Light:
-        """The light with its share of what all give at the focus, or send out."""
+        """Return the light with its share of the illuminance at the focus or of the flux."""
         if self.luminous_flux_lm is None:
             intensity_cd = illuminance_to_intensity_cd(light, strength, distance_m)
         else:
             intensity_cd = flux_to_intensity_cd(light, strength)
         return replace(light, intensity_cd=round(intensity_cd, 4))
 
-    def _direction(self, rng: Rng) -> Vec3:
+    def _draw_direction(self, rng: Rng) -> Vec3:
         elevation = math.radians(self.elevation_deg.draw(rng))
         azimuth = math.radians(self.azimuth_deg.draw(rng))
         level = math.cos(elevation)
         return (level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation))
 
-    def _position(self, scene: Scene, assets: AssetIndex, rng: Rng, margin_m: float) -> Vec3:
+    def _draw_position(self, scene: Scene, assets: AssetIndex, rng: Rng, margin_m: float) -> Vec3:
         x, y, z = scene.focus.center_m
         for _ in range(TRIES):
-            dx, dy, dz = self._direction(rng)
+            dx, dy, dz = self._draw_direction(rng)
             distance_m = self.distance_m.draw(rng)
             for shortened in (1.0, 0.85, 0.7, 0.55):
                 d = shortened * distance_m
@@ -186,7 +193,7 @@ class Lighting(RandomizerBase):
 
 
 def _aim(light: Light, position_m: Vec3, target_m: Vec3) -> Light:
-    """The light at a place, turned to another; rectangles stand level."""
+    """Return the light at a position, aimed at a target; rectangles have a level side."""
     away = [p - t for p, t in zip(position_m, target_m, strict=True)]
     distance_m = math.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
     direction = _round_vector((-away[0] / distance_m, -away[1] / distance_m, -away[2] / distance_m))

@@ -1,4 +1,4 @@
-"""How surfaces reflect."""
+"""Reflection and transmission of object surfaces."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import LookRandomizer, set_materials
+from gen_data.randomizers.base import SurfaceRandomizer, set_materials
 
 
-class Materials(LookRandomizer):
-    """Draws roughness, metallic and specular of objects, and makes some coated or clear.
+class Materials(SurfaceRandomizer):
+    """Draws the finish of objects: roughness, metal, and optionally clear coat or transparency.
 
     Attributes:
-        probability: That an object is changed; 1 = every one, 0.3 = about three in ten.
-        roughness: 0 is a mirror, 1 is chalk.
-        metallic: Whether the object is of metal.
-        specular: Reflectance of what is no metal; 0.5 is 4 % at normal incidence.
-        coated: Whether it gets a clear coat; one that it has stays otherwise.
-        coat: Weight of that coat.
-        coat_roughness: Of that coat.
-        clear: Whether light goes through it: then it is no metal, and its colour is a tint.
-        transmission: Share of the light that goes through.
-        ior: Its refractive index.
-        solid: Whether it refracts; else its walls are thin panes.
+        probability: Probability that an object is changed.
+        roughness: Roughness: 0 mirror, 1 chalk.
+        metallic: Whether the object is metal.
+        specular: Reflectance of a dielectric; 0.5 is 4 % at normal incidence.
+        coated: Whether to set a clear coat; otherwise the material keeps its own.
+        coat: Weight of the clear coat.
+        coat_roughness: Roughness of the clear coat.
+        clear: Whether the object transmits light; its colour then is a tint, and it is no metal.
+        transmission: Fraction of the light that is transmitted.
+        ior: Index of refraction.
+        solid: Whether the object refracts as a solid; otherwise its walls are thin panes.
     """
 
     type: Literal["materials"] = "materials"
@@ -53,9 +53,9 @@ class Materials(LookRandomizer):
     solid: Flag = Constant(False)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """One finish per object; every material slot takes it."""
+        """Return the scene with one finish per object, in every material slot."""
         finished = []
-        for body in self.chosen(scene):
+        for body in self.find_targets(scene):
             if not self.probability.draw(rng):
                 continue
             changes = self._draw_changes(rng)
@@ -67,7 +67,7 @@ class Materials(LookRandomizer):
         return scene.with_bodies(*finished)
 
     def _draw_changes(self, rng: Rng) -> dict[str, Any]:
-        """The fields of a material that change. What is not asked for draws nothing."""
+        """Draw the changed fields of a material; no draw for a coat or glass that is not wanted."""
         changes: dict[str, Any] = {
             "roughness": round(self.roughness.draw(rng), 4),
             "metallic": float(self.metallic.draw(rng)),

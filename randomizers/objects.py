@@ -1,4 +1,4 @@
-"""Which objects there are, how many, and where."""
+"""Objects of a group: which, how many, and where."""
 
 from __future__ import annotations
 
@@ -19,26 +19,26 @@ from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.members import Member, add_members, remove_members
 from gen_data.generator.core.scene import ObjectGroup, Scene
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.asset_groups import CategoryWeights, draw_asset, find_group, make_wheel
+from gen_data.randomizers.asset_groups import CategoryWeights, draw_asset, find_weighted_group
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.placement import Item, find_floors, half_extents_m, lay_out
 
 COUNT_MAX = 500
-"""As many as the template's ``objects`` element may have."""
+"""Largest count of the template's ``objects`` element."""
 
 
 class Objects(RandomizerBase):
-    """Draws the objects of a group anew: how many, which, how large, and where they start.
+    """Replaces the objects of a group by drawn ones: their number, assets, sizes and start poses.
 
-    Categories are drawn first and then one of the category's assets, so that a category with many
-    variants is not more frequent.
+    The category is drawn first and then one of its assets, so that a category with many variants
+    is not more frequent.
 
     Attributes:
         group: Name of the template's object group; empty = the randomizer's own name.
-        count: How many objects.
+        count: Number of objects.
         scale: Factor on an object's size.
-        upright: Whether an object starts standing; else it is turned any way (drop only).
-        weights: How often a category is drawn compared with the others, 1 if not listed.
+        upright: Whether an object starts upright; otherwise at any rotation (placement drop only).
+        weights: Relative frequency by category; 1 if not listed.
     """
 
     type: Literal["objects"] = "objects"
@@ -50,15 +50,15 @@ class Objects(RandomizerBase):
     weights: dict[str, Annotated[float, Field(ge=0)]] = Field({})
 
     def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raises ConfigError if there is no such group, or it lacks a category of the weights."""
+        """Raise ConfigError if the group or a category of the weights is unknown."""
         self._find_group(scene, assets)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with the group's objects exchanged."""
-        group, wheel = self._find_group(scene, assets)
+        """Return the scene with the group's objects replaced."""
+        group, weights = self._find_group(scene, assets)
         scene = remove_members(scene, group.name)
         count = self.count.draw(rng)
-        chosen = [assets.get(draw_asset(wheel, rng)) for _ in range(count)]
+        chosen = [assets.get(draw_asset(weights, rng)) for _ in range(count)]
         scales = [round(self.scale.draw(rng), 4) for _ in range(count)]
         upright = [self.upright.draw(rng) for _ in range(count)]
         items = [
@@ -79,7 +79,5 @@ class Objects(RandomizerBase):
         return add_members(scene, group, members, assets)
 
     def _find_group(self, scene: Scene, assets: AssetIndex) -> tuple[ObjectGroup, CategoryWeights]:
-        """The group, and the weighted categories of its assets."""
-        field = f"randomizers.{self.name}"
-        group = find_group(scene, self.group or self.name, f"{field}.group")
-        return group, make_wheel(group, assets, self.weights, f"{field}.weights")
+        name = self.group or self.name
+        return find_weighted_group(scene, assets, name, self.weights, f"randomizers.{self.name}")

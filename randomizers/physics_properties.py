@@ -1,4 +1,4 @@
-"""Mass and friction."""
+"""Mass, friction and restitution of dynamic objects."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from gen_data.randomizers.base import RandomizerBase
 
 
 class PhysicsProperties(RandomizerBase):
-    """Draws how heavy, slippery and springy each object is, which changes how it comes to rest.
+    """Draws mass, friction and restitution of every dynamic object, which affect its resting pose.
 
     Attributes:
         mass_factor: Factor on the asset's mass.
-        friction: Coulomb coefficient.
-        restitution: Share of speed that is left after a bounce.
+        friction: Coefficient of Coulomb friction.
+        restitution: Coefficient of restitution: ratio of the speeds after and before a bounce.
     """
 
     type: Literal["physics_properties"] = "physics_properties"
@@ -34,7 +34,7 @@ class PhysicsProperties(RandomizerBase):
     restitution: UnitInterval = Uniform(0.0, 0.1)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with other dynamic bodies."""
+        """Return the scene with drawn properties on every dynamic body."""
         del assets
         dynamic = [body for body in scene.bodies if body.motion == "dynamic"]
         return scene.with_bodies(*(self._draw_properties(body, rng) for body in dynamic))

@@ -1,4 +1,4 @@
-"""Where objects start: layouts on surfaces that physics then settles."""
+"""Start poses of objects: layouts on surfaces, before physics settles them."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.core.streams import Rng
 
 GAP_M = 0.004
-"""Free space between what is placed."""
+"""Gap between placed objects."""
 DROP_M = (0.01, 0.05)
-"""Objects fall this far: enough to tumble, too little to bounce away."""
+"""Range of drop heights: enough to tumble, too little to bounce away."""
 DROP_TRIES = 24
-"""Free places are tried this often before an object is dropped on top of others."""
+"""Attempts to find a free place before an object is dropped on top of others."""
 SCATTER_TRIES = 200
 
 _LIFT_M = 0.0005
@@ -27,11 +27,11 @@ _TOO_HIGH = Rejection("object higher than the space above the surface", "smaller
 
 @dataclass(frozen=True)
 class Item:
-    """Something to be placed.
+    """An object to place.
 
     Attributes:
-        half_m: Half its extents along its own axes, scale included.
-        stackable: Flat above and below.
+        half_m: Scaled half extents along its own axes.
+        stackable: Whether top and bottom are flat.
     """
 
     half_m: Vec3
@@ -39,25 +39,25 @@ class Item:
 
     @property
     def radius_m(self) -> float:
-        """Of the upright cylinder around it."""
+        """Radius of the bounding cylinder of the upright object."""
         return math.hypot(self.half_m[0], self.half_m[1])
 
     @property
     def reach_m(self) -> float:
-        """Of the ball around it, however it is turned."""
+        """Radius of the bounding sphere, at any rotation."""
         return math.hypot(*self.half_m)
 
 
 @dataclass
 class Floor:
-    """A surface that is being filled: cylinders ``(x, y, radius, top)`` in its own frame [m]."""
+    """A surface being filled: occupied cylinders ``(x, y, radius, top)`` in its frame [m]."""
 
     surface: SupportSurface
     taken: list[tuple[float, float, float, float]] = field(default_factory=list)
     closed: list[Vec3] = field(default_factory=list)
 
     def top_under(self, x: float, y: float, radius_m: float) -> float:
-        """How high what is placed reaches under a disc; 0 where the surface is bare."""
+        """Height of the objects below a disc [m]; 0 where the surface is bare."""
         tops = [
             top
             for ox, oy, other_m, top in self.taken
@@ -66,18 +66,18 @@ class Floor:
         return max(tops, default=0.0)
 
     def is_closed(self, x: float, y: float, radius_m: float) -> bool:
-        """Whether a disc touches a place where nothing may be put."""
+        """Whether a disc touches a keep-out area."""
         return any(math.hypot(x - cx, y - cy) < radius_m + r for cx, cy, r in self.closed)
 
     def place(self, rng: Rng, radius_m: float) -> tuple[float, float]:
-        """A point at which a disc lies within the surface; its centre where it is too large."""
+        """Draw a point where a disc fits on the surface; the centre along axes too short for it."""
         room_x = max(0.0, 0.5 * self.surface.size_m[0] - radius_m)
         room_y = max(0.0, 0.5 * self.surface.size_m[1] - radius_m)
         return float(rng.uniform(-room_x, room_x)), float(rng.uniform(-room_y, room_y))
 
 
 def find_floors(scene: Scene, group: ObjectGroup, assets: AssetIndex) -> list[Floor]:
-    """The surfaces of a group, with what already lies on them."""
+    """Find the surfaces of a group, with the objects already on them."""
     floors = []
     for name in group.surfaces:
         surface = scene.surface(name)
@@ -102,10 +102,10 @@ def lay_out(
     rng: Rng,
     upright: Sequence[bool],
 ) -> list[SE3]:
-    """``T_world_body`` of every item, by the group's placement.
+    """Draw ``T_world_body`` of every item, by the group's placement.
 
     Raises:
-        LayoutRejected: there is no place.
+        LayoutRejected: no free place was found, or an item is too high.
     """
     if group.placement == "stack":
         return _stack(group, items, floors, rng)
@@ -120,7 +120,7 @@ def lay_out(
 
 
 def _drop(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: bool) -> SE3:
-    """Above a free place if one is found soon, else above what lies there."""
+    """Pose above a free place if one is found, else above the lowest objects."""
     clearance_m = floor.surface.clearance_m
     upright = upright or 2 * item.reach_m + DROP_M[1] > clearance_m
     radius_m = item.radius_m if upright else item.reach_m
@@ -139,9 +139,9 @@ def _drop(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: bool)
 
 
 def _find_lowest_place(floor: Floor, radius_m: float, rng: Rng) -> Vec3 | None:
-    """``(x, y, height)`` of the first bare place of some, else of that with the least below it.
+    """Find ``(x, y, height)`` of a bare place, else of the lowest one tried.
 
-    None if something stands at all of them.
+    None if every place tried is in a keep-out area.
     """
     lowest: Vec3 | None = None
     for _ in range(DROP_TRIES):
@@ -157,7 +157,7 @@ def _find_lowest_place(floor: Floor, radius_m: float, rng: Rng) -> Vec3 | None:
 
 
 def _scatter(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
-    """Standing apart from everything else; the widest choose first."""
+    """Upright poses apart from everything else; the widest items choose first."""
     poses: dict[int, SE3] = {}
     for k in sorted(range(len(items)), key=lambda k: (-items[k].radius_m, k)):
         floor, x, y = _find_bare_place(group, items[k], floors, rng)
@@ -168,7 +168,7 @@ def _scatter(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng
 def _find_bare_place(
     group: ObjectGroup, item: Item, floors: list[Floor], rng: Rng
 ) -> tuple[Floor, float, float]:
-    """A surface, and a point on it around which there is room for an upright item."""
+    """Find a surface and a point on it with room for an upright item."""
     for _ in range(SCATTER_TRIES):
         floor = floors[_draw_floor(floors, item, rng)]
         x, y = floor.place(rng, item.radius_m)
@@ -181,12 +181,12 @@ def _find_bare_place(
 def _arrange_in_grid(
     group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng
 ) -> list[SE3]:
-    """In rows, surface after surface, turned by quarters."""
+    """Poses in rows, surface by surface, at multiples of a quarter turn."""
     poses = []
     share = -(-len(items) // len(floors))
     for number, floor in enumerate(floors):
         here = items[number * share : (number + 1) * share]
-        cells = _cells(floor, here)
+        cells = _find_cells(floor, here)
         if len(cells) < len(here):
             raise LayoutRejected(_no_place(group))
         for item, (x, y) in zip(here, cells, strict=False):
@@ -195,8 +195,8 @@ def _arrange_in_grid(
     return poses
 
 
-def _cells(floor: Floor, items: Sequence[Item]) -> list[tuple[float, float]]:
-    """Centres of the free cells of the coarsest grid that has one for every item; else none."""
+def _find_cells(floor: Floor, items: Sequence[Item]) -> list[tuple[float, float]]:
+    """Centres of the free cells of the coarsest grid with a cell for every item; else empty."""
     half_m = max((max(item.half_m[:2]) for item in items), default=0.0)
     length_m, width_m = floor.surface.size_m
     for count in range(max(len(items), 1), 4 * len(items) + 64):
@@ -221,7 +221,7 @@ def _cells(floor: Floor, items: Sequence[Item]) -> list[tuple[float, float]]:
 
 
 def _stack(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: Rng) -> list[SE3]:
-    """In towers of two to four, the widest lowest; what is not flat stands alone."""
+    """Poses in towers of two to four, the widest at the bottom; items not flat stand alone."""
     poses: dict[int, SE3] = {}
     flat = [k for k, item in enumerate(items) if item.stackable]
     flat.sort(key=lambda k: (-items[k].radius_m, k))
@@ -241,7 +241,7 @@ def _stack(group: ObjectGroup, items: Sequence[Item], floors: list[Floor], rng: 
 
 
 def _stand(item: Item, floor: Floor, place: Vec3, turn: SE3) -> SE3:
-    """Upright on a point of the surface's frame."""
+    """Upright pose on a point in the surface's frame."""
     x, y, z = place
     top_m = z + 2 * item.half_m[2]
     if top_m > floor.surface.clearance_m:
@@ -252,7 +252,7 @@ def _stand(item: Item, floor: Floor, place: Vec3, turn: SE3) -> SE3:
 
 
 def _draw_floor(floors: list[Floor], item: Item, rng: Rng) -> int:
-    """One of the surfaces that the item fits under, by area."""
+    """Draw a surface with enough clearance for the item, in proportion to its area."""
     areas = [
         f.surface.size_m[0] * f.surface.size_m[1]
         if 2 * item.half_m[2] + DROP_M[0] < f.surface.clearance_m
@@ -280,7 +280,7 @@ def _cylinder(
 
 
 def half_extents_m(low: Vec3, high: Vec3, scale: float) -> Vec3:
-    """Half the extents of a scaled bounding box."""
+    """Half extents of a scaled bounding box."""
     return (
         0.5 * scale * (high[0] - low[0]),
         0.5 * scale * (high[1] - low[1]),

@@ -1,4 +1,4 @@
-"""How far sensors are from where a rig's drawing has them."""
+"""Mounting errors of the sensors on a rig."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from gen_data.randomizers.base import RandomizerBase
 
 
 class RigCalibration(RandomizerBase):
-    """Mounts every sensor of a rig a little beside its place, as no two vehicles are built alike.
+    """Perturbs the pose of every sensor on its rig, as no two vehicles are built alike.
 
-    Labels and calibration files know where the sensors really are.
+    Labels and calibration files contain the perturbed poses.
 
     Attributes:
         rig: Name of a rig; empty = every rig.
-        offset_m: Along each axis of the sensor.
-        turn_deg: About each axis of the sensor.
+        offset_m: Offset along each axis of the sensor.
+        turn_deg: Rotation about each axis of the sensor.
     """
 
     type: Literal["rig_calibration"] = "rig_calibration"
@@ -33,10 +33,10 @@ class RigCalibration(RandomizerBase):
     turn_deg: Scalar = Normal(0.0, 0.2, clip=(-1.0, 1.0))
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with other poses of sensors on their rigs.
+        """Return the scene with perturbed sensor poses.
 
         Raises:
-            ConfigError: there is no such rig, or nothing is mounted on it.
+            ConfigError: the rig is unknown or carries no sensor.
         """
         del assets
         sensors: tuple[Camera | Lidar | Device, ...]
@@ -73,7 +73,7 @@ class RigCalibration(RandomizerBase):
         )
 
     def _perturb(self, T_rig_sensor: SE3, rng: Rng) -> SE3:
-        """The pose after an offset and three turns, each about an axis of the sensor."""
+        """Apply an offset, then a rotation about each axis of the sensor."""
         x, y, z = (self.offset_m.draw(rng) for _ in range(3))
         half = [0.5 * math.radians(self.turn_deg.draw(rng)) for _ in range(3)]
         turn = (1.0, 0.0, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""Lamps along the street, and windows that are lit."""
+"""Street lamps and lit windows at night."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from gen_data.generator.config.distributions import (
     Scalar,
     Uniform,
 )
-from gen_data.generator.core.asset_types import Keypoint, Material
+from gen_data.generator.core.asset_types import Keypoint
 from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.photometry import flux_to_intensity_cd
 from gen_data.generator.core.scene import Body, Light, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase, body_materials
+from gen_data.randomizers.base import RandomizerBase, body_materials, scale_emission, set_emission
 from gen_data.randomizers.color_space import temperature_to_linear
 from gen_data.randomizers.daylight import is_dark
 
@@ -35,22 +35,22 @@ LAMP, WINDOW = "lamp", "window"
 
 
 class StreetLights(RandomizerBase):
-    """Switches on street lamps and windows when it is dark.
+    """Switches on street lamps and windows in the dark.
 
-    Lamps are bodies whose assets have keypoints named ``lamp``; their slots of role ``lamp``
-    glow. Slots of role ``window`` are lit by chance, body by body.
+    Street lamps are bodies whose assets have keypoints named ``lamp``; their material slots of
+    role ``lamp`` emit light. Slots of role ``window`` are lit per body.
 
     Attributes:
-        when: dark: when time_of_day or weather, listed before it, has put the sun below the
-            horizon. always: by day, too.
+        when: dark: only while the sun is below the horizon; list time_of_day or weather before
+            this randomizer. always: also by day.
         flux_lm: Luminous flux of one lamp.
-        temperature_k: Of all lamps of a scene: 2300 sodium, 3000 to 4000 LED.
-        cone_deg: Half angle of the cone in which a lamp sends its light down.
-        broken: Whether a lamp stays dark.
-        lamp_luminance_cd_m2: Of a lamp's glowing part.
+        temperature_k: Colour temperature of all lamps of a scene: 2300 sodium, 3000 to 4000 LED.
+        cone_deg: Half angle of a lamp's downward cone of light.
+        broken: Whether a lamp is dark.
+        lamp_luminance_cd_m2: Luminance of a lamp's emitting surface.
         windows: Whether the windows of a body are lit.
-        window_luminance_cd_m2: Of lit windows.
-        window_temperature_k: Of the light in them.
+        window_luminance_cd_m2: Luminance of lit windows.
+        window_temperature_k: Colour temperature of lit windows.
     """
 
     type: Literal["street_lights"] = "street_lights"
@@ -67,36 +67,36 @@ class StreetLights(RandomizerBase):
     window_temperature_k: Annotated[Scalar, Bounds(1667, 25_000)] = Uniform(2400.0, 4500.0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with its lamps on; by day the scene as it is."""
+        """Return the scene with its lamps on; the same scene by day."""
         if self.when == "dark" and not is_dark(scene):
             return scene
         color = white_balanced_color(self.temperature_k.draw(rng))
         flux_lm, cone_rad = self.flux_lm.draw(rng), math.radians(self.cone_deg.draw(rng))
-        glow = _times(color, self.lamp_luminance_cd_m2.draw(rng))
+        glow = scale_emission(color, self.lamp_luminance_cd_m2.draw(rng))
         lights, bodies = list(scene.lights), []
         for body in scene.bodies:
             roles = {material.role for material in body_materials(body, assets)}
             lamps = [k for k in assets.keypoints(body.asset) if k.name == LAMP]
             if lamps and not self.broken.draw(rng):
                 lights += (
-                    _lamp(f"{self.name}/{body.name}/{n}", body, lamp, flux_lm, color, cone_rad)
+                    _make_lamp(f"{self.name}/{body.name}/{n}", body, lamp, flux_lm, color, cone_rad)
                     for n, lamp in enumerate(lamps)
                 )
-                body = _light_up(body, assets, LAMP, glow)  # noqa: PLW2901
+                body = set_emission(body, assets, {LAMP: glow})  # noqa: PLW2901
             if WINDOW in roles and self.windows.draw(rng):
-                body = _light_up(body, assets, WINDOW, self._window(rng))  # noqa: PLW2901
+                body = set_emission(body, assets, {WINDOW: self._draw_window(rng)})  # noqa: PLW2901
             bodies.append(body)
         return replace(scene, bodies=tuple(bodies), lights=tuple(lights))
 
-    def _window(self, rng: Rng) -> Vec3:
+    def _draw_window(self, rng: Rng) -> Vec3:
         color = white_balanced_color(self.window_temperature_k.draw(rng))
-        return _times(color, self.window_luminance_cd_m2.draw(rng))
+        return scale_emission(color, self.window_luminance_cd_m2.draw(rng))
 
 
 def white_balanced_color(temperature_k: float) -> Vec3:
-    """Colour of a lamp for a camera half adapted to a street at night, luminance 1.
+    """Linear RGB of a lamp, luminance 1, with the white balance halfway adapted to street light.
 
-    Images are balanced for daylight; no camera leaves it at that under sodium lamps.
+    Images are balanced for daylight, but cameras partly adapt to the light of sodium lamps.
     """
     lamp = temperature_to_linear(temperature_k)
     white = temperature_to_linear(_WHITE_K)
@@ -107,11 +107,11 @@ def white_balanced_color(temperature_k: float) -> Vec3:
 
 
 def spot_intensity_cd(flux_lm: float, cone_rad: float) -> float:
-    """Luminous intensity of a spot that sends a flux into a cone."""
+    """Luminous intensity of a spot with a flux and the half angle of its cone."""
     return flux_to_intensity_cd(Light("", "spot", cone_rad=cone_rad), flux_lm)
 
 
-def _lamp(
+def _make_lamp(
     name: str, body: Body, lamp: Keypoint, flux_lm: float, color: Vec3, cone_rad: float
 ) -> Light:
     at_body = body.scale * np.asarray(lamp.position_m)
@@ -127,18 +127,3 @@ def _lamp(
         radius_m=0.12,
         cone_rad=round(cone_rad, 6),
     )
-
-
-def _light_up(body: Body, assets: AssetIndex, role: str, emission_cd_m2: Vec3) -> Body:
-    """The body with every slot of that role lit."""
-
-    def set_emission(material: Material) -> Material:
-        return replace(material, emission_cd_m2=emission_cd_m2)
-
-    slots = body_materials(body, assets)
-    return replace(body, materials=tuple(set_emission(m) if m.role == role else m for m in slots))
-
-
-def _times(color: Vec3, luminance_cd_m2: float) -> Vec3:
-    red, green, blue = (round(part * luminance_cd_m2, 3) for part in color)
-    return (red, green, blue)

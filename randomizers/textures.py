@@ -12,17 +12,24 @@ from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import LookRandomizer, choose, find_textures, set_materials
+from gen_data.randomizers.base import (
+    SurfaceRandomizer,
+    body_materials,
+    choose,
+    find_texture_files,
+    find_textures,
+    set_materials,
+)
 
 
-class Textures(LookRandomizer):
-    """Covers its targets with drawn textures; what is printed stays as it is.
+class Textures(SurfaceRandomizer):
+    """Covers each target with a drawn texture; printed materials are unchanged.
 
     Attributes:
-        textures: Families or tags of textures: wood, marble, fabric.
-        probability: That a target is covered; 1 = every one, 0.3 = about three in ten.
-        scale_m: Length of one repeat of the texture.
-        slots: Numbers of the material slots to cover; empty = all.
+        textures: Families or tags of textures, such as wood, marble, fabric.
+        probability: Probability that a target is covered.
+        scale_m: Size of one repeat of the texture.
+        slots: Indices of the material slots to cover, from 0; empty = all.
     """
 
     type: Literal["textures"] = "textures"
@@ -31,16 +38,20 @@ class Textures(LookRandomizer):
     scale_m: Positive = Uniform(0.15, 0.6)
     slots: tuple[int, ...] = ()
 
+    def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
+        """Ids of the texture files to draw from."""
+        return find_texture_files(assets, self._find_options(assets))
+
     def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raises ConfigError if there is no texture of a name."""
+        """Raise ConfigError if a name matches no texture."""
         del scene
-        self._options(assets)
+        self._find_options(assets)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """One texture per body."""
-        options = self._options(assets)
+        """Return the scene with one texture per target."""
+        options = self._find_options(assets)
         covered = []
-        for body in self.chosen(scene):
+        for body in self.find_targets(scene):
             if not self.probability.draw(rng):
                 continue
             texture, scale_m = choose(options, rng), round(self.scale_m.draw(rng), 4)
@@ -54,7 +65,7 @@ class Textures(LookRandomizer):
 
             changed = set_materials(body, assets, cover)
             if self.slots:
-                before = body.materials or assets.materials(body.asset)
+                before = body_materials(body, assets)
                 mixed = tuple(
                     new if slot in self.slots else old
                     for slot, (new, old) in enumerate(zip(changed.materials, before, strict=True))
@@ -63,6 +74,6 @@ class Textures(LookRandomizer):
             covered.append(changed)
         return scene.with_bodies(*covered)
 
-    def _options(self, assets: AssetIndex) -> tuple[str, ...]:
-        """Ids of the textures it draws from."""
+    def _find_options(self, assets: AssetIndex) -> tuple[str, ...]:
+        """Ids of the textures to draw from."""
         return find_textures(assets, self.textures, f"randomizers.{self.name}.textures")

@@ -1,4 +1,4 @@
-"""Sun and sky through the day and the night."""
+"""Sun and sky by time of day."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ Turbidity = Annotated[Scalar, Bounds(1.8, 8.0)]
 
 
 class TimeOfDay(RandomizerBase):
-    """Draws where the sun stands; light, colours and the sky follow from it.
+    """Draws the position of the sun; daylight and sky follow from it.
 
     Attributes:
-        sun_altitude_deg: Over the horizon: 60 a summer's noon, 0 sunset, -6 the end of dusk,
-            below -12 night.
-        sun_azimuth_deg: Direction around the vertical, from +X towards +Y.
-        cloudiness: 0 clear, 0.5 broken clouds, 1 overcast; without it what the weather said,
-            else anything up to broken clouds.
+        sun_altitude_deg: Angle of the sun above the horizon: 60 summer noon, 0 sunset, -6 end of
+            dusk, below -12 night.
+        sun_azimuth_deg: Direction of the sun around the vertical, from +X towards +Y.
+        cloudiness: Cloud cover: 0 clear, 0.5 broken clouds, 1 overcast; null = the value of the
+            weather randomizer, else uniform from 0 to 0.6.
         turbidity: Haze of clear air: 2 very clear, 6 hazy.
-        sky: measured: as much light as tables of daylight say, under any clouds, day and night.
-            preetham: the luminances of the analytic clear sky by day of Preetham 1999, and its sun.
+        sky: measured: illuminance from tables of measured daylight, for any cloud cover, day and
+            night. preetham: luminance of Preetham's analytic clear daytime sky (1999), with its
+            sun.
     """
 
     type: Literal["time_of_day"] = "time_of_day"
@@ -42,13 +43,15 @@ class TimeOfDay(RandomizerBase):
     def _is_day_and_clear(self) -> TimeOfDay:
         if self.sky == "preetham":
             if self.cloudiness is not None and self.cloudiness.support() != (0.0, 0.0):
-                raise ValueError("sky 'preetham' has no clouds; leave cloudiness out")
+                raise ValueError("sky 'preetham' has no clouds; omit cloudiness")
             if self.sun_altitude_deg.support()[0] < 1.0:
-                raise ValueError("sky 'preetham' has no night; let sun_altitude_deg begin at 1")
+                raise ValueError(
+                    "sky 'preetham' has no night; expected sun_altitude_deg of at least 1"
+                )
         return self
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene at another time."""
+        """Return the scene with a drawn sun and sky."""
         del assets
         altitude_deg = self.sun_altitude_deg.draw(rng)
         azimuth_deg = self.sun_azimuth_deg.draw(rng)

@@ -1,4 +1,4 @@
-"""Who takes part in traffic, and what stands in its way."""
+"""Vehicles, pedestrians, obstacles and signals that a traffic simulation reads from a scene."""
 
 from __future__ import annotations
 
@@ -15,28 +15,28 @@ from gen_data.generator.traffic.axles import Axles, find_axles
 from gen_data.generator.traffic.conflict_zones import crosswalk_zones, heading
 from gen_data.generator.traffic.lane_routes import LaneGraph, LanePosition
 from gen_data.generator.traffic.signal_cycles import Approach, Cycle
-from gen_data.randomizers.footprints import Footprint
+from gen_data.randomizers.free_space import Footprint
 from gen_data.randomizers.traffic_lights import Signal, runs_along
 
 PERSON = "person"
 MOVING_POSES = ("walk", "run", "carry")
-"""People in other poses stand."""
+"""Poses of people who walk; people in other poses stand."""
 POSTS = ("street_light", "traffic_light", "traffic_sign", "tree")
 POST_M = 0.12
-"""Things of these categories stand on a post at their origin, and reach out above heads only."""
+"""Half width of the post at the origin of ``POSTS``; only parts above head height reach further."""
 SIGNAL_REACH_M = 30.0
-"""A lane obeys a signal no farther from its end than this."""
+"""Largest distance between the end of a lane and its signal."""
 NEAR_JUNCTION_M = 12.0
-"""Crosswalks this near to the beginning of a junction's lane belong to its signals."""
+"""Largest distance of a signal's crosswalk from the beginning of a lane across the junction."""
 
 
 @dataclass(frozen=True, slots=True)
 class Driver:
-    """How a category of vehicles is driven.
+    """Driving limits of a category of vehicles.
 
     Attributes:
-        speed_m_s: It is driven no faster.
-        acceleration_m_s2: Greatest one.
+        speed_m_s: Largest speed.
+        acceleration_m_s2: Largest acceleration.
     """
 
     speed_m_s: float = 60.0
@@ -53,7 +53,7 @@ DRIVERS: Mapping[str, Driver] = {
 
 @dataclass(frozen=True, slots=True)
 class OnRoad:
-    """A vehicle that drives: its body, its axles, and where its rear axle is."""
+    """A driving vehicle: its body, its axles, and the lane position of its rear axle."""
 
     body: Body
     axles: Axles
@@ -63,13 +63,13 @@ class OnRoad:
 
     @property
     def ahead(self) -> tuple[float, float]:
-        """Where it points, level, unit."""
+        """Horizontal unit vector of its front."""
         return heading_direction(self.body)
 
 
 @dataclass(frozen=True, slots=True)
 class OnFoot:
-    """Somebody on foot: their body, and where they are on a sidewalk or crosswalk."""
+    """A pedestrian: the body and its position on a sidewalk or crosswalk."""
 
     body: Body
     place: LanePosition
@@ -77,9 +77,9 @@ class OnFoot:
 
 
 def find_drivers(scene: Scene, graph: LaneGraph, assets: AssetIndex) -> list[OnRoad]:
-    """Vehicles on driving lanes, in order: members of groups, and what carries a rig.
+    """Find the vehicles on driving lanes, in order: members of groups and carriers of rigs.
 
-    What stands across a lane or against it takes no part.
+    Vehicles across a lane or against its direction are left out.
     """
     groups = {group.name for group in scene.groups}
     carriers = {rig.body for rig in scene.rigs}
@@ -97,7 +97,7 @@ def find_drivers(scene: Scene, graph: LaneGraph, assets: AssetIndex) -> list[OnR
         place = graph.nearest(*T_world_rear.translation_m[:2])
         if place is None or place.away_m > 0.5 * graph.lines[place.lane].lane.width_m:
             continue
-        (ax, ay), (bx, by) = heading_direction(body), _ahead_at(graph, place)
+        (ax, ay), (bx, by) = heading_direction(body), _lane_direction(graph, place)
         if ax * bx + ay * by > 0.7:
             found.append(OnRoad(body, axles, T_world_rear, place, category))
     return found
@@ -106,7 +106,7 @@ def find_drivers(scene: Scene, graph: LaneGraph, assets: AssetIndex) -> list[OnR
 def find_pedestrians(
     scene: Scene, sidewalks: LaneGraph, crosswalks: LaneGraph, assets: AssetIndex
 ) -> list[OnFoot]:
-    """People of the scene's groups, in order, on the sidewalk or crosswalk nearest to them."""
+    """Find the people of the scene's groups, in order, on their nearest sidewalk or crosswalk."""
     groups = {group.name for group in scene.groups}
     found = []
     for body in scene.bodies:
@@ -126,7 +126,7 @@ def find_pedestrians(
             place = min(near, key=lambda pair: pair[0])[1]
             pose = dict(asset.attributes).get("pose", "walk")
             walks = pose in MOVING_POSES
-            # Who stands on a crosswalk is in the way.
+            # Somebody who stands on a crosswalk is an obstacle.
             if walks or place.lane in sidewalks.lines:
                 found.append(OnFoot(body, place, walks))
     return found
@@ -134,12 +134,12 @@ def find_pedestrians(
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Standing:
-    """What stands on the ground and takes no part.
+    """Obstacles on the ground.
 
     Attributes:
-        names: Of the bodies.
-        categories: What it is.
-        boxes: What it covers [b, 6]: centre, half extents, cosine and sine of its direction.
+        names: Names of the bodies.
+        categories: Their categories.
+        boxes: Their footprints [b, 6]: centre and half extents [m], cosine and sine of the yaw.
     """
 
     names: tuple[str, ...]
@@ -147,22 +147,26 @@ class Standing:
     boxes: Array
 
     def at(self, x_m: float, y_m: float) -> str:
-        """Name of what covers a point; empty = nothing."""
+        """Name of the obstacle at a point; empty if the point is free."""
         x, y, hx, hy, c, s = self.boxes.T
         dx, dy = x_m - x, y_m - y
         inside = (np.abs(c * dx + s * dy) < hx) & (np.abs(c * dy - s * dx) < hy)
         return self.names[int(np.argmax(inside))] if inside.any() else ""
 
 
-def find_obstacles(scene: Scene, taking_part: Iterable[Body], assets: AssetIndex) -> Standing:
-    """Everything that has an instance, but roads and those who take part."""
-    moving = {body.name for body in taking_part}
+def find_obstacles(scene: Scene, moving: Iterable[Body], assets: AssetIndex) -> Standing:
+    """Find every body with an instance id, except roads and moving bodies."""
+    moving_names = {body.name for body in moving}
     roads = {lane.road for lane in scene.lanes}
     names: list[str] = []
     categories: list[str] = []
     rows: list[tuple[float, ...]] = []
     for body in scene.bodies:
-        if not body.instance_id or body.name in moving or body.name.partition("/")[0] in roads:
+        if (
+            not body.instance_id
+            or body.name in moving_names
+            or body.name.partition("/")[0] in roads
+        ):
             continue
         category = assets.get(body.asset).category
         if category in POSTS:
@@ -170,7 +174,8 @@ def find_obstacles(scene: Scene, taking_part: Iterable[Body], assets: AssetIndex
             rows.append((x, y, POST_M, POST_M, 1.0, 0.0))
         else:
             bounds_m = assets.bounds_m(body.asset)
-            rows.append(Footprint.of(body.T_world_body, bounds_m, body.scale).row()[:6])
+            footprint = Footprint.of(body.T_world_body, bounds_m, body.scale)
+            rows.append(footprint.as_row()[:6])
         names.append(body.name)
         categories.append(category)
     return Standing(tuple(names), tuple(categories), np.array(rows).reshape(-1, 6))
@@ -179,11 +184,11 @@ def find_obstacles(scene: Scene, taking_part: Iterable[Body], assets: AssetIndex
 def find_approaches(
     graph: LaneGraph, crosswalks: LaneGraph, signals: Sequence[tuple[Signal, Approach]]
 ) -> dict[str, Approach]:
-    """The signals that lanes into junctions, and crosswalks there, obey, by the lanes' names."""
+    """Map the names of lanes into junctions, and of crosswalks there, to their signals."""
     found: dict[str, Approach] = {}
     for name in graph.names:
         ways = [n for n in graph.successors(name) if graph.lines[n].lane.junction]
-        approach = None if graph.lines[name].lane.junction else _signal_for(graph, name, signals)
+        approach = None if graph.lines[name].lane.junction else _find_signal(graph, name, signals)
         if not ways or approach is None:
             continue
         found[name] = approach
@@ -194,8 +199,8 @@ def find_approaches(
     return found
 
 
-def cycles_axes(junction: Sequence[Signal]) -> list[int]:
-    """Number of the axis of every signal of a junction, in order of their first signals."""
+def number_axes(junction: Sequence[Signal]) -> list[int]:
+    """Number the axes of a junction by first appearance; the axis of every signal."""
     firsts: list[Signal] = []
     axes = []
     for signal in junction:
@@ -210,30 +215,30 @@ def cycles_axes(junction: Sequence[Signal]) -> list[int]:
 def set_cycles(
     junctions: Iterable[tuple[Sequence[Signal], Cycle]],
 ) -> list[tuple[Signal, Approach]]:
-    """Every signal with its place in its junction's cycle."""
+    """Pair every signal with its approach in the junction's cycle."""
     return [
         (signal, Approach(cycle, axis))
         for junction, cycle in junctions
-        for signal, axis in zip(junction, cycles_axes(junction), strict=True)
+        for signal, axis in zip(junction, number_axes(junction), strict=True)
     ]
 
 
 def heading_direction(body: Body) -> tuple[float, float]:
-    """Where a body's front points, level, unit."""
+    """Horizontal unit vector of a body's front."""
     x, y, _ = body.T_world_body.rotation()[:, 0].tolist()
     length = math.sqrt(x * x + y * y)
     return x / length, y / length
 
 
-def _ahead_at(graph: LaneGraph, place: LanePosition) -> tuple[float, float]:
+def _lane_direction(graph: LaneGraph, place: LanePosition) -> tuple[float, float]:
     x, y, _ = graph.lines[place.lane].pose(place.at_m).rotation()[:, 0].tolist()
     return x, y
 
 
-def _signal_for(
+def _find_signal(
     graph: LaneGraph, name: str, signals: Sequence[tuple[Signal, Approach]]
 ) -> Approach | None:
-    """The nearest signal that faces those who come along a lane."""
+    """Nearest signal that faces the traffic of a lane; None if there is none in reach."""
     lane = graph.lines[name].lane
     ax, ay = heading(lane.center_m, -1)
     near = [

@@ -1,4 +1,4 @@
-"""Traffic through time: everything on the road and on foot moves."""
+"""Motion of vehicles and pedestrians through a sequence."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ from gen_data.randomizers.traffic_actors import (
     OnFoot,
     OnRoad,
     Standing,
-    cycles_axes,
     find_approaches,
     find_drivers,
     find_obstacles,
     find_pedestrians,
     heading_direction,
+    number_axes,
     set_cycles,
 )
 from gen_data.randomizers.traffic_lights import (
@@ -56,14 +56,14 @@ from gen_data.randomizers.traffic_states import (
 )
 
 JUNCTION_M = 40.0
-"""Signals nearer to one another than this belong to one junction."""
+"""Largest distance between neighbouring signals of one junction."""
 BODY_M = (0.2, 0.22)
-"""Half extents of a person's trunk, ahead and to the side."""
+"""Half extents of a person's trunk, forwards and sideways."""
 
 
 @dataclass(frozen=True, slots=True)
 class Streets:
-    """Lanes by what moves on them."""
+    """Lane graphs by kind of traffic."""
 
     driving: LaneGraph
     sidewalks: LaneGraph
@@ -71,34 +71,34 @@ class Streets:
 
     @classmethod
     def of(cls, scene: Scene) -> Streets:
-        """Those of a scene."""
+        """Build the lane graphs of a scene."""
         kinds = ("driving", "sidewalk", "crosswalk")
         return cls(*(LaneGraph.of(scene.lanes, kind) for kind in kinds))
 
 
 class TrafficFlow(RandomizerBase):
-    """Makes traffic move; list it after all groups, paints and lights of a street.
+    """Simulates traffic; list it after all groups, paints and lights of a street.
 
-    Vehicles on driving lanes, the ego vehicle among them, follow routes over the lanes with pure
-    pursuit (Coulter 1992) and keep distance by the Intelligent Driver Model (Treiber, Hennecke,
-    Helbing 2000). They obey signals, give way in junctions without them, and stop for people on
-    crosswalks. People whose pose is one of walking follow sidewalks and cross where they may.
-    Everything else stands. What comes to the end of the network stops there.
+    Vehicles on driving lanes, including the ego vehicle, follow routes over the lanes with pure
+    pursuit (Coulter 1992) and keep their distance with the Intelligent Driver Model (Treiber,
+    Hennecke, Helbing 2000). They obey signals, give way at junctions without signals, and stop for
+    pedestrians on crosswalks. People in a walking pose follow sidewalks and use crosswalks.
+    Everything else stands still. Vehicles and pedestrians stop at the end of the road network.
 
     Attributes:
-        duration_s: From time 0 on; a data set's sequences may not be longer.
-        routes: By the name of a vehicle (``ego``): lanes, or points (x, y) in metres, that it
-            drives through; it drives on at random. All others do so from the beginning.
-        signals: Whether traffic lights work. If they do not, they stay as they are, and who comes
-            first or from the right goes first.
-        green_s: How long an axis of a junction has green.
-        all_red_s: Between one axis' amber and the other's green.
-        lens_cd_m2: Luminance of a lit lens of a signal.
-        speed_factor: Of a driver, on the lanes' usual speed.
+        duration_s: Simulated time from time 0; limits the length of the data set's sequences.
+        routes: Route by name of a vehicle (``ego``): lanes, or points (x, y) in metres, to drive
+            through; a random route follows. Vehicles without an entry drive at random.
+        signals: Whether traffic lights operate. If not, they keep their state, and vehicles give
+            way to those that arrive first or from the right.
+        green_s: Duration of green for one axis of a junction.
+        all_red_s: Time between amber for one axis and green for the other.
+        lens_cd_m2: Luminance of a lit signal lens.
+        speed_factor: Factor of a driver on the lanes' usual speed.
         headway_s: Time gap that a driver keeps.
-        walking_m_s: Pace of somebody on foot.
-        crossing: Probability that people take a crosswalk that they come to.
-        brakelight_cd_m2, indicator_cd_m2: Luminance of lamps of vehicles.
+        walking_m_s: Walking speed of a pedestrian.
+        crossing: Probability that a pedestrian takes a crosswalk on the way.
+        brakelight_cd_m2, indicator_cd_m2: Luminance of vehicle lamps.
     """
 
     type: Literal["traffic_flow"] = "traffic_flow"
@@ -118,45 +118,47 @@ class TrafficFlow(RandomizerBase):
 
     @property
     def motion_duration_s(self) -> float:
-        """The motion ends there."""
+        """End of the simulated motion [s]."""
         return self.duration_s
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with tracks and changes, as it is at time 0.
+        """Return the scene at time 0, with trajectories and state changes.
 
         Raises:
-            ConfigError: a route names nothing, or leaves the lanes.
-            LayoutRejected: things would run into one another.
+            ConfigError: a route names an unknown vehicle or lane, or leaves the lanes.
+            LayoutRejected: the simulated bodies would collide.
         """
         streets = Streets.of(scene)
-        signals = self._signals(scene, assets, rng) if self.signals else []
+        signals = self._draw_signal_cycles(scene, assets, rng) if self.signals else []
         approaches = find_approaches(streets.driving, streets.crosswalks, signals)
         drivers = find_drivers(scene, streets.driving, assets)
         people = find_pedestrians(scene, streets.sidewalks, streets.crosswalks, assets)
-        taking_part = [m.body for m in drivers] + [m.body for m in people]
-        standing = find_obstacles(scene, taking_part, assets)
+        moving = [m.body for m in drivers] + [m.body for m in people]
+        standing = find_obstacles(scene, moving, assets)
         planned = self._plan_routes(drivers, standing, streets)
-        fleet = self._fleet(drivers, streets, planned, standing.boxes, rng)
+        vehicles = self._make_vehicles(drivers, streets, planned, standing.boxes, rng)
         walks = make_walk_network(streets.sidewalks, streets.crosswalks, standing.boxes)
-        walkers = self._walkers(people, walks, rng)
-        motion = simulate(fleet, walkers, standing.boxes, approaches, self.duration_s)
-        _check(motion, drivers, people, standing, self.name)
-        tracks = _tracks(motion, drivers, people, assets)
+        pedestrians = self._make_pedestrians(people, walks, rng)
+        motion = simulate(vehicles, pedestrians, standing.boxes, approaches, self.duration_s)
+        _reject_collisions(motion, drivers, people, standing, self.name)
+        tracks = _make_trajectories(motion, drivers, people, assets)
         changes = [
-            *self._signal_changes(signals, assets, rng),
-            *self._lamp_changes(fleet, drivers, motion, assets, rng),
-            *_gait(people, motion, assets, rng),
+            *self._draw_signal_changes(signals, assets, rng),
+            *self._draw_lamp_changes(vehicles, drivers, motion, assets, rng),
+            *_draw_gait_changes(people, motion, assets, rng),
         ]
         return _set_in_motion(scene, tracks, changes)
 
-    def _signals(self, scene: Scene, assets: AssetIndex, rng: Rng) -> list[tuple[Signal, Approach]]:
-        """All traffic lights with cycles that are drawn per junction."""
+    def _draw_signal_cycles(
+        self, scene: Scene, assets: AssetIndex, rng: Rng
+    ) -> list[tuple[Signal, Approach]]:
+        """Draw one cycle per junction for all traffic lights."""
         roles = frozenset(COLORS)
         lights = [read_signal(body) for body in scene.bodies if has_lenses(body, assets, roles)]
         junctions = []
         for junction in group_junctions(lights, JUNCTION_M):
             green_s, all_red_s = self.green_s.draw(rng), self.all_red_s.draw(rng)
-            cycle = Cycle(max(cycles_axes(junction)) + 1, round(green_s, 2), round(all_red_s, 2))
+            cycle = Cycle(max(number_axes(junction)) + 1, round(green_s, 2), round(all_red_s, 2))
             offset_s = round(float(rng.uniform()) * cycle.length_s, 2)
             junctions.append((junction, replace(cycle, offset_s=offset_s)))
         return set_cycles(junctions)
@@ -164,7 +166,7 @@ class TrafficFlow(RandomizerBase):
     def _plan_routes(
         self, drivers: Sequence[OnRoad], standing: Standing, streets: Streets
     ) -> dict[str, tuple[str, ...]]:
-        """Lanes of the routes that were given, by the vehicles' names."""
+        """Expand the configured routes to names of lanes, by vehicle."""
         places = {driver.body.name: driver.place for driver in drivers}
         planned = {}
         for name, stops in sorted(self.routes.items()):
@@ -172,7 +174,7 @@ class TrafficFlow(RandomizerBase):
             if name not in places:
                 known = sorted(places)
                 raise ConfigError(
-                    f"{where}: no vehicle '{name}' is on a driving lane; expected one of "
+                    f"{where}: there is no vehicle '{name}' on a driving lane; expected one of "
                     f"{', '.join(known) or 'none'}{did_you_mean(name, known)}"
                 )
             _check_points(standing, stops, where)
@@ -186,7 +188,7 @@ class TrafficFlow(RandomizerBase):
             planned[name] = lanes[lanes.index(start) :]
         return planned
 
-    def _fleet(
+    def _make_vehicles(
         self,
         drivers: Sequence[OnRoad],
         streets: Streets,
@@ -194,7 +196,7 @@ class TrafficFlow(RandomizerBase):
         obstacles: Array,
         rng: Rng,
     ) -> Vehicles | None:
-        """Vehicles with drivers and routes; draws the same number for each of them."""
+        """Draw a driver and a route for each vehicle; None if there is none."""
         vehicles = []
         for member in drivers:
             factor, headway_s = self.speed_factor.draw(rng), self.headway_s.draw(rng)
@@ -231,8 +233,10 @@ class TrafficFlow(RandomizerBase):
         reach_m = fastest * self.duration_s + 5.0
         return make_vehicles(vehicles, streets.driving, streets.crosswalks, obstacles, reach_m)
 
-    def _walkers(self, people: Sequence[OnFoot], walks: WalkNetwork, rng: Rng) -> list[Pedestrian]:
-        walkers = []
+    def _make_pedestrians(
+        self, people: Sequence[OnFoot], walks: WalkNetwork, rng: Rng
+    ) -> list[Pedestrian]:
+        pedestrians = []
         for member in people:
             speed_m_s = self.walking_m_s.draw(rng)
             x, y, _ = member.body.T_world_body.translation_m
@@ -252,14 +256,14 @@ class TrafficFlow(RandomizerBase):
                 rng,
             )
             left_m = member.place.left_m if forward else -member.place.left_m
-            walkers.append(
+            pedestrians.append(
                 Pedestrian(member.body.name, (x, y), ahead, speed_m_s, path, left_m)
                 if member.walks
                 else Pedestrian(member.body.name, (x, y), ahead)
             )
-        return walkers
+        return pedestrians
 
-    def _signal_changes(
+    def _draw_signal_changes(
         self, signals: Sequence[tuple[Signal, Approach]], assets: AssetIndex, rng: Rng
     ) -> list[StateChange]:
         lens_cd_m2 = round(self.lens_cd_m2.draw(rng), 2)
@@ -269,9 +273,9 @@ class TrafficFlow(RandomizerBase):
             for change in signal_changes(signal, approach, assets, lens_cd_m2, self.duration_s)
         ]
 
-    def _lamp_changes(
+    def _draw_lamp_changes(
         self,
-        fleet: Vehicles | None,
+        vehicles: Vehicles | None,
         drivers: Sequence[OnRoad],
         motion: SimulatedMotion,
         assets: AssetIndex,
@@ -281,13 +285,13 @@ class TrafficFlow(RandomizerBase):
         for k, member in enumerate(drivers):
             brake, blink = self.brakelight_cd_m2.draw(rng), self.indicator_cd_m2.draw(rng)
             begun = float(rng.uniform())
-            assert fleet is not None, "there are drivers, so there is a fleet"
+            assert vehicles is not None, "drivers imply vehicles"
             states = lamp_states(
                 motion.station_m[:, k],
                 motion.speed_m_s[:, k],
                 motion.acceleration_m_s2[:, k],
                 member.axles.front_m,
-                fleet.entries[k],
+                vehicles.entries[k],
                 begun,
             )
             made += lamp_changes(member.body, assets, states, brake, blink)
@@ -295,7 +299,7 @@ class TrafficFlow(RandomizerBase):
 
 
 def _check_points(standing: Standing, stops: Sequence[Stop], where: str) -> None:
-    """Raises ConfigError if a route's point is where something stands."""
+    """Raise ConfigError if a point of a route is inside a standing body."""
     for k, stop in enumerate(stops):
         wall = "" if isinstance(stop, str) else standing.at(*stop)
         if wall and not isinstance(stop, str):
@@ -305,7 +309,7 @@ def _check_points(standing: Standing, stops: Sequence[Stop], where: str) -> None
             )
 
 
-def _gait(
+def _draw_gait_changes(
     people: Sequence[OnFoot], motion: SimulatedMotion, assets: AssetIndex, rng: Rng
 ) -> list[StateChange]:
     made: list[StateChange] = []
@@ -318,10 +322,10 @@ def _gait(
     return made
 
 
-def _tracks(
+def _make_trajectories(
     motion: SimulatedMotion, drivers: Sequence[OnRoad], people: Sequence[OnFoot], assets: AssetIndex
 ) -> list[tuple[Body, Trajectory | None]]:
-    """The track of everybody who takes part; None = they never move."""
+    """Trajectory of every vehicle and pedestrian; None for a body that never moves."""
     backs = [member.axles.T_body_rear.inverse().translation_m for member in drivers]
     wheelbases = np.array([member.axles.wheelbase_m for member in drivers])
     bodies = [m.body for m in drivers] + [m.body for m in people]
@@ -329,6 +333,7 @@ def _tracks(
         [member.body.name for member in drivers],
         motion.axle_m,
         motion.ahead,
+        # Small-angle pitch; the floor on the wheelbase avoids a division by zero.
         np.clip(motion.rise / np.maximum(wheelbases, 0.1), -0.3, 0.3),
         backs,
     ) + make_upright_trajectories(
@@ -341,14 +346,14 @@ def _tracks(
     return list(zip(bodies, made, strict=True))
 
 
-def _check(
+def _reject_collisions(
     motion: SimulatedMotion,
     drivers: Sequence[OnRoad],
     people: Sequence[OnFoot],
     standing: Standing,
     name: str,
 ) -> None:
-    """Raises LayoutRejected if anything that moves overlaps anything."""
+    """Raise LayoutRejected if a moving body overlaps another body."""
     middle = np.array([0.5 * (m.axles.front_m - m.axles.rear_m) for m in drivers])
     centres = motion.axle_m[..., :2] + middle[:, None] * motion.ahead
     cars = np.concatenate([centres, motion.ahead], axis=2)
@@ -365,13 +370,13 @@ def _check(
     kinds = [m.category for m in drivers] + ["person"] * len(people) + list(standing.categories)
     one, other = sorted((kinds[found[1]], kinds[found[2]]))
     remedy = f"fewer vehicles or people, or a shorter duration_s (randomizers.{name})"
-    raise LayoutRejected(Rejection(f"{one} and {other} meet in traffic", remedy))
+    raise LayoutRejected(Rejection(f"{one} and {other} collide in traffic", remedy))
 
 
 def _set_in_motion(
     scene: Scene, tracks: Sequence[tuple[Body, Trajectory | None]], changes: Sequence[StateChange]
 ) -> Scene:
-    """The scene at time 0 with all that will happen."""
+    """Return the scene at time 0 with its trajectories and state changes."""
     moved = [
         replace(body, T_world_body=track.knots[0].rounded())
         for body, track in tracks

@@ -1,4 +1,4 @@
-"""What traffic lights show."""
+"""States of traffic lights."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 from gen_data.generator.config.distributions import Choice, Constant, Name, Positive, Uniform
-from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Instance, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase, body_materials
+from gen_data.randomizers.base import RandomizerBase, body_materials, set_emission
 
 LIT: Mapping[str, tuple[str, ...]] = {
     "red": ("lens_red", "lens_stop"),
@@ -22,7 +21,7 @@ LIT: Mapping[str, tuple[str, ...]] = {
     "yellow": ("lens_yellow", "lens_stop"),
     "green": ("lens_green", "lens_walk"),
 }
-"""Roles that emit light in each state; people wait while vehicles do, and when these clear."""
+"""Roles that emit light in each state; pedestrians walk only while vehicles have green."""
 
 COLORS: Mapping[str, Vec3] = {
     "lens_red": (4.35, 0.1, 0.03),
@@ -31,12 +30,12 @@ COLORS: Mapping[str, Vec3] = {
     "lens_green": (0.12, 1.3, 0.62),
     "lens_walk": (0.12, 1.3, 0.62),
 }
-"""Linear RGB of luminance 1 within the chromaticity regions of EN 12368, as far as sRGB reaches."""
+"""Linear RGB of luminance 1, in the chromaticity regions of EN 12368 as far as in sRGB's gamut."""
 
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """A traffic light's body, where it stands, and the axis of the traffic that it is for."""
+    """A traffic light: its body, its position, and the axis of the traffic it controls."""
 
     body: Body
     at_m: Vec3
@@ -44,16 +43,16 @@ class Signal:
 
 
 class TrafficLights(RandomizerBase):
-    """Draws a state per junction; crossing directions never have green together.
+    """Draws a state per junction; crossing directions never have green at the same time.
 
-    Signals that stand close together are one junction. Its first signal shows the drawn state, as
-    do all along the same axis; signals across it show red, or green while the first shows red.
-    Signals for people follow the traffic that goes their way.
+    Signals close to each other form a junction. All signals along the axis of its first signal
+    show the drawn state; signals across it show red, or green while the first axis has red.
+    Pedestrian signals follow the parallel traffic.
 
     Attributes:
-        state: Of a junction's first axis: red, red_yellow, green or yellow.
-        luminance_cd_m2: Of a lit lens; 200 cd from a lens of 200 mm are 6400 cd/m^2.
-        junction_m: Signals nearer to one another than this belong to one junction.
+        state: State of a junction's first axis: red, red_yellow, green or yellow.
+        luminance_cd_m2: Luminance of a lit lens; 200 cd from a lens of 200 mm is 6400 cd/m^2.
+        junction_m: Largest distance between neighbouring signals of one junction.
     """
 
     type: Literal["traffic_lights"] = "traffic_lights"
@@ -64,16 +63,16 @@ class TrafficLights(RandomizerBase):
     ROLES: ClassVar[frozenset[str]] = frozenset(COLORS)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with every lens lit or dark, and its state among the labels' attributes."""
+        """Return the scene with every signal set, and its state in the instances' attributes."""
         signals = [
             read_signal(body) for body in scene.bodies if has_lenses(body, assets, self.ROLES)
         ]
         bodies: list[Body] = []
         states: dict[int, str] = {}
         for junction in group_junctions(signals, self.junction_m.draw(rng)):
-            state, luminance = self._state(rng), round(self.luminance_cd_m2.draw(rng), 2)
+            state, luminance = self._draw_state(rng), round(self.luminance_cd_m2.draw(rng), 2)
             for signal in junction:
-                own = state if runs_along(junction[0], signal) else _crossing(state)
+                own = state if runs_along(junction[0], signal) else _crossing_state(state)
                 bodies.append(show_state(signal.body, assets, own, luminance))
                 states[signal.body.instance_id] = own
         instances = tuple(
@@ -84,7 +83,7 @@ class TrafficLights(RandomizerBase):
         )
         return replace(scene, instances=instances).with_bodies(*bodies)
 
-    def _state(self, rng: Rng) -> str:
+    def _draw_state(self, rng: Rng) -> str:
         state = self.state.draw(rng)
         if state not in LIT:
             raise ConfigError(
@@ -94,13 +93,13 @@ class TrafficLights(RandomizerBase):
         return state
 
 
-def _crossing(state: str) -> str:
-    """What the other axis shows. All red would be safe as well, but is rare."""
+def _crossing_state(state: str) -> str:
+    """State of the other axis. All red would be safe as well, but is rare."""
     return "green" if state == "red" else "red"
 
 
 def group_junctions(signals: Sequence[Signal], radius_m: float) -> Iterator[list[Signal]]:
-    """Signals in groups that are linked by distances below ``radius_m``, in order."""
+    """Group signals linked by distances below ``radius_m``, in order (single linkage)."""
     waiting = list(signals)
     while waiting:
         group, frontier = [waiting[0]], [waiting.pop(0)]
@@ -114,37 +113,34 @@ def group_junctions(signals: Sequence[Signal], radius_m: float) -> Iterator[list
 
 
 def runs_along(first: Signal, other: Signal) -> bool:
-    """Whether two signals are for traffic along the same axis, within 45 degrees."""
+    """Whether two signals control traffic along the same axis, within 45 degrees."""
     (ax, ay), (bx, by) = first.axis, other.axis
     return abs(ax * bx + ay * by) >= abs(ax * by - ay * bx)
 
 
 def read_signal(body: Body) -> Signal:
-    """A body as a signal: its front is towards the traffic that it is for."""
+    """Read a signal from a body, whose front faces the traffic it controls."""
     x, y, _ = body.T_world_body.rotation()[:, 0].tolist()
     return Signal(body, body.T_world_body.translation_m, (x, y))
 
 
 def has_lenses(body: Body, assets: AssetIndex, roles: frozenset[str]) -> bool:
-    """Whether a body has a slot of any of these roles."""
+    """Whether a body has a material slot of any of these roles."""
     return any(material.role in roles for material in body_materials(body, assets))
 
 
 def show_state(body: Body, assets: AssetIndex, state: str, luminance_cd_m2: float) -> Body:
-    """The body with the lenses of a state lit and all others dark."""
-
-    def set_emission(material: Material) -> Material:
-        if material.role not in COLORS:
-            return material
-        level = luminance_cd_m2 if material.role in LIT[state] else 0.0
-        r, g, b = (round(level * channel, 2) for channel in COLORS[material.role])
-        return replace(material, emission_cd_m2=(r, g, b))
-
-    return replace(body, materials=tuple(set_emission(m) for m in body_materials(body, assets)))
+    """Return the body with the lenses of a state lit and all others dark."""
+    emission: dict[str, Vec3] = {}
+    for role, color in COLORS.items():
+        level = luminance_cd_m2 if role in LIT[state] else 0.0
+        r, g, b = (round(level * channel, 2) for channel in color)
+        emission[role] = (r, g, b)
+    return set_emission(body, assets, emission)
 
 
 def label_state(instance: Instance, state: str) -> Instance:
-    """The instance with its state among its attributes; for people: stop or walk."""
+    """Return the instance with its state as an attribute; stop or walk for pedestrian signals."""
     if instance.subcategory == "pedestrian":
         state = "walk" if state == "green" else "stop"
     facts = {**dict(instance.attributes), "state": state}

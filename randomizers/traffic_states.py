@@ -1,4 +1,4 @@
-"""What changes on bodies in traffic: lamps, signals, and the steps of those who walk."""
+"""State changes of bodies in traffic: vehicle lamps, signals and the gait of pedestrians."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ from gen_data.generator.traffic.pedestrians import stride_m
 from gen_data.generator.traffic.signal_cycles import Approach
 from gen_data.generator.traffic.simulation import STEP_S
 from gen_data.generator.traffic.vehicles import Entry
-from gen_data.randomizers.base import body_materials
+from gen_data.randomizers.base import body_materials, scale_emission, set_emission
 from gen_data.randomizers.traffic_lights import Signal, show_state
-from gen_data.randomizers.vehicle_lights import AMBER, RED, scale_emission, set_emission
+from gen_data.randomizers.vehicle_lights import AMBER, RED
 
 BRAKES_M_S2 = 0.7
-"""Brake lights come on from this deceleration on (UN R13-H, 5.2.22.4) and at a standstill."""
+"""Deceleration from which brake lights are on (UN R13-H, 5.2.22.4); also at a standstill."""
 BRAKES_S = 0.3
-"""They stay on for at least this long."""
+"""Shortest time that brake lights stay on."""
 SIGNALLED_M = 30.0
-"""Turns are indicated this far ahead."""
+"""Distance before a turn at which the indicator starts."""
 TURNS = 0.25
-"""Sine of half the angle of what counts as a turn, 29 degrees."""
+"""Sine of half the smallest angle of a turn, 29 degrees."""
 BLINKS_PER_S = 1.5
 """UN R48, 6.5.9.1: 90 a minute, give or take 30."""
 STANDS_M_S, WALKS_M_S = 0.05, 0.2
-"""Who is slower stands still; who stands walks again when faster."""
+"""Speeds below which a pedestrian stands and above which one walks again (hysteresis)."""
 DEFAULT_HEIGHT_M = 1.7
 
 S = TypeVar("S")
 Lamps = tuple[bool, str, bool]
-"""Whether a vehicle brakes, the turn that it indicates, and whether that lamp is lit now."""
+"""Whether a vehicle brakes, its indicated turn, and whether that indicator is lit now."""
 
 
 def lamp_states(
@@ -51,15 +51,15 @@ def lamp_states(
     entries: Sequence[Entry],
     blink: float,
 ) -> list[Lamps]:
-    """What a vehicle's lamps show at every step.
+    """Compute the states of a vehicle's lamps at every step.
 
     Args:
-        station_m: Of its rear axle on its route [t].
-        speed_m_s: [t].
-        acceleration_m_s2: [t].
-        front_m: From its rear axle to its front.
-        entries: The junctions on its route.
-        blink: Share of a blink that is over at time 0.
+        station_m: Position of the rear axle along the route [t].
+        speed_m_s: Speed [t].
+        acceleration_m_s2: Acceleration [t].
+        front_m: Distance from the rear axle to the front.
+        entries: Junctions on the route.
+        blink: Phase of the indicator at time 0, in [0, 1).
     """
     brakes = (acceleration_m_s2 < -BRAKES_M_S2) | (speed_m_s < STANDS_M_S)
     held = _hold(brakes, round(BRAKES_S / STEP_S))
@@ -80,7 +80,7 @@ def lamp_states(
 def lamp_changes(
     body: Body, assets: AssetIndex, states: Sequence[Lamps], brake_cd_m2: float, blink_cd_m2: float
 ) -> list[StateChange]:
-    """A vehicle's lamps from time 0 on; none for those that have no such lamps."""
+    """State changes of a vehicle's lamps from time 0; empty if it has no such lamps."""
     roles = {material.role for material in body_materials(body, assets)}
     if not roles & {"brakelight", "indicator_left", "indicator_right"}:
         return []
@@ -101,7 +101,7 @@ def lamp_changes(
 def signal_changes(
     signal: Signal, approach: Approach, assets: AssetIndex, lens_cd_m2: float, until_s: float
 ) -> list[StateChange]:
-    """What a traffic light shows from time 0 on."""
+    """State changes of a traffic light from time 0."""
     made = []
     for time_s in (0.0, *approach.cycle.switches_s(approach.axis, until_s)):
         state = approach.state(time_s)
@@ -114,13 +114,13 @@ def signal_changes(
 def gait_changes(
     body: Body, assets: AssetIndex, walked_m: Array, pace_m_s: Array, start: float
 ) -> list[StateChange]:
-    """The steps of somebody who walks, and their standing still; none for other assets.
+    """State changes of a pedestrian who walks and stands; empty for assets without poses.
 
     Args:
-        body: Theirs.
-        assets: The library.
-        walked_m: Distances so far, at every step of time.
-        pace_m_s: Their speeds.
+        body: Body of the pedestrian.
+        assets: Library of its asset.
+        walked_m: Distance walked since time 0 [t].
+        pace_m_s: Walking speed [t].
         start: Phase of the stride at time 0, in [0, 1).
     """
     known = dict(assets.get(body.asset).attributes)
@@ -153,7 +153,7 @@ def gait_changes(
 
 
 def apply_first_changes(scene: Scene, changes: Iterable[StateChange]) -> Scene:
-    """The scene as it is at time 0."""
+    """Return the scene with its state changes at time 0 applied."""
     first = {change.body: change for change in changes if change.time_s == 0.0}
     bodies = tuple(
         replace(
@@ -170,10 +170,9 @@ def apply_first_changes(scene: Scene, changes: Iterable[StateChange]) -> Scene:
             asset=by_id[instance.instance_id].asset or instance.asset,
             attributes=tuple(
                 sorted(
-                    {
-                        **dict(instance.attributes),
-                        **dict(by_id[instance.instance_id].attributes),
-                    }.items()
+                    (
+                        dict(instance.attributes) | dict(by_id[instance.instance_id].attributes)
+                    ).items()
                 )
             ),
         )
@@ -185,7 +184,7 @@ def apply_first_changes(scene: Scene, changes: Iterable[StateChange]) -> Scene:
 
 
 def _hold(on: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
-    """True for at least some steps once it is."""
+    """Extend every True over at least this many steps."""
     held: NDArray[np.bool_] = on.copy()
     for k in range(1, steps):
         held[k:] |= on[:-k]
@@ -193,7 +192,7 @@ def _hold(on: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:
 
 
 def _changes(states: Sequence[S], change: Callable[[float, S], StateChange]) -> list[StateChange]:
-    """A change at time 0 and wherever a state differs from the one before."""
+    """Make a change at time 0 and wherever a state differs from the previous one."""
     return [
         change(round(k * STEP_S, 6), state)
         for k, state in enumerate(states)

@@ -15,12 +15,11 @@ from gen_data.generator.config.distributions import (
     Probability,
     Uniform,
 )
-from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Instance, Light, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import LookRandomizer, body_materials
+from gen_data.randomizers.base import SurfaceRandomizer, scale_emission, set_emission
 from gen_data.randomizers.daylight import is_dark
 
 _WHITE: Vec3 = (1.02, 1.0, 0.94)
@@ -31,22 +30,23 @@ _CUTOFF = 0.01
 """UN R48: headlights of cars are aimed 1 to 1.5 % down."""
 _CONE_RAD = 0.9
 _EVEN = 0.5
+"""The beam is uniform up to this fraction of its cone."""
 _OUTSIDE_M = 0.06
+"""A beam starts this far in front of its lens, so that the lens does not shade it."""
 
 
-class VehicleLights(LookRandomizer):
-    """Switches lights of vehicles on, by the roles of their slots, and labels their state.
+class VehicleLights(SurfaceRandomizer):
+    """Switches the lights of vehicles and adds their states to the labels.
 
     Attributes:
-        headlights: Whether head and tail lights are on by day; in the dark they always are.
+        headlights: Whether head and tail lights are on by day; they always are in the dark.
         braking: Whether the brake lights are on.
-        indicator: Which indicator blinks: none, left, right or both.
-        headlight_cd_m2: Luminance of headlight slots: what a lens shows on average off its beam.
-        taillight_cd_m2, brakelight_cd_m2, indicator_cd_m2: Luminance of the other slots. UN R7
-            and R6 ask for 4 to 17 cd, 60 to 260 cd and 175 to 1000 cd; lenses have 50 to 100 cm^2.
-        beam_cd: Luminous intensity of a dipped beam where it is brightest; with 9 to 14 kcd the
-            whole beam is as UN R112 asks for.
-        beams: Whether headlights cast light on the street in the dark.
+        indicator: Indicators that are on: none, left, right or both.
+        headlight_cd_m2: Mean luminance of a headlight's lens outside its beam.
+        taillight_cd_m2, brakelight_cd_m2, indicator_cd_m2: Luminance of the other lamps. UN R7 and
+            R6 require 4 to 17 cd, 60 to 260 cd and 175 to 1000 cd; lenses have 50 to 100 cm^2.
+        beam_cd: Peak luminous intensity of a dipped beam; 9 to 14 kcd conforms to UN R112.
+        beams: Whether headlights illuminate the scene in the dark.
     """
 
     type: Literal["vehicle_lights"] = "vehicle_lights"
@@ -61,18 +61,18 @@ class VehicleLights(LookRandomizer):
     beams: bool = Field(True)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with the lights of its vehicles as drawn."""
+        """Return the scene with drawn states of all vehicle lights."""
         dark = is_dark(scene)
         bodies, lights, states = [], list(scene.lights), {}
-        for body in self.chosen(scene):
+        for body in self.find_targets(scene):
             on, braking = self.headlights.draw(rng), self.braking.draw(rng)
             side, beam_cd = self.indicator.draw(rng), self.beam_cd.draw(rng)
             on = on or dark
-            glow = self._glow(on, braking, side, rng)
+            glow = self._draw_emission(on, braking, side, rng)
             bodies.append(set_emission(body, assets, glow))
             states[body.instance_id] = (
-                ("brake_lights", _word(braking)),
-                ("head_lights", _word(on)),
+                ("brake_lights", "on" if braking else "off"),
+                ("head_lights", "on" if on else "off"),
                 ("indicator", side),
             )
             if dark and self.beams:
@@ -80,11 +80,13 @@ class VehicleLights(LookRandomizer):
         return replace(
             scene.with_bodies(*bodies),
             lights=tuple(lights),
-            instances=tuple(_label(i, states.get(i.instance_id, ())) for i in scene.instances),
+            instances=tuple(
+                _label_instance(i, states.get(i.instance_id, ())) for i in scene.instances
+            ),
         )
 
-    def _glow(self, on: bool, braking: bool, side: str, rng: Rng) -> dict[str, Vec3]:
-        """Emission by role; one draw of every luminance, so that switches move no other draw."""
+    def _draw_emission(self, on: bool, braking: bool, side: str, rng: Rng) -> dict[str, Vec3]:
+        """Draw emission by role; every luminance is drawn, so that switches shift no other draw."""
         head, tail, brake, blink = (
             luminance.draw(rng)
             for luminance in (
@@ -108,17 +110,8 @@ class VehicleLights(LookRandomizer):
         return glow
 
 
-def set_emission(body: Body, assets: AssetIndex, glow: dict[str, Vec3]) -> Body:
-    """The body with the emission of some roles exchanged."""
-
-    def set_emission(material: Material) -> Material:
-        return replace(material, emission_cd_m2=glow.get(material.role, material.emission_cd_m2))
-
-    return replace(body, materials=tuple(set_emission(m) for m in body_materials(body, assets)))
-
-
 def dipped_beam(name: str, T_world_lens: SE3, beam_cd: float) -> Light:
-    """The dipped beam of a lens, which faces +X: dark above its cut-off."""
+    """Dipped beam of a lens that faces +X, with a cut-off."""
     x, y, z = (round(part, 6) for part in T_world_lens.translation_m)
     dx, dy, dz = (round(float(part), 6) for part in T_world_lens.rotation()[:, 0])
     return Light(
@@ -136,7 +129,7 @@ def dipped_beam(name: str, T_world_lens: SE3, beam_cd: float) -> Light:
 
 
 def _beams(name: str, body: Body, assets: AssetIndex, beam_cd: float) -> list[Light]:
-    """One spot per headlight, just before its lens."""
+    """One spot per headlight, just in front of its lens."""
     lights = []
     for point in assets.keypoints(body.asset):
         if point.name.startswith("headlight"):
@@ -147,16 +140,6 @@ def _beams(name: str, body: Body, assets: AssetIndex, beam_cd: float) -> list[Li
     return lights
 
 
-def _label(instance: Instance, states: tuple[tuple[str, str], ...]) -> Instance:
+def _label_instance(instance: Instance, states: tuple[tuple[str, str], ...]) -> Instance:
     attributes = {**dict(instance.attributes), **dict(states)}
     return replace(instance, attributes=tuple(sorted(attributes.items())))
-
-
-def _word(on: bool) -> str:
-    return "on" if on else "off"
-
-
-def scale_emission(color: Vec3, luminance_cd_m2: float) -> Vec3:
-    """Emission of a colour of luminance 1."""
-    red, green, blue = (round(part * luminance_cd_m2, 3) for part in color)
-    return (red, green, blue)

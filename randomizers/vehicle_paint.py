@@ -22,7 +22,7 @@ from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import LookRandomizer, body_materials
+from gen_data.randomizers.base import SurfaceRandomizer, body_materials
 from gen_data.randomizers.color_space import hsv_to_linear
 
 PAINT = "paint"
@@ -30,7 +30,7 @@ _DUST: Vec3 = (0.17, 0.145, 0.115)
 _PIGMENT = 0.45
 """Roughness of the pigment below a clear coat."""
 _WORN = 0.4
-"""Roughness of a clear coat, as a share of that of a paint which looks like it from afar."""
+"""Ratio of a clear coat's roughness to that of an uncoated paint of similar appearance."""
 _SOILED = ("paint", "glass", "rim", "tyre", "trim", "chrome", "plate", "headlight", "taillight")
 
 
@@ -60,22 +60,22 @@ ON_ROADS = {
     "white": 30.0, "black": 21.0, "grey": 21.0, "silver": 10.0, "blue": 9.0,
     "red": 5.0, "green": 1.5, "brown": 1.2, "yellow": 0.7, "orange": 0.6,
 }  # fmt: skip
-"""Weights of ours in the order that paint makers report year by year: white, black, grey first."""
+"""The project's own weights, in the order of paint makers' annual reports."""
 
 
-class VehiclePaint(LookRandomizer):
-    """Paints every slot of role ``paint`` of a vehicle in one colour; soils and registers it.
+class VehiclePaint(SurfaceRandomizer):
+    """Draws the paint, the dirt and the licence plate of every vehicle.
 
     Attributes:
-        weights: How often a colour is drawn: white, black, grey, silver, blue, red, green, brown,
+        weights: Relative frequency by colour: white, black, grey, silver, blue, red, green, brown,
             yellow, orange.
-        probability: That a vehicle is painted anew; the others keep their model's paint.
-        roughness: Of the clear coat: 0.1 waxed, 0.3 weathered.
-        metallic: Whether the paint has flakes of metal; white never has.
-        dirt: Share of dust in every colour of the vehicle.
-        plates: Whether every vehicle gets a licence plate of its own, or keeps its model's.
-        coat: Weight of a clear coat that mirrors what is around, by a ray per pixel; with it
-            ``roughness`` tells how worn that coat is. 0 = the paint itself shines.
+        probability: Probability that a vehicle is repainted; others keep their model's paint.
+        roughness: Roughness of the finish: 0.1 waxed, 0.3 weathered.
+        metallic: Whether the paint contains metal flakes; white never does.
+        dirt: Fraction of dust on the vehicle's surfaces.
+        plates: Whether every vehicle gets its own licence plate instead of its model's.
+        coat: Weight of a separate clear coat, traced with one ray per pixel; ``roughness`` then
+            sets the wear of the coat. 0 = no separate coat.
     """
 
     type: Literal["vehicle_paint"] = "vehicle_paint"
@@ -88,7 +88,7 @@ class VehiclePaint(LookRandomizer):
     coat: UnitInterval = Constant(0.0)
 
     def model_post_init(self, context: object) -> None:
-        """Refuse colours that do not exist, and weights of which none counts."""
+        """Reject unknown colours, and weights that are all 0."""
         del context
         unknown = sorted(set(self.weights) - set(PAINTS))
         if unknown:
@@ -97,18 +97,18 @@ class VehiclePaint(LookRandomizer):
             raise ValueError("every weight is 0; expected one above 0")
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with its vehicles painted; one draw of everything for each of them."""
+        """Return the scene with its vehicles painted; the same number of draws for each."""
         painted = []
-        for body in self.chosen(scene):
-            paint = self._paint(rng)
+        for body in self.find_targets(scene):
+            paint = self._draw_paint(rng)
             anew, dirt = self.probability.draw(rng), self.dirt.draw(rng)
             painted.append(_finish(body, assets, paint if anew else None, dirt))
         if self.plates:
             painted = [_change_plates(body, int(rng.integers(SEEDS))) for body in painted]
         return scene.with_bodies(*painted)
 
-    def _paint(self, rng: Rng) -> Material:
-        """The material of a paint; only its colour and gloss count."""
+    def _draw_paint(self, rng: Rng) -> Material:
+        """Draw the material of a paint: colour, gloss and coat."""
         names = sorted(self.weights)
         ends = [sum(self.weights[n] for n in names[: k + 1]) for k in range(len(names))]
         draw = float(rng.uniform()) * ends[-1]
@@ -133,7 +133,7 @@ class VehiclePaint(LookRandomizer):
 
 
 def _finish(body: Body, assets: AssetIndex, paint: Material | None, dirt: float) -> Body:
-    """The body painted (unless None) and with dust on it."""
+    """Return the body with dust on it, and painted unless the paint is None."""
 
     def finish(material: Material) -> Material:
         if paint is not None and material.role == PAINT and not material.printed:
@@ -154,7 +154,7 @@ def _finish(body: Body, assets: AssetIndex, paint: Material | None, dirt: float)
 
 
 def _change_plates(body: Body, seed: int) -> Body:
-    """The body with another licence plate, where it has one."""
+    """Return the body with another licence plate, if it has one."""
     return replace(
         body,
         materials=tuple(replace(m, texture=reseed_plate(m.texture, seed)) for m in body.materials),
@@ -162,7 +162,7 @@ def _change_plates(body: Body, seed: int) -> Body:
 
 
 def _soil(material: Material, dirt: float) -> Material:
-    """A surface under a thin layer of dust: towards its colour, and duller."""
+    """Return the material under a thin layer of dust: blended with its colour, and rougher."""
     share = 0.35 * dirt if material.role == "glass" else dirt
     red, green, blue = (
         round(clean * (1.0 - share) + dust * share, 6)

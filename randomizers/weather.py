@@ -1,4 +1,4 @@
-"""The weather, and the sun and sky that go with it."""
+"""Weather, with the matching sun and sky."""
 
 from __future__ import annotations
 
@@ -40,25 +40,26 @@ _PATTERNS = 2**31
 
 
 class Weather(RandomizerBase):
-    """Draws a named kind of weather; fields that are given replace what the name stands for.
+    """Draws a weather preset; other fields, where given, override the preset's values.
 
     Attributes:
-        preset: Condition and time in one name: ClearNoon, WetCloudySunset, HardRainNight,
-            FoggyMorning, SoftSnowDusk. Conditions: Clear, Cloudy, Wet, WetCloudy, SoftRain,
-            MidRain, HardRain, Misty, Foggy, DenseFog, Snowy, SoftSnow, HardSnow, DustStorm.
-            Times: Noon, Morning, Sunset, Dusk, Night.
-        sun_altitude_deg: Over the horizon; negative at night.
-        sun_azimuth_deg: Direction around the vertical, from +X towards +Y.
-        cloudiness: 0 clear, 0.5 broken clouds, 1 overcast.
+        preset: Condition and time of day in one name, such as ClearNoon, WetCloudySunset or
+            HardRainNight. Conditions: Clear, Cloudy, Wet, WetCloudy, SoftRain, MidRain, HardRain,
+            Misty, Foggy, DenseFog, Snowy, SoftSnow, HardSnow, DustStorm. Times: Noon, Morning,
+            Sunset, Dusk, Night.
+        sun_altitude_deg: Angle of the sun above the horizon; negative at night.
+        sun_azimuth_deg: Direction of the sun around the vertical, from +X towards +Y.
+        cloudiness: Cloud cover: 0 clear, 0.5 broken clouds, 1 overcast.
         turbidity: Haze of clear air: 2 very clear, 6 hazy.
-        fog_extinction_per_m: At the ground; 3.912 over it is the meteorological range.
-        fog_height_m: Height over which fog thins by a factor of e; 0 = evenly thick.
-        rain_mm_h: Rain that is falling.
-        snow_mm_h: Snow that is falling, as water.
-        wetness: Of surfaces open to the sky, 0 dry to 1 soaked.
-        puddles: Share of level ground under water.
-        snow_cover: Share of upward surfaces under snow.
-        lens_drops: Share of the image behind drops on the lens.
+        fog_extinction_per_m: Extinction coefficient at the ground; the meteorological range is
+            3.912 divided by it.
+        fog_height_m: Height over which fog thins by a factor of e; 0 = uniform fog.
+        rain_mm_h: Rain rate.
+        snow_mm_h: Snow rate as water equivalent.
+        wetness: Wetness of surfaces open to the sky: 0 dry, 1 soaked.
+        puddles: Fraction of level ground under water.
+        snow_cover: Fraction of upward-facing surfaces under snow.
+        lens_drops: Fraction of the image covered by drops on the lens.
     """
 
     type: Literal["weather"] = "weather"
@@ -77,7 +78,7 @@ class Weather(RandomizerBase):
     lens_drops: UnitInterval | None = Field(None)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene in other weather."""
+        """Return the scene with drawn weather, sun and sky."""
         del assets
         preset = PRESETS[self.preset.draw(rng)]
         condition = preset.condition
@@ -100,7 +101,7 @@ class Weather(RandomizerBase):
     @field_validator("preset")
     @classmethod
     def _check_preset(cls, preset: Name) -> Name:
-        """Refuse names that stand for nothing."""
+        """Reject unknown presets."""
         for name in preset.outcomes():
             if name not in PRESETS:
                 raise custom_error(
@@ -112,5 +113,5 @@ class Weather(RandomizerBase):
         return preset
 
 
-def _draw(given: Scalar | None, usual: Range, rng: Rng) -> float:
-    return (given or Uniform(*usual)).draw(rng)
+def _draw(given: Scalar | None, default: Range, rng: Rng) -> float:
+    return (given or Uniform(*default)).draw(rng)

@@ -1,8 +1,9 @@
-"""Kinds of weather by name: a condition and a time, as in ``HardRainSunset``.
+"""Weather presets: a condition and a time of day in one name, as in ``HardRainSunset``.
 
-The names are those of CARLA's ``WeatherParameters``, continued for fog and snow; the values are
-ours. Rain rates after the World Meteorological Organization's classes: light below 2.5 mm/h,
-moderate to 10, heavy above. Fog after meteorological range: mist 1 km to 5 km, fog below 1 km.
+The names follow CARLA's ``WeatherParameters``, extended by fog and snow; the values are this
+project's own. Rain rates follow the classes of the World Meteorological Organization: light below
+2.5 mm/h, moderate up to 10, heavy above. Fog follows the meteorological range: mist from 1 km to
+5 km, fog below 1 km.
 """
 
 from __future__ import annotations
@@ -19,11 +20,11 @@ KOSCHMIEDER = 3.912
 
 @dataclass(frozen=True, slots=True)
 class Condition:
-    """What the sky, the air and the ground are like.
+    """State of the sky, the air and the ground.
 
     Attributes:
-        cloudiness, turbidity: Uniformly drawn in these ranges.
-        weather: Typical values; its seed is drawn.
+        cloudiness, turbidity: Ranges of uniform draws.
+        weather: Typical values; the seed is drawn.
     """
 
     cloudiness: Range
@@ -76,7 +77,7 @@ CONDITIONS: dict[str, Condition] = {
     "HardSnow": Condition((1.0, 1.0), (3.0, 5.0), _snow(2.5, 500.0, 0.85)),
     "DustStorm": Condition((0.3, 0.6), (7.0, 8.0), Weather(fog_extinction_per_m=0.006)),
 }
-"""By the first part of a preset's name."""
+"""Conditions by the first part of a preset's name."""
 
 ALTITUDES_DEG: dict[str, Range] = {
     "Noon": (32.0, 62.0),
@@ -85,7 +86,7 @@ ALTITUDES_DEG: dict[str, Range] = {
     "Dusk": (-7.0, -3.0),
     "Night": (-50.0, -16.0),
 }
-"""Where the sun stands, by the last part of a preset's name."""
+"""Range of the sun's altitude, by the last part of a preset's name."""
 
 _OTHER_NAMES = {"MidRainy": "MidRain"}
 

@@ -1,4 +1,4 @@
-"""Declarative scenes: YAML templates, and the element types they are made of."""
+"""Scene templates: YAML files, and the element types that they consist of."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from gen_data.generator.core.plugins import PluginTable
 TABLE = PluginTable[Element](
     "element",
     {
-        "lane_objects": "gen_data.scene_templates.along:Along",
+        "lane_objects": "gen_data.scene_templates.lane_objects:LaneObjects",
         "backdrop": "gen_data.scene_templates.backdrop:Backdrop",
         "bin": "gen_data.scene_templates.bin:Bin",
         "crosswalk": "gen_data.scene_templates.crosswalk:Crosswalk",

@@ -1,4 +1,4 @@
-"""What stands behind the scene when there is no room."""
+"""Backgrounds of scenes without a room."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from gen_data.scene_templates.element import PlacedElement, add_static, stand_up
 
 
 class Backdrop(PlacedElement):
-    """Flat ground (``plane``) or a photographer's sweep (``backdrop``), without a label.
+    """Flat ground (``plane``) or a studio backdrop (``backdrop``), without a label.
 
     Attributes:
-        asset: ``plane``, ``backdrop``, or either with a size: ``plane?size_m=6,6``.
+        asset: ``plane`` or ``backdrop``, optionally with a size: ``plane?size_m=6,6``.
     """
 
     type: Literal["backdrop"] = "backdrop"
     asset: str = "plane"
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """A static body; background has no instance."""
+        """Add a static body; background has no instance."""
         return add_static(
             scene,
             assets,

@@ -1,4 +1,4 @@
-"""An open container."""
+"""Open containers."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from gen_data.scene_templates.element import PlacedElement, add_static, add_surf
 
 
 class Bin(PlacedElement):
-    """A container whose floor is a walled surface: parts dropped in it stay in it.
+    """A container whose floor is a walled surface, on which dropped parts stay.
 
     Attributes:
         size_m: Outer length, width and height.
-        annotate: Whether labels are written for it.
+        annotate: Whether to write labels for it.
     """
 
     type: Literal["bin"] = "bin"
@@ -24,7 +24,7 @@ class Bin(PlacedElement):
     annotate: bool = False
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """A static body, its instance, and the surface of its floor."""
+        """Add a static body, its instance, and the surface of its floor."""
         T_world_bin = self.pose(scene)
         scene = add_static(
             scene,

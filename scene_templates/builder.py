@@ -1,4 +1,4 @@
-"""From a template's elements to its nominal Scene."""
+"""Builds the nominal Scene of a template's elements."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from gen_data.generator.core.scene import Lane, Light, Region, Scene, SupportSur
 from gen_data.generator.core.se3 import Vec3
 
 CONTENT_HEIGHT_M = 0.25
-"""Height over a surface that counts as what is looked at."""
+"""Height above a surface that belongs to the focus region."""
 
 STREET_MARGIN_M, STREET_HEIGHT_M = 50.0, 60.0
-"""How far beyond its lanes, and how high, a street reaches."""
+"""Extents beyond the lanes of a street, to the sides and upwards."""
 
 DEFAULT_LIGHT = Light("lamp", "sphere", (0.4, -0.9, 2.2), intensity_cd=900.0, radius_m=0.08)
 
 
 def build_scene(name: str, elements: Sequence[Element], assets: AssetIndex) -> Scene:
-    """The nominal scene of a template: every element at its nominal place.
+    """Build the nominal scene of a template: every element at its nominal pose.
 
-    Elements are added in the order of their lines, groups of objects after all others: they have
-    to keep clear of what stands on their surfaces.
+    Elements are added in their order, but groups of objects last: they have to keep clear of the
+    other elements on their surfaces.
 
     Raises:
-        ConfigError: a relation names nothing, or cannot hold.
-        AssetError: an asset is unknown or unfit.
+        ConfigError: a relation names an unknown element, or is impossible.
+        AssetError: an asset is unknown or unsuitable.
     """
     _check_names(elements)
     scene = Scene(template=name)
@@ -38,12 +38,12 @@ def build_scene(name: str, elements: Sequence[Element], assets: AssetIndex) -> S
     if not scene.lights:
         scene = replace(scene, lights=(DEFAULT_LIGHT,))
     if scene.lanes:
-        scene = replace(scene, interior_m=_around_lanes(scene.lanes))
+        scene = replace(scene, interior_m=_bounds_of_lanes(scene.lanes))
     return replace(scene, focus=focus_region(scene))
 
 
 def focus_region(scene: Scene) -> Region:
-    """The box around the surfaces that carry objects; without any, around all surfaces."""
+    """Box around the surfaces with objects; around all surfaces if there are none."""
     names = {name for group in scene.groups for name in group.surfaces}
     surfaces = [s for s in scene.surfaces if s.name in names] or list(scene.surfaces)
     if not surfaces:
@@ -61,8 +61,8 @@ def focus_region(scene: Scene) -> Region:
     )
 
 
-def _around_lanes(lanes: Sequence[Lane]) -> tuple[Vec3, Vec3]:
-    """Where cameras and lamps of a street may be: over its lanes and beside them."""
+def _bounds_of_lanes(lanes: Sequence[Lane]) -> tuple[Vec3, Vec3]:
+    """Space for the cameras and lamps of a street: above its lanes and beside them."""
     points = np.concatenate([np.array(lane.center_m) for lane in lanes])
     low, high = points.min(axis=0), points.max(axis=0)
     x0, y0 = (float(v) - STREET_MARGIN_M for v in low[:2])
@@ -75,7 +75,7 @@ def _check_names(elements: Sequence[Element]) -> None:
     for element in elements:
         if element.name in seen:
             raise ConfigError(
-                f"elements.{element.name}: two elements have this name; expected one of its own"
+                f"elements.{element.name}: two elements have this name; names must be unique"
             )
         seen.add(element.name)
 

@@ -1,4 +1,4 @@
-"""Where people cross a road."""
+"""Pedestrian crossings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pydantic import Field
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Lane, Scene
-from gen_data.generator.roads.cross_section import height_m
+from gen_data.generator.roads.cross_section import height_m, non_default_fields
 from gen_data.generator.roads.lane_graph import world_points
 from gen_data.scene_templates.element import Element, parametric_id
 from gen_data.scene_templates.road import add_street, find_road
@@ -21,8 +21,8 @@ class Crosswalk(Element):
 
     Attributes:
         road: Name of the road.
-        station_m: Where it is, along the road.
-        width_m: Its width: the length of its bars.
+        station_m: Position of its centre along the road.
+        width_m: Width along the road: the length of its bars.
     """
 
     type: Literal["crosswalk"] = "crosswalk"
@@ -31,7 +31,7 @@ class Crosswalk(Element):
     width_m: float = Field(4.0, ge=1.5, le=20)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """Paint on the road, and the lane of those who cross."""
+        """Add the markings on the road, and the lane of the pedestrians."""
         where = f"elements.{self.name}"
         shape, parameters, T_world_road = find_road(scene, self.road, f"{where}.road")
         if not 0.5 * self.width_m <= self.station_m <= shape.length_m - 0.5 * self.width_m:
@@ -42,7 +42,7 @@ class Crosswalk(Element):
         looks = {name: parameters[name] for name in ("seed", "wear") if name in parameters}
         asset = parametric_id(
             "crosswalk",
-            **shape.changed(),
+            **non_default_fields(shape),
             **looks,
             station_m=self.station_m,
             width_m=self.width_m,

@@ -1,4 +1,4 @@
-"""The vehicle that carries the sensors."""
+"""Ego vehicles, which carry the sensors."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from gen_data.generator.traffic.axles import find_axles
 from gen_data.scene_templates.element import Element, next_instance_id
 
 CATEGORY = "ego"
-"""What its pixels are called; no data set has this category, so that they carry none."""
+"""Category of its pixels; no data set lists it, so that they have no category id."""
 
 
 class Ego(Element):
-    """A vehicle with a rig of its own name for sensors; never labelled.
+    """A vehicle that carries a sensor rig of the same name; never labelled.
 
     The rig's origin is on the ground below the middle of the rear axle, X forward, Z up, as in
     nuScenes (Caesar et al. 2020).
 
     Attributes:
-        asset: Its id; empty = the first asset with all of ``tags``.
-        tags: What it is, unless ``asset`` says so.
-        lane: Name of the lane in whose middle it stands; empty = the first driving lane.
+        asset: Id of the asset; empty = the first asset with all of ``tags``.
+        tags: Tags of the asset if ``asset`` is empty.
+        lane: Name of the lane in the middle of which it stands; empty = the first driving lane.
     """
 
     type: Literal["ego"] = "ego"
@@ -36,12 +36,12 @@ class Ego(Element):
     lane: str = ""
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """The vehicle, and the rig on it.
+        """Add the vehicle and its rig.
 
         Raises:
-            ConfigError: there is no such asset or lane.
+            ConfigError: no asset has the tags, or the lane is unknown.
         """
-        asset = self.asset or self._first(assets)
+        asset = self.asset or self._find_asset(assets)
         lanes = [lane for lane in scene.lanes if lane.name == self.lane or not self.lane]
         lanes = [lane for lane in lanes if lane.kind == "driving" and not lane.junction]
         if not lanes:
@@ -68,7 +68,7 @@ class Ego(Element):
             rigs=(*scene.rigs, Rig(self.name, self.name, T_body_rig)),
         )
 
-    def _first(self, assets: AssetIndex) -> str:
+    def _find_asset(self, assets: AssetIndex) -> str:
         found = assets.find(self.tags)
         if not found:
             raise ConfigError(

@@ -1,4 +1,4 @@
-"""What all elements share: names, places, and how things get into a Scene."""
+"""Base classes of elements, and functions that add bodies and surfaces to a Scene."""
 
 from __future__ import annotations
 
@@ -20,35 +20,36 @@ NAME_PATTERN = r"^[A-Za-z][A-Za-z0-9_-]*$"
 
 
 class Element(Strict):
-    """One line of a template.
+    """One element of a template.
 
     Attributes:
-        name: What other elements, randomizers and labels call it; unique in the template.
+        name: Name for other elements, randomizers and labels; unique in the template.
     """
 
     name: str = Field(pattern=NAME_PATTERN)
 
     @property
     def follows_others(self) -> bool:
-        """Whether it is added after the elements that do not."""
+        """Whether it is added after all elements for which this is False."""
         return False
 
     @abstractmethod
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """The scene with this element in it, at its nominal place. Draws nothing.
+        """Return the scene with this element at its nominal pose. Draws nothing.
 
         Raises:
-            ConfigError: a relation names nothing, or cannot hold.
+            ConfigError: a relation names an unknown element, or is impossible.
         """
 
 
 class PlacedElement(Element):
-    """An element that stands somewhere.
+    """An element with a pose.
 
     Attributes:
-        on: Name of the surface or element it stands on; empty = the floor.
-        at_m: Place on what it stands on, from its centre along its axes; a third number lifts it.
-        yaw_deg: Turn about the vertical.
+        on: Name of the supporting surface or element; empty = the floor.
+        at_m: Position on the support (x, y), from its centre; an optional third number is the
+            height above it.
+        yaw_deg: Rotation about the vertical.
     """
 
     on: str = ""
@@ -56,16 +57,21 @@ class PlacedElement(Element):
     yaw_deg: float = 0.0
 
     def pose(self, scene: Scene) -> SE3:
-        """``T_world_element``: origin where it stands, Z up."""
-        x, y, *lift = self.at_m
-        local = SE3.about_z(math.radians(self.yaw_deg), (x, y, lift[0] if lift else 0.0))
+        """``T_world_element``: origin on the support, Z up."""
+        local = level_pose(self.at_m, self.yaw_deg)
         if not self.on:
             return local
         return find_surfaces(scene, self.on, f"elements.{self.name}.on")[0].T_world_surface @ local
 
 
+def level_pose(at_m: tuple[float, float] | tuple[float, float, float], yaw_deg: float) -> SE3:
+    """Pose with Z up at a position, whose height defaults to 0, rotated about the vertical."""
+    x, y, *height = at_m
+    return SE3.about_z(math.radians(yaw_deg), (x, y, height[0] if height else 0.0))
+
+
 def find_surfaces(scene: Scene, name: str, field: str) -> tuple[SupportSurface, ...]:
-    """The surface of that name, or all surfaces of the element of that name.
+    """Find the surface of a name, or all surfaces of the element of that name.
 
     Raises:
         ConfigError: there is none.
@@ -73,7 +79,7 @@ def find_surfaces(scene: Scene, name: str, field: str) -> tuple[SupportSurface, 
     found = tuple(s for s in scene.surfaces if name in (s.name, s.body))
     if not found:
         known = sorted({s.name for s in scene.surfaces} | {s.body for s in scene.surfaces})
-        listed = ", ".join(known) or "none: list the surface before what stands on it"
+        listed = ", ".join(known) or "none: list the surface before the elements on it"
         raise ConfigError(
             f"{field}: there is no surface '{name}'; expected one of {listed}"
             f"{did_you_mean(name, known)}"
@@ -87,7 +93,7 @@ def parametric_id(family: str, **parameters: ParameterValue) -> str:
 
 
 def next_instance_id(scene: Scene) -> int:
-    """The smallest instance id that is free."""
+    """Smallest free instance id."""
     return free_instance_ids(scene, 1)[0]
 
 
@@ -101,9 +107,9 @@ def add_static(
     annotated: bool = False,
     unlabelled: bool = False,
 ) -> Scene:
-    """The scene with a body that stands still, and the instance that labels it.
+    """Add a static body, and the instance that labels it.
 
-    ``unlabelled`` bodies (walls, ground) have no instance: they are background.
+    ``unlabelled`` bodies (walls, ground) are background: they have no instance.
     """
     entry = assets.get(asset)
     instance_id = 0 if unlabelled else next_instance_id(scene)
@@ -115,17 +121,17 @@ def add_static(
 
 
 def add_surface(scene: Scene, surface: SupportSurface) -> Scene:
-    """The scene with one more surface."""
+    """Add a surface."""
     return replace(scene, surfaces=(*scene.surfaces, surface))
 
 
 def stand_upright(assets: AssetIndex, asset: str, T_world_stand: SE3) -> SE3:
-    """``T_world_body`` of an upright asset whose lowest point stands at a pose's origin."""
+    """``T_world_body`` of an upright asset whose lowest point is at a pose's origin."""
     low, _ = assets.bounds_m(asset)
     return T_world_stand @ SE3((0.0, 0.0, -low[2]))
 
 
 def extent_m(assets: AssetIndex, asset: str) -> Vec3:
-    """Size of an asset's bounding box along its own axes."""
+    """Size of an asset's bounding box along its own axes [m]."""
     low, high = assets.bounds_m(asset)
     return (high[0] - low[0], high[1] - low[1], high[2] - low[2])

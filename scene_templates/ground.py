@@ -1,4 +1,4 @@
-"""The land around a street."""
+"""Terrain around a street."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from gen_data.scene_templates.road import Ground
 
 
 class GroundElement(PlacedElement):
-    """A wide plane, a little lower than the gutters of roads, without a label.
+    """A wide, slightly uneven plane just below the gutters of roads, without a label.
 
     Attributes:
         size_m: Extent along X and Y.
-        cover: What grows or lies on it.
-        relief_m: How deep its hollows are.
-        level_m: Height of its highest points; the land beside roads comes down to -0.1.
-        seed: Of relief and texture.
+        cover: Material of the surface.
+        relief_m: Depth of its hollows.
+        level_m: Height of its highest points; the aprons of roads slope down to -0.1.
+        seed: Seed of relief and texture.
     """
 
     type: Literal["ground"] = "ground"
@@ -33,7 +33,7 @@ class GroundElement(PlacedElement):
     name: str = Field("ground", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """A static body; background has no instance."""
+        """Add a static body; background has no instance."""
         asset = parametric_id(
             "ground",
             size_m=self.size_m,

@@ -1,4 +1,4 @@
-"""Where roads meet."""
+"""Road junctions."""
 
 from __future__ import annotations
 
@@ -12,29 +12,30 @@ from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import SE3
+from gen_data.generator.roads.cross_section import non_default_fields
 from gen_data.generator.roads.junction_shape import ABSENT, JunctionShape, junction_lanes
-from gen_data.scene_templates.element import Element, parametric_id
-from gen_data.scene_templates.road import RoadLooks, add_street, find_port
+from gen_data.scene_templates.element import Element, level_pose, parametric_id
+from gen_data.scene_templates.road import RoadSurface, add_street, find_port
 
 
-class Junction(RoadLooks, Element):
-    """A level junction with rounded corners; roads go on from its arms by ``after: <name>/<arm>``.
+class Junction(RoadSurface, Element):
+    """A level junction with rounded corners; roads start at its arms with ``after: <name>/<arm>``.
 
     Attributes:
-        after: Name of the road whose end meets the arm at 180 degrees; empty = it lies at ``at_m``.
-        at_m: Its centre; a third number lifts it.
-        yaw_deg: Turn about the vertical.
-        arms_deg: Directions of its three or four arms, rising from 0; arm 0 is the first.
-        lanes: Per arm and direction.
-        lane_width_m: Of each lane.
+        after: Name of the road whose end meets the arm at 180 degrees; empty = use ``at_m``.
+        at_m: Position of its centre (x, y); an optional third number is the height.
+        yaw_deg: Rotation about the vertical.
+        arms_deg: Directions of its three or four arms, ascending from 0; arm 0 is the first.
+        lanes: Number of lanes per arm and direction.
+        lane_width_m: Width of each lane.
         sidewalk_m: Width of the sidewalks; 0 = none.
-        beside_m: Width between kerb and sidewalk, to match roads with verges or parked cars.
+        beside_m: Width between kerb and sidewalk, to match roads with verges or parking strips.
         kerb_m: Height of the kerbs.
-        radius_m: Of the kerb at the corners.
-        crown: Slope of the arms from their middle to their gutters.
-        traffic: Side that is driven on.
-        crossings: What crosswalks look like; lines = as at traffic lights.
-        speed_m_s: Usual speed of those that cross it.
+        radius_m: Radius of the kerb at the corners.
+        crown: Cross slope of the arms, from their middle to their gutters.
+        traffic: Side on which vehicles drive.
+        crossings: Style of the crosswalks; lines as at traffic lights.
+        speed_m_s: Usual speed of crossing vehicles.
     """
 
     type: Literal["junction"] = "junction"
@@ -56,16 +57,18 @@ class Junction(RoadLooks, Element):
     speed_m_s: float = Field(8.0, ge=0, le=60)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """The junction is background; its paths join the roads that it meets."""
+        """Add the junction as background, and link its lanes to the roads that it meets."""
         shape = self.shape()
-        pose = self._pose(scene, shape)
+        pose = self._find_pose(scene, shape)
         given: dict[str, Any] = {} if self.crossings == "zebra" else {"crossings": self.crossings}
-        asset = parametric_id("junction", **shape.changed(), **given, **self.looks())
+        asset = parametric_id(
+            "junction", **non_default_fields(shape), **given, **self.surface_parameters()
+        )
         lanes = junction_lanes(shape, self.name, pose, self.speed_m_s, self.crossings != "none")
         return add_street(scene, assets, self.name, asset, pose, lanes)
 
     def shape(self) -> JunctionShape:
-        """Its plan. Raises ConfigError if the arms or the corners make none."""
+        """Return its shape. Raises ConfigError if the arms or the corners are impossible."""
         where = f"elements.{self.name}"
         arms = self.arms_deg
         first, second, third = arms[:3]
@@ -77,7 +80,9 @@ class Junction(RoadLooks, Element):
         rising = all(a < b for a, b in pairwise(arms))
         gaps = shape.gaps_rad()
         if not rising or arms[0] < 0.0 or arms[-1] >= 360.0:
-            raise ConfigError(f"{where}.arms_deg: expected directions rising from 0 to below 360")
+            raise ConfigError(
+                f"{where}.arms_deg: expected ascending directions from 0 to below 360"
+            )
         if min(gaps) < math.radians(40.0) or max(gaps) > math.pi + 1e-3:
             raise ConfigError(
                 f"{where}.arms_deg: neighbouring arms must be 40 to 180 degrees apart; "
@@ -90,13 +95,12 @@ class Junction(RoadLooks, Element):
             )
         return shape
 
-    def _pose(self, scene: Scene, shape: JunctionShape) -> SE3:
+    def _find_pose(self, scene: Scene, shape: JunctionShape) -> SE3:
         if not self.after:
-            x, y, *lift = self.at_m
-            return SE3.about_z(math.radians(self.yaw_deg), (x, y, lift[0] if lift else 0.0))
+            return level_pose(self.at_m, self.yaw_deg)
         if 180.0 not in self.arms_deg:
             raise ConfigError(
-                f"elements.{self.name}.after: no arm points back to it; expected 180 in arms_deg"
+                f"elements.{self.name}.after: no arm points at the road; expected 180 in arms_deg"
             )
         return find_port(scene, self.after, f"elements.{self.name}.after") @ SE3(
             (shape.reach_m(), 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""A lamp."""
+"""Lights at fixed positions."""
 
 from __future__ import annotations
 
@@ -17,19 +17,19 @@ from gen_data.scene_templates.element import Element
 
 
 class LightElement(Element):
-    """A light at a fixed place; the ``lighting`` randomizer replaces all lights.
+    """A light at a fixed position; the ``lighting`` randomizer replaces all lights.
 
     Attributes:
-        kind: sphere, spot, or a panel that shines to one side: rectangle, disk.
-        position_m: Its centre in the world.
-        direction: Where a spot or a panel shines; any length.
-        intensity_cd: Luminous intensity; 1 cd lights a surface at 1 m with 1 lx. Of panels,
-            straight before them.
-        luminous_flux_lm: Of all its light, instead of ``intensity_cd``.
-        radius_m: Of the ball or disk: the larger, the softer its shadows.
-        size_m: Of the rectangle; the first side is level.
+        kind: sphere, spot, or a one-sided panel: rectangle or disk.
+        position_m: Centre in the world.
+        direction: Direction of a spot or a panel; any length.
+        intensity_cd: Luminous intensity, of panels along their normal; 1 cd illuminates a surface
+            at 1 m with 1 lx.
+        luminous_flux_lm: Total luminous flux, instead of ``intensity_cd``.
+        radius_m: Radius of a sphere or disk: the larger, the softer the shadows.
+        size_m: Sides of a rectangle; the first is horizontal.
         cone_deg: Half angle of a spot.
-        visible: Whether a panel is seen, in a housing with a bright front.
+        visible: Whether a panel appears in images, as a housing with a bright front.
     """
 
     type: Literal["light"] = "light"
@@ -56,12 +56,12 @@ class LightElement(Element):
         return self
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """One more light, and what it is seen in."""
+        """Add the light and, if visible, its housing."""
         light = Light(
             self.name,
             self.kind,
             position_m=self.position_m,
-            direction=_unit(self.direction),
+            direction=_normalize(self.direction),
             intensity_cd=self.intensity_cd,
             radius_m=self.radius_m,
         )
@@ -77,7 +77,7 @@ class LightElement(Element):
         return replace(scene, lights=(*scene.lights, light))
 
 
-def _unit(direction: Vec3) -> Vec3:
+def _normalize(direction: Vec3) -> Vec3:
     length = math.sqrt(sum(v * v for v in direction))
     x, y, z = (round(v / length, 6) for v in direction)
     return (x, y, z)

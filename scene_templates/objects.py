@@ -1,4 +1,4 @@
-"""A group of objects on surfaces."""
+"""Groups of objects on surfaces."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from gen_data.generator.core.members import Member, add_members
 from gen_data.generator.core.scene import ObjectGroup, Placement, Scene, SupportSurface
 from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.scene_templates.element import Element, extent_m, find_surfaces, stand_upright
-from gen_data.scene_templates.rows import LAYERS, place_in_rows, standing_discs
+from gen_data.scene_templates.rows import LAYERS, find_keep_out_discs, place_in_rows
 
 
 class AssetChoice(Strict):
-    """Which assets a group may draw from: all that fit any of the lists.
+    """Assets of a group: the union of the lists, without the excluded ones.
 
     Attributes:
-        tags: Assets that carry every one of these tags.
-        any_of: Assets that carry at least one of these tags.
-        ids: Assets by id; a family name stands for all of its variants.
-        exclude: Tags or categories that are left out.
-        prefer: Tags, the most wanted first: of those that fit, only the ones with the first of
-            these tags that any of them has; category by category.
+        tags: Assets with all of these tags.
+        any_of: Assets with at least one of these tags.
+        ids: Assets by id; the name of a family stands for all of its variants.
+        exclude: Tags or categories to leave out.
+        prefer: Tags in order of preference: each category keeps only its assets with the first of
+            these tags that it has.
     """
 
     tags: tuple[str, ...] = ()
@@ -38,16 +38,16 @@ class AssetChoice(Strict):
     prefer: tuple[str, ...] = ()
 
     @model_validator(mode="after")
-    def _says_something(self) -> AssetChoice:
+    def _has_a_list(self) -> AssetChoice:
         if not (self.tags or self.any_of or self.ids):
             raise ValueError("expected tags, any_of or ids")
         return self
 
-    def resolved(self, assets: AssetIndex, field: str) -> tuple[str, ...]:
-        """Ids of all that fit, sorted.
+    def resolve(self, assets: AssetIndex, field: str) -> tuple[str, ...]:
+        """Find the ids of all matching assets, sorted.
 
         Raises:
-            ConfigError: nothing fits.
+            ConfigError: no asset matches.
             AssetError: an id is unknown.
         """
         found = {a.asset_id: a for a in assets.find(self.tags)} if self.tags else {}
@@ -62,12 +62,12 @@ class AssetChoice(Strict):
             for asset in found.values()
             if not {asset.category, *asset.tags} & set(self.exclude)
         ]
-        kept = sorted(asset.asset_id for asset in self._preferred(fitting))
+        kept = sorted(asset.asset_id for asset in self._select_preferred(fitting))
         if not kept:
-            raise ConfigError(f"{field}: no asset fits; expected other tags or ids")
+            raise ConfigError(f"{field}: no asset matches; expected other tags or ids")
         return tuple(kept)
 
-    def _preferred(self, fitting: list[Asset]) -> Iterator[Asset]:
+    def _select_preferred(self, fitting: list[Asset]) -> Iterator[Asset]:
         by_category: dict[str, list[Asset]] = {}
         for asset in fitting:
             by_category.setdefault(asset.category, []).append(asset)
@@ -85,12 +85,12 @@ class Objects(Element):
     """Objects on one or several surfaces; the ``objects`` randomizer of the same name draws them.
 
     Attributes:
-        on: Name of a surface, or of an element with several (a shelf).
-        count: How many there are nominally.
-        assets: Which there may be.
-        placement: drop: fall from above; scatter: stand apart; grid: stand in rows; stack: in
-            towers.
-        annotate: Whether labels are written for them.
+        on: Name of a surface, or of an element with several surfaces (a shelf).
+        count: Nominal number of objects.
+        assets: Assets to choose from.
+        placement: drop: objects fall from above; scatter: they stand apart; grid: they stand in
+            rows; stack: they stand in towers.
+        annotate: Whether to write labels for them.
     """
 
     type: Literal["objects"] = "objects"
@@ -102,17 +102,17 @@ class Objects(Element):
 
     @property
     def follows_others(self) -> bool:
-        """Objects keep clear of everything that stands on their surfaces."""
+        """True: objects keep clear of all other elements on their surfaces."""
         return True
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """The group, and its objects in rows on its surfaces, clear of what stands there."""
+        """Add the group, and its objects in rows on its surfaces, clear of other elements."""
         surfaces = find_surfaces(scene, self.on, f"elements.{self.name}.on")
-        discs = [standing_discs(scene, surface, assets) for surface in surfaces]
+        discs = [find_keep_out_discs(scene, surface, assets) for surface in surfaces]
         group = ObjectGroup(
             name=self.name,
             surfaces=tuple(s.name for s in surfaces),
-            assets=self.assets.resolved(assets, f"elements.{self.name}.assets"),
+            assets=self.assets.resolve(assets, f"elements.{self.name}.assets"),
             count=self.count,
             placement=self.placement,
             annotated=self.annotate,
@@ -122,8 +122,8 @@ class Objects(Element):
         share = -(-self.count // len(surfaces))
         for number, surface in enumerate(surfaces):
             here = range(self.count)[number * share : (number + 1) * share]
-            chosen = [self._nominal(group, k, surface, assets) for k in here]
-            points = self._points(chosen, surface, group, assets)
+            chosen = [self._choose_asset(group, k, surface, assets) for k in here]
+            points = self._place(chosen, surface, group, assets)
             members = []
             for asset, point in zip(chosen, points, strict=True):
                 pose = stand_upright(assets, asset, surface.T_world_surface @ SE3(point)).rounded()
@@ -132,10 +132,10 @@ class Objects(Element):
             scene = add_members(scene, group, members, assets, first=here.start)
         return scene
 
-    def _nominal(
+    def _choose_asset(
         self, group: ObjectGroup, number: int, surface: SupportSurface, assets: AssetIndex
     ) -> str:
-        """The asset of an object: evenly from the group's, the next one where one does not fit."""
+        """Choose the asset of an object: evenly from the group, or the next one that fits."""
         first = (number * len(group.assets)) // max(self.count, 1)
         for asset in (*group.assets[first:], *group.assets[:first]):
             length_m, width_m, height_m = extent_m(assets, asset)
@@ -147,10 +147,10 @@ class Objects(Element):
             "expected smaller assets or a larger surface"
         )
 
-    def _points(
+    def _place(
         self, chosen: list[str], surface: SupportSurface, group: ObjectGroup, assets: AssetIndex
     ) -> list[Vec3]:
-        """Where the objects of one surface stand, in its frame."""
+        """Positions of the objects of one surface, in its frame [m]."""
         T_surface_world = surface.T_world_surface.inverse()
         height_m = surface.T_world_surface.translation_m[2]
         discs: list[Vec3] = []

@@ -1,4 +1,4 @@
-"""A car park."""
+"""Car parks."""
 
 from __future__ import annotations
 
@@ -8,17 +8,18 @@ from pydantic import Field
 
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
+from gen_data.generator.roads.cross_section import non_default_fields
 from gen_data.generator.roads.parking_shape import ParkingShape, parking_lanes
 from gen_data.scene_templates.element import PlacedElement, parametric_id
-from gen_data.scene_templates.road import RoadLooks, add_street
+from gen_data.scene_templates.road import RoadSurface, add_street
 
 
-class ParkingArea(RoadLooks, PlacedElement):
+class ParkingArea(RoadSurface, PlacedElement):
     """Aisles along X with bays at right angles on both sides, around ``at_m``.
 
     Attributes:
-        bays: Per row.
-        aisles: Each with two rows.
+        bays: Number of bays per row.
+        aisles: Number of aisles, each with two rows.
         bay_m: Width and length of a bay.
         aisle_m: Width of an aisle.
     """
@@ -30,10 +31,11 @@ class ParkingArea(RoadLooks, PlacedElement):
     aisle_m: float = Field(6.0, ge=3, le=12)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """The surface is background; every bay is a lane."""
+        """Add the surface as background; every bay is a lane."""
         shape = ParkingShape(self.bays, self.aisles, self.bay_m, self.aisle_m)
         pose = self.pose(scene)
-        asset = parametric_id("parking_area", **shape.changed(), **self.looks())
+        parameters = non_default_fields(shape) | self.surface_parameters()
+        asset = parametric_id("parking_area", **parameters)
         return add_street(
             scene, assets, self.name, asset, pose, parking_lanes(shape, self.name, pose)
         )

@@ -1,4 +1,4 @@
-"""One thing that stands still and is only looked at."""
+"""Single static objects."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from gen_data.scene_templates.element import PlacedElement, add_static, stand_up
 
 
 class Prop(PlacedElement):
-    """Any asset, standing still: a gantry, a plinth, a tray.
+    """A static asset, such as a gantry, a plinth or a tray.
 
     Attributes:
-        asset: Its id, such as ``gantry?size_m=1.6,1,1.8``.
-        annotate: Whether labels are written for it.
-        hollow: Cameras and lamps may be within its bounding box, as under a gantry. It counts as
-            background then: it has no instance.
+        asset: Id of the asset, such as ``gantry?size_m=1.6,1,1.8``.
+        annotate: Whether to write labels for it.
+        hollow: Whether cameras and lamps may be inside its bounding box, as under a gantry; it is
+            background then, without an instance.
     """
 
     type: Literal["prop"] = "prop"
@@ -27,13 +27,13 @@ class Prop(PlacedElement):
     hollow: bool = False
 
     @model_validator(mode="after")
-    def _is_one_or_the_other(self) -> Prop:
+    def _is_consistent(self) -> Prop:
         if self.annotate and self.hollow:
             raise ValueError("annotate and hollow exclude each other")
         return self
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """A static body and, unless it is background, its instance."""
+        """Add a static body and, unless it is background, its instance."""
         return add_static(
             scene,
             assets,

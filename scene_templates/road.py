@@ -1,4 +1,4 @@
-"""A stretch of road, and the lanes on and beside it."""
+"""Roads, and the lanes on and beside them."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Lane, Scene
 from gen_data.generator.core.se3 import SE3
-from gen_data.generator.roads.cross_section import RoadShape
+from gen_data.generator.roads.cross_section import RoadShape, non_default_fields
 from gen_data.generator.roads.junction_shape import JunctionShape, arm_pose
 from gen_data.generator.roads.lane_graph import link_lanes, road_lanes
-from gen_data.scene_templates.element import Element, add_static, parametric_id
+from gen_data.scene_templates.element import Element, add_static, level_pose, parametric_id
 
 T = TypeVar("T")
 Width = float
@@ -28,14 +28,14 @@ PARKING_M = 2.2
 Ground = Literal["grass", "paving", "cobbles", "gravel", "earth", "asphalt"]
 
 
-class RoadLooks(Strict):
-    """What roads, junctions and parking areas are made of.
+class RoadSurface(Strict):
+    """Surfaces of roads, junctions and parking areas.
 
     Attributes:
-        wear: 0 freshly laid to 1 worn out: ruts, patches, sealed cracks, flaking paint.
-        paving: What sidewalks are paved with.
-        ground: What the land beside is covered with.
-        seed: Of patches, cracks, covers and textures.
+        wear: Wear from 0, new, to 1, worn out: ruts, patches, sealed cracks, flaking paint.
+        paving: Material of the sidewalks.
+        ground: Material of the land beside.
+        seed: Seed of patches, cracks, manhole covers and textures.
     """
 
     wear: float = Field(0.3, ge=0, le=1)
@@ -43,40 +43,40 @@ class RoadLooks(Strict):
     ground: Ground = "grass"
     seed: int = Field(0, ge=0, le=1_000_000)
 
-    def looks(self) -> dict[str, Any]:
-        """The parameters of an asset that differ from the default."""
-        default = RoadLooks()
-        named = ((name, getattr(self, name)) for name in RoadLooks.model_fields)
+    def surface_parameters(self) -> dict[str, Any]:
+        """Asset parameters that differ from their defaults."""
+        default = RoadSurface()
+        named = ((name, getattr(self, name)) for name in RoadSurface.model_fields)
         return {name: value for name, value in named if value != getattr(default, name)}
 
 
-class Road(RoadLooks, Element):
-    """A road along +X from its place; pairs are (left, right) as seen along it.
+class Road(RoadSurface, Element):
+    """A road along its own +X axis; pairs are (left, right) as seen along it.
 
     Attributes:
-        after: Name of the road whose end, or ``<junction>/<arm>``, it goes on from; empty = it
+        after: Name of the road, or ``<junction>/<arm>``, at the end of which it starts; empty = it
             starts at ``at_m``.
-        at_m: Where it starts, in the middle of the road; a third number lifts it.
-        yaw_deg: Direction in which it starts.
-        length_m: Along its middle.
-        curvature_per_m: 1 / radius, positive to the left; 0 = straight.
-        lanes: Numbers of lanes against its direction and along it.
-        lane_width_m: Of each driving lane.
-        median_m: Strip between the directions; 0 = only a line.
+        at_m: Start of the centre line (x, y); an optional third number is the height.
+        yaw_deg: Direction at the start.
+        length_m: Length of the centre line.
+        curvature_per_m: Curvature, 1 / radius, positive to the left; 0 = straight.
+        lanes: Number of lanes against its direction and along it.
+        lane_width_m: Width of each driving lane.
+        median_m: Width of the strip between the directions; 0 = only a line.
         bicycle_m, shoulder_m: Width of bicycle lanes and of hard shoulders; 0 = none.
-        parking: Whether cars park along the kerb, in strips of 2.2 m.
-        verge_m: Planted strips between kerb and sidewalk; 0 = none.
+        parking: Whether there are parking strips, 2.2 m wide, along the kerb.
+        verge_m: Width of planted strips between kerb and sidewalk; 0 = none.
         sidewalk_m: Width of the sidewalks; 0 = none.
-        kerb_m: Height of the kerbs; 0 = a country road or a motorway, which has none.
-        crown: Slope of the carriageway from its middle to its gutters.
-        traffic: Side that is driven on.
-        markings: The line in the middle.
-        edge_lines: Whether the outer edges of the lanes are lined.
+        kerb_m: Height of the kerbs; 0 = none, as on country roads and motorways.
+        crown: Cross slope of the carriageway, from its middle to its gutters.
+        traffic: Side on which vehicles drive.
+        markings: Style of the centre line.
+        edge_lines: Whether the carriageway has edge lines.
         dash_m: Length of dashes and of the gaps between them: 3, 6 in towns; 4, 8 on country
             roads; 6, 12 on motorways.
-        line_m: Width of narrow lines: 0.12, on motorways 0.15.
+        line_m: Width of narrow lines: 0.12; 0.15 on motorways.
         rails: Whether there are guard rails.
-        apron_m: Land beside the road that belongs to it and slopes down to the ground.
+        apron_m: Width of the land beside the road that slopes down to the ground.
         speed_m_s: Usual speed.
     """
 
@@ -106,9 +106,9 @@ class Road(RoadLooks, Element):
     speed_m_s: float = Field(13.9, ge=0, le=60)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """The road is background; its lanes join those of the roads that it meets."""
+        """Add the road as background, and link its lanes to those of the roads that it meets."""
         shape = self.shape()
-        pose = self._pose(scene)
+        pose = self._find_pose(scene)
         options: dict[str, Any] = {
             "markings": (self.markings, "dashed"),
             "edge_lines": ("solid" if self.edge_lines else "none", "none"),
@@ -118,7 +118,8 @@ class Road(RoadLooks, Element):
             "apron_m": (self.apron_m, 6.0),
         }
         given = {name: value for name, (value, default) in options.items() if value != default}
-        asset = parametric_id("road", **shape.changed(), **given, **self.looks())
+        given |= non_default_fields(shape) | self.surface_parameters()
+        asset = parametric_id("road", **given)
         return add_street(
             scene,
             assets,
@@ -129,7 +130,7 @@ class Road(RoadLooks, Element):
         )
 
     def shape(self) -> RoadShape:
-        """Its cross section and course. Raises ConfigError if they make no road."""
+        """Return its cross section and course. Raises ConfigError if they are impossible."""
         values = {f.name: getattr(self, f.name) for f in fields(RoadShape) if f.name != "parking_m"}
         values["lanes"] = _numbers(self.lanes)
         values["parking_m"] = tuple(PARKING_M * flag for flag in self.parking)
@@ -140,21 +141,22 @@ class Road(RoadLooks, Element):
         if abs(shape.curvature_per_m) * reach >= 1.0:
             raise ConfigError(
                 f"{where}.curvature_per_m: a radius of {1 / abs(shape.curvature_per_m):.1f} m is "
-                f"less than the road is wide; expected less than {1 / reach:.3g}"
+                f"less than the width of the road; expected a curvature below {1 / reach:.3g}"
             )
         if abs(shape.curvature_per_m) * shape.length_m >= math.tau:
-            raise ConfigError(f"{where}.length_m: the bend closes on itself; make it shorter")
+            raise ConfigError(
+                f"{where}.length_m: the bend closes on itself; expected a shorter road"
+            )
         return shape
 
-    def _pose(self, scene: Scene) -> SE3:
+    def _find_pose(self, scene: Scene) -> SE3:
         if self.after:
             return find_port(scene, self.after, f"elements.{self.name}.after")
-        x, y, *lift = self.at_m
-        return SE3.about_z(math.radians(self.yaw_deg), (x, y, lift[0] if lift else 0.0))
+        return level_pose(self.at_m, self.yaw_deg)
 
 
 def check_widths(where: str, shape: RoadShape) -> None:
-    """Raises ConfigError if a cross section has no lane or a negative width."""
+    """Raise ConfigError if a cross section has no lane or a negative width."""
     if shape.lanes[0] + shape.lanes[1] < 1 or min(shape.lanes) < 0 or max(shape.lanes) > 8:
         raise ConfigError(f"{where}.lanes: {shape.lanes[0]:g}, {shape.lanes[1]:g}; expected 1 to 8")
     for name in ("bicycle_m", "shoulder_m", "verge_m", "sidewalk_m"):
@@ -170,7 +172,7 @@ def add_street(
     T_world_body: SE3,
     lanes: tuple[Lane, ...],
 ) -> Scene:
-    """The scene with a surface as background, and its lanes linked to those it meets."""
+    """Add a surface as background, and link its lanes to those that it meets."""
     scene = add_static(
         scene, assets, name=name, asset=asset, T_world_body=T_world_body, unlabelled=True
     )
@@ -178,14 +180,14 @@ def add_street(
 
 
 def find_road(scene: Scene, name: str, field: str) -> tuple[RoadShape, dict[str, Any], SE3]:
-    """Shape, all parameters and pose of a road that is in the scene already.
+    """Find the shape, all parameters and the pose of a road in the scene.
 
     Raises:
         ConfigError: there is no such road.
     """
     roads = {b.name: b for b in scene.bodies if b.asset.partition("?")[0] == "road"}
     if name not in roads:
-        known = ", ".join(sorted(roads)) or "none: list the road before what belongs to it"
+        known = ", ".join(sorted(roads)) or "none: list the road before the elements on it"
         raise ConfigError(
             f"{field}: there is no road '{name}'; expected one of {known}"
             f"{did_you_mean(name, roads)}"
@@ -197,20 +199,20 @@ def find_road(scene: Scene, name: str, field: str) -> tuple[RoadShape, dict[str,
 
 
 def find_port(scene: Scene, name: str, field: str) -> SE3:
-    """Where a road can go on: the end of a road, or of ``<junction>/<arm>``.
+    """Find the pose at which a road can start: the end of a road, or of ``<junction>/<arm>``.
 
     Raises:
         ConfigError: there is no such road or arm.
     """
     owner, slash, arm = name.partition("/")
     if slash:
-        return _arm_end(scene, owner, arm, field)
+        return _find_arm_end(scene, owner, arm, field)
     shape, _, T_world_road = find_road(scene, name, field)
     x, y, heading = (float(v) for v in shape.line().poses(np.array([shape.length_m]))[0])
     return T_world_road @ SE3.about_z(heading, (x, y, 0.0))
 
 
-def _arm_end(scene: Scene, name: str, arm: str, field: str) -> SE3:
+def _find_arm_end(scene: Scene, name: str, arm: str, field: str) -> SE3:
     for body in scene.bodies:
         parsed = parse_asset_id(body.asset) if body.name == name else None
         if parsed is not None and parsed.name == "junction":
@@ -222,7 +224,7 @@ def _arm_end(scene: Scene, name: str, arm: str, field: str) -> SE3:
                 return body.T_world_body @ arm_pose(shape, int(arm))
             raise ConfigError(f"{field}: '{name}' has no arm '{arm}'; expected 0 to {count - 1}")
     raise ConfigError(
-        f"{field}: there is no junction '{name}'; list it before what goes on from it"
+        f"{field}: there is no junction '{name}'; list it before the roads that start at it"
     )
 
 

@@ -20,35 +20,35 @@ class RoadNetwork(PlacedElement):
     """The roads of an ``.xodr`` file in one of the user's asset folders, around ``at_m``.
 
     Attributes:
-        asset: Its id: ``user/town`` for ``town.xodr``.
+        asset: Id of the asset: ``user/town`` for ``town.xodr``.
     """
 
     type: Literal["road_network"] = "road_network"
     asset: str
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """The roads are background; their lanes are named ``<name>/<road>.<section>.<lane>``."""
+        """Add the roads as background, with lanes named ``<name>/<road>.<section>.<lane>``."""
         lanes = assets.lanes(self.asset)
         if not lanes:
             raise ConfigError(
                 f"elements.{self.name}.asset: '{self.asset}' has no lanes; expected an .xodr file"
             )
         pose = self.pose(scene)
-        placed = tuple(self._placed(lane, pose) for lane in lanes)
+        placed = tuple(self._place_lane(lane, pose) for lane in lanes)
         return add_street(scene, assets, self.name, self.asset, pose, placed)
 
-    def _placed(self, lane: Lane, pose: SE3) -> Lane:
-        """The lane in the world, under this element's name."""
+    def _place_lane(self, lane: Lane, pose: SE3) -> Lane:
+        """Return the lane in the world, with names below this element's."""
 
-        def named(name: str) -> str:
+        def qualify(name: str) -> str:
             return f"{self.name}/{name}" if name else ""
 
         return replace(
             lane,
-            name=named(lane.name),
+            name=qualify(lane.name),
             center_m=world_points(np.array(lane.center_m), pose),
-            road=named(lane.road),
-            successors=tuple(named(name) for name in lane.successors),
-            left=named(lane.left),
-            right=named(lane.right),
+            road=qualify(lane.road),
+            successors=tuple(qualify(name) for name in lane.successors),
+            left=qualify(lane.left),
+            right=qualify(lane.right),
         )

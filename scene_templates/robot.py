@@ -1,4 +1,4 @@
-"""A robot arm."""
+"""Robot arms."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from gen_data.scene_templates.element import PlacedElement, find_surfaces, next_
 
 CATEGORY = "robot_arm"
 R_GRASP_RIG = (math.sqrt(0.5), 0.0, -math.sqrt(0.5), 0.0)
-"""A rig's X axis is a grasp frame's Z axis; their Y axes are one."""
+"""Rotation between frames: a rig's X axis is a grasp frame's Z axis; they share the Y axis."""
 
 
 class Robot(PlacedElement):
-    """A robot, standing at its home pose until a randomizer moves its arm.
+    """A robot arm at its home pose; randomizers move it.
 
-    Its wrist is a rig, ``<name>_wrist``, that sensors may be mounted on: X out of the hand, Y the
-    direction in which the fingers open.
+    Its wrist is a rig for sensors, ``<name>_wrist``: X points out of the hand, Y along the opening
+    direction of the fingers.
 
     Attributes:
-        asset: franka_panda, kuka_iiwa, xarm6, one of a pack, or one of yours; of several, the
-            first that is installed.
-        reach_m: Its hand is sent no farther than this from its base.
-        annotate: Whether labels are written for it.
+        asset: franka_panda, kuka_iiwa, xarm6, or the id of a robot in a pack or an asset folder;
+            of several, the first that is installed.
+        reach_m: Largest horizontal distance of the hand's goals from the base, along each axis.
+        annotate: Whether to write labels for it.
     """
 
     type: Literal["robot"] = "robot"
@@ -45,8 +45,8 @@ class Robot(PlacedElement):
     annotate: bool = True
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """An articulation, one instance, and a body per visible link."""
-        asset = self._installed(assets)
+        """Add an articulation, one instance, and a body per visible link."""
+        asset = self._find_installed(assets)
         robot = assets.robot(asset)
         T_world_base = self.pose(scene).rounded()
         instance_id = next_instance_id(scene)
@@ -74,17 +74,17 @@ class Robot(PlacedElement):
             instances=(*scene.instances, instance),
             articulations=(*scene.articulations, articulation),
             bodies=(*scene.bodies, *make_link_bodies(articulation, robot, parts)),
-            rigs=(*scene.rigs, wrist(f"{self.name}_wrist", self.name, robot)),
+            rigs=(*scene.rigs, make_wrist_rig(f"{self.name}_wrist", self.name, robot)),
         )
 
-    def _installed(self, assets: AssetIndex) -> str:
-        """The first of its assets that there is; the first one, to be missed, if there is none."""
+    def _find_installed(self, assets: AssetIndex) -> str:
+        """Find its first installed asset; the first one, for the error text, if there is none."""
         wanted = (self.asset,) if isinstance(self.asset, str) else self.asset
         known = {asset.asset_id for asset in assets.find((), kind="robot")}
         return next((name for name in wanted if name in known), wanted[0])
 
     def _workspace_m(self, scene: Scene, T_world_base: SE3) -> tuple[Vec3, Vec3]:
-        """The air over the surface it stands on, as far as it reaches."""
+        """Space for the hand's goals: above the supporting surface, within reach."""
         x, y, z = T_world_base.translation_m
         low, high = [x - self.reach_m, y - self.reach_m], [x + self.reach_m, y + self.reach_m]
         if self.on:
@@ -98,13 +98,13 @@ class Robot(PlacedElement):
         return (low[0], low[1], z + 0.10), (high[0], high[1], z + 0.50)
 
 
-def wrist(name: str, arm: str, robot: RobotModel) -> Rig:
-    """The rig on a robot's hand; on its last link if it has no gripper."""
+def make_wrist_rig(name: str, arm: str, robot: RobotModel) -> Rig:
+    """Make the rig on a robot's hand, or on its last link if it has no gripper."""
     fixed = [link for link in robot.links if link not in finger_links(robot)]
     hand, turn = fixed[-1], SE3().quaternion_wxyz
     if robot.gripper is not None:
         hand, turn = robot.gripper.link, robot.gripper.T_link_grasp.quaternion_wxyz
-    # The hand may be a mere frame: what carries the rig is the last thing to be seen before it.
+    # The hand may be a mere frame: the last visible link before it carries the rig.
     with_it = [k for k in fixed if k in robot.visuals and k in rigid_group(robot, hand)]
     visible = with_it or [k for k in fixed if k in robot.visuals]
     carrier = hand if hand in visible else visible[-1]

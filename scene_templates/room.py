@@ -13,15 +13,15 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.scene_templates.element import Element, add_static, parametric_id
 
 CLEARANCE_M = 0.15
-"""Cameras and lights keep this far from the walls."""
+"""Smallest distance of cameras and lights from the walls."""
 
 
 class Room(Element):
-    """Floor, ceiling and four walls around the origin; what lies inside is lit and seen.
+    """Floor, ceiling and four walls around the origin; cameras and lights stay inside.
 
     Attributes:
         size_m: Length, width and height of the inside.
-        door, window: Whether the walls have them.
+        door, window: Whether the room has a door and a window.
     """
 
     type: Literal["room"] = "room"
@@ -31,7 +31,7 @@ class Room(Element):
     name: str = Field("room", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """The room is background: it has no instance."""
+        """Add the room as background, without an instance."""
         x, y, z = self.size_m
         asset = parametric_id(
             "room", size_m=self.size_m, door=int(self.door), window=int(self.window)

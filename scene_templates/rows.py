@@ -1,4 +1,4 @@
-"""Where a group's objects stand nominally: in rows, clear of what already stands there."""
+"""Nominal positions of a group's objects: in rows, clear of other elements."""
 
 from __future__ import annotations
 
@@ -12,22 +12,21 @@ from gen_data.generator.core.scene import Placement, Scene, SupportSurface
 from gen_data.generator.core.se3 import Vec3
 
 LAYERS: dict[Placement, int] = {"drop": 4, "scatter": 1, "grid": 1, "stack": 4}
-"""How many objects may start above one another."""
+"""Largest number of objects that start above one another, by placement."""
 
 MARGIN_M = 0.02
-"""Objects stay this far from what stands on the surface."""
+"""Gap between objects and other elements on the surface."""
 
 _GAPS_M = (0.24, 0.18, 0.12, 0.08, 0.05, 0.03, 0.015, 0.005)
 _STEP_M = 0.02
 _TURNS_MAX = 100_000
-"""Steps, rows and layers tried for one object; surfaces of many metres need fewer."""
+"""Limit on the steps, rows and layers tried for one object; large surfaces need fewer."""
 
 
-def standing_discs(scene: Scene, surface: SupportSurface, assets: AssetIndex) -> tuple[Vec3, ...]:
-    """Discs ``(x, y, radius)`` [m], world, around what stands on a surface: arms, bins.
-
-    Objects that can move are none of it.
-    """
+def find_keep_out_discs(
+    scene: Scene, surface: SupportSurface, assets: AssetIndex
+) -> tuple[Vec3, ...]:
+    """Discs ``(x, y, radius)`` [m], world, around the static bodies on a surface: arms, bins."""
     discs = []
     for body in scene.bodies:
         if body.motion == "dynamic" or body.name == surface.body:
@@ -49,32 +48,32 @@ def standing_discs(scene: Scene, surface: SupportSurface, assets: AssetIndex) ->
 def place_in_rows(
     sizes_m: Sequence[Vec3], surface: SupportSurface, discs: Sequence[Vec3], layers: int
 ) -> list[Vec3] | None:
-    """Points of the surface's frame [m] to stand upright boxes on, as far apart as they may be.
+    """Place upright boxes in rows on a surface, with the largest gap that fits.
 
     Args:
         sizes_m: Extents of the boxes.
-        surface: What they stand on.
-        discs: ``(x, y, radius)`` in the surface's frame in which nothing stands.
-        layers: How many may be above one another.
+        surface: Supporting surface.
+        discs: Keep-out discs ``(x, y, radius)`` in the surface's frame.
+        layers: Largest number of boxes above one another.
 
     Returns:
-        One point per box, or None where they do not fit.
+        Centre of each box's base in the surface's frame [m]; None if they do not fit.
     """
     for gap_m in _GAPS_M:
-        points = _packed(sizes_m, surface, discs, layers, gap_m)
+        points = _pack_rows(sizes_m, surface, discs, layers, gap_m)
         if points is not None:
             return points
     return None
 
 
-def _packed(
+def _pack_rows(
     sizes_m: Sequence[Vec3],
     surface: SupportSurface,
     discs: Sequence[Vec3],
     layers: int,
     gap_m: float,
 ) -> list[Vec3] | None:
-    """Row after row from the low corner, then layer upon layer."""
+    """Place boxes row by row from the low corner, then layer by layer."""
     half_x, half_y = (0.5 * size for size in surface.size_m)
     left, front = -half_x + 0.5 * gap_m, -half_y + 0.5 * gap_m
     x, y, z, layer = left, front, 0.0, 1
@@ -93,7 +92,7 @@ def _packed(
                 row_m = layer_m = 0.0
             elif z + height_m > surface.clearance_m:
                 return None
-            elif _meets(discs, x, y, length_m, width_m):
+            elif _touches_disc(discs, x, y, length_m, width_m):
                 x += _STEP_M
             else:
                 break
@@ -105,8 +104,10 @@ def _packed(
     return points
 
 
-def _meets(discs: Sequence[Vec3], x: float, y: float, length_m: float, width_m: float) -> bool:
-    """Whether the rectangle with that low corner touches a disc."""
+def _touches_disc(
+    discs: Sequence[Vec3], x: float, y: float, length_m: float, width_m: float
+) -> bool:
+    """Whether the rectangle with this low corner touches a disc."""
     for center_x, center_y, radius_m in discs:
         near_x = min(max(center_x, x), x + length_m)
         near_y = min(max(center_y, y), y + width_m)

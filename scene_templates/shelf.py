@@ -1,4 +1,4 @@
-"""A shelf with several boards."""
+"""Shelves with several boards."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class Shelf(PlacedElement):
     Attributes:
         size_m: Width, depth and height.
         levels: Number of boards.
-        style: bookcase or rack.
-        annotate: Whether labels are written for it.
+        style: Type of shelf: bookcase or rack.
+        annotate: Whether to write labels for it.
     """
 
     type: Literal["shelf"] = "shelf"
@@ -33,7 +33,7 @@ class Shelf(PlacedElement):
     annotate: bool = False
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """A static body, its instance, and one surface per board."""
+        """Add a static body, its instance, and one surface per board."""
         T_world_shelf = self.pose(scene)
         asset = parametric_id("shelf", size_m=self.size_m, levels=self.levels, style=self.style)
         scene = add_static(

@@ -15,18 +15,18 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.scene_templates.element import Element, add_static, parametric_id, stand_upright
 
 SIGNAL_M = 0.6
-"""From the kerb to the pole."""
+"""Distance of the pole from the kerb."""
 
 
 class Signals(Element):
-    """A traffic light beside every road that comes to a junction, facing those who come.
+    """A traffic light beside every road into a junction, facing the incoming traffic.
 
     Attributes:
-        junction: Name of the junction; its roads are listed before.
-        mount: Where the lights hang: on poles, or on arms over the road.
-        beside_m: Width between the outer lane and the kerb: parked cars and verges.
-        seed: Of the lights' make.
-        annotate: Whether labels are written for them.
+        junction: Name of the junction; list its roads before this element.
+        mount: Mounting of the lights: on poles, or on mast arms above the road.
+        beside_m: Width between the outer lane and the kerb: parking strips and verges.
+        seed: Seed of the lights' design.
+        annotate: Whether to write labels for them.
     """
 
     type: Literal["signals"] = "signals"
@@ -37,13 +37,13 @@ class Signals(Element):
     annotate: bool = False
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """One light per incoming road.
+        """Add one light per incoming road.
 
         Raises:
             ConfigError: no road leads to such a junction.
         """
         crossing = {lane.name for lane in scene.lanes if lane.road == self.junction}
-        coming = [lane for lane in scene.lanes if _enters(lane, crossing, self.junction)]
+        coming = [lane for lane in scene.lanes if _is_entry(lane, crossing, self.junction)]
         if not coming:
             raise ConfigError(
                 f"elements.{self.name}.junction: no road leads to a junction '{self.junction}'; "
@@ -65,7 +65,7 @@ class Signals(Element):
         return scene
 
 
-def _enters(lane: Lane, crossing: set[str], junction: str) -> bool:
-    """Whether it is the outermost lane of a road that ends at the junction."""
+def _is_entry(lane: Lane, crossing: set[str], junction: str) -> bool:
+    """Whether a lane is the outermost one of a road that ends at the junction."""
     outermost = lane.kind == "driving" and not lane.right and lane.road != junction
     return outermost and bool(crossing & set(lane.successors))

@@ -1,4 +1,4 @@
-"""Tables and other things with a top."""
+"""Tables and other supports."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ CLEARANCE_M = 1.5
 
 
 class SurfaceElement(PlacedElement):
-    """Something whose top other things stand on.
+    """A table or another asset whose top supports other elements.
 
     Attributes:
-        asset: ``table`` is made to measure; any other asset has the size it has.
+        asset: ``table``, made to the sizes below, or the id of an asset with its own size.
         top_size_m: Length and width of a table's top.
         height_m: Height of a table's top.
-        style: How a table stands: legs, trestle or bench.
-        annotate: Whether labels are written for it.
+        style: Type of table: legs, trestle or bench.
+        annotate: Whether to write labels for it.
     """
 
     type: Literal["surface"] = "surface"
@@ -40,7 +40,7 @@ class SurfaceElement(PlacedElement):
     annotate: bool = False
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """A static body, its instance, and the surface of its top."""
+        """Add a static body, its instance, and the surface of its top."""
         asset = self.asset
         if asset == "table":
             size_m = (*self.top_size_m, self.height_m)

@@ -1,4 +1,4 @@
-"""A whole OpenUSD stage."""
+"""OpenUSD stages."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ class UsdStage(PlacedElement):
     """The stage in a ``.usd``, ``.usda``, ``.usdc`` or ``.usdz`` file of the user's asset folders.
 
     Attributes:
-        asset: Its id: ``user/kitchen`` for ``kitchen.usdc``.
+        asset: Id of the asset: ``user/kitchen`` for ``kitchen.usdc``.
         annotate: Whether prims with semantic labels (UsdSemantics, taxonomy ``category`` or
-            ``class``) become labelled things; else all of it is background.
-        lights: Whether its lamps and suns shine; a ``lighting`` randomizer replaces them.
+            ``class``) become labelled instances; otherwise the stage is background.
+        lights: Whether to import its lights; a ``lighting`` randomizer replaces them.
         cameras: Whether each of its cameras becomes a rig ``<name>/<prim>`` for a sensor's ``rig``:
             X along the camera's axis, Z up in its image.
-        collides: Whether things can rest on it, and bump into it.
+        collides: Whether other bodies collide with it and can rest on it.
     """
 
     type: Literal["usd_stage"] = "usd_stage"
@@ -33,10 +33,10 @@ class UsdStage(PlacedElement):
     collides: bool = True
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """A static body per mesh, ``<name>/<prim>``; its lights and, as rigs, its cameras."""
+        """Add a static body per mesh, ``<name>/<prim>``, its lights and, as rigs, its cameras."""
         stage, pose = assets.stage(self.asset), self.pose(scene)
         first = next_instance_id(scene)
-        things = self._things(stage, first) if self.annotate else {}
+        things = self._make_instances(stage, first) if self.annotate else {}
         bodies = tuple(
             Body(
                 f"{self.name}/{piece.name}",
@@ -47,9 +47,11 @@ class UsdStage(PlacedElement):
             )
             for piece in stage.pieces
         )
-        lights = tuple(self._placed(light, pose) for light in stage.lights) if self.lights else ()
+        lights = (
+            tuple(self._place_light(light, pose) for light in stage.lights) if self.lights else ()
+        )
         rigs = tuple(
-            self._rig(name, pose @ T_stage_camera, bodies[0])
+            self._make_rig(name, pose @ T_stage_camera, bodies[0])
             for name, T_stage_camera in (stage.cameras if self.cameras else ())
         )
         return replace(
@@ -60,7 +62,7 @@ class UsdStage(PlacedElement):
             rigs=(*scene.rigs, *rigs),
         )
 
-    def _things(self, stage: StageModel, first_id: int) -> dict[str, Instance]:
+    def _make_instances(self, stage: StageModel, first_id: int) -> dict[str, Instance]:
         """Instances by the name of their labelled prim."""
         first: dict[str, StagePiece] = {}
         for piece in stage.pieces:
@@ -71,7 +73,7 @@ class UsdStage(PlacedElement):
             for k, (thing, piece) in enumerate(first.items())
         }
 
-    def _placed(self, light: Light, pose: SE3) -> Light:
+    def _place_light(self, light: Light, pose: SE3) -> Light:
         return replace(
             light,
             name=f"{self.name}/{light.name}",
@@ -80,6 +82,6 @@ class UsdStage(PlacedElement):
             side=rotate_by_quaternion(pose.quaternion_wxyz, light.side),
         )
 
-    def _rig(self, name: str, T_world_camera: SE3, carrier: Body) -> Rig:
+    def _make_rig(self, name: str, T_world_camera: SE3, carrier: Body) -> Rig:
         T_body_rig = carrier.T_world_body.inverse() @ T_world_camera @ RIG_AXES
         return Rig(f"{self.name}/{name}", carrier.name, T_body_rig)

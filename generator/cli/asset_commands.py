@@ -223,7 +223,12 @@ def _print_findings(findings: Sequence[Finding]) -> None:
 
 def _write_thumbnails(library: Library, asset_ids: Sequence[str], path: Path) -> None:
     """Write one PNG with captioned pictures of assets."""
-    from gen_data.generator.preview.contact_sheet import Tile, arrange_tiles, pictures, write_sheet
+    from gen_data.generator.preview.contact_sheet import (
+        Tile,
+        arrange_tiles,
+        render_tiles,
+        write_sheet,
+    )
     from gen_data.generator.preview.thumbnails import thumbnail
     from gen_data.generator.renderers.warp.renderer import WarpRenderer
     from gen_data.generator.renderers.warp.settings import RenderSettings
@@ -235,7 +240,7 @@ def _write_thumbnails(library: Library, asset_ids: Sequence[str], path: Path) ->
         Tile(asset_id, thumbnail(library.get(asset_id), library, renderer, TILE_PX))
         for asset_id in asset_ids
     )
-    write_sheet(arrange_tiles(pictures(shown, TILE_PX, captions=True), 0), path)
+    write_sheet(arrange_tiles(render_tiles(shown, TILE_PX, captions=True), 0), path)
     click.echo(f"{path}: {len(asset_ids)} pictures")
 
 

@@ -125,7 +125,12 @@ def contact_sheet(
     each follow those of the one before.
     """
     from gen_data.generator.assemble.pipeline_factory import open_pipeline
-    from gen_data.generator.preview.contact_sheet import arrange_tiles, pictures, tiles, write_sheet
+    from gen_data.generator.preview.contact_sheet import (
+        arrange_tiles,
+        make_tiles,
+        render_tiles,
+        write_sheet,
+    )
 
     own = channels == WRITTEN
     wanted = () if own else tuple(_channel(name.strip()) for name in channels.split(","))
@@ -136,8 +141,8 @@ def contact_sheet(
             samples = _samples(pipeline.sample, first, n, step)
             info = pipeline.info
             shown = info.media if own else dict.fromkeys(info.cameras, wanted)
-            drawn = tiles(samples, shown, labels=labels, devices=own)
-            images += pictures(drawn, tile_px, captions=captions)
+            drawn = make_tiles(samples, shown, labels=labels, devices=own)
+            images += render_tiles(drawn, tile_px, captions=captions)
     write_sheet(arrange_tiles(images, columns), out)
     click.echo(f"{out}: {len(images)} tiles")
 

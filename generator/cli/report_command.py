@@ -24,14 +24,18 @@ def report(folder: Path, html: Path | None) -> None:
     from rich.console import Console
     from rich.table import Table as RichTable
 
-    from gen_data.generator.report.html_page import page
-    from gen_data.generator.report.label_files import records
+    from gen_data.generator.report.html_page import format_page
+    from gen_data.generator.report.label_files import read_records
     from gen_data.generator.report.label_statistics import collect_statistics
-    from gen_data.generator.report.lidar_scans import scans
-    from gen_data.generator.report.report_tables import histograms, scan_tables, tables
+    from gen_data.generator.report.lidar_scans import read_scans
+    from gen_data.generator.report.report_tables import (
+        make_histograms,
+        make_scan_tables,
+        make_tables,
+    )
 
-    found = collect_statistics(records(folder))
-    made = (*tables(found), *scan_tables(tuple(scans(folder))))
+    found = collect_statistics(read_records(folder))
+    made = (*make_tables(found), *make_scan_tables(tuple(read_scans(folder))))
     console = Console()
     for table in made:
         shown = RichTable(title=table.title, caption=table.note or None, box=box.SIMPLE_HEAD)
@@ -44,7 +48,9 @@ def report(folder: Path, html: Path | None) -> None:
         try:
             html.parent.mkdir(parents=True, exist_ok=True)
             html.write_text(
-                page(folder.resolve().name, made, histograms(found)), encoding="utf-8", newline="\n"
+                format_page(folder.resolve().name, made, make_histograms(found)),
+                encoding="utf-8",
+                newline="\n",
             )
         except OSError as error:
             raise StorageError(f"{html}: {error.strerror}") from error

@@ -1,1 +1,1 @@
-"""Looking at samples: contact sheets (PNG) and Rerun recordings."""
+"""Previews of samples: contact sheets (PNG) and Rerun recordings."""

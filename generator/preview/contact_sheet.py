@@ -1,4 +1,4 @@
-"""Contact sheet: many samples, or many sensors, on one PNG."""
+"""Contact sheets: tiles of samples and sensors on one PNG."""
 
 from __future__ import annotations
 
@@ -25,32 +25,32 @@ BACKGROUND = 24
 
 
 CAPTION_PX = 18
-"""Height of the strip under a tile that its caption stands on."""
+"""Height of the caption below a tile."""
 INK = (225, 225, 225)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Tile:
-    """One picture of a sheet, uint8 [h, w, 3], and what it is."""
+    """One image of a sheet, uint8 [h, w, 3], and its caption."""
 
     caption: str
     image: Image
 
 
-def tiles(
+def make_tiles(
     samples: Iterable[Sample],
     channels: Mapping[str, Sequence[Channel]],
     *,
     labels: bool,
     devices: bool = False,
 ) -> Iterator[Tile]:
-    """One tile per sample, camera and channel it has, and two per scan.
+    """Yield one tile per sample, camera and channel, and two per scan.
 
     Args:
-        samples: What is shown.
-        channels: Of every camera.
-        labels: Whether they are drawn on colour images.
-        devices: Whether radars and event cameras have tiles too.
+        samples: Samples to show.
+        channels: Channels of every camera.
+        labels: Whether to draw labels on colour images.
+        devices: Whether to add tiles of radars and event cameras.
     """
     for sample in samples:
         aspect = 1.0
@@ -76,21 +76,21 @@ def tiles(
                 yield Tile(name, event_view(table))
 
 
-def pictures(shown: Iterable[Tile], width_px: int, *, captions: bool) -> list[Image]:
-    """The images of tiles, ``width_px`` wide, with their captions below if asked for."""
+def render_tiles(shown: Iterable[Tile], width_px: int, *, captions: bool) -> list[Image]:
+    """Scale the images of tiles to ``width_px``, optionally with captions below."""
     return [
-        _captioned(_scaled(tile.image, width_px), tile.caption)
+        _add_caption(_scale(tile.image, width_px), tile.caption)
         if captions
-        else _scaled(tile.image, width_px)
+        else _scale(tile.image, width_px)
         for tile in shown
     ]
 
 
 def arrange_tiles(images: Sequence[Image], columns: int) -> Image:
-    """Tiles in rows of ``columns``, with a small gap; 0 = as many as make a sheet of 4 to 3.
+    """Arrange tiles in rows of ``columns``, with a small gap; 0 = for a sheet of about 4:3.
 
     Raises:
-        ConfigError: if there is no tile.
+        ConfigError: there is no tile.
     """
     if not images:
         raise ConfigError("a contact sheet needs at least one sample")
@@ -115,7 +115,7 @@ def write_sheet(sheet: Image, path: Path) -> None:
     """Write a sheet as PNG.
 
     Raises:
-        StorageError: if the file cannot be written.
+        StorageError: the file cannot be written.
     """
     done, encoded = cv2.imencode(".png", sheet[..., ::-1])
     if not done:
@@ -127,14 +127,14 @@ def write_sheet(sheet: Image, path: Path) -> None:
         raise StorageError(f"{path}: {error.strerror}") from error
 
 
-def _captioned(image: Image, caption: str) -> Image:
+def _add_caption(image: Image, caption: str) -> Image:
     strip: Image = np.full((CAPTION_PX, image.shape[1], 3), BACKGROUND, np.uint8)
     face = cv2.FONT_HERSHEY_SIMPLEX
     cv2.putText(strip, caption, (4, CAPTION_PX - 5), face, 0.42, INK, 1, cv2.LINE_AA)
     return np.concatenate([image, strip])
 
 
-def _scaled(image: Image, width_px: int) -> Image:
+def _scale(image: Image, width_px: int) -> Image:
     height_px = round(image.shape[0] * width_px / image.shape[1])
     how = cv2.INTER_AREA if width_px < image.shape[1] else cv2.INTER_LINEAR
     return np.asarray(cv2.resize(image, (width_px, height_px), interpolation=how), np.uint8)

@@ -1,4 +1,4 @@
-"""Radars and event cameras to look at."""
+"""Views of radars and event cameras."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from gen_data.generator.preview.point_cloud_views import (
 )
 
 FAST_M_S = 15.0
-"""Speeds beyond this, towards the radar or away, look alike."""
+"""Radial speed at which colours saturate."""
 DOT_PX = 6
 GREY = 40
 BRIGHTER, DARKER = (90, 170, 255), (255, 90, 70)
 
 
 def radar_view(table: Measurements, scene: Scene, aspect: float) -> Image:
-    """Detections from above, the radar's X axis to the right, uint8 [h, w, 3]; boxes are outlined.
+    """Draw detections from above, the radar's X axis to the right, uint8 [h, w, 3], with boxes.
 
-    Green stands still; blue comes closer, red goes away. The smaller a dot, the weaker its signal.
+    Green is static, blue approaches, red recedes. The size of a dot shows its signal strength.
 
     Args:
         table: Rows of a radar.
-        scene: Whose annotated things are outlined.
+        scene: Scene of the annotated instances to outline.
         aspect: Width over height.
     """
     image = empty_view(aspect)
@@ -48,22 +48,22 @@ def radar_view(table: Measurements, scene: Scene, aspect: float) -> Image:
 
 
 def event_view(table: Measurements) -> Image:
-    """All events of a reading on one picture, as large as they reach, uint8 [h, w, 3].
+    """Draw all events of a reading, uint8 [h, w, 3], cropped to their extent.
 
-    Blue where it became brighter, red where it became darker; the last event of a pixel counts.
+    Blue is brighter, red is darker; the last event of a pixel counts.
     """
     rows = table.rows
     shape = (int(rows["y_px"].max(initial=7)) + 1, int(rows["x_px"].max(initial=7)) + 1)
     image: Image = np.full((*shape, 3), GREY, np.uint8)
     for sign, color in ((1, BRIGHTER), (-1, DARKER)):
-        last = _last(rows, shape) == sign
+        last = _last_polarity(rows, shape) == sign
         image[last] = color
     return image
 
 
-def _last(rows: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+def _last_polarity(rows: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     """Polarity of the last event of every pixel, int8 [h, w]; 0 = none."""
     last: np.ndarray = np.zeros(shape, np.int8)
-    # Rows are in order of time, and of several values for one place the last one stays.
+    # Rows are in order of time, and assignment keeps the last of several values per pixel.
     last[rows["y_px"], rows["x_px"]] = rows["polarity"]
     return last

@@ -1,4 +1,4 @@
-"""Labels drawn on their image: masks tinted, boxes and skeletons outlined, names written."""
+"""Drawing of labels on images: tinted masks, boxes, skeletons and names."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ BOX_EDGES = (
 """Pairs of ``OrientedBox.corners`` that share an edge."""
 
 PIECES = 32
-"""That an edge is drawn in where a lens bends it."""
+"""Number of pieces of an edge that a lens bends."""
 NEAR_M = 0.01
-"""Edges are cut where they come closer to the camera plane than this."""
+"""Edges are clipped at this distance from the camera plane."""
 
 
 def draw_labels(reading: SensorReading, truth: ImageTruth) -> Image:
-    """The RGB image with every label drawn on it, uint8 [h, w, 3]."""
+    """Draw every label on the RGB image, uint8 [h, w, 3]."""
     image: Image = np.array(reading.channels[Channel.RGB], np.uint8, order="C")
     for item in truth.objects:
         _tint(image, item)
@@ -55,10 +55,10 @@ def draw_labels(reading: SensorReading, truth: ImageTruth) -> Image:
 
 
 def channel_image(reading: SensorReading, channel: Channel) -> Image:
-    """Any channel as something to look at, uint8 [h, w, 3].
+    """Convert any channel to a visible image, uint8 [h, w, 3].
 
     Raises:
-        KeyError: if the reading does not have the channel.
+        KeyError: the reading does not have the channel.
     """
     image = reading.channels[channel]
     return _SHOWN[channel](image) if channel in _SHOWN else color_ids(image)
@@ -70,7 +70,7 @@ def _disparity(disparity_px: NDArray[Any]) -> Image:
 
 
 def _flow_from_above(scene_flow_m: NDArray[Any]) -> Image:
-    """To the right, and away from the camera."""
+    """Colour the components to the right and away from the camera."""
     return color_flow(np.stack([scene_flow_m[..., 0], -scene_flow_m[..., 2]], axis=-1))
 
 
@@ -94,7 +94,7 @@ _SHOWN: Mapping[Channel, Callable[[NDArray[Any]], Image]] = {
     Channel.FLOW_OCCLUDED_FORWARD: _white_where_set,
     Channel.FLOW_OCCLUDED_BACKWARD: _white_where_set,
 }
-"""How channels are made visible; all others are ids."""
+"""Conversions of channels to visible images; all other channels are ids."""
 
 
 def draw_box3d(image: Image, box: OrientedBox, intrinsics: Intrinsics, color: Rgb) -> None:
@@ -115,7 +115,7 @@ def draw_box3d(image: Image, box: OrientedBox, intrinsics: Intrinsics, color: Rg
 def _draw_bent(
     image: Image, a: NDArray[Any], b: NDArray[Any], intrinsics: Intrinsics, color: Rgb
 ) -> None:
-    """Draw a segment in pieces, without those that the lens does not show or that jump a seam."""
+    """Draw a segment in pieces, without pieces outside of the lens's field or across a seam."""
     share = np.linspace(0.0, 1.0, PIECES + 1)[:, None]
     places = intrinsics.project(a + (b - a) * share)
     for start, end in pairwise(places):
@@ -127,7 +127,7 @@ def _draw_bent(
 
 
 def draw_keypoints(image: Image, points: Sequence[KeypointTruth], color: Rgb) -> None:
-    """Draw bones and points that are in the image, in place: hidden points are rings."""
+    """Draw bones and points inside the image, in place; hidden points are rings."""
     shown = {p.name: p for p in points if p.visibility}
     skeleton = find_skeleton(p.name for p in points)
     for a, b in skeleton.bones:
@@ -140,13 +140,13 @@ def draw_keypoints(image: Image, points: Sequence[KeypointTruth], color: Rgb) ->
 
 
 def _lighter(color: Rgb) -> Rgb:
-    """Halfway to white: told apart from the tint of the same object."""
+    """Mix with white, to differ from the tint of the same object."""
     red, green, blue = color
     return ((red + 255) // 2, (green + 255) // 2, (blue + 255) // 2)
 
 
 _SHIFT = 4
-"""OpenCV's coordinates for drawing have this many binary places; centres are whole numbers."""
+"""Fractional bits of OpenCV's drawing coordinates; its pixel centres are integers."""
 
 
 def _at(point: KeypointTruth) -> tuple[int, int]:
@@ -155,7 +155,7 @@ def _at(point: KeypointTruth) -> tuple[int, int]:
 
 
 def _in_front(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any] | None:
-    """The part of a segment that lies in front of the camera, shape [2, 3]; None if none does."""
+    """Clip a segment to the part in front of the camera, shape [2, 3]; None if there is none."""
     if a[2] < NEAR_M and b[2] < NEAR_M:
         return None
     if a[2] < NEAR_M:

@@ -1,4 +1,4 @@
-"""Colours for ids: far apart for neighbours, the same in every picture."""
+"""Colour maps for ids, depth, flow and fractions; ids have the same colour in every image."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 Rgb = tuple[int, int, int]
 GOLDEN_RATIO_CONJUGATE = 0.618033988749895
-"""Steps of this around the hue circle never come close to each other early on."""
+"""Step around the hue circle that keeps the hues of successive ids far apart."""
 
 
 def id_color(number: int) -> Rgb:
@@ -22,14 +22,14 @@ def id_color(number: int) -> Rgb:
 
 
 def color_ids(ids: NDArray[np.integer]) -> NDArray[np.uint8]:
-    """An id image [h, w] as colours, uint8 [h, w, 3]."""
+    """Colour an id image [h, w], uint8 [h, w, 3]."""
     table = np.array([id_color(i) for i in range(int(ids.max(initial=0)) + 1)], np.uint8)
     colored: NDArray[np.uint8] = table[ids]
     return colored
 
 
 def color_depth(z_depth_m: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """A depth image [h, w] as grey, near = bright, uint8 [h, w, 3]; black = nothing."""
+    """Convert a depth image [h, w] to grey, near = bright, uint8 [h, w, 3]; black = nothing."""
     seen = np.isfinite(z_depth_m)
     grey = np.zeros(z_depth_m.shape, np.uint8)
     if seen.any():
@@ -40,17 +40,17 @@ def color_depth(z_depth_m: NDArray[np.floating]) -> NDArray[np.uint8]:
 
 
 def grey_infrared(infrared: NDArray[np.uint16]) -> NDArray[np.uint8]:
-    """An infrared image [h, w] in the gamma of screens, uint8 [h, w, 3]; a hundredth is white."""
+    """Convert an infrared image [h, w] to grey with gamma 2.2, uint8 [h, w, 3]; 1 % saturates."""
     white = max(float(np.quantile(infrared, 0.99)), 1.0)
     grey = np.round(255.0 * np.clip(infrared / white, 0.0, 1.0) ** (1.0 / 2.2)).astype(np.uint8)
     return np.repeat(grey[..., None], 3, axis=2)
 
 
 def color_flow(flow_px: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """A flow image [h, w, 2] on the colour wheel of flow, uint8 [h, w, 3]; black = none.
+    """Colour a flow image [h, w, 2] by the flow colour wheel, uint8 [h, w, 3]; black = none.
 
     The hue is the direction, red to the right and yellow downwards; the saturation is the length,
-    full at the 99th percentile, at least at a pixel, and darker beyond.
+    full at the 99th percentile (at least 1 px), and darker beyond.
     Source: Baker et al., "A database and evaluation methodology for optical flow", IJCV 92, 2011.
     """
     u, v = (flow_px[..., k].astype(np.float64) for k in (0, 1))
@@ -69,7 +69,7 @@ def color_flow(flow_px: NDArray[np.floating]) -> NDArray[np.uint8]:
 
 
 def _flow_wheel() -> NDArray[np.float64]:
-    """Hues from red over yellow, green, cyan, blue and magenta, more where eyes tell more apart."""
+    """Hues from red through yellow, green, cyan, blue and magenta, spaced by discernibility."""
     ends = np.array([[1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1], [1, 0, 1]], float)
     counts = (15, 6, 4, 11, 13, 6)
     ramps = [
@@ -80,7 +80,7 @@ def _flow_wheel() -> NDArray[np.float64]:
 
 
 def color_shares(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Shares [n] as colours from blue (0) over green to red (1), uint8 [n, 3]; others are clipped.
+    """Colour fractions [n] from blue (0) through green to red (1), clipped, uint8 [n, 3].
 
     The hue runs from 240 degrees to 0 at full saturation.
     """

@@ -1,4 +1,4 @@
-"""Laser scans to look at: coloured points, a view from above, and one from the scanner."""
+"""Views of laser scans: coloured points, a top view, and a range view."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from gen_data.generator.preview.overlay import BOX_EDGES, Image
 from gen_data.generator.preview.palette import color_shares, id_color
 
 PointColors = Literal["class", "intensity"]
-"""What decides the colour of a point."""
+"""Property that determines the colour of a point."""
 PANEL_PX = 960
-"""Width of a view from above before it is scaled to its tile."""
+"""Width of a view before it is scaled to its tile."""
 AHEAD_M = 50.0
-"""Shown before and behind the scanner."""
+"""Extent of the top view in front of and behind the scanner."""
 NEAR_M, FAR_M = 2.0, 100.0
-"""Ranges between which colours differ in the view from the scanner."""
+"""Limits of the colour scale of the range view."""
 ROW_PX = 2
-"""Height of a ring in the view from the scanner."""
+"""Height of a ring in the range view."""
 
 GREY = (120, 120, 120)
 COLORS = {
@@ -42,19 +42,19 @@ COLORS = {
     "roof": (150, 70, 60),
     "window": (90, 130, 170),
 }
-"""Of what has no category, by surface."""
+"""Colours of points without a category, by surface."""
 
 
 def point_colors(cloud: PointCloud, by: PointColors = "class") -> NDArray[np.uint8]:
     """SRGB colour of each point, uint8 [n, 3].
 
     Args:
-        cloud: Whose points these are.
-        by: ``class`` is that of its category, else of its surface.
+        cloud: Scan with the points.
+        by: ``class``: colour of the category, else of the surface; ``intensity``.
     """
     points = cloud.points
     if by == "intensity":
-        # Most surfaces return little: the root tells them apart.
+        # Most intensities are low: the square root spreads them.
         return color_shares(np.sqrt(points["intensity"]))
     categories = points["category_id"]
     of_category = [id_color(k) for k in range(int(categories.max(initial=0)) + 1)]
@@ -66,11 +66,11 @@ def point_colors(cloud: PointCloud, by: PointColors = "class") -> NDArray[np.uin
 
 
 def top_view(cloud: PointCloud, scene: Scene, aspect: float) -> Image:
-    """The scan from above, its X axis to the right, uint8 [h, w, 3]; boxes are outlined.
+    """Draw a scan from above, its X axis to the right, uint8 [h, w, 3], with outlined boxes.
 
     Args:
-        cloud: What is shown.
-        scene: Whose annotated things are outlined.
+        cloud: Scan to draw.
+        scene: Scene of the annotated instances to outline.
         aspect: Width over height.
     """
     image = empty_view(aspect)
@@ -79,7 +79,7 @@ def top_view(cloud: PointCloud, scene: Scene, aspect: float) -> Image:
     colors = point_colors(cloud)
     column, row = pixels_from_above(position_m, image)
     inside = (column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0])
-    # Higher points last: they are what is seen from above.
+    # Draw higher points last: they hide lower ones in a top view.
     order = np.argsort(position_m[:, 2], kind="stable")
     order = order[inside[order]]
     image[row[order], column[order]] = colors[order]
@@ -88,12 +88,12 @@ def top_view(cloud: PointCloud, scene: Scene, aspect: float) -> Image:
 
 
 def empty_view(aspect: float) -> Image:
-    """What views from above are drawn on, uint8 [h, w, 3]."""
+    """Black image for a top view, uint8 [h, w, 3]."""
     return np.zeros((max(8, round(PANEL_PX / aspect)), PANEL_PX, 3), np.uint8)
 
 
 def outline_things(image: Image, scene: Scene, T_world_sensor: SE3) -> None:
-    """Draw the boxes of annotated things from above, in place, around a sensor."""
+    """Draw the boxes of annotated instances around a sensor from above, in place."""
     T_sensor_world = T_world_sensor.inverse()
     for thing in scene.instances:
         if thing.annotated:
@@ -107,13 +107,13 @@ def outline_things(image: Image, scene: Scene, T_world_sensor: SE3) -> None:
 
 
 def range_view(cloud: PointCloud) -> Image:
-    """What the scanner sees all around: range, intensity and class, one above the other.
+    """Draw panoramas of range, intensity and class, one above the other.
 
-    A row is a ring, the highest first; the middle column is straight ahead, left is left. Of
-    several points in one pixel the nearest is shown. Near is blue, far is red.
+    A row is a ring, the highest first; the middle column is straight ahead, left is left. The
+    nearest of several points in a pixel wins. Near is blue, far is red.
 
     Returns:
-        uint8 [h, w, 3]; black where no point is.
+        uint8 [h, w, 3]; black without a point.
     """
     position_m = cloud.points["position_m"].astype(np.float64)
     range_m = np.sqrt(np.einsum("ij,ij->i", position_m, position_m))

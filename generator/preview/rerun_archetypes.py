@@ -1,7 +1,7 @@
-"""What is seen in 3D, as Rerun has it: frames, meshes, boxes, ways.
+"""Conversion of frames, meshes, boxes and trajectories to Rerun's archetypes.
 
-Borders of the format: quaternions are x y z w, boxes have half sizes, the pinhole's principal point
-is in our own convention (pixel centres at i + 0.5).
+Rerun's conventions: quaternions are x y z w, boxes have half sizes; a pinhole's principal point is
+as in this project (pixel centres at i + 0.5).
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.generator.preview.palette import id_color
 
 WAY_M = 0.1
-"""What moves less than this has no way to show."""
+"""Shortest trajectory to show."""
 LIFT_M = 0.05
-"""Ways are drawn this far above where a body's origin passes."""
+"""Height of trajectories above the path of a body's origin."""
 
 
 def transform(pose: SE3, scale: float = 1.0) -> rr.Transform3D:
-    """A pose, and a factor on what is below it."""
+    """Convert a pose, with an optional scale of its children."""
     return rr.Transform3D(
         translation=pose.translation_m,
         quaternion=rr.Quaternion(xyzw=_xyzw(pose)),
@@ -34,7 +34,7 @@ def transform(pose: SE3, scale: float = 1.0) -> rr.Transform3D:
 
 
 def pinhole(camera: Intrinsics) -> rr.Pinhole:
-    """A camera, X right, Y down, Z forward."""
+    """Convert a pinhole camera: X right, Y down, Z forward."""
     return rr.Pinhole(
         image_from_camera=camera.matrix(),
         width=camera.width_px,
@@ -45,7 +45,7 @@ def pinhole(camera: Intrinsics) -> rr.Pinhole:
 
 
 def mesh_3d(mesh: MeshData, slot_colors: NDArray[np.uint8]) -> rr.Mesh3D:
-    """A mesh with one sRGB colour per material slot, [slots, 3]."""
+    """Convert a mesh with one sRGB colour per material slot, [slots, 3]."""
     corners = mesh.faces.reshape(-1)
     slots = np.repeat(mesh.face_slots, 3)
     return rr.Mesh3D(
@@ -57,7 +57,7 @@ def mesh_3d(mesh: MeshData, slot_colors: NDArray[np.uint8]) -> rr.Mesh3D:
 
 
 def boxes_3d(sample: Sample) -> rr.Boxes3D:
-    """Boxes in the world of everything that any camera sees, by instance id."""
+    """World boxes of all objects visible to any camera, by instance id."""
     found: dict[int, tuple[Instance, OrientedBox]] = {
         item.instance.instance_id: (item.instance, item.box3d_world)
         for truth in sample.truth.values()
@@ -75,7 +75,7 @@ def boxes_3d(sample: Sample) -> rr.Boxes3D:
 
 
 def boxes_2d(truth: ImageTruth) -> rr.Boxes2D:
-    """Boxes in the image of everything visible."""
+    """Image boxes of all visible objects."""
     items = [item for item in truth.objects if item.box is not None]
     return rr.Boxes2D(
         mins=[(item.box.x_min, item.box.y_min) for item in items if item.box],
@@ -86,7 +86,7 @@ def boxes_2d(truth: ImageTruth) -> rr.Boxes2D:
 
 
 def trajectory_strips(scene: Scene, until_s: float) -> rr.LineStrips3D:
-    """Where bodies go from now to an instant; things in their category's colour, rigs in white."""
+    """Trajectories of bodies from now to an instant, coloured by category; rigs in white."""
     categories = {i.instance_id: i.category_id for i in scene.instances}
     carriers = {rig.body for rig in scene.rigs}
     strips, colors = [], []

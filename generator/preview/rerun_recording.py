@@ -1,7 +1,7 @@
-"""Samples as a Rerun recording: the 3D scene, the images, the scans.
+"""Rerun recordings of samples: the 3D scene, images and scans.
 
-Timelines are ``sample``, the number of the sample, and for sequences ``time`` in seconds, on which
-sequences follow each other. What has not changed since the last sample is not sent again.
+Timelines are ``sample``, the index of the sample, and for sequences ``time`` in seconds, with one
+sequence after the other. Unchanged values are not sent again.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ TIMELINE = "sample"
 TIME = "time"
 APPLICATION = "gen-data"
 IN_IMAGE = {Channel.RGB, Channel.Z_DEPTH, Channel.MEASURED_DEPTH, Channel.CATEGORY}
-"""Channels that are laid over each other; all others have pictures of their own."""
+"""Channels that are overlaid in one view; each other channel has its own view."""
 AXES_M = 0.5
-"""Length at which the axes of rigs and devices are drawn."""
+"""Length of the axes of rigs and devices."""
 
 
 @dataclass
@@ -50,9 +50,9 @@ class Recorder:
     """Writes samples to one recording stream; remembers what it has already sent.
 
     Attributes:
-        stream: Where to write.
-        info: The data set that the samples are of.
-        points: What decides the colour of a laser point.
+        stream: Recording to write to.
+        info: Data set of the samples.
+        points: Property that determines the colour of laser points.
     """
 
     stream: rr.RecordingStream
@@ -64,13 +64,13 @@ class Recorder:
     _sequence: int = -1
 
     def start(self) -> None:
-        """Log what holds for every sample: axes, category names, the layout of the views."""
+        """Log values common to all samples: axes, category names, layout of the views."""
         self._name_classes()
         self.stream.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         self.stream.send_blueprint(_layout(self.info))
 
     def _name_classes(self) -> None:
-        """Log names and colours of categories and, as far as they are known, their skeletons."""
+        """Log names, colours and known skeletons of categories."""
         background = rr.AnnotationInfo(id=0, label="background", color=(60, 60, 60))
         described = [rr.ClassDescription(info=background)]
         for k, name in enumerate(self.info.categories, 1):
@@ -89,7 +89,7 @@ class Recorder:
         self.stream.log("/", rr.AnnotationContext(described), static=True)
 
     def _learn_skeletons(self, instances: Iterable[Instance]) -> None:
-        """Name the keypoints of categories that are met for the first time, or with more points."""
+        """Log the keypoints of categories that are new or have more keypoints than before."""
         known = dict(self._skeletons)
         for instance in instances:
             if instance.keypoints and instance.category_id:
@@ -101,7 +101,7 @@ class Recorder:
             self._name_classes()
 
     def record(self, sample: Sample) -> None:
-        """Log one sample at its own place in time."""
+        """Log one sample at its time."""
         self._learn_skeletons(sample.scene.instances)
         self._set_time(sample, sample.scene.time_s)
         self._record_bodies(sample.scene)
@@ -117,7 +117,7 @@ class Recorder:
             self._record_cloud(name, cloud)
 
     def _set_time(self, sample: Sample, time_s: float) -> None:
-        """Log what follows at an instant of the sample's sequence."""
+        """Set the time of the following logs to an instant of the sample's sequence."""
         self.stream.set_time(TIMELINE, sequence=sample.index)
         if self.info.steps_per_scene > 1:
             begins_s = (sample.index - sample.step_index) * self.info.step_s
@@ -140,7 +140,7 @@ class Recorder:
             self.stream.log(path, rr.Clear(recursive=False))
 
     def _record_frames(self, scene: Scene) -> None:
-        """Log where rigs and devices are; cameras and scanners are logged as they read."""
+        """Log the poses of rigs and devices; cameras and scanners are logged per reading."""
         frames: dict[str, SE3] = {
             f"world/rigs/{rig.name}": scene.rig_pose(rig.name) for rig in scene.rigs
         } | {f"world/devices/{device.name}": device.T_world_device for device in scene.devices}
@@ -148,7 +148,7 @@ class Recorder:
             self.stream.log(path, transform(pose), rr.TransformAxes3D(AXES_M))
 
     def _record_ways(self, sample: Sample) -> None:
-        """Log where things go, once per sequence."""
+        """Log trajectories, once per sequence."""
         sequence = sample.index // self.info.steps_per_scene
         if self.info.steps_per_scene > 1 and sequence != self._sequence:
             self._sequence = sequence
@@ -174,7 +174,7 @@ class Recorder:
     def _record_image(self, name: str, reading: SensorReading, truth: ImageTruth) -> None:
         path = f"world/cameras/{name}"
         self.stream.log(path, transform(reading.camera.T_world_camera))
-        # Rerun knows no other camera: images of other lenses are shown by themselves.
+        # Rerun supports pinholes only: images of other lenses are shown without projection.
         if reading.camera.intrinsics.straight:
             self.stream.log(f"{path}/image", pinhole(reading.camera.intrinsics))
         for channel, data in reading.channels.items():
@@ -230,7 +230,7 @@ def save_recording(
     """Write samples to a ``.rrd`` file.
 
     Raises:
-        StorageError: if the file cannot be written.
+        StorageError: the file cannot be written.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -251,7 +251,7 @@ def send_samples(
     info: DatasetInfo,
     points: PointColors = "class",
 ) -> None:
-    """Send samples to the viewer at ``url``, one by one as they are made."""
+    """Send samples to the viewer at ``url``, one by one as they are generated."""
     stream = rr.RecordingStream(APPLICATION)
     stream.connect_grpc(url)
     _record_all(Recorder(stream, assets, info, points), samples)
@@ -271,7 +271,7 @@ def _layout(info: DatasetInfo) -> rrb.Blueprint:
 
 
 def _camera_view(info: DatasetInfo, name: str) -> rrb.Spatial2DView | rrb.Tabs:
-    """The image of a camera, and tabs for the pictures of its other channels."""
+    """View of a camera's image, with tabs for its other channels."""
     image = rrb.Spatial2DView(origin=f"world/cameras/{name}/image", name=name)
     others = [
         rrb.Spatial2DView(origin=f"channels/{name}/{c.value}", name=f"{name} {c.value}")

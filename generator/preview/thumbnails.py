@@ -1,4 +1,4 @@
-"""Small pictures of single assets."""
+"""Thumbnails of assets."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ _MARGIN = 1.1
 
 
 def thumbnail(asset: Asset, library: AssetLibrary, renderer: Renderer, size_px: int) -> Image:
-    """An asset, uint8 [size_px, size_px, 3]: images as they are, all else seen from its front.
+    """Render an asset, uint8 [size_px, size_px, 3]: images as they are, others from the front.
 
     Raises:
-        AssetError: if it cannot be read.
+        AssetError: the asset cannot be read.
     """
     if asset.kind == "texture":
-        return _fitted(library.texture(asset.asset_id).albedo, size_px)
+        return _fit_in_square(library.texture(asset.asset_id).albedo, size_px)
     if asset.kind == "environment":
         radiance = library.environment(asset.asset_id)
         shown = np.power(radiance / (1.0 + radiance), 1.0 / 2.2)
-        return _fitted((255.0 * shown).astype(np.uint8), size_px)
+        return _fit_in_square((255.0 * shown).astype(np.uint8), size_px)
     scene = Scene(
         "thumbnail",
         _bodies(asset, library),
@@ -50,7 +50,7 @@ def thumbnail(asset: Asset, library: AssetLibrary, renderer: Renderer, size_px: 
 
 
 def _bodies(asset: Asset, library: AssetLibrary) -> tuple[Body, ...]:
-    """What shows an object, or a robot at home."""
+    """Bodies of an object, or of a robot at its home pose."""
     if asset.kind != "robot":
         return (Body("object", asset.asset_id),)
     robot = library.robot(asset.asset_id)
@@ -58,7 +58,7 @@ def _bodies(asset: Asset, library: AssetLibrary) -> tuple[Body, ...]:
 
 
 def _camera(scene: Scene, library: AssetLibrary, size_px: int) -> Camera:
-    """A camera that shows all bodies, from the front, the left and above."""
+    """Camera that shows all bodies from the front, the left and above."""
     corners = np.concatenate([_corners(body, library) for body in scene.bodies])
     low, high = corners.min(axis=0), corners.max(axis=0)
     x, y, z = (float(v) for v in 0.5 * (low + high))
@@ -82,8 +82,8 @@ def _corners(body: Body, library: AssetLibrary) -> NDArray[np.float64]:
     return body.T_world_body.apply(box)
 
 
-def _fitted(image: Image, size_px: int) -> Image:
-    """An image at most ``size_px`` wide and high, in the middle of a grey square."""
+def _fit_in_square(image: Image, size_px: int) -> Image:
+    """Scale an image to fit, in the middle of a grey square."""
     scale = size_px / max(image.shape[:2])
     height, width = (max(1, round(scale * side)) for side in image.shape[:2])
     small = cv2.resize(np.ascontiguousarray(image), (width, height), interpolation=cv2.INTER_AREA)

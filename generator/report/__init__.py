@@ -1,1 +1,1 @@
-"""What a data set contains, in numbers: read from its label files, shown as tables and a page."""
+"""Reports on data sets: statistics of label files, as tables and as an HTML page."""

@@ -1,4 +1,4 @@
-"""A report as one HTML file: no script, no font, no image from anywhere else."""
+"""A report as one self-contained HTML file, without external scripts, fonts or images."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from html import escape
 from gen_data.generator.report.report_tables import Histogram, Table
 
 BARS_PX = (300, 90)
-"""Width and height of the bars of one histogram."""
+"""Width and height of one histogram's bars."""
 
 STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #1d2430; margin: 2em auto; max-width: 1100px;
@@ -27,9 +27,13 @@ text { font-size: 9px; fill: #5b6675; }
 """
 
 
-def page(title: str, tables: Iterable[Table], histograms: Iterable[Histogram]) -> str:
-    """The whole document."""
-    body = [f"<h1>{escape(title)}</h1>", *map(_table, tables), *map(_plots, histograms)]
+def format_page(title: str, tables: Iterable[Table], histograms: Iterable[Histogram]) -> str:
+    """Format the HTML document."""
+    body = [
+        f"<h1>{escape(title)}</h1>",
+        *map(_format_table, tables),
+        *map(_format_plots, histograms),
+    ]
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
         f"<title>{escape(title)}</title><style>{STYLE}</style></head>\n<body>\n"
@@ -38,7 +42,7 @@ def page(title: str, tables: Iterable[Table], histograms: Iterable[Histogram]) -
     )
 
 
-def _table(table: Table) -> str:
+def _format_table(table: Table) -> str:
     head = "".join(f"<th>{escape(cell)}</th>" for cell in table.header)
     rows = "\n".join(
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows
@@ -47,17 +51,17 @@ def _table(table: Table) -> str:
     return f"<h2>{escape(table.title)}</h2>\n<table><tr>{head}</tr>\n{rows}</table>{note}"
 
 
-def _plots(histogram: Histogram) -> str:
+def _format_plots(histogram: Histogram) -> str:
     figures = "\n".join(
-        f"<figure>{bars(histogram, name)}<figcaption>{escape(name)}</figcaption></figure>"
+        f"<figure>{format_bars(histogram, name)}<figcaption>{escape(name)}</figcaption></figure>"
         for name, counts in histogram.counts.items()
         if counts.any()
     )
     return f'<h2>{escape(histogram.title)}</h2>\n<div class="plots">{figures}</div>'
 
 
-def bars(histogram: Histogram, name: str) -> str:
-    """One histogram as inline SVG: equally wide bars, the lower edge of each bin below it."""
+def format_bars(histogram: Histogram, name: str) -> str:
+    """Format one histogram as inline SVG: bars of equal width, labelled with their lower edges."""
     counts = histogram.counts[name]
     width_px, height_px = BARS_PX
     step_px = width_px / len(counts)

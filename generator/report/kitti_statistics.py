@@ -1,4 +1,4 @@
-"""What is published about KITTI's object training set (7,481 images).
+"""Published statistics of KITTI's object training set (7,481 images).
 
 * Objects: counted in ``label_2`` of the object benchmark's training set (A. Geiger, P. Lenz,
   R. Urtasun, "Are we ready for Autonomous Driving? The KITTI Vision Benchmark Suite", CVPR 2012;
@@ -17,12 +17,12 @@ from dataclasses import dataclass
 
 IMAGES = 7481
 POINTS_PER_SCAN = (120_000, 104_450)
-"""Of the recordings, and of the odometry sequences."""
+"""Points per scan of the raw recordings, and of the odometry sequences."""
 
 
 @dataclass(frozen=True, slots=True)
 class KittiType:
-    """One of KITTI's types: how many there are, and their mean height, width and length [m]."""
+    """One of KITTI's types: number of objects, and mean height, width and length [m]."""
 
     objects: int
     size_hwl_m: tuple[float, float, float]
@@ -42,11 +42,11 @@ TYPES = {
 
 @dataclass(frozen=True, slots=True)
 class Difficulty:
-    """What an object must show to count at a level of difficulty.
+    """Limits for an object to count at a difficulty.
 
     Attributes:
-        height_px: The least height of its box.
-        occlusion_level, truncation: The largest.
+        height_px: Smallest height of its box.
+        occlusion_level, truncation: Largest values.
     """
 
     name: str

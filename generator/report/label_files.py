@@ -1,7 +1,7 @@
-"""Labels of an exported data set, one at a time: COCO's files, or KITTI's where there are none.
+"""Stream of the labels of an exported data set: COCO's files, or else KITTI's.
 
-COCO's files are read line by line, as ``gen_data.exporters.coco`` writes them (an image or an
-annotation per line): millions of annotations are never in memory together.
+COCO files are read line by line, with an image or annotation per line as
+``gen_data.exporters.coco`` writes them, so that memory does not grow with the data set.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ class Label:
     """One object in one image.
 
     Attributes:
-        image: Split and name of the image it is in.
+        image: Split and name of its image.
         kind: KITTI's type.
         occlusion_level: KITTI's 0, 1, 2; None = not annotated.
-        truncation, visible_fraction: Shares; None = not annotated.
-        distance_m: From the camera to the box's centre, over the ground; None = not annotated.
+        truncation, visible_fraction: Fractions; None = not annotated.
+        distance_m: Horizontal distance from the camera to the box's centre; None = not annotated.
         size_lwh_m: Length (along X), width, height; None = not annotated.
     """
 
@@ -48,7 +48,7 @@ class Label:
 
 @dataclass(frozen=True, slots=True)
 class Points:
-    """Keypoints of one object: how many are outside the image, hidden, and visible."""
+    """Numbers of keypoints of one object: outside the image, hidden, and visible."""
 
     category: str
     counts: tuple[int, int, int]
@@ -61,32 +61,32 @@ class Picture(NamedTuple):
     name: str
 
 
-def records(folder: Path) -> Iterator[Picture | Label | Points]:
-    """All images, then all objects, of each file of a data set.
+def read_records(folder: Path) -> Iterator[Picture | Label | Points]:
+    """Yield all images, then all objects, of each file of a data set.
 
     Args:
-        folder: Of a data set (``coco/`` or ``kitti/`` is looked for), or of one of its formats.
+        folder: Folder of a data set (with ``coco/`` or ``kitti/``), or of one of its formats.
 
     Raises:
-        StorageError: if no labels are found, or a file is not laid out as expected.
+        StorageError: no labels are found, or a file does not have the expected layout.
     """
     for root in (folder / "coco", folder):
         files = sorted((root / "annotations").glob("*.json"))
         if files:
             for path in files:
-                yield from _of_coco(path)
+                yield from _read_coco(path)
             return
     for root in (folder / "kitti", folder):
         if (root / "training" / "label_2").is_dir():
-            yield from _of_kitti(root)
+            yield from _read_kitti(root)
             return
     raise StorageError(
-        f"{folder}: no labels here: neither coco/annotations nor kitti/training/label_2; name the "
-        "folder of a data set that was exported as coco or kitti"
+        f"{folder}: there are no labels in coco/annotations or kitti/training/label_2; expected "
+        "the folder of a data set exported as coco or kitti"
     )
 
 
-def _of_coco(path: Path) -> Iterator[Picture | Label | Points]:
+def _read_coco(path: Path) -> Iterator[Picture | Label | Points]:
     kind, _, split = path.stem.rpartition("_")
     names: dict[int, str] = {}
     points = kind != INSTANCES.rstrip("_")
@@ -144,7 +144,7 @@ def _points(category: str, row: dict[str, Any]) -> Points:
     return Points(category, (states.count(0), states.count(1), states.count(2)))
 
 
-def _of_kitti(root: Path) -> Iterator[Picture | Label]:
+def _read_kitti(root: Path) -> Iterator[Picture | Label]:
     for listing in sorted((root / "ImageSets").glob("*.txt")):
         for frame in listing.read_text(encoding="utf-8").split():
             yield Picture(listing.stem, frame)

@@ -1,4 +1,4 @@
-"""Columns of numbers by category, collected from a stream of labels."""
+"""Statistics of labels by category, collected from a stream."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ COLUMNS = (
 
 @dataclass
 class Survey:
-    """Everything a report shows; NaN in a column = not annotated.
+    """Statistics of a data set; NaN in a column = not annotated.
 
     Attributes:
-        images: Objects per image, by (split, image).
-        numbers: By (category, KITTI's type): objects in rows, ``COLUMNS`` one after another.
-        points: By category: keypoints outside the image, hidden, visible.
+        images: Number of objects by (split, image).
+        numbers: Rows of ``COLUMNS``, one per object, by (category, KITTI's type).
+        points: Numbers of keypoints outside the image, hidden and visible, by category.
     """
 
     images: Counter[tuple[str, str]] = field(default_factory=Counter)
@@ -37,19 +37,19 @@ class Survey:
 
     @property
     def categories(self) -> tuple[str, ...]:
-        """Sorted names of what is there."""
+        """Names of the categories, sorted."""
         return tuple(sorted({category for category, _ in self.numbers}))
 
-    def of_category(self, category: str) -> dict[str, Column]:
+    def category_columns(self, category: str) -> dict[str, Column]:
         """All columns of a category."""
         return self._columns([key for key in self.numbers if key[0] == category])
 
-    def of_kind(self, kind: str) -> dict[str, Column]:
-        """All columns of one of KITTI's types; empty ones where there is no such object."""
+    def kind_columns(self, kind: str) -> dict[str, Column]:
+        """All columns of one of KITTI's types; empty if there is no such object."""
         return self._columns([key for key in self.numbers if key[1] == kind])
 
-    def per_image(self, split: str | None = None) -> Column:
-        """Objects in each image, of one split or of all."""
+    def objects_per_image(self, split: str | None = None) -> Column:
+        """Number of objects in each image of one split, or of all."""
         return np.array(
             [n for (where, _), n in self.images.items() if split in (None, where)], np.float64
         )
@@ -61,7 +61,7 @@ class Survey:
 
 
 def collect_statistics(records: Iterable[Picture | Label | Points]) -> Survey:
-    """Collect what a report needs; memory grows by nine numbers per object."""
+    """Collect the statistics of a report; nine numbers per object stay in memory."""
     found = Survey()
     for record in records:
         if isinstance(record, Picture):

@@ -1,4 +1,4 @@
-"""Laser scans of a data set in KITTI's format: how full they are, and how many points cars have."""
+"""Statistics of laser scans in KITTI's format: points per scan, and points on cars."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from gen_data.generator.core.errors import StorageError
 
 SCANS_MAX = 200
-"""Scans are alike; of a larger data set, as many are read, evenly chosen."""
+"""Largest number of scans to read, chosen evenly: scans are similar."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,9 +20,9 @@ class Scan:
     """One sweep.
 
     Attributes:
-        points: How many.
-        dark: How many of them have reflectance 0.
-        cars: Distance over the ground [m] and points of every car that is not occluded.
+        points: Number of points.
+        dark: Number of points with reflectance 0.
+        cars: Horizontal distance [m] and number of points of every unoccluded car.
     """
 
     points: int
@@ -30,19 +30,19 @@ class Scan:
     cars: tuple[tuple[float, int], ...]
 
 
-def scans(folder: Path) -> Iterator[Scan]:
-    """Scans of a data set, or of its ``kitti`` folder; none where it has no laser scanner.
+def read_scans(folder: Path) -> Iterator[Scan]:
+    """Read the scans of a data set, or of its ``kitti`` folder; none without a laser scanner.
 
     Raises:
-        StorageError: if a file is not laid out as expected.
+        StorageError: a file does not have the expected layout.
     """
     for root in (folder / "kitti/training", folder / "training"):
         labelled = sorted((root / "velodyne_labels").glob("*.label"))
         for path in labelled[:: max(1, math.ceil(len(labelled) / SCANS_MAX))]:
-            yield _scan(root, path)
+            yield _read_scan(root, path)
 
 
-def _scan(root: Path, path: Path) -> Scan:
+def _read_scan(root: Path, path: Path) -> Scan:
     try:
         points = np.fromfile(root / f"velodyne/{path.stem}.bin", "<f4").reshape(-1, 4)
         rows = np.fromfile(path, "<u4") >> np.uint32(16)
@@ -57,5 +57,5 @@ def _scan(root: Path, path: Path) -> Scan:
             if label[0] == "Car" and label[2] == "0"
         )
     except (OSError, ValueError, IndexError) as error:
-        raise StorageError(f"{path}: not a scan with labels of KITTI's: {error}") from error
+        raise StorageError(f"{path}: not a scan with labels in KITTI's format: {error}") from error
     return Scan(len(points), int((points[:, 3] == 0.0).sum()), cars)

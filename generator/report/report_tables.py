@@ -1,4 +1,4 @@
-"""A survey as tables of text, and as histograms: what the terminal and the page both show."""
+"""Tables and histograms of a report, for the terminal and the HTML page."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from gen_data.generator.report.lidar_scans import Scan
 
 NOTHING = "-"
 TRUNCATED = 0.15
-"""Share outside the image above which KITTI's easy level leaves an object out."""
+"""Fraction outside the image above which KITTI's easy level excludes an object."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +35,11 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Histogram:
-    """Counts between edges; the last bin also holds all that is larger.
+    """Counts between edges; the last bin includes all larger values.
 
     Attributes:
-        edges: Shape [n + 1].
-        counts: By name of what is counted, shape [n] each.
+        edges: Edges of the bins [n + 1].
+        counts: Counts [n] by the name of the counted objects.
     """
 
     title: str
@@ -47,8 +47,8 @@ class Histogram:
     counts: dict[str, NDArray[np.intp]]
 
 
-def tables(found: Survey) -> tuple[Table, ...]:
-    """All tables of a report; the last ones only where there is something to say."""
+def make_tables(found: Survey) -> tuple[Table, ...]:
+    """All tables of a report; keypoints and the comparison with KITTI only if they apply."""
     made = [_images(found), _objects(found), _hidden(found), _sizes(found)]
     if found.points:
         made.append(_keypoints(found))
@@ -57,8 +57,8 @@ def tables(found: Survey) -> tuple[Table, ...]:
     return tuple(made)
 
 
-def scan_tables(scans: Sequence[Scan]) -> tuple[Table, ...]:
-    """Tables about laser scans; none where there are no scans."""
+def make_scan_tables(scans: Sequence[Scan]) -> tuple[Table, ...]:
+    """Tables of laser scans; none without scans."""
     if not scans:
         return ()
     points = np.array([scan.points for scan in scans], np.float64)
@@ -81,10 +81,10 @@ def _car_points(scans: Sequence[Scan]) -> Table:
     return Table("Laser points on cars", header, tuple(rows), "Cars that are not occluded.")
 
 
-def histograms(found: Survey) -> tuple[Histogram, ...]:
-    """Distributions by category, and of objects over images."""
-    columns = {name: found.of_category(name) for name in found.categories}
-    per_image = found.per_image()
+def make_histograms(found: Survey) -> tuple[Histogram, ...]:
+    """Histograms by category, and of the number of objects per image."""
+    columns = {name: found.category_columns(name) for name in found.categories}
+    per_image = found.objects_per_image()
     return (
         _histogram(
             "Objects per image",
@@ -115,7 +115,7 @@ def histograms(found: Survey) -> tuple[Histogram, ...]:
 
 
 def counts_at(columns: dict[str, Column], level: Difficulty) -> NDArray[np.bool_]:
-    """Which objects count at one of KITTI's levels of difficulty."""
+    """Mask [n] of the objects that count at one of KITTI's difficulties."""
     counted: NDArray[np.bool_] = (
         (columns["height_px"] >= level.height_px)
         & (columns["occlusion_level"] <= level.occlusion_level)
@@ -125,7 +125,7 @@ def counts_at(columns: dict[str, Column], level: Difficulty) -> NDArray[np.bool_
 
 
 def _distance_edges(columns: dict[str, dict[str, Column]]) -> Column:
-    """Steps of 1, 2 or 5 times a power of ten, about a dozen of them."""
+    """About a dozen edges in steps of 1, 2 or 5 times a power of ten."""
     known = [_drop_missing(c["distance_m"]) for c in columns.values()]
     far_m = max((float(v.max()) for v in known if v.size), default=1.0)
     rough_m = max(far_m, 1e-3) / 12.0
@@ -146,7 +146,7 @@ def _images(found: Survey) -> Table:
     splits = sorted({split for split, _ in found.images})
     rows = []
     for name, split in [*((s, s) for s in splits), ("all", None)]:
-        objects = found.per_image(split)
+        objects = found.objects_per_image(split)
         shown = f"{np.median(objects):.0f} / {objects.max():.0f}" if objects.size else NOTHING
         rows.append(
             (
@@ -166,7 +166,7 @@ def _objects(found: Survey) -> Table:
     rows = []
     total = sum(found.images.values())
     for name in found.categories:
-        c = found.of_category(name)
+        c = found.category_columns(name)
         n = c["width_px"].size
         rows.append(
             (
@@ -187,7 +187,7 @@ def _objects(found: Survey) -> Table:
 def _hidden(found: Survey) -> Table:
     rows = []
     for name in found.categories:
-        c = found.of_category(name)
+        c = found.category_columns(name)
         level = _drop_missing(c["occlusion_level"])
         rows.append(
             (
@@ -212,7 +212,7 @@ def _hidden(found: Survey) -> Table:
 def _sizes(found: Survey) -> Table:
     rows = []
     for name in found.categories:
-        c = found.of_category(name)
+        c = found.category_columns(name)
         sizes = (_format_spread(c[f"{side}_m"]) for side in ("height", "width", "length"))
         rows.append((name, _quantiles(c["distance_m"], 1), *sizes))
     header = ("category", "distance m", "height m", "width m", "length m")
@@ -233,7 +233,7 @@ def _beside_kitti(found: Survey) -> Table:
     rows = []
     images = max(len(found.images), 1)
     for kind, kitti in TYPES.items():
-        c = found.of_kind(kind)
+        c = found.kind_columns(kind)
         n = c["width_px"].size
         row = [kind, f"{n}", f"{kitti.objects}", f"{n / images:.2f}"]
         row.append(f"{kitti.objects / IMAGES:.2f}")

@@ -1,1 +1,1 @@
-"""Roads as geometry: reference lines, cross sections, lane graphs, OpenDRIVE files."""
+"""Geometry of roads: reference lines, cross sections, lane graphs, OpenDRIVE files."""

@@ -1,4 +1,4 @@
-"""What a road looks like in cross section: strips side by side, from the middle outwards.
+"""Cross sections of roads: strips side by side, from the middle outwards.
 
 ``t`` is the distance to the left of the reference line, ``s`` the arc length along it. The lowest
 gutter is at z = 0; the carriageway rises to its crown in the middle.
@@ -20,11 +20,11 @@ Pair = tuple[float, float]
 
 KERB_WIDTH_M = 0.15
 APRON_M, APRON_FALL_M = 6.0, 0.1
-"""Land beside a road that belongs to it: how wide, and how far below the gutter it ends."""
+"""Width of a road's apron, and depth of its outer edge below the gutter."""
 APRON_STEPS, APRON_DROPS = (0.0, 0.25, 1.0), (0.0, 0.25, 1.0)
-"""Its profile as shares of both."""
+"""Profile of the apron as fractions of both."""
 FALL = 0.025
-"""Slope of sidewalks and verges: 2 to 2.5 % sheds rain (EAE/RASt 06, 6.1.1.2)."""
+"""Slope of sidewalks and verges: 2 to 2.5 % for drainage (EAE/RASt 06, 6.1.1.2)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,15 +32,15 @@ class RoadShape:
     """A road of constant cross section. Pairs are (left, right) as seen along the road.
 
     Attributes:
-        length_m: Along the reference line, the middle of the road.
+        length_m: Length of the reference line, the middle of the road.
         lanes: Numbers of lanes against and along the road's direction.
-        median_m: Strip that keeps the two directions apart.
+        median_m: Width of the strip between the two directions.
         bicycle_m, shoulder_m, parking_m: Widths of strips beside the lanes; 0 = none.
         kerb_m: Height of the kerbs; 0 = none.
         verge_m, sidewalk_m: Widths of planting strips and of sidewalks beyond them; 0 = none.
-        curvature_per_m: Of the reference line, positive to the left.
-        crown: Slope of the carriageway from the middle down to the gutters.
-        traffic: Side that is driven on, ``right`` or ``left``.
+        curvature_per_m: Curvature of the reference line, positive to the left.
+        crown: Cross slope of the carriageway, from the middle to the gutters.
+        traffic: Side on which vehicles drive, ``right`` or ``left``.
     """
 
     length_m: float = 100.0
@@ -58,7 +58,7 @@ class RoadShape:
     traffic: str = "right"
 
     def line(self) -> ReferenceLine:
-        """Its reference line, from the origin along +X."""
+        """Reference line, from the origin along +X."""
         return bend_line(self.length_m, self.curvature_per_m)
 
     def lanes_on(self, side: int) -> int:
@@ -70,19 +70,14 @@ class RoadShape:
         return (side < 0) == (self.traffic == "right")
 
     def carriageway_m(self, side: int) -> float:
-        """From the middle to the gutter."""
+        """Distance from the middle to the gutter."""
         k = side_index(side)
         beside = self.bicycle_m[k] + self.shoulder_m[k] + self.parking_m[k]
         return 0.5 * self.median_m + self.lanes_on(side) * self.lane_width_m + beside
 
     def crowned_m(self, side: int) -> float:
-        """From the middle to where the carriageway's fall ends: parking strips are level."""
+        """Distance from the middle to the end of the cross slope; parking strips are level."""
         return self.carriageway_m(side) - self.parking_m[side_index(side)]
-
-    def changed(self) -> dict[str, Any]:
-        """Fields that differ from their defaults."""
-        pairs = ((f.name, getattr(self, f.name), f.default) for f in fields(self))
-        return {name: value for name, value, default in pairs if value != default}
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +86,9 @@ class Strip:
 
     Attributes:
         side: +1 left, -1 right of the reference line.
-        number: From the middle, among its kind.
+        number: Number among its kind, from the middle.
         inner_m, outer_m: Distances from the reference line, both >= 0.
-        inner_z_m, outer_z_m: Heights at them.
+        inner_z_m, outer_z_m: Heights of both edges.
     """
 
     kind: StripKind
@@ -106,7 +101,7 @@ class Strip:
 
     @property
     def width_m(self) -> float:
-        """Across the road."""
+        """Extent across the road."""
         return self.outer_m - self.inner_m
 
     @property
@@ -121,7 +116,7 @@ class Strip:
 
 
 def strips(shape: RoadShape, side: int) -> tuple[Strip, ...]:
-    """The strips of one side, from the middle outwards."""
+    """Strips of one side, from the middle outwards."""
     k = side_index(side)
     top = shape.crown * max(shape.crowned_m(1), shape.crowned_m(-1))
     made: list[Strip] = []
@@ -141,7 +136,7 @@ def strips(shape: RoadShape, side: int) -> tuple[Strip, ...]:
     beyond = shape.verge_m[k] + shape.sidewalk_m[k]
     if beyond > 0.0 and shape.kerb_m > 0.0:
         put("kerb", KERB_WIDTH_M, shape.kerb_m)
-    # Behind a kerb the ground rises away from it; without one it falls, and water runs off.
+    # Behind a kerb the ground rises outwards, to drain to the gutter; without one it falls.
     fall = FALL if shape.kerb_m > 0.0 else -FALL
     put("verge", shape.verge_m[k], fall * shape.verge_m[k])
     put("sidewalk", shape.sidewalk_m[k], fall * shape.sidewalk_m[k])
@@ -149,7 +144,7 @@ def strips(shape: RoadShape, side: int) -> tuple[Strip, ...]:
 
 
 def height_m(shape: RoadShape, t_m: Array) -> Array:
-    """Height of the surface at distances to the left of the middle; beyond the edge, the edge's."""
+    """Heights of the surface [n] at distances to the left [n], clipped to the edges."""
     heights = np.zeros_like(t_m)
     for side in (1, -1):
         row = strips(shape, side)
@@ -160,6 +155,12 @@ def height_m(shape: RoadShape, t_m: Array) -> Array:
     return heights
 
 
+def non_default_fields(shape: Any) -> dict[str, Any]:
+    """Fields of a dataclass instance that differ from their defaults."""
+    pairs = ((f.name, getattr(shape, f.name), f.default) for f in fields(shape))
+    return {name: value for name, value, default in pairs if value != default}
+
+
 def side_index(side: int) -> int:
-    """Where a side stands in a (left, right) pair."""
+    """Index of a side in a (left, right) pair."""
     return 0 if side > 0 else 1

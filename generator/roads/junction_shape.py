@@ -1,11 +1,10 @@
-"""A junction of like roads: arms from a centre, corners rounded, one path per turn."""
+"""Shape and lanes of junctions: arms from a centre, rounded corners, one path per turn."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from gen_data.generator.roads.lane_graph import FURNITURE_M, world_points
 from gen_data.generator.roads.reference_line import Array
 
 CROSSWALK_M = (0.5, 3.5)
-"""Where a crosswalk lies on an arm, beyond where the corners' curves end."""
+"""Extent of a crosswalk along an arm, from the end of the corners' curves."""
 STOP_LINE_M = (4.5, 5.0)
 SETBACK_M = 6.5
 ABSENT = -1.0
@@ -25,13 +24,13 @@ _ARC_STEP_RAD = math.radians(7.5)
 
 @dataclass(frozen=True, slots=True)
 class JunctionShape:
-    """Arms with as many lanes in as out, all of one width.
+    """Arms with equal numbers of lanes in and out, all of one width.
 
     Attributes:
-        arms_deg: Directions of the arms from the centre, rising; ``ABSENT`` = no such arm.
-        lanes: Per arm and direction.
-        beside_m: Width beyond the kerb that is not sidewalk (verge, or the road's parking).
-        radius_m: Of the kerb at the corners.
+        arms_deg: Directions of the arms from the centre, ascending; ``ABSENT`` = no such arm.
+        lanes: Number of lanes per arm and direction.
+        beside_m: Width between kerb and sidewalk (verge, or the road's parking).
+        radius_m: Radius of the kerb at the corners.
     """
 
     arms_deg: tuple[float, float, float, float] = (0.0, 90.0, 180.0, 270.0)
@@ -46,17 +45,17 @@ class JunctionShape:
 
     @property
     def half_m(self) -> float:
-        """From an arm's middle to its kerb."""
+        """Distance from an arm's middle to its kerb."""
         return self.lanes * self.lane_width_m
 
     @property
     def border_m(self) -> float:
-        """From the kerb's face to the outer edge of the sidewalk."""
+        """Distance from the kerb's face to the outer edge of the sidewalk."""
         return KERB_WIDTH_M + self.beside_m + self.sidewalk_m
 
     @property
     def top_m(self) -> float:
-        """Height of the middle over the gutters."""
+        """Height of the middle above the gutters."""
         return self.crown * self.half_m
 
     @property
@@ -65,11 +64,11 @@ class JunctionShape:
         return self.kerb_m + FALL * self.sidewalk_m
 
     def arms_rad(self) -> tuple[float, ...]:
-        """Directions of the arms there are, rising."""
+        """Directions of the existing arms, ascending."""
         return tuple(math.radians(arm) for arm in self.arms_deg if arm != ABSENT)
 
     def curve_end_m(self) -> float:
-        """From the centre to where the longest corner's curve ends on its arm."""
+        """Distance from the centre to the end of the longest corner's curve on its arm."""
         ends = [self.half_m]
         for gap in self.gaps_rad():
             if abs(gap - math.pi) > 1e-3:
@@ -87,19 +86,14 @@ class JunctionShape:
             (after - arm) % math.tau for arm, after in zip(arms, (*arms[1:], arms[0]), strict=True)
         )
 
-    def changed(self) -> dict[str, Any]:
-        """Fields that differ from their defaults."""
-        pairs = ((f.name, getattr(self, f.name), f.default) for f in fields(self))
-        return {name: value for name, value, default in pairs if value != default}
-
 
 def corner(shape: JunctionShape, number: int, offset_m: float) -> Array:
-    """The line [n, 2] parallel to the kerb, from an arm's end around to the next arm's end.
+    """Line [n, 2] parallel to the kerb, from the end of an arm to the end of the next one.
 
     Args:
-        shape: The junction.
-        number: Of the arm it starts on, on its left side seen from the centre.
-        offset_m: Distance behind the kerb's face; equal numbers of points for all distances.
+        shape: Shape of the junction.
+        number: Number of the first arm, on its left side seen from the centre.
+        offset_m: Distance behind the kerb's face; n is the same for all distances.
     """
     arms, gap = shape.arms_rad(), shape.gaps_rad()[number]
     here, after = arms[number], arms[(number + 1) % len(arms)]
@@ -110,7 +104,7 @@ def corner(shape: JunctionShape, number: int, offset_m: float) -> Array:
         share = np.linspace(0.0, 1.0, 9)[:, None]
         return first + share * (last - first)
     radius = shape.radius_m - offset_m
-    # The centre of the arc is as far from both edges as the radius says.
+    # The centre of the arc is one radius away from both edges.
     middle = _on_arm(here, (shape.half_m + shape.radius_m) / math.tan(0.5 * gap), 0.0)
     middle = middle + (shape.half_m + shape.radius_m) * _left_of(here)
     turn = math.pi - gap
@@ -122,7 +116,7 @@ def corner(shape: JunctionShape, number: int, offset_m: float) -> Array:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fan:
-    """The carriageway: triangles from the centre to its outline.
+    """Carriageway of a junction: triangles from the centre to its outline.
 
     Attributes:
         outline_m: Points [n, 3], counter-clockwise from the first arm's right kerb.
@@ -146,10 +140,10 @@ class Fan:
         return heights
 
 
-# Every lane of a junction asks for its heights.
+# Cached, because every lane of a junction needs its heights.
 @lru_cache(maxsize=16)
 def make_fan(shape: JunctionShape) -> Fan:
-    """The carriageway of a junction; its mouths have the cross section of a crowned road."""
+    """Build the carriageway of a junction; its mouths have the cross section of a crowned road."""
     parts = []
     for number, arm in enumerate(shape.arms_rad()):
         t = np.linspace(-shape.half_m, shape.half_m, 9)
@@ -162,7 +156,7 @@ def make_fan(shape: JunctionShape) -> Fan:
 
 
 def arm_pose(shape: JunctionShape, number: int) -> SE3:
-    """The end of an arm, X pointing away from the junction."""
+    """Pose of the end of an arm, with X pointing away from the junction."""
     arm = shape.arms_rad()[number]
     x, y = (float(v) for v in _on_arm(arm, shape.reach_m(), 0.0))
     return SE3.about_z(arm, (x, y, 0.0))
@@ -178,18 +172,18 @@ def arm_points(shape: JunctionShape, number: int, r_m: Array, t_m: Array) -> Arr
 def junction_lanes(
     shape: JunctionShape, name: str, T_world_junction: SE3, speed_m_s: float, crosswalks: bool
 ) -> tuple[Lane, ...]:
-    """Paths of all turns, sidewalks and house fronts around the corners, and crosswalks."""
+    """Make the paths of all turns, sidewalks and frontages around the corners, and crosswalks."""
     lanes = [
         Lane(
             f"{name}/{i}to{j}_{k}",
             "driving",
-            _world(_turn(shape, i, j, k), shape, T_world_junction),
+            _to_world(_turn_path(shape, i, j, k), shape, T_world_junction),
             shape.lane_width_m,
             road=name,
             speed_m_s=speed_m_s,
             junction=True,
         )
-        for i, j, k in _turns(shape)
+        for i, j, k in _list_turns(shape)
     ]
     inner = KERB_WIDTH_M + shape.beside_m
     into = inner + min(FURNITURE_M, 0.5 * shape.sidewalk_m)
@@ -217,15 +211,15 @@ def _crosswalk(shape: JunctionShape, name: str, number: int, T_world_junction: S
     return Lane(
         f"{name}/crosswalk{number}",
         "crosswalk",
-        _world(line, shape, T_world_junction),
+        _to_world(line, shape, T_world_junction),
         CROSSWALK_M[1] - CROSSWALK_M[0],
         road=name,
         junction=True,
     )
 
 
-def _turns(shape: JunctionShape) -> list[tuple[int, int, int]]:
-    """Arm, arm and lane of every turn: outer lanes turn to their side, inner ones to the other."""
+def _list_turns(shape: JunctionShape) -> list[tuple[int, int, int]]:
+    """Arms and lane of every turn: the outer lane turns to its side, the inner one across."""
     arms = shape.arms_rad()
     turns = []
     for i, j in ((i, j) for i in range(len(arms)) for j in range(len(arms)) if i != j):
@@ -238,16 +232,16 @@ def _turns(shape: JunctionShape) -> list[tuple[int, int, int]]:
     return turns
 
 
-def _turn(shape: JunctionShape, start: int, end: int, lane: int) -> Array:
-    """A path [n, 2] from one arm's end to another's: the cubic nearest to a circle's arc."""
+def _turn_path(shape: JunctionShape, start: int, end: int, lane: int) -> Array:
+    """Path [n, 2] from the end of one arm to another: a cubic close to a circular arc."""
     away = (lane + 0.5) * shape.lane_width_m * (1.0 if shape.traffic == "right" else -1.0)
     arms = shape.arms_rad()
     a = _on_arm(arms[start], shape.reach_m(), away)
     b = _on_arm(arms[end], shape.reach_m(), -away)
-    inward, outward = -_along(arms[start]), _along(arms[end])
+    inward, outward = -_direction(arms[start]), _direction(arms[end])
     turn = math.remainder(arms[end] - arms[start] - math.pi, math.tau)
     chord = math.hypot(*(b - a))
-    # Length of the handles: 4/3 tan(turn / 4) of the radius.
+    # Bezier handles of a circular arc: 4/3 tan(turn / 4) times the radius.
     handle = (2.0 / 3.0) * chord / (1.0 + math.cos(0.5 * turn))
     count = max(2, math.ceil(1.2 * chord / 0.8))
     p = np.linspace(0.0, 1.0, count + 1)[:, None]
@@ -256,13 +250,13 @@ def _turn(shape: JunctionShape, start: int, end: int, lane: int) -> Array:
     return path
 
 
-def _world(
+def _to_world(
     line: Array, shape: JunctionShape, T_world_junction: SE3
 ) -> tuple[tuple[float, float, float], ...]:
     return world_points(np.column_stack([line, make_fan(shape).height_m(line)]), T_world_junction)
 
 
-def _along(arm_rad: float) -> Array:
+def _direction(arm_rad: float) -> Array:
     return np.array([math.cos(arm_rad), math.sin(arm_rad)])
 
 
@@ -271,5 +265,5 @@ def _left_of(arm_rad: float) -> Array:
 
 
 def _on_arm(arm_rad: float, r_m: float, t_m: float) -> Array:
-    point: Array = r_m * _along(arm_rad) + t_m * _left_of(arm_rad)
+    point: Array = r_m * _direction(arm_rad) + t_m * _left_of(arm_rad)
     return point

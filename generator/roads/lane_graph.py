@@ -1,4 +1,4 @@
-"""Lane graphs: what moves and stands where, and which lane follows which."""
+"""Lanes of roads, and the links between them."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from gen_data.generator.roads.cross_section import RoadShape, Strip, strips
 from gen_data.generator.roads.reference_line import Array, ReferenceLine
 
 FURNITURE_M = 0.5
-"""Poles and bins keep this far from the kerb."""
+"""Distance of poles and bins from the kerb."""
 MEETING_M = 0.05
 MEETING_RAD = math.radians(8.0)
-"""Lanes that end and start nearer than this, in directions that differ by less, are one path."""
+"""Largest distance and angle between the end of a lane and the start of its successor."""
 _STEP_M = 2.0
 
 
 def road_lanes(
     shape: RoadShape, name: str, T_world_road: SE3, speed_m_s: float
 ) -> tuple[Lane, ...]:
-    """The lanes of a road: those that drive in its directions, the others with the street left."""
+    """Make the lanes of a road: driving lanes both ways, others with the road on their left."""
     line = shape.line()
     lanes: list[Lane] = []
     for side in (1, -1):
@@ -47,14 +47,14 @@ def road_lanes(
 
 
 def lane_name(road: str, side: int, number: int, shape: RoadShape) -> str:
-    """Name of a driving lane: ``main/forward0`` is the one next to the middle."""
+    """Name of a driving lane, such as ``main/forward0`` next to the middle."""
     return f"{road}/{'forward' if shape.forward(side) else 'backward'}{number}"
 
 
 def path(
     line: ReferenceLine, t_m: float, z_m: float, forward: bool, T_world_road: SE3
 ) -> tuple[Vec3, ...]:
-    """Points of a line beside a reference line, in the world."""
+    """Points of a line parallel to a reference line, in the world."""
     s = stations(line, _STEP_M)
     s = s if forward else s[::-1]
     flat = line.points(s, np.full(len(s), t_m))
@@ -62,26 +62,26 @@ def path(
 
 
 def world_points(points: Array, T_world_road: SE3) -> tuple[Vec3, ...]:
-    """Points [n, 3] of a road's frame in the world, rounded to a micrometre."""
+    """Transform points [n, 3] of a road's frame to the world, rounded to a micrometre."""
     placed = np.round(T_world_road.apply(points), 6) + 0.0
     return tuple((float(x), float(y), float(z)) for x, y, z in placed)
 
 
 def stations(line: ReferenceLine, step_m: float) -> Array:
-    """Evenly spaced arc lengths from start to end, at most a step apart."""
+    """Evenly spaced arc lengths from start to end, at most one step apart."""
     count = max(1, math.ceil(line.length_m / step_m - 1e-9))
     return np.linspace(0.0, line.length_m, count + 1)
 
 
 def link_lanes(lanes: Sequence[Lane]) -> tuple[Lane, ...]:
-    """The lanes, each with those as successors that start where and as it ends."""
+    """Set the successors of lanes: those that start at a lane's end, in its direction."""
     starts = [
         (lane.name, lane.kind, lane.center_m[0], _heading(lane.center_m, 0)) for lane in lanes
     ]
-    return tuple(replace(lane, successors=tuple(_after(lane, starts))) for lane in lanes)
+    return tuple(replace(lane, successors=tuple(_find_successors(lane, starts))) for lane in lanes)
 
 
-def _after(lane: Lane, starts: Iterable[tuple[str, LaneKind, Vec3, float]]) -> list[str]:
+def _find_successors(lane: Lane, starts: Iterable[tuple[str, LaneKind, Vec3, float]]) -> list[str]:
     end, heading = lane.center_m[-1], _heading(lane.center_m, -2)
     found = {
         name
@@ -100,15 +100,15 @@ def _heading(points: Sequence[Vec3], k: int) -> float:
 
 
 def _neighbours(name: str, shape: RoadShape, side: int, number: int, count: int) -> tuple[str, str]:
-    """Names of the lanes left and right that run the same way."""
-    # Seen along its own direction, the middle is to the left of a lane in right-hand traffic.
+    """Names of the left and right neighbours with the same direction."""
+    # In right-hand traffic, the middle of the road is to the left of a lane.
     inner = lane_name(name, side, number - 1, shape) if number > 0 else ""
     outer = lane_name(name, side, number + 1, shape) if number + 1 < count else ""
     return (inner, outer) if shape.traffic == "right" else (outer, inner)
 
 
 def _beside(row: Sequence[Strip], side: int) -> list[tuple[LaneKind, float, float, float]]:
-    """Kind, t, height and width of the lanes of one side on which nobody drives a car."""
+    """Kind, t, height and width of all lanes of one side except driving lanes."""
     by_kind = {strip.kind: strip for strip in row}
     made: list[tuple[LaneKind, float, float, float]] = []
     whole: tuple[LaneKind, ...] = ("bicycle", "parking", "verge", "sidewalk")

@@ -1,9 +1,8 @@
-"""A car park: aisles with bays on both sides."""
+"""Shape and lanes of car parks."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -21,8 +20,8 @@ class ParkingShape:
     """Bays at right angles to aisles that run along X.
 
     Attributes:
-        bays: Per row.
-        aisles: Each with a row of bays on both sides.
+        bays: Number of bays per row.
+        aisles: Number of aisles, each with a row of bays on both sides.
         bay_m: Width and length of a bay (EAR 05: 2.50 m x 5.00 m).
         aisle_m: Width of an aisle (EAR 05: 6.00 m for bays at right angles).
     """
@@ -34,31 +33,26 @@ class ParkingShape:
 
     @property
     def length_m(self) -> float:
-        """Along the aisles."""
+        """Extent along the aisles."""
         return self.bays * self.bay_m[0]
 
     @property
     def module_m(self) -> float:
-        """Across an aisle and its two rows."""
+        """Extent across an aisle and its two rows."""
         return self.aisle_m + 2.0 * self.bay_m[1]
 
     @property
     def width_m(self) -> float:
-        """Across all."""
+        """Extent across all aisles."""
         return self.aisles * self.module_m
 
     def aisle_y_m(self, number: int) -> float:
-        """Middle of an aisle."""
+        """Y coordinate of an aisle's middle."""
         return (number + 0.5) * self.module_m - 0.5 * self.width_m
-
-    def changed(self) -> dict[str, Any]:
-        """Fields that differ from their defaults."""
-        pairs = ((f.name, getattr(self, f.name), f.default) for f in fields(self))
-        return {name: value for name, value, default in pairs if value != default}
 
 
 def parking_lanes(shape: ParkingShape, name: str, T_world_area: SE3) -> tuple[Lane, ...]:
-    """A lane per bay, from the aisle inwards, and two along each aisle."""
+    """Make a lane per bay, from the aisle inwards, and two along each aisle."""
     lanes: list[Lane] = []
     for number in range(shape.aisles):
         y = shape.aisle_y_m(number)

@@ -33,7 +33,7 @@ class Curve(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """Straight."""
+    """A straight line."""
 
     length_m: float
 
@@ -44,13 +44,13 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Arc:
-    """Of constant curvature, positive to the left; 0 is straight."""
+    """An arc of constant curvature, positive to the left; 0 = straight."""
 
     length_m: float
     curvature_per_m: float
 
     def local(self, s_m: Array) -> Array:
-        """Poses [n, 3] at arc lengths [n]; exact, and stable for the slightest curvature."""
+        """Poses [n, 3] at arc lengths [n]; exact, and stable for any small curvature."""
         turn = self.curvature_per_m * s_m
         chord = s_m * np.sinc(turn / (2.0 * math.pi))
         return np.stack([chord * np.cos(turn / 2), chord * np.sin(turn / 2), turn], axis=1)
@@ -58,7 +58,7 @@ class Arc:
 
 @dataclass(frozen=True, slots=True)
 class Spiral:
-    """A clothoid: curvature changes evenly along it."""
+    """A clothoid: the curvature changes linearly with arc length."""
 
     length_m: float
     start_per_m: float
@@ -86,7 +86,7 @@ class Poly3:
     v: tuple[float, float, float, float]
 
     def local(self, s_m: Array) -> Array:
-        """Poses [n, 3] at arc lengths [n]; u is found by Newton's method."""
+        """Poses [n, 3] at arc lengths [n]; u by Newton's method."""
         u = s_m.copy()
         for _ in range(30):
             excess = _integral(self._speed, u, 1 + int(self.length_m / 2.0)) - s_m
@@ -116,7 +116,7 @@ class ParamPoly3:
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """A curve and the pose it starts at."""
+    """A curve with its start pose."""
 
     s_m: float
     x_m: float
@@ -127,7 +127,7 @@ class Placed:
 
 @dataclass(frozen=True, slots=True)
 class ReferenceLine:
-    """Curves one after the other. ``s`` runs from 0 to ``length_m``."""
+    """Consecutive curves; ``s`` runs from 0 to ``length_m``."""
 
     pieces: tuple[Placed, ...]
 
@@ -137,7 +137,7 @@ class ReferenceLine:
         return self.pieces[-1].s_m + self.pieces[-1].curve.length_m
 
     def poses(self, s_m: Array) -> Array:
-        """Poses [n, 3] at arc lengths [n]; what lies outside is clipped to the ends."""
+        """Poses [n, 3] at arc lengths [n], clipped to the ends."""
         starts = np.array([piece.s_m for piece in self.pieces])
         which = np.clip(np.searchsorted(starts, s_m, side="right") - 1, 0, len(starts) - 1)
         poses = np.zeros((len(s_m), 3))
@@ -170,7 +170,7 @@ def _slope(coefficients: Sequence[float], x: Array) -> Array:
 
 
 def _integral(of: Callable[[Array], Array], upper: Array, panels: int) -> Array:
-    """Integrals from 0 to each upper bound, each over equal panels."""
+    """Integrals from 0 to each upper bound, by Gauss-Legendre quadrature on equal panels."""
     width = upper[:, None, None] / panels
     starts = np.arange(panels)[None, :, None] * width
     x = starts + 0.5 * width * (1.0 + _NODES)

@@ -1,9 +1,9 @@
-"""Traffic through time: routes over lanes, drivers, people on foot, and signals.
+"""Traffic simulation: routes over lanes, drivers, pedestrians and signals.
 
-Vehicles follow their routes as a kinematic bicycle with pure-pursuit steering: a path that depends
-on distance alone. When they are where on it is decided by the Intelligent Driver Model, by signals
-and by who has the right of way (path-velocity decomposition: Kant and Zucker, "Toward efficient
-trajectory planning", IJRR 5(3), 1986). Nothing here is random except routes, which are drawn.
+Vehicles follow their routes as kinematic bicycles with pure-pursuit steering; their paths depend on
+distance only. The Intelligent Driver Model, signals and right of way determine the progress along a
+path (path-velocity decomposition: Kant and Zucker, "Toward efficient trajectory planning", IJRR
+5(3), 1986). Only routes and paths of pedestrians are random.
 
-Only ``+ - * / sqrt`` and comparisons decide where things go.
+Motion is computed with ``+ - * / sqrt`` and comparisons only, for equal results on all machines.
 """

@@ -1,4 +1,4 @@
-"""Where a vehicle's axles are."""
+"""Axles of vehicles."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.se3 import SE3
 
 _OVERHANG = 0.2
-"""Share of its length by which a vehicle of unknown wheels reaches over either axle."""
+"""Overhang beyond either axle, as a fraction of the length, without wheel keypoints."""
 
 
 @dataclass(frozen=True, slots=True)
 class Axles:
-    """A vehicle on its wheels.
+    """Axles and extents of a vehicle.
 
     Attributes:
-        T_body_rear: On the ground below the middle of the rear axle, X forward, Z up.
-        wheelbase_m: Between the axles.
-        front_m, rear_m: From the rear axle to the vehicle's front and rear ends.
-        width_m: Over everything.
+        T_body_rear: Frame on the ground below the middle of the rear axle, X forward, Z up.
+        wheelbase_m: Distance between the axles.
+        front_m, rear_m: Distances from the rear axle to the vehicle's front and rear ends.
+        width_m: Overall width.
     """
 
     T_body_rear: SE3
@@ -30,7 +30,7 @@ class Axles:
 
 
 def find_axles(assets: AssetIndex, asset: str, scale: float) -> Axles:
-    """Axles by the keypoints ``wheel_front...`` and ``wheel_rear...``, else by the length."""
+    """Locate axles by the keypoints ``wheel_front...`` and ``wheel_rear...``, else by length."""
     (x0, y0, z0), (x1, y1, _) = assets.bounds_m(asset)
     points = assets.keypoints(asset)
     rear = [p.position_m[0] for p in points if p.name.startswith("wheel_rear")]

@@ -1,4 +1,4 @@
-"""From what moves to the tracks of bodies."""
+"""Trajectories of upright bodies."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gen_data.generator.core.se3 import SE3, Array, Vec3
 from gen_data.generator.traffic.simulation import KNOT_S
 
 STILL_M = 0.002
-"""What moves no farther stands."""
+"""Displacement up to which a body counts as static."""
 
 
 def make_upright_trajectories(
@@ -21,14 +21,14 @@ def make_upright_trajectories(
     climb: Array,
     offsets_m: Sequence[Vec3],
 ) -> list[Trajectory | None]:
-    """Tracks of bodies that stand on the ground; None for those that never move.
+    """Make trajectories of bodies on the ground; None for bodies that never move.
 
     Args:
-        names: Of the bodies [n].
-        ground_m: Points of the ground that they stand on [t, n, 3].
-        ahead: Where they point, level, unit [t, n, 2].
-        climb: Sine of the angle by which they point upwards [t, n].
-        offsets_m: Origin of each body, in a frame on that point that is X ahead, Z up.
+        names: Names of the bodies [n].
+        ground_m: Points of support on the ground [t, n, 3].
+        ahead: Horizontal directions, unit [t, n, 2].
+        climb: Sines of the upward pitch angles [t, n].
+        offsets_m: Origin of each body [n], in a frame at that point with X ahead and Z up.
     """
     quaternions = _quaternions(ahead, climb)
     level = np.sqrt(1.0 - climb * climb)[..., None]
@@ -58,16 +58,16 @@ def make_upright_trajectories(
 
 
 def _quaternions(ahead: Array, climb: Array) -> Array:
-    """Unit quaternions [..., 4] of a turn about Z, then upwards; no angle is computed."""
+    """Unit quaternions [..., 4] of a yaw, then a pitch upwards, without trigonometric functions."""
     c, s = ahead[..., 0], ahead[..., 1]
-    w, z = _half(c, s)
-    up_w, up_y = _half(np.sqrt(1.0 - climb * climb), -climb)
+    w, z = _half_angle(c, s)
+    up_w, up_y = _half_angle(np.sqrt(1.0 - climb * climb), -climb)
     return np.stack([w * up_w, -z * up_y, w * up_y, z * up_w], axis=-1)
 
 
-def _half(c: Array, s: Array) -> tuple[Array, Array]:
-    """Cosine and sine of half an angle; the cosine is not negative."""
-    # Each root is taken where it is far from zero.
+def _half_angle(c: Array, s: Array) -> tuple[Array, Array]:
+    """Cosine (not negative) and sine of half an angle."""
+    # Divide by the larger of the two roots: the other one may vanish.
     cosine, sine = np.sqrt(np.maximum(0.5 + 0.5 * c, 0.0)), np.sqrt(np.maximum(0.5 - 0.5 * c, 0.0))
     forward = c >= 0.0
     half_c = np.where(forward, cosine, 0.5 * np.abs(s) / np.maximum(sine, 0.5))

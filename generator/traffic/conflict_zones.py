@@ -1,4 +1,4 @@
-"""Where lanes cross, part and meet, and where people cross them."""
+"""Conflict zones: where lanes cross, diverge and merge, and where crosswalks cross them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gen_data.generator.traffic.lane_routes import LaneGraph
 
 _STEP_M = 0.5
 _SAME_M = 0.5
-"""Lanes whose ends are this near start or end together."""
+"""Lanes whose ends are nearer than this start or end together."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +23,8 @@ class Overlap:
     """Two lanes that vehicles cannot use side by side.
 
     Attributes:
-        kind: ``part``: they begin together; ``meet``: they end together; ``cross``.
-        own_m, other_m: Stations between which they are too near.
+        kind: ``part``: they start together; ``meet``: they end together; ``cross``.
+        own_m, other_m: Stations between which they are too close.
     """
 
     kind: Literal["part", "meet", "cross"]
@@ -34,12 +34,12 @@ class Overlap:
 
 @dataclass(frozen=True, slots=True)
 class Zone:
-    """Where a lane leads over a crosswalk.
+    """Intersection of a lane and a crosswalk.
 
     Attributes:
         enter_m, leave_m: Stations on the driving lane.
         at_m: Station on the crosswalk.
-        width_m: Of the driving lane.
+        width_m: Width of the driving lane.
     """
 
     crosswalk: str
@@ -52,12 +52,12 @@ class Zone:
 def find_overlaps(
     graph: LaneGraph, widths_m: Mapping[str, float], spare_m: float = 0.4
 ) -> dict[tuple[str, str], Overlap]:
-    """All pairs of overlapping lanes across junctions, both ways around.
+    """Find all pairs of overlapping lanes across junctions, in both orders.
 
     Args:
-        graph: Of the driving lanes.
-        widths_m: Widest vehicle that uses each lane; other lanes do not count.
-        spare_m: Distance that vehicles keep at least.
+        graph: Graph of the driving lanes.
+        widths_m: Width of the widest vehicle on each used lane; others are ignored.
+        spare_m: Smallest distance between vehicles.
     """
     names = [name for name in sorted(widths_m) if graph.lines[name].lane.junction]
     sampled = {name: _sample(graph.lines[name]) for name in names}
@@ -65,7 +65,7 @@ def find_overlaps(
     for k, one in enumerate(names):
         for other in names[k + 1 :]:
             apart_m = 0.5 * (widths_m[one] + widths_m[other]) + spare_m
-            overlap = _overlap(sampled[one], sampled[other], apart_m)
+            overlap = _find_overlap(sampled[one], sampled[other], apart_m)
             if overlap is not None:
                 found[one, other] = overlap
                 found[other, one] = Overlap(overlap.kind, overlap.other_m, overlap.own_m)
@@ -75,14 +75,14 @@ def find_overlaps(
 def crosswalk_zones(
     graph: LaneGraph, used: Iterable[str], crosswalks: LaneGraph
 ) -> dict[str, tuple[Zone, ...]]:
-    """Where each used driving lane leads over crosswalks, in order."""
+    """Find the crosswalks on each used driving lane, in order."""
     made: dict[str, tuple[Zone, ...]] = {}
     for name in sorted(used):
         line = graph.lines[name]
         found = [
             zone
             for walk in sorted(crosswalks.lines)
-            if (zone := _zone(line, crosswalks.lines[walk])) is not None
+            if (zone := _find_zone(line, crosswalks.lines[walk])) is not None
         ]
         if found:
             made[name] = tuple(sorted(found, key=lambda zone: zone.enter_m))
@@ -97,14 +97,14 @@ def heading(points: tuple[Vec3, ...], k: int) -> tuple[float, float]:
 
 
 def _sample(line: LaneLine) -> tuple[Array, Array]:
-    """Even stations [k] of a lane and the points [k, 2] there."""
+    """Sample a lane: even stations [k] and points [k, 2]."""
     count = max(2, math.ceil(line.length_m / _STEP_M) + 1)
     at = np.linspace(0.0, line.length_m, count)
     points = np.asarray(line.lane.center_m)
     return at, np.stack([np.interp(at, line.at_m, points[:, k]) for k in range(2)], axis=1)
 
 
-def _overlap(
+def _find_overlap(
     one: tuple[Array, Array], other: tuple[Array, Array], apart_m: float
 ) -> Overlap | None:
     (at_a, a), (at_b, b) = one, other
@@ -126,8 +126,8 @@ def _overlap(
     )
 
 
-def _zone(line: LaneLine, crosswalk: LaneLine) -> Zone | None:
-    """Where a driving lane meets a crosswalk's middle; None where it does not."""
+def _find_zone(line: LaneLine, crosswalk: LaneLine) -> Zone | None:
+    """Intersection of a driving lane and a crosswalk's centre line; None without one."""
     lane = crosswalk.lane
     if abs(lane.center_m[0][2] - line.lane.center_m[0][2]) > 3.0:
         return None

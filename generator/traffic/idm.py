@@ -13,17 +13,17 @@ import numpy as np
 from gen_data.generator.core.se3 import Array
 
 HARDEST_M_S2 = 8.0
-"""Nobody brakes harder: what tyres hold on a dry road."""
+"""Largest deceleration: the limit of tyres on a dry road."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Drivers:
-    """What drivers want; arrays [n].
+    """Parameters of n drivers; arrays [n].
 
     Attributes:
-        headway_s: Time gap to the vehicle ahead.
-        standstill_m: Gap in a queue.
-        acceleration_m_s2: Greatest one.
+        headway_s: Desired time gap to the vehicle ahead.
+        standstill_m: Gap at a standstill.
+        acceleration_m_s2: Largest acceleration.
         braking_m_s2: Comfortable deceleration.
     """
 
@@ -41,13 +41,13 @@ class Drivers:
         acceleration_m_s2: float = 1.5,
         braking_m_s2: float = 2.0,
     ) -> Drivers:
-        """``n`` drivers who want the same."""
+        """Make ``n`` drivers with equal parameters."""
         values = (headway_s, standstill_m, acceleration_m_s2, braking_m_s2)
         return cls(*(np.full(n, value) for value in values))
 
 
 def free_acceleration(drivers: Drivers, speed_m_s: Array, wanted_m_s: Array) -> Array:
-    """Acceleration [n] on an empty road: ``a (1 - (v / v0)^4)``."""
+    """Acceleration [n] on a free road: ``a (1 - (v / v0)^4)``."""
     ratio = speed_m_s / np.maximum(wanted_m_s, 0.1)
     squared = ratio * ratio
     free: Array = drivers.acceleration_m_s2 * (1.0 - squared * squared)
@@ -55,13 +55,13 @@ def free_acceleration(drivers: Drivers, speed_m_s: Array, wanted_m_s: Array) -> 
 
 
 def interaction(drivers: Drivers, speed_m_s: Array, gap_m: Array, leader_m_s: Array) -> Array:
-    """What something ahead takes away from it [n]: ``a (s* / s)^2``.
+    """Deceleration due to the leader [n]: ``a (s* / s)^2``.
 
     Args:
-        drivers: Who drives.
+        drivers: Parameters of the drivers.
         speed_m_s: Own speeds [n].
-        gap_m: Free length to what is ahead [n]; ``inf`` = nothing.
-        leader_m_s: Its speeds [n].
+        gap_m: Gaps to the leaders [n]; ``inf`` = none.
+        leader_m_s: Speeds of the leaders [n].
     """
     scale = 2.0 * np.sqrt(drivers.acceleration_m_s2 * drivers.braking_m_s2)
     closing = speed_m_s * (speed_m_s - leader_m_s) / scale
@@ -72,10 +72,10 @@ def interaction(drivers: Drivers, speed_m_s: Array, gap_m: Array, leader_m_s: Ar
 
 
 def equilibrium_speed(drivers: Drivers, gap_m: Array, wanted_m_s: Array) -> Array:
-    """Speeds [n] at most as high as suit a gap behind a leader who is as fast.
+    """Upper bound of the speeds [n] that suit a gap behind a leader of equal speed.
 
-    The equilibrium gap is ``(s0 + v T) / sqrt(1 - (v / v0)^4)``; without the root it is an upper
-    bound of the speed that the wanted speed bounds as well.
+    The equilibrium gap is ``(s0 + v T) / sqrt(1 - (v / v0)^4)``; dropping the root
+    gives an upper bound of the speed, which the wanted speed bounds as well.
     """
     room = np.maximum(gap_m - drivers.standstill_m, 0.0) / drivers.headway_s
     speeds: Array = np.minimum(room, wanted_m_s)

@@ -1,4 +1,4 @@
-"""Routes: one lane after the other, as points at even stations."""
+"""Routes over lane graphs."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ STATION_M = 0.5
 
 @dataclass(frozen=True, eq=False)
 class LaneGraph:
-    """Lanes of one kind by name, and how they follow one another.
+    """Graph of the lanes of one kind.
 
     Attributes:
-        names: Sorted, lanes across junctions last.
-        segments: All pieces of all centre lines [k, 6]: start, step, station, number of the lane.
+        names: Names of the lanes, sorted, lanes across junctions last.
+        segments: Segments of all centre lines [k, 6]: start, vector, station, number of the lane.
     """
 
     lines: Mapping[str, LaneLine]
@@ -35,14 +35,14 @@ class LaneGraph:
 
     @classmethod
     def of(cls, lanes: Iterable[Lane], kind: str) -> LaneGraph:
-        """The graph of all lanes of a kind."""
+        """Build the graph of all lanes of a kind."""
         lines = {lane.name: LaneLine(lane) for lane in lanes if lane.kind == kind}
         before: dict[str, list[str]] = {}
         for name, line in lines.items():
             for after in line.lane.successors:
                 before.setdefault(after, []).append(name)
         names = sorted(lines, key=lambda name: (lines[name].lane.junction, name))
-        pieces = [_pieces(lines[name], k) for k, name in enumerate(names)]
+        pieces = [_segments(lines[name], k) for k, name in enumerate(names)]
         return cls(
             lines,
             {name: tuple(sorted(found)) for name, found in before.items()},
@@ -51,11 +51,11 @@ class LaneGraph:
         )
 
     def successors(self, name: str) -> tuple[str, ...]:
-        """Lanes that go on where one ends."""
+        """Lanes that start at the end of one."""
         return tuple(n for n in self.lines[name].lane.successors if n in self.lines)
 
     def nearest(self, x_m: float, y_m: float) -> LanePosition | None:
-        """The place on a lane nearest to a point; None if there is no lane."""
+        """Nearest lane position to a point; None if there is no lane."""
         if not len(self.segments):
             return None
         k, at_m, left_m, away_m = _nearest(self.segments, x_m, y_m)
@@ -64,12 +64,12 @@ class LaneGraph:
 
 @dataclass(frozen=True, slots=True)
 class LanePosition:
-    """A place on a lane, as a point sees it.
+    """Position of a point relative to a lane.
 
     Attributes:
         at_m: Station.
-        left_m: How far to the left of the lane the point is.
-        away_m: Its distance.
+        left_m: Offset to the left of the lane's centre line.
+        away_m: Distance from the centre line.
     """
 
     lane: str
@@ -83,9 +83,9 @@ class Route:
     """Lanes in the order of travel.
 
     Attributes:
-        lanes: Their names.
-        starts_m: Station at which each begins; 0 is the beginning of the first.
-        end_m: Where the last one ends.
+        lanes: Names of the lanes.
+        starts_m: Station at the start of each lane; 0 at the first.
+        end_m: Station at the end of the last one.
         dead_end: Whether the network ends there.
     """
 
@@ -96,25 +96,25 @@ class Route:
 
 
 def project_on_lane(line: LaneLine, x_m: float, y_m: float) -> LanePosition:
-    """The place on one lane nearest to a point."""
-    _, at_m, left_m, away_m = _nearest(_pieces(line, 0), x_m, y_m)
+    """Nearest position on one lane to a point."""
+    _, at_m, left_m, away_m = _nearest(_segments(line, 0), x_m, y_m)
     return LanePosition(line.lane.name, at_m, left_m, away_m)
 
 
-def _pieces(line: LaneLine, number: int) -> Array:
+def _segments(line: LaneLine, number: int) -> Array:
     points = np.asarray(line.lane.center_m)[:, :2]
     at = np.asarray(line.at_m[:-1])
     return np.column_stack([points[:-1], np.diff(points, axis=0), at, np.full(len(at), number)])
 
 
 def _nearest(segments: Array, x_m: float, y_m: float) -> tuple[int, float, float, float]:
-    """Number of the lane, station, how far left of it a point is, and how far away."""
+    """Number of the nearest lane, station, offset to its left, and distance."""
     x, y, sx, sy, at, number = segments.T
     dx, dy = x_m - x, y_m - y
     squared = sx * sx + sy * sy
     share = np.clip((dx * sx + dy * sy) / squared, 0.0, 1.0)
     ox, oy = dx - share * sx, dy - share * sy
-    # To the nearest micrometre, so that of lanes that are equally near the first is taken.
+    # Rounding to micrometres makes the first of equally near lanes win.
     k = int(np.argmin(np.round(np.sqrt(ox * ox + oy * oy), 6)))
     span = math.sqrt(float(squared[k]))
     left = float(sx[k] * dy[k] - sy[k] * dx[k]) / span
@@ -123,7 +123,7 @@ def _nearest(segments: Array, x_m: float, y_m: float) -> tuple[int, float, float
 
 
 def draw_route(graph: LaneGraph, given: Sequence[str], length_m: float, rng: Rng) -> Route:
-    """The lanes given, and drawn ones after them until it is long enough or the network ends."""
+    """Extend the given lanes by drawn ones to a length, or to the end of the network."""
     lanes, starts = [given[0]], [0.0]
     end_m = graph.lines[given[0]].length_m
     for name in given[1:]:
@@ -140,7 +140,7 @@ def draw_route(graph: LaneGraph, given: Sequence[str], length_m: float, rng: Rng
 
 
 def points_at(graph: LaneGraph, route: Route, stations_m: Array) -> Array:
-    """Points [k, 3] of a route; it goes on straight beyond its ends."""
+    """Points [k, 3] of a route at stations [k]; beyond its ends it is straight."""
     lines = [graph.lines[name] for name in route.lanes]
     joined = np.concatenate(
         [np.asarray(line.lane.center_m)[k > 0 :] for k, line in enumerate(lines)]
@@ -164,22 +164,22 @@ def points_at(graph: LaneGraph, route: Route, stations_m: Array) -> Array:
 def lanes_through_point(
     graph: LaneGraph, stops: Sequence[str | tuple[float, float]], where: str
 ) -> tuple[str, ...]:
-    """The lanes that lead through lanes and points, in order; the fewest between two of them.
+    """Find the lanes through stops, in order, with the fewest lanes between two of them.
 
     Args:
-        graph: Of the lanes that may be driven on.
+        graph: Graph of the driving lanes.
         stops: Names of lanes, or points ``(x, y)`` [m] on lanes.
-        where: What messages call them.
+        where: Path of the stops in error texts.
 
     Raises:
-        ConfigError: a stop is on no lane, or no lanes lead to it from the one before.
+        ConfigError: a stop is on no lane, or cannot be reached from the previous one.
     """
-    names = [_lane_of(graph, stop, f"{where}[{k}]") for k, stop in enumerate(stops)]
+    names = [_find_lane(graph, stop, f"{where}[{k}]") for k, stop in enumerate(stops)]
     lanes = [names[0]]
     for k, (one, other) in enumerate(pairwise(names), 1):
         if one == other:
             continue
-        way = _way(graph, one, other)
+        way = _shortest_path(graph, one, other)
         if not way:
             after = ", ".join(graph.successors(one)) or "none: the network ends there"
             raise ConfigError(
@@ -190,7 +190,7 @@ def lanes_through_point(
     return tuple(lanes)
 
 
-def _lane_of(graph: LaneGraph, stop: str | tuple[float, float], where: str) -> str:
+def _find_lane(graph: LaneGraph, stop: str | tuple[float, float], where: str) -> str:
     if isinstance(stop, str):
         if stop not in graph.lines:
             known = sorted(graph.lines)
@@ -211,8 +211,8 @@ def _lane_of(graph: LaneGraph, stop: str | tuple[float, float], where: str) -> s
     return place.lane
 
 
-def _way(graph: LaneGraph, start: str, goal: str) -> list[str]:
-    """Lanes after one up to another, as few as there can be; empty = there is no way."""
+def _shortest_path(graph: LaneGraph, start: str, goal: str) -> list[str]:
+    """Fewest lanes after one up to another (breadth-first search); empty = unreachable."""
     came: dict[str, str] = {start: ""}
     row = [start]
     while row:

@@ -1,4 +1,4 @@
-"""When moving boxes first overlap."""
+"""First overlap of moving boxes."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from gen_data.generator.core.se3 import Array
 def first_overlap(
     moving: Array, half_m: Array, standing: Array, standing_half_m: Array
 ) -> tuple[int, int, int] | None:
-    """When two boxes first overlap, and which; None = never.
+    """Find the first overlap of two boxes, at least one of them moving; None = no overlap.
 
     Args:
         moving: Centres and directions of n boxes [t, n, 4]: x, y, cosine, sine.
         half_m: Their half extents [n, 2].
-        standing: The same of m boxes that stand still [m, 4].
+        standing: Centres and directions of m static boxes [m, 4].
         standing_half_m: Their half extents [m, 2].
 
     Returns:
         Index of the instant, number of the moving box, and number of the other one: below n a
-        moving box, from n on a standing one.
+        moving box, from n on a static one.
     """
     others = np.concatenate([half_m, standing_half_m])
     reach = np.sqrt(others[:, 0] * others[:, 0] + others[:, 1] * others[:, 1])
@@ -42,7 +42,7 @@ def first_overlap(
 
 
 def _near_pairs(moving: Array, every: Array, reach_m: Array) -> list[tuple[int, int]]:
-    """Pairs of which one moves whose ways come near, by the boxes around their whole ways."""
+    """Pairs with a moving box whose paths come close, by the bounding boxes of the paths."""
     n = moving.shape[1]
     low = every[..., :2].min(axis=0) - reach_m[:, None]
     high = every[..., :2].max(axis=0) + reach_m[:, None]

@@ -1,4 +1,4 @@
-"""Where people on foot go: along sidewalks, over crosswalks, around what stands in their way."""
+"""Paths of pedestrians: along sidewalks, over crosswalks and around obstacles."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from gen_data.generator.traffic.lane_routes import LaneGraph, project_on_lane
 GRID_M = 0.25
 """Distance between stations of a path."""
 SHOULDER_M = 0.3
-"""Half the width of a person, and a bit."""
+"""Half the width of a person, with a margin."""
 BERTH_M, BERTH_ALONG_M = 0.42, 0.7
-"""The middle of a person keeps this far from things to the side, and from before to after them."""
+"""Distances of a person's centre from obstacles, sideways and lengthwise."""
 JOIN_M = 12.0
-"""A crosswalk leads to a sidewalk that is no farther from its end than this."""
+"""Largest distance between the end of a crosswalk and its sidewalk."""
 ASIDE = 0.35
-"""How far people step aside per length of way."""
+"""Lateral displacement per length of path when people step aside."""
 KERB_M = 0.3
-"""The step down to the road is spread over this length."""
+"""Length of path over which the step at the kerb is spread."""
 
 
 @dataclass(frozen=True, slots=True)
 class Join:
-    """Where a crosswalk's end is reached from a sidewalk.
+    """Connection of a crosswalk's end to a sidewalk.
 
     Attributes:
         at_m: Station on the sidewalk.
-        begins: Whether it is the crosswalk's beginning.
+        begins: Whether it is the crosswalk's start.
     """
 
     sidewalk: str
@@ -55,12 +55,12 @@ class Passage:
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A line with room on both sides.
+    """A line with lateral bounds.
 
     Attributes:
-        points_m: [k, 3], ``GRID_M`` apart.
-        right_m, left_m: How far to the left of it people may be at least and at most [k].
-        end_m: Where they stop; ``inf`` = it is long enough.
+        points_m: Points [k, 3], ``GRID_M`` apart.
+        right_m, left_m: Smallest and largest offset to the left of the line [k].
+        end_m: Station at which people stop; ``inf`` = the path is long enough.
     """
 
     points_m: Array
@@ -72,11 +72,11 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class WalkNetwork:
-    """Sidewalks, crosswalks, where they meet, and the room that is left on sidewalks.
+    """Sidewalks and crosswalks with their connections and lateral bounds.
 
     Attributes:
-        joins: By sidewalk, in order.
-        room: By lane: stations, and how far left of it people may be at least and at most there.
+        joins: Connections by sidewalk, in order.
+        room: By lane: stations, and smallest and largest offset to the left there.
     """
 
     sidewalks: LaneGraph
@@ -86,18 +86,18 @@ class WalkNetwork:
 
 
 def make_walk_network(sidewalks: LaneGraph, crosswalks: LaneGraph, obstacles: Array) -> WalkNetwork:
-    """Everything that people walk on.
+    """Build the network of sidewalks and crosswalks.
 
     Args:
-        sidewalks: Lanes of that kind.
-        crosswalks: Lanes of that kind.
-        obstacles: Boxes of what stands [b, 6]: centre, half extents, cosine and sine.
+        sidewalks: Graph of the sidewalks.
+        crosswalks: Graph of the crosswalks.
+        obstacles: Boxes of obstacles [b, 6]: centre, half extents, cosine and sine of the yaw.
     """
     joins: dict[str, list[Join]] = {}
     for name in sorted(crosswalks.lines):
         points = crosswalks.lines[name].lane.center_m
         for begins, end, inner in ((True, points[0], points[1]), (False, points[-1], points[-2])):
-            join = _join(sidewalks, name, begins, end, inner)
+            join = _find_join(sidewalks, name, begins, end, inner)
             if join is not None:
                 joins.setdefault(join.sidewalk, []).append(join)
     return WalkNetwork(
@@ -105,14 +105,14 @@ def make_walk_network(sidewalks: LaneGraph, crosswalks: LaneGraph, obstacles: Ar
         crosswalks,
         {name: tuple(sorted(found, key=lambda j: j.at_m)) for name, found in joins.items()},
         {
-            name: _room(line, obstacles)
+            name: _lateral_bounds(line, obstacles)
             for graph in (sidewalks, crosswalks)
             for name, line in sorted(graph.lines.items())
         },
     )
 
 
-def _join(
+def _find_join(
     sidewalks: LaneGraph, crosswalk: str, begins: bool, end: Vec3, inner: Vec3
 ) -> Join | None:
     span = math.dist(end[:2], inner[:2])
@@ -123,8 +123,8 @@ def _join(
     return Join(place.lane, place.at_m, crosswalk, begins)
 
 
-def _room(line: LaneLine, boxes: Array) -> tuple[Array, Array, Array]:
-    """Where people fit on a lane: on the wider side of whatever stands on it."""
+def _lateral_bounds(line: LaneLine, boxes: Array) -> tuple[Array, Array, Array]:
+    """Lateral bounds on a lane: people pass obstacles on the wider side."""
     count = max(2, math.ceil(line.length_m / GRID_M) + 1)
     at = np.linspace(0.0, line.length_m, count)
     half = max(0.5 * line.lane.width_m - SHOULDER_M, 0.0)
@@ -143,7 +143,7 @@ def _room(line: LaneLine, boxes: Array) -> tuple[Array, Array, Array]:
         beside = (at > starts - BERTH_ALONG_M) & (at < ends + BERTH_ALONG_M)
         if max(p.away_m for p in corners) > half + 4.0:
             continue
-        # Around it on the side where more room is left.
+        # Pass on the side with more room.
         if l0 + l1 > 0.0:
             left[beside] = np.minimum(left[beside], l0 - BERTH_M)
         else:
@@ -153,7 +153,7 @@ def _room(line: LaneLine, boxes: Array) -> tuple[Array, Array, Array]:
 
 @dataclass
 class _Line:
-    """A path that grows."""
+    """A path under construction."""
 
     points: list[Vec3]
     right: list[float]
@@ -180,34 +180,34 @@ def draw_path(
     crossing: float,
     rng: Rng,
 ) -> Path:
-    """A path from a place on a sidewalk or crosswalk, long enough or until nothing goes on.
+    """Draw a path from a position on a sidewalk or crosswalk.
 
     Args:
-        walks: What there is to walk on.
-        lane: Where it begins.
-        at_m: Station there.
-        forward: Whether it goes along that lane.
-        length_m: How long it is to be.
-        crossing: Probability that people cross where they can.
-        rng: Draws at every crosswalk and every fork.
+        walks: Network of sidewalks and crosswalks.
+        lane: Lane on which it starts.
+        at_m: Station on that lane.
+        forward: Whether it starts in the lane's direction.
+        length_m: Wanted length; the path ends earlier where the network ends.
+        crossing: Probability of taking a crosswalk.
+        rng: Generator of the draws at every crosswalk and fork.
     """
     line = _Line([], [], [])
     passages: list[Passage] = []
     if lane in walks.crosswalks.lines:
         whole = walks.crosswalks.lines[lane]
         goal = whole.length_m if forward else 0.0
-        _along(line, walks, whole, at_m, goal)
+        _append_lane(line, walks, whole, at_m, goal)
         passages.append(Passage(lane, 0.0, line.length_m, forward, whole.length_m))
         place = _leave_crosswalk(line, walks, lane, forward, rng)
     else:
         place = (lane, at_m, forward)
     while place is not None and line.length_m < length_m:
         left_m = length_m - line.length_m
-        place = _onward(line, walks, place, left_m, crossing, passages, rng)
-    return _path(line, passages, length_m)
+        place = _append_next(line, walks, place, left_m, crossing, passages, rng)
+    return _resample_path(line, passages, length_m)
 
 
-def _onward(
+def _append_next(
     line: _Line,
     walks: WalkNetwork,
     place: tuple[str, float, bool],
@@ -216,19 +216,19 @@ def _onward(
     passages: list[Passage],
     rng: Rng,
 ) -> tuple[str, float, bool] | None:
-    """Adds a stretch of sidewalk, and a crosswalk if it is taken; where it goes on from there."""
+    """Append a section of sidewalk, and a crosswalk if taken; return the next position."""
     name, at_m, forward = place
     here = walks.sidewalks.lines[name]
     joins = walks.joins.get(name, ())
     for join in joins if forward else reversed(joins):
         gone = join.at_m - at_m if forward else at_m - join.at_m
         if 0.5 < gone < left_m and float(rng.uniform()) < crossing:
-            _along(line, walks, here, at_m, join.at_m)
+            _append_lane(line, walks, here, at_m, join.at_m)
             return _cross_road(line, walks, join, passages, rng)
     if left_m < (here.length_m - at_m if forward else at_m):
-        _along(line, walks, here, at_m, at_m + left_m if forward else at_m - left_m)
+        _append_lane(line, walks, here, at_m, at_m + left_m if forward else at_m - left_m)
         return None
-    _along(line, walks, here, at_m, here.length_m if forward else 0.0)
+    _append_lane(line, walks, here, at_m, here.length_m if forward else 0.0)
     if forward:
         ways = walks.sidewalks.successors(name)
     else:
@@ -242,13 +242,13 @@ def _onward(
 def _cross_road(
     line: _Line, walks: WalkNetwork, join: Join, passages: list[Passage], rng: Rng
 ) -> tuple[str, float, bool] | None:
-    """Adds the way to a crosswalk and over it."""
+    """Append the path to a crosswalk and over it."""
     whole = walks.crosswalks.lines[join.crosswalk]
     start = 0.0 if join.begins else whole.length_m
     kerb = whole.pose(start).translation_m
-    _over_kerb(line, line.points[-1], kerb)
+    _append_kerb(line, line.points[-1], kerb)
     from_m = line.length_m
-    _along(line, walks, whole, start, whole.length_m - start)
+    _append_lane(line, walks, whole, start, whole.length_m - start)
     passages.append(Passage(join.crosswalk, from_m, line.length_m, join.begins, whole.length_m))
     return _leave_crosswalk(line, walks, join.crosswalk, join.begins, rng)
 
@@ -256,18 +256,20 @@ def _cross_road(
 def _leave_crosswalk(
     line: _Line, walks: WalkNetwork, crosswalk: str, forward: bool, rng: Rng
 ) -> tuple[str, float, bool] | None:
-    """Adds the way from a crosswalk's end to the sidewalk there; either way on is as likely."""
+    """Append the path from a crosswalk's end to the sidewalk; draw one of its directions."""
     for joins in walks.joins.values():
         for join in joins:
             if join.crosswalk == crosswalk and join.begins != forward:
                 place = walks.sidewalks.lines[join.sidewalk].pose(join.at_m).translation_m
-                _over_kerb(line, line.points[-1], place)
+                _append_kerb(line, line.points[-1], place)
                 return join.sidewalk, join.at_m, bool(rng.uniform() < 0.5)
     return None
 
 
-def _along(line: _Line, walks: WalkNetwork, lane: LaneLine, start_m: float, end_m: float) -> None:
-    """Adds a stretch of a lane, backwards if it ends before it starts."""
+def _append_lane(
+    line: _Line, walks: WalkNetwork, lane: LaneLine, start_m: float, end_m: float
+) -> None:
+    """Append a section of a lane, backwards if it ends before it starts."""
     way = 1.0 if end_m >= start_m else -1.0
     at, right, left = walks.room[lane.lane.name]
     inner = [s for s in at.tolist() if min(start_m, end_m) < s < max(start_m, end_m)]
@@ -279,8 +281,8 @@ def _along(line: _Line, walks: WalkNetwork, lane: LaneLine, start_m: float, end_
         line.add(lane.pose(s).translation_m, low, high)
 
 
-def _over_kerb(line: _Line, start: Vec3, end: Vec3) -> None:
-    """Adds the way from a sidewalk to the end of a crosswalk, or back, with its step at the kerb.
+def _append_kerb(line: _Line, start: Vec3, end: Vec3) -> None:
+    """Append the path between a sidewalk and the end of a crosswalk, with the step at the kerb.
 
     The ground between falls gently towards the kerb, to 0.7 of the sidewalk's height over the road.
     """
@@ -295,8 +297,8 @@ def _over_kerb(line: _Line, start: Vec3, end: Vec3) -> None:
     line.add(end, -0.5, 0.5)
 
 
-def _path(line: _Line, passages: Sequence[Passage], length_m: float) -> Path:
-    """The path at even stations; blocked where nobody fits."""
+def _resample_path(line: _Line, passages: Sequence[Passage], length_m: float) -> Path:
+    """Resample the path at even stations; it ends where nobody fits."""
     points = np.array(line.points)
     if len(points) == 1:
         points = np.concatenate([points, points + np.array([0.01, 0.0, 0.0])])
@@ -310,7 +312,7 @@ def _path(line: _Line, passages: Sequence[Passage], length_m: float) -> Path:
     blocked = np.flatnonzero(right[k] > left[k])
     if len(blocked):
         end_m = min(end_m, max(GRID_M * float(blocked[0]) - 1.0, 0.0))
-    low, high = _ease(right[k]), -_ease(-left[k])
+    low, high = _limit_slope(right[k]), -_limit_slope(-left[k])
     low, high = np.minimum(low, np.maximum(high, right[k])), np.maximum(high, right[k])
     return Path(
         np.stack([np.interp(grid, at, points[:, c]) for c in range(3)], axis=1),
@@ -321,8 +323,8 @@ def _path(line: _Line, passages: Sequence[Passage], length_m: float) -> Path:
     )
 
 
-def _ease(least_m: Array) -> Array:
-    """Least distances to the left that rise and fall along a path as people step aside."""
+def _limit_slope(least_m: Array) -> Array:
+    """Limit the slope of lower bounds along a path to that of stepping aside."""
     eased: Array = least_m.copy()
     for k in range(1, len(eased)):
         eased[k] = max(eased[k], eased[k - 1] - ASIDE * GRID_M)

@@ -1,4 +1,4 @@
-"""People on foot through time: along their paths, around one another, and over crosswalks."""
+"""Motion of pedestrians: along paths, around each other, and over crosswalks."""
 
 from __future__ import annotations
 
@@ -18,36 +18,36 @@ from gen_data.generator.traffic.vehicle_model import CrossingPedestrian
 Indices = NDArray[np.int64]
 
 AHEAD_M = 0.8
-"""People walk towards a point of their path this far ahead."""
+"""Lookahead along the path."""
 SEEN_M, BESIDE_M = 3.5, 0.75
-"""They make room for whom they would meet within this distance, this near to their line."""
+"""Distances ahead and to the side within which people make room for each other."""
 SIDESTEP_M_S = 0.7
 TIGHT_M, SLOW_M_S = 0.05, 0.4
-"""Who is farther than this from where there is room walks no faster than that."""
+"""Lateral error above which people slow down, and the speed to which they do."""
 NEAR_M = 0.62
-"""Middles of two people come no nearer."""
+"""Smallest distance between the centres of two people."""
 TOUCH_M = 0.31
-"""Middles of people come no nearer to things."""
+"""Smallest distance between a person's centre and an obstacle."""
 CHANGE_M_S2 = 2.0
-"""How quickly they change their pace."""
+"""Acceleration of pedestrians."""
 TURN_PER_S = 4.0
-"""How quickly they turn to where they go: the inverse of a time constant."""
+"""Rate of turning to the walking direction: inverse of a time constant."""
 AT_KERB_M = 2.0
-"""Who is this near to a crosswalk on their way wants to cross."""
+"""Distance to a crosswalk at which people ask to cross."""
 HURRY = 1.25
-"""Who starts to cross must be over before the cars get green, if need be this much faster."""
+"""Factor on the walking speed to finish crossing before vehicles get green."""
 
 
 @dataclass(frozen=True, slots=True)
 class Pedestrian:
-    """Somebody on foot.
+    """A person on foot.
 
     Attributes:
-        xy_m: Where they are.
-        ahead: Where they look, unit.
-        speed_m_s: When nothing is in their way; 0 = they stand.
-        path: Where they go; None = they stand.
-        left_m: How far to the left of it they would like to be.
+        xy_m: Start position.
+        ahead: Start direction, unit.
+        speed_m_s: Free walking speed; 0 = standing.
+        path: Path to walk; None = standing.
+        left_m: Preferred offset to the left of the path.
     """
 
     name: str
@@ -60,15 +60,15 @@ class Pedestrian:
 
 @dataclass
 class Pedestrians:
-    """The state of some people; ``step`` changes it.
+    """State of n pedestrians; ``step`` changes it.
 
     Attributes:
-        obstacles: Boxes of what stands [b, 6]: centre, half extents, cosine and sine.
-        xy_m, ahead: Of everybody [n, 2].
-        speed_m_s: [n].
-        walked_m: Distance so far [n].
-        at_m: Station on the path [n].
-        off_m: How far left of it they aim [n].
+        obstacles: Boxes of obstacles [b, 6]: centre, half extents, cosine and sine of the yaw.
+        xy_m, ahead: Positions and directions [n, 2].
+        speed_m_s: Speeds [n].
+        walked_m: Distances walked [n].
+        at_m: Stations on the paths [n].
+        off_m: Targeted offsets to the left of the paths [n].
     """
 
     walkers: Sequence[Pedestrian]
@@ -89,7 +89,7 @@ class Pedestrians:
     _end_m: Array = field(init=False)
 
     def __post_init__(self) -> None:
-        """Everybody in full walk, except who stands."""
+        """Start at full walking speed, except people who stand."""
         n = len(self.walkers)
         paths = [w.path for w in self.walkers]
         longest = max((len(p.points_m) for p in paths if p is not None), default=2)
@@ -108,14 +108,14 @@ class Pedestrians:
         self.walked_m, self.at_m = np.zeros(n), np.zeros(n)
         self.off_m = np.array([w.left_m for w in self.walkers])
         self.height_m = self._lines[:, 0, 2].copy()
-        self.obstacles = _within_reach(self.obstacles, self._lines)
+        self.obstacles = _select_near_boxes(self.obstacles, self._lines)
         self._asks = [False] * n
         self._let = [
             sum(p.from_m < 0.05 for p in path.passages) if path is not None else 0 for path in paths
         ]
 
     def crossers(self) -> list[CrossingPedestrian]:
-        """Everybody on a crosswalk or at the kerb before it, but who waits for their own light."""
+        """Everybody on a crosswalk or at its kerb, except people who wait for their signal."""
         found = []
         for k, walker in enumerate(self.walkers):
             passages = walker.path.passages if walker.path is not None else ()
@@ -132,11 +132,11 @@ class Pedestrians:
         return found
 
     def step(self, time_s: float, step_s: float, lets_pass: Callable[[str], bool]) -> None:
-        """One step of time.
+        """Advance by one step.
 
         Args:
-            time_s: At its beginning.
-            step_s: Its length.
+            time_s: Time at the start of the step.
+            step_s: Duration of the step.
             lets_pass: Whether no vehicle is on a crosswalk or too fast to stop before it.
         """
         if not len(self.walkers):
@@ -146,12 +146,12 @@ class Pedestrians:
         k = np.minimum(((self.at_m + AHEAD_M) / GRID_M).astype(np.int64), self._lines.shape[1] - 3)
         along = normalize(self._lines[rows, k + 1, :2] - self._lines[rows, k, :2])
         target = self._lines[rows, k, :2] + self.off_m[:, None] * _left_normals(along)
-        # Between grid points, so that a walk is even.
+        # Interpolate between grid points, so that the walk is smooth.
         target += (self.at_m + AHEAD_M - GRID_M * k)[:, None] * along
         to = target - self.xy_m
         away = np.sqrt(to[:, 0] * to[:, 0] + to[:, 1] * to[:, 1])
         way = normalize(to)
-        push, limit = self._others(way)
+        push, limit = self._avoid_people(way)
         limit = np.minimum(limit, self._sidestep(push, rows, k, step_s))
         goal = np.minimum(np.minimum(self._wanted, limit), room_m / 0.5)
         change = np.clip(goal - self.speed_m_s, -3.0 * CHANGE_M_S2 * step_s, CHANGE_M_S2 * step_s)
@@ -159,8 +159,8 @@ class Pedestrians:
         self._advance(way, away, step_s)
 
     def _advance(self, way: Array, away: Array, step_s: float) -> None:
-        """Moves everybody whom nobody keeps from it, and turns them to where they go."""
-        moves = self._around(way * (self.speed_m_s * step_s)[:, None])
+        """Move everybody whose way is free, and turn them to their walking direction."""
+        moves = self._avoid_obstacles(way * (self.speed_m_s * step_s)[:, None])
         delta = self.xy_m[None] - self.xy_m[:, None]
         before = delta[..., 0] * delta[..., 0] + delta[..., 1] * delta[..., 1]
         after = delta - moves[:, None]
@@ -173,7 +173,7 @@ class Pedestrians:
         gone = np.sqrt(moves[:, 0] * moves[:, 0] + moves[:, 1] * moves[:, 1])
         self.xy_m = self.xy_m + moves
         self.walked_m = self.walked_m + gone
-        # The point ahead waits for who is late and hurries for who is early.
+        # The target point slows down for people behind it and speeds up for people close to it.
         self.at_m = self.at_m + gone * np.clip(1.5 - 0.5 * away / AHEAD_M, 0.0, 1.5)
         share = np.minimum(1.0, TURN_PER_S * step_s) * (gone > 0.0)
         cosine = self.ahead[:, 0] * way[:, 0] + self.ahead[:, 1] * way[:, 1]
@@ -185,14 +185,14 @@ class Pedestrians:
         a, b = self._lines[rows, k, 2], self._lines[rows, k + 1, 2]
         self.height_m = a + np.minimum(f, 1.0) * (b - a)
 
-    def _around(self, moves: Array) -> Array:
-        """Moves [n, 2] without the part of each that leads into the nearest obstacle."""
+    def _avoid_obstacles(self, moves: Array) -> Array:
+        """Remove the component of each move [n, 2] that leads into the nearest obstacle."""
         if not len(self.obstacles):
             return moves
         x, y, hx, hy, c, s = self.obstacles.T
         dx, dy = self.xy_m[:, :1] - x, self.xy_m[:, 1:] - y
         u, v = c * dx + s * dy, c * dy - s * dx
-        # From the nearest point of the box to the person, in the box's axes.
+        # Vector from the nearest point of the box to the person, in the box's axes.
         u, v = u - np.clip(u, -hx, hx), v - np.clip(v, -hy, hy)
         away = np.sqrt(u * u + v * v)
         rows, k = np.arange(len(away)), np.argmin(away, axis=1)
@@ -223,15 +223,15 @@ class Pedestrians:
         return room
 
     def _may_cross(self, crosswalk: str, length_m: float, k: int, time_s: float) -> bool:
-        """Whether the signals leave time to cross."""
+        """Whether the signals leave enough time to cross."""
         approach = self.approaches.get(crosswalk)
         if approach is None:
             return True
         needed_s = (length_m + 1.5) / (HURRY * max(float(self._wanted[k]), 0.5))
         return approach.red_left_s(time_s) > needed_s
 
-    def _others(self, way: Array) -> tuple[Array, Array]:
-        """Whom everybody meets next: which side to make room to [n], and how fast they may go."""
+    def _avoid_people(self, way: Array) -> tuple[Array, Array]:
+        """Avoidance of other people: side to step to [n], and largest speed [n]."""
         rel = self.xy_m[None] - self.xy_m[:, None]
         x = rel[..., 0] * way[:, :1] + rel[..., 1] * way[:, 1:]
         y = rel[..., 1] * way[:, :1] - rel[..., 0] * way[:, 1:]
@@ -249,7 +249,7 @@ class Pedestrians:
         return push, np.where(before < np.inf, pace, np.inf).min(axis=1)
 
     def _sidestep(self, push: Array, rows: Indices, k: Indices, step_s: float) -> Array:
-        """Moves aims to the side, within the room there is; paces [n] that leave time for it."""
+        """Shift the offsets within their bounds; return speeds [n] that leave time for it."""
         low, high = self._sides[rows, k, 0], self._sides[rows, k, 1]
         home = np.array([w.left_m for w in self.walkers])
         back = np.clip(home - self.off_m, -0.2 * step_s, 0.2 * step_s)
@@ -260,8 +260,8 @@ class Pedestrians:
         return np.where(np.abs(self.off_m - aim) > TIGHT_M, SLOW_M_S, np.inf)
 
 
-def _within_reach(boxes: Array, lines: Array) -> Array:
-    """The boxes that are near the ways [n, m, 3] of any who walk."""
+def _select_near_boxes(boxes: Array, lines: Array) -> Array:
+    """Select the boxes near any path [n, m, 3]."""
     if not len(lines) or not len(boxes):
         return np.zeros((0, 6))
     low, high = lines[..., :2].min(axis=1) - SEEN_M, lines[..., :2].max(axis=1) + SEEN_M
@@ -276,15 +276,15 @@ def _left_normals(vectors: Array) -> Array:
 
 
 def stride_m(height_m: float) -> float:
-    """Length of a stride, two steps.
+    """Length of a stride, two steps [m].
 
-    What legs of 0.53 body heights cover at the hip angles of level walking (Winter 2009), and what
-    Murray, Drought and Kory (1964) measured on grown men: 0.9 of the height at a free pace of
-    1.5 m/s, less when slower.
+    Legs of 0.53 body heights cover it at the hip angles of level walking (Winter 2009). It agrees
+    with Murray, Drought and Kory (1964): 0.9 body heights at a free speed of 1.5 m/s for adult men,
+    less when slower.
     """
     return 0.8 * height_m
 
 
 def stride_phases(walked_m: Array, stride: float, start: int, phases: int) -> list[int]:
-    """Phase of the stride at every distance walked; ``start`` at the first."""
+    """Phase of the stride at every distance walked, from ``start`` at 0."""
     return [(start + math.floor(d / stride * phases)) % phases for d in walked_m.tolist()]

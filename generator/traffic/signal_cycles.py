@@ -1,7 +1,7 @@
 """Cycles of traffic lights.
 
-Amber lasts 3 s, red and amber together 1 s (RiLSA, at 50 km/h); between the end of one
-green and the beginning of the next lie amber and a time in which all is red.
+Amber lasts 3 s, red with amber 1 s (RiLSA, at 50 km/h). Amber and an all-red time separate the
+greens of two axes.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ RED_AMBER_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Cycle:
-    """A junction's programme: its axes have green one after the other.
+    """Signal programme of a junction: its axes have green in turn.
 
     Attributes:
         axes: Number of axes.
-        green_s: Of each.
-        all_red_s: After each amber, red and amber included.
+        green_s: Duration of each green.
+        all_red_s: Duration after each amber, including red with amber.
         offset_s: Time in the cycle at time 0.
     """
 
@@ -34,16 +34,16 @@ class Cycle:
 
     @property
     def share_s(self) -> float:
-        """From the beginning of one axis' green to that of the next."""
+        """Time from the start of one axis' green to that of the next [s]."""
         return self.green_s + AMBER_S + self.all_red_s
 
     @property
     def length_s(self) -> float:
-        """Of the whole cycle."""
+        """Duration of the whole cycle [s]."""
         return self.axes * self.share_s
 
     def state(self, axis: int, time_s: float) -> State:
-        """What the signals of an axis show."""
+        """State of the signals of an axis."""
         local = self._local(axis, time_s)
         if local < self.green_s:
             return "green"
@@ -54,13 +54,13 @@ class Cycle:
         return "red"
 
     def red_left_s(self, axis: int, time_s: float) -> float:
-        """How long an axis stays red; 0 when it is not."""
+        """Remaining red time of an axis [s]; 0 if it is not red."""
         if self.state(axis, time_s) != "red":
             return 0.0
         return self.length_s - RED_AMBER_S - self._local(axis, time_s)
 
     def switches_s(self, axis: int, until_s: float) -> tuple[float, ...]:
-        """Times above 0 and up to some time at which an axis' signals change."""
+        """Times in (0, until_s] at which an axis' signals change."""
         ends = (0.0, self.green_s, self.green_s + AMBER_S, self.length_s - RED_AMBER_S)
         start = axis * self.share_s - self.offset_s
         found = []
@@ -74,22 +74,22 @@ class Cycle:
         return tuple(sorted(found))
 
     def _local(self, axis: int, time_s: float) -> float:
-        """Time since the beginning of an axis' latest green."""
-        # A step of the simulation may come out a bit below the instant of a switch.
+        """Time since the start of an axis' latest green [s]."""
+        # Rounding may put a step of the simulation slightly before the instant of a switch.
         return (time_s + 1e-9 + self.offset_s - axis * self.share_s) % self.length_s
 
 
 @dataclass(frozen=True, slots=True)
 class Approach:
-    """The signals that a lane into a junction obeys."""
+    """Signals of a lane into a junction."""
 
     cycle: Cycle
     axis: int
 
     def state(self, time_s: float) -> State:
-        """What they show."""
+        """State of the signals."""
         return self.cycle.state(self.axis, time_s)
 
     def red_left_s(self, time_s: float) -> float:
-        """How long they stay red; 0 when they are not."""
+        """Remaining red time [s]; 0 if they are not red."""
         return self.cycle.red_left_s(self.axis, time_s)

@@ -1,4 +1,4 @@
-"""Everybody on the road through time."""
+"""Simulation of all vehicles and pedestrians."""
 
 from __future__ import annotations
 
@@ -18,24 +18,24 @@ from gen_data.generator.traffic.vehicles import Vehicles
 
 STEP_S = 0.05
 KNOT_S = 0.1
-"""Poses are kept at every second step."""
+"""Interval of the poses: every second step."""
 _PER_KNOT = round(KNOT_S / STEP_S)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SimulatedMotion:
-    """What n vehicles and p people do; arrays over t knots, or t' steps where it says so.
+    """Motion of n vehicles and p pedestrians, at t knots or t' steps.
 
     Attributes:
-        axle_m: Middles of rear axles on the ground [t, n, 3].
+        axle_m: Middles of the rear axles on the ground [t, n, 3].
         ahead: Directions of vehicles [t, n, 2].
-        rise: Height of the front axle's ground over the rear's [t, n].
-        station_m: Of rear axles on routes [t', n].
-        speed_m_s, acceleration_m_s2: Of vehicles [t', n].
-        feet_m: Where people are [t, p, 3].
-        look: Directions of people [t, p, 2].
-        walked_m: Distances [t', p].
-        pace_m_s: Speeds of people [t', p].
+        rise: Height of the ground at the front axle above that at the rear axle [t, n].
+        station_m: Stations of rear axles on their routes [t', n].
+        speed_m_s, acceleration_m_s2: Motion of vehicles along their routes [t', n].
+        feet_m: Positions of pedestrians on the ground [t, p, 3].
+        look: Directions of pedestrians [t, p, 2].
+        walked_m: Distances walked [t', p].
+        pace_m_s: Speeds of pedestrians [t', p].
     """
 
     axle_m: Array
@@ -51,7 +51,7 @@ class SimulatedMotion:
 
     @property
     def knots(self) -> int:
-        """How many there are."""
+        """Number of knots."""
         return len(self.feet_m)
 
 
@@ -62,14 +62,14 @@ def simulate(
     approaches: Mapping[str, Approach],
     duration_s: float,
 ) -> SimulatedMotion:
-    """What happens from time 0 to the first knot at or after ``duration_s``.
+    """Simulate from time 0 to the first knot at or after ``duration_s``.
 
     Args:
-        fleet: The vehicles; None = there are none.
-        walkers: The people.
-        obstacles: Boxes of what stands [b, 6]: centre, half extents, cosine and sine.
-        approaches: Signals by the lanes into junctions and by the crosswalks that obey them.
-        duration_s: How long.
+        fleet: Vehicles; None = none.
+        walkers: Pedestrians.
+        obstacles: Boxes of obstacles [b, 6]: centre, half extents, cosine and sine of the yaw.
+        approaches: Signals by the names of lanes into junctions and of crosswalks.
+        duration_s: Simulated time.
     """
     steps = _PER_KNOT * math.ceil(duration_s / KNOT_S - 1e-9)
     driving = VehicleModel(fleet, approaches) if fleet is not None else None
@@ -90,7 +90,7 @@ def simulate(
         walking.step(time_s, STEP_S, driving.lets_pass if driving is not None else _always)
         if driving is not None:
             driving.step(time_s, STEP_S, walking.crossers())
-    return _motion(fleet, cars, people)
+    return _collect_motion(fleet, cars, people)
 
 
 def _always(crosswalk: str) -> bool:
@@ -98,7 +98,7 @@ def _always(crosswalk: str) -> bool:
     return True
 
 
-def _motion(
+def _collect_motion(
     fleet: Vehicles | None,
     cars: Sequence[tuple[Array, Array, Array]],
     people: Sequence[tuple[Array, ...]],
@@ -116,14 +116,14 @@ def _motion(
         )
     else:
         station, speed, acceleration = (np.stack(column) for column in zip(*cars, strict=True))
-        axle, ahead, rise = _poses(fleet, station[kept])
+        axle, ahead, rise = _vehicle_poses(fleet, station[kept])
     return SimulatedMotion(
         axle, ahead, rise, station, speed, acceleration, feet, look[kept], walked, pace
     )
 
 
-def _poses(fleet: Vehicles, station_m: Array) -> tuple[Array, Array, Array]:
-    """Rear axles [t, n, 3], directions [t, n, 2] and rises [t, n] of vehicles at stations."""
+def _vehicle_poses(fleet: Vehicles, station_m: Array) -> tuple[Array, Array, Array]:
+    """Compute rear axles [t, n, 3], directions [t, n, 2] and rises [t, n] at stations [t, n]."""
     along = (station_m - fleet.first_m) / STATION_M
     xy, ahead = fleet.courses.poses(along)
     low, high = _interpolate(fleet.height_m, along)
@@ -131,7 +131,7 @@ def _poses(fleet: Vehicles, station_m: Array) -> tuple[Array, Array, Array]:
 
 
 def _interpolate(values: Array, along: Array) -> tuple[Array, Array]:
-    """Two values per station [n, m, 2], between stations [t, n]."""
+    """Interpolate two values per station [n, m, 2] at stations [t, n]."""
     k: NDArray[np.int64] = np.clip(along.astype(np.int64), 0, values.shape[1] - 2)
     f = np.clip(along - k, 0.0, 1.0)[..., None]
     rows = np.arange(len(values))

@@ -1,8 +1,9 @@
-"""What a vehicle drives when it follows a line: pure pursuit with a kinematic bicycle.
+"""Path of a vehicle that follows a line: pure pursuit with a kinematic bicycle.
 
 Coulter, "Implementation of the pure pursuit path tracking algorithm", CMU-RI-TR-92-01, 1992: the
-rear axle moves on the circle that meets its own direction and a point of the line some way ahead.
-A kinematic bicycle's path does not depend on its speed, so it is driven once, by distance.
+rear axle moves on the circle that is tangent to its direction and passes through a point of the
+line ahead. A kinematic bicycle's path does not depend on its speed, so it is computed once, by
+distance.
 """
 
 from __future__ import annotations
@@ -17,12 +18,12 @@ from gen_data.generator.core.se3 import Array
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Courses:
-    """Where the rear axles of n vehicles go, at m even stations of their lines.
+    """Paths of the rear axles of n vehicles, at m even stations of their lines.
 
     Attributes:
         xy_m: Middles of the rear axles [n, m, 2].
         ahead: Directions [n, m, 2], unit.
-        curvature_per_m: Of the paths [n, m], positive to the left.
+        curvature_per_m: Curvatures of the paths [n, m], positive to the left.
     """
 
     xy_m: Array
@@ -30,10 +31,10 @@ class Courses:
     curvature_per_m: Array
 
     def poses(self, stations: Array) -> tuple[Array, Array]:
-        """Rear axles [..., n, 2] and directions [..., n, 2] at stations [..., n].
+        """Interpolate rear axles [..., n, 2] and directions [..., n, 2] at stations [..., n].
 
         Args:
-            stations: In units of ``STATION_M`` from the beginning of each course.
+            stations: Stations in units of ``STATION_M`` from the start of each course.
         """
         last = self.xy_m.shape[1] - 2
         k = np.clip(stations.astype(np.int64), 0, last)
@@ -44,7 +45,7 @@ class Courses:
         chord = b - a
         span = np.sqrt(chord[..., :1] * chord[..., :1] + chord[..., 1:] * chord[..., 1:])
         g = 1.0 - f
-        # A cubic whose ends point where the axle points.
+        # Cubic Hermite interpolation: its ends have the axle's directions.
         xy = (1.0 + 2.0 * f) * g * g * a + f * f * (3.0 - 2.0 * f) * b
         xy = xy + span * (f * g * g * u + f * f * (f - 1.0) * v)
         return xy, normalize(g * u + f * v)
@@ -57,15 +58,15 @@ def follow_lines(
     lookahead: NDArray[np.int64],
     sharpest_per_m: Array,
 ) -> Courses:
-    """What n vehicles drive along their lines.
+    """Compute the paths of n vehicles along their lines.
 
     Args:
         lines_m: Points of the lines [n, m + l, 2], ``STATION_M`` apart, the first beside each
             vehicle's rear axle.
-        xy_m: Where the rear axles are [n, 2].
-        ahead: Where the vehicles point [n, 2], unit.
-        lookahead: How many stations ahead they look [n, m], at most l.
-        sharpest_per_m: Greatest curvatures that they can steer [n].
+        xy_m: Start positions of the rear axles [n, 2].
+        ahead: Start directions of the vehicles [n, 2], unit.
+        lookahead: Lookahead in stations [n, m], at most l.
+        sharpest_per_m: Largest curvatures that they can steer [n].
     """
     n, m = lookahead.shape
     tangents = normalize(np.gradient(lines_m, axis=1))
@@ -81,7 +82,7 @@ def follow_lines(
         curvature[:, k] = bend
         if k + 1 == m:
             break
-        # As far as brings it beside the line's next station.
+        # Advance until the axle is beside the line's next station.
         t, ahead_of = tangents[:, k + 1], lines_m[:, k + 1] - p
         along = np.maximum(h[:, 0] * t[:, 0] + h[:, 1] * t[:, 1], 0.3)
         step = np.maximum((ahead_of[:, 0] * t[:, 0] + ahead_of[:, 1] * t[:, 1]) / along, 0.0)
@@ -92,7 +93,7 @@ def follow_lines(
 
 
 def rotate_small(vectors: Array, angle_rad: Array) -> Array:
-    """Vectors [n, 2] turned to the left by small angles [n]; ``tan(x)`` is taken to be x."""
+    """Rotate vectors [n, 2] to the left by small angles [n], with ``tan(x / 2) = x / 2``."""
     q = 0.5 * angle_rad
     scale = 1.0 / (1.0 + q * q)
     c, s = (1.0 - q * q) * scale, 2.0 * q * scale
@@ -101,7 +102,7 @@ def rotate_small(vectors: Array, angle_rad: Array) -> Array:
 
 
 def normalize(vectors: Array) -> Array:
-    """Vectors [..., 2] at length 1."""
+    """Scale vectors [..., 2] to length 1."""
     x, y = vectors[..., :1], vectors[..., 1:]
     scaled: Array = vectors / np.maximum(np.sqrt(x * x + y * y), 1e-12)
     return scaled

@@ -1,4 +1,4 @@
-"""Vehicles through time: behind one another, at signals, in junctions and before people."""
+"""Longitudinal motion of vehicles: following, signals, right of way and pedestrians."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ from gen_data.generator.traffic.signal_cycles import Approach
 from gen_data.generator.traffic.vehicles import EASY_M_S2, Entry, Vehicles
 
 SEEN_M = 12.0
-"""Drivers decide about a junction this far before it at the latest, and in time to brake."""
+"""Smallest distance at which drivers decide about a junction; more at higher speeds."""
 CAN_STOP_M_S2 = 3.0
-"""Whoever would have to brake harder than this for amber, or for people who wait, drives on."""
+"""Largest deceleration for amber or for waiting pedestrians; otherwise drivers go on."""
 MUST_STOP_M_S2 = 6.0
-"""Whoever would have to brake harder than this for people drives on; they have waited for it."""
+"""Largest deceleration for crossing pedestrians; otherwise drivers go on."""
 GAP_S = 1.0
-"""Spare time between who crosses before and who comes."""
+"""Time margin between a vehicle that crosses and the next one."""
 PATIENCE_S = 3.0
-"""After waiting that long, drivers go in the order in which they came."""
+"""Waiting time after which drivers go in the order of arrival."""
 AT_LINE_S = 0.4
-"""Time gap to lines, which do not brake as who is ahead may."""
+"""Time gap to stop lines, which cannot brake, unlike leaders."""
 BEFORE_LINE_M = 1.0
-"""They stop this far before a line."""
+"""Distance of stopped vehicles from a stop line."""
 
 
 @dataclass(frozen=True, slots=True)
 class CrossingPedestrian:
-    """Somebody on a crosswalk, or waiting to step on it.
+    """A pedestrian on a crosswalk, or waiting at its kerb.
 
     Attributes:
-        waits: Whether they still stand at the kerb: who can stop easily does.
+        waits: Whether the pedestrian stands at the kerb; drivers stop if they can do so easily.
         at_m: Station on the crosswalk.
-        forward: Whether they walk along it.
+        forward: Whether the pedestrian walks in its direction.
     """
 
     crosswalk: str
@@ -53,8 +53,8 @@ class CrossingPedestrian:
 
 
 @dataclass(frozen=True, slots=True)
-class _Comer:
-    """Somebody who comes to a junction and may not yet enter it.
+class _Approaching:
+    """A vehicle that approaches a junction and may not yet enter it.
 
     Attributes:
         after_s: Time until the front is at the junction.
@@ -67,12 +67,12 @@ class _Comer:
 
 @dataclass
 class VehicleModel:
-    """The state of a fleet; ``step`` changes it.
+    """State of all vehicles; ``step`` changes it.
 
     Attributes:
-        station_m, speed_m_s, acceleration_m_s2: Of every vehicle [n].
-        entered: How many of its junctions each may enter or has entered.
-        waited_s: For how long each has stood.
+        station_m, speed_m_s, acceleration_m_s2: Motion along the routes [n].
+        entered: Number of junctions that each vehicle has entered or may enter.
+        waited_s: Time since each vehicle stopped [n].
     """
 
     fleet: Vehicles
@@ -85,7 +85,7 @@ class VehicleModel:
     _at_lines: Drivers = field(init=False)
 
     def __post_init__(self) -> None:
-        """Everybody at the speed that suits the place."""
+        """Start at the speed limits of the places."""
         n = len(self.fleet.vehicles)
         self._at_lines = replace(self.fleet.drivers, headway_s=np.full(n, AT_LINE_S))
         self.station_m = self.fleet.first_m.copy()
@@ -99,13 +99,13 @@ class VehicleModel:
         self.speed_m_s = self._speed_limits(np.zeros(n))
 
     def settle(self, crossers: Sequence[CrossingPedestrian]) -> None:
-        """Lowers speeds at time 0 to what leaves room for easy braking."""
+        """Lower the speeds at time 0 so that comfortable braking suffices."""
         fleet = self.fleet
-        stops = self._stops(0.0, crossers)
+        stops = self._find_stops(0.0, crossers)
         room = np.maximum(stops - self.station_m - fleet.front_m - BEFORE_LINE_M, 0.0)
         speed = np.minimum(self.speed_m_s, np.sqrt(2.0 * EASY_M_S2 * np.minimum(room, 1e4)))
         for _ in range(len(speed)):
-            gap, leader = self._leaders(speed)
+            gap, leader = self._find_leaders(speed)
             behind = equilibrium_speed(fleet.drivers, gap, speed)
             free = np.maximum(np.minimum(gap, 1e4) - fleet.drivers.standstill_m, 0.0)
             lower = np.minimum(behind, np.sqrt(leader * leader + 2.0 * EASY_M_S2 * free))
@@ -115,10 +115,10 @@ class VehicleModel:
         self.speed_m_s = speed
 
     def step(self, time_s: float, step_s: float, crossers: Sequence[CrossingPedestrian]) -> None:
-        """One step of time; speeds change evenly within it and never below 0."""
+        """Advance by one step with constant accelerations; speeds stay at or above 0."""
         fleet, drivers, v = self.fleet, self.fleet.drivers, self.speed_m_s
-        gap, leader = self._leaders(v)
-        stops = self._stops(time_s, crossers, gap, leader)
+        gap, leader = self._find_leaders(v)
+        stops = self._find_stops(time_s, crossers, gap, leader)
         to_stop = stops - self.station_m - fleet.front_m + drivers.standstill_m - BEFORE_LINE_M
         taken = np.maximum(
             interaction(drivers, v, gap, leader),
@@ -127,7 +127,7 @@ class VehicleModel:
         a = free_acceleration(drivers, v, self._speed_limits(v)) - taken
         a = np.maximum(np.minimum(a, drivers.acceleration_m_s2), -HARDEST_M_S2)
         after = np.maximum(v + a * step_s, 0.0)
-        # Creeping on by millimetres is no driving: who is about to stand stands.
+        # Stop vehicles that would creep on by millimetres.
         after[(after < 0.05) & (a < 0.1)] = 0.0
         self.acceleration_m_s2 = (after - v) / step_s
         self.station_m = self.station_m + 0.5 * (v + after) * step_s
@@ -135,7 +135,7 @@ class VehicleModel:
         self.waited_s = np.where(after < 0.3, self.waited_s + step_s, 0.0)
 
     def lets_pass(self, crosswalk: str) -> bool:
-        """Whether people may step on a crosswalk: nobody is on it or too fast to stop."""
+        """Whether pedestrians may enter a crosswalk: no vehicle is on it or too fast to stop."""
         for i, zones in enumerate(self.fleet.zones):
             for zone in zones:
                 if zone.zone.crosswalk != crosswalk:
@@ -149,15 +149,15 @@ class VehicleModel:
         return True
 
     def _speed_limits(self, speed_m_s: Array) -> Array:
-        """What is allowed half a second ahead [n]."""
+        """Speed limits half a second ahead [n]."""
         ahead = self.station_m - self.fleet.first_m + 0.5 * speed_m_s
         last = self.fleet.allowed_m_s.shape[1] - 1
         k = np.minimum((ahead / STATION_M).astype(np.int64), last)
         allowed: Array = self.fleet.allowed_m_s[np.arange(len(k)), k]
         return allowed
 
-    def _leaders(self, speed_m_s: Array) -> tuple[Array, Array]:
-        """Gaps to who is ahead on the own way [n], ``inf`` = nobody, and their speeds [n]."""
+    def _find_leaders(self, speed_m_s: Array) -> tuple[Array, Array]:
+        """Gaps to the leaders [n], ``inf`` = none, and their speeds [n]."""
         fleet = self.fleet
         if not len(speed_m_s):
             return np.zeros(0), np.zeros(0)
@@ -174,36 +174,40 @@ class VehicleModel:
         gap = gaps[np.arange(len(who)), who]
         return gap, np.where(gap < np.inf, speed_m_s[who], 0.0)
 
-    def _stops(
+    def _find_stops(
         self,
         time_s: float,
         crossers: Sequence[CrossingPedestrian],
         gap_m: Array | None = None,
         leader_m_s: Array | None = None,
     ) -> Array:
-        """Stations before which each has to stop now [n]; ``inf`` = nowhere."""
+        """Stations of the next stops [n]; ``inf`` = none. Lets vehicles into junctions."""
         stops: Array = self.fleet.end_m.copy()
-        comers = self._comers(time_s, stops)
-        for comer in comers:
-            i = comer.number
+        approaching = self._find_approaching(time_s, stops)
+        for own in approaching:
+            i = own.number
             full = (
                 gap_m is not None
                 and leader_m_s is not None
-                and self._is_full(comer, float(gap_m[i]), float(leader_m_s[i]))
+                and self._is_full(own, float(gap_m[i]), float(leader_m_s[i]))
             )
-            if full or any(self._yields(comer, other) for other in comers) or self._is_taken(comer):
-                stops[i] = min(stops[i], comer.entry.at_m)
+            if (
+                full
+                or any(self._must_yield(own, other) for other in approaching)
+                or self._is_taken(own)
+            ):
+                stops[i] = min(stops[i], own.entry.at_m)
             else:
                 self.entered[i] += 1
         if crossers:
             self._stop_for_people(crossers, stops)
         return stops
 
-    def _comers(self, time_s: float, stops: Array) -> list[_Comer]:
-        """Who comes to a junction and has no red light, first comers first."""
-        comers = []
+    def _find_approaching(self, time_s: float, stops: Array) -> list[_Approaching]:
+        """Vehicles that approach a junction without a red light, by time of arrival."""
+        approaching = []
         for i, entries in enumerate(self.fleet.entries):
-            self._give_back(i, time_s)
+            self._revoke_entry(i, time_s)
             if self.entered[i] >= len(entries):
                 continue
             entry = entries[self.entered[i]]
@@ -214,11 +218,11 @@ class VehicleModel:
             if self._is_red(entry, left, v, time_s):
                 stops[i] = min(stops[i], entry.at_m)
                 continue
-            comers.append(_Comer(i, entry, max(left, 0.0) / max(v, 2.0)))
-        return sorted(comers, key=lambda comer: (comer.after_s, comer.number))
+            approaching.append(_Approaching(i, entry, max(left, 0.0) / max(v, 2.0)))
+        return sorted(approaching, key=lambda own: (own.after_s, own.number))
 
-    def _give_back(self, i: int, time_s: float) -> None:
-        """Whoever may enter a junction, but has not, stops when the light turns to amber."""
+    def _revoke_entry(self, i: int, time_s: float) -> None:
+        """Revoke the permission of a vehicle that can still stop when the light changes."""
         k = self.entered[i] - 1
         if k < 0:
             return
@@ -236,13 +240,13 @@ class VehicleModel:
             return speed_m_s * speed_m_s <= 2.0 * CAN_STOP_M_S2 * max(left_m, 0.0)
         return state != "green"
 
-    def _is_taken(self, comer: _Comer) -> bool:
-        """Whether somebody is on, or has been let on, a lane that crosses or meets the own one."""
+    def _is_taken(self, own: _Approaching) -> bool:
+        """Whether a vehicle is on, or may enter, a lane that crosses or joins its own."""
         for k, entries in enumerate(self.fleet.entries):
-            if k == comer.number:
+            if k == own.number:
                 continue
             for entry in entries[: self.entered[k]]:
-                overlap = self.fleet.overlaps.get((entry.lane, comer.entry.lane))
+                overlap = self.fleet.overlaps.get((entry.lane, own.entry.lane))
                 if overlap is None or overlap.kind == "part":
                     continue
                 rear = float(self.station_m[k]) - self.fleet.vehicles[k].rear_m
@@ -250,15 +254,15 @@ class VehicleModel:
                     return True
         return False
 
-    def _is_full(self, comer: _Comer, gap_m: float, leader_m_s: float) -> bool:
-        """Whether there is no room behind the junction: nobody stops within it."""
-        vehicle = self.fleet.vehicles[comer.number]
-        front = float(self.station_m[comer.number]) + vehicle.front_m
-        needed = comer.entry.leave_m + vehicle.front_m + vehicle.rear_m + 2.0
+    def _is_full(self, own: _Approaching, gap_m: float, leader_m_s: float) -> bool:
+        """Whether there is no room beyond the junction; vehicles do not stop inside it."""
+        vehicle = self.fleet.vehicles[own.number]
+        front = float(self.station_m[own.number]) + vehicle.front_m
+        needed = own.entry.leave_m + vehicle.front_m + vehicle.rear_m + 2.0
         return leader_m_s < 2.0 and front + gap_m < needed
 
-    def _yields(self, own: _Comer, other: _Comer) -> bool:
-        """Whether another who comes has the right of way and comes too soon to go before."""
+    def _must_yield(self, own: _Approaching, other: _Approaching) -> bool:
+        """Whether another vehicle has the right of way and arrives too early to go first."""
         if own.number == other.number:
             return False
         overlap = self.fleet.overlaps.get((own.entry.lane, other.entry.lane))
@@ -276,10 +280,10 @@ class VehicleModel:
             return (waited[1], -other.number) > (waited[0], -own.number)
         return self._is_second(own, other)
 
-    def _is_second(self, own: _Comer, other: _Comer) -> bool:
-        """Who goes first: straight on before oncoming turns, then first come, then from the right.
+    def _is_second(self, own: _Approaching, other: _Approaching) -> bool:
+        """Whether the other goes first: straight before oncoming turns, by arrival, from the right.
 
-        Drivers from the same lane follow each other and never ask.
+        Vehicles from the same lane follow each other and are never compared.
         """
         ax, ay = self.fleet.headings[own.entry.came]
         bx, by = self.fleet.headings[other.entry.came]
@@ -310,12 +314,12 @@ class VehicleModel:
 
 
 def _is_in_the_way(crosser: CrossingPedestrian, zone: Zone, needed_m_s2: float) -> bool:
-    """Whether to stop before a zone for somebody who has not left the lane's strip of it.
+    """Whether to stop before a zone for a pedestrian who has not yet left the lane.
 
     Args:
-        crosser: Who crosses.
-        zone: Where the lane leads over the crosswalk.
-        needed_m_s2: Deceleration that this takes.
+        crosser: Pedestrian.
+        zone: Intersection of lane and crosswalk.
+        needed_m_s2: Deceleration needed to stop.
     """
     if crosser.crosswalk != zone.crosswalk:
         return False

@@ -1,4 +1,4 @@
-"""Vehicles with all that does not change while they drive: courses, limits, who may meet whom."""
+"""Constant properties of simulated vehicles: courses, speed limits and conflicts."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from gen_data.generator.traffic.lane_routes import STATION_M, LaneGraph, Route, 
 from gen_data.generator.traffic.steering import Courses, follow_lines
 
 LOOKAHEAD_S, LOOKAHEAD_M = 0.6, (3.0, 10.0)
-"""How far ahead drivers look for where to steer: a time at their speed, within bounds."""
+"""Lookahead of the steering: a time at the vehicle's speed, within bounds."""
 LATERAL_M_S2 = 2.0
-"""Sideways acceleration that drivers take bends with."""
+"""Lateral acceleration in bends."""
 EASY_M_S2 = 1.5
-"""Deceleration with which they come to bends and stops that they see from afar."""
+"""Comfortable deceleration for bends and stops that are visible early."""
 CLEAR_M = 1.5
-"""Drivers see what stands in their way and come no nearer."""
+"""Distance of stopped vehicles from obstacles."""
 STEERED_RAD_TAN = 0.75
-"""Tangent of the greatest steering angle, 37 degrees."""
+"""Tangent of the largest steering angle, 37 degrees."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,13 +39,13 @@ class Vehicle:
 
     Attributes:
         xy_m: Middle of the rear axle on the ground, world.
-        ahead: Direction it points in, unit.
-        front_m, rear_m: From the rear axle to its front and rear ends.
-        wheelbase_m: Between the axles.
-        route: What it follows.
-        station_m: Where on the route its rear axle is.
-        speed_factor: On the lanes' usual speed.
-        speed_max_m_s: It never drives faster.
+        ahead: Direction of its front, unit.
+        front_m, rear_m: Distances from the rear axle to its front and rear ends.
+        wheelbase_m: Distance between the axles.
+        route: Its route.
+        station_m: Station of the rear axle on the route.
+        speed_factor: Factor on the lanes' usual speed.
+        speed_max_m_s: Largest speed.
     """
 
     name: str
@@ -65,11 +65,11 @@ class Vehicle:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """Where a route enters a junction's lane.
+    """Entry of a route into a junction's lane.
 
     Attributes:
-        at_m, leave_m: Stations of the route at which that lane begins and ends.
-        came: Lane before it.
+        at_m, leave_m: Stations of the route at which that lane starts and ends.
+        came: Previous lane.
         turn: Sine of half the turn, positive to the left; 0 = straight on.
     """
 
@@ -82,7 +82,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class RouteZone:
-    """A crosswalk's zone on a route, stations as on the route."""
+    """A crosswalk's zone on a route, with stations of the route."""
 
     zone: Zone
     enter_m: float
@@ -91,16 +91,15 @@ class RouteZone:
 
 @dataclass(frozen=True, eq=False)
 class Vehicles:
-    """n vehicles; arrays [n], [n, n] or [n, m] with m stations from where each begins.
+    """n vehicles; arrays [n], [n, n] or [n, m] with m stations from each start.
 
     Attributes:
         first_m: Station of the rear axle at time 0.
-        allowed_m_s: Speeds that lanes, bends and drivers allow [n, m].
-        height_m: Of the ground under the rear and the front axle [n, m, 2].
-        offset_m: What turns a station of vehicle j into one of vehicle i [n, n].
-        from_m, to_m: Stations of i between which j is on i's way [n, n].
-        end_m: Where the network ends on each route, or something stands in the way; ``inf`` =
-            neither.
+        allowed_m_s: Speed limits from lanes, bends and drivers [n, m].
+        height_m: Height of the ground at the rear and the front axle [n, m, 2].
+        offset_m: Offset from stations of vehicle j to stations of vehicle i [n, n].
+        from_m, to_m: Stations of i between which j shares i's route [n, n].
+        end_m: Station of the network's end, or of the first obstacle; ``inf`` = neither.
     """
 
     vehicles: tuple[Vehicle, ...]
@@ -128,21 +127,21 @@ def make_vehicles(
     obstacles: Array,
     reach_m: float,
 ) -> Vehicles:
-    """The fleet of some vehicles.
+    """Compute courses, limits and conflicts of vehicles.
 
     Args:
-        vehicles: At least one.
-        graph: Of the driving lanes.
-        crosswalks: Lanes of that kind.
-        obstacles: Boxes of what stands [b, 6]: centre, half extents, cosine and sine.
-        reach_m: Nobody drives farther.
+        vehicles: At least one vehicle.
+        graph: Graph of the driving lanes.
+        crosswalks: Graph of the crosswalks.
+        obstacles: Boxes of obstacles [b, 6]: centre, half extents, cosine and sine of the yaw.
+        reach_m: Longest distance that a vehicle drives.
     """
     m = math.ceil((reach_m + 1.0) / STATION_M)
     first = np.array([v.station_m for v in vehicles])
     beyond = math.ceil(max([LOOKAHEAD_M[1], *(v.wheelbase_m for v in vehicles)]) / STATION_M) + 2
     grid: Array = STATION_M * np.arange(m + beyond, dtype=np.float64)
     lines = np.stack([points_at(graph, v.route, v.station_m + grid) for v in vehicles])
-    limits = np.stack([_limits(graph, v, grid[:m]) for v in vehicles])
+    limits = np.stack([_speed_limits(graph, v, grid[:m]) for v in vehicles])
     limit_braking(limits)
     lookahead = np.clip(LOOKAHEAD_S * limits, *LOOKAHEAD_M) / STATION_M
     courses = follow_lines(
@@ -176,7 +175,7 @@ def make_vehicles(
         to_m=high,
         end_m=np.minimum(
             np.array([v.route.end_m if v.route.dead_end else np.inf for v in vehicles]),
-            [_free_m(v, courses, k, obstacles) for k, v in enumerate(vehicles)],
+            [_free_station_m(v, courses, k, obstacles) for k, v in enumerate(vehicles)],
         ),
         entries=tuple(_entries(graph, v.route) for v in vehicles),
         zones=tuple(_zones(v.route, walked) for v in vehicles),
@@ -186,15 +185,15 @@ def make_vehicles(
 
 
 def limit_braking(limits: Array) -> None:
-    """Lowers limits [n, m] in place so that lower ones ahead are reached by easy braking."""
+    """Lower limits [n, m] in place so that comfortable braking reaches the lower ones ahead."""
     for k in range(limits.shape[1] - 2, -1, -1):
         after = limits[:, k + 1]
         reachable = np.sqrt(after * after + 2.0 * EASY_M_S2 * STATION_M)
         limits[:, k] = np.minimum(limits[:, k], reachable)
 
 
-def _free_m(vehicle: Vehicle, courses: Courses, k: int, obstacles: Array) -> float:
-    """Station that a vehicle's front may reach before it meets what stands; ``inf`` = any."""
+def _free_station_m(vehicle: Vehicle, courses: Courses, k: int, obstacles: Array) -> float:
+    """Station at which a vehicle's front has to stop for obstacles; ``inf`` = none."""
     xy, ahead = courses.xy_m[k], courses.ahead[k]
     half = np.array([0.5 * (vehicle.front_m + vehicle.rear_m), 0.5 * vehicle.width_m])
     swept = np.column_stack([xy + (half[0] - vehicle.rear_m) * ahead, ahead])
@@ -215,8 +214,8 @@ def _free_m(vehicle: Vehicle, courses: Courses, k: int, obstacles: Array) -> flo
     return free_m
 
 
-def _limits(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> Array:
-    """Speeds [m] that lanes and the driver allow."""
+def _speed_limits(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> Array:
+    """Speed limits [m] from lanes and the driver."""
     speeds = np.array([graph.lines[name].lane.speed_m_s for name in vehicle.route.lanes])
     starts = np.array(vehicle.route.starts_m)
     at = np.searchsorted(starts, vehicle.station_m + grid, side="right") - 1
@@ -234,7 +233,7 @@ def _drivers(vehicles: Sequence[Vehicle]) -> Drivers:
 
 
 def _heights(line_z_m: Array, wheelbases_m: Sequence[float], m: int) -> Array:
-    """Heights [n, m, 2] of lines under rear and front axles."""
+    """Heights [n, m, 2] of lines below rear and front axles."""
     k = np.arange(line_z_m.shape[1], dtype=np.float64)
     front = [
         np.interp(k[:m] + base / STATION_M, k, z)
@@ -269,7 +268,7 @@ def _shared_lanes(
     first_m: Array,
     crossed: Mapping[tuple[str, str], Overlap],
 ) -> tuple[Array, Array, Array]:
-    """For each pair, the first lanes that both use: offset, beginning and end, [n, n] each."""
+    """First shared lanes of each pair: offset, start and end, [n, n] each."""
     n = len(routes)
     offset, low = np.zeros((n, n)), np.full((n, n), np.inf)
     high = np.full((n, n), -np.inf)

@@ -61,12 +61,12 @@ def world() -> World:
 
 
 def made(name: str) -> AnyAnnotator:
-    """An annotator with its defaults."""
+    """Make an annotator with its defaults."""
     return ANNOTATORS[name]()
 
 
 def annotated(name: str, of: World | None = None) -> tuple[ImageTruth, EgoTruth | None]:
-    """Everything that one annotator says."""
+    """Fields that one annotator fills in."""
     given = of or world()
     image = annotate_reading(given.scene, given.reading, [made(name)], FEW_PX, given.assets)
     return image, annotate_ego({"": given.scene}, [made(name)], given.assets)
@@ -104,7 +104,7 @@ def plain(value: Any) -> Any:
 
 
 def test_every_documented_field_has_an_annotator_and_the_other_way_round() -> None:
-    """But semantic masks, which are images alone."""
+    """All except semantic masks, which are images only."""
     owners = {n for t in (ObjectTruth, ImageTruth, EgoTruth) for n in documented(t)}
 
     assert owners == set(TABLE) - {"semantic_masks"}
@@ -134,7 +134,7 @@ def empty_fields(truth: ObjectTruth, names: set[str]) -> set[str]:
 
 @each
 def test_it_says_the_same_every_time_and_in_every_process(name: str) -> None:
-    """There is no rng; a copy from another process agrees."""
+    """Annotators have no rng; a copy from another process gives equal results."""
     copy = pickle.loads(pickle.dumps(made(name)))
     given = world()
     image = annotate_reading(given.scene, given.reading, [copy], FEW_PX, given.assets)
@@ -159,7 +159,7 @@ def test_its_arguments_stay_as_they_are(name: str) -> None:
 
 @each
 def test_it_needs_no_other_channel_than_it_names(name: str) -> None:
-    """Others need not have been rendered."""
+    """Other channels need not be rendered."""
     given, channels = world(), made(name).channels
     images = {c: image for c, image in given.reading.channels.items() if c in channels}
     outlines = given.reading.silhouettes if Channel.AMODAL in channels else {}
@@ -190,7 +190,7 @@ def test_an_empty_scene_has_empty_truth(name: str) -> None:
 
 
 def test_images_are_annotated_as_a_whole_where_objects_are_not() -> None:
-    """The world of these tests has something for annotators of images and of samples to say."""
+    """The scene of these tests gives annotators of images and of samples non-empty results."""
     image, _ = annotated("lanes")
 
     assert isinstance(made("lanes"), ImageAnnotator)

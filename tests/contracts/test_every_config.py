@@ -30,7 +30,7 @@ def reduced(name: str) -> list[str]:
 
 
 def smaller(sensor: Sensor) -> list[str]:
-    """Settings of a sensor that takes an eighth of the pixels or beams."""
+    """Settings of a sensor with an eighth of the pixels or beams."""
     size_px = getattr(sensor, "size_px", None)
     if size_px is None:
         return []
@@ -41,7 +41,7 @@ def smaller(sensor: Sensor) -> list[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CONFIGS)
 def test_one_sample_is_rendered_exported_and_verified(name: str, tmp_path: Path) -> None:
-    """Every exporter of it writes files, and every byte agrees with the manifest."""
+    """Every exporter writes files, and all files agree with the manifest."""
     options = ("--n", "1", "--workers", "1", "--out", "out", *reduced(name))
     made = gen_data("--config", name, *options, cwd=tmp_path)
     assert made.returncode == 0, made.stdout + made.stderr

@@ -1,4 +1,4 @@
-"""What must hold for every randomizer in the table, ours or anybody's."""
+"""Contract of every randomizer in the table, built-in or third-party."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ GIVEN: dict[str, dict[str, Any]] = {
     "street_lights": {"when": "always"},
     "textures": {"textures": ["wood"], "probability": True},
 }
-"""Fields without which a randomizer cannot be made, or may leave a scene as it is."""
+"""Fields that a randomizer requires, or that ensure that it changes the scene."""
 
 PHYSICS_BOUND = (
     "arm_configuration", "arm_motion", "distractors", "ego_on_lane", "lane_objects", "objects",
     "physics_properties", "traffic_flow",
 )  # fmt: skip
-"""Randomizers whose draws physics has to see."""
+"""Randomizers that must run before physics."""
 
 
 def nominal_scene() -> Scene:
@@ -89,7 +89,7 @@ def nominal_scene() -> Scene:
 
 
 def made(kind: str) -> Any:
-    """A randomizer of that type, read as YAML would be."""
+    """Make a randomizer of a type, as from YAML."""
     plain = {"type": kind, "name": kind, **GIVEN.get(kind, {})}
     return TABLE.load(kind).model_validate_json(json.dumps(plain))
 
@@ -115,7 +115,7 @@ def test_scene_that_is_handed_in_stays_as_it_is(kind: str) -> None:
 
 @each
 def test_same_stream_draws_the_same_scene_in_any_process(kind: str) -> None:
-    """Twice, and once more by a copy that was sent to another process."""
+    """Equal draws from a second call and from a copy in another process."""
     copy = pickle.loads(pickle.dumps(made(kind)))
     by_copy = copy(nominal_scene(), FakeAssets(), rng_of("stream"))
 
@@ -132,7 +132,7 @@ def test_other_streams_draw_other_scenes(kind: str) -> None:
 
 @each
 def test_scene_holds_plain_values_only(kind: str) -> None:
-    """No numpy scalar hides in it: it reads back from JSON as the same scene."""
+    """The scene has no numpy scalars: it reads back from JSON as the same scene."""
     scene = drawn(kind)
     plain = to_plain(scene)
 
@@ -158,7 +158,7 @@ def test_names_and_ids_stay_in_order(kind: str) -> None:
 
 @each
 def test_it_explains_itself(kind: str) -> None:
-    """Schema and description exist, and every field of ours is described."""
+    """Schema and description exist, and every field has a description."""
     model = TABLE.load(kind)
     schema = json_schema(model)
     undescribed = [
@@ -198,7 +198,7 @@ def test_what_physics_has_to_see_is_drawn_per_scene_only(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", [kind for kind in TABLE if kind not in PHYSICS_BOUND])
 def test_looks_can_be_drawn_per_scene_or_per_view(kind: str) -> None:
-    """``stage`` names the stage."""
+    """``stage`` is scene or view."""
     for word, stage in (("scene", Stage.BUILD), ("view", Stage.VIEW)):
         plain = {"type": kind, "name": kind, "stage": word, **GIVEN.get(kind, {})}
         assert TABLE.load(kind).model_validate_json(json.dumps(plain)).stage == stage

@@ -42,7 +42,7 @@ ARRAYS = {
 LABELS = frozenset(ARRAYS) - {Channel.RADIANCE}
 CHANNELS = frozenset(ARRAYS) | {Channel.AMODAL}
 NOTHING = {Channel.Z_DEPTH: np.inf, Channel.RANGE: np.inf}
-"""Value where nothing is seen; 0 for every other label."""
+"""Value where nothing was hit; 0 for every other label."""
 
 WIDTH_PX, HEIGHT_PX = 48, 36
 SIZE_M = (0.4, 0.6, 0.8)
@@ -50,7 +50,7 @@ SIZE_M = (0.4, 0.6, 0.8)
 
 @cache
 def opened(name: str) -> Renderer:
-    """A renderer that all tests share: what it keeps must not matter."""
+    """A renderer shared by all tests: its caches must not affect results."""
     return fresh(name)
 
 
@@ -104,7 +104,7 @@ def assert_same(one: SensorReading, other: SensorReading) -> None:
 @each
 @pytest.mark.parametrize("channel", ARRAYS)
 def test_a_requested_channel_has_the_documented_type(name: str, channel: Channel) -> None:
-    """Alone; no other channel comes with it, and no silhouette."""
+    """Each channel alone, without other channels or silhouettes."""
     reading = rendered(name, channels=frozenset({channel}))
     dtype, last = ARRAYS[channel]
 

@@ -1,4 +1,4 @@
-"""What must hold for every sensor in the table, ours or anybody's."""
+"""Contract of every sensor in the table, built-in or third-party."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ GIVEN: dict[str, dict[str, Any]] = {
     "lidar": {"model": "VLP-16"},
     "event_camera": {"size_px": [32, 24], "frames_per_step": 2},
 }
-"""Fields by which a sensor is quicker than by default."""
+"""Fields that make a sensor faster than by default."""
 
 each = pytest.mark.parametrize("kind", list(TABLE))
 device = pytest.mark.parametrize(
@@ -45,14 +45,14 @@ device = pytest.mark.parametrize(
 
 @cache
 def renderer() -> Renderer:
-    """The renderer of the project, on small pictures."""
+    """The project's renderer, for small images."""
     meshes = {"box": box_mesh((4.0, 1.8, 1.0)), "ground": plane_mesh(300.0)}
     return WarpRenderer(FakeLibrary(meshes), "cpu")
 
 
 @cache
 def street() -> Scene:
-    """A box that drives at 8 m/s with a rig on it, another that meets it, and the ground."""
+    """A box with a rig that drives at 8 m/s, an oncoming box, and the ground."""
     poses = {
         "ego": tuple(SE3((0.8 * k, 0.0, 0.5)) for k in range(31)),
         "car": tuple(SE3((30.0 - 0.5 * k, 3.0, 0.5)) for k in range(31)),
@@ -81,13 +81,13 @@ def street() -> Scene:
 
 
 def made(kind: str, **fields: Any) -> Any:
-    """A sensor of that type on the rig, read as YAML would be."""
+    """Make a sensor of a type on the rig, as from YAML."""
     plain = {"type": kind, "name": "unit", "rig": "ego", **GIVEN.get(kind, {}), **fields}
     return TABLE.load(kind).model_validate_json(json.dumps(plain))
 
 
 def seen(sensor: Any, step: int = 3, seed: int = 0) -> SensorReading | PointCloud | Measurements:
-    """What it returns at one step."""
+    """Reading of the sensor at one step."""
     scene = place_sensors(sensor.mount(street()))
     rng = Streams(seed, scene=0, view=0, step=step).rng("sensor/unit")
     channels = frozenset({Channel.INSTANCE})
@@ -95,7 +95,7 @@ def seen(sensor: Any, step: int = 3, seed: int = 0) -> SensorReading | PointClou
 
 
 def data(returned: SensorReading | PointCloud | Measurements) -> bytes:
-    """All bytes of what was returned."""
+    """All bytes of a reading."""
     if isinstance(returned, SensorReading):
         return b"".join(returned.channels[c].tobytes() for c in sorted(returned.channels))
     return (returned.rows if isinstance(returned, Measurements) else returned.points).tobytes()
@@ -157,7 +157,7 @@ def test_it_moves_with_its_rig(kind: str) -> None:
 
 @each
 def test_a_step_made_alone_has_the_same_bytes_in_any_process(kind: str) -> None:
-    """By a copy that was sent to another process, after another step."""
+    """Equal readings from a copy in another process, after another step."""
     sensor = made(kind)
     copy = pickle.loads(pickle.dumps(sensor))
     seen(copy, step=2)
@@ -167,7 +167,7 @@ def test_a_step_made_alone_has_the_same_bytes_in_any_process(kind: str) -> None:
 
 @each
 def test_it_explains_itself(kind: str) -> None:
-    """Schema and description exist, and every field of ours is described."""
+    """Schema and description exist, and every field has a description."""
     model = TABLE.load(kind)
     schema = json_schema(model)
     undescribed = [
@@ -190,7 +190,7 @@ def test_unknown_fields_are_refused(kind: str) -> None:
 
 @device
 def test_rows_are_of_the_type_that_is_documented(kind: str) -> None:
-    """And every column says what it means, its unit at its name's end."""
+    """Every column has a meaning, and its unit at the end of its name."""
     returned = seen(made(kind))
 
     assert isinstance(returned, Measurements)

@@ -1,4 +1,4 @@
-"""What must hold for every template and configuration that is shipped."""
+"""Contract of every shipped template and configuration."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def randomized(name: str, streams: Streams) -> Scene | None:
 
 
 def test_every_template_is_used_by_a_configuration() -> None:
-    """What is shipped can be run."""
+    """Shipped files can be loaded."""
     assert {spec(name).general.template for name in CONFIGS} == set(TEMPLATES)
 
 

@@ -1,4 +1,4 @@
-"""The same bytes whatever the number of workers, the order, or the interruptions."""
+"""Equal bytes for any number of workers, any order and any interruptions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def reference_digest(tmp_path_factory: pytest.TempPathFactory) -> str:
 def test_the_number_of_workers_does_not_matter(
     tmp_path: Path, reference_digest: str, workers: int
 ) -> None:
-    """One, two, three processes: the bytes that no process at all gives."""
+    """One, two and three processes give the same bytes as none."""
     make(tmp_path / "out", N, SHARD_SIZE, workers=workers)
 
     assert tree_digest(tmp_path / "out") == reference_digest
@@ -93,7 +93,7 @@ def test_killed_at_random_instants_and_resumed_it_is_the_same_data_set(
 
 
 def test_a_resumed_run_makes_only_what_is_missing(tmp_path: Path) -> None:
-    """Samples of committed shards are not made again."""
+    """Samples of committed shards are not generated again."""
     out = tmp_path / "out"
     process = start_fake_run(out, workers=1, delay_s=DELAY_S)
     while not (out / "shards" / "000002.json").exists():

@@ -1,4 +1,4 @@
-"""One small data set that several tests look at."""
+"""A small data set shared by several tests."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Running ``gen-data`` as a user does: in a process of its own."""
+"""Run ``gen-data`` in its own process, as a user does."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def environment() -> dict[str, str]:
 
 
 def gen_data(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    """Run to the end; the caller looks at the exit code."""
+    """Run to the end; the caller checks the exit code."""
     return subprocess.run(
         command(*arguments),
         cwd=cwd,
@@ -37,7 +37,7 @@ def gen_data(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
 
 
 def digest(folder: Path) -> dict[str, str]:
-    """sha256 of every file of a data set but those in ``run/``."""
+    """sha256 of every file of a data set except those in ``run/``."""
     return {
         str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(folder.rglob("*"))

@@ -1,4 +1,4 @@
-"""One clear error, its own exit code, nothing half-written: a test per way to be wrong."""
+"""Bad input: one clear error with its own exit code, and no partial output."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ COUNT = "randomizers.clutter.count"
 
 
 def assert_refused(tmp_path: Path, arguments: tuple[str, ...], code: int, *texts: str) -> None:
-    """Exit code and message are as told; no traceback; no data set has appeared."""
+    """Exit code and message are as expected; there is no traceback and no data set."""
     done = gen_data(*arguments, cwd=tmp_path)
     assert done.returncode == code, done.stderr
     assert "Traceback" not in done.stderr
@@ -186,7 +186,7 @@ def test_template_that_cannot_be_satisfied_is_rejected_with_reasons(tmp_path: Pa
 
 
 def test_folder_with_other_things_in_it_exits_with_4(tmp_path: Path) -> None:
-    """A folder that is not ours is not touched."""
+    """A folder without a data set is left unchanged."""
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.txt").write_text("irreplaceable")
     assert_refused(tmp_path, ("--config", "tabletop.yaml", *JOB, "--out", "mine"), 4, "mine")
@@ -196,7 +196,7 @@ def test_folder_with_other_things_in_it_exits_with_4(tmp_path: Path) -> None:
 def test_dataset_of_another_configuration_exits_with_4_and_stays(
     dataset: Path, tmp_path: Path
 ) -> None:
-    """The differing field is named, and not a byte changes."""
+    """The error names the differing field, and no file changes."""
     before = digest(dataset)
     done = gen_data(
         "--config", "tabletop.yaml", "--n", "15", "--seed", "2", *SMALL, "--out", str(dataset),

@@ -1,4 +1,4 @@
-"""The main job, from the command line to files that other people's readers accept."""
+"""The main use case, from the command line to files that third-party readers accept."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_dataset_is_complete_and_verifies(dataset: Path) -> None:
 
 
 def test_checksums_agree_with_coreutils(dataset: Path) -> None:
-    """``sha256sum -c SHA256SUMS`` needs nothing of ours."""
+    """``sha256sum -c SHA256SUMS`` works without gen-data."""
     done = subprocess.run(
         ["sha256sum", "--check", "--quiet", "--strict", "SHA256SUMS"],
         cwd=dataset,
@@ -51,7 +51,7 @@ def test_two_workers_write_the_same_bytes(dataset: Path, tmp_path: Path) -> None
 
 
 def test_killed_run_resumes_to_the_same_bytes(dataset: Path, tmp_path: Path) -> None:
-    """SIGKILL to the whole process group once a shard is committed; the same command goes on."""
+    """After SIGKILL to the whole process group, the same command resumes."""
     arguments = command(*MAIN_JOB, "--workers", "1", "--out", "killed")
     process = subprocess.Popen(
         arguments,

@@ -1,4 +1,4 @@
-"""Commands that show and tell."""
+"""Preview and information commands."""
 
 from __future__ import annotations
 

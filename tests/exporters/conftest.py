@@ -1,4 +1,4 @@
-"""A hand-made data set: boxes and ellipsoids on a ground plane, ray-cast in a few lines of numpy.
+"""A small data set: boxes and ellipsoids on a ground plane, ray-cast with numpy.
 
 Independent of every renderer of the project, so that what exporters write can be held against
 geometry.
@@ -42,6 +42,7 @@ from gen_data.generator.core.scene import Body, Camera, Device, Instance, Lidar,
 from gen_data.generator.core.scene_time import RIG_AXES, add_twists, place_sensors, scene_at
 from gen_data.generator.core.se3 import SE3, Array, look_at
 from gen_data.generator.runner.shard import drop_pixels
+from tests.exporters.drives import drive_info
 
 CATEGORIES = ("car", "crate", "pedestrian")
 MEDIA = (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY)
@@ -75,7 +76,7 @@ KEYPOINTS = {
 def instance(
     number: int, category: str, x_m: float, y_m: float, yaw_rad: float, shape: str = "box"
 ) -> Instance:
-    """A thing that stands on the ground at (x, y); ``shape`` is ``box`` or ``ellipsoid``."""
+    """An object on the ground at (x, y); ``shape`` is ``box`` or ``ellipsoid``."""
     length, width, height = SIZES_M[category]
     return Instance(
         instance_id=number,
@@ -145,7 +146,7 @@ def _ground_depth(rays: Array, camera: Camera) -> Array:
 
 
 def _hit(rays: Array, thing: Instance, camera: Camera) -> Array:
-    """Depth at which each ray enters the thing; inf where it misses."""
+    """Depth at which each ray enters the object; inf where it misses."""
     low, high = np.array(thing.box_min_m), np.array(thing.box_max_m)
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     T_instance_camera = thing.T_world_instance.inverse() @ camera.T_world_camera
@@ -228,7 +229,7 @@ SPEED_M_S, TURN_RAD_S, STEP_S = 10.0, 0.2, 0.1
 
 
 def ego_pose(time_s: float) -> SE3:
-    """Where the ego is after a time: on its circle, headed along it."""
+    """Pose of the ego vehicle after a time: on its circle, headed along it."""
     angle, radius_m = TURN_RAD_S * time_s, SPEED_M_S / TURN_RAD_S
     place = (radius_m * math.sin(angle), radius_m * (1.0 - math.cos(angle)), 0.0)
     return SE3.about_z(angle, place)
@@ -455,3 +456,30 @@ class World:
 def world() -> World:
     """Seven frames of a street in three shards; two splits; frame 3 is empty."""
     return World()
+
+
+@pytest.fixture(scope="session")
+def samples(world: Any) -> Any:
+    """Two sequences of four steps in three shards: both are cut."""
+    return world.drive()
+
+
+@pytest.fixture(scope="session")
+def slow(world: Any) -> Any:
+    """The same; the right camera and the scanner read at every second step."""
+    return world.drive({"right": 2, "top": 2})
+
+
+@pytest.fixture(scope="session")
+def exported(world: Any, samples: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Exports once per exporter and remembers the folder."""
+    folders: dict[str, Path] = {}
+
+    def export(exporter: Any) -> Path:
+        key = repr(exporter)
+        if key not in folders:
+            folder = tmp_path_factory.mktemp(exporter.type)
+            folders[key] = world.export(exporter, drive_info(world), samples, folder)
+        return folders[key]
+
+    return export

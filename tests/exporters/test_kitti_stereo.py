@@ -125,7 +125,7 @@ def test_data_sets_without_a_pair_are_refused(world: Any) -> None:
     info, _ = world.pairs()
     with pytest.raises(ConfigError, match=r"camera '' does not write .*disparity"):
         KittiStereo().check(world.info(4))
-    with pytest.raises(ConfigError, match=r"right: '' is no other camera .*one of: none"):
+    with pytest.raises(ConfigError, match=r"right: '' is not another camera .*one of: none"):
         KittiStereo().check(replace(info, sensors=(info.sensor("left"),)))
     rear = SensorInfo("rear", Modality.CAMERA, channels=(Channel.RGB,))
     three = replace(info, sensors=(*info.sensors, rear))
@@ -146,5 +146,5 @@ def test_cameras_that_are_not_beside_each_other_are_refused(world: Any, tmp_path
     cameras = tuple(high if c.name == "right" else c for c in scene.cameras)
     wrong = replace(samples[0], scene=replace(scene, cameras=cameras))
 
-    with pytest.raises(ConfigError, match=r"'left' and 'right' are no rectified pair: .*below"):
+    with pytest.raises(ConfigError, match=r"'left' and 'right' are not a rectified pair: .*below"):
         world.export(KittiStereo(), info, [wrong], tmp_path)

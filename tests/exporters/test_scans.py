@@ -66,7 +66,7 @@ def test_the_native_file_holds_every_field_and_nothing_else(world: Any, tmp_path
     kept = read_points(tmp_path / "shards/000000", "top", 1)
 
     assert kept.tobytes() == world.samples[1].capture.clouds["top"].points.tobytes()
-    with pytest.raises(StorageError, match="make the data set again"):
+    with pytest.raises(StorageError, match="generate the data set again"):
         read_points(tmp_path / "shards/000000", "top", 99)
 
 

@@ -16,7 +16,7 @@ from gen_data.generator.core.measurement_dtypes import table_rows
 from gen_data.generator.core.sample import ImageTruth, Sample
 from gen_data.generator.core.scene import Camera, Device, Instance, Scene
 from gen_data.generator.core.se3 import SE3
-from gen_data.generator.preview.contact_sheet import CAPTION_PX, Tile, pictures, tiles
+from gen_data.generator.preview.contact_sheet import CAPTION_PX, Tile, make_tiles, render_tiles
 from gen_data.generator.preview.device_views import BRIGHTER, DARKER, GREY, event_view, radar_view
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -56,10 +56,10 @@ def test_every_sensor_shows_what_it_writes() -> None:
     """Captions name the sensor, and the channel where it has several."""
     channels = {"color": (Channel.RGB,), "depth": (Channel.RGB, Channel.Z_DEPTH)}
 
-    shown = list(tiles([sample()], channels, labels=False, devices=True))
+    shown = list(make_tiles([sample()], channels, labels=False, devices=True))
 
     assert [t.caption for t in shown] == ["color", "depth rgb", "depth depth", "events", "radar"]
-    without = tiles([sample()], channels, labels=True)
+    without = make_tiles([sample()], channels, labels=True)
     assert [t.caption for t in without] == ["color", "depth rgb", "depth depth"]
 
 
@@ -67,8 +67,8 @@ def test_captions_stand_below_their_tiles() -> None:
     """The picture is not covered; without captions it is all there is."""
     tile = Tile("camera", np.full((30, 40, 3), 200, np.uint8))
 
-    (plain,) = pictures([tile], 80, captions=False)
-    (named,) = pictures([tile], 80, captions=True)
+    (plain,) = render_tiles([tile], 80, captions=False)
+    (named,) = render_tiles([tile], 80, captions=True)
 
     assert plain.shape == (60, 80, 3)
     assert named.shape == (60 + CAPTION_PX, 80, 3)

@@ -1,4 +1,4 @@
-"""An index of made-up assets whose sizes, tags and materials the tests state themselves."""
+"""Fake asset library with the sizes, tags and materials that the tests define."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ SLOTS = {"room": 7, "table": 2, "shelf": 2}
 
 @dataclass(frozen=True)
 class Thing:
-    """What an object is like.
+    """Properties of a fake object.
 
     Attributes:
         size_m: Its bounding box, around its origin.
@@ -92,10 +92,10 @@ ENVIRONMENTS = {
 
 
 class FakeAssets:
-    """An AssetIndex without files; furniture has the size that its id asks for."""
+    """An AssetIndex without files; the id of a piece of furniture gives its size."""
 
     def get(self, asset_id: str) -> Asset:
-        """Any thing, piece of furniture, robot, texture or environment above."""
+        """Entry of any object, piece of furniture, robot, texture or environment above."""
         if asset_id in THINGS:
             thing = THINGS[asset_id]
             return _asset(
@@ -115,19 +115,19 @@ class FakeAssets:
         raise AssetError(f"unknown asset '{asset_id}'{did_you_mean(asset_id, THINGS)}")
 
     def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:
-        """Everything of the kind that carries all tags, sorted by id."""
+        """All assets of the kind with all tags, sorted by id."""
         wanted = set(tags)
         every = (self.get(i) for i in sorted([*THINGS, *TEXTURES, *ENVIRONMENTS, "two_link"]))
         return tuple(a for a in every if a.kind == kind and wanted <= set(a.tags))
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
-        """The thing's own; plain ones for furniture and links."""
+        """Materials of an object; plain ones for furniture and links."""
         if asset_id in THINGS:
             return THINGS[asset_id].materials
         return (Material(),) * SLOTS.get(parse_asset_id(asset_id).name, 1)
 
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
-        """Things lie around their origin; furniture stands on its."""
+        """Bounds: centred at the origin for objects, above it for furniture."""
         if asset_id in THINGS:
             x, y, z = THINGS[asset_id].size_m
             return (-x / 2, -y / 2, -z / 2), (x / 2, y / 2, z / 2)
@@ -182,7 +182,7 @@ def two_link_arm() -> RobotModel:
 
 
 def rng_of(name: str = "test", scene: int = 0, index: int = 0) -> Rng:
-    """The stream of one name in one scene."""
+    """Random stream of a name in a scene."""
     return Streams(seed=7, scene=scene, index=index).rng(name)
 
 
@@ -249,7 +249,7 @@ def corners_of(body: Body) -> Array:
 
 
 def overlap_m(one: Body, other: Body) -> float:
-    """How deep two boxes are in each other [m]; negative where they are apart.
+    """Penetration depth of two boxes [m]; negative if they are apart.
 
     Separating axes of two oriented boxes: Gottschalk, Lin and Manocha, "OBBTree", 1996.
     """
@@ -262,6 +262,6 @@ def overlap_m(one: Body, other: Body) -> float:
 
 
 def deepest_overlap_m(bodies: Sequence[Body]) -> float:
-    """The deepest overlap of any two bodies [m]."""
+    """Largest penetration depth of any two bodies [m]."""
     pairs = combinations(bodies, 2)
     return max((overlap_m(one, other) for one, other in pairs), default=-np.inf)

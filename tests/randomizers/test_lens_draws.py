@@ -83,7 +83,7 @@ def test_a_lens_that_folds_over_is_drawn_again() -> None:
         ),
         (
             {"camera": "straight", "hfov_deg": Uniform(100.0, 200.0)},
-            "200 degrees are too wide for the pinhole",
+            "200 degrees is too wide for the pinhole",
         ),
     ],
 )

@@ -15,7 +15,7 @@ from gen_data.generator.core.scene import Body, Light, Region, Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.randomizers.ceiling_lights import CeilingLights
 from gen_data.randomizers.environment import EnvironmentLight
-from gen_data.randomizers.free_space_tests import is_clear
+from gen_data.randomizers.free_space import is_clear
 from gen_data.randomizers.lighting import Lighting
 from tests.randomizers.doubles import FakeAssets, rng_of
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
+from PIL import Image
 
+from gen_data.generator.assets.library import open_library
 from gen_data.generator.config.distributions import Constant, Probability, Uniform
 from gen_data.generator.config.problems import Problems
 from gen_data.generator.config.validation import validate
@@ -105,6 +108,26 @@ def test_geometry_and_labels_are_left_alone(
 
     assert [replace(body, materials=()) for body in now.bodies] == list(scene.bodies)
     assert now.instances == scene.instances
+
+
+@pytest.mark.parametrize(
+    "randomizer",
+    [
+        Textures(name="t", textures=("masonry", "wood")),
+        Backdrop(name="b", floor=("wood",), walls=("masonry",)),
+    ],
+    ids=lambda randomizer: randomizer.type,
+)
+def test_a_plan_lists_the_texture_files_of_a_user_but_not_generated_textures(
+    tmp_path: Path, randomizer: RandomizerBase
+) -> None:
+    """The release of gen-data identifies the textures that it generates."""
+    Image.new("RGB", (4, 4)).save(tmp_path / "brick_wall.png")
+    (tmp_path / "assets.yaml").write_text(
+        "textures:\n  - {id: brick_wall, file: brick_wall.png, tags: [masonry]}\n"
+    )
+
+    assert randomizer.possible_assets(open_library([tmp_path])) == ("user/brick_wall",)
 
 
 def test_probability_is_the_share_of_objects_that_change() -> None:

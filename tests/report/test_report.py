@@ -13,18 +13,18 @@ from click.testing import CliRunner
 
 from gen_data.generator.cli.report_command import report
 from gen_data.generator.core.errors import StorageError
-from gen_data.generator.report.html_page import page
+from gen_data.generator.report.html_page import format_page
 from gen_data.generator.report.kitti_statistics import DIFFICULTIES, TYPES
-from gen_data.generator.report.label_files import Label, Picture, Points, records
+from gen_data.generator.report.label_files import Label, Picture, Points, read_records
 from gen_data.generator.report.label_statistics import Survey, collect_statistics
-from gen_data.generator.report.lidar_scans import SCANS_MAX, scans
+from gen_data.generator.report.lidar_scans import SCANS_MAX, read_scans
 from gen_data.generator.report.report_tables import (
     Histogram,
     Table,
     counts_at,
-    histograms,
-    scan_tables,
-    tables,
+    make_histograms,
+    make_scan_tables,
+    make_tables,
 )
 
 
@@ -79,7 +79,7 @@ def row_of(made: tuple[Table, ...], title: str, name: str) -> dict[str, str]:
 
 def test_cocos_files_are_read_an_object_at_a_time(street: Path) -> None:
     """Distance is over the ground; the pose makes the type; points are counted by state."""
-    found = list(records(street))
+    found = list(read_records(street))
 
     assert [r for r in found if isinstance(r, Picture)] == [
         Picture("train", str(k)) for k in (1, 2, 3)
@@ -103,7 +103,7 @@ def test_kittis_files_are_read_where_there_is_no_coco(tmp_path: Path) -> None:
         "DontCare -1 -1 -10 1.00 1.00 2.00 2.00 -1 -1 -1 -1000 -1000 -1000 -10\n"
     )
 
-    picture, label = records(tmp_path)
+    picture, label = read_records(tmp_path)
 
     assert picture == Picture("val", "000007")
     assert label == Label(
@@ -113,8 +113,8 @@ def test_kittis_files_are_read_where_there_is_no_coco(tmp_path: Path) -> None:
 
 def test_a_folder_without_labels_is_refused(tmp_path: Path) -> None:
     """With the remedy."""
-    with pytest.raises(StorageError, match=r"no labels here.*exported as coco or kitti"):
-        list(records(tmp_path))
+    with pytest.raises(StorageError, match=r"there are no labels.*exported as coco or kitti"):
+        list(read_records(tmp_path))
 
 
 @pytest.mark.parametrize("text", ["Car 0 0 0\n", "Car a 0 0 1 1 2 2 1 1 1 1 1 1 1\n"])
@@ -125,7 +125,7 @@ def test_a_damaged_label_is_named_with_its_line(tmp_path: Path, text: str) -> No
     path.write_text(text)
 
     with pytest.raises(StorageError, match=r"000007.txt:1: not the 15 columns"):
-        list(records(tmp_path))
+        list(read_records(tmp_path))
 
 
 def test_a_coco_file_of_another_layout_is_refused(tmp_path: Path) -> None:
@@ -135,12 +135,12 @@ def test_a_coco_file_of_another_layout_is_refused(tmp_path: Path) -> None:
     (folder / "instances_val.json").write_text('{\n "images": [],\n "annotations": []\n}')
 
     with pytest.raises(StorageError, match="not written by gen-data"):
-        list(records(tmp_path))
+        list(read_records(tmp_path))
 
 
 def test_tables_count_what_was_written(street: Path) -> None:
     """Two of four objects in each of two images, one image empty."""
-    made = tables(collect_statistics(records(street)))
+    made = make_tables(collect_statistics(read_records(street)))
 
     images = row_of(made, "Images", "all")
     assert (images["images"], images["objects"], images["empty"]) == ("3", "4", "33.3 %")
@@ -162,7 +162,7 @@ def test_tables_count_what_was_written(street: Path) -> None:
 
 def test_labels_that_were_not_annotated_are_left_blank() -> None:
     """A data set of boxes only has sizes still; without its types KITTI is no match."""
-    made = tables(
+    made = make_tables(
         collect_statistics([Picture("train", "1"), Label(("train", "1"), "mug", "Misc", 10, 20)])
     )
 
@@ -176,8 +176,8 @@ def test_a_data_set_without_objects_has_a_report() -> None:
     """Only negatives."""
     found = collect_statistics([Picture("train", "1")])
 
-    assert row_of(tables(found), "Images", "train")["empty"] == "100.0 %"
-    assert histograms(found)[0].counts["images"].sum() == 1
+    assert row_of(make_tables(found), "Images", "train")["empty"] == "100.0 %"
+    assert make_histograms(found)[0].counts["images"].sum() == 1
 
 
 def test_the_difficulties_are_those_of_the_devkit() -> None:
@@ -204,10 +204,10 @@ def test_kittis_counts_add_up() -> None:
 
 def test_histograms_lose_nothing(street: Path) -> None:
     """What is beyond the last edge is in the last bin."""
-    found = collect_statistics(records(street))
+    found = collect_statistics(read_records(street))
     found.numbers[("car", "Car")].extend([5000.0, 4000.0, 0, 0, 1, 999.0, 4, 2, 1])
 
-    made = histograms(found)
+    made = make_histograms(found)
 
     for histogram in made[1:]:
         assert histogram.counts["car"].sum() == 4
@@ -218,7 +218,7 @@ def test_histograms_lose_nothing(street: Path) -> None:
 def test_the_page_is_well_formed_and_whole(street: Path) -> None:
     """Names are escaped; every bar says its bin; nothing is fetched from elsewhere."""
     bars = Histogram("Depth <m>", np.array([0.0, 1.0, 2.5]), {"a & b": np.array([3, 6])})
-    text = page("x < y", [Table("T", ("a", "b"), (("<i>", "2"),), "note")], [bars])
+    text = format_page("x < y", [Table("T", ("a", "b"), (("<i>", "2"),), "note")], [bars])
 
     root = ElementTree.fromstring(text.partition("\n")[2].replace('<meta charset="utf-8">', ""))
 
@@ -275,8 +275,8 @@ def test_points_on_cars_are_counted_by_distance(tmp_path: Path) -> None:
     """Two cars in view, 5 m and 20 m away, with three points and none."""
     write_scan(tmp_path / "kitti", "000000", [1, 1, 1, 2, 3, 0], CAR_ROWS)
 
-    (scan,) = scans(tmp_path)
-    whole, cars = scan_tables([scan])
+    (scan,) = read_scans(tmp_path)
+    whole, cars = make_scan_tables([scan])
 
     assert (scan.points, scan.dark) == (6, 3)
     assert scan.cars == ((5.0, 3), (20.0, 0))
@@ -288,11 +288,11 @@ def test_points_on_cars_are_counted_by_distance(tmp_path: Path) -> None:
 
 def test_of_many_scans_some_are_read(tmp_path: Path) -> None:
     """Evenly chosen, from the first on; none of a data set without a scanner."""
-    assert list(scans(tmp_path)) == [] and scan_tables([]) == ()
+    assert list(read_scans(tmp_path)) == [] and make_scan_tables([]) == ()
     for k in range(SCANS_MAX + 1):
         write_scan(tmp_path, f"{k:06d}", [0] * (k + 1), "")
 
-    read = [scan.points for scan in scans(tmp_path)]
+    read = [scan.points for scan in read_scans(tmp_path)]
 
     assert read == list(range(1, SCANS_MAX + 2, 2))
 
@@ -303,4 +303,4 @@ def test_a_scan_whose_labels_do_not_fit_is_refused(tmp_path: Path) -> None:
     (tmp_path / "training/velodyne/000007.bin").write_bytes(b"1234")
 
     with pytest.raises(StorageError, match=r"000007.label: not a scan"):
-        list(scans(tmp_path))
+        list(read_scans(tmp_path))

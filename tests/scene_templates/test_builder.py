@@ -304,7 +304,7 @@ def test_assets_are_chosen_by_tags_and_ids(chosen: dict[str, Any], assets: set[s
         ({**ARM, "on": "tabel"}, r"elements\.arm\.on: .*'tabel'.*did you mean 'table'"),
         (clutter(count=400), r"elements\.clutter\.count: 400 objects do not fit .*'table'"),
         (clutter(count=60, placement="scatter"), r"elements\.clutter\.count: 60 objects do not"),
-        (clutter(assets={"tags": ["no_such_tag"]}), r"elements\.clutter\.assets: no asset fits"),
+        (clutter(assets={"tags": ["no_such_tag"]}), r"elements\.clutter\.assets: no asset matches"),
         ({**DESK, "height_m": 0.5}, r"elements\.table: two elements have this name"),
     ],
 )

@@ -11,9 +11,9 @@ import pytest
 from gen_data.generator.assets.library import Library, open_library
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.scene import Body, Scene
-from gen_data.scene_templates.along import Along
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.junction import Junction
+from gen_data.scene_templates.lane_objects import LaneObjects
 from gen_data.scene_templates.objects import AssetChoice
 from gen_data.scene_templates.road import Road
 from gen_data.scene_templates.signals import Signals
@@ -47,7 +47,7 @@ def yaw_of(body: Body) -> float:
 
 def test_things_are_spread_evenly_over_all_lanes_of_their_kinds() -> None:
     """Twelve benches on four furniture lanes of 60 m and 40 m: distances are the same."""
-    benches = Along(
+    benches = LaneObjects(
         name="benches", lanes=("furniture",), count=10, assets=AssetChoice(ids=("bench",))
     )
     scene = built(benches)
@@ -64,7 +64,7 @@ def test_things_are_spread_evenly_over_all_lanes_of_their_kinds() -> None:
 
 def test_house_fronts_stand_on_the_frontage_and_face_the_street() -> None:
     """To the left of their lane, where the street is."""
-    houses = Along(
+    houses = LaneObjects(
         name="houses",
         lanes=("frontage",),
         facing="left",
@@ -101,7 +101,9 @@ def test_every_road_that_comes_to_a_junction_has_a_signal_that_faces_it() -> Non
     [
         (Signals(name="signals", junction="corss"), "no road leads to a junction 'corss'"),
         (
-            Along(name="boats", lanes=("bicycle",), count=3, assets=AssetChoice(ids=("bench",))),
+            LaneObjects(
+                name="boats", lanes=("bicycle",), count=3, assets=AssetChoice(ids=("bench",))
+            ),
             "no lane of kind bicycle",
         ),
     ],
@@ -115,9 +117,9 @@ def test_what_has_no_place_is_one_clear_error(element: object, fact: str) -> Non
 def test_preferred_assets_replace_others_category_by_category() -> None:
     """Street lights are taken, since nothing of their category is preferred; benches all are."""
     choice = AssetChoice(ids=("bench", "street_light"), prefer=("bench",))
-    chosen = choice.resolved(library(), "field")
-    everything = AssetChoice(ids=("bench", "street_light")).resolved(library(), "field")
+    chosen = choice.resolve(library(), "field")
+    everything = AssetChoice(ids=("bench", "street_light")).resolve(library(), "field")
 
     assert chosen == everything
-    trees = AssetChoice(tags=("tree",), prefer=("birch",)).resolved(library(), "field")
+    trees = AssetChoice(tags=("tree",), prefer=("birch",)).resolve(library(), "field")
     assert trees and all(asset.startswith("tree/birch") for asset in trees)

@@ -1,4 +1,4 @@
-"""Small streets whose lanes the tests lay out themselves."""
+"""Small streets for traffic tests."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ REACH_M = 400.0
 
 
 def rng_of(name: str = "test") -> Rng:
-    """A stream."""
+    """Random stream."""
     return Streams(3, 0).rng(name)
 
 
@@ -79,7 +79,7 @@ def driven(
     walkers: Sequence[Pedestrian] = (),
     obstacles: np.ndarray = NO_BOXES,
 ) -> tuple[Vehicles, SimulatedMotion]:
-    """What cars and people do."""
+    """Simulated motion of cars and pedestrians."""
     made = fleet(lanes, *cars, obstacles=obstacles)
     return made, simulate(made, walkers, obstacles, approaches or {}, duration_s)
 

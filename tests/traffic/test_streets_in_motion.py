@@ -19,7 +19,7 @@ from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.scene_time import scene_at
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.core.streams import Streams
-from gen_data.randomizers.footprints import Footprint, Ground
+from gen_data.randomizers.free_space import Footprint, Ground
 from gen_data.randomizers.traffic_flow import TrafficFlow
 
 SMALL = ("sensors[0].size_px=[64, 32]", "sensors[0].channels=[rgb, depth, instance]")

@@ -17,9 +17,9 @@ from gen_data.generator.core.errors import ConfigError, LayoutRejected
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.scene import Body, Camera, Lane, ObjectGroup, Scene
 from gen_data.generator.core.se3 import SE3
-from gen_data.randomizers.along import Along
 from gen_data.randomizers.camera_on_lane import CameraOnLane
-from gen_data.randomizers.footprints import Footprint, Ground
+from gen_data.randomizers.free_space import Footprint, Ground
+from gen_data.randomizers.lane_objects import LaneObjects
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 BRICK_M = (0.06, 0.03)
@@ -36,7 +36,7 @@ def street(**group: Any) -> Scene:
 
 def drawn(scene: Scene, stream: str = "stream", **fields: Any) -> Scene:
     """After one draw."""
-    return Along(name="things", **fields)(scene, FakeAssets(), rng_of(stream))
+    return LaneObjects(name="things", **fields)(scene, FakeAssets(), rng_of(stream))
 
 
 def test_rows_have_the_gaps_that_were_asked_for() -> None:
@@ -107,7 +107,7 @@ def test_nothing_overlaps_even_when_lanes_are_walked_often(scattered: bool) -> N
 def test_too_many_scattered_things_are_refused_by_name() -> None:
     """A square of 10 cm has room for few bricks."""
     lane = Lane("a", "driving", ((0.0, 0.0, 0.0), (0.1, 0.1, 0.0)), 0.1)
-    with pytest.raises(LayoutRejected, match="no room left"):
+    with pytest.raises(LayoutRejected, match="no free place for a scattered object"):
         drawn(replace(street(), lanes=(lane,)), count=Constant(500), uniform_area=True)
 
 
@@ -122,7 +122,7 @@ def test_an_impossible_density_is_refused_by_name() -> None:
 def test_a_scale_that_leaves_nothing_is_refused(scale: float) -> None:
     """Things without extent and without gaps would follow one another for ever."""
     with pytest.raises(ValidationError, match="scale"):
-        Along(name="things", gap_m=Constant(0.0), scale=Constant(scale))
+        LaneObjects(name="things", gap_m=Constant(0.0), scale=Constant(scale))
 
 
 def test_a_row_of_more_things_than_a_lane_can_hold_is_refused_by_name() -> None:
@@ -131,11 +131,11 @@ def test_a_row_of_more_things_than_a_lane_can_hold_is_refused_by_name() -> None:
         drawn(street(), gap_m=Constant(0.0), scale=Constant(0.001), occupancy=Constant(False))
 
 
-@pytest.mark.parametrize("field", ["count", "at_least"])
+@pytest.mark.parametrize("field", ["count", "min_count"])
 def test_a_count_beyond_what_a_scene_holds_is_refused(field: str) -> None:
     """A thousand million things would be drawn one by one."""
     with pytest.raises(ValidationError, match=field):
-        Along.model_validate_json(f'{{"name": "things", "{field}": 1000000000}}')
+        LaneObjects.model_validate_json(f'{{"name": "things", "{field}": 1000000000}}')
 
 
 def test_the_camera_rides_where_nothing_stands() -> None:

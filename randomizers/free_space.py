@@ -1,4 +1,4 @@
-"""What bodies cover of the ground, and whether rectangles overlap."""
+"""Free space: footprints of bodies on the ground, and clearance of points."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.obb import rectangles_overlap
-from gen_data.generator.core.scene import Body
+from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.se3 import SE3, Array, Vec3
 
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
-    """A rectangle on the ground: centre [m], half extents [m] and the direction of its X."""
+    """A rectangle on the ground: centre [m], half extents [m] and yaw of its X axis."""
 
     x_m: float
     y_m: float
@@ -26,20 +26,20 @@ class Footprint:
 
     @classmethod
     def of(cls, T_world_body: SE3, bounds_m: tuple[Vec3, Vec3], scale: float = 1.0) -> Footprint:
-        """Of an upright body with these bounds in its own frame."""
+        """Footprint of an upright body with these bounds in its own frame."""
         (x0, y0, _), (x1, y1, _) = bounds_m
         w, _, _, z = T_world_body.quaternion_wxyz
         center = T_world_body @ SE3((0.5 * scale * (x0 + x1), 0.5 * scale * (y0 + y1), 0.0))
         x, y, _ = center.translation_m
         return cls(x, y, 0.5 * scale * (x1 - x0), 0.5 * scale * (y1 - y0), 2.0 * math.atan2(z, w))
 
-    def grown(self, margin_m: float) -> Footprint:
-        """The same with more room around it."""
+    def expand(self, margin_m: float) -> Footprint:
+        """Return the rectangle with a margin on every side."""
         half_x_m, half_y_m = self.half_x_m + margin_m, self.half_y_m + margin_m
         return Footprint(self.x_m, self.y_m, half_x_m, half_y_m, self.yaw_rad)
 
-    def row(self) -> tuple[float, ...]:
-        """Centre, cosine and sine of the direction, half extents, half diagonal."""
+    def as_row(self) -> tuple[float, ...]:
+        """Centre, cosine and sine of the yaw, half extents, half diagonal."""
         c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         reach_m = math.hypot(self.half_x_m, self.half_y_m)
         return (self.x_m, self.y_m, c, s, self.half_x_m, self.half_y_m, reach_m)
@@ -47,22 +47,22 @@ class Footprint:
 
 @dataclass
 class Ground:
-    """Footprints of all that stands already."""
+    """Footprints of existing objects."""
 
     _rows: Array = field(default_factory=lambda: np.zeros((64, 7)))
     _count: int = 0
 
     def add(self, footprint: Footprint) -> None:
-        """One more."""
+        """Add a footprint."""
         if self._count == len(self._rows):
             self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
-        self._rows[self._count] = footprint.row()
+        self._rows[self._count] = footprint.as_row()
         self._count += 1
 
     def is_free(self, footprint: Footprint) -> bool:
-        """Whether a rectangle overlaps nothing."""
+        """Whether a rectangle overlaps no footprint."""
         others = self._rows[: self._count]
-        own = np.array(footprint.row())
+        own = np.array(footprint.as_row())
         delta = others[:, :2] - own[:2]
         reach = others[:, 6] + own[6]
         dx, dy = delta.T
@@ -71,8 +71,37 @@ class Ground:
 
 
 def make_ground(bodies: Iterable[Body], assets: AssetIndex) -> Ground:
-    """The ground under bodies."""
+    """Collect the footprints of bodies."""
     ground = Ground()
     for body in bodies:
         ground.add(Footprint.of(body.T_world_body, assets.bounds_m(body.asset), body.scale))
     return ground
+
+
+def is_inside(point_m: Vec3, low_m: Vec3, high_m: Vec3) -> bool:
+    """Whether a point lies in an axis-aligned box."""
+    return all(a <= p <= b for p, a, b in zip(point_m, low_m, high_m, strict=True))
+
+
+def is_in_the_open(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: float) -> bool:
+    """Whether a point is inside the scene's interior and no nearer than ``margin_m`` to a body."""
+    return is_inside(point_m, *scene.interior_m) and is_clear(point_m, scene, assets, margin_m)
+
+
+def is_clear(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: float) -> bool:
+    """Whether a point is no nearer than ``margin_m`` to a body.
+
+    Bodies are tested by their bounding boxes. The background (the room itself) is ignored, except
+    for the fixtures of lights.
+    """
+    fixtures = {light.body for light in scene.lights}
+    for body in scene.bodies:
+        if body.instance_id == 0 and body.name not in fixtures:
+            continue
+        local = (body.T_world_body.inverse() @ SE3(point_m)).translation_m
+        low, high = assets.bounds_m(body.asset)
+        grown_low = tuple(body.scale * v - margin_m for v in low)
+        grown_high = tuple(body.scale * v + margin_m for v in high)
+        if all(a <= p <= b for p, a, b in zip(local, grown_low, grown_high, strict=True)):
+            return False
+    return True

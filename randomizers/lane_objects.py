@@ -1,4 +1,4 @@
-"""What stands or moves along lanes, how densely, and where."""
+"""Objects along lanes: which, how densely, and where."""
 
 from __future__ import annotations
 
@@ -24,44 +24,45 @@ from gen_data.generator.core.members import Member, add_members, remove_members
 from gen_data.generator.core.scene import LaneKind, ObjectGroup, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.asset_groups import CategoryWeights, draw_asset, find_group, make_wheel
+from gen_data.randomizers.asset_groups import CategoryWeights, draw_asset, find_weighted_group
 from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.footprints import Footprint, Ground, make_ground
+from gen_data.randomizers.free_space import Footprint, Ground, make_ground
 
 COUNT_MAX = 2000
-"""As many as the template's ``along`` element may have."""
+"""Largest count of the template's ``lane_objects`` element."""
 PER_LANE_MAX = 20_000
-"""Places in one row of a lane: a parked car every 50 cm for 10 km."""
+"""Largest number of places along one lane: one every 50 cm for 10 km."""
 SCALE = Bounds(0.001, 1000.0)
-"""Factors that leave things an extent: scales are rounded to four decimals."""
+"""Scales are rounded to four decimals: none in this range becomes 0."""
 SCATTER_TRIES = 20
-"""Free places are tried this often for each thing that is scattered."""
+"""Attempts to find a free place for one scattered object."""
 
 
-class Along(RandomizerBase):
-    """Draws the members of a template's ``lane_objects`` group anew.
+class LaneObjects(RandomizerBase):
+    """Replaces the members of a template's ``lane_objects`` group by drawn ones.
 
-    Along every lane of the group's kinds, things and gaps follow one another; what would overlap
-    something that stands already is left out.
+    Objects and gaps alternate along every lane of the group's kinds; objects that would overlap
+    existing ones are left out.
 
     Attributes:
         group: Name of the template's group; empty = the randomizer's own name.
-        lanes: Only lanes of these kinds; empty = those of the group.
-        roads: Only lanes of the elements with these names; empty = all.
-        gap_m: Free length between neighbours of a row.
-        passes: How often every lane is filled: several passes let people walk abreast.
-        occupancy: Whether a place is taken: how full a parking lane is.
-        count: How many at most: a random choice of all places; null = all.
-        min_count: A layout with fewer free places is refused.
-        lateral: Place across the lane, of the room there is: -1 right edge, 0 middle, 1 left edge.
-        yaw_deg: Turn from the lane's direction.
-        reversed: Whether it faces the other way.
-        scale: Factor on its size.
-        weights: How often a category is drawn compared with the others, 1 if not listed.
-        min_clearance_m: Nothing else is nearer than this.
-        junctions: Whether lanes across junctions count, too.
-        uniform_area: Whether things are strewn over the lanes' area, turned any way, as in
-            unstructured domain randomisation (Tremblay et al. 2018); ``count`` says how many.
+        lanes: Kinds of lanes to use; empty = those of the group.
+        roads: Names of the elements whose lanes to use; empty = all.
+        gap_m: Gap between neighbours along a lane.
+        passes: Number of times to fill every lane: several passes let people walk abreast.
+        occupancy: Whether a place is occupied; its probability is how full a parking lane is.
+        count: Largest number of objects, chosen at random from all places; null = no limit.
+        min_count: Smallest number of free places; a layout with fewer is rejected.
+        lateral: Position across the free width of the lane: -1 right edge, 0 middle, 1 left edge.
+        yaw_deg: Rotation from the lane's direction.
+        reversed: Whether an object faces against the lane's direction.
+        scale: Factor on an object's size.
+        weights: Relative frequency by category; 1 if not listed.
+        min_clearance_m: Smallest distance to any other object.
+        junctions: Whether to use lanes across junctions, too.
+        uniform_area: Whether to scatter objects over the bounding rectangle of the lanes at any
+            yaw, as in unstructured domain randomisation (Tremblay et al. 2018); ``count`` sets
+            their number.
     """
 
     type: Literal["lane_objects"] = "lane_objects"
@@ -84,17 +85,17 @@ class Along(RandomizerBase):
     uniform_area: bool = False
 
     def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raises ConfigError if there is no such group, or it lacks a category of the weights."""
+        """Raise ConfigError if the group or a category of the weights is unknown."""
         self._find_group(scene, assets)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with the group's members exchanged.
+        """Return the scene with the group's members replaced.
 
         Raises:
-            ConfigError: things and gaps are so short that a lane has room for too many.
-            LayoutRejected: there is no room for the things to be scattered, or too little.
+            ConfigError: objects and gaps are so short that a lane has too many places.
+            LayoutRejected: there are too few free places.
         """
-        group, wheel = self._find_group(scene, assets)
+        group, weights = self._find_group(scene, assets)
         scene = remove_members(scene, group.name)
         lines = self._select_lanes(scene, group)
         roads = {lane.road for lane in scene.lanes}
@@ -103,7 +104,7 @@ class Along(RandomizerBase):
             assets,
         )
         fill = self._scatter if self.uniform_area else self._fill_rows
-        members = list(fill(lines, group, wheel, ground, assets, rng))
+        members = list(fill(lines, group, weights, ground, assets, rng))
         if len(members) < self.min_count:
             remedy = (
                 "a smaller min_count, gap_m or min_clearance_m, or longer roads "
@@ -116,13 +117,11 @@ class Along(RandomizerBase):
         return add_members(scene, group, members, assets)
 
     def _find_group(self, scene: Scene, assets: AssetIndex) -> tuple[ObjectGroup, CategoryWeights]:
-        """The group, and the weighted categories of its assets."""
-        field = f"randomizers.{self.name}"
-        group = find_group(scene, self.group or self.name, f"{field}.group")
-        return group, make_wheel(group, assets, self.weights, f"{field}.weights")
+        name = self.group or self.name
+        return find_weighted_group(scene, assets, name, self.weights, f"randomizers.{self.name}")
 
     def _select_lanes(self, scene: Scene, group: ObjectGroup) -> list[LaneLine]:
-        """The lanes of the kinds and roads that are wanted."""
+        """Select the lanes of the wanted kinds and roads."""
         kinds = self.lanes or group.lanes
         return [
             LaneLine(lane)
@@ -136,16 +135,16 @@ class Along(RandomizerBase):
         self,
         lines: list[LaneLine],
         group: ObjectGroup,
-        wheel: CategoryWeights,
+        weights: CategoryWeights,
         ground: Ground,
         assets: AssetIndex,
         rng: Rng,
     ) -> Iterator[Member]:
-        """Things and gaps in turn along every lane, once per pass."""
+        """Alternate objects and gaps along every lane, once per pass."""
         for line in lines * self.passes:
             at_m = float(rng.uniform()) * self.gap_m.draw(rng)
             for _ in range(PER_LANE_MAX):
-                asset, scale, bounds_m = self._draw_thing(wheel, assets, rng)
+                asset, scale, bounds_m = self._draw_thing(weights, assets, rng)
                 length_m, width_m = _extent_m(bounds_m, group.facing)
                 room_m = max(0.0, 0.5 * (line.lane.width_m - width_m))
                 left_m = room_m * self.lateral.draw(rng)
@@ -163,7 +162,7 @@ class Along(RandomizerBase):
                 at_m += length_m + self.gap_m.draw(rng)
             else:
                 raise ConfigError(
-                    f"randomizers.{self.name}.gap_m: things and gaps are so short that a lane of "
+                    f"randomizers.{self.name}.gap_m: objects and gaps are so short that a lane of "
                     f"{line.length_m:.1f} m has more than {PER_LANE_MAX:,} places; expected a "
                     "larger gap_m or scale"
                 )
@@ -172,19 +171,19 @@ class Along(RandomizerBase):
         self,
         lines: list[LaneLine],
         group: ObjectGroup,
-        wheel: CategoryWeights,
+        weights: CategoryWeights,
         ground: Ground,
         assets: AssetIndex,
         rng: Rng,
     ) -> Iterator[Member]:
-        """Things anywhere over the lanes' area."""
+        """Scatter objects over the bounding rectangle of the lanes."""
         del group
         points = [point for line in lines for point in line.lane.center_m]
         low = [min(point[k] for point in points) for k in range(3)]
         high = [max(point[k] for point in points) for k in range(3)]
         for _ in range(self.count.draw(rng) if self.count is not None else 10):
             for _ in range(SCATTER_TRIES):
-                asset, scale, bounds_m = self._draw_thing(wheel, assets, rng)
+                asset, scale, bounds_m = self._draw_thing(weights, assets, rng)
                 x, y = (float(rng.uniform(low[k], high[k])) for k in range(2))
                 stand = SE3.about_z(float(rng.uniform(0.0, 2.0 * math.pi)), (x, y, low[2]))
                 pose = (stand @ SE3((0.0, 0.0, -bounds_m[0][2]))).rounded()
@@ -193,21 +192,21 @@ class Along(RandomizerBase):
                     break
             else:
                 remedy = f"a smaller count or min_clearance_m (randomizers.{self.name})"
-                raise LayoutRejected(Rejection("no room left between the lanes' things", remedy))
+                raise LayoutRejected(Rejection("no free place for a scattered object", remedy))
 
     def _occupy(self, ground: Ground, pose: SE3, bounds_m: tuple[Vec3, Vec3]) -> bool:
-        """Take the ground under a thing if it is free; whether it was."""
+        """Occupy the ground under an object if it is free; return whether it was."""
         footprint = Footprint.of(pose, bounds_m)
-        if not ground.is_free(footprint.grown(self.min_clearance_m)):
+        if not ground.is_free(footprint.expand(self.min_clearance_m)):
             return False
         ground.add(footprint)
         return True
 
     def _draw_thing(
-        self, wheel: CategoryWeights, assets: AssetIndex, rng: Rng
+        self, weights: CategoryWeights, assets: AssetIndex, rng: Rng
     ) -> tuple[str, float, tuple[Vec3, Vec3]]:
-        """An asset, its scale, and its bounds."""
-        asset = draw_asset(wheel, rng)
+        """Draw an asset and its scale; also return its scaled bounds."""
+        asset = draw_asset(weights, rng)
         scale = round(self.scale.draw(rng), 4)
         (x0, y0, z0), (x1, y1, z1) = assets.bounds_m(asset)
         return asset, scale, (
@@ -217,6 +216,6 @@ class Along(RandomizerBase):
 
 
 def _extent_m(bounds_m: tuple[Vec3, Vec3], facing: str) -> tuple[float, float]:
-    """Extent along and across the lane."""
+    """Extents along and across the lane."""
     x, y = bounds_m[1][0] - bounds_m[0][0], bounds_m[1][1] - bounds_m[0][1]
     return (x, y) if facing == "along" else (y, x)

@@ -1,4 +1,4 @@
-"""A group of things along lanes: traffic, people, houses, trees, lamps."""
+"""Groups of objects along lanes: traffic, people, houses, trees, lamps."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from gen_data.scene_templates.element import Element
 from gen_data.scene_templates.objects import AssetChoice
 
 
-class Along(Element):
-    """Things along lanes; the ``lane_objects`` randomizer of the same name draws them.
+class LaneObjects(Element):
+    """Objects along lanes; the ``lane_objects`` randomizer of the same name draws them.
 
     Attributes:
-        lanes: Kinds of the lanes they are spread over.
-        assets: Which there may be.
-        count: How many there are nominally, evenly spread.
-        facing: Whether fronts point along the lane, or to its left, where a street is for all
-            lanes that are not driven on.
-        annotate: Whether labels are written for them.
+        lanes: Kinds of lanes to use.
+        assets: Assets to choose from.
+        count: Nominal number of objects, evenly spread.
+        facing: Direction of the fronts: along the lane, or to its left; the street is on the left
+            of all lanes except driving lanes.
+        annotate: Whether to write labels for them.
     """
 
     type: Literal["lane_objects"] = "lane_objects"
@@ -36,7 +36,7 @@ class Along(Element):
     annotate: bool = True
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """The group, and its things evenly along the lanes.
+        """Add the group, and its objects evenly along the lanes.
 
         Raises:
             ConfigError: the template has no lane of these kinds before this element.
@@ -46,12 +46,12 @@ class Along(Element):
             known = ", ".join(sorted({lane.kind for lane in scene.lanes})) or "none"
             raise ConfigError(
                 f"elements.{self.name}.lanes: there is no lane of kind {' or '.join(self.lanes)}; "
-                f"there is {known}: list the road before what stands along it"
+                f"there is {known}: list the road before the objects along it"
             )
         group = ObjectGroup(
             name=self.name,
             surfaces=(),
-            assets=self.assets.resolved(assets, f"elements.{self.name}.assets"),
+            assets=self.assets.resolve(assets, f"elements.{self.name}.assets"),
             count=self.count,
             placement="along",
             annotated=self.annotate,
@@ -71,7 +71,7 @@ class Along(Element):
 
 
 def _locate(lines: list[LaneLine], at_m: float) -> tuple[LaneLine, float]:
-    """The line, and the arc length on it, at an arc length along all lines together."""
+    """Find the line, and the arc length on it, at an arc length along all lines together."""
     for line in lines[:-1]:
         if at_m < line.length_m:
             return line, at_m

@@ -1,0 +1,67 @@
+"""MOTChallenge: rows, sequence files and classes."""
+
+from __future__ import annotations
+
+import configparser
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from gen_data.exporters.motchallenge import MotChallenge, mot_class
+from tests.exporters.drives import stems
+
+
+def test_mot_rows_count_from_one(exported: Any, samples: Any) -> None:
+    """Frames, ids and pixels; boxes are those of the visible pixels."""
+    folder = exported(MotChallenge()) / "street-val/street-0001"
+    rows = [line.split(",") for line in (folder / "gt/gt.txt").read_text().splitlines()]
+
+    assert stems(folder / "img1") == [f"{k:06d}" for k in range(1, 5)]
+    assert [row[0] for row in rows if row[1] == "2"] == ["1", "2", "3", "4"]
+    for row in rows:
+        truth = samples[4 + int(row[0]) - 1].truth["left"]
+        (thing,) = (t for t in truth.objects if t.instance.instance_id == int(row[1]))
+        assert thing.box is not None
+        assert list(map(int, row[2:6])) == [
+            thing.box.x_min + 1, thing.box.y_min + 1, thing.box.width_px, thing.box.height_px
+        ]  # fmt: skip
+        assert float(row[8]) == pytest.approx(thing.visible_fraction, abs=1e-6)
+    assert {(row[1], row[6], row[7]) for row in rows} == {("1", "0", "3"), ("2", "1", "1")}
+
+
+def test_mot_sequences_describe_themselves(exported: Any) -> None:
+    """seqinfo.ini by an ini reader; the list of sequences has TrackEval's header."""
+    folder = exported(MotChallenge())
+    ini = configparser.ConfigParser()
+    ini.read(folder / "street-train/street-0000/seqinfo.ini")
+
+    assert dict(ini["Sequence"]) == {
+        "name": "street-0000",
+        "imdir": "img1",
+        "framerate": "10",
+        "seqlength": "4",
+        "imwidth": "160",
+        "imheight": "120",
+        "imext": ".png",
+    }
+    assert (folder / "seqmaps/street-val.txt").read_text() == "name\nstreet-0001\n"
+
+
+@pytest.mark.parametrize(
+    ("category", "facts", "number"),
+    [
+        ("person", (), 1),
+        ("pedestrian", (("pose", "sitting"),), 7),
+        ("motorcycle", (("rider", "yes"),), 2),
+        ("motorcycle", (("rider", "no"),), 5),
+        ("bicycle", (), 4),
+        ("bus", (), 3),
+        ("crate", (), 0),
+    ],
+)
+def test_mot_classes(category: str, facts: Any, number: int, world: Any) -> None:
+    """Numbers of MOT16's table 5; 0 has no rows."""
+    thing = replace(world.instance(1, "car", 0.0, 0.0, 0.0), category=category, attributes=facts)
+
+    assert mot_class(thing) == number
