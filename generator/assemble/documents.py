@@ -17,7 +17,7 @@ from gen_data.generator.assemble.inheritance import (
 from gen_data.generator.config.merging import merge_nodes
 from gen_data.generator.config.paths import find_path
 from gen_data.generator.config.problems import Position, Problems
-from gen_data.generator.config.renamed_keys import replace_old_words
+from gen_data.generator.config.renamed_keys import refuse_moved_keys, replace_old_words
 from gen_data.generator.config.yaml_tree import Node, load_yaml, with_override
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.sensors.lidar.datasheets import load_sheets
@@ -57,6 +57,7 @@ def resolve_document(
             raise ConfigError(f"--set {text}: expected KEY=VALUE")
         resolved = with_override(resolved, path.strip(), value.strip())
     resolved = replace_old_words(resolved)
+    refuse_moved_keys(resolved)
     return _without_randomizers(_with_sensor_files(resolved), without)
 
 

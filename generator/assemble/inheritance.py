@@ -53,7 +53,9 @@ def extended_document(
     if len(chain) > EXTENDS_MAX:
         fact = f"more than {EXTENDS_MAX} configurations extend one another"
         raise ConfigError(str(Problem(base.position, "extends", fact)))
-    return _inheriting(extended_document(found, shipped, chain), document)
+    merged = _inheriting(extended_document(found, shipped, chain), document)
+    # Again, because overrides without a type have got one now.
+    return replace_old_words(merged)
 
 
 def _inheriting(base: Node, document: Node) -> Node:

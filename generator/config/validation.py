@@ -1,4 +1,4 @@
-"""From a document to typed, frozen values; every fault is told at its place, in plain words."""
+"""Validation of documents: typed, frozen values, or error messages with their places."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from pydantic import BaseModel, ValidationError
 from gen_data.generator.config.error_messages import error_text
 from gen_data.generator.config.problems import FieldPath, Position, Problems, format_path
 from gen_data.generator.config.pydantic_errors import Fault, locate_error, without_union_noise
-from gen_data.generator.config.renaming import with_present_keys
 from gen_data.generator.config.yaml_tree import Node
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -19,20 +18,19 @@ Model = TypeVar("Model", bound=BaseModel)
 def validate(
     node: Node, model: type[Model], problems: Problems, field_prefix: str = ""
 ) -> Model | None:
-    """The model that a node of a document stands for.
+    """Validate a node of a document as a model.
 
     Args:
         node: Usually a mapping.
-        model: What it is read as.
-        problems: Receives every fault that is found.
+        model: The expected type.
+        problems: Receives every error.
         field_prefix: Dotted path of the node in its document: ``randomizers[0]``.
 
     Returns:
-        An instance; None where there was a problem.
+        The instance; None if there was an error.
     """
-    node = with_present_keys(node, model, problems, field_prefix)
-    # In JSON mode, strictness means what YAML needs: a list is a tuple's only spelling and a
-    # string an enum's, but a string is still no number.
+    # Pydantic's strict mode for JSON suits YAML: it reads a list as a tuple and a string as an enum
+    # member, which have no other spelling, but never a string as a number.
     try:
         return model.model_validate_json(json.dumps(node.plain(), allow_nan=False))
     except ValidationError as error:
@@ -45,7 +43,7 @@ def validate(
 
 
 def _position(node: Node, fault: Fault) -> Position:
-    """Of the value; of the key where that is at fault; of what holds it where it is missing."""
+    """Position of the value; of its key if that is wrong; of its parent if it is missing."""
     path = (*fault.path, *fault.below)
     if fault.at_key and path and isinstance(path[-1], str):
         return _nearest(node, path[:-1]).key_position(path[-1])
@@ -53,7 +51,7 @@ def _position(node: Node, fault: Fault) -> Position:
 
 
 def _nearest(node: Node, path: FieldPath) -> Node:
-    """The last node on the way that exists."""
+    """The deepest existing node on a path."""
     for part in path:
         child = node.get(part)
         if child is None:

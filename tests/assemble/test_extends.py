@@ -139,7 +139,7 @@ def test_a_chain_has_an_end(folder: Path) -> None:
         written(folder, f"extends: c{k + 1}.yaml\n", f"c{k}.yaml")
     written(folder, BASE, "c10.yaml")
 
-    assert load_config(str(folder / "c2.yaml")).head.seed == 3
+    assert load_config(str(folder / "c2.yaml")).general.seed == 3
     assert "more than 8 configurations extend one another" in refusal(str(folder / "c1.yaml"))
 
 

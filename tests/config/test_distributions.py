@@ -434,7 +434,7 @@ def test_a_distribution_of_a_third_party_needs_fields_and_a_draw_only(
             """Both ends."""
             return self.peak - self.reach, self.peak + self.reach
 
-    monkeypatch.setattr(base, "names_of", lambda kind: ("triangular",))
+    monkeypatch.setattr(base, "distribution_names", lambda kind: ("triangular",))
     monkeypatch.setattr(base, "distribution", lambda name: Triangular)
     kind = fields.NUMBER
 
