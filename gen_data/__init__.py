@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from gen_data.generator.core.errors import (
         AssetError,
         ConfigError,
+        ConfigWarning,
         DeterminismError,
         GenDataError,
         Interrupted,
@@ -47,6 +48,7 @@ _HOMES = {
     "generate": "gen_data.generator.api.generate",
     "AssetError": "gen_data.generator.core.errors",
     "ConfigError": "gen_data.generator.core.errors",
+    "ConfigWarning": "gen_data.generator.core.errors",
     "DeterminismError": "gen_data.generator.core.errors",
     "GenDataError": "gen_data.generator.core.errors",
     "Interrupted": "gen_data.generator.core.errors",
@@ -65,6 +67,7 @@ __all__ = [
     "Box3d",
     "CameraReading",
     "ConfigError",
+    "ConfigWarning",
     "Dataset",
     "DeterminismError",
     "GenDataError",

@@ -20,7 +20,7 @@ from gen_data.generator.core.capture import (
     SensorReading,
 )
 from gen_data.generator.core.errors import StorageError
-from gen_data.generator.core.interfaces import cloud_path, media_path, table_path
+from gen_data.generator.core.interfaces import Modality, cloud_path, media_path, table_path
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.runner.labels import LABELS_NAME, Labels, read_labels
 from gen_data.generator.runner.plan import load_plan
@@ -42,6 +42,11 @@ class StoredSamples:
         self.folder = Path(folder)
         self._plan = load_plan(self.folder)
         self._info = self._manifest()["info"]
+        self._channels = {
+            sensor["name"]: tuple(Channel(name) for name in sensor["channels"])
+            for sensor in self._info["sensors"]
+            if sensor["modality"] == Modality.CAMERA.value
+        }
         self._shard = lru_cache(SHARDS_KEPT)(self._read_shard)
 
     @property
@@ -79,7 +84,7 @@ class StoredSamples:
             capture=self._capture(folder, labels),
             truth=labels.truth,
             attempts=kept.attempts,
-            cameras=tuple(self._info["sensors"]),
+            cameras=tuple(self._channels),
             frame=labels.frame,
         )
 
@@ -93,7 +98,7 @@ class StoredSamples:
             name: SensorReading(
                 name,
                 labels.truth[name].camera,
-                ImageFiles(folder, name, index, self._channels(name), self._info["depth_scale_m"]),
+                ImageFiles(folder, name, index, self._channels[name], self._info["depth_scale_m"]),
                 time_s=image.time_s,
                 ev100=image.ev100,
             )
@@ -110,9 +115,6 @@ class StoredSamples:
             for name, table in labels.tables.items()
         }
         return Capture(readings, clouds, tables)
-
-    def _channels(self, camera: str) -> tuple[Channel, ...]:
-        return tuple(Channel(name) for name in self._info["media"][camera])
 
     def _read_shard(self, shard: int) -> list[tuple[KeptScene, Labels]]:
         folder = self._shard_dir(shard)

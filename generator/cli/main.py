@@ -122,10 +122,10 @@ def cli(
         return
     if n is None:
         raise ConfigError("--n is missing: how many samples?")
-    from gen_data.generator.cli.generate_command import generate
+    from gen_data.generator.cli.generate_command import generate_with_progress
 
     choice = ConfigurationOptions(config, seed, overrides, without)
-    generate(choice, n, out=out, workers=workers, repair=repair)
+    generate_with_progress(choice, n, out=out, workers=workers, repair=repair)
 
 
 def main() -> None:

@@ -61,6 +61,7 @@ class Summary:
         cpu_s: Mean CPU seconds per sample by stage, over this run.
         worker_deaths: Processes that ended unexpectedly.
         rss_bytes_max: Largest memory of a worker after a shard; 0 if unknown.
+        folder: Of the data set; empty in the run's log.
     """
 
     dataset_id: str
@@ -73,6 +74,7 @@ class Summary:
     worker_deaths: int = 0
     rss_bytes_max: int = 0
     already_complete: bool = False
+    folder: str = ""
 
     @property
     def samples_per_s(self) -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gen_data.generator.core.errors import GenDataError
@@ -61,7 +61,7 @@ def run(  # noqa: PLR0913  (the front door: each argument is a question only the
     *,
     workers: int,
     resume_command: str,
-    progress: Callable[[RunProgress], None] = _silent,
+    progress: Callable[[RunProgress], None] | None = None,
     licences: LicencesOf | None = None,
     settings: Settings | None = None,
 ) -> Summary:
@@ -73,7 +73,7 @@ def run(  # noqa: PLR0913  (the front door: each argument is a question only the
         make_pipeline: Makes the same pipeline in any process; picklable unless ``workers`` is 0.
         workers: Processes that make shards; 0 makes them in this process, for debugging.
         resume_command: What a user types to go on after a fault; part of messages.
-        progress: Called at each sample and shard.
+        progress: Called after each sample and shard.
         licences: Makes the text of ``LICENSES-ASSETS.md``; None = no such file.
         settings: How to work; None = the defaults.
 
@@ -92,7 +92,8 @@ def run(  # noqa: PLR0913  (the front door: each argument is a question only the
             store.state(plan)
         with store.locked():
             job = Job(plan, store, make_pipeline, settings.write_media)
-            return _Run(job, workers, progress, settings, interruption).to_the_end(licences)
+            run_ = _Run(job, workers, progress or _silent, settings, interruption)
+            return replace(run_.to_the_end(licences), folder=str(out))
 
 
 @dataclass(frozen=True)
