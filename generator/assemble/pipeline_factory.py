@@ -13,7 +13,7 @@ from gen_data.generator.assemble.config import Config, SceneConfig
 from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, default_plugin
 from gen_data.generator.assemble.reference_checks import check_references
 from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.config.places import find_text
+from gen_data.generator.config.yaml_tree import find_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError, UnknownAsset
 from gen_data.generator.core.interfaces import (

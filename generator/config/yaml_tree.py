@@ -133,6 +133,26 @@ def is_distribution(node: Node) -> bool:
     return len(keys) == 1 and keys[0] in DISTRIBUTIONS
 
 
+def find_text(document: Node, text: str) -> tuple[Position, str] | None:
+    """Position and dotted path of the first scalar with a text; None if there is none."""
+    for path, node in _scalars(document, ()):
+        if text in (node.text, node.content):
+            return node.position, format_path(path)
+    return None
+
+
+def _scalars(node: Node, path: FieldPath) -> Iterator[tuple[FieldPath, Node]]:
+    """All scalars below a node with their paths, in the order of the source."""
+    if isinstance(node.content, Mapping):
+        for key, child in node.content.items():
+            yield from _scalars(child, (*path, key))
+    elif isinstance(node.content, tuple):
+        for number, child in enumerate(node.content):
+            yield from _scalars(child, (*path, number))
+    else:
+        yield path, node
+
+
 def with_override(node: Node, path: str, value: str, origin: str = "--set") -> Node:
     """The document with one value exchanged, as by ``--set randomizers.clutter.count=5``.
 
