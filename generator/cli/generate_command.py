@@ -63,18 +63,23 @@ def _progress_bar(console: Console, n: int) -> Iterator[Callable[[RunProgress], 
         TimeRemainingColumn(),
         TextColumn("{task.fields[rejections]} rejected"),
     )
-    with Progress(*columns, console=console) as bar:
-        task = bar.add_task("samples", total=n, rate="", rejections=0)
+    bar = Progress(*columns, console=console)
+    task = bar.add_task("samples", total=n, rate="", rejections=0)
 
-        def show(progress: RunProgress) -> None:
-            bar.update(
-                task,
-                completed=progress.done,
-                rate=f"{progress.samples_per_s:.1f}/s",
-                rejections=progress.rejections,
-            )
+    def show(progress: RunProgress) -> None:
+        # Started by the first sample, so that errors and warnings of the configuration come alone.
+        bar.start()
+        bar.update(
+            task,
+            completed=progress.done,
+            rate=f"{progress.samples_per_s:.1f}/s",
+            rejections=progress.rejections,
+        )
 
+    try:
         yield show
+    finally:
+        bar.stop()
 
 
 def _print_summary(console: Console, summary: Summary) -> None:

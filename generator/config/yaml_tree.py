@@ -54,10 +54,10 @@ class Node:
     """A value in a document.
 
     Attributes:
-        position: Where it begins.
+        position: Of its first character.
         content: A scalar, a tuple of nodes (a list), or a dictionary of nodes (a mapping).
-        key_positions: Where each key of a mapping stands.
-        text: The scalar as it was written, without quotes.
+        key_positions: Of the keys of a mapping.
+        text: The scalar as written, without quotes.
     """
 
     position: Position
@@ -84,7 +84,7 @@ class Node:
         return node
 
     def key_position(self, key: str) -> Position:
-        """Where a key of this mapping stands; where the mapping begins if it has no such key."""
+        """Position of a key of this mapping; of the mapping itself if it has no such key."""
         return self.key_positions.get(key, self.position)
 
     def _child(self, part: str | int) -> Node | None:
@@ -96,10 +96,10 @@ class Node:
 
 
 def load_yaml(path: Path) -> Node:
-    """The mapping in a YAML file.
+    """Read the mapping in a YAML file.
 
     Raises:
-        ConfigError: if it cannot be read, or is no valid document.
+        ConfigError: the file cannot be read, or is no valid document.
     """
     try:
         if path.exists() and not path.is_file():
@@ -110,19 +110,19 @@ def load_yaml(path: Path) -> Node:
         raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
     except ValueError:
         raise ConfigError(f"{str(path)!r}: is no file name") from None
-    return parse_yaml(_decoded(data, str(path)), str(path))
+    return parse_yaml(_decode(data, str(path)), str(path))
 
 
 def parse_yaml(text: str, file: str) -> Node:
-    """The mapping in a YAML text; ``file`` is what messages call it.
+    """Parse the mapping in a YAML text; ``file`` is its name in messages.
 
     Raises:
-        ConfigError: if the text is no valid document; it names every fault that can be told apart.
+        ConfigError: the text is no valid document; the message lists all independent errors.
     """
-    # A byte order mark is legal at the start of a document, and means nothing in UTF-8.
+    # A byte order mark is legal at the start of a document, and has no meaning in UTF-8.
     node = _Reader(text.removeprefix("\ufeff"), file).read()
     if not isinstance(node.content, Mapping):
-        what = "nothing" if node.content is None else _noun(node)
+        what = "nothing" if node.content is None else _describe(node)
         _refuse(node.position, "", f"expected a mapping of settings, got {what}")
     return node
 
@@ -154,22 +154,22 @@ def _scalars(node: Node, path: FieldPath) -> Iterator[tuple[FieldPath, Node]]:
 
 
 def with_override(node: Node, path: str, value: str, origin: str = "--set") -> Node:
-    """The document with one value exchanged, as by ``--set randomizers.clutter.count=5``.
+    """Replace one value of a document, as ``--set randomizers.clutter.count=5`` does.
 
     Args:
         node: The document.
-        path: Keys joined by dots; list items by ``[index]``, or by the ``name`` they carry. Keys
-            that a mapping does not have are added: validation will judge them.
+        path: Keys joined by dots; list items by ``[index]`` or by their ``name``. Missing
+            keys of mappings are added and left to validation.
         value: YAML, usually a scalar or a flow collection.
-        origin: What messages call the source.
+        origin: Name of the source in messages.
 
     Raises:
-        ConfigError: if the path leads nowhere or the value is no YAML.
+        ConfigError: the path does not exist, or the value is no valid YAML.
     """
-    steps = _steps(path, value, origin)
+    steps = _parse_path(path, value, origin)
     within = tuple(step.part for step in steps)
     replacement = _Reader(f"{path}={value}", origin, start=len(path) + 1, within=within).read()
-    return _exchanged(node, steps, replacement, ())
+    return _replace_value(node, steps, replacement, ())
 
 
 class _Abort(Exception):
@@ -384,7 +384,7 @@ def _height(node: Node) -> int:
     return 1 + max((_height(child) for child in _children(node)), default=0)
 
 
-def _decoded(data: bytes, file: str) -> str:
+def _decode(data: bytes, file: str) -> str:
     if len(data) > MAX_FILE_BYTES:
         _refuse(Position(file, 1, 1), "", f"larger than {MAX_FILE_BYTES} bytes")
     try:
@@ -404,7 +404,7 @@ def _printable(line: str) -> str:
     return _BAD_IN_SOURCE.sub(lambda bad: " " if bad[0] == "\t" else "\ufffd", line)
 
 
-def _noun(node: Node) -> str:
+def _describe(node: Node) -> str:
     if isinstance(node.content, tuple):
         return "a list"
     return "a mapping" if isinstance(node.content, Mapping) else quote_value(node.content)
@@ -412,7 +412,7 @@ def _noun(node: Node) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """One part of an override's path, and where it stands."""
+    """One part of the path of an override, with its position."""
 
     part: str | int
     position: Position
@@ -421,7 +421,7 @@ class _Step:
 _STEP = re.compile(r"\[(\d{1,6})\]|\.?([^.\[\]]+)")
 
 
-def _steps(path: str, value: str, origin: str) -> list[_Step]:
+def _parse_path(path: str, value: str, origin: str) -> list[_Step]:
     source = _printable(_LINE_BREAK.split(f"{path}={value}")[0])
     steps: list[_Step] = []
     at = 0
@@ -443,20 +443,20 @@ def _steps(path: str, value: str, origin: str) -> list[_Step]:
     return steps
 
 
-def _exchanged(node: Node, steps: list[_Step], value: Node, path: FieldPath) -> Node:
+def _replace_value(node: Node, steps: list[_Step], value: Node, path: FieldPath) -> Node:
     if not steps:
         return value
     step, rest = steps[0], steps[1:]
     if isinstance(node.content, tuple):
         index = _index(node, step, path)
         items = list(node.content)
-        items[index] = _exchanged(items[index], rest, value, (*path, index))
+        items[index] = _replace_value(items[index], rest, value, (*path, index))
         return replace(node, content=tuple(items))
     if isinstance(node.content, Mapping) or node.content is None:
         key = str(step.part)
         content = dict(node.content or {})
         child = content.get(key, Node(step.position, None))
-        content[key] = _exchanged(child, rest, value, (*path, key))
+        content[key] = _replace_value(child, rest, value, (*path, key))
         positions = {**node.key_positions}
         if key not in positions or not rest:
             positions[key] = step.position
@@ -469,7 +469,7 @@ def _exchanged(node: Node, steps: list[_Step], value: Node, path: FieldPath) -> 
 
 
 def _index(node: Node, step: _Step, path: FieldPath) -> int:
-    """Which item of a list a step means: by number, or by the item's ``name``."""
+    """Index of the list item that a step gives by number or by the item's ``name``."""
     items = node.content if isinstance(node.content, tuple) else ()
     if isinstance(step.part, int) or step.part.isdecimal():
         index = int(step.part)
