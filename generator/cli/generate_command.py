@@ -79,7 +79,8 @@ def _progress_bar(console: Console, n: int) -> Iterator[Callable[[RunProgress], 
     try:
         yield show
     finally:
-        bar.stop()
+        if bar.live.is_started:
+            bar.stop()
 
 
 def _print_summary(console: Console, summary: Summary) -> None:
