@@ -6,7 +6,7 @@
     >>> gen_data.generate("tabletop.yaml", n=1000, out="out/tabletop")
     >>> gen_data.open("out/tabletop")[17].boxes2d
 
-Every name in ``__all__`` is public; all else may move between releases.
+Only the names in ``__all__`` are public; everything else may change between releases.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from gen_data.generator.core.errors import (
         AssetError,
         ConfigError,
+        ConfigWarning,
         DeterminismError,
         GenDataError,
         Interrupted,
@@ -47,6 +48,7 @@ _HOMES = {
     "generate": "gen_data.generator.api.generate",
     "AssetError": "gen_data.generator.core.errors",
     "ConfigError": "gen_data.generator.core.errors",
+    "ConfigWarning": "gen_data.generator.core.errors",
     "DeterminismError": "gen_data.generator.core.errors",
     "GenDataError": "gen_data.generator.core.errors",
     "Interrupted": "gen_data.generator.core.errors",
@@ -57,7 +59,7 @@ _HOMES = {
     "UnknownNameError": "gen_data.generator.core.errors",
     "VerificationError": "gen_data.generator.core.errors",
 }
-"""Where each public name lives; a module is imported when its first name is used."""
+"""Module of each public name; modules are imported on first use."""
 
 __all__ = [
     "AssetError",
@@ -65,6 +67,7 @@ __all__ = [
     "Box3d",
     "CameraReading",
     "ConfigError",
+    "ConfigWarning",
     "Dataset",
     "DeterminismError",
     "GenDataError",
@@ -85,7 +88,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """A public name, from the module where it lives."""
+    """Import a public name."""
     if name == "open":
         return import_module("gen_data.generator.api.dataset").open_dataset
     if name not in _HOMES:

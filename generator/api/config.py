@@ -1,4 +1,4 @@
-"""Configurations as users of the Python API give them: files, names, dictionaries, objects."""
+"""Configurations of the Python API: files, names, dictionaries, objects."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def load_config(
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
 ) -> Config:
-    """The validated configuration.
+    """Load and validate a configuration.
 
     Raises:
-        ConfigError: the message names everything that is wrong, with its place.
+        ConfigError: the message lists all errors with their positions.
     """
     from gen_data.generator.assemble.config import load_source_config, parse_config
 
@@ -36,7 +36,7 @@ def load_config(
 
 
 def _yaml_text(config: Mapping[str, Any]) -> str:
-    """The dictionary as a document: messages quote its lines."""
+    """Format a dictionary as a document, whose lines error messages quote."""
     import yaml
 
     try:
@@ -46,7 +46,7 @@ def _yaml_text(config: Mapping[str, Any]) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """Dictionaries, lists and scalars of a value; typed plug-ins become their YAML."""
+    """Convert a value, with typed plug-ins in it, to dictionaries, lists and scalars."""
     from pydantic import BaseModel
 
     if isinstance(value, BaseModel):
@@ -59,6 +59,6 @@ def _plain(value: Any) -> Any:
 
 
 def _type_of(plugin: Any) -> dict[str, str]:
-    """The ``type`` of a plug-in, which is a default and so never set by its user."""
+    """The ``type`` of a plug-in, which is a default and so unset in its dump."""
     kind = getattr(plugin, "type", None)
     return {} if kind is None else {"type": kind}

@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 Self = TypeVar("Self", bound="SampleSequence")
 
 UNBOUNDED = range(sys.maxsize)
-"""Indices of a data set whose size was not given."""
+"""Indices of a data set without a size."""
 
 
 class SampleSource(Protocol):
-    """Where the samples of a sequence come from."""
+    """Source of the samples of a sequence."""
 
     def sample(self, index: int) -> CoreSample:
-        """The sample of that number."""
+        """Return the sample of that number."""
         ...
 
     @property
@@ -44,15 +44,15 @@ class SampleSource(Protocol):
         ...
 
     def close(self) -> None:
-        """Release engines; a later call of ``sample`` starts them again."""
+        """Release the engines; a later call of ``sample`` restarts them."""
         ...
 
 
 class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", None]):
-    """Samples by index. Slices are sequences over the same source; nothing is computed early.
+    """Samples by index. Slices are lazy sequences over the same source.
 
-    Iteration, ``len``, negative indices and ``in`` work as they do for a list. A sequence can be
-    pickled: another process makes the same samples.
+    Iteration, ``len``, negative indices and ``in`` work as for a list. A pickled sequence gives the
+    same samples in another process.
     """
 
     def __init__(self, source: SampleSource, indices: range) -> None:
@@ -66,11 +66,11 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
     def __getitem__(self: Self, index: slice) -> Self: ...
 
     def __getitem__(self: Self, index: int | slice) -> Sample | Self:
-        """One sample, or the sequence of some.
+        """One sample, or a sequence for a slice.
 
         Raises:
             SampleIndexError: the index is out of range; it is also an IndexError.
-            SampleError: the sample cannot be made.
+            SampleError: the sample cannot be generated.
         """
         if isinstance(index, slice):
             part = copy.copy(self)
@@ -97,7 +97,7 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
         return len(self._indices)
 
     def __iter__(self) -> Iterator[Sample]:
-        """Samples in order; without an end if the data set has no size."""
+        """Iterate over the samples in order; endless if the data set has no size."""
         for number in self._indices:
             yield Sample(self._source.sample(number))
 
@@ -112,7 +112,7 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
         return self._source.config
 
     def close(self) -> None:
-        """Release the engines; using the sequence again starts them again."""
+        """Release the engines; further use restarts them."""
         self._source.close()
 
     def __exit__(
@@ -130,24 +130,23 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
 
 
 class Dataset(SampleSequence):
-    """The samples that a configuration describes, generated when they are read.
+    """Samples of a configuration, generated on access.
 
-    Sample ``i`` depends on the configuration, the seed and ``i`` alone: it has the same pixels and
-    labels whatever was read before it, and in every process.
+    Sample ``i`` depends only on the configuration, the seed and ``i``: it has the same pixels and
+    labels in any order of access and in every process.
 
     Args:
         config: A YAML file, a shipped name such as ``tabletop.yaml``, the folder of a data set, or
             a dictionary with the same content; paths in a dictionary are relative to the current
             folder.
         seed: Replaces the configuration's seed.
-        n: Number of samples; None = without an end.
-        overrides: ``KEY=VALUE`` texts as of ``gen-data --set``.
+        n: Number of samples; None = endless.
+        overrides: ``KEY=VALUE`` texts, as for ``gen-data --set``.
         without: Names of randomizers to leave out.
-        channels: Names of channels that every camera renders besides its own, such as
-            ``normals``.
+        channels: Names of additional channels for every camera, such as ``normals``.
 
     Raises:
-        ConfigError: the configuration is wrong; the message names every place.
+        ConfigError: the configuration is wrong; the message lists all errors.
 
     Example:
         >>> data = Dataset("tabletop.yaml", seed=7)
@@ -167,9 +166,9 @@ class Dataset(SampleSequence):
     ) -> None:
         if n is not None and n < 0:
             raise ConfigError(f"n: {n} is negative; expected 0 or more")
-        spec = load_config(config, seed=seed, overrides=overrides, without=without)
+        loaded = load_config(config, seed=seed, overrides=overrides, without=without)
         indices = UNBOUNDED if n is None else range(n)
-        super().__init__(GeneratedSamples(spec, _channels(channels)), indices)
+        super().__init__(GeneratedSamples(loaded, _parse_channels(channels)), indices)
 
     def __repr__(self) -> str:
         """Name and size."""
@@ -178,22 +177,22 @@ class Dataset(SampleSequence):
 
 
 class GeneratedSamples:
-    """Samples made by a pipeline in this process, which starts when the first one is read."""
+    """Samples of a pipeline in this process, which starts with the first access."""
 
-    def __init__(self, spec: Any, channels: frozenset[Channel]) -> None:
+    def __init__(self, config: Any, channels: frozenset[Channel]) -> None:
         from gen_data.generator.assemble.pipeline_factory import PipelineFactory
 
-        self._make_pipeline = PipelineFactory(spec, n=1, extra_channels=channels)
+        self._make_pipeline = PipelineFactory(config, n=1, extra_channels=channels)
         self._pipeline: Pipeline | None = None
         self._resources = ExitStack()
 
     def sample(self, index: int) -> CoreSample:
-        """The sample of that number."""
+        """Return the sample of that number."""
         from threadpoolctl import threadpool_limits
 
-        # Sums in BLAS depend on the number of threads, and with them the last bits of a pose.
+        # The last bits of sums in BLAS, and so of poses, depend on the number of threads.
         with threadpool_limits(limits=1):
-            return self._opened().sample(index)
+            return self._open_pipeline().sample(index)
 
     @property
     def categories(self) -> tuple[str, ...]:
@@ -210,7 +209,7 @@ class GeneratedSamples:
         self._pipeline = None
         self._resources.close()
 
-    def _opened(self) -> Pipeline:
+    def _open_pipeline(self) -> Pipeline:
         if self._pipeline is None:
             self._pipeline = self._resources.enter_context(self._make_pipeline())
         return self._pipeline
@@ -221,7 +220,7 @@ class GeneratedSamples:
 
 
 class StoredDataset(SampleSequence):
-    """A finished data set on disk, read back as the samples that were written."""
+    """Samples of a finished data set on disk."""
 
     def __init__(self, folder: str | PathLike[str]) -> None:
         source = StoredSamples(folder)
@@ -234,9 +233,9 @@ class StoredDataset(SampleSequence):
 
 
 def open_dataset(folder: str | PathLike[str]) -> StoredDataset:
-    """Open a finished data set; its samples equal those that were generated.
+    """Open a finished data set; its samples equal the generated ones.
 
-    Colour, ids and labels are exact; depth and other measures have the resolution of their files.
+    Colours, ids and labels are exact; other quantities have the resolution of their files.
 
     Raises:
         StorageError: the folder holds no finished data set.
@@ -244,7 +243,7 @@ def open_dataset(folder: str | PathLike[str]) -> StoredDataset:
     return StoredDataset(folder)
 
 
-def _channels(names: Sequence[str]) -> frozenset[Channel]:
+def _parse_channels(names: Sequence[str]) -> frozenset[Channel]:
     from gen_data.generator.core.capture import Channel
 
     known = {channel.value: channel for channel in Channel if channel is not Channel.AMODAL}

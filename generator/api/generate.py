@@ -1,4 +1,4 @@
-"""Writing a data set from Python: what ``gen-data --config ... --n ...`` does."""
+"""Generation of a data set on disk: the function behind ``gen-data --config ... --n ...``."""
 
 from __future__ import annotations
 
@@ -25,33 +25,39 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     seed: int | None = None,
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
+    repair: bool = False,
     on_progress: Callable[[RunProgress], None] | None = None,
     resume_command: str = "the same call of gen_data.generate",
 ) -> Summary:
-    """Generate a data set, or what is missing of it.
+    """Generate a data set, or the missing part of an unfinished one.
 
     Args:
-        config: As of ``Dataset``.
+        config: See ``Dataset``.
         n: Number of samples, at least 1.
         out: Folder; None = ``out/<name of the configuration>``.
         workers: Processes; None = one per core, 0 = this process. The bytes do not depend on it.
         seed: Replaces the configuration's seed.
-        overrides: ``KEY=VALUE`` texts as of ``gen-data --set``.
+        overrides: ``KEY=VALUE`` texts, as for ``gen-data --set``.
         without: Names of randomizers to leave out.
+        repair: Hash all existing files and generate damaged shards again.
         on_progress: Called after each sample and shard.
-        resume_command: What error messages name as the way to go on.
+        resume_command: Command that error messages give for resuming.
 
     Returns:
-        What was made, with the identity of the data set; its folder is ``summary.folder``.
+        Summary of the run, with the identity of the data set; its folder is ``summary.folder``.
 
     Raises:
         ConfigError: the configuration or an argument is wrong.
-        GenDataError: of the kind that fits; see ``gen_data.generator.core.errors``.
-        Interrupted: Ctrl-C or SIGTERM; finished shards stay.
+        GenDataError: any other failure; see ``gen_data.generator.core.errors``.
+        Interrupted: Ctrl-C or SIGTERM; finished shards are kept.
+
+    Warns:
+        ConfigWarning: ``n`` is so small that a split of the configuration stays empty.
     """
     from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+    from gen_data.generator.pipeline.splits import warn_of_empty_splits
     from gen_data.generator.runner.identity import format_licences, make_plan
-    from gen_data.generator.runner.run import run
+    from gen_data.generator.runner.run import Settings, run
 
     if n < 1:
         raise ConfigError(f"n: {n} samples cannot be made; expected at least 1")
@@ -59,19 +65,18 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
         raise ConfigError(
             f"workers: {workers}; expected at least 1, or 0 to generate in this process"
         )
-    spec = load_config(config, seed=seed, overrides=overrides, without=without)
-    factory = PipelineFactory(spec, n)
-    folder = Path(out) if out is not None else Path("out") / spec.name
+    loaded = load_config(config, seed=seed, overrides=overrides, without=without)
+    general = loaded.general
+    scenes = -(-n // (general.views_per_scene * general.steps_per_scene))
+    warn_of_empty_splits(scenes, loaded.split_shares, general.splits.assign, general.seed)
+    factory = PipelineFactory(loaded, n)
     return run(
         make_plan(factory),
         factory,
-        folder,
+        Path(out) if out is not None else Path("out") / loaded.name,
         workers=len(os.sched_getaffinity(0)) if workers is None else workers,
         resume_command=resume_command,
         licences=partial(format_licences, factory),
-        progress=on_progress or _ignore,
+        settings=Settings(full_check=repair),
+        progress=on_progress,
     )
-
-
-def _ignore(progress: RunProgress) -> None:
-    del progress

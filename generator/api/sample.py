@@ -1,4 +1,4 @@
-"""A sample as users of the Python API see it: images, boxes and points by sensor name."""
+"""Samples of the Python API: images, boxes and points by sensor name."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class ByName(Mapping[str, T], Generic[T]):
         self._values = values
 
     def __getitem__(self, name: str) -> T:
-        """The value of that name.
+        """Return the value of a name.
 
         Raises:
             UnknownNameError: there is none; it is also a KeyError.
@@ -47,7 +47,7 @@ class ByName(Mapping[str, T], Generic[T]):
         return iter(self._values)
 
     def __len__(self) -> int:
-        """How many there are."""
+        """Number of entries."""
         return len(self._values)
 
     def __repr__(self) -> str:
@@ -79,12 +79,12 @@ class Box2d:
 
     @property
     def xyxy(self) -> tuple[int, int, int, int]:
-        """Corners, as torchvision has them."""
+        """Corners, in torchvision's order."""
         return self.x_min, self.y_min, self.x_max, self.y_max
 
     @property
     def xywh(self) -> tuple[int, int, int, int]:
-        """Corner and size, as COCO has them."""
+        """Corner and size, in COCO's order."""
         return self.x_min, self.y_min, self.x_max - self.x_min, self.y_max - self.y_min
 
 
@@ -93,7 +93,7 @@ class Box3d:
     """The oriented box around an object.
 
     Attributes:
-        category, category_id, instance_id: As of Box2d.
+        category, category_id, instance_id: As for Box2d.
         box: In the world frame; ``box.corners()`` are its corners [m], shape [8, 3].
         box_camera: In the camera frame.
     """
@@ -106,9 +106,9 @@ class Box3d:
 
 
 class CameraReading:
-    """What one camera captured, and the annotations of its image.
+    """Images of one camera with their annotations.
 
-    Arrays are [height, width, ...]; their values for "nothing" are those of CONVENTIONS.md.
+    Arrays are [height, width, ...]; CONVENTIONS.md lists their values for "nothing".
     """
 
     def __init__(self, reading: SensorReading, truth: ImageTruth) -> None:
@@ -122,7 +122,7 @@ class CameraReading:
 
     @property
     def channels(self) -> Mapping[str, NDArray[Any]]:
-        """Every image by the name of its channel, such as ``normals``; decoded when read."""
+        """Images by channel name, such as ``normals``; decoded on access."""
         return ByName("channel", _ChannelNames(self._reading.channels))
 
     @property
@@ -132,17 +132,17 @@ class CameraReading:
 
     @property
     def depth_m(self) -> NDArray[np.float32]:
-        """Distance along the optical axis [m], float32 [height, width]; inf where nothing is."""
+        """Distance along the optical axis [m], float32 [height, width]; inf where there is none."""
         return self.channels["depth"]
 
     @property
     def instance_ids(self) -> NDArray[np.uint16]:
-        """Instance id of each pixel, uint16 [height, width]; 0 where nothing is."""
+        """Instance id of each pixel, uint16 [height, width]; 0 where nothing was hit."""
         return self.channels["instance"]
 
     @property
     def category_ids(self) -> NDArray[np.uint16]:
-        """Category id of each pixel, uint16 [height, width]; 0 where nothing is."""
+        """Category id of each pixel, uint16 [height, width]; 0 where nothing was hit."""
         return self.channels["category"]
 
     @property
@@ -152,12 +152,12 @@ class CameraReading:
 
     @property
     def truth(self) -> ImageTruth:
-        """All annotations of the image, those of no single object included."""
+        """All annotations of the image, including those of the image as a whole."""
         return self._truth
 
     @cached_property
     def boxes2d(self) -> tuple[Box2d, ...]:
-        """Boxes of the annotated objects that have a visible pixel."""
+        """Boxes of the annotated objects with a visible pixel."""
         return tuple(
             Box2d(*_identity(item), *_corners(item.box), item.visible_fraction)
             for item in self._truth.objects
@@ -180,12 +180,12 @@ class CameraReading:
 
     @property
     def T_world_camera(self) -> Array:  # noqa: N802
-        """Camera coordinates (X right, Y down, Z forward) to world coordinates, [4, 4]."""
+        """Transform from camera (X right, Y down, Z forward) to world, float64 [4, 4], metres."""
         return self._truth.camera.T_world_camera.matrix()
 
     @property
     def time_s(self) -> float:
-        """The instant of depth, ids and boxes, from the start of the sequence [s]."""
+        """Instant of depth, ids and boxes, from the start of the sequence [s]."""
         return self._reading.time_s
 
     @property
@@ -226,7 +226,7 @@ class Sample:
     """One element of a data set, generated or read from disk.
 
     Attributes:
-        core: The same sample as the generator's own record, with everything that is known.
+        core: The sample as the generator's internal record, with all of its data.
     """
 
     def __init__(self, core: CoreSample) -> None:
@@ -249,7 +249,7 @@ class Sample:
 
     @cached_property
     def cameras(self) -> Mapping[str, CameraReading]:
-        """By name, the cameras that read at this sample."""
+        """Cameras with a reading in this sample, by name."""
         readings, truth = self.core.capture.readings, self.core.truth
         return ByName(
             "camera", {name: CameraReading(readings[name], truth[name]) for name in truth}
@@ -257,33 +257,33 @@ class Sample:
 
     @property
     def lidars(self) -> Mapping[str, PointCloud]:
-        """By name, the scans of the laser scanners that read at this sample."""
+        """Scans of the laser scanners with a reading in this sample, by name."""
         return ByName("laser scanner", self.core.capture.clouds)
 
     @property
     def measurements(self) -> Mapping[str, NDArray[np.void]]:
-        """By name, the records of radars, inertial units and all other devices."""
+        """Records of radars, inertial units and all other devices, by name."""
         tables = self.core.capture.tables
         return ByName("device", {name: table.rows for name, table in tables.items()})
 
     @property
     def boxes2d(self) -> Mapping[str, tuple[Box2d, ...]]:
-        """By camera, the boxes of the annotated objects that have a visible pixel."""
+        """Boxes of the annotated objects with a visible pixel, by camera."""
         return self._by_camera(lambda camera: camera.boxes2d)
 
     @property
     def boxes3d(self) -> Mapping[str, tuple[Box3d, ...]]:
-        """By camera, the oriented boxes of the annotated objects."""
+        """Oriented boxes of the annotated objects, by camera."""
         return self._by_camera(lambda camera: camera.boxes3d)
 
     @property
     def objects(self) -> Mapping[str, tuple[ObjectTruth, ...]]:
-        """By camera, all annotations of all instances in its image."""
+        """All annotations of all instances, by camera."""
         return self._by_camera(lambda camera: camera.objects)
 
     @property
     def ego(self) -> EgoTruth | None:
-        """The ego vehicle's pose, motion and surroundings; None where none was annotated."""
+        """The ego vehicle's pose, motion and surroundings; None without such annotations."""
         return self.core.frame
 
     def _by_camera(self, read: Callable[[CameraReading], T]) -> Mapping[str, T]:

@@ -28,7 +28,7 @@ from gen_data.generator.runner.provenance import SCENES_NAME, KeptScene, read_sc
 from gen_data.generator.runner.store import MANIFEST_NAME, SHARDS_NAME
 
 SHARDS_KEPT = 4
-"""Shards whose scenes and labels stay in memory; images are read when they are asked for."""
+"""Number of shards whose scenes and labels stay in memory; images are read on access."""
 
 
 class StoredSamples:
@@ -42,8 +42,8 @@ class StoredSamples:
         self.folder = Path(folder)
         self._plan = load_plan(self.folder)
         self._info = self._manifest()["info"]
-        self._cameras = {
-            sensor["name"]: sensor["channels"]
+        self._channels = {
+            sensor["name"]: tuple(Channel(name) for name in sensor["channels"])
             for sensor in self._info["sensors"]
             if sensor["modality"] == Modality.CAMERA.value
         }
@@ -61,12 +61,12 @@ class StoredSamples:
 
     @property
     def config(self) -> Mapping[str, Any]:
-        """The resolved configuration that the data set was made with."""
+        """The resolved configuration of the data set."""
         config: Mapping[str, Any] = self._plan.config
         return config
 
     def sample(self, index: int) -> Sample:
-        """The sample of that number; its images are decoded when they are read.
+        """Return the sample of that number; its images are decoded on access.
 
         Raises:
             StorageError: a file of the sample's shard is missing or damaged.
@@ -84,12 +84,12 @@ class StoredSamples:
             capture=self._capture(folder, labels),
             truth=labels.truth,
             attempts=kept.attempts,
-            cameras=tuple(sorted(self._cameras)),
+            cameras=tuple(self._channels),
             frame=labels.frame,
         )
 
     def close(self) -> None:
-        """Forget the shards in memory."""
+        """Drop the shards from memory."""
         self._shard.cache_clear()
 
     def _capture(self, folder: Path, labels: Labels) -> Capture:
@@ -98,7 +98,7 @@ class StoredSamples:
             name: SensorReading(
                 name,
                 labels.truth[name].camera,
-                ImageFiles(folder, name, index, self._channels(name), self._info["depth_scale_m"]),
+                ImageFiles(folder, name, index, self._channels[name], self._info["depth_scale_m"]),
                 time_s=image.time_s,
                 ev100=image.ev100,
             )
@@ -115,9 +115,6 @@ class StoredSamples:
             for name, table in labels.tables.items()
         }
         return Capture(readings, clouds, tables)
-
-    def _channels(self, camera: str) -> tuple[Channel, ...]:
-        return tuple(Channel(name) for name in self._cameras[camera])
 
     def _read_shard(self, shard: int) -> list[tuple[KeptScene, Labels]]:
         folder = self._shard_dir(shard)
@@ -147,7 +144,7 @@ class StoredSamples:
         return manifest
 
     def __getstate__(self) -> dict[str, Any]:
-        """Another process opens the folder itself."""
+        """Pickle only the folder."""
         return {"folder": self.folder}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -156,7 +153,7 @@ class StoredSamples:
 
 
 class ImageFiles(Mapping[Channel, NDArray[Any]]):
-    """Images of one reading by channel; each is decoded when it is read, and not kept."""
+    """Images of one reading by channel, decoded at each access."""
 
     def __init__(
         self,
@@ -192,5 +189,7 @@ def _load(path: Path) -> NDArray[np.void]:
     try:
         records: NDArray[np.void] = np.load(path, allow_pickle=False)
     except (OSError, ValueError) as error:
-        raise StorageError(f"{path}: cannot be read ({error}); make the data set again") from error
+        raise StorageError(
+            f"{path}: cannot be read ({error}); generate the data set again"
+        ) from error
     return records

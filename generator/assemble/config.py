@@ -1,4 +1,4 @@
-"""Config: a whole configuration, read, merged with its template, and validated."""
+"""Configurations: read, merged with their templates, and validated."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ from gen_data.generator.physics import PhysicsConfig
 from gen_data.generator.pipeline.splits import Assignment
 
 SHARD_SIZE = 20
-"""Small enough that few samples are redone after a crash and that all workers stay busy."""
+"""Small, so that a crash loses few samples and all workers stay busy."""
 
 DEFAULT_RENDERER = "warp"
 
@@ -77,13 +77,13 @@ class Splits(Strict):
 
 
 class AssetFolders(Strict):
-    """Assets besides those that come with the dependencies."""
+    """Assets of the user."""
 
     folders: tuple[str, ...] = Field((), description="Folders of OBJ, GLB, PLY, STL or URDF files.")
 
 
 class GeneralSettings(Strict):
-    """A configuration without its plug-ins."""
+    """Settings of a configuration, without its plug-ins."""
 
     seed: int = Field(0, ge=0, lt=2**63, description="Seed of the data set; 0 is a seed.")
     views_per_scene: int = Field(
@@ -108,10 +108,10 @@ class GeneralSettings(Strict):
 
 @dataclass(frozen=True)
 class SceneConfig:
-    """The part of a configuration that one scene is built and drawn from, shared values filled in.
+    """Configuration of one scene, with its shared values filled in.
 
     Attributes:
-        shared: Names and values, sorted by name.
+        shared: Names and values of shared values, sorted by name.
     """
 
     shared: tuple[tuple[str, SharedValue], ...]
@@ -125,13 +125,13 @@ VARYING: Mapping[str, PluginTable[Any]] = {
     "randomizers": RANDOMIZERS,
     "sensors": SENSORS,
 }
-"""Lists that may depend on shared values, and the plug-ins they hold."""
+"""Lists that may depend on shared values, with their plug-in tables."""
 
 PLUGIN_LISTS: Mapping[str, PluginTable[Any]] = {
     **VARYING,
     "exporters": EXPORTERS,
 }
-"""Lists of plug-ins with a ``type``."""
+"""Lists of plug-ins with a ``type``, with their tables."""
 
 CONSTANT = {
     "elements": ("type", "name"),
@@ -149,10 +149,9 @@ CONSTANT = {
         "lens.model",
     ),
 }
-"""Lists that may depend on shared values, and the fields of their items that may not.
+"""Fields that must not depend on shared values, by list.
 
-What all samples of a data set have in common, such as the size of its images, is no matter of a
-scene.
+They are properties of the whole data set, such as the size of its images.
 """
 
 
@@ -162,14 +161,12 @@ class Config:
 
     Attributes:
         name: Of the configuration; names the default output folder.
-        resolved: The merged document as plain data: what ``plan.json`` keeps, and enough to make
-            the same Config again.
+        resolved: The merged document as plain data, as in ``plan.json``; it gives the same Config.
         render: Settings of the renderer.
         exporters: Plug-ins, in order.
         annotations: Annotators by name, in order.
-        probes: Configurations of scenes that between them show what scenes can be; one where
-            nothing is shared.
-        document: The merged document; configurations of scenes are made from it.
+        probes: Configurations of scenes that cover the shared values; one if there are none.
+        document: The merged document, the source of configurations of scenes.
     """
 
     name: str
@@ -183,44 +180,48 @@ class Config:
 
     @property
     def elements(self) -> tuple[Element, ...]:
-        """The template elements of the first scene."""
+        """Elements of the first scene."""
         return self.probes[0].elements
 
     @property
     def randomizers(self) -> tuple[Randomizer, ...]:
-        """The randomizers of the first scene."""
+        """Randomizers of the first scene."""
         return self.probes[0].randomizers
 
     @property
     def sensors(self) -> tuple[Sensor, ...]:
-        """The sensors of the first scene; those of others differ in parameters only."""
+        """Sensors of the first scene; those of other scenes differ in parameters only."""
         return self.probes[0].sensors
 
     def plugins(self) -> Iterator[object]:
-        """Every plug-in that it is made of."""
+        """Yield all plug-ins of the configuration."""
         yield self.render
         yield from (*self.annotations.values(), *self.exporters)
         for config in self.probes:
             yield from (*config.elements, *config.randomizers, *config.sensors)
 
     def shared(self, streams: Streams) -> tuple[tuple[str, SharedValue], ...]:
-        """The shared values of one scene, sorted by name."""
+        """Draw the shared values of one scene, sorted by name."""
         section = self.document.get("shared")
         if section is None or not section.content:
             return ()
         return tuple(sorted(draw_shared(section, streams).items()))
 
     def scene_config(self, shared: tuple[tuple[str, SharedValue], ...]) -> SceneConfig:
-        """The configuration of a scene with these shared values.
+        """Make the configuration of a scene with these shared values.
 
         Raises:
-            ConfigError: they make something invalid.
+            ConfigError: the shared values make a plug-in invalid.
         """
         return _scene_config(self.document, dict(shared)) if shared else self.probes[0]
 
     @property
     def asset_folders(self) -> tuple[Path, ...]:
-        """Where the user keeps assets."""
+        """Folders of the user's assets.
+
+        Raises:
+            ConfigError: a folder does not exist.
+        """
         listed = self.document.get("assets", "folders")
         nodes = listed.content if listed is not None and isinstance(listed.content, tuple) else ()
         return tuple(
@@ -230,7 +231,7 @@ class Config:
 
     @property
     def split_shares(self) -> dict[str, float]:
-        """Share of each split that has one, in order."""
+        """Shares of the splits that are above 0, in order."""
         splits = self.general.splits
         shares = {"train": splits.train, "val": splits.val, "test": splits.test}
         return {name: share for name, share in shares.items() if share > 0}
@@ -243,17 +244,17 @@ def load_config(
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
 ) -> Config:
-    """The configuration of that path or shipped name.
+    """Load a configuration by path or shipped name.
 
     Raises:
-        ConfigError: telling everything that is wrong, each with its place.
+        ConfigError: the message lists all errors with their positions.
     """
     if seed is not None and seed < 0:
         raise ConfigError(f"--seed: {seed} is negative; expected 0 or more")
     document = resolve_document(
         load_config_document(source), seed=seed, overrides=overrides, without=without
     )
-    return _config(document, Path(source).stem)
+    return _make_config(document, Path(source).stem)
 
 
 def load_source_config(
@@ -263,7 +264,7 @@ def load_source_config(
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
 ) -> Config:
-    """Like ``load_config``; a data set's folder stands for the configuration it was made with."""
+    """Like ``load_config``; the folder of a data set stands for its configuration."""
     plan = Path(source) / "plan.json"
     if not plan.is_file():
         return load_config(source, seed=seed, overrides=overrides, without=without)
@@ -273,7 +274,7 @@ def load_source_config(
     except (ValueError, KeyError, TypeError, OSError) as error:
         raise ConfigError(f"{plan}: is not the plan of a data set: {error}") from error
     document = parse_yaml(text, str(plan))
-    return _config(
+    return _make_config(
         resolve_document(document, seed=seed, overrides=overrides, without=without), name
     )
 
@@ -286,17 +287,17 @@ def parse_config(
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
 ) -> Config:
-    """The configuration in a YAML text; ``name`` is what messages call it.
+    """Parse a configuration in a YAML text; ``name`` is its name in messages.
 
     Raises:
-        ConfigError: telling everything that is wrong, each with its place.
+        ConfigError: the message lists all errors with their positions.
     """
     document = parse_yaml(text, name)
     document = resolve_document(document, seed=seed, overrides=overrides, without=without)
-    return _config(document, name.strip("<>"))
+    return _make_config(document, name.strip("<>"))
 
 
-def _config(document: Node, name: str) -> Config:
+def _make_config(document: Node, name: str) -> Config:
     assert isinstance(document.content, Mapping)
     problems = Problems()
     apart = {*PLUGIN_LISTS, "annotations", "shared", "render"}
@@ -317,7 +318,7 @@ def _config(document: Node, name: str) -> Config:
         problems.add(document.position, "sensors", "at least one sensor is needed")
     for key, names in CONSTANT.items():
         _refuse_varying(document.content[key], key, names)
-    probes_ = _probed(document, head.seed if head else 0, problems)
+    probes = _probe(document, head.seed if head else 0, problems)
     problems.raise_if_any()
     assert head is not None
     assert render is not None
@@ -328,15 +329,15 @@ def _config(document: Node, name: str) -> Config:
         render,
         annotations,
         tuple(exporter for exporter in exporters if exporter is not None),
-        probes_,
+        probes,
         document,
     )
-    _ = config.asset_folders  # A folder that is missing is refused before anything runs.
+    _ = config.asset_folders  # Missing folders are refused before a run.
     return config
 
 
 def _refuse_varying(listed: Node, key: str, names: tuple[str, ...]) -> None:
-    """Raises ConfigError where a field depends on shared values that all scenes have in common."""
+    """Raise ConfigError if a field of the whole data set depends on shared values."""
     fact = "is the same in all scenes of a data set; "
     fact += "expected a value that does not depend on shared ones"
     problems = Problems()
@@ -350,14 +351,14 @@ def _refuse_varying(listed: Node, key: str, names: tuple[str, ...]) -> None:
     problems.raise_if_any()
 
 
-def _probed(document: Node, seed: int, problems: Problems) -> tuple[SceneConfig, ...]:
-    """Configurations of all that shared values can be, each once; each fault is reported once."""
+def _probe(document: Node, seed: int, problems: Problems) -> tuple[SceneConfig, ...]:
+    """Distinct configurations of scenes for probe values; stops at the first with errors."""
     section = document.get("shared")
     every = list(probe_values(section, seed)) if section is not None and section.content else [{}]
     configs: list[SceneConfig] = []
     for shared in every:
         found = Problems()
-        config = _scene_config_or_problems(document, shared, found)
+        config = _collect_scene_config(document, shared, found)
         if len(found):
             problems.extend(found)
             break
@@ -368,12 +369,12 @@ def _probed(document: Node, seed: int, problems: Problems) -> tuple[SceneConfig,
 
 def _scene_config(document: Node, shared: Mapping[str, SharedValue]) -> SceneConfig:
     problems = Problems()
-    config = _scene_config_or_problems(document, shared, problems)
+    config = _collect_scene_config(document, shared, problems)
     problems.raise_if_any()
     return config
 
 
-def _scene_config_or_problems(
+def _collect_scene_config(
     document: Node, shared: Mapping[str, SharedValue], problems: Problems
 ) -> SceneConfig:
     lists = {}
@@ -392,7 +393,7 @@ def _scene_config_or_problems(
 def _plugins(
     listed: Node, key: str, table: PluginTable[P], problems: Problems
 ) -> tuple[P | None, ...]:
-    """Each item read as the plug-in that its ``type`` names; None where that is impossible."""
+    """Make the plug-in of each item; None for an item with errors."""
     if not isinstance(listed.content, tuple):
         problems.add(listed.position, key, f"expected a list of {table.kind}s")
         return ()
@@ -413,7 +414,7 @@ N = TypeVar("N", bound=_Named)
 def _named_plugins(
     listed: Node, key: str, table: PluginTable[N], problems: Problems
 ) -> tuple[N, ...]:
-    """The same for plug-ins with names, which must be unique."""
+    """Make plug-ins, whose names must be unique."""
     made = _plugins(listed, key, table, problems)
     names: set[str] = set()
     for number, plugin in enumerate(made):
@@ -442,14 +443,14 @@ def _plugin(node: Node, field: str, table: PluginTable[P], problems: Problems) -
 
 
 def _renderer_settings(node: Node, problems: Problems) -> RendererSettings | None:
-    """The section ``render``; without ``renderer`` it is that of the default renderer."""
+    """Settings of the renderer in the section ``render``."""
     if node.get(RENDERERS.tag) is not None:
         return _plugin(node, "render", RENDERERS, problems)
     return make_plugin(RENDERERS, DEFAULT_RENDERER, node, problems, "render")
 
 
 def _annotations(listed: Node, problems: Problems) -> dict[str, AnyAnnotator]:
-    """Annotators by name; an item is a name, or a mapping with it as ``type`` and parameters."""
+    """Annotators by name; an item is a name, or a mapping with ``type`` and parameters."""
     items = listed.content if isinstance(listed.content, tuple) else (listed,)
     made: dict[str, AnyAnnotator] = {}
     for number, node in enumerate(items):

@@ -1,4 +1,4 @@
-"""JSON Schema of a configuration: what editors complete and check against."""
+"""JSON Schema of configurations, for completion and checks in editors."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def config_schema() -> dict[str, Any]:
-    """Schema of a whole configuration, every plug-in of every table included."""
+    """Schema of a configuration, with the plug-ins of all tables."""
     definitions: dict[str, Any] = {}
-    schema = _hoisted(json_schema(GeneralSettings), definitions)
+    schema = _hoist_definitions(json_schema(GeneralSettings), definitions)
     properties = schema["properties"]
     for key, table in PLUGIN_LISTS.items():
         properties[key] = {
@@ -51,19 +51,19 @@ def config_schema() -> dict[str, Any]:
     }
     properties["extends"] = {
         "type": "string",
-        "description": "Configuration that this one is laid over: a path or a shipped name.",
+        "description": "Configuration to inherit from: a path or a shipped name.",
     }
     names = {"anyOf": [{"const": ALL}, {"type": "array", "items": {"type": "string"}}]}
     properties["without"] = {
         "type": "object",
-        "description": "Names of what is not inherited, by section.",
+        "description": "Names of items that are not inherited, by section.",
         "properties": dict.fromkeys(NAMED, names),
         "additionalProperties": False,
     }
     properties["annotations"] = {
         "type": "array",
         "items": {"oneOf": [{"enum": list(ANNOTATIONS)}, *_parametric(definitions)]},
-        "description": "What is computed about every object, image and sample.",
+        "description": "Labels to compute for every object, image and sample.",
     }
     return {
         "$schema": DRAFT,
@@ -74,7 +74,7 @@ def config_schema() -> dict[str, Any]:
 
 
 def _parametric(definitions: dict[str, Any]) -> list[dict[str, str]]:
-    """Annotators that have parameters, which may be written as mappings."""
+    """Schemas of the annotators with parameters, which may be written as mappings."""
     return [
         _plugin(ANNOTATIONS, name, definitions)
         for name in ANNOTATIONS
@@ -87,9 +87,9 @@ def _plugin(table: PluginTable[Any], name: str, definitions: dict[str, Any]) -> 
     varying = next((key for key, known in VARYING.items() if known is table), None)
     if varying is not None:
         schema = with_shared_values(schema, CONSTANT[varying])
-    schema = _hoisted(schema, definitions)
+    schema = _hoist_definitions(schema, definitions)
     if (table, name) != (RENDERERS, DEFAULT_RENDERER):
-        # The tag chooses the plug-in, so it has to be written even where its field has a default.
+        # The tag selects the plug-in, so it is required although its field has a default.
         schema["required"] = sorted({table.tag, *schema.get("required", ())})
     definitions[f"{table.kind}.{name}"] = schema
     return {"$ref": f"#/$defs/{table.kind}.{name}"}
@@ -100,7 +100,7 @@ def _model(table: PluginTable[Any], name: str) -> type[Strict]:
     return model
 
 
-def _hoisted(schema: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
-    """The schema with its own definitions moved to the common ones."""
+def _hoist_definitions(schema: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:
+    """Move the definitions of a schema to the common ones."""
     definitions.update(schema.pop("$defs", {}))
     return schema

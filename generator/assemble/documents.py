@@ -1,4 +1,4 @@
-"""Where configurations and templates are found, and how the two become one document."""
+"""Loading of configurations and templates, and their merging into one document."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from types import ModuleType
 from gen_data import configs, scene_templates
 from gen_data.generator.assemble.inheritance import (
     LISTS,
-    extended_document,
+    load_extended,
     mapping_of,
-    overridden_elements,
+    override_elements,
 )
 from gen_data.generator.config.merging import merge_nodes
 from gen_data.generator.config.paths import find_path
 from gen_data.generator.config.problems import Position, Problems
-from gen_data.generator.config.renamed_keys import replace_old_words
+from gen_data.generator.config.renamed_keys import refuse_moved_keys, replace_old_words
 from gen_data.generator.config.yaml_tree import Node, load_yaml, with_override
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.sensors.lidar.datasheets import load_sheets
@@ -26,30 +26,30 @@ SECTIONS = ("render", "physics", "labels", "splits", "assets", "shared")
 """Optional mappings of a configuration; a resolved document has them all."""
 
 TEMPLATE_KEYS = ("shared", "defaults", "elements")
-"""What a template may say."""
+"""Keys of a template."""
 
 
 def resolve_document(
     document: Node, *, seed: int | None, overrides: Sequence[str], without: Sequence[str]
 ) -> Node:
-    """A configuration with its template's elements in it and the command line laid over it.
+    """Merge a configuration with its template and the overrides of the command line.
 
-    In the result ``elements`` is a list, ``template`` is its name only, and every section is there.
+    In the result, ``elements`` is a list, ``template`` is only a name, and all sections exist.
 
     Raises:
-        ConfigError: naming the place of what is wrong.
+        ConfigError: the document, its template or an override is invalid.
     """
     document = replace_old_words(document)
     content = dict(mapping_of(document))
-    template = _template(document)
-    content["elements"] = _elements(document, template)
+    template = _load_template(document)
+    content["elements"] = _merge_elements(document, template)
     _inherit_shared(content, template)
     for key in SECTIONS:
-        content.setdefault(key, _made({}))
+        content.setdefault(key, _default_node({}))
     for key in LISTS:
-        content.setdefault(key, _made(()))
+        content.setdefault(key, _default_node(()))
     if seed is not None:
-        content["seed"] = _made(seed)
+        content["seed"] = _default_node(seed)
     resolved = Node(document.position, content, document.key_positions)
     for text in overrides:
         path, separator, value = text.partition("=")
@@ -57,11 +57,12 @@ def resolve_document(
             raise ConfigError(f"--set {text}: expected KEY=VALUE")
         resolved = with_override(resolved, path.strip(), value.strip())
     resolved = replace_old_words(resolved)
-    return _without_randomizers(_with_sensor_files(resolved), without)
+    refuse_moved_keys(resolved)
+    return _without_randomizers(_with_datasheets(resolved), without)
 
 
-def _with_sensor_files(document: Node) -> Node:
-    """The document with what sensors keep in files in their places."""
+def _with_datasheets(document: Node) -> Node:
+    """Replace references to datasheets in sensors by their contents."""
     content, sensors = dict(mapping_of(document)), document.get("sensors")
     if sensors is not None and isinstance(sensors.content, tuple):
         listed = tuple(load_sheets(sensor) for sensor in sensors.content)
@@ -70,22 +71,22 @@ def _with_sensor_files(document: Node) -> Node:
 
 
 def load_config_document(name: str) -> Node:
-    """The document of a configuration, by path or shipped name, with all that it extends.
+    """Load a configuration by path or shipped name, with everything that it extends.
 
     Raises:
         ConfigError: a file is missing or invalid, or extends itself.
     """
-    shipped = _files_of(configs)
-    return extended_document(find_path(name, None, "", "configuration", shipped=shipped), shipped)
+    shipped = _shipped_files(configs)
+    return load_extended(find_path(name, None, "", "configuration", shipped=shipped), shipped)
 
 
-def _files_of(package: ModuleType) -> list[Path]:
-    """The YAML files that a package ships."""
+def _shipped_files(package: ModuleType) -> list[Path]:
+    """YAML files of a package."""
     return sorted(Path(str(files(package))).glob("*.yaml"))
 
 
-def _template(document: Node) -> Node | None:
-    """The template's document; None where the configuration lists its elements itself."""
+def _load_template(document: Node) -> Node | None:
+    """Load the template; None if the configuration lists its elements itself."""
     given = document.get("elements")
     template = document.get("template")
     if given is not None and isinstance(given.content, tuple):
@@ -96,7 +97,7 @@ def _template(document: Node) -> Node | None:
         problems.add(where, "template", "expected the name of a template, or a list of elements")
         problems.raise_if_any()
         raise AssertionError("unreachable")
-    shipped = _files_of(scene_templates)
+    shipped = _shipped_files(scene_templates)
     path = find_path(template.content, template.position, "template", "template", shipped=shipped)
     loaded = replace_old_words(load_yaml(path))
     problems = Problems()
@@ -109,7 +110,7 @@ def _template(document: Node) -> Node | None:
 
 
 def _inherit_shared(content: dict[str, Node], template: Node | None) -> None:
-    """The template's shared values, each exchanged where the configuration has its own.
+    """Merge the shared values of a template with those of the configuration, which win.
 
     The template's come first, so that the configuration's may depend on them.
     """
@@ -121,8 +122,8 @@ def _inherit_shared(content: dict[str, Node], template: Node | None) -> None:
     content["shared"] = Node((own or inherited).position, entries, positions)
 
 
-def _elements(document: Node, template: Node | None) -> Node:
-    """The template's elements with the configuration's overrides merged in, and its own ones."""
+def _merge_elements(document: Node, template: Node | None) -> Node:
+    """Merge the template's elements with the configuration's overrides and new elements."""
     given = document.get("elements")
     if template is None:
         assert given is not None
@@ -133,11 +134,11 @@ def _elements(document: Node, template: Node | None) -> Node:
     elements = _with_defaults(elements, template.get("defaults"))
     if given is None:
         return elements
-    return overridden_elements(elements, given)
+    return override_elements(elements, given)
 
 
 def _with_defaults(elements: Node, defaults: Node | None) -> Node:
-    """A template's elements with what it lays down for all elements of a type."""
+    """Apply a template's defaults to its elements of each type."""
     if defaults is None:
         return elements
     assert isinstance(elements.content, tuple)
@@ -179,6 +180,6 @@ def _scalar(node: Node, key: str) -> object:
     return None if found is None else found.content
 
 
-def _made(content: dict[str, Node] | tuple[Node, ...] | int) -> Node:
-    """A value that no file holds."""
+def _default_node(content: dict[str, Node] | tuple[Node, ...] | int) -> Node:
+    """Node of a value that is in no file."""
     return Node(Position("(default)", 1, 1), content)

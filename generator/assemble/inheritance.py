@@ -20,21 +20,19 @@ NAMED = (*LISTS, "elements", "shared")
 """Sections whose entries have names, by which ``without`` leaves them out."""
 
 ALL = "all"
-"""Instead of a list of names: everything that is inherited in a section."""
+"""Keyword for all inherited items of a section, in place of a list of names."""
 
 EXTENDS_MAX = 8
 """Longest chain of configurations that extend one another."""
 
 
-def extended_document(
-    path: Path, shipped: Sequence[Path], extending: tuple[Path, ...] = ()
-) -> Node:
-    """The document in a file laid over the one that it extends.
+def load_extended(path: Path, shipped: Sequence[Path], extending: tuple[Path, ...] = ()) -> Node:
+    """Load a configuration and merge it into the one that it extends.
 
     Args:
         path: Of the file.
-        shipped: Configurations that come with the package.
-        extending: The files that lead here, each of which extends the next.
+        shipped: Configurations of the package.
+        extending: Files on the way to this one, each of which extends the next.
 
     Raises:
         ConfigError: a file is missing or invalid, or extends itself.
@@ -53,11 +51,13 @@ def extended_document(
     if len(chain) > EXTENDS_MAX:
         fact = f"more than {EXTENDS_MAX} configurations extend one another"
         raise ConfigError(str(Problem(base.position, "extends", fact)))
-    return _inheriting(extended_document(found, shipped, chain), document)
+    merged = _merge_into_base(load_extended(found, shipped, chain), document)
+    # Again, because overrides without a type have got one now.
+    return replace_old_words(merged)
 
 
-def _inheriting(base: Node, document: Node) -> Node:
-    """A configuration laid over the one that it extends."""
+def _merge_into_base(base: Node, document: Node) -> Node:
+    """Merge a configuration into the one that it extends."""
     content = dict(mapping_of(_without(base, document.get("without"))))
     for key, node in mapping_of(document).items():
         if key in ("extends", "without"):
@@ -66,24 +66,24 @@ def _inheriting(base: Node, document: Node) -> Node:
         if inherited is None:
             content[key] = node
         elif key in (*LISTS, "elements"):
-            content[key] = _merged_items(inherited, node)
+            content[key] = _merge_items(inherited, node)
         else:
             content[key] = merge_nodes(inherited, node)
     positions = {**base.key_positions, **document.key_positions}
     return Node(document.position, content, positions)
 
 
-def _merged_items(base: Node, override: Node) -> Node:
-    """Plug-ins laid over inherited ones; elements of a template are overridden by mappings."""
+def _merge_items(base: Node, override: Node) -> Node:
+    """Merge plug-ins into inherited ones; a mapping overrides elements by name."""
     if isinstance(base.content, tuple) and isinstance(override.content, Mapping):
-        return overridden_elements(base, override)
+        return override_elements(base, override)
     if isinstance(base.content, tuple):
         return merge_named(base, override)
     return merge_nodes(base, override)
 
 
 def _without(base: Node, dropped: Node | None) -> Node:
-    """The inherited document without the items that ``without`` names, section by section."""
+    """Drop the inherited items that ``without`` names by section."""
     if dropped is None:
         return base
     content, problems = dict(mapping_of(base)), Problems()
@@ -97,13 +97,15 @@ def _without(base: Node, dropped: Node | None) -> Node:
         elif not isinstance(names.content, tuple):
             problems.add(names.position, field, f"expected a list of names, or {ALL}")
         else:
-            content[key] = _dropped(content.get(key), names.content, field, problems)
+            content[key] = _drop_items(content.get(key), names.content, field, problems)
     problems.raise_if_any()
     return Node(base.position, content, base.key_positions)
 
 
-def _dropped(section: Node | None, names: tuple[Node, ...], field: str, problems: Problems) -> Node:
-    """A list or mapping of plug-ins without some of them."""
+def _drop_items(
+    section: Node | None, names: tuple[Node, ...], field: str, problems: Problems
+) -> Node:
+    """Drop named items from a list or mapping of plug-ins."""
     inherited = section.content if section is not None else ()
     kept: dict[str, Node] = {}
     if isinstance(inherited, Mapping):
@@ -120,11 +122,11 @@ def _dropped(section: Node | None, names: tuple[Node, ...], field: str, problems
     return Node(where, kept if isinstance(inherited, Mapping) else tuple(kept.values()))
 
 
-def overridden_elements(elements: Node, overrides: Node) -> Node:
-    """A list of elements with overrides by name merged in; those with a type may be new.
+def override_elements(elements: Node, overrides: Node) -> Node:
+    """Merge overrides by name into a list of elements; an override with a type may be new.
 
     Raises:
-        ConfigError: an override names no element.
+        ConfigError: an override without a type names no element.
     """
     assert isinstance(elements.content, tuple)
     by_name = {node_name(node): node for node in elements.content}
@@ -133,10 +135,10 @@ def overridden_elements(elements: Node, overrides: Node) -> Node:
         problems.add(overrides.position, "elements", "expected overrides by element name")
     else:
         for name, given in overrides.content.items():
-            key = Node(overrides.key_position(name), name, text=name)
-            node = given if given.get("name") else with_entry(given, "name", key)
+            name_node = Node(overrides.key_position(name), name, text=name)
+            node = given if given.get("name") else with_entry(given, "name", name_node)
             if name not in by_name and node.get("type") is not None:
-                # A new element that states its type comes after all of the template's.
+                # New elements come after those of the template.
                 by_name[name] = node
             elif name not in by_name:
                 fact = f"the template has no element '{name}'; expected one of "
@@ -152,7 +154,7 @@ def mapping_of(node: Node) -> Mapping[str, Node]:
     """The entries of a mapping.
 
     Raises:
-        ConfigError: it is none.
+        ConfigError: the node is not a mapping.
     """
     if not isinstance(node.content, Mapping):
         raise ConfigError(f"{node.position}: expected a mapping of settings")

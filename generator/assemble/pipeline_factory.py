@@ -1,4 +1,4 @@
-"""From a Config to a running Pipeline."""
+"""Construction of pipelines from configurations."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gen_data.generator.assemble.config import Config, SceneConfig
 from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, default_plugin
 from gen_data.generator.assemble.reference_checks import check_references
 from gen_data.generator.assets.library import Library, open_library
-from gen_data.generator.config.places import find_text
+from gen_data.generator.config.yaml_tree import find_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError, UnknownAsset
 from gen_data.generator.core.interfaces import (
@@ -41,7 +41,7 @@ class PipelineFactory:
     """Makes the same Pipeline in any process; picklable.
 
     Attributes:
-        n: Number of samples of the data set, as exporters are told.
+        n: Number of samples of the data set, for exporters.
         extra_channels: Channels to render beyond what sensors and annotators need.
     """
 
@@ -50,8 +50,8 @@ class PipelineFactory:
     extra_channels: frozenset[Channel] = frozenset()
 
     def __call__(self) -> Pipeline:
-        """A pipeline, to be used as a context manager."""
-        # One process, one core: workers fill the others.
+        """Make a pipeline, which is used as a context manager."""
+        # One core per process: workers use the others.
         cv2.setNumThreads(1)
         config = self.config
         library = open_library(config.asset_folders)
@@ -65,10 +65,10 @@ class PipelineFactory:
 
     @cached_property
     def nominal(self) -> tuple[Scene, ...]:
-        """Nominal scenes that between them hold whatever a scene may hold.
+        """Nominal scenes, one per probe, that cover what a scene can contain.
 
         Raises:
-            ConfigError: a randomizer names what neither they nor the assets have.
+            ConfigError: a randomizer refers to something that neither they nor the assets have.
         """
         library = open_library(self.config.asset_folders)
         scenes = tuple(nominal_scene(self.config, scene, library) for scene in self.config.probes)
@@ -81,14 +81,14 @@ class PipelineFactory:
         return collect_categories(self.nominal, open_library(self.config.asset_folders))
 
     def __getstate__(self) -> dict[str, object]:
-        """Other processes are told the categories, which take a second to find out."""
+        """Pickle the categories, because finding them takes a second."""
         categories = self.categories
-        told = {name: value for name, value in self.__dict__.items() if name != "nominal"}
-        return {**told, "categories": categories}
+        state = {name: value for name, value in self.__dict__.items() if name != "nominal"}
+        return {**state, "categories": categories}
 
 
 def open_pipeline(config: Config, extra_channels: frozenset[Channel] = frozenset()) -> Pipeline:
-    """A pipeline to look at samples with, outside any data set."""
+    """Open a pipeline for single samples, outside of a data set."""
     return PipelineFactory(config, n=1, extra_channels=extra_channels)()
 
 
@@ -99,11 +99,10 @@ def pipeline_config(
     categories: tuple[str, ...],
     extra_channels: frozenset[Channel],
 ) -> PipelineConfig:
-    """Everything that samples depend on, resolved.
+    """Resolve everything that samples depend on.
 
     Raises:
-        ConfigError: when parts do not fit together, such as an exporter whose images no sensor
-            writes.
+        ConfigError: parts do not fit together, such as an exporter without images of a sensor.
     """
     _check_durations(config)
     annotators = annotators_of(config)
@@ -143,7 +142,7 @@ def dataset_info(config: Config, n: int, categories: tuple[str, ...]) -> Dataset
 
 
 def _check_durations(config: Config) -> None:
-    """Raises ConfigError if a sequence is longer than the motion in it."""
+    """Raise ConfigError if a sequence is longer than the motion in it."""
     steps, step_s = config.general.steps_per_scene, config.general.step_s
     lasts_s = (steps - 1) * step_s
     for scene in config.probes:
@@ -158,7 +157,7 @@ def _check_durations(config: Config) -> None:
 
 
 def _strides(info: DatasetInfo) -> dict[str, int]:
-    """Steps from one reading of a sensor to the next; devices may read several times per step."""
+    """Steps between the readings of each sensor; devices may have several readings per step."""
     return {
         s.name: stride(s.name, s.rate_hz, info.step_s)
         for s in info.sensors
@@ -167,34 +166,34 @@ def _strides(info: DatasetInfo) -> dict[str, int]:
 
 
 def scene_source(config: Config, assets: AssetIndex) -> SceneSource:
-    """The nominal scene and the randomizers of given streams; the last few are remembered."""
+    """Function that makes nominal scene, randomizers and sensors of a scene; it is cached."""
 
     @lru_cache(maxsize=NOMINAL_SCENES_KEPT)
-    def made(
+    def make(
         shared: tuple[tuple[str, SharedValue], ...],
     ) -> tuple[Scene, Sequence[Randomizer], Sequence[Sensor]]:
-        of_scene = config.scene_config(shared)
-        nominal = nominal_scene(config, of_scene, assets)
-        return nominal, of_scene.randomizers, of_scene.sensors
+        scene_config = config.scene_config(shared)
+        nominal = nominal_scene(config, scene_config, assets)
+        return nominal, scene_config.randomizers, scene_config.sensors
 
-    return lambda streams: made(config.shared(streams))
+    return lambda streams: make(config.shared(streams))
 
 
-def nominal_scene(config: Config, of_scene: SceneConfig, assets: AssetIndex) -> Scene:
-    """The template's scene with every sensor mounted.
+def nominal_scene(config: Config, scene_config: SceneConfig, assets: AssetIndex) -> Scene:
+    """Build the scene of the template and mount all sensors.
 
     Raises:
-        ConfigError: an element or a sensor has no place in it.
+        ConfigError: an element or a sensor does not fit into it.
     """
     try:
-        scene = build_scene(config.general.template or config.name, of_scene.elements, assets)
+        scene = build_scene(config.general.template or config.name, scene_config.elements, assets)
     except UnknownAsset as error:
         place = find_text(config.document, error.asset_id)
         if place is None:
             raise
         raise UnknownAsset(f"{place[0]}: {place[1]}: {error}", error.asset_id) from None
-    scene = replace(scene, shared=of_scene.shared, step_s=config.general.step_s)
-    for sensor in of_scene.sensors:
+    scene = replace(scene, shared=scene_config.shared, step_s=config.general.step_s)
+    for sensor in scene_config.sensors:
         scene = sensor.mount(scene)
         info = sensor.describe()
         _check_mounted(scene, info)
@@ -204,7 +203,7 @@ def nominal_scene(config: Config, of_scene: SceneConfig, assets: AssetIndex) -> 
 
 
 def _check_mounted(scene: Scene, info: SensorInfo) -> None:
-    """Raises ConfigError if a plug-in's ``mount`` and ``describe`` contradict each other."""
+    """Raise ConfigError if ``mount`` and ``describe`` of a plug-in contradict each other."""
     mounted = {
         Modality.CAMERA: [camera.name for camera in scene.cameras],
         Modality.LIDAR: [lidar.name for lidar in scene.lidars],
@@ -231,7 +230,7 @@ def collect_categories(scenes: Sequence[Scene], assets: AssetIndex) -> tuple[str
 
 
 def annotators_of(config: Config) -> Sequence[AnyAnnotator]:
-    """The configuration's, then those that exporters need besides."""
+    """Annotators of the configuration, then the others that exporters need."""
     annotators = dict(config.annotations)
     for exporter in config.exporters:
         for name in sorted(exporter.needs - annotators.keys()):

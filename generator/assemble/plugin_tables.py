@@ -1,4 +1,4 @@
-"""Every plug-in table of the project, by kind."""
+"""Tables of all kinds of plug-ins."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ TABLES: Mapping[str, PluginTable[Any]] = {
     table.kind: table
     for table in (ELEMENTS, RANDOMIZERS, SENSORS, ANNOTATIONS, EXPORTERS, RENDERERS)
 }
-"""For what treats all kinds alike: ``gen-data describe`` and the JSON Schema."""
+"""All tables by kind, for ``gen-data describe`` and the JSON Schema."""
 
 ASSET_FAMILY = "asset_family"
-"""Kind of the plug-ins that the asset library loads by itself."""
+"""Kind of the plug-ins that only the asset library loads."""
 
 P = TypeVar("P")
 
@@ -37,29 +37,29 @@ P = TypeVar("P")
 def make_plugin(
     table: PluginTable[P], name: str, node: Node, problems: Problems, field: str
 ) -> P | None:
-    """The plug-in of that name, made from its entry in YAML; None where there was a problem.
+    """Make a plug-in from its entry in YAML; None if the entry has errors.
 
     Raises:
-        ConfigError: the name is unknown, or its class is no plug-in of this kind.
+        ConfigError: the name is unknown, or its class is not a plug-in of this kind.
     """
     model = cast("type[Strict]", table.load(name))
     return cast("P | None", validate(node, model, problems, field))
 
 
 def default_plugin(table: PluginTable[P], name: str) -> P:
-    """The plug-in of that name with nothing but defaults.
+    """Make a plug-in with defaults.
 
     Raises:
-        ConfigError: the name is unknown, or its class is no plug-in of this kind.
+        ConfigError: the name is unknown, or its class is not a plug-in of this kind.
     """
     return table.load(name)()
 
 
 def third_party_packages(plugins: Iterable[object]) -> dict[str, str]:
-    """``{name: version}`` of the installed packages that some plug-ins come from.
+    """``{name: version}`` of the third-party packages of plug-ins.
 
-    Packages with asset families are always among them: their families take part in every selection
-    by tags.
+    Packages with asset families are always included, because their families take part in every
+    selection by tags.
     """
     classes = {f"{type(p).__module__}:{type(p).__qualname__}" for p in plugins}
     found = [e for kind in TABLES for e in third_party(kind).values() if e.value in classes]
@@ -69,10 +69,10 @@ def third_party_packages(plugins: Iterable[object]) -> dict[str, str]:
 
 
 def find_plugin(name: str) -> tuple[str, type]:
-    """Kind and class of a plug-in by its name, or by ``kind/name`` where a name is used twice.
+    """Kind and class of a plug-in, by name or, for ambiguous names, by ``kind/name``.
 
     Raises:
-        ConfigError: unknown, or more than one kind has it.
+        ConfigError: the name is unknown or ambiguous.
     """
     kind, _, short = name.rpartition("/")
     hits = [k for k, t in TABLES.items() if short in t and kind in ("", k)]

@@ -1,4 +1,4 @@
-"""Names in randomizers are compared with the scene and the assets before a run."""
+"""Checks of the names in randomizers against the scene and the assets, before a run."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from gen_data.generator.core.scene import Scene
 from gen_data.randomizers.base import RandomizerBase
 
 
-def check_references(spec: Config, scenes: Sequence[Scene], assets: AssetIndex) -> None:
-    """Refuse randomizers whose fields name a group, category or texture that does not exist.
+def check_references(config: Config, scenes: Sequence[Scene], assets: AssetIndex) -> None:
+    """Check that the groups, categories and textures that randomizers name exist.
 
     Args:
-        spec: The configuration.
-        scenes: The nominal scene of each of its probes.
+        config: The configuration.
+        scenes: Nominal scene of each of its probes.
         assets: The library.
 
     Raises:
-        ConfigError: one or more do; each is reported with its place.
+        ConfigError: some do not exist; each is reported with its position.
     """
     problems = Problems()
-    for probe, scene in zip(spec.probes, scenes, strict=True):
+    for probe, scene in zip(config.probes, scenes, strict=True):
         for number, randomizer in enumerate(probe.randomizers):
             if not isinstance(randomizer, RandomizerBase):
                 continue
@@ -34,13 +34,13 @@ def check_references(spec: Config, scenes: Sequence[Scene], assets: AssetIndex) 
             except ConfigError as error:
                 path, _, fact = str(error).partition(": ")
                 field = path.removeprefix(f"randomizers.{randomizer.name}.")
-                position = _find_position(spec.document, number, field)
+                position = _find_position(config.document, number, field)
                 problems.add(position, f"randomizers[{number}].{field}", fact)
     problems.raise_if_any()
 
 
 def _find_position(document: Node, number: int, field: str) -> Position:
-    """Of a field of a randomizer; of the randomizer where the field is not written."""
+    """Position of a field of a randomizer; of the randomizer if the field has its default."""
     paths: tuple[tuple[str | int, ...], ...] = (
         ("randomizers", number, field),
         ("randomizers", number),

@@ -27,10 +27,9 @@ from gen_data.generator.assets.discovery import (
 from gen_data.generator.assets.readers import MESH_SUFFIXES
 from gen_data.generator.assets.texture_maps import TextureMaps as Maps
 from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.places import find_text
 from gen_data.generator.config.problems import Problems
 from gen_data.generator.config.validation import validate
-from gen_data.generator.config.yaml_tree import Node, load_yaml
+from gen_data.generator.config.yaml_tree import Node, find_text, load_yaml
 from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.se3 import Vec3
 

@@ -1,7 +1,7 @@
-"""``gen-data doctor``: try every engine on this machine.
+"""``gen-data doctor``: checks of all engines on this machine.
 
-Each check loads a library and uses it once, in a process of its own: a library that crashes, as
-on a processor it was not built for, is one failed check.
+Each check loads a library and uses it once, in a separate process, so that a crash, as on an
+unsupported processor, is one failed check.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ REINSTALL = "reinstall it: pip install --force-reinstall --no-deps {}"
 
 @dataclass(frozen=True)
 class Check:
-    """One thing to try.
+    """One check.
 
     Attributes:
-        name: What is tried, a word.
-        attempt: Tries it; returns a short finding, raises anything when it does not work.
-        remedy: What a user can do about a failure.
-        required: Whether a failure is a fault of the installation.
+        name: One word.
+        attempt: Runs the check; returns a short finding, or raises any exception.
+        remedy: Advice for the user in case of failure.
+        required: A failure means that the installation is broken.
     """
 
     name: str
@@ -47,9 +47,9 @@ class Check:
 
 @click.command()
 def doctor() -> None:
-    """Check this machine: load and try every engine; make one sample.
+    """Check this machine: load and try every engine; generate one sample.
 
-    Exit code 6 if anything fails that gen-data cannot work without.
+    Exit code 6 if a required check fails.
     """
     failed = [check.name for check in CHECKS if not _passes(check) and check.required]
     if failed:
@@ -68,7 +68,7 @@ def _passes(check: Check) -> bool:
 
 
 def _attempt_in_process(check: Check) -> tuple[bool, str]:
-    """Return whether a check works, and its finding or its error."""
+    """Run a check in a new process; returns success, and the finding or the error."""
     context = multiprocessing.get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_report, args=(check, sender))
@@ -217,12 +217,12 @@ def _try_preview() -> str:
 
 
 def _try_sample() -> str:
-    """One small sample of the shipped tabletop, through every stage."""
+    """Generate one small sample of the shipped tabletop, through every stage."""
     from gen_data.generator.assemble.config import load_config
     from gen_data.generator.assemble.pipeline_factory import open_pipeline
 
-    spec = load_config("tabletop.yaml", overrides=("sensors[0].size_px=[160, 120]",))
-    with open_pipeline(spec) as pipeline:
+    config = load_config("tabletop.yaml", overrides=("sensors[0].size_px=[160, 120]",))
+    with open_pipeline(config) as pipeline:
         sample = pipeline.sample(0)
     labelled = sum(len(truth.objects) for truth in sample.truth.values())
     return f"{labelled} objects labelled, {sample.attempts} layout attempt(s)"
@@ -257,5 +257,5 @@ CHECKS = (
     Check("preview", _try_preview, REINSTALL.format("rerun-sdk")),
     Check("sample", _try_sample, "if the checks above pass, delete ~/.cache/warp and try again"),
     Check("denoiser", _try_denoiser, "pip install 'gen-data[denoise]'", required=False),
-    Check("packs", _try_packs, "gen-data assets list shows what there is", required=False),
+    Check("packs", _try_packs, "gen-data assets list shows the available packs", required=False),
 )

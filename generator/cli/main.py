@@ -1,6 +1,6 @@
-"""``gen-data``: the group of commands and the exit codes.
+"""``gen-data``: commands and exit codes.
 
-Imports stay light here: each command imports what it needs when it runs.
+Imports are few here: each command imports its modules when it runs.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ SINGLE_THREADED = (
     "MKL_NUM_THREADS",
     "NUMEXPR_NUM_THREADS",
 )
-"""Worker processes fill the cores; one thread each keeps every sum in one order."""
+"""Limits on threads: workers use all cores, and one thread fixes the order of sums."""
 
 
-class LateCommands(click.Group):
-    """A group whose commands are imported when they are asked for."""
+class LazyCommands(click.Group):
+    """A group of commands that are imported on demand."""
 
     modules = {  # noqa: RUF012
         "preview": "gen_data.generator.cli.preview_commands:preview",
@@ -45,7 +45,7 @@ class LateCommands(click.Group):
         "preview": "Show samples in Rerun: live, in a browser, or as a .rrd file.",
         "contact-sheet": "Draw samples with their labels on one PNG.",
         "assets": "Install, list, show, verify and remove packs of assets.",
-        "report": "Count what a data set contains, beside KITTI's own numbers.",
+        "report": "Statistics of a data set, compared with KITTI's.",
         "verify": "Check a data set against its manifest.",
         "describe": "Explain a plug-in: what it does, its fields, an example.",
         "schema": "Print the JSON Schema of configurations.",
@@ -53,12 +53,12 @@ class LateCommands(click.Group):
     }
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names of all commands, in the order in which a user meets them."""
+        """Names of all commands, in the order of the help."""
         del ctx
         return list(self.modules)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command, imported now; None if unknown."""
+        """Import a command; None if unknown."""
         del ctx
         if cmd_name not in self.modules:
             return None
@@ -69,7 +69,7 @@ class LateCommands(click.Group):
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The list of commands, from the table above, without importing one."""
+        """Write the list of commands without importing them."""
         del ctx
         with formatter.section("Commands"):
             formatter.write_dl(list(self.summaries.items()))
@@ -87,7 +87,7 @@ An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configu
 """
 
 
-@click.group(cls=LateCommands, invoke_without_command=True, help=HELP)
+@click.group(cls=LazyCommands, invoke_without_command=True, help=HELP)
 @click.version_option(__version__, prog_name="gen-data")
 @click.option("--config", "-c", metavar="FILE", help="Configuration: a path, or a shipped name.")
 @click.option("--n", "-n", type=int, help="Number of samples.")
@@ -95,7 +95,7 @@ An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configu
     "--out", "-o", type=click.Path(path_type=Path), help="Folder [default: out/<config>]."
 )
 @click.option("--workers", "-w", type=int, help="Worker processes [default: one per core].")
-@click.option("--repair", is_flag=True, help="Hash what is there; make damaged shards again.")
+@click.option("--repair", is_flag=True, help="Hash existing files; generate damaged shards again.")
 @configuration_options
 @click.pass_context
 def cli(
@@ -109,11 +109,11 @@ def cli(
     overrides: tuple[str, ...],
     without: tuple[str, ...],
 ) -> None:
-    """Generate, or hand over to the command that was named."""
+    """Generate a data set, unless a command follows."""
     if context.invoked_subcommand is not None:
         if config is not None:
             raise ConfigError(
-                f"--config goes without a command; expected: "
+                f"--config cannot precede a command; expected: "
                 f"gen-data {context.invoked_subcommand} {config}"
             )
         return
@@ -122,14 +122,14 @@ def cli(
         return
     if n is None:
         raise ConfigError("--n is missing: how many samples?")
-    from gen_data.generator.cli.generate_command import generate
+    from gen_data.generator.cli.generate_command import generate_with_progress
 
     choice = ConfigurationOptions(config, seed, overrides, without)
-    generate(choice, n, out=out, workers=workers, repair=repair)
+    generate_with_progress(choice, n, out=out, workers=workers, repair=repair)
 
 
 def main() -> None:
-    """Run the command line and leave with its exit code."""
+    """Run the command line and exit with its code."""
     for name in SINGLE_THREADED:
         os.environ[name] = "1"
     warnings.showwarning = partial(_show_warning, warnings.showwarning)
@@ -143,7 +143,7 @@ def _show_warning(
     *place: Any,
     **options: Any,
 ) -> None:
-    """Our own warnings as one plain message; those of libraries as Python shows them."""
+    """Print our own warnings as plain messages; those of libraries as usual."""
     if category in (FutureWarning, ConfigWarning):
         click.echo(f"gen-data: warning: {message}", err=True)
     else:
@@ -162,7 +162,7 @@ def _exit_code() -> int:
         click.echo("gen-data: interrupted", err=True)
         return Interrupted.exit_code
     except BrokenPipeError:
-        # The reader of our output left (`| head`): there is nobody to tell.
+        # The reader of the output has closed it, as in `| head`.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     except GenDataError as error:

@@ -1,4 +1,4 @@
-"""Options that every command with a configuration has."""
+"""Options of all commands with a configuration."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 @dataclass(frozen=True)
 class ConfigurationOptions:
-    """A configuration and what the command line changes in it.
+    """A configuration and its changes on the command line.
 
     Attributes:
         source: A path, a shipped name, or the folder of a data set.
@@ -30,7 +30,7 @@ class ConfigurationOptions:
     without: tuple[str, ...]
 
     def config(self) -> Config:
-        """The validated configuration."""
+        """Load and validate the configuration."""
         from gen_data.generator.assemble.config import load_source_config
 
         return load_source_config(
@@ -41,7 +41,7 @@ class ConfigurationOptions:
 def configuration_options(command: F) -> F:
     """Add ``--seed``, ``--set`` and ``--without`` to a command."""
     for option in (
-        click.option("--without", multiple=True, metavar="NAME", help="Leave a randomizer out."),
+        click.option("--without", multiple=True, metavar="NAME", help="Omit a randomizer."),
         click.option(
             "--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Override one field."
         ),

@@ -32,7 +32,7 @@ WRITTEN = "written"
     type=click.Choice(["class", "intensity"]),
     default="class",
     show_default=True,
-    help="What decides the colour of laser points.",
+    help="Quantity shown by the colour of laser points.",
 )
 @click.option("--web", is_flag=True, help="Serve to a browser instead of the desktop viewer.")
 @click.option(
@@ -54,10 +54,10 @@ def preview(
     overrides: tuple[str, ...],
     without: tuple[str, ...],
 ) -> None:
-    """Show samples in Rerun: the 3D scene, images, scans, boxes; sequences play in seconds.
+    """Show samples in Rerun: 3D scene, images, scans, boxes; sequences have a timeline [s].
 
     SOURCE is a configuration (a path or a shipped name), or the folder of a data set, whose
-    samples are made again from its plan.
+    samples are generated again from its plan.
     """
     from gen_data.generator.assemble.pipeline_factory import open_pipeline
     from gen_data.generator.preview.rerun_recording import save_recording, send_samples
@@ -93,16 +93,16 @@ def preview(
     show_default=True,
     help="The PNG to write.",
 )
-@click.option("--columns", type=int, default=0, help="Tiles in a row; 0 = a sheet of 4 to 3.")
+@click.option("--columns", type=int, default=0, help="Tiles in a row; 0 = a sheet of about 4:3.")
 @click.option("--tile-px", type=int, default=320, show_default=True, help="Width of a tile.")
 @click.option(
     "--channels",
     default="rgb",
     show_default=True,
-    help="Comma-separated channels of all cameras; 'written' = what each sensor itself writes.",
+    help="Comma-separated channels of all cameras; 'written' = those that each sensor writes.",
 )
 @click.option("--labels/--no-labels", default=True, show_default=True, help="Draw the labels.")
-@click.option("--captions", is_flag=True, help="Write under every tile what it is.")
+@click.option("--captions", is_flag=True, help="Write a caption under every tile.")
 @configuration_options
 def contact_sheet(
     sources: tuple[str, ...],
@@ -121,8 +121,8 @@ def contact_sheet(
 ) -> None:
     """Draw samples with their labels on one PNG.
 
-    SOURCES are configurations (paths or shipped names), or folders of data sets; the samples of
-    each follow those of the one before.
+    SOURCES are configurations (paths or shipped names) or folders of data sets, in the order of
+    the tiles.
     """
     from gen_data.generator.assemble.pipeline_factory import open_pipeline
     from gen_data.generator.preview.contact_sheet import (

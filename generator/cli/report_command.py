@@ -1,4 +1,4 @@
-"""``gen-data report``: what a data set contains."""
+"""``gen-data report``: statistics of a data set."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from gen_data.generator.core.errors import StorageError
     "--html", type=click.Path(path_type=Path), help="Also write a page with histograms here."
 )
 def report(folder: Path, html: Path | None) -> None:
-    """Count what a data set contains, beside what is published about KITTI.
+    """Print statistics of a data set, compared with published ones of KITTI.
 
-    FOLDER is a data set that was exported as coco or kitti: objects, box sizes, occlusion,
-    truncation, distances and keypoints by category; laser points, where kitti has them.
+    FOLDER is a data set with an export as coco or kitti. Statistics by category: objects, box
+    sizes, occlusion, truncation, distances and keypoints; also laser points, if kitti has them.
     """
     from rich import box
     from rich.console import Console

@@ -1,23 +1,15 @@
-"""The base of everything that is read from YAML."""
+"""Base class of all models that are read from YAML."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import ClassVar
 
 from pydantic import BaseModel, ConfigDict
 
 
 class Strict(BaseModel):
-    """Frozen values, exactly as declared.
+    """A frozen model without silent conversions.
 
-    An unknown key is an error, a string is never read as a number, a boolean never as 0 or 1, and
-    NaN and infinity are refused. Whole numbers are accepted where fractions are due; lists where
-    tuples are due, since YAML knows only lists.
-
-    Attributes:
-        former_keys: Former names of fields, and their present ones; documents may still use them.
-        moved_keys: Keys that other models have now, and their places in a configuration.
+    Unknown keys, NaN and infinity are errors; a string is never read as a number, nor a boolean as
+    0 or 1. A whole number is accepted for a ``float``, and a list for a tuple, which YAML lacks.
     """
 
     model_config = ConfigDict(
@@ -27,6 +19,3 @@ class Strict(BaseModel):
         validate_default=True,
         allow_inf_nan=False,
     )
-
-    former_keys: ClassVar[Mapping[str, str]] = {}
-    moved_keys: ClassVar[Mapping[str, str]] = {}

@@ -1,4 +1,4 @@
-"""What a plug-in is and what it can be given, as text for people."""
+"""Descriptions and examples of plug-ins for ``gen-data describe``."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ _HEADINGS = ("field", "type", "default")
 
 
 def describe(model: type) -> str:
-    """The first line of the docstring, a table of the fields, and an example in YAML.
+    """Summary of a plug-in, a table of its fields, and an example in YAML.
 
-    What takes no parameters, such as most annotators, is told by its docstring alone.
+    A plug-in without parameters, such as most annotators, has its summary only.
     """
     if not issubclass(model, BaseModel):
         return docstring_summary(model) + "\n"
@@ -52,10 +52,10 @@ def describe(model: type) -> str:
 
 
 def make_example(model: type[BaseModel]) -> dict[str, Any] | None:
-    """Plain data that the model accepts: what it requires, and up to two of its options.
+    """Valid plain data for a model: its required fields and up to two optional ones.
 
     Required fields take their first declared example (``Field(examples=[...])``), else a value
-    made up from their type. None if the model refuses what comes of that.
+    generated from their type. None if the model refuses the result.
     """
     required: dict[str, Any] = {}
     optional: dict[str, Any] = {}
@@ -74,12 +74,12 @@ def make_example(model: type[BaseModel]) -> dict[str, Any] | None:
 
 
 def plain_default(info: FieldInfo) -> Any:
-    """A field's default as plain data."""
+    """Default of a field as plain data."""
     return to_plain_yaml(info.get_default(call_default_factory=True, validated_data={}))
 
 
 def to_plain_yaml(value: Any) -> Any:
-    """A value of a model as the plain data that YAML would hold."""
+    """Convert a value of a model to the plain data of its YAML."""
     if isinstance(value, Distribution):
         return value.to_yaml()
     if isinstance(value, BaseModel):
@@ -152,21 +152,21 @@ def _sample_value(info: FieldInfo) -> Any:
         return to_plain_yaml(info.examples[0])
     if not info.is_required():
         return plain_default(info)
-    return _made_up(info.annotation, tuple(info.metadata))
+    return _example_value(info.annotation, tuple(info.metadata))
 
 
-def _made_up(annotation: Any, metadata: tuple[Any, ...] = ()) -> Any:
-    """Some value of a type."""
+def _example_value(annotation: Any, metadata: tuple[Any, ...] = ()) -> Any:
+    """Generate a value of a type."""
     annotation, metadata = unwrap_annotated(annotation, metadata)
     marker = next((m for m in metadata if isinstance(m, FieldOf)), None)
     value = marker.kind.example if marker is not None else _EXAMPLES.get(annotation)
     limits = numeric_bounds(metadata)
     if limits is not None and isinstance(value, (int, float)):
-        return _within(value, limits)
-    return _made_up_collection(annotation) if value is None else value
+        return _clamp_inside(value, limits)
+    return _example_collection(annotation) if value is None else value
 
 
-def _within(value: float, limits: Bounds) -> float:
+def _clamp_inside(value: float, limits: Bounds) -> float:
     if value in limits:
         return value
     if math.isinf(limits.high):
@@ -174,14 +174,14 @@ def _within(value: float, limits: Bounds) -> float:
     return limits.high - 1 if math.isinf(limits.low) else 0.5 * (limits.low + limits.high)
 
 
-def _made_up_collection(annotation: Any) -> Any:
+def _example_collection(annotation: Any) -> Any:
     origin, arguments = get_origin(annotation), get_args(annotation)
     if is_union(annotation):
-        return _made_up(union_branches(annotation)[0])
+        return _example_value(union_branches(annotation)[0])
     if origin is tuple and Ellipsis not in arguments:
-        return [_made_up(argument) for argument in arguments]
+        return [_example_value(argument) for argument in arguments]
     if origin in (list, tuple):
-        return [_made_up(arguments[0])]
+        return [_example_value(arguments[0])]
     if origin is Literal:
         return arguments[0]
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):

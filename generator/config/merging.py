@@ -1,11 +1,10 @@
-"""How one document is laid over another.
+"""Merging of documents.
 
 1. Mappings merge key by key; numbers, texts and lists are replaced as a whole.
 2. A distribution and a selection by a shared value are one value each: they are replaced.
-3. A mapping with another ``type`` (``model`` where it has no type) describes another thing: it
-   takes the place of the old one, of which nothing is left.
-4. Keys that choose assets (``asset``, ``ids``, ``tags``, ``any_of``) are alternatives: one that is
-   given drops those that are inherited.
+3. A mapping with another ``type`` (``model`` if it has no type) replaces the old one as a whole.
+4. Keys that select assets (``asset``, ``ids``, ``tags``, ``any_of``) are alternatives: giving one
+   drops the inherited ones.
 5. Lists of plug-ins merge item by item, see ``merge_named``.
 """
 
@@ -21,7 +20,7 @@ ASSET_KEYS = frozenset({"asset", "ids", "tags", "any_of"})
 
 
 def merge_nodes(base: Node, override: Node) -> Node:
-    """``override`` laid over ``base``."""
+    """Merge ``override`` into ``base``."""
     if not isinstance(base.content, Mapping) or not isinstance(override.content, Mapping):
         return override
     if any(is_distribution(node) or is_reference(node) for node in (base, override)):
@@ -37,10 +36,10 @@ def merge_nodes(base: Node, override: Node) -> Node:
 
 
 def merge_named(base: Node, override: Node) -> Node:
-    """A list of plug-ins laid over another.
+    """Merge a list of plug-ins into another.
 
-    An item merges with the inherited one of the same name. What is new comes after everything
-    inherited, or right before the inherited item that follows it in ``override``.
+    An item merges with the inherited one of the same name. New items come last, or right before
+    the inherited item that follows them in ``override``.
     """
     if not isinstance(base.content, tuple) or not isinstance(override.content, tuple):
         return override
@@ -50,7 +49,7 @@ def merge_named(base: Node, override: Node) -> Node:
     for item in override.content:
         name = node_name(item)
         if name in items:
-            items[name] = merge_nodes(items[name], _named_as(item, items[name]))
+            items[name] = merge_nodes(items[name], _with_name_of(item, items[name]))
             at = order.index(name)
             order[at:at], new = new, []
         else:
@@ -60,20 +59,20 @@ def merge_named(base: Node, override: Node) -> Node:
 
 
 def node_name(item: Node) -> str:
-    """What tells an item of a list of plug-ins from the others: its name, else its type."""
+    """Key of an item in a list of plug-ins: its name, else its type, else its position."""
     for node in (item.get("name"), item.get("type"), item):
         if node is not None and isinstance(node.content, str):
             return node.content
     return str(item.position)
 
 
-def _named_as(item: Node, inherited: Node) -> Node:
-    """The item, with the name of the one it may take the place of."""
+def _with_name_of(item: Node, inherited: Node) -> Node:
+    """Give an item without a name that of the inherited one, which it may replace."""
     return item if item.get("name") else with_entry(item, "name", inherited.get("name"))
 
 
 def with_entry(node: Node, key: str, value: Node | None) -> Node:
-    """A mapping with one more entry in front; the node itself if it is no mapping."""
+    """Prepend an entry to a mapping; anything else is returned unchanged."""
     if value is None or not isinstance(node.content, Mapping):
         return node
     return Node(node.position, {key: value, **node.content}, node.key_positions)

@@ -1,8 +1,8 @@
-"""Where the files are that configurations name.
+"""Resolution of the paths in configurations and templates.
 
-A relative path starts from the folder of the file that names it; on the command line, from the
-current folder. ``~`` is the user's home. Where there is nothing, a shipped file of that name is
-meant. All paths in configurations and templates are found here.
+A relative path starts from the folder of the file that contains it; on the command line, from the
+current folder. ``~`` is the home folder. If nothing exists there, a shipped file of that name is
+used.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from gen_data.generator.config.problems import Position, Problem
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 
 PLAN = "plan.json"
-"""A data set's own record names paths as its configuration did, which lies elsewhere."""
+"""Record of a data set; its paths are those of its configuration, which lies elsewhere."""
 
 
 def find_path(
@@ -26,25 +26,25 @@ def find_path(
     shipped: Sequence[Path] = (),
     is_folder: bool = False,
 ) -> Path:
-    """The file or folder that a configuration means.
+    """Find a file or folder that a configuration names.
 
     Args:
-        name: As it is written. Of a shipped file only, ``.yaml`` may be left out.
-        position: Of the name in a document; None for an argument of the command line.
-        field: That holds the name.
-        kind: Of thing, for the message: ``template``.
-        shipped: Files that come with the package.
+        name: As written; ``.yaml`` may be omitted for shipped files.
+        position: Of the name in its document; None for an argument of the command line.
+        field: Dotted path of the field with the name.
+        kind: Noun for the message, such as ``template``.
+        shipped: Files of the package.
         is_folder: Whether a folder is expected.
 
     Raises:
-        ConfigError: there is none; the message says where it was looked for.
+        ConfigError: there is none; the message gives the path.
     """
-    path = _folder_of(position) / Path(name).expanduser()
-    if path.is_dir() if is_folder else path.is_file() and not _is(path, position):
+    path = _base_folder(position) / Path(name).expanduser()
+    if path.is_dir() if is_folder else path.is_file() and not _is_document(path, position):
         return path
     by_name = {file.name: file for file in shipped}
     for known in (name, f"{name}.yaml"):
-        if known in by_name and not _is(by_name[known], position):
+        if known in by_name and not _is_document(by_name[known], position):
             return by_name[known]
     fact = f"there is no {kind} '{name}'; looked for '{path}'"
     if by_name:
@@ -52,14 +52,14 @@ def find_path(
     raise ConfigError(str(Problem(position, field, fact)) if position else fact)
 
 
-def _folder_of(position: Position | None) -> Path:
-    """Where relative paths of a document start."""
+def _base_folder(position: Position | None) -> Path:
+    """Folder that relative paths of a document start from."""
     if position is None or not Path(position.file).is_file():
         return Path()
     file = Path(position.file)
     return Path() if file.name == PLAN else file.parent
 
 
-def _is(candidate: Path, position: Position | None) -> bool:
-    """Whether a path is the document itself: a file that names itself means a shipped one."""
+def _is_document(candidate: Path, position: Position | None) -> bool:
+    """Whether a path is the document itself, whose own name stands for a shipped file."""
     return position is not None and candidate.resolve() == Path(position.file).resolve()

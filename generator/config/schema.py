@@ -1,4 +1,4 @@
-"""JSON Schema of models: what editors complete and check against."""
+"""JSON Schema of models, for completion and checks in editors."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from gen_data.generator.config.describe import (
 from gen_data.generator.config.distributions.fields import DISTRIBUTION_TITLE
 
 SHARED_VALUE = "shared_value"
-"""Name of the definition of what stands for a shared value."""
+"""Name of the definition for references to shared values."""
 
 _SHARED_VALUE = {
     "description": "A shared value, or the entry that one selects.",
@@ -28,12 +28,12 @@ _SHARED_VALUE = {
 
 
 def json_schema(model: type[BaseModel]) -> dict[str, Any]:
-    """JSON Schema (2020-12) of what YAML may hold, with the docstrings' words in it.
+    """JSON Schema (2020-12) of a model's YAML, with descriptions from docstrings.
 
-    What a distribution may be is the same for all fields of a kind: it stands once, in ``$defs``.
+    Distributions of one kind share one definition in ``$defs``.
     """
     definitions: dict[str, Any] = {}
-    schema: dict[str, Any] = _shared(
+    schema: dict[str, Any] = _hoist_distributions(
         model.model_json_schema(schema_generator=_Generator), definitions
     )
     schema["description"] = docstring_summary(model)
@@ -47,13 +47,13 @@ def json_schema(model: type[BaseModel]) -> dict[str, Any]:
 
 
 def with_shared_values(schema: dict[str, Any], constant: Collection[str] = ()) -> dict[str, Any]:
-    """The schema of a plug-in in which a shared value may stand wherever a value may.
+    """Allow references to shared values in the schema of a plug-in.
 
     Args:
         schema: Of a model, definitions included.
         constant: Names of fields that must not depend on shared values.
     """
-    wrapped: dict[str, Any] = _wrapped(schema)
+    wrapped: dict[str, Any] = _allow_shared(schema)
     for name in constant:
         if name in schema.get("properties", {}):
             wrapped["properties"][name] = schema["properties"][name]
@@ -61,14 +61,14 @@ def with_shared_values(schema: dict[str, Any], constant: Collection[str] = ()) -
     return wrapped
 
 
-def _wrapped(schema: Any) -> Any:
-    """A schema in which every value below it may be a shared one."""
+def _allow_shared(schema: Any) -> Any:
+    """Allow references to shared values everywhere below a schema."""
     if not isinstance(schema, dict):
         return schema
     wrapped = dict(schema)
     for key, part in schema.items():
         if key == "$defs":
-            wrapped[key] = {name: _wrapped(entry) for name, entry in part.items()}
+            wrapped[key] = {name: _allow_shared(entry) for name, entry in part.items()}
         elif key == "properties":
             wrapped[key] = {name: _or_shared(entry) for name, entry in part.items()}
         elif key in ("items", "additionalProperties"):
@@ -76,27 +76,27 @@ def _wrapped(schema: Any) -> Any:
         elif key == "prefixItems":
             wrapped[key] = [_or_shared(item) for item in part]
         elif key in ("anyOf", "oneOf"):
-            wrapped[key] = [_wrapped(option) for option in part]
+            wrapped[key] = [_allow_shared(option) for option in part]
     return wrapped
 
 
 def _or_shared(schema: Any) -> Any:
     if not isinstance(schema, dict) or "const" in schema:
         return schema
-    return {"anyOf": [_wrapped(schema), {"$ref": f"#/$defs/{SHARED_VALUE}"}]}
+    return {"anyOf": [_allow_shared(schema), {"$ref": f"#/$defs/{SHARED_VALUE}"}]}
 
 
 class _Generator(GenerateJsonSchema):
-    """Writes defaults as YAML has them."""
+    """Generator that writes defaults as plain YAML data."""
 
     def encode_default(self, dft: Any) -> Any:
         return to_plain_yaml(dft)
 
 
-def _shared(part: Any, definitions: dict[str, Any]) -> Any:
-    """A part of a schema with its distributions moved to the definitions."""
+def _hoist_distributions(part: Any, definitions: dict[str, Any]) -> Any:
+    """Move the distributions in a part of a schema to the definitions."""
     if isinstance(part, list):
-        return [_shared(item, definitions) for item in part]
+        return [_hoist_distributions(item, definitions) for item in part]
     if not isinstance(part, dict):
         return part
     title = part.get("title")
@@ -104,4 +104,4 @@ def _shared(part: Any, definitions: dict[str, Any]) -> Any:
         name = title.replace(" ", "_")
         definitions[name] = part
         return {"$ref": f"#/$defs/{name}"}
-    return {key: _shared(value, definitions) for key, value in part.items()}
+    return {key: _hoist_distributions(value, definitions) for key, value in part.items()}

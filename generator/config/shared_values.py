@@ -1,8 +1,8 @@
-"""Values that several draws have in common, and what depends on them.
+"""Values that are drawn once per scene, and references to them.
 
-A configuration may have a section ``shared`` of named values, drawn once per scene, each from a
-stream of its own, so that their order means nothing. Elsewhere ``$shared.NAME`` stands for such a
-value, and a mapping with the key ``switch`` for the one of its entries that the value selects::
+A configuration may have a section ``shared`` of named values. Each is drawn once per scene from its
+own stream, so that their order has no effect. Elsewhere, ``$shared.NAME`` stands for such a value,
+and a mapping with the key ``switch`` for the entry that the value selects::
 
     shared:
       road: {choice: {street: 3, highway: 1}}
@@ -10,9 +10,8 @@ value, and a mapping with the key ``switch`` for the one of its entries that the
     elements:
       - {type: road, name: main, lanes: $shared.lanes}
 
-Global choices condition local ones, and these the objects: structured domain randomisation
-(Prakash et al., ICRA 2019). Everything here rewrites documents; what comes out is validated like
-any other.
+Global choices condition local ones, and these condition objects: structured domain randomisation
+(Prakash et al., ICRA 2019). The functions here rewrite documents, which are validated afterwards.
 """
 
 from __future__ import annotations
@@ -39,7 +38,7 @@ Shared = Mapping[str, SharedValue]
 
 
 def refers(node: Node) -> bool:
-    """Whether a value depends on shared ones."""
+    """Whether a value depends on shared values."""
     if isinstance(node.content, tuple):
         return any(refers(item) for item in node.content)
     if isinstance(node.content, Mapping) and SWITCH not in node.content:
@@ -48,9 +47,9 @@ def refers(node: Node) -> bool:
 
 
 def varying_place(item: Node, path: str) -> Position | None:
-    """Where the value at a dotted path depends on shared values; None if it is constant.
+    """Position of a shared value that the value at a dotted path depends on; None if constant.
 
-    A selection on the way there makes the value vary, too.
+    A selection along the path also makes the value vary.
     """
     node: Node | None = item
     for part in path.split("."):
@@ -61,17 +60,17 @@ def varying_place(item: Node, path: str) -> Position | None:
 
 
 def is_reference(node: Node) -> bool:
-    """Whether a value stands for a shared one, or is selected by one."""
+    """Whether a value is a reference to a shared value or a selection by one."""
     if isinstance(node.content, Mapping):
         return SWITCH in node.content
     return isinstance(node.content, str) and node.content.startswith(REFERENCE)
 
 
 def resolve_shared(node: Node, shared: Shared, field: str = "") -> Node:
-    """The document with every reference and every ``switch`` replaced by what it stands for.
+    """Replace every reference and every ``switch`` of a document by its value.
 
     Raises:
-        ConfigError: a name is unknown, or no entry fits its value.
+        ConfigError: a name is unknown, or a ``switch`` has no entry for its value.
     """
     content = node.content
     if isinstance(content, tuple):
@@ -81,7 +80,7 @@ def resolve_shared(node: Node, shared: Shared, field: str = "") -> Node:
         return replace(node, content=items)
     if isinstance(content, Mapping):
         if SWITCH in content:
-            key, chosen = _selected(node, shared, field)
+            key, chosen = _select_entry(node, shared, field)
             return resolve_shared(chosen, shared, f"{field}.{key}")
         items_by_key = {
             key: resolve_shared(item, shared, f"{field}.{key}" if field else key)
@@ -89,35 +88,35 @@ def resolve_shared(node: Node, shared: Shared, field: str = "") -> Node:
         }
         return replace(node, content=items_by_key)
     if isinstance(content, str) and content.startswith(REFERENCE):
-        value = _value(content.removeprefix(REFERENCE), shared, node.position, field)
+        value = _look_up(content.removeprefix(REFERENCE), shared, node.position, field)
         return replace(node, content=value, text=str(value))
     return node
 
 
 def draw_shared(section: Node, streams: Streams) -> dict[str, SharedValue]:
-    """A value for every name, each from a stream of its own.
+    """Draw a value for every name, each from its own stream.
 
     Raises:
-        ConfigError: an entry is no value and no distribution.
+        ConfigError: an entry is neither a value nor a distribution.
     """
-    return _evaluated(section, streams, {})
+    return _evaluate(section, streams, {})
 
 
 def probe_values(section: Node, seed: int) -> Iterator[dict[str, SharedValue]]:
-    """Values that between them show what a configuration can be: to check it before it runs.
+    """Values that cover a configuration, for checks before a run.
 
-    The first scenes' own values, and every single outcome of every choice.
+    Yields the values of the first scenes, then each outcome of each choice by itself.
     """
     for scene in range(_PROBED_SCENES):
-        yield _evaluated(section, Streams(seed, scene, index=scene), {})
+        yield _evaluate(section, Streams(seed, scene, index=scene), {})
     first = Streams(seed, 0)
     for name, node in _entries(section).items():
         for outcome in _outcomes(node):
-            yield _evaluated(section, first, {name: outcome})
+            yield _evaluate(section, first, {name: outcome})
 
 
-def _evaluated(section: Node, streams: Streams, fixed: Shared) -> dict[str, SharedValue]:
-    """Every value, after those it depends on; ``fixed`` ones are taken as they are."""
+def _evaluate(section: Node, streams: Streams, fixed: Shared) -> dict[str, SharedValue]:
+    """Evaluate all values in the order of their dependencies; ``fixed`` ones are not drawn."""
     entries = _entries(section)
     shared: dict[str, SharedValue] = {}
     waiting = dict(entries)
@@ -129,15 +128,15 @@ def _evaluated(section: Node, streams: Streams, fixed: Shared) -> dict[str, Shar
             raise ConfigError(str(Problem(node.position, f"shared.{name}", fact)))
         for name in ready:
             node = waiting.pop(name)
-            shared[name] = fixed[name] if name in fixed else _drawn(name, node, shared, streams)
+            shared[name] = fixed[name] if name in fixed else _draw(name, node, shared, streams)
     return shared
 
 
-def _drawn(name: str, node: Node, shared: Shared, streams: Streams) -> SharedValue:
+def _draw(name: str, node: Node, shared: Shared, streams: Streams) -> SharedValue:
     field = f"shared.{name}"
     entry = resolve_shared(node, shared, field)
     try:
-        distribution = read_distribution(entry.plain(), _kind_of(entry))
+        distribution = read_distribution(entry.plain(), _infer_kind(entry))
     except Malformed as error:
         raise ConfigError(str(Problem(entry.position, field, error.fact))) from None
     value: SharedValue = distribution.draw(streams.rng(field))
@@ -163,8 +162,8 @@ def _entries(section: Node) -> Mapping[str, Node]:
     return section.content
 
 
-def _kind_of(node: Node) -> Kind[Any]:
-    """What a value is, from how it is written."""
+def _infer_kind(node: Node) -> Kind[Any]:
+    """Infer the kind of a value from its notation."""
     outcomes = _outcomes(node)
     if not outcomes and isinstance(node.content, (str, int, float)):
         outcomes = (node.content,)
@@ -183,7 +182,7 @@ def _kind_of(node: Node) -> Kind[Any]:
 
 
 def _outcomes(node: Node) -> tuple[SharedValue, ...]:
-    """Every value of a choice or sequence; none for anything else."""
+    """All values of a choice or sequence; empty for any other node."""
     if not is_distribution(node):
         return ()
     assert isinstance(node.content, Mapping)
@@ -196,11 +195,11 @@ def _outcomes(node: Node) -> tuple[SharedValue, ...]:
     return tuple(i.content for i in items if isinstance(i.content, (str, int, float)))
 
 
-def _selected(node: Node, shared: Shared, field: str) -> tuple[str, Node]:
-    """The entry of a ``switch`` that the value of its name selects."""
+def _select_entry(node: Node, shared: Shared, field: str) -> tuple[str, Node]:
+    """Key and value of the entry that a ``switch`` selects."""
     assert isinstance(node.content, Mapping)
     name = node.content[SWITCH].content
-    value = _value(str(name), shared, node.content[SWITCH].position, f"{field}.{SWITCH}")
+    value = _look_up(str(name), shared, node.content[SWITCH].position, f"{field}.{SWITCH}")
     for key, item in node.content.items():
         if key not in (SWITCH, DEFAULT) and _scalar(key) == value:
             return key, item
@@ -211,7 +210,7 @@ def _selected(node: Node, shared: Shared, field: str) -> tuple[str, Node]:
 
 
 def _scalar(key: str) -> SharedValue:
-    """A key as the value it spells."""
+    """Parse a key as a scalar."""
     try:
         value = resolve_scalar(key)
     except ValueError:
@@ -219,7 +218,7 @@ def _scalar(key: str) -> SharedValue:
     return key if value is None else value
 
 
-def _value(name: str, shared: Shared, position: Position, field: str) -> SharedValue:
+def _look_up(name: str, shared: Shared, position: Position, field: str) -> SharedValue:
     if name not in shared:
         fact = f"there is no shared value '{name}'; expected one of {', '.join(shared) or 'none'}"
         raise ConfigError(str(Problem(position, field, fact + did_you_mean(name, shared))))

@@ -1,4 +1,4 @@
-"""Types in words: what a field expects, as messages and descriptions say it."""
+"""Descriptions of types for error messages and for ``gen-data describe``."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _SIMPLE: dict[Any, str] = {
 
 
 def describe_type(annotation: Any, metadata: tuple[Any, ...] = ()) -> str:
-    """What values of a type are: ``a number in [0, 1]``, ``a list of texts``."""
+    """Describe the values of a type: ``a number in [0, 1]``, ``a list of texts``."""
     annotation, metadata = unwrap_annotated(annotation, metadata)
     limits = numeric_bounds(metadata)
     suffix = "" if limits is None else f" {limits.within()}"
@@ -38,7 +38,7 @@ def describe_type(annotation: Any, metadata: tuple[Any, ...] = ()) -> str:
 def unwrap_annotated(
     annotation: Any, metadata: tuple[Any, ...] = ()
 ) -> tuple[Any, tuple[Any, ...]]:
-    """The bare type, and all metadata that Annotated has put around it."""
+    """Separate a type from all of its ``Annotated`` metadata."""
     if typing.get_origin(annotation) is Annotated:
         inner, *more = typing.get_args(annotation)
         return unwrap_annotated(inner, (*more, *metadata))
@@ -49,7 +49,7 @@ def unwrap_annotated(
 
 
 def numeric_bounds(metadata: tuple[Any, ...]) -> Bounds | None:
-    """The limits on a number among its metadata: our Bounds, or pydantic's gt, ge, lt, le."""
+    """Limits on a number: its Bounds, or pydantic's gt, ge, lt and le; None if unlimited."""
     found = [m for m in metadata if isinstance(m, Bounds)]
     if found:
         return found[-1]
@@ -81,7 +81,7 @@ def union_branches(annotation: Any) -> tuple[Any, ...]:
 
 
 def _scalar(annotation: Any) -> str:
-    """Words for what is no collection; empty if it is one."""
+    """Describe a scalar, choice or union; empty for any other type."""
     if annotation in _SIMPLE:
         return _SIMPLE[annotation]
     if typing.get_origin(annotation) is Literal:
@@ -95,7 +95,7 @@ def _scalar(annotation: Any) -> str:
 
 
 def _tagged(models: tuple[Any, ...]) -> str:
-    """Words for models that one field tells apart by its single value in each; else empty."""
+    """Describe models with a discriminating literal field; empty if they have none."""
     if not all(isinstance(m, type) and issubclass(m, BaseModel) for m in models):
         return ""
     tags = [
@@ -114,12 +114,12 @@ def _tagged(models: tuple[Any, ...]) -> str:
 
 
 def _collection(annotation: Any) -> str:
-    """Words for lists, mappings and models; empty if it is something else."""
+    """Describe a list, mapping or model; empty for any other type."""
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is tuple and Ellipsis not in arguments:
         kinds = {describe_type(a) for a in arguments}
-        what = _plural(kinds.pop()) if len(kinds) == 1 else "values"
-        return f"a list of {len(arguments)} {what}"
+        noun = _plural(kinds.pop()) if len(kinds) == 1 else "values"
+        return f"a list of {len(arguments)} {noun}"
     if origin in (list, tuple, set, frozenset):
         return f"a list of {_plural(describe_type(arguments[0]))}"
     if isinstance(origin, type) and issubclass(origin, Mapping):
@@ -135,7 +135,7 @@ def _alternatives(words: list[str]) -> str:
 
 
 def _plural(words: str) -> str:
-    """``numbers`` for ``a number``; phrases that have no simple plural stay as they are."""
+    """``numbers`` for ``a number``; phrases without a simple plural are returned unchanged."""
     for noun in ("whole number", "number", "text", "mapping", "list", "name"):
         if words.startswith(f"a {noun}"):
             return f"{noun}s{words[len(noun) + 2 :]}"

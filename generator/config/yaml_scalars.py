@@ -1,7 +1,7 @@
-"""Scalars of the YAML 1.2 core schema, in both directions.
+"""Parsing and formatting of scalars of the YAML 1.2 core schema.
 
 Source: YAML 1.2.2, section 10.3.2. ``no`` and ``1:30`` are strings, ``010`` is ten, ``1e3`` is a
-float. NaN and infinity, which the schema has, have no place in a configuration.
+float. NaN and infinity, which the schema allows, are refused.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def resolve_scalar(text: str) -> PlainScalar:
     """The value of an unquoted scalar.
 
     Raises:
-        ValueError: if it is a number that cannot be held: not finite, or beyond 64 bits.
+        ValueError: a number is not finite, or needs more than 64 bits.
     """
     if text in _NULL:
         return None
@@ -42,11 +42,11 @@ def resolve_scalar(text: str) -> PlainScalar:
     if _NOT_FINITE.fullmatch(text):
         raise ValueError(f"{text} is not a finite number")
     if _INT.fullmatch(text):
-        return _integer(text, 10)
+        return _parse_integer(text, 10)
     if _OCTAL.fullmatch(text):
-        return _integer(text[2:], 8)
+        return _parse_integer(text[2:], 8)
     if _HEX.fullmatch(text):
-        return _integer(text[2:], 16)
+        return _parse_integer(text[2:], 16)
     if _FLOAT.fullmatch(text):
         value = float(text)
         if not math.isfinite(value):
@@ -56,7 +56,7 @@ def resolve_scalar(text: str) -> PlainScalar:
 
 
 def to_flow_yaml(value: Any) -> str:
-    """A plain value as YAML on one line; reading it back gives an equal value."""
+    """Format a plain value as YAML on one line, which reads back as an equal value."""
     if isinstance(value, str):
         if _SAFE_TEXT.fullmatch(value) and resolve_scalar(value) == value:
             return value
@@ -77,14 +77,14 @@ def to_flow_yaml(value: Any) -> str:
 
 
 def format_number(value: float) -> str:
-    """Shortest text that reads back as the same number; whole floats without a fraction."""
+    """Shortest text that reads back as the same number; whole floats have no fraction."""
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
         return str(int(value))
     return repr(value)
 
 
 def quote_value(value: Any) -> str:
-    """A value as error messages quote it: strings in single quotes, long ones cut."""
+    """Format a value for an error message: strings in single quotes, long ones truncated."""
     if isinstance(value, str):
         return f"'{abbreviate(value)}'"
     if value is None:
@@ -93,12 +93,12 @@ def quote_value(value: Any) -> str:
 
 
 def abbreviate(text: str, length: int = 60) -> str:
-    """At most ``length`` characters of a text, on one line; what cannot be printed is escaped."""
+    """At most ``length`` characters of a text, on one line; unprintable characters are escaped."""
     start = text if len(text) <= length else text[: length - 3] + "..."
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in start)
 
 
-def _integer(digits: str, base: int) -> int:
+def _parse_integer(digits: str, base: int) -> int:
     # The length is checked first: int() is quadratic, and refuses 4,301 digits with its own error.
     if len(digits.lstrip("+-0")) <= _MAX_INT_DIGITS * 2:
         value = int(digits, base)

@@ -1,13 +1,13 @@
-"""YAML 1.2 as a tree in which every key and every value knows its place.
+"""YAML 1.2 documents as trees in which every key and every value has its position.
 
-Read from libyaml's *events*; its composer and constructors are never called: no tag is honoured,
-no object is built, nesting costs no stack, and every limit is checked while reading.
+The reader uses libyaml's *events*, never its composer or constructors: tags build no objects, and
+each limit is checked before the memory or stack is used.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NoReturn
@@ -15,12 +15,12 @@ from typing import Any, NoReturn
 import yaml
 from yaml.events import (
     AliasEvent,
-    CollectionEndEvent,
-    CollectionStartEvent,
     DocumentStartEvent,
-    Event,
+    MappingEndEvent,
     MappingStartEvent,
+    NodeEvent,
     ScalarEvent,
+    SequenceEndEvent,
 )
 
 from gen_data.generator.config.distributions.base import DISTRIBUTIONS
@@ -54,10 +54,10 @@ class Node:
     """A value in a document.
 
     Attributes:
-        position: Where it begins.
+        position: Of its first character.
         content: A scalar, a tuple of nodes (a list), or a dictionary of nodes (a mapping).
-        key_positions: Where each key of a mapping stands.
-        text: The scalar as it was written, without quotes.
+        key_positions: Of the keys of a mapping.
+        text: The scalar as written, without quotes.
     """
 
     position: Position
@@ -84,7 +84,7 @@ class Node:
         return node
 
     def key_position(self, key: str) -> Position:
-        """Where a key of this mapping stands; where the mapping begins if it has no such key."""
+        """Position of a key of this mapping; of the mapping itself if it has no such key."""
         return self.key_positions.get(key, self.position)
 
     def _child(self, part: str | int) -> Node | None:
@@ -96,10 +96,10 @@ class Node:
 
 
 def load_yaml(path: Path) -> Node:
-    """The mapping in a YAML file.
+    """Read the mapping in a YAML file.
 
     Raises:
-        ConfigError: if it cannot be read, or is no valid document.
+        ConfigError: the file cannot be read, or is no valid document.
     """
     try:
         if path.exists() and not path.is_file():
@@ -110,19 +110,19 @@ def load_yaml(path: Path) -> Node:
         raise ConfigError(f"{path}: cannot be read: {error.strerror or error}") from None
     except ValueError:
         raise ConfigError(f"{str(path)!r}: is no file name") from None
-    return parse_yaml(_decoded(data, str(path)), str(path))
+    return parse_yaml(_decode(data, str(path)), str(path))
 
 
 def parse_yaml(text: str, file: str) -> Node:
-    """The mapping in a YAML text; ``file`` is what messages call it.
+    """Parse the mapping in a YAML text; ``file`` is its name in messages.
 
     Raises:
-        ConfigError: if the text is no valid document; it names every fault that can be told apart.
+        ConfigError: the text is no valid document; the message lists all independent errors.
     """
-    # A byte order mark is legal at the start of a document, and means nothing in UTF-8.
+    # A byte order mark is legal at the start of a document, and has no meaning in UTF-8.
     node = _Reader(text.removeprefix("\ufeff"), file).read()
     if not isinstance(node.content, Mapping):
-        what = "nothing" if node.content is None else _noun(node)
+        what = "nothing" if node.content is None else _describe(node)
         _refuse(node.position, "", f"expected a mapping of settings, got {what}")
     return node
 
@@ -133,84 +133,95 @@ def is_distribution(node: Node) -> bool:
     return len(keys) == 1 and keys[0] in DISTRIBUTIONS
 
 
+def find_text(document: Node, text: str) -> tuple[Position, str] | None:
+    """Position and dotted path of the first scalar with a text; None if there is none."""
+    for path, node in _scalars(document, ()):
+        if text in (node.text, node.content):
+            return node.position, format_path(path)
+    return None
+
+
+def _scalars(node: Node, path: FieldPath) -> Iterator[tuple[FieldPath, Node]]:
+    """All scalars below a node with their paths, in the order of the source."""
+    if isinstance(node.content, Mapping):
+        for key, child in node.content.items():
+            yield from _scalars(child, (*path, key))
+    elif isinstance(node.content, tuple):
+        for number, child in enumerate(node.content):
+            yield from _scalars(child, (*path, number))
+    else:
+        yield path, node
+
+
 def with_override(node: Node, path: str, value: str, origin: str = "--set") -> Node:
-    """The document with one value exchanged, as by ``--set randomizers.clutter.count=5``.
+    """Replace one value of a document, as ``--set randomizers.clutter.count=5`` does.
 
     Args:
         node: The document.
-        path: Keys joined by dots; list items by ``[index]``, or by the ``name`` they carry. Keys
-            that a mapping does not have are added: validation will judge them.
+        path: Keys joined by dots; list items by ``[index]`` or by their ``name``. Missing
+            keys of mappings are added and left to validation.
         value: YAML, usually a scalar or a flow collection.
-        origin: What messages call the source.
+        origin: Name of the source in messages.
 
     Raises:
-        ConfigError: if the path leads nowhere or the value is no YAML.
+        ConfigError: the path does not exist, or the value is no valid YAML.
     """
-    steps = _steps(path, value, origin)
+    steps = _parse_path(path, value, origin)
     within = tuple(step.part for step in steps)
     replacement = _Reader(f"{path}={value}", origin, start=len(path) + 1, within=within).read()
-    return _exchanged(node, steps, replacement, ())
-
-
-@dataclass
-class _Open:
-    """A list or mapping whose end has not been read yet."""
-
-    position: Position
-    path: FieldPath
-    anchor: str | None
-    is_mapping: bool
-    items: list[Node] = field(default_factory=list)
-    entries: dict[str, Node] = field(default_factory=dict)
-    key_positions: dict[str, Position] = field(default_factory=dict)
-    key: str | None = None
-    size: int = 1
-    height: int = 1
+    return _replace_value(node, steps, replacement, ())
 
 
 class _Abort(Exception):
-    """Reading cannot go on; the reason is among the problems."""
+    """Reading cannot continue; the reason is among the problems."""
 
 
 class _Reader:
-    """Builds the tree of one text from the parser's events, with an explicit stack."""
+    """Builds the tree of one text from the parser's events.
+
+    It descends recursively, which is safe because the depth is limited before each descent.
+    """
 
     def __init__(self, text: str, file: str, *, start: int = 0, within: FieldPath = ()) -> None:
         """Read ``text[start:]``, which is the value of the field ``within``."""
         self._text = text[start:]
         self._start = start
-        self._within = within
+        self._path = list(within)
         self._file = file
         self._lines = _LINE_BREAK.split(text)
         self._problems = Problems()
-        self._open: list[_Open] = []
-        self._anchors: dict[str, tuple[Node, int, int] | None] = {}
+        self._anchors: dict[str, Node | None] = {}
         self._nodes = 0
         self._aliased = 0
-        self._documents = 0
-        self._root: Node | None = None
 
     def read(self) -> Node:
+        root: Node | None = None
+        documents = 0
         try:
             self._check_text()
-            for event in self._events():
-                self._take(event)
+            events = self._events()
+            for event in events:
+                if isinstance(event, DocumentStartEvent):
+                    documents += 1
+                    self._check_document(event, documents)
+                elif isinstance(event, NodeEvent):
+                    root = self._node(event, events, depth=0)
         except _Abort:
             pass
         self._problems.raise_if_any()
-        return self._root or Node(self._at(0, 0), None)
+        return root or Node(self._at(0, 0), None)
 
-    def _events(self) -> Iterator[Event]:
+    def _events(self) -> Iterator[Any]:
         try:
             yield from yaml.parse(self._text, Loader=_LOADER)
         except yaml.MarkedYAMLError as error:
             what = ", ".join(part for part in (error.context, error.problem) if part)
-            self._abort(self._blamed(error), f"not valid YAML: {what}")
+            self._abort(self._place_of(error), f"not valid YAML: {what}")
         except yaml.YAMLError as error:
             self._abort(self._at(0, 0), f"not valid YAML: {abbreviate(str(error), 200)}")
 
-    def _blamed(self, error: yaml.MarkedYAMLError) -> Position:
-        """Where a syntax error lies: what was left open, if the parser only met the text's end."""
+    def _place_of(self, error: yaml.MarkedYAMLError) -> Position:
+        """Position of a syntax error; of what was left open if the text ended too early."""
         last = max((i for i, line in enumerate(self._lines) if line.strip()), default=0)
         for mark in (error.problem_mark, error.context_mark):
             if mark is not None and mark.line <= last:
@@ -229,32 +240,32 @@ class _Reader:
                 self._abort(where, "a tab; indent and separate with spaces")
             self._abort(where, f"character U+{ord(bad[0]):04X} is not allowed")
 
-    def _take(self, event: Event) -> None:
-        if isinstance(event, DocumentStartEvent):
-            self._start_document(event)
-        elif isinstance(event, AliasEvent):
-            self._take_alias(event)
-        elif isinstance(event, (ScalarEvent, CollectionStartEvent)):
-            self._check_node(event)
-            if isinstance(event, ScalarEvent):
-                self._take_scalar(event)
-            else:
-                self._start_collection(event)
-        elif isinstance(event, CollectionEndEvent):
-            self._end_collection()
-
-    def _start_document(self, event: DocumentStartEvent) -> None:
+    def _check_document(self, event: DocumentStartEvent, number: int) -> None:
         where = self._start_of(event)
-        self._documents += 1
-        if self._documents > 1:
+        if number > 1:
             self._abort(where, "a second document begins; expected one document per file")
         if event.version not in (None, (1, 2)):
             self._abort(where, "only YAML 1.2 is read; remove the %YAML line")
         if event.tags:
             self._abort(where, "tags are not allowed; remove the %TAG line")
 
-    def _check_node(self, event: ScalarEvent | CollectionStartEvent) -> None:
+    def _node(self, event: NodeEvent, events: Iterator[Any], depth: int) -> Node:
+        """The value that begins with an event; takes the rest of it from ``events``."""
         where = self._start_of(event)
+        if isinstance(event, AliasEvent):
+            return self._alias_target(event, depth)
+        self._check_node(event, where, depth)
+        if isinstance(event, ScalarEvent):
+            node = self._scalar(event, where)
+        elif isinstance(event, MappingStartEvent):
+            node = self._mapping(events, where, depth + 1)
+        else:
+            node = self._list(events, where, depth + 1)
+        if event.anchor is not None:
+            self._anchors[event.anchor] = node
+        return node
+
+    def _check_node(self, event: Any, where: Position, depth: int) -> None:
         if event.tag is not None:
             self._problem(where, f"tag {abbreviate(event.tag)} is not allowed")
         if event.anchor is not None:
@@ -262,109 +273,84 @@ class _Reader:
         self._nodes += 1
         if self._nodes > MAX_NODES:
             self._abort(where, f"more than {MAX_NODES} values in one document")
-        if len(self._open) >= MAX_DEPTH:
+        if depth >= MAX_DEPTH:
             self._abort(where, f"nested deeper than {MAX_DEPTH} levels")
 
-    def _take_scalar(self, event: ScalarEvent) -> None:
-        where = self._start_of(event)
-        text: str = event.value
-        self._check_string(where, text)
-        if self._awaits_key():
-            self._take_key(text, where, plain=event.implicit[0])
-            return
+    def _scalar(self, event: ScalarEvent, where: Position) -> Node:
+        text = self._text_of(event, where)
         content: PlainScalar = text
         if event.implicit[0]:
             try:
                 content = resolve_scalar(text)
             except ValueError as error:
                 self._problem(where, str(error))
-        self._add(Node(where, content, text=text), event.anchor, size=1, height=0)
+        return Node(where, content, text=text)
 
-    def _check_string(self, where: Position, text: str) -> None:
+    def _text_of(self, event: ScalarEvent, where: Position) -> str:
+        text: str = event.value
         if len(text.encode("utf-8", "surrogatepass")) > MAX_STRING_BYTES:
             self._abort(where, f"a text longer than {MAX_STRING_BYTES} bytes")
         bad = _BAD_IN_STRING.search(text)
         if bad:
             self._abort(where, f"a text with the character U+{ord(bad[0]):04X}")
+        return text
 
-    def _take_key(self, text: str, where: Position, *, plain: bool) -> None:
-        parent = self._open[-1]
-        if plain and text == "<<":
-            self._problem(where, "merge keys (<<) are not part of YAML 1.2; repeat the values")
-        elif plain and not text:
-            self._problem(where, "an empty key; expected a name before ':'")
-        elif text in parent.key_positions:
-            first = parent.key_positions[text]
-            path = format_path((*parent.path, text))
-            self._problems.add(
-                where, path, f"duplicate key; it is first given at line {first.line}"
-            )
-        else:
-            parent.key_positions[text] = where
-        parent.key = text
+    def _list(self, events: Iterator[Any], where: Position, depth: int) -> Node:
+        items: list[Node] = []
+        self._path.append(0)
+        while not isinstance(event := next(events), SequenceEndEvent):
+            items.append(self._node(event, events, depth))
+            self._path[-1] = len(items)
+        self._path.pop()
+        return Node(where, tuple(items))
 
-    def _start_collection(self, event: CollectionStartEvent) -> None:
+    def _mapping(self, events: Iterator[Any], where: Position, depth: int) -> Node:
+        entries: dict[str, Node] = {}
+        positions: dict[str, Position] = {}
+        while not isinstance(event := next(events), MappingEndEvent):
+            key = self._key(event, positions, depth)
+            self._path.append(key)
+            entries.setdefault(key, self._node(next(events), events, depth))
+            self._path.pop()
+        return Node(where, entries, positions)
+
+    def _key(self, event: Any, positions: dict[str, Position], depth: int) -> str:
         where = self._start_of(event)
-        if self._awaits_key():
-            self._abort(where, "a key must be plain text, got a list or a mapping")
-        is_mapping = isinstance(event, MappingStartEvent)
-        self._open.append(_Open(where, self._path(), event.anchor, is_mapping))
-
-    def _end_collection(self) -> None:
-        done = self._open.pop()
-        content = done.entries if done.is_mapping else tuple(done.items)
-        node = Node(done.position, content, done.key_positions)
-        self._add(node, done.anchor, done.size, done.height)
-
-    def _take_alias(self, event: AliasEvent) -> None:
-        where = self._start_of(event)
-        anchor = event.anchor or ""
-        name = abbreviate(anchor)
-        if self._awaits_key():
+        if isinstance(event, AliasEvent):
             self._abort(where, "a key must be plain text, got an alias")
-        if anchor not in self._anchors:
+        self._check_node(event, where, depth)
+        if not isinstance(event, ScalarEvent):
+            self._abort(where, "a key must be plain text, got a list or a mapping")
+        text, is_plain = self._text_of(event, where), event.implicit[0]
+        if is_plain and text == "<<":
+            self._problem(where, "merge keys (<<) are not part of YAML 1.2; repeat the values")
+        elif is_plain and not text:
+            self._problem(where, "an empty key; expected a name before ':'")
+        elif text in positions:
+            path = format_path((*self._path, text))
+            fact = f"duplicate key; it is first given at line {positions[text].line}"
+            self._problems.add(where, path, fact)
+        else:
+            positions[text] = where
+        return text
+
+    def _alias_target(self, event: AliasEvent, depth: int) -> Node:
+        where, name = self._start_of(event), abbreviate(event.anchor)
+        if event.anchor not in self._anchors:
             self._abort(where, f"alias *{name} has no anchor &{name} before it")
-        target = self._anchors[anchor]
+        target = self._anchors[event.anchor]
         if target is None:
             self._abort(where, f"alias *{name} stands inside what it names")
-        node, size, height = target
-        self._aliased += size
+        # Aliases of aliases grow exponentially, so what they stand for counts, not their number.
+        self._aliased += _size(target)
         if self._aliased > MAX_ALIASED_NODES:
             self._abort(where, f"aliases stand for more than {MAX_ALIASED_NODES} values")
-        if len(self._open) + height > MAX_DEPTH:
+        if depth + _height(target) > MAX_DEPTH:
             self._abort(where, f"nested deeper than {MAX_DEPTH} levels")
-        self._add(node, None, size, height)
+        return target
 
-    def _add(self, node: Node, anchor: str | None, size: int, height: int) -> None:
-        """Put a finished node where it belongs; size and height are those of its subtree."""
-        if anchor is not None:
-            self._anchors[anchor] = (node, size, height)
-        if not self._open:
-            self._root = node
-            return
-        parent = self._open[-1]
-        parent.size += size
-        parent.height = max(parent.height, height + 1)
-        if not parent.is_mapping:
-            parent.items.append(node)
-        elif parent.key is not None:
-            parent.entries.setdefault(parent.key, node)
-            parent.key = None
-
-    def _awaits_key(self) -> bool:
-        return bool(self._open) and self._open[-1].is_mapping and self._open[-1].key is None
-
-    def _path(self) -> FieldPath:
-        if not self._open:
-            return self._within
-        parent = self._open[-1]
-        if not parent.is_mapping:
-            return (*parent.path, len(parent.items))
-        return parent.path if parent.key is None else (*parent.path, parent.key)
-
-    def _start_of(self, event: Event) -> Position:
-        mark = event.start_mark
-        return self._at(mark.line, mark.column) if mark is not None else self._at(0, 0)
+    def _start_of(self, event: Any) -> Position:
+        return self._at(event.start_mark.line, event.start_mark.column)
 
     def _at(self, line: int, column: int) -> Position:
         if line == 0:
@@ -373,14 +359,32 @@ class _Reader:
         return Position(self._file, line + 1, column + 1, source)
 
     def _problem(self, where: Position, fact: str) -> None:
-        self._problems.add(where, format_path(self._path()), fact)
+        self._problems.add(where, format_path(tuple(self._path)), fact)
 
     def _abort(self, where: Position, fact: str) -> NoReturn:
         self._problem(where, fact)
         raise _Abort
 
 
-def _decoded(data: bytes, file: str) -> str:
+def _children(node: Node) -> Iterable[Node]:
+    if isinstance(node.content, Mapping):
+        return node.content.values()
+    return node.content if isinstance(node.content, tuple) else ()
+
+
+def _size(node: Node) -> int:
+    """Number of values in a tree."""
+    return 1 + sum(_size(child) for child in _children(node))
+
+
+def _height(node: Node) -> int:
+    """Levels of lists and mappings in a tree; 0 for a scalar."""
+    if not isinstance(node.content, (tuple, Mapping)):
+        return 0
+    return 1 + max((_height(child) for child in _children(node)), default=0)
+
+
+def _decode(data: bytes, file: str) -> str:
     if len(data) > MAX_FILE_BYTES:
         _refuse(Position(file, 1, 1), "", f"larger than {MAX_FILE_BYTES} bytes")
     try:
@@ -400,7 +404,7 @@ def _printable(line: str) -> str:
     return _BAD_IN_SOURCE.sub(lambda bad: " " if bad[0] == "\t" else "\ufffd", line)
 
 
-def _noun(node: Node) -> str:
+def _describe(node: Node) -> str:
     if isinstance(node.content, tuple):
         return "a list"
     return "a mapping" if isinstance(node.content, Mapping) else quote_value(node.content)
@@ -408,7 +412,7 @@ def _noun(node: Node) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Step:
-    """One part of an override's path, and where it stands."""
+    """One part of the path of an override, with its position."""
 
     part: str | int
     position: Position
@@ -417,7 +421,7 @@ class _Step:
 _STEP = re.compile(r"\[(\d{1,6})\]|\.?([^.\[\]]+)")
 
 
-def _steps(path: str, value: str, origin: str) -> list[_Step]:
+def _parse_path(path: str, value: str, origin: str) -> list[_Step]:
     source = _printable(_LINE_BREAK.split(f"{path}={value}")[0])
     steps: list[_Step] = []
     at = 0
@@ -439,20 +443,20 @@ def _steps(path: str, value: str, origin: str) -> list[_Step]:
     return steps
 
 
-def _exchanged(node: Node, steps: list[_Step], value: Node, path: FieldPath) -> Node:
+def _replace_value(node: Node, steps: list[_Step], value: Node, path: FieldPath) -> Node:
     if not steps:
         return value
     step, rest = steps[0], steps[1:]
     if isinstance(node.content, tuple):
         index = _index(node, step, path)
         items = list(node.content)
-        items[index] = _exchanged(items[index], rest, value, (*path, index))
+        items[index] = _replace_value(items[index], rest, value, (*path, index))
         return replace(node, content=tuple(items))
     if isinstance(node.content, Mapping) or node.content is None:
         key = str(step.part)
         content = dict(node.content or {})
         child = content.get(key, Node(step.position, None))
-        content[key] = _exchanged(child, rest, value, (*path, key))
+        content[key] = _replace_value(child, rest, value, (*path, key))
         positions = {**node.key_positions}
         if key not in positions or not rest:
             positions[key] = step.position
@@ -465,7 +469,7 @@ def _exchanged(node: Node, steps: list[_Step], value: Node, path: FieldPath) -> 
 
 
 def _index(node: Node, step: _Step, path: FieldPath) -> int:
-    """Which item of a list a step means: by number, or by the item's ``name``."""
+    """Index of the list item that a step gives by number or by the item's ``name``."""
     items = node.content if isinstance(node.content, tuple) else ()
     if isinstance(step.part, int) or step.part.isdecimal():
         index = int(step.part)

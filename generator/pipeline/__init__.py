@@ -1,6 +1,6 @@
 """Pipeline.sample(index): a pure function of (configuration, index).
 
-It sees physics, renderers, sensors, annotations and randomizers only through the Protocols of
+Physics, renderers, sensors, annotations and randomizers are used only through the Protocols in
 ``gen_data.generator.core.interfaces``.
 """
 

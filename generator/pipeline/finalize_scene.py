@@ -1,4 +1,4 @@
-"""From a settled scene to the scene that labels refer to: ids, instance frames, boxes, rounding."""
+"""Scenes as labels refer to them: category ids, instance frames, boxes, rounding."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ from gen_data.generator.core.se3 import SE3, Array, Vec3
 
 @dataclass(frozen=True, eq=False)
 class Timeline:
-    """A view through time: the only source of scenes that sensors and labels refer to.
+    """A view through time: the only source of scenes for sensors and labels.
 
-    Invariant: every scene it returns follows from the view at its beginning, whatever was asked
-    before, and its instances have the frames, boxes and motion of its own instant.
+    Invariant: every scene depends only on the view at time 0 and its instant, and its instances
+    have the frames, boxes and motion of that instant.
 
     Attributes:
-        view: A frozen scene at time 0, with its sensors in their places.
+        view: Finalized scene at time 0, with its sensors in their places.
         category_ids: By name of the category.
     """
 
     view: Scene
     assets: AssetLibrary
     category_ids: Mapping[str, int]
-    _known: dict[float, Scene] = field(default_factory=dict)
+    _scenes: dict[float, Scene] = field(default_factory=dict)
 
     def at(self, time_s: float) -> Scene:
-        """The scene at an instant; each is computed once."""
+        """The scene at an instant [s]; cached."""
         if time_s == self.view.time_s:
             return self.view
-        if time_s not in self._known:
+        if time_s not in self._scenes:
             moved = scene_at(self.view, time_s)
-            self._known[time_s] = finalize_scene(moved, self.assets, self.category_ids)
-        return self._known[time_s]
+            self._scenes[time_s] = finalize_scene(moved, self.assets, self.category_ids)
+        return self._scenes[time_s]
 
 
 def finalize_scene(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Scene:
-    """The scene with every instance's category id, facts, frame, keypoints and tight box filled in.
+    """Fill in category id, attributes, frame, keypoints and tight box of every instance.
 
     An instance of one body has that body's frame. An instance of several bodies (a robot) has
     the frame of its articulation's base, and the box around all its bodies' vertices.
@@ -51,8 +51,8 @@ def finalize_scene(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str
         members.setdefault(body.instance_id, []).append(body)
     bases = {a.instance_id: a.T_world_base for a in scene.articulations}
     instances = tuple(
-        _measured(
-            _known(instance, assets, category_ids),
+        _measure(
+            _describe(instance, assets, category_ids),
             members.get(instance.instance_id, []),
             bases.get(instance.instance_id),
             assets,
@@ -62,8 +62,10 @@ def finalize_scene(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str
     return add_twists(replace(scene, instances=instances))
 
 
-def _known(instance: Instance, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Instance:
-    """The instance with what its asset says about it; its own attributes win."""
+def _describe(
+    instance: Instance, assets: AssetLibrary, category_ids: Mapping[str, int]
+) -> Instance:
+    """Add category id and the asset's attributes to an instance; its own attributes win."""
     asset = assets.get(instance.asset)
     attributes = {**dict(asset.attributes), **dict(instance.attributes)}
     return replace(
@@ -74,7 +76,7 @@ def _known(instance: Instance, assets: AssetLibrary, category_ids: Mapping[str, 
     )
 
 
-def _measured(
+def _measure(
     instance: Instance, bodies: list[Body], T_world_base: SE3 | None, assets: AssetLibrary
 ) -> Instance:
     if not bodies:
@@ -85,12 +87,12 @@ def _measured(
         return replace(
             instance,
             T_world_instance=body.T_world_body,
-            box_min_m=_scaled(low, body.scale),
-            box_max_m=_scaled(high, body.scale),
+            box_min_m=_scale(low, body.scale),
+            box_max_m=_scale(high, body.scale),
             keypoints=tuple(
                 replace(
                     point,
-                    position_m=_scaled(point.position_m, body.scale),
+                    position_m=_scale(point.position_m, body.scale),
                     radius_m=point.radius_m * body.scale,
                 )
                 for point in assets.keypoints(body.asset)
@@ -107,15 +109,15 @@ def _measured(
     return replace(
         instance,
         T_world_instance=T_world_instance,
-        box_min_m=_rounded(np.min(lows, axis=0)),
-        box_max_m=_rounded(np.max(highs, axis=0)),
+        box_min_m=_round_to_micrometre(np.min(lows, axis=0)),
+        box_max_m=_round_to_micrometre(np.max(highs, axis=0)),
     )
 
 
-def _scaled(corner_m: Vec3, scale: float) -> Vec3:
-    return _rounded(np.asarray(corner_m) * scale)
+def _scale(corner_m: Vec3, scale: float) -> Vec3:
+    return _round_to_micrometre(np.asarray(corner_m) * scale)
 
 
-def _rounded(corner_m: Array) -> Vec3:
+def _round_to_micrometre(corner_m: Array) -> Vec3:
     x, y, z = (round(float(v), 6) for v in corner_m)
     return (x, y, z)

@@ -1,4 +1,4 @@
-"""What laser scans add to the truth about images."""
+"""Numbers of laser points on the objects of images."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from gen_data.generator.core.sample import ImageTruth
 def count_lidar_points(
     truth: Mapping[str, ImageTruth], clouds: Mapping[str, PointCloud]
 ) -> Mapping[str, ImageTruth]:
-    """The truth with the number of points of every scan on every object."""
+    """Add to each object its number of points in every scan."""
     if not clouds:
         return truth
     counts = {name: np.bincount(c.points["instance_id"]) for name, c in sorted(clouds.items())}
 
-    def counted(image: ImageTruth) -> ImageTruth:
+    def add_counts(image: ImageTruth) -> ImageTruth:
         objects = []
-        for thing in image.objects:
-            k = thing.instance.instance_id
+        for item in image.objects:
+            k = item.instance.instance_id
             points = {name: int(n[k]) if k < len(n) else 0 for name, n in counts.items()}
-            objects.append(replace(thing, lidar_points=points))
+            objects.append(replace(item, lidar_points=points))
         return replace(image, objects=tuple(objects))
 
-    return {name: counted(image) for name, image in truth.items()}
+    return {name: add_counts(image) for name, image in truth.items()}

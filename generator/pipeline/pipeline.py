@@ -41,25 +41,24 @@ if TYPE_CHECKING:
 
 
 SceneSource = Callable[[Streams], tuple[Scene, Sequence[Randomizer], Sequence[Sensor]]]
-"""The nominal scene of given streams with its sensors mounted, its randomizers and its sensors: a
-pure function."""
+"""Pure function from streams to nominal scene (sensors mounted), randomizers and sensors."""
 
 
 @dataclass(frozen=True, eq=False)
 class PipelineConfig:
-    """What a pipeline does, as data and pure functions.
+    """Configuration of a pipeline, as data and pure functions.
 
     Attributes:
-        info: The data set as its exporters see it.
-        open_scene: The beginning of every scene.
+        info: Facts about the data set, for exporters.
+        open_scene: Makes the nominal scene.
         channels: Channels that annotators need.
         image_truth: Annotates one reading.
         frame_truth: Annotates a sample as a whole, given the scene at the sample's instant by
-            ``""`` and at each laser scanner's by its name; None if there is nothing to say.
+            ``""`` and at each laser scanner's by its name; None = no such annotations.
         split_shares: ``{split: share}`` in order; shares sum to 1.
         split_assignment: How scenes are assigned to splits.
-        layout_attempts_max: Bound on the attempts at one scene.
-        strides: Steps from one reading of a sensor to the next, by name, where that is not one.
+        layout_attempts_max: Largest number of attempts at one scene.
+        strides: Steps between readings, by sensor; 1 for all others.
     """
 
     info: DatasetInfo
@@ -76,12 +75,12 @@ class PipelineConfig:
 
 @dataclass(frozen=True, slots=True)
 class AcceptedScene:
-    """A scene at rest, and how it came to be.
+    """A settled scene with its plug-ins and its history.
 
     Attributes:
-        randomizers: What draws its views.
-        sensors: What captures them.
-        attempt: Number of the attempt that was accepted, from 0.
+        randomizers: Draw its views.
+        sensors: Capture its views.
+        attempt: Number of the accepted attempt, from 0.
         timings_s: CPU seconds by stage, all attempts together.
     """
 
@@ -95,7 +94,7 @@ class AcceptedScene:
 
 @dataclass(frozen=True, slots=True)
 class DrawnView:
-    """A view of a scene at the beginning of its sequence, and the streams that drew it."""
+    """A view of a scene at the beginning of its sequence, with the streams that drew it."""
 
     scene_index: int
     view_index: int
@@ -104,10 +103,10 @@ class DrawnView:
 
 
 class Pipeline:
-    """Owns the engines; ``sample(index)`` depends on nothing but the config and the index.
+    """Owner of the engines; ``sample(index)`` depends only on the configuration and the index.
 
-    The last accepted scene and view are kept, because the next index is usually another view or
-    the next instant of them: an optimisation, never a state.
+    The last accepted scene and view are cached, because the next index is usually another view or
+    instant of them; the cache never changes a result.
     """
 
     def __init__(
@@ -130,12 +129,12 @@ class Pipeline:
 
     @property
     def info(self) -> DatasetInfo:
-        """The data set as its exporters see it."""
+        """Facts about the data set, for exporters."""
         return self.config.info
 
     @cached_property
     def renderer(self) -> Renderer:
-        """Opened by the context, or when first asked for: who merges shards draws nothing."""
+        """The renderer, opened by the context or on first use; merging shards needs none."""
         return self._open_renderer()
 
     @property
@@ -146,7 +145,7 @@ class Pipeline:
     def __enter__(self) -> Pipeline:
         """Start the engines."""
         engine = self._open_physics()
-        # A machine that cannot render fails before work begins.
+        # Open the renderer now, so that a machine that cannot render fails early.
         _ = self.renderer
         self._physics = self._resources.enter_context(engine)
         return self
@@ -162,7 +161,7 @@ class Pipeline:
         self._resources.close()
 
     def sample(self, index: int) -> Sample:
-        """Sample number ``index``, from 0.
+        """Generate sample number ``index``, from 0.
 
         Raises:
             SceneRejected: no valid layout within the bounded number of attempts.
@@ -179,7 +178,7 @@ class Pipeline:
             time_s = step_index * self.info.step_s
             scene = timeline.at(time_s)
             streams = replace(view.streams, step=step_index)
-        capture, truth = self._captured(timeline, time_s, accepted.sensors, streams, timings)
+        capture, truth = self._capture(timeline, time_s, accepted.sensors, streams, timings)
         with _timed(timings, "annotate"):
             swept = {name: timeline.at(c.time_s) for name, c in capture.clouds.items()}
             seen = {name: timeline.at(r.time_s) for name, r in capture.readings.items()}
@@ -201,7 +200,7 @@ class Pipeline:
             instants={n: s for n, s in {**swept, **seen}.items() if s is not scene},
         )
 
-    def _captured(
+    def _capture(
         self,
         timeline: Timeline,
         time_s: float,
@@ -209,7 +208,7 @@ class Pipeline:
         streams: Streams,
         timings_s: dict[str, float],
     ) -> tuple[Capture, dict[str, ImageTruth]]:
-        """The readings of every sensor at its own instant, and the truth about every image."""
+        """Readings of all sensors, each at its own instant, and the annotations of all images."""
         readings: dict[str, SensorReading] = {}
         clouds: dict[str, PointCloud] = {}
         tables: dict[str, Measurements] = {}
@@ -232,13 +231,13 @@ class Pipeline:
         return Capture(readings, clouds, tables), truth
 
     def accepted_scene(self, scene_index: int) -> AcceptedScene:
-        """The scene at rest that all views of it share."""
+        """The settled scene that its views share."""
         if self._latest is None or self._latest.index != scene_index:
             self._latest = self._accept(scene_index)
         return self._latest
 
     def split(self, scene_index: int) -> str:
-        """The split that all views of a scene belong to."""
+        """Split of a scene and all of its views."""
         shares, assignment = self.config.split_shares, self.config.split_assignment
         return split_of(scene_index, shares, assignment, self.info.seed)
 
@@ -251,7 +250,7 @@ class Pipeline:
             try:
                 with _timed(timings, "randomize"):
                     nominal, randomizers, sensors = self.config.open_scene(streams)
-                    scene = self._randomized(nominal, randomizers, Stage.BUILD, streams)
+                    scene = self._randomize(nominal, randomizers, Stage.BUILD, streams)
             except LayoutRejected as refused:
                 rejections.append(refused.rejection)
                 continue
@@ -264,7 +263,7 @@ class Pipeline:
         raise SceneRejected(scene_index, tuple(rejections))
 
     def drawn_view(self, accepted: AcceptedScene, view_index: int) -> DrawnView:
-        """One view of a scene, before anything has moved."""
+        """A view of a scene at time 0."""
         latest = self._view
         if latest is None or (latest.scene_index, latest.view_index) != (
             accepted.index,
@@ -274,7 +273,7 @@ class Pipeline:
         return latest
 
     def _draw_view(self, accepted: AcceptedScene, view_index: int) -> DrawnView:
-        """A view that cannot be drawn is tried again."""
+        """Draw a view, with a limited number of attempts."""
         number = accepted.index * self.info.views_per_scene + view_index
         rejections: list[Rejection] = []
         for attempt in range(self.config.layout_attempts_max):
@@ -282,14 +281,14 @@ class Pipeline:
                 self.info.seed, accepted.index, view=view_index, attempt=attempt, index=number
             )
             try:
-                scene = self._randomized(accepted.scene, accepted.randomizers, Stage.VIEW, streams)
+                scene = self._randomize(accepted.scene, accepted.randomizers, Stage.VIEW, streams)
             except LayoutRejected as refused:
                 rejections.append(refused.rejection)
                 continue
             return DrawnView(accepted.index, view_index, place_sensors(scene), streams)
         raise SceneRejected(accepted.index, tuple(rejections))
 
-    def _randomized(
+    def _randomize(
         self, scene: Scene, randomizers: Sequence[Randomizer], stage: Stage, streams: Streams
     ) -> Scene:
         for randomizer in randomizers:
@@ -301,7 +300,7 @@ class Pipeline:
 
 @contextmanager
 def _timed(timings_s: dict[str, float], stage: str) -> Iterator[None]:
-    """Adds the CPU time of a block to a stage. Timings go to logs, never into a data file."""
+    """Add the CPU time of a block to a stage. Timings are logged, never part of a data file."""
     started_s = time.process_time()
     try:
         yield

@@ -1,4 +1,4 @@
-"""Which split a scene belongs to."""
+"""Assignment of scenes to splits."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ _FIRST_BLOCK = 1024
 def split_of(
     scene_index: int, shares: Mapping[str, float], assignment: Assignment, seed: int
 ) -> str:
-    """The split of a scene; it does not depend on how many scenes there are.
+    """Split of a scene; it does not depend on the number of scenes.
 
     Args:
         scene_index: From 0.
         shares: ``{split: share}`` in order; shares sum to 1.
-        assignment: How scenes are assigned.
+        assignment: Method of assignment.
         seed: Of the data set.
     """
     if assignment == "round_robin":
@@ -43,7 +43,7 @@ def split_of(
 def warn_of_empty_splits(
     scene_count: int, shares: Mapping[str, float], assignment: Assignment, seed: int
 ) -> None:
-    """A ConfigWarning if a split that has a share has no scene."""
+    """Warn with a ConfigWarning if a split with a share has no scene."""
     used: set[str] = set()
     for scene_index in range(scene_count):
         used.add(split_of(scene_index, shares, assignment, seed))
@@ -60,11 +60,11 @@ def warn_of_empty_splits(
 
 @lru_cache(maxsize=8)
 def _turns(shares: tuple[tuple[str, float], ...], count: int) -> tuple[str, ...]:
-    """The splits of the first scenes: each goes to the split that is furthest behind its share."""
+    """Splits of the first scenes; each goes to the split that is furthest below its share."""
     made = dict.fromkeys((name for name, _ in shares), 0)
     turns = []
     for number in range(1, count + 1):
-        # Rounded, so that equal shares tie in spite of floating point; the first one wins.
+        # Rounded, so that equal shares tie despite floating-point errors; the first one wins.
         behind = {name: round(share * number - made[name], 9) for name, share in shares}
         name = max(behind, key=lambda split: behind[split])
         made[name] += 1

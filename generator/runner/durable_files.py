@@ -1,8 +1,7 @@
-"""Durable file operations: after a crash a file is there with all its bytes, or not at all.
+"""Durable file operations: after a crash, a file exists with all its bytes or not at all.
 
-Every call here that changes a disk is followed by the fsync that makes it last. POSIX promises
-nothing about a rename that no fsync of the folder followed (Pillai et al., "All file systems are
-not created equal", OSDI 2014).
+Every change is followed by an fsync. POSIX guarantees nothing about a rename without an fsync of
+its folder (Pillai et al., "All file systems are not created equal", OSDI 2014).
 """
 
 from __future__ import annotations
@@ -25,7 +24,7 @@ IRREGULAR = -1
 
 
 def hash_file(path: Path) -> str:
-    """Hexadecimal digest of a file's bytes."""
+    """Hexadecimal SHA-256 of a file."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while chunk := file.read(CHUNK_BYTES):
@@ -34,7 +33,7 @@ def hash_file(path: Path) -> str:
 
 
 def sync_path(path: Path) -> None:
-    """Make a file's bytes, or a folder's entries, survive a power cut."""
+    """Flush the bytes of a file, or the entries of a folder, to the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -43,9 +42,9 @@ def sync_path(path: Path) -> None:
 
 
 def sync_tree(folder: Path, synced: Container[Inode] = ()) -> None:
-    """Sync every file and every folder under ``folder``, itself last.
+    """Flush every file and folder in ``folder``, itself last.
 
-    ``synced`` are the inodes of files whose bytes are known to be on disk.
+    ``synced`` are the inodes of files that are already on the disk.
     """
     for inner, _, names in os.walk(folder, topdown=False):
         for name in names:
@@ -56,15 +55,15 @@ def sync_tree(folder: Path, synced: Container[Inode] = ()) -> None:
 
 
 def get_inode(path: Path) -> Inode:
-    """What all hard links to one file have in common."""
+    """Device and inode number, equal for all hard links to one file."""
     status = path.lstat()
     return (status.st_dev, status.st_ino)
 
 
 def write_durably(path: Path, data: bytes, scratch: Path) -> None:
-    """Create or replace a file in one step; ``scratch`` holds the unfinished one.
+    """Create or replace a file atomically.
 
-    ``scratch`` must be on the same file system.
+    ``scratch`` is a folder for the unfinished file, on the same file system.
     """
     unfinished = scratch / f"{path.name}.part"
     with unfinished.open("wb") as file:
@@ -76,11 +75,10 @@ def write_durably(path: Path, data: bytes, scratch: Path) -> None:
 
 
 def move_durably(source: Path, target: Path) -> None:
-    """Rename a file or folder, so that both parents remember it after a power cut.
+    """Rename a file or folder durably.
 
     Raises:
-        OSError: also when ``target`` is a folder that holds something: rename(2) never replaces
-            one.
+        OSError: among others, ``target`` is a folder with contents, which rename(2) never replaces.
     """
     source.rename(target)
     sync_path(target.parent)
@@ -88,7 +86,7 @@ def move_durably(source: Path, target: Path) -> None:
 
 
 def make_folder(path: Path) -> None:
-    """Create a folder and its missing parents, each one durable; existing ones are fine."""
+    """Create a folder and its missing parents durably; existing folders are no error."""
     missing = []
     while not path.is_dir():
         missing.append(path)
@@ -99,9 +97,9 @@ def make_folder(path: Path) -> None:
 
 
 def tree_sizes(folder: Path) -> dict[str, int]:
-    """``{path relative to folder: bytes}`` of everything in it, sorted; empty if it is missing.
+    """``{path relative to folder: bytes}`` of its contents, sorted; empty if it does not exist.
 
-    What is neither file nor folder, such as a symbolic link, has the size IRREGULAR.
+    Anything but files and folders, such as a symbolic link, has the size IRREGULAR.
     """
     sizes: dict[str, int] = {}
     for inner, folders, names in os.walk(folder):
@@ -115,7 +113,7 @@ def tree_sizes(folder: Path) -> dict[str, int]:
 
 
 def free_bytes(path: Path) -> int:
-    """Bytes that this user may still write to the file system of the nearest existing parent."""
+    """Free bytes for this user on the file system of the nearest existing parent."""
     while not path.exists():
         path = path.parent
     return shutil.disk_usage(path).free
@@ -123,7 +121,7 @@ def free_bytes(path: Path) -> int:
 
 @contextmanager
 def storage_errors(folder: Path, resume_command: str) -> Iterator[None]:
-    """Turn an OSError of the block into a StorageError that says what, where and how to go on."""
+    """Turn an OSError of the block into a StorageError with path, cause and resume command."""
     try:
         yield
     except OSError as error:
@@ -131,7 +129,7 @@ def storage_errors(folder: Path, resume_command: str) -> Iterator[None]:
 
 
 def storage_error(error: OSError, folder: Path, resume_command: str) -> StorageError:
-    """The message for a failed file operation somewhere in ``folder``."""
+    """Error for a failed file operation in ``folder``."""
     path = os.fsdecode(error.filename) if error.filename is not None else str(folder)
     name = errno.errorcode.get(error.errno or 0, type(error).__name__)
     try:
@@ -142,9 +140,9 @@ def storage_error(error: OSError, folder: Path, resume_command: str) -> StorageE
     if not resume_command:
         return StorageError(message)
     advice = (
-        "What is finished stays. After the cause is gone, go on with"
+        "Finished shards are kept. After removing the cause, resume with"
         if _is_folder(folder)
-        else "Nothing was written. Choose another folder with --out, or after the cause is gone try"
+        else "Nothing was written. Choose another folder with --out, or remove the cause and run"
     )
     return StorageError(f"{message}\n  {advice}:\n    {resume_command}")
 

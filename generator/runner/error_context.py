@@ -1,4 +1,4 @@
-"""Unexpected errors as messages: place, fact, command to reproduce, end of the trace."""
+"""Messages for unexpected errors: place, fact, end of the traceback, command to reproduce."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from gen_data.generator.core.errors import GenDataError, SampleError
 
 TRACE_LINES = 12
 CACHE_DAMAGE = ("Failed to find forward kernel", "Failed to load CPU module")
-"""Texts of Warp's errors when a compiled kernel on disk is not as it was written."""
+"""Texts of Warp's errors for a damaged compiled kernel on disk."""
 
 
 @contextmanager
 def explain_errors(place: str, command: str = "") -> Iterator[None]:
-    """Turn whatever is no GenDataError into a SampleError that names the place.
+    """Turn any other error than a GenDataError into a SampleError with the place.
 
-    A plain SampleError gets place and command, too; its subclasses say more than that themselves.
+    A plain SampleError also gets place and command; its subclasses have better messages.
     """
     try:
         yield
@@ -31,7 +31,7 @@ def explain_errors(place: str, command: str = "") -> Iterator[None]:
 
 
 def unexpected_error(error: Exception, place: str, command: str = "") -> SampleError:
-    """A SampleError with the end of the error's traceback, which does not cross processes."""
+    """Make a SampleError with the end of the traceback, which cannot be pickled itself."""
     trace = "".join(traceback.format_exception(type(error), error, error.__traceback__))
     lines = [f"{place}: {type(error).__name__}: {error}"]
     lines += [f"  {line}" for line in trace.rstrip().splitlines()[-TRACE_LINES:]]

@@ -34,7 +34,7 @@ from gen_data.generator.runner.store import (
 )
 
 LicencesOf = Callable[[Sequence[str]], str]
-"""Makes the text about the assets with these ids."""
+"""Formats the licences of the assets with these ids."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,12 +49,12 @@ class Entry:
 def finalize(
     plan: Plan, store: LocalStore, pipeline: PipelineLike, licences: LicencesOf | None
 ) -> str:
-    """Merge, sum up and seal a data set whose shards are all committed.
+    """Merge, summarise and seal a data set whose shards are all committed.
 
     ``licences`` makes the text of ``LICENSES-ASSETS.md``; None = no such file.
 
     Returns:
-        The data set's id: sha256 over its sums, of which ``dataset_id`` has the definition.
+        Id of the data set, as defined by ``dataset_id``.
 
     Raises:
         StorageError: a shard is not committed, or a file cannot be written.
@@ -104,7 +104,7 @@ def _all_records(plan: Plan, store: LocalStore) -> list[ShardRecord]:
 
 
 def _inodes(store: LocalStore, records: list[ShardRecord]) -> dict[Inode, str]:
-    """Digests by inode: what exporters hard-link need not be hashed again."""
+    """Digests by inode: files that exporters hard-link are not hashed again."""
     return {
         get_inode(store.shard_dir(record.shard) / file.path): file.sha256
         for record in records
@@ -115,7 +115,7 @@ def _inodes(store: LocalStore, records: list[ShardRecord]) -> dict[Inode, str]:
 def _merge(
     plan: Plan, store: LocalStore, pipeline: PipelineLike, name: str, known: Mapping[Inode, str]
 ) -> None:
-    """Let one exporter merge into a folder aside, then put that in place of an older one."""
+    """Let one exporter merge into a temporary folder, which then replaces the older one."""
     staging = store.scratch_dir()
     shard_dirs = [store.shard_dir(shard) for shard in range(plan.shard_count)]
     pipeline.exporters[name].finalize(pipeline.info, shard_dirs, staging)
@@ -135,7 +135,7 @@ def _entries(
     exporters: list[str],
     known: Mapping[Inode, str],
 ) -> Iterator[Entry]:
-    """Every file but the manifest and the sums, in no particular order."""
+    """All files except the manifest and the sums, in no particular order."""
     yield _entry_of_bytes(PLAN_NAME, plan_bytes(plan))
     licences = store.root / LICENCES_NAME
     if licences.exists():
@@ -155,7 +155,7 @@ def _entries(
 def _manifest(
     plan: Plan, info: DatasetInfo, records: list[ShardRecord], entries: list[Entry]
 ) -> bytes:
-    """The manifest: what the data set holds. No time, host, path or number of workers."""
+    """Contents of the manifest, without time, host, path or number of workers."""
     sized_by_records = {file.sha256 for record in records for file in record.files}
     manifest = {
         "format_version": plan.format_version,
@@ -170,7 +170,7 @@ def _manifest(
         "rejections": sum(record.rejections for record in records),
         "bytes": sum(record.size_bytes for record in records),
         "shards": [hashlib.sha256(record.to_bytes()).hexdigest() for record in records],
-        # Sizes of all files whose bytes no shard has.
+        # Sizes of the files that equal no file of a shard.
         "files": {e.path: e.bytes for e in entries if e.sha256 not in sized_by_records},
         "versions": plan.versions,
     }

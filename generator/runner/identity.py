@@ -1,4 +1,4 @@
-"""What a data set records about itself: its plan and its assets' licences."""
+"""Identity of a data set: its plan and the licences of its assets."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ BYTES_DEPEND_ON = {
     "trimesh": "trimesh",
     "warp": "warp-lang",
 }
-"""Packages whose release can change the bytes of a data set, by the module that is imported.
+"""Packages whose release can change the bytes of a data set, by imported module.
 
-``tests/architecture/test_identity.py`` fails for an imported library that is neither here nor
-known to change nothing.
+``tests/architecture/test_identity.py`` checks that each imported library is here or known to be
+harmless.
 """
 
 
 def make_plan(factory: PipelineFactory) -> Plan:
-    """The identity of the data set that a factory makes."""
+    """Make the plan of a factory's data set."""
     config = factory.config
     assets = possible_assets(factory)
     return Plan(
@@ -59,7 +59,7 @@ def make_plan(factory: PipelineFactory) -> Plan:
 
 
 def format_licences(factory: PipelineFactory, used: Sequence[str]) -> str:
-    """Markdown table of the assets with these ids, grouped by where they come from."""
+    """Markdown table of the assets with these ids, grouped by source."""
     library = open_library(factory.config.asset_folders)
     groups: dict[tuple[str, str, str], list[str]] = {}
     for asset in (library.get(asset_id) for asset_id in used):
@@ -77,7 +77,7 @@ def format_licences(factory: PipelineFactory, used: Sequence[str]) -> str:
 def possible_assets(factory: PipelineFactory) -> tuple[Asset, ...]:
     """Every object, robot and panorama that a sample may contain, sorted by id."""
     library = open_library(factory.config.asset_folders)
-    ids = {asset_id for scene in factory.nominal for asset_id in _ids(scene)}
+    ids = {asset_id for scene in factory.nominal for asset_id in _asset_ids(scene)}
     drawn = {
         asset_id
         for scene in factory.config.probes
@@ -88,7 +88,7 @@ def possible_assets(factory: PipelineFactory) -> tuple[Asset, ...]:
 
 
 def _packs(assets: tuple[Asset, ...]) -> dict[str, str]:
-    """Installed packs, if a sample may contain anything of any of them."""
+    """Versions of the installed packs, if a sample may contain an asset of any."""
     if not any(TAG in asset.tags for asset in assets):
         return {}
     return {
@@ -97,7 +97,7 @@ def _packs(assets: tuple[Asset, ...]) -> dict[str, str]:
     }
 
 
-def _ids(scene: Scene) -> set[str]:
+def _asset_ids(scene: Scene) -> set[str]:
     placed = {instance.asset for instance in scene.instances if instance.asset}
     robots = {articulation.asset for articulation in scene.articulations}
     links = {f"{a.name}/" for a in scene.articulations}

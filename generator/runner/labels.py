@@ -1,10 +1,10 @@
 """``labels.jsonl``: one line per sample of a shard, with its annotations.
 
-Together with the images, the point clouds, the tables and ``scenes.jsonl`` of the shard it holds
-the whole sample: any exporter can write its format from these files, without a renderer.
+With the images, point clouds, tables and ``scenes.jsonl`` of the shard, it is the whole sample:
+exporters can write their formats from these files without a renderer.
 
-An object's ``instance`` is its instance id where the instance equals that of the sample's scene;
-it is written out where the image shows another instant.
+The ``instance`` of an object is an instance id if the instance equals that of the sample's scene,
+else (in an image of another instant) the whole instance.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ LABELS_NAME = "labels.jsonl"
 
 @dataclass(frozen=True, slots=True)
 class ImageInfo:
-    """When a camera read, and how it was exposed; as of ``SensorReading``."""
+    """Instant and exposure of an image; see ``SensorReading``."""
 
     time_s: float
     ev100: float | None = None
@@ -32,7 +32,7 @@ class ImageInfo:
 
 @dataclass(frozen=True, slots=True)
 class ScanInfo:
-    """When and from where a laser scanner read; as of ``PointCloud``."""
+    """Instant and pose of a laser scan; see ``PointCloud``."""
 
     lidar: Lidar
     time_s: float
@@ -40,7 +40,7 @@ class ScanInfo:
 
 @dataclass(frozen=True, slots=True)
 class TableInfo:
-    """When and from where a device read; as of ``Table``."""
+    """Instant and pose of a device's measurements; see ``Measurements``."""
 
     device: Device
     time_s: float
@@ -53,8 +53,8 @@ class Labels:
     Attributes:
         index: Number of the sample.
         truth: Annotations by camera.
-        frame: Annotations of no single image; None where none was asked for.
-        images, scans, tables: By sensor, for those that read at this sample.
+        frame: Annotations of the sample as a whole; None if there are none.
+        images, scans, tables: By sensor, for those with a reading in this sample.
     """
 
     index: int
@@ -70,7 +70,7 @@ _OBJECT_FIELDS = tuple(f.name for f in fields(ObjectTruth) if f.name != "instanc
 
 
 def labels_line(sample: Sample) -> str:
-    """The line of a sample, without its line break."""
+    """Format the line of a sample, without line break."""
     capture = sample.capture
     instances = {i.instance_id: i for i in sample.scene.instances}
     return canonical_json(
@@ -86,7 +86,7 @@ def labels_line(sample: Sample) -> str:
 
 
 def read_labels(path: Path, scenes: Mapping[int, Scene]) -> Iterator[Labels]:
-    """The annotations of a shard's file, in order.
+    """Read the annotations of a shard, in order.
 
     Args:
         path: Of the file.
@@ -103,7 +103,7 @@ def read_labels(path: Path, scenes: Mapping[int, Scene]) -> Iterator[Labels]:
 
 
 def _resolve_instances(plain: Mapping[str, Any], scene: Scene) -> None:
-    """Put the scene's instances in place of the ids that refer to them."""
+    """Replace instance ids by the instances of the scene."""
     instances = {i.instance_id: i for i in scene.instances}
     for image in plain["truth"].values():
         for item in image["objects"]:
@@ -117,7 +117,7 @@ def _plain_image(truth: ImageTruth, instances: Mapping[int, Instance]) -> dict[s
 
 
 def _plain_object(truth: ObjectTruth, instances: Mapping[int, Instance]) -> dict[str, Any]:
-    """The fields that say something: an annotator that was not asked for leaves None."""
+    """Fields that are not None, which stands for annotations that were not requested."""
     values = ((name, getattr(truth, name)) for name in _OBJECT_FIELDS)
     plain = {name: to_plain(value) for name, value in values if value is not None or name == "box"}
     number = truth.instance.instance_id

@@ -1,4 +1,4 @@
-"""Plan: everything a data set's bytes depend on. Its file is the first one in the folder."""
+"""Plans: everything that the bytes of a data set depend on."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Plan:
     format_version: int = FORMAT_VERSION
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be cut into shards."""
+        """Check the sizes."""
         if self.n < 1 or self.shard_size < 1:
             raise ValueError(f"n and shard_size must be >= 1, got {self.n} and {self.shard_size}")
 
@@ -56,23 +56,23 @@ class Plan:
 
 
 def plan_bytes(plan: Plan) -> bytes:
-    """What ``plan.json`` holds: one line of canonical JSON."""
+    """Contents of ``plan.json``: one line of canonical JSON."""
     return (canonical_json(plan) + "\n").encode()
 
 
 def write_plan(plan: Plan, folder: Path, scratch: Path) -> None:
-    """Put ``plan.json`` into a data set's folder, whole or not at all.
+    """Write ``plan.json`` into the folder of a data set, atomically.
 
-    ``scratch`` is a folder on the same file system for the unfinished file.
+    ``scratch`` is a folder for the unfinished file, on the same file system.
     """
     write_durably(folder / PLAN_NAME, plan_bytes(plan), scratch)
 
 
 def load_plan(folder: Path) -> Plan:
-    """The plan of a data set.
+    """Read the plan of a data set.
 
     Raises:
-        StorageError: missing, or not a plan.
+        StorageError: it is missing or damaged.
     """
     path = folder / PLAN_NAME
     try:
@@ -87,9 +87,9 @@ def load_plan(folder: Path) -> Plan:
 
 
 def compare_plans(old: Plan, new: Plan) -> list[str]:
-    """What differs, one line per field: ``camera.fov_deg: was 50, now 60``; empty when equal.
+    """Differences, one line per field: ``camera.fov_deg: was 50, now 60``; empty if equal.
 
-    Fields of the configuration are named as in the YAML file, all others by their place in Plan.
+    Fields of the configuration are named as in YAML, all others as in Plan.
     """
     was, now = to_plain(old), to_plain(new)
     lines = list(_differences("", was.pop("config"), now.pop("config")))
@@ -105,12 +105,12 @@ def _differences(place: str, was: Any, now: Any) -> Iterator[str]:
         for i, (left, right) in enumerate(zip(was, now, strict=True)):
             yield from _differences(f"{place}[{i}]", left, right)
     elif canonical_json(was) != canonical_json(now):
-        yield f"{place}: was {_shown(was)}, now {_shown(now)}"
+        yield f"{place}: was {_format(was)}, now {_format(now)}"
 
 
 _ABSENT = "(absent)"
 
 
-def _shown(value: Any, most: int = 120) -> str:
+def _format(value: Any, most: int = 120) -> str:
     text = value if value is _ABSENT else canonical_json(value)
     return text if len(text) <= most else text[: most - 3] + "..."

@@ -1,10 +1,10 @@
-"""Worker processes: carries out the supervisor's actions and reports events to it.
+"""Worker processes: executes the actions of the supervisor and reports events to it.
 
-Nothing here may block the supervisor, or Ctrl-C would be ignored and a batch job would burn its
-whole allocation. ``multiprocessing`` blocks: its ``Process.start`` writes the task into a pipe and
-waits until the new process reads it, which a process killed at birth never does;
-``multiprocessing.Pool`` waits for ever after a worker is killed; one kill breaks every future of a
-``ProcessPoolExecutor``. Here the job is a file in memory that workers inherit, and a process is a
+Nothing here may block the supervisor, or Ctrl-C would be ignored and a batch job would use up its
+allocation. ``multiprocessing`` blocks: its ``Process.start`` writes the task into a pipe and
+waits until the new process reads it, which a process that is killed at its start never does;
+``multiprocessing.Pool`` waits forever after a worker is killed; one kill breaks all futures of a
+``ProcessPoolExecutor``. Here, workers inherit the job as a file in memory, and a process is a
 socket and an exit code.
 """
 
@@ -41,14 +41,14 @@ from gen_data.generator.runner.worker_events import (
 TICK_S = 0.5
 ENDING_TICK_S = 0.02
 JOIN_S = 3.0
-"""How long to wait for killed processes. A process that the kernel cannot end, as on dead storage,
-must not keep the run; its parent-death signal is pending."""
+"""Time to wait for killed processes [s]. A process that the kernel cannot end, as on dead storage,
+must not block the run; its parent-death signal is pending."""
 
 START_WORKER = (
     "import sys; sys.path[:] = sys.argv[5:]; "
     "from gen_data.generator.runner.worker import main; main(*map(int, sys.argv[1:5]))"
 )
-"""The module search path is this process's: a plug-in that is found here is found there."""
+"""Program of a worker; it has the module search path of this process, and so its plug-ins."""
 
 
 @dataclass
@@ -58,7 +58,7 @@ class _Child:
     connected: bool = True
 
     def messages(self) -> Iterator[Event]:
-        """Receive everything the worker has sent; drop a message torn by its death."""
+        """Receive all messages of the worker; a message cut off by its death is dropped."""
         try:
             while self.connected and self.connection.poll():
                 yield self.connection.recv()
@@ -70,8 +70,8 @@ class WorkerPool:
     """The worker processes of one run. A context manager: leaves no process behind.
 
     Args:
-        job: The work.
-        logs: Folder for what workers print, one file per worker.
+        job: What the workers do.
+        logs: Folder for the output of workers, one file per worker.
     """
 
     def __init__(self, job: Job, logs: Path) -> None:
@@ -83,11 +83,11 @@ class WorkerPool:
         self._out_of_memory_kills = _count_out_of_memory_kills()
 
     def __enter__(self) -> WorkerPool:
-        """Begin with no process."""
+        """Start without processes."""
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Kill the remaining processes and wait for their end, for a bounded time."""
+        """Kill the remaining processes and wait for them for at most ``JOIN_S``."""
         for child in self._children.values():
             child.process.kill()
         deadline_s = time.monotonic() + JOIN_S
@@ -99,7 +99,7 @@ class WorkerPool:
         os.close(self._job_fd)
 
     def execute(self, action: Action) -> None:
-        """Carry out one action; actions on a process that has ended do nothing.
+        """Execute one action; actions on a process that has ended do nothing.
 
         Raises:
             OSError: No process can be started, or its log cannot be opened.
@@ -120,7 +120,7 @@ class WorkerPool:
         some_end = len(connections) < len(self._children)
         wait([wake_fd, *connections], ENDING_TICK_S if some_end else timeout_s)
         for number, child in sorted(self._children.items()):
-            # In this order: messages that precede the end are not lost.
+            # Poll first, so that messages before the end are not lost.
             exit_code = child.process.poll()
             yield from child.messages()
             if exit_code is not None:
@@ -187,7 +187,7 @@ def run_supervisor(
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Block SIGINT: a new process inherits the mask until it ignores Ctrl-C by itself."""
+    """Block SIGINT: a new process inherits the mask until it ignores SIGINT itself."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -196,7 +196,7 @@ def _interrupts_blocked() -> Iterator[None]:
 
 
 def _count_out_of_memory_kills() -> int:
-    """Count the processes that the kernel killed for lack of memory since boot; 0 if unknown."""
+    """Number of processes killed for lack of memory since boot; 0 if unknown."""
     try:
         lines = Path("/proc/vmstat").read_text().splitlines()
     except OSError:

@@ -1,7 +1,7 @@
 """``scenes.jsonl``: one line per sample of a shard, with its complete final scene.
 
-A later view of a scene holds only those fields of its Scene that differ from the scene's first
-line in the shard, whose sample index it names as ``base``: views share most of their world.
+Further views of a scene have only those fields of the Scene that differ from the first line of the
+scene in the shard, whose sample index is ``base``: views share most of their scene.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ SCENES_NAME = "scenes.jsonl"
 
 @dataclass(frozen=True, slots=True)
 class KeptScene:
-    """Where a sample came from, and its final scene: rendering it again gives its images."""
+    """Indices of a sample and its final scene, which renders to its images."""
 
     index: int
     scene_index: int
@@ -34,10 +34,10 @@ class KeptScene:
 
 
 def scene_line(sample: Sample, base: Sample | None) -> str:
-    """The line of a sample, without its line break.
+    """Format the line of a sample, without line break.
 
     Args:
-        sample: What the line is about.
+        sample: Described by the line.
         base: The first sample of its scene in the shard; None if that is the sample itself.
     """
     fields = {f.name: getattr(sample.scene, f.name) for f in dataclasses.fields(Scene)}
@@ -58,7 +58,7 @@ def scene_line(sample: Sample, base: Sample | None) -> str:
 
 
 def read_scenes(path: Path) -> Iterator[KeptScene]:
-    """The scenes of a shard's file, in order.
+    """Read the scenes of a shard, in order.
 
     Raises:
         ValueError, KeyError, TypeError: the file is damaged.

@@ -1,11 +1,11 @@
-"""run(plan, ...): a finished data set, or an error that says how to go on."""
+"""Runs: from a plan to a finished data set, or to an error that says how to resume."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from gen_data.generator.core.errors import GenDataError
@@ -31,17 +31,17 @@ from gen_data.generator.runner.worker_events import SampleDone
 __all__ = ["Limits", "RunProgress", "Settings", "Summary", "run"]
 
 IN_PROCESS = -1
-"""The number of the worker that is this process."""
+"""Worker number of this process."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """How a run works; nothing here changes a byte of the data set.
+    """Settings of a run; they change no byte of the data set.
 
     Attributes:
-        full_check: On resumption, hash what is there instead of comparing sizes. This also
-            repairs a damaged data set: damaged shards are made again.
-        limits: Bounds on silence, deaths and memory of workers.
+        full_check: On resumption, hash existing files instead of comparing sizes. This also
+            repairs a damaged data set: damaged shards are generated again.
+        limits: Limits on silence, deaths and memory of workers.
         write_media: Writes the images of one sample; picklable.
     """
 
@@ -54,45 +54,46 @@ def _silent(progress: RunProgress) -> None:
     del progress
 
 
-def run(  # noqa: PLR0913  (the front door: each argument is a question only the caller can answer)
+def run(  # noqa: PLR0913  (every argument is the choice of the caller)
     plan: Plan,
     make_pipeline: Callable[[], EnteredPipeline],
     out: Path,
     *,
     workers: int,
     resume_command: str,
-    progress: Callable[[RunProgress], None] = _silent,
+    progress: Callable[[RunProgress], None] | None = None,
     licences: LicencesOf | None = None,
     settings: Settings | None = None,
 ) -> Summary:
-    """Make a data set, or what is missing of it.
+    """Generate a data set, or the missing part of an unfinished one.
 
     Args:
         plan: The identity of the data set.
-        out: Its folder: absent, empty, or begun with an equal plan.
+        out: Its folder: absent, empty, or started with an equal plan.
         make_pipeline: Makes the same pipeline in any process; picklable unless ``workers`` is 0.
-        workers: Processes that make shards; 0 makes them in this process, for debugging.
-        resume_command: What a user types to go on after a fault; part of messages.
-        progress: Called at each sample and shard.
+        workers: Processes that generate shards; 0 generates them in this process, for debugging.
+        resume_command: Command that error messages give for resuming.
+        progress: Called after each sample and shard.
         licences: Makes the text of ``LICENSES-ASSETS.md``; None = no such file.
-        settings: How to work; None = the defaults.
+        settings: None = the defaults.
 
     Raises:
-        StorageError: the folder is another data set's, or cannot be written.
+        StorageError: the folder belongs to another data set, or cannot be written.
         ConfigError: another run is writing there.
-        SampleError: a sample cannot be made; WorkerLost, if trying kills the process.
+        SampleError: a sample cannot be generated; WorkerLost if it kills its process.
         DeterminismError: a shard came out differently the second time.
         Interrupted: Ctrl-C or SIGTERM; committed shards stay.
     """
     settings = settings or Settings()
     store = LocalStore(Path(out).absolute(), resume_command)
-    message = f"finished shards are kept; go on with:\n    {resume_command}"
+    message = f"finished shards are kept; resume with:\n    {resume_command}"
     with Interruption(message) as interruption:
         with interruption.immediate(), store.errors():
             store.state(plan)
         with store.locked():
             job = Job(plan, store, make_pipeline, settings.write_media)
-            return _Run(job, workers, progress, settings, interruption).to_the_end(licences)
+            run_ = _Run(job, workers, progress or _silent, settings, interruption)
+            return replace(run_.execute(licences), folder=str(out))
 
 
 @dataclass(frozen=True)
@@ -103,35 +104,35 @@ class _Run:
     settings: Settings
     interruption: Interruption
 
-    def to_the_end(self, licences: LicencesOf | None) -> Summary:
-        """Make what is missing, merge, seal."""
+    def execute(self, licences: LicencesOf | None) -> Summary:
+        """Generate the missing shards, merge and seal them."""
         plan, store = self.job.plan, self.job.store
         with self.interruption.immediate():
             with store.errors():
                 state = store.state(plan)
-                if state is FolderState.FINISHED and self._is_whole():
-                    return self._nothing_to_do()
+                if state is FolderState.FINISHED and self._is_intact():
+                    return self._summarize_finished()
             store.prepare(plan)
             scan = store.scan(plan, self.settings.full_check)
         monitor = RunMonitor(store, scan, plan.n, self.progress)
         monitor.show("samples")
         try:
-            self._make(scan, monitor)
+            self._generate(scan, monitor)
             with self.interruption.immediate():
                 monitor.show("merging")
                 dataset_id = finalize(plan, store, self.job.make_pipeline(), licences)
         finally:
-            # On a faulty disk this may fail as well; the next run begins with it.
+            # This may also fail on a faulty disk; the next run starts with it.
             with suppress(OSError):
                 store.clear_scratch()
-        return self._summary(dataset_id, scan, monitor)
+        return self._summarize(dataset_id, scan, monitor)
 
-    def _make(self, scan: Scan, monitor: RunMonitor) -> None:
+    def _generate(self, scan: Scan, monitor: RunMonitor) -> None:
         if not scan.missing:
             return
         if self.workers == 0:
             with self.interruption.immediate():
-                self._make_here(scan, monitor)
+                self._generate_here(scan, monitor)
             return
         supervisor = Supervisor(
             shards=scan.missing,
@@ -145,7 +146,7 @@ class _Run:
         if supervisor.error is not None:
             raise supervisor.error
 
-    def _make_here(self, scan: Scan, monitor: RunMonitor) -> None:
+    def _generate_here(self, scan: Scan, monitor: RunMonitor) -> None:
         with self.job.make_pipeline() as pipeline:
             for shard in scan.missing:
 
@@ -157,12 +158,12 @@ class _Run:
                 if objection is not None:
                     raise objection
 
-    def _is_whole(self) -> bool:
-        """Whether a finished data set still is one. Files that others put there do not matter."""
+    def _is_intact(self) -> bool:
+        """Whether a finished data set is undamaged; additional files do not matter."""
         found = find_deviations(self.job.store.root, self.settings.full_check)
         return all(finding.kind == "extra" for finding in found)
 
-    def _nothing_to_do(self) -> Summary:
+    def _summarize_finished(self) -> Summary:
         manifest = json.loads(self.job.store.manifest_path.read_bytes())
         return Summary(
             dataset_id=manifest["dataset_id"],
@@ -174,7 +175,7 @@ class _Run:
             already_complete=True,
         )
 
-    def _summary(self, dataset_id: str, scan: Scan, monitor: RunMonitor) -> Summary:
+    def _summarize(self, dataset_id: str, scan: Scan, monitor: RunMonitor) -> Summary:
         summary = Summary(
             dataset_id=dataset_id,
             samples=self.job.plan.n,

@@ -1,4 +1,4 @@
-"""Making one shard: samples, images, labels, provenance, commit."""
+"""Generation of one shard: samples, images, labels, provenance, commit."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ MediaWriter = Callable[[DatasetInfo, Sample, Path], object]
 
 
 class PipelineLike(Protocol):
-    """What the runner needs of a pipeline.
+    """Interface of a pipeline to the runner.
 
-    ``info`` and ``exporters`` can be read without entering it; ``sample`` is called inside a
+    ``info`` and ``exporters`` are available without entering it; ``sample`` is called inside a
     ``with`` block only.
     """
 
     @property
     def info(self) -> DatasetInfo:
-        """The data set as its exporters see it."""
+        """Facts about the data set, for exporters."""
         ...
 
     @property
     def exporters(self) -> Mapping[str, Exporter]:
-        """Exporters by name; an exporter's results go to the folder of that name."""
+        """Exporters by name, which is also that of the folder of their results."""
         ...
 
     def sample(self, index: int) -> Sample:
@@ -52,12 +52,12 @@ class EnteredPipeline(PipelineLike, Protocol):
         ...
 
     def __exit__(self, *exception: Any) -> bool | None:
-        """Stop them."""
+        """Stop the engines."""
         ...
 
 
 def write_images(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
-    """Encode a sample's images to where exporters expect them; imports OpenCV when first used."""
+    """Write the images of a sample to their places in a shard; imports OpenCV when first used."""
     from gen_data.exporters.image_files import write_media
 
     write_media(info, sample, shard_dir)
@@ -65,7 +65,7 @@ def write_images(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
 
 @dataclass(frozen=True)
 class Job:
-    """Everything that making a shard takes, except its number; picklable.
+    """Everything needed to generate a shard, except its number; picklable.
 
     Attributes:
         make_pipeline: Makes the same pipeline in any process.
@@ -80,7 +80,7 @@ class Job:
 
 @dataclass(frozen=True)
 class MadeShard:
-    """A committed shard, and the CPU seconds that its labels and its commit took, by stage."""
+    """A committed shard, with the CPU seconds of its export and commit by stage."""
 
     record: ShardRecord
     timings_s: Mapping[str, float]
@@ -89,14 +89,14 @@ class MadeShard:
 def make_shard(
     job: Job, pipeline: PipelineLike, shard: int, on_sample: Callable[[Sample], None]
 ) -> MadeShard:
-    """Make and commit one shard.
+    """Generate and commit one shard.
 
-    A sample's images are written and dropped as soon as it is made; exporters then see the whole
-    shard as a list of samples whose readings have cameras and no pixels. Truth masks are tight
-    crops, so memory stays within one sample's images and one shard's labels.
+    The images of each sample are written and dropped at once; exporters then receive all samples
+    of the shard without pixels. Masks are tight crops, so that memory is bounded by the images of
+    one sample and the labels of one shard.
 
     Raises:
-        GenDataError: a sample cannot be made, or its files cannot be written.
+        GenDataError: a sample cannot be generated, or its files cannot be written.
     """
     indices = job.plan.samples_of(shard)
     with job.store.errors():
@@ -104,7 +104,7 @@ def make_shard(
     try:
         samples: list[Sample] = []
         for index in indices:
-            samples.append(_written(job, pipeline, index, folder, samples, on_sample))
+            samples.append(_make_sample(job, pipeline, index, folder, samples, on_sample))
         started_s = time.process_time()
         for name in sorted(pipeline.exporters):
             with explain_errors(f"shard {shard}, exporter {name}"), job.store.errors():
@@ -114,12 +114,12 @@ def make_shard(
             job.store.commit(folder, record)
         write_s = time.process_time() - started_s
     finally:
-        # After a failure, give the space back; after a commit there is nothing left here.
+        # Frees the space after a failure; after a commit, the folder no longer exists.
         shutil.rmtree(folder, ignore_errors=True)
     return MadeShard(record, {"write": write_s})
 
 
-def _written(
+def _make_sample(
     job: Job,
     pipeline: PipelineLike,
     index: int,
@@ -127,9 +127,9 @@ def _written(
     before: Sequence[Sample],
     on_sample: Callable[[Sample], None],
 ) -> Sample:
-    """One sample without its pixels, after they and its scene are in files.
+    """Generate a sample, write its images, scene and labels, and return it without pixels.
 
-    ``before`` are the shard's samples before it.
+    ``before`` are the earlier samples of the shard.
     """
     with explain_errors(f"sample {index}", job.store.reproduce_command(index)):
         sample = pipeline.sample(index)
@@ -147,7 +147,7 @@ def _written(
 
 
 def drop_pixels(sample: Sample) -> Sample:
-    """The sample with its labels, and of what its sensors saw only when and from where."""
+    """Remove images and points from a sample; poses and instants of its sensors remain."""
     capture = sample.capture
     readings = {
         name: SensorReading(reading.sensor, reading.camera, {}, time_s=reading.time_s)

@@ -1,4 +1,4 @@
-"""ShardRecord: what a committed shard holds; its existence *is* the commit."""
+"""Records of committed shards; the existence of its record *is* the commit of a shard."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class FileRecord:
 
 @dataclass(frozen=True, slots=True)
 class SplitCount:
-    """What a split holds: samples, and visible annotated objects per category."""
+    """Numbers of samples and of visible annotated objects by category in a split."""
 
     split: str
     samples: int
@@ -35,12 +35,12 @@ class SplitCount:
 
 @dataclass(frozen=True, slots=True)
 class ShardRecord:
-    """The content of one shard.
+    """Contents of one shard.
 
     Attributes:
         first, end: Sample indices ``first <= i < end``.
         scenes: Scenes whose first view lies in this shard.
-        rejections: Layouts refused before those scenes were accepted.
+        rejections: Layouts rejected before these scenes were accepted.
         splits: Counts, sorted by split.
         assets: Ids of all objects, robots, textures and environments in its samples, sorted.
         files: Sorted by path.
@@ -61,12 +61,12 @@ class ShardRecord:
         return sum(file.bytes for file in self.files)
 
     def to_bytes(self) -> bytes:
-        """The record's file: one line of canonical JSON."""
+        """Contents of the record's file: one line of canonical JSON."""
         return (canonical_json(self) + "\n").encode()
 
 
 def parse_record(data: bytes) -> ShardRecord | None:
-    """The record in a file's bytes, or None if they are not one."""
+    """Parse the bytes of a record; None if they are damaged."""
     try:
         return from_plain(ShardRecord, json.loads(data))
     except (ValueError, TypeError, KeyError, AttributeError):
@@ -76,10 +76,10 @@ def parse_record(data: bytes) -> ShardRecord | None:
 def describe_shard(
     shard: int, indices: range, samples: Iterable[Sample], folder: Path
 ) -> ShardRecord:
-    """The record of a finished shard folder; reads every file once to hash it.
+    """Make the record of a finished shard folder; hashes every file.
 
     Raises:
-        StorageError: if something in the folder is not a regular file.
+        StorageError: the folder contains something other than regular files and folders.
     """
     scenes, rejections = 0, 0
     counts = []
@@ -110,7 +110,7 @@ def describe_shard(
 
 
 def sum_counts(counts: Iterable[SplitCount]) -> tuple[SplitCount, ...]:
-    """One count per split, sorted by split and category."""
+    """Sum counts by split, sorted by split and category."""
     samples: Counter[str] = Counter()
     objects: dict[str, Counter[str]] = {}
     for count in counts:
@@ -123,7 +123,7 @@ def sum_counts(counts: Iterable[SplitCount]) -> tuple[SplitCount, ...]:
 
 
 def _assets_in(scene: Scene) -> set[str]:
-    """Ids of what a scene shows; a robot's links go by the robot's id."""
+    """Asset ids of a scene; the links of a robot count as the robot."""
     links = tuple(f"{articulation.name}/" for articulation in scene.articulations)
     bodies = [b for b in scene.bodies if not (links and b.name.startswith(links))]
     materials = (material for body in scene.bodies for material in body.materials)

@@ -1,15 +1,15 @@
-"""LocalStore: how shards get into a folder, and what a folder says about itself.
+"""Storage of a data set in a folder.
 
     plan.json               identity of the data set; written first
     shards/000042/          files of one shard, renamed into place when all are on disk
     shards/000042.json      its record; from here on the shard is committed
-    coco/ kitti/ ...        what exporters merged
+    coco/ kitti/ ...        merged results of exporters
     SHA256SUMS              every file but run/ and itself, for ``sha256sum -c``
-    manifest.json           last: its presence says that the data set is finished
+    manifest.json           written last: it marks the data set as finished
     run/                    lock, log, unfinished and quarantined files; no part of the data set
 
-Nothing is inferred from what lies in a folder: a shard is what its record says, or it is
-made again.
+Nothing is inferred from the files in a folder: a shard either matches its record or is generated
+again.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ SCRATCH_FOLDERS_MAX = 1_000_000
 
 
 class FolderState(Enum):
-    """What an output folder holds."""
+    """State of an output folder."""
 
     NEW = "nothing yet"
     STARTED = "an unfinished data set of this plan"
@@ -67,11 +67,10 @@ class FolderState(Enum):
 
 @dataclass(frozen=True)
 class Scan:
-    """What a look at all records found.
+    """Result of reading all records.
 
     Attributes:
-        missing: Shards to make, ascending. A ``range`` while nothing is there, so that planning
-            costs no memory.
+        missing: Shards to generate, ascending. A ``range`` for a new data set, to save memory.
         samples, bytes, rejections: Sums over the committed shards.
     """
 
@@ -83,11 +82,11 @@ class Scan:
 
 @dataclass(frozen=True)
 class LocalStore:
-    """A data set's folder on a local file system. Only data: every process may have one.
+    """The folder of a data set on a local file system. Only data: every process may have one.
 
     Attributes:
         root: The folder.
-        resume_command: What a user types to go on after a storage fault; part of messages.
+        resume_command: Command that error messages give for resuming.
     """
 
     root: Path
@@ -95,12 +94,12 @@ class LocalStore:
 
     @property
     def run_dir(self) -> Path:
-        """Everything that is no part of the data set."""
+        """Folder of everything that is not part of the data set."""
         return self.root / RUN_NAME
 
     @property
     def manifest_path(self) -> Path:
-        """The manifest of a finished data set."""
+        """Path of the manifest of a finished data set."""
         return self.root / MANIFEST_NAME
 
     @property
@@ -109,39 +108,39 @@ class LocalStore:
 
     @property
     def scratch_root(self) -> Path:
-        """Unfinished and temporary files; cleared before and after a run."""
+        """Folder of unfinished and temporary files; cleared before and after a run."""
         return self.run_dir / "tmp"
 
     def shard_dir(self, shard: int) -> Path:
-        """The folder of a committed shard."""
+        """Path of the folder of a committed shard."""
         return self._shards_dir / f"{shard:06d}"
 
     def record_path(self, shard: int) -> Path:
-        """The record of a committed shard."""
+        """Path of the record of a committed shard."""
         return self._shards_dir / f"{shard:06d}.json"
 
     def reproduce_command(self, index: int) -> str:
-        """What a user types to make one sample of this data set alone."""
+        """Command that generates one sample of this data set by itself."""
         return f"gen-data contact-sheet {shlex.quote(str(self.root))} --first {index} --n 1"
 
     def errors(self) -> AbstractContextManager[None]:
-        """OSErrors of the block become StorageErrors that name the resume command."""
+        """Context that turns OSErrors into StorageErrors with the resume command."""
         return storage_errors(self.root, self.resume_command)
 
     def state(self, plan: Plan) -> FolderState:
-        """What the folder holds; changes nothing.
+        """Determine the state of the folder; changes nothing.
 
         Raises:
-            StorageError: the folder belongs to something else, or to another plan.
+            StorageError: the folder has other contents, or a data set of another plan.
         """
         if not self.root.exists():
-            self._refuse_impossible_place()
+            self._check_parents()
             return FolderState.NEW
         if not self.root.is_dir():
             raise StorageError(f"{self.root}: is not a folder; {REMEDY}")
         names = {path.name for path in self.root.iterdir()}
         if PLAN_NAME in names:
-            self._refuse_another(plan)
+            self._check_plan(plan)
             return FolderState.FINISHED if MANIFEST_NAME in names else FolderState.STARTED
         if names - {RUN_NAME} or not _is_run_dir(self.run_dir):
             raise StorageError(
@@ -152,10 +151,10 @@ class LocalStore:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Own the folder; the lock dies with the process, however that dies.
+        """Lock the folder; the kernel releases the lock when the process ends in any way.
 
         Raises:
-            ConfigError: another process has it; names host and pid.
+            ConfigError: another process holds the lock; the message names host and pid.
         """
         with self.errors():
             make_folder(self.run_dir)
@@ -170,9 +169,9 @@ class LocalStore:
             os.close(descriptor)
 
     def prepare(self, plan: Plan) -> None:
-        """Make the folder ready for shards: no remains of earlier runs, plan written.
+        """Prepare the folder for shards: remove unfinished files, write the plan.
 
-        A manifest that is there is withdrawn: call this only when there is something to do.
+        An existing manifest is removed: call this only if shards are missing.
         """
         with self.errors():
             self.clear_scratch()
@@ -186,7 +185,7 @@ class LocalStore:
                 sync_path(self.root)
 
     def clear_scratch(self) -> None:
-        """Remove unfinished files. The folder moves away first, so that no late writer finds it."""
+        """Remove unfinished files. The folder is renamed first, out of reach of late writers."""
         if self.scratch_root.exists():
             doomed = self.run_dir / "tmp-doomed"
             shutil.rmtree(doomed, ignore_errors=True)
@@ -194,7 +193,7 @@ class LocalStore:
             shutil.rmtree(doomed, ignore_errors=True)
 
     def scratch_dir(self) -> Path:
-        """A new empty folder for unfinished files, on the data set's own file system."""
+        """Create an empty folder for unfinished files, on the file system of the data set."""
         for number in range(SCRATCH_FOLDERS_MAX):
             folder = self.scratch_root / f"{os.getpid()}-{number}"
             try:
@@ -207,7 +206,7 @@ class LocalStore:
     def commit(self, folder: Path, record: ShardRecord) -> None:
         """Publish a finished shard: files, then folder, then record, each synced before the next.
 
-        Publishing the same bytes twice is no error and changes nothing.
+        Publishing the same bytes twice changes nothing.
 
         Raises:
             DeterminismError: the shard was committed before, with other bytes.
@@ -217,13 +216,13 @@ class LocalStore:
             self._expect_equal(committed, record, folder)
             return
         sync_tree(folder)
-        # A folder without a record is what a kill between the two steps below leaves.
+        # A kill between the two steps below leaves a folder without a record.
         self.quarantine(record.shard)
         move_durably(folder, self.shard_dir(record.shard))
         write_durably(self.record_path(record.shard), record.to_bytes(), self.scratch_root)
 
     def record(self, shard: int) -> ShardRecord | None:
-        """The record of a shard, or None if it is missing or damaged."""
+        """Read the record of a shard; None if it is missing or damaged."""
         try:
             data = self.record_path(shard).read_bytes()
         except FileNotFoundError:
@@ -233,7 +232,7 @@ class LocalStore:
     def scan(self, plan: Plan, full: bool = False) -> Scan:
         """Check every record and the sizes of its files, or their digests when ``full``.
 
-        What is damaged goes to ``run/quarantine`` and counts as missing.
+        Damaged shards are moved to ``run/quarantine`` and count as missing.
         """
         with self.errors():
             if next(self._shards_dir.iterdir(), None) is None:
@@ -241,7 +240,7 @@ class LocalStore:
             missing = array("q")
             samples, size, rejections = 0, 0, 0
             for shard in range(plan.shard_count):
-                record = self._intact(plan, shard, full)
+                record = self._intact_record(plan, shard, full)
                 if record is None:
                     self.quarantine(shard)
                     missing.append(shard)
@@ -252,8 +251,8 @@ class LocalStore:
             return Scan(missing, samples, size, rejections)
 
     def quarantine(self, shard: int) -> None:
-        """Move a shard's folder and record out of the data set, where there are any."""
-        # The record goes first: without it the folder is no shard any more.
+        """Move the record and the folder of a shard, if they exist, out of the data set."""
+        # The record first: without it, the folder is not a shard.
         for path in (self.record_path(shard), self.shard_dir(shard)):
             if path.exists():
                 self._quarantine(path)
@@ -267,7 +266,7 @@ class LocalStore:
         move_durably(path, kept)
         return kept
 
-    def _intact(self, plan: Plan, shard: int, full: bool) -> ShardRecord | None:
+    def _intact_record(self, plan: Plan, shard: int, full: bool) -> ShardRecord | None:
         record = self.record(shard)
         if record is None:
             return None
@@ -294,7 +293,7 @@ class LocalStore:
             f"  Compare {self.shard_dir(committed.shard)} with {kept}"
         )
 
-    def _refuse_impossible_place(self) -> None:
+    def _check_parents(self) -> None:
         for path in (self.root, *self.root.parents):
             if path.is_symlink() and not path.exists():
                 target = path.readlink()
@@ -302,7 +301,7 @@ class LocalStore:
             if path.exists() and not path.is_dir():
                 raise StorageError(f"{path}: is not a folder; {REMEDY}")
 
-    def _refuse_another(self, plan: Plan) -> None:
+    def _check_plan(self, plan: Plan) -> None:
         differences = compare_plans(load_plan(self.root), plan)
         if differences:
             listed = "\n".join(f"  {line}" for line in differences[:20])
@@ -310,7 +309,7 @@ class LocalStore:
             raise StorageError(
                 f"{self.root}: holds a data set of another plan; nothing was changed:\n"
                 f"{listed}{more}\n"
-                "  Choose another folder with --out, or go on with the old configuration."
+                "  Choose another folder with --out, or use the old configuration."
             )
 
     def _lock(self, descriptor: int) -> None:
@@ -328,7 +327,7 @@ class LocalStore:
 
 
 def _is_run_dir(folder: Path) -> bool:
-    """Whether a folder is absent, or one that a run killed before its plan was written left."""
+    """Whether a folder is absent, or left by a run that was killed before it wrote its plan."""
     if not folder.exists():
         return True
     return folder.is_dir() and {p.name for p in folder.iterdir()} <= {"lock", "tmp", "tmp-doomed"}

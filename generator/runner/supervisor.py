@@ -1,7 +1,7 @@
-"""The supervisor's decisions, as a state machine: events in, actions out.
+"""Decisions of the supervisor as a state machine: events in, actions out.
 
-It starts no process, reads no clock and touches no file, so that a simulation with a virtual
-clock and seeded faults drives exactly the code that runs in production.
+It starts no process, reads no clock and accesses no file, so that a simulation with a virtual
+clock and seeded faults exercises exactly the production code.
 """
 
 from __future__ import annotations
@@ -37,9 +37,9 @@ class Limits:
     Attributes:
         silence_s: A worker that sends nothing for this long counts as hung and is killed. Covers
             the start of its engines, too.
-        farewell_s: Time for a dismissed worker to end.
+        farewell_s: Time that a dismissed worker has to exit.
         shard_attempts: Deaths on one shard until it is abandoned.
-        lost_shards: Abandoned shards until the run is; the others are still made until then.
+        lost_shards: Abandoned shards until the run is abandoned.
         failed_starts: Consecutive deaths during start until the run is abandoned.
         rss_bytes: Memory at which a worker is replaced after its shard; None = never.
     """
@@ -72,14 +72,14 @@ class _Worker:
 
 @dataclass
 class Supervisor:
-    """Keeps up to ``workers`` processes busy until every shard is made or given up.
+    """Keeps up to ``workers`` processes busy until every shard is finished or abandoned.
 
     Attributes:
-        shards: Shards to make, in this order.
+        shards: Shards to generate, in this order.
         samples_of: Sample indices of a shard.
-        describe_sample: The command that makes one sample alone; for messages.
+        describe_sample: Command that generates one sample by itself, for messages.
         error: The first error that ends the run, or None.
-        given_up: Shards that killed their workers too often.
+        given_up: Abandoned shards, which killed too many workers.
         deaths: Processes that ended unexpectedly.
     """
 
@@ -93,7 +93,7 @@ class Supervisor:
     deaths: int = 0
 
     def __post_init__(self) -> None:
-        """Begin with no process."""
+        """Start without processes."""
         if self.workers < 1:
             raise ValueError(f"at least one worker is needed, got {self.workers}")
         self._alive: dict[int, _Worker] = {}
@@ -106,12 +106,12 @@ class Supervisor:
 
     @property
     def finished(self) -> bool:
-        """Whether no process is left and none will be started."""
+        """Whether no process runs and none will be started."""
         return not self._alive and (self._draining or self._waiting == 0)
 
     @property
     def _waiting(self) -> int:
-        """Shards that no worker has yet."""
+        """Number of shards that are not assigned."""
         return len(self.shards) - self._cursor + len(self._again)
 
     def start(self, now_s: float) -> list[Action]:
@@ -119,7 +119,7 @@ class Supervisor:
         return self._dispatch(now_s)
 
     def handle(self, event: Event, now_s: float) -> list[Action]:
-        """Return the actions that an event calls for; ignore events of ended processes."""
+        """Return the actions for an event; events of processes that have ended are ignored."""
         actions = self._react(event, now_s)
         return actions + self._dispatch(now_s)
 
@@ -146,15 +146,15 @@ class Supervisor:
         return []
 
     def _dispatch(self, now_s: float) -> list[Action]:
-        """Give idle workers shards, start missing workers, dismiss superfluous ones."""
+        """Assign shards to idle workers, start missing workers, dismiss superfluous ones."""
         actions: list[Action] = []
-        for number, worker in self._of(State.IDLE):
+        for number, worker in self._workers_in(State.IDLE):
             if self._draining or self._waiting == 0:
                 break
-            worker.state, worker.shard, worker.done = State.BUSY, self._take(), 0
+            worker.state, worker.shard, worker.done = State.BUSY, self._next_shard(), 0
             worker.heard_s = now_s
             actions.append(Assign(number, worker.shard))
-        open_shards = 0 if self._draining else self._waiting + len(self._of(State.BUSY))
+        open_shards = 0 if self._draining else self._waiting + len(self._workers_in(State.BUSY))
         if open_shards == 0:
             return actions + self._dismiss_idle(now_s)
         staff = sum(worker.state is not State.LEAVING for worker in self._alive.values())
@@ -166,18 +166,18 @@ class Supervisor:
 
     def _dismiss_idle(self, now_s: float) -> list[Action]:
         actions: list[Action] = []
-        for number, worker in self._of(State.IDLE):
+        for number, worker in self._workers_in(State.IDLE):
             worker.state, worker.heard_s = State.LEAVING, now_s
             actions.append(Dismiss(number))
-        for number, worker in self._of(State.STARTING):
+        for number, worker in self._workers_in(State.STARTING):
             worker.state, worker.killed = State.LEAVING, "no longer needed"
             actions.append(Kill(number))
         return actions
 
-    def _of(self, state: State) -> list[tuple[int, _Worker]]:
+    def _workers_in(self, state: State) -> list[tuple[int, _Worker]]:
         return [(n, w) for n, w in sorted(self._alive.items()) if w.state is state]
 
-    def _take(self) -> int:
+    def _next_shard(self) -> int:
         if self._again:
             return self._again.popleft()
         self._cursor += 1
@@ -205,12 +205,12 @@ class Supervisor:
     def _report(self, error: GenDataError, worker: _Worker) -> list[Action]:
         worker.state = State.LEAVING
         if isinstance(error, (StorageError, DeterminismError)):
-            # The others would only fail in the same way, after much work.
+            # The other workers would fail in the same way.
             return self._abort(error)
         return self._drain(error)
 
     def _drain(self, error: GenDataError) -> list[Action]:
-        """Hand out no more shards; those in work are finished."""
+        """Assign no more shards; those in progress are finished."""
         self.error = self.error or error
         self._draining = True
         return []
@@ -222,9 +222,9 @@ class Supervisor:
         cause = worker.killed or describe_exit(event)
         if event.out_of_memory and self.workers > 1:
             self.workers -= 1
-            cause += f"; going on with {self.workers} worker(s)"
+            cause += f"; continuing with {self.workers} worker(s)"
         if worker.state is State.BUSY:
-            return self._shard_died(event.worker, worker, cause)
+            return self._on_shard_death(event.worker, worker, cause)
         if worker.state is State.STARTING:
             self._failed_starts += 1
             if self._failed_starts >= self.limits.failed_starts:
@@ -236,7 +236,7 @@ class Supervisor:
                 )
         return [Note(f"worker {event.worker} {cause} while {worker.state.value}")]
 
-    def _shard_died(self, number: int, worker: _Worker, cause: str) -> list[Action]:
+    def _on_shard_death(self, number: int, worker: _Worker, cause: str) -> list[Action]:
         shard = worker.shard
         self._deaths[shard] = self._deaths.get(shard, 0) + 1
         place = self._in_flight(worker)
@@ -274,7 +274,7 @@ class Supervisor:
 
 
 def describe_exit(event: Exited) -> str:
-    """Say how a process ended."""
+    """Describe the end of a process."""
     if event.exit_code >= 0:
         return f"exited with status {event.exit_code}"
     number = -event.exit_code

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM as a flag and a file descriptor, instead of an exception anywhere."""
+"""SIGINT and SIGTERM as a flag and a file descriptor, instead of an exception at any point."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Interruption:
-    """Whether the user asked to stop. A context manager, for the main thread.
+    """Requests to stop, by signal. A context manager for the main thread.
 
-    In other threads it does nothing: there, signals are the host program's business.
+    In other threads it does nothing, because signals belong to the host program there.
 
     Attributes:
-        wake_fd: Becomes readable when the user asks.
+        wake_fd: Becomes readable at a request.
     """
 
     def __init__(self, message: str) -> None:
@@ -31,14 +31,14 @@ class Interruption:
         self.wake_fd, self._signal_fd = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
 
     def __enter__(self) -> Interruption:
-        """Take over the signals."""
+        """Install the signal handlers."""
         if threading.current_thread() is threading.main_thread():
             for number in SIGNALS:
                 self._before[number] = signal.signal(number, self._on_signal)
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Give them back."""
+        """Restore the previous handlers."""
         for number, handler in self._before.items():
             signal.signal(number, handler)  # type: ignore[arg-type]
         os.close(self.wake_fd)
@@ -46,11 +46,11 @@ class Interruption:
 
     @property
     def pending(self) -> bool:
-        """Whether the user asked and nobody has taken note."""
+        """Whether there is a request that ``take`` has not returned."""
         return bool(self._name)
 
     def take(self) -> Interrupted:
-        """The error to end with; nothing is pending any more."""
+        """Return the error for the pending request, and clear the request."""
         error = Interrupted(f"{self._name}: {self._message}")
         self._name = ""
         try:

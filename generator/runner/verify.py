@@ -1,4 +1,4 @@
-"""Does a finished data set hold what its manifest declares?"""
+"""Verification of a finished data set against its manifest."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ SHOWN_MAX = 50
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """One deviation.
+    """One deviation from the manifest.
 
     Attributes:
         kind: ``missing``, ``extra``, ``size``, ``digest`` or ``inconsistent``.
         path: Relative to the data set's root.
-        text: What is wrong.
-        samples: Which samples it concerns, in words; empty = all or none.
+        text: Description of the deviation.
+        samples: Affected samples, in words; empty = all or none.
     """
 
     kind: str
@@ -54,10 +54,10 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A data set without deviations.
+    """Result for a data set without deviations.
 
     Attributes:
-        full: Whether every byte was hashed, not only sizes compared.
+        full: Every file was hashed, instead of comparing sizes.
     """
 
     dataset_id: str
@@ -78,10 +78,10 @@ class Report:
 def verify(folder: Path, full: bool = False) -> Report:
     """Check a data set against its manifest.
 
-    With ``full`` every file is hashed; else sizes, records and sums are compared.
+    With ``full``, every file is hashed; otherwise sizes, records and sums are compared.
 
     Raises:
-        VerificationError: not a finished data set, or every deviation that was found.
+        VerificationError: the folder has no finished data set, or deviations, which it lists.
     """
     if not (folder / MANIFEST_NAME).is_file():
         raise VerificationError(
@@ -99,7 +99,7 @@ def verify(folder: Path, full: bool = False) -> Report:
 
 
 def find_deviations(folder: Path, full: bool = False) -> list[Finding]:
-    """Every deviation, in order of discovery; empty if there is none."""
+    """Find all deviations, in order of discovery."""
     try:
         plan = load_plan(folder)
     except StorageError as error:
@@ -108,7 +108,7 @@ def find_deviations(folder: Path, full: bool = False) -> list[Finding]:
 
 
 class _Check:
-    """One look at a data set: what is declared, what is there."""
+    """Comparison of the declared with the existing files of a data set."""
 
     def __init__(self, folder: Path, plan: Plan) -> None:
         self._folder = folder
@@ -119,9 +119,9 @@ class _Check:
         self._hashed: dict[Inode, str] = {}
 
     def run(self, full: bool) -> Iterator[Finding]:
-        """All findings."""
-        manifest_bytes = _bytes_of(self._folder / MANIFEST_NAME)
-        manifest = _object(manifest_bytes)
+        """Yield all deviations."""
+        manifest_bytes = _read_or_empty(self._folder / MANIFEST_NAME)
+        manifest = _parse_object(manifest_bytes)
         if manifest is None:
             yield Finding("inconsistent", MANIFEST_NAME, "is not a manifest")
             return
@@ -133,7 +133,7 @@ class _Check:
 
     def _read_sums(self, manifest: dict[str, Any], manifest_bytes: bytes) -> Iterator[Finding]:
         finding = partial(Finding, "inconsistent", SUMS_NAME)
-        lines = _bytes_of(self._folder / SUMS_NAME).decode(errors="replace").splitlines()
+        lines = _read_or_empty(self._folder / SUMS_NAME).decode(errors="replace").splitlines()
         matches = [SUM_LINE.fullmatch(line) for line in lines]
         self._sums = {match[2]: match[1] for match in matches if match}
         if None in matches or len(self._sums) != len(lines):
@@ -146,14 +146,14 @@ class _Check:
             yield finding(f"does not belong to {MANIFEST_NAME}: its sha256 is not dataset_id")
 
     def _read_sizes(self, manifest: dict[str, Any]) -> Iterator[Finding]:
-        """Declared sizes: from records, from the manifest, and by equal digest."""
+        """Collect declared sizes: from records, from the manifest, and by equal digest."""
         by_digest: dict[str, int] = {}
         digests = manifest.get("shards", [])
         if len(digests) != self._plan.shard_count:
             yield Finding("inconsistent", MANIFEST_NAME, "number of shards is not the plan's")
         for shard, digest in enumerate(digests[: self._plan.shard_count]):
             path = self._relative(self._store.record_path(shard))
-            data = _bytes_of(self._store.record_path(shard))
+            data = _read_or_empty(self._store.record_path(shard))
             record = parse_record(data)
             if record is None or hashlib.sha256(data).hexdigest() != digest:
                 text = "its sha256 is not the one in the manifest" if data else "is missing"
@@ -188,7 +188,7 @@ class _Check:
             yield finding("digest", text="its bytes differ (sha256)")
 
     def _digest(self, path: str) -> str:
-        """Digest of a file; hard links to one file are read once."""
+        """SHA-256 of a file; hard links to one file are read once."""
         inode = get_inode(self._folder / path)
         if inode not in self._hashed:
             self._hashed[inode] = hash_file(self._folder / path)
@@ -213,11 +213,11 @@ def _actual_sizes(folder: Path) -> dict[str, int]:
     return {path: size for path, size in sizes.items() if not path.startswith(f"{RUN_NAME}/")}
 
 
-def _bytes_of(path: Path) -> bytes:
+def _read_or_empty(path: Path) -> bytes:
     return path.read_bytes() if path.is_file() else b""
 
 
-def _object(data: bytes) -> dict[str, Any] | None:
+def _parse_object(data: bytes) -> dict[str, Any] | None:
     try:
         value = json.loads(data)
     except ValueError:

@@ -1,8 +1,8 @@
-"""A worker process: starts its engines once, makes shards until there are none.
+"""Worker process: starts its engines once and generates shards until it is dismissed.
 
-The module is light, so that a new process can tie its life to its parent's before it imports
-anything slow. The environment is the parent's: the command line has pinned the thread pools of BLAS
-and OpenMP there, because their sums depend on the number of threads.
+The module imports little, so that a new process can arrange to end with its parent before slow
+imports. It inherits the environment, where the command line limits BLAS and OpenMP to one thread,
+because their sums depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -33,13 +33,13 @@ if TYPE_CHECKING:
 
 
 def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
-    """Entry of the process; ends when the connection brings None or closes.
+    """Entry point of the process; returns when it receives None or the connection closes.
 
     Args:
         number: Of the worker.
-        connection_fd: A socket: shards come in, events go out.
-        job_fd: A file that holds a pickled Job.
-        parent_pid: The process ends with that one.
+        connection_fd: Socket for shard numbers (in) and events (out).
+        job_fd: File with a pickled Job.
+        parent_pid: Process whose end also ends this one.
     """
     end_with_parent(parent_pid)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -49,10 +49,10 @@ def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
     connection = Connection(connection_fd)
     try:
         job = _load_job(job_fd)
-        _keep_temporary_files_in(job.store.scratch_root)
+        _set_temporary_folder(job.store.scratch_root)
         _make_shards(number, connection, job)
     except (EOFError, ConnectionError):
-        # The supervisor is gone: nobody would read a report.
+        # The supervisor has ended, so there is no reader for a report.
         sys.exit(1)
     except Exception as error:
         traceback.print_exc()
@@ -62,35 +62,35 @@ def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
 
 
 def _load_job(descriptor: int) -> Job:
-    # All workers share the descriptor's position, hence pread.
+    # pread, because all workers share the position of the descriptor.
     job: Job = pickle.loads(os.pread(descriptor, os.fstat(descriptor).st_size, 0))
     os.close(descriptor)
     return job
 
 
-def _keep_temporary_files_in(folder: Path) -> None:
-    """Let ``tempfile`` use a folder of the run, which outlives no run, even of killed workers.
+def _set_temporary_folder(folder: Path) -> None:
+    """Make ``tempfile`` use a folder of the run, which is cleared even if workers are killed.
 
-    The alias is short and plain whatever the folder is called: Bullet cuts long paths off.
+    The alias is short ASCII whatever the name of the folder, because Bullet truncates long paths.
     """
     tempfile.tempdir = f"/proc/self/fd/{os.open(folder, os.O_RDONLY | os.O_DIRECTORY)}"
 
 
 def make_sendable(error: Exception) -> GenDataError:
-    """The error as one that survives the way to another process and has a message for users."""
+    """Convert an error to one that can be pickled and has a message for users."""
     if not isinstance(error, GenDataError):
         return unexpected_error(error, "a worker could not start")
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:
-        # Whatever a plug-in's error class does wrong, its kind and its text still count.
-        plain: GenDataError = _ancestor_of_message(type(error))(str(error))
+        # The error class of a plug-in cannot be pickled: keep its kind and its text.
+        plain: GenDataError = _picklable_base(type(error))(str(error))
         return plain
     return error
 
 
-def _ancestor_of_message(kind: type[GenDataError]) -> type[GenDataError]:
-    """The nearest of our own error classes that is made of nothing but a message."""
+def _picklable_base(kind: type[GenDataError]) -> type[GenDataError]:
+    """Nearest base class among our own errors whose only argument is a message."""
     return next(
         base
         for base in kind.__mro__
@@ -100,24 +100,24 @@ def _ancestor_of_message(kind: type[GenDataError]) -> type[GenDataError]:
 
 def _make_shards(number: int, connection: Connection, job: Job) -> None:
     with job.make_pipeline() as pipeline:
-        # Objects that exist now stay to the end. Collecting the rest between shards is early
-        # enough: automatic collection takes 2 % of the run.
+        # Existing objects live until the end. Collecting the others between shards suffices;
+        # automatic collection takes 2 % of the run.
         gc.collect()
         gc.freeze()
         gc.disable()
         connection.send(Ready(number))
         while (shard := connection.recv()) is not None:
-            _make(number, connection, job, pipeline, shard)
-            _give_memory_back()
+            _make_shard(number, connection, job, pipeline, shard)
+            _release_memory()
 
 
-def _make(
+def _make_shard(
     number: int, connection: Connection, job: Job, pipeline: PipelineLike, shard: int
 ) -> None:
     def report(sample: Sample) -> None:
         connection.send(SampleDone(number, shard, sample.index, dict(sample.timings_s)))
 
-    # Imports numpy: only after this process is tied to its parent.
+    # Imports numpy, therefore only after ``end_with_parent``.
     from gen_data.generator.runner.shard import make_shard
 
     made = make_shard(job, pipeline, shard, report)
@@ -125,7 +125,7 @@ def _make(
 
 
 def done_event(number: int, made: MadeShard) -> ShardDone:
-    """Summarise a shard that worker ``number`` made, for the supervisor."""
+    """Event for a shard that worker ``number`` has committed."""
     record = made.record
     return ShardDone(
         number,
@@ -139,7 +139,7 @@ def done_event(number: int, made: MadeShard) -> ShardDone:
 
 
 def resident_bytes() -> int:
-    """Memory that this process occupies now; 0 where Linux's procfs is missing."""
+    """Resident memory of this process; 0 without Linux's procfs."""
     try:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
     except OSError:
@@ -147,8 +147,8 @@ def resident_bytes() -> int:
     return pages * resource.getpagesize()
 
 
-def _give_memory_back() -> None:
-    """Return freed memory to the system: glibc keeps what caches of arrays leave in between."""
+def _release_memory() -> None:
+    """Return freed memory to the system; glibc keeps the gaps between cached arrays otherwise."""
     gc.collect()
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:

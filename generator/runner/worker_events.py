@@ -11,14 +11,14 @@ from gen_data.generator.core.errors import GenDataError
 
 @dataclass(frozen=True, slots=True)
 class Ready:
-    """A worker's engines are up; it waits for a shard."""
+    """The engines of a worker have started; it waits for a shard."""
 
     worker: int
 
 
 @dataclass(frozen=True, slots=True)
 class SampleDone:
-    """One sample was made and its images are written. Also the sign of life."""
+    """A sample was generated and its images written; also the sign of life of a worker."""
 
     worker: int
     shard: int
@@ -47,7 +47,7 @@ class ShardDone:
 
 @dataclass(frozen=True, slots=True)
 class Failed:
-    """A worker met an error that another attempt would meet again; it ends now."""
+    """A worker exits because of an error that would recur."""
 
     worker: int
     error: GenDataError
@@ -55,11 +55,11 @@ class Failed:
 
 @dataclass(frozen=True, slots=True)
 class Exited:
-    """A worker's process is gone.
+    """The process of a worker has ended.
 
     Attributes:
-        exit_code: As ``multiprocessing`` has it: negative = killed by that signal.
-        out_of_memory: The kernel killed some process for want of memory at that time.
+        exit_code: As of ``subprocess``: negative = killed by that signal.
+        out_of_memory: The kernel killed some process for lack of memory at that time.
     """
 
     worker: int
@@ -74,7 +74,7 @@ class Tick:
 
 @dataclass(frozen=True, slots=True)
 class Abort:
-    """Stop everything at once, for this reason."""
+    """Stop everything at once because of an error."""
 
     error: GenDataError
 
@@ -84,14 +84,14 @@ Event: TypeAlias = Ready | SampleDone | ShardDone | Failed | Exited | Tick | Abo
 
 @dataclass(frozen=True, slots=True)
 class Spawn:
-    """Start a process under this number."""
+    """Start a process with this worker number."""
 
     worker: int
 
 
 @dataclass(frozen=True, slots=True)
 class Assign:
-    """Let a ready worker make a shard."""
+    """Let an idle worker generate a shard."""
 
     worker: int
     shard: int
@@ -99,21 +99,21 @@ class Assign:
 
 @dataclass(frozen=True, slots=True)
 class Dismiss:
-    """Let an idle worker end by itself."""
+    """Let an idle worker exit."""
 
     worker: int
 
 
 @dataclass(frozen=True, slots=True)
 class Kill:
-    """End a process now."""
+    """Kill a process."""
 
     worker: int
 
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """Something a user may want to know; for the log."""
+    """A line for the log."""
 
     text: str
 

@@ -6,6 +6,7 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,17 +14,25 @@ import yaml
 
 import gen_data
 from gen_data.exporters.image_files import SIGNED_ZERO, encode_channel, read_image
+from gen_data.generator.assemble.config import parse_config
+from gen_data.generator.assemble.pipeline_factory import PipelineFactory
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.serialization import to_plain
 from tests.end_to_end.running import environment
 
-SMALL = ("sensors.color.size_px=[96, 72]", "shard_size=3")
+SMALL = (
+    "sensors.color.size_px=[96, 72]",
+    "shard_size=3",
+    "splits={train: 1, val: 0, test: 0}",  # A few scenes would leave the others empty.
+)
+README = Path(__file__).parents[2] / "README.md"
 MINIMAL = {
     "template": "tabletop",
     "elements": {"clutter": {"count": 2}},
     "randomizers": [{"type": "camera_pose", "name": "orbit", "distance_m": {"uniform": [0.8, 1]}}],
     "sensors": [{"type": "rgb_camera", "name": "color", "size_px": [64, 48]}],
     "annotations": ["boxes2d"],
+    "splits": {"train": 1, "val": 0, "test": 0},
 }
 
 
@@ -190,6 +199,48 @@ def test_progress_is_reported(tmp_path: Path) -> None:
     )
 
     assert max(seen) == 2
+
+
+def test_the_summary_names_the_folder_and_empty_splits_are_warned_of(tmp_path: Path) -> None:
+    """As the command line does."""
+    two_splits = {**MINIMAL, "splits": {"train": 0.5, "val": 0.5, "test": 0}}
+    with pytest.warns(gen_data.ConfigWarning, match="splits: 1 scene leaves"):
+        summary = gen_data.generate(two_splits, 1, out=tmp_path / "out", workers=0)
+
+    assert summary.folder == str(tmp_path / "out")
+
+
+def readme_block(language: str) -> str:
+    """The first code block of a language in the README."""
+    return README.read_text().partition(f"```{language}\n")[2].partition("```")[0]
+
+
+def test_the_yaml_of_the_readme_is_valid() -> None:
+    """All of its names refer to something, and its exporters fit its sensors."""
+    config = parse_config(readme_block("yaml"), "README.md")
+
+    assert [sensor.name for sensor in config.sensors] == ["color"]
+    with PipelineFactory(config, n=1)() as pipeline:
+        assert set(pipeline.exporters) == {"coco", "kitti"}
+
+
+def test_the_python_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With small images, and few of them."""
+    monkeypatch.chdir(tmp_path)
+    program = readme_block("python")
+    for written, small in (
+        ('"tabletop.yaml", ', f'"tabletop.yaml", overrides={SMALL!r}, '),
+        ("n=1000", "n=2"),
+        ("workers=8", "workers=0"),
+    ):
+        assert written in program
+        program = program.replace(written, small)
+
+    names: dict[str, Any] = {}
+    exec(compile(program, str(README), "exec"), names)
+
+    assert names["sample"].index == 1
+    assert (tmp_path / "out" / "tabletop" / "manifest.json").is_file()
 
 
 def test_public_names_are_the_listed_ones() -> None:

@@ -110,9 +110,11 @@ def test_the_command_line_may_use_old_words_too(tmp_path: Path) -> None:
 def test_every_new_word_is_one_of_its_plugin_and_no_old_one_is() -> None:
     """The tables agree with the plug-ins."""
     for (section, kind), renames in PLUGINS.items():
-        fields = TABLES[section.removesuffix("s")].load(kind).model_fields
-        assert set(renames.keys.values()) <= fields.keys()
-        assert not renames.keys.keys() & fields.keys()
+        plugin = TABLES[section.removesuffix("s")].load(kind)
+        for path, words in renames.keys.items():
+            fields = (plugin.model_fields[path].annotation if path else plugin).model_fields
+            assert set(words.values()) <= fields.keys()
+            assert not words.keys() & fields.keys()
     for section, names in TYPES.items():
         table = TABLES[section.removesuffix("s")]
         assert set(names.values()) <= set(table)
@@ -142,3 +144,39 @@ def test_the_command_line_shows_a_warning_as_one_plain_line(tmp_path: Path) -> N
         f"gen-data: warning: {path}:2:22: randomizers[0].type: 'along' is called 'lane_objects'"
     )
     assert lines[1].startswith(f"gen-data: {path}:2:38: randomizers[13].sped: unknown key")
+
+
+def test_an_override_without_a_type_may_use_old_words(tmp_path: Path) -> None:
+    """Nested ones too; what it does not override stays inherited, and the last file wins."""
+    (tmp_path / "base.yaml").write_text(
+        "template: tabletop\n"
+        "sensors: [{type: rgb_camera, name: c, image_pipeline: {glare: 0.1, flare: 0.2}}]\n"
+    )
+    middle = tmp_path / "middle.yaml"
+    middle.write_text(
+        "extends: base.yaml\nsensors: [{name: c, formation: {bloom: 0.3, vignetting: 0.4}}]\n"
+    )
+    top = tmp_path / "top.yaml"
+    top.write_text("extends: middle.yaml\nsensors: [{name: c, image_pipeline: {glare: 0.5}}]\n")
+
+    with pytest.warns(FutureWarning) as caught:
+        (overridden,) = load_config(str(middle)).sensors
+    with pytest.warns(FutureWarning):
+        (last,) = load_config(str(top)).sensors
+
+    found = overridden.image_pipeline
+    assert (found.glare.mean(), found.flare.mean(), found.vignetting.mean()) == (0.3, 0.2, 0.4)
+    assert last.image_pipeline.glare.mean() == 0.5
+    messages = [str(warning.message) for warning in caught]
+    assert [m.partition(": ")[0] for m in messages] == [f"{middle}:2:21", f"{middle}:2:33"]
+
+
+def test_a_field_that_a_shared_value_selects_may_use_old_words() -> None:
+    """In every entry of the selection."""
+    text = "sensors: [{type: rgb_camera, formation: {given: s, a: {bloom: 1}, otherwise: {}}}]"
+
+    with pytest.warns(FutureWarning):
+        current = replace_old_words(parse_yaml(text, "x.yaml"))
+
+    pipeline = {"switch": "s", "a": {"glare": 1}, "default": {}}
+    assert current.plain() == {"sensors": [{"type": "rgb_camera", "image_pipeline": pipeline}]}

@@ -26,13 +26,13 @@ def assert_refused(tmp_path: Path, arguments: tuple[str, ...], code: int, *texts
 @pytest.mark.parametrize(
     ("arguments", "texts"),
     [
-        (("--config", "tabletop.yaml", "--n", "0"), ("--n: 0",)),
-        (("--config", "tabletop.yaml", "--n", "-3"), ("--n: -3",)),
+        (("--config", "tabletop.yaml", "--n", "0"), ("n: 0",)),
+        (("--config", "tabletop.yaml", "--n", "-3"), ("n: -3",)),
         (("--config", "tabletop.yaml"), ("--n is missing",)),
         (("--config", "tabletop.yaml", "--n", "x"), ("--n",)),
         (("--config", "tabeltop.yaml", *JOB), ("did you mean 'tabletop.yaml'?",)),
         (("--config", "tabletop.yaml", *JOB, "--seed", "-1"), ("--seed: -1 is negative",)),
-        (("--config", "tabletop.yaml", *JOB, "--workers", "-1"), ("--workers: -1",)),
+        (("--config", "tabletop.yaml", *JOB, "--workers", "-1"), ("workers: -1",)),
         (("--config", "tabletop.yaml", *JOB, "--without", "colour"), ("did you mean 'colors'?",)),
         (("--config", "tabletop.yaml", *JOB, "--set", "views_per_scene"), ("KEY=VALUE",)),
         (

@@ -31,7 +31,10 @@ if TYPE_CHECKING:
 
 
 DISTRIBUTION_TITLE = "distribution of "
-"""What titles of distributions begin with in JSON Schema."""
+"""Prefix of the titles of distributions in JSON Schema."""
+
+MEANT = {"yes": "true", "on": "true", "no": "false", "off": "false"}
+"""Booleans of YAML 1.1 that YAML 1.2 reads as text."""
 
 
 @dataclass(frozen=True)
@@ -201,7 +204,7 @@ def _quote_hint(value: Any) -> str:
 
 
 def _flag_hint(value: Any) -> str:
-    meant = {"yes": "true", "on": "true", "no": "false", "off": "false"}.get(str(value).lower())
+    meant = MEANT.get(str(value).lower())
     return f" (did you mean {meant}?)" if meant else ""
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import ClassVar, Literal
+from typing import Literal
 
 from pydantic import Field
 
@@ -33,11 +32,6 @@ class RenderSettings(Strict):
         visibility: Method that finds the surface at a pixel centre: ``raster`` (CPU only),
             ``rays``, or the faster one on the device.
     """
-
-    moved_keys: ClassVar[Mapping[str, str]] = {
-        key: f"sensors[].image_pipeline.{key}: it is a property of each camera"
-        for key in ("tone", "glare", "exposure_compensation_ev")
-    }
 
     tier: Literal["realtime", "pathtraced"] = "realtime"
     samples: int = Field(64, ge=1, le=65536)

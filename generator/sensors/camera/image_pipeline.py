@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,12 +86,6 @@ class ImagePipeline(Strict):
         sharpening_px: Radius of unsharp masking.
         jpeg_quality: Quality of compression, 1 to 100; null = none.
     """
-
-    former_keys: ClassVar[Mapping[str, str]] = {
-        "bloom": "glare",
-        "photosites": "image_sensor",
-        "shutter": "exposure_control",
-    }
 
     preset: str = "ideal"
     focus: Focus | None = None

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -78,7 +77,6 @@ class RgbCamera(Mounted):
             to its right that forms a rectified pair with it.
     """
 
-    former_keys: ClassVar[Mapping[str, str]] = {"formation": "image_pipeline"}
     type: Literal["rgb_camera"] = "rgb_camera"
     name: str = Field("color", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     size_px: tuple[SidePx, SidePx] = (640, 480)

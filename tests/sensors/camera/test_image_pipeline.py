@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from gen_data.generator.assemble.config import load_config
-from gen_data.generator.config.renaming import RenamedKeyWarning
 from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.intrinsics import Intrinsics
@@ -171,7 +170,7 @@ def written(tmp_path: Path, text: str) -> str:
     return str(path)
 
 
-def test_former_keys_are_read_with_a_warning_that_names_the_new_ones(tmp_path: Path) -> None:
+def test_deprecated_keys_are_read_with_a_warning_that_names_the_new_ones(tmp_path: Path) -> None:
     """``formation`` with ``bloom``, ``shutter`` and ``photosites``, each told at its place."""
     own = written(
         tmp_path,
@@ -183,7 +182,7 @@ def test_former_keys_are_read_with_a_warning_that_names_the_new_ones(tmp_path: P
         "      photosites: {bits: 10}\n",
     )
 
-    with pytest.warns(RenamedKeyWarning) as warned:
+    with pytest.warns(FutureWarning) as warned:
         (camera,) = load_config(own).sensors
 
     pipeline = camera.image_pipeline
@@ -191,15 +190,15 @@ def test_former_keys_are_read_with_a_warning_that_names_the_new_ones(tmp_path: P
     assert pipeline.exposure_control.f_number == 4.0
     assert pipeline.image_sensor.bits == 10
     told = [str(warning.message) for warning in warned]
-    assert any("own.yaml:4:5: " in text and "now 'image_pipeline'" in text for text in told)
+    assert any("own.yaml:4:5: " in text and "called 'image_pipeline' now" in text for text in told)
     for name in ("glare", "exposure_control", "image_sensor"):
-        assert any(f"now '{name}'" in text for text in told), name
+        assert any(f"called '{name}' now" in text for text in told), name
 
 
-def test_a_former_key_beside_its_new_name_is_unknown(tmp_path: Path) -> None:
+def test_a_deprecated_key_beside_its_new_name_is_refused(tmp_path: Path) -> None:
     """No value is dropped without a word."""
     own = written(tmp_path, "sensors:\n  - {type: rgb_camera, formation: {}, image_pipeline: {}}\n")
-    with pytest.raises(ConfigError, match=r"own\.yaml:3:24: .*unknown key 'formation'"):
+    with pytest.raises(ConfigError, match=r"own\.yaml:3:24: .*called 'image_pipeline' now"):
         load_config(own)
 
 
