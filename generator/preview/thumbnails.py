@@ -15,7 +15,9 @@ from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.kinematics import make_link_bodies
 from gen_data.generator.core.scene import Articulation, Body, Camera, Environment, Light, Scene
 from gen_data.generator.core.se3 import SE3, look_at
+from gen_data.generator.core.streams import Streams
 from gen_data.generator.preview.overlay import Image
+from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 
 _HALF_FIELD_RAD = math.radians(15.0)
 _AZIMUTH_RAD, _ELEVATION_RAD = math.radians(35.0), math.radians(25.0)
@@ -40,7 +42,9 @@ def thumbnail(asset: Asset, library: AssetLibrary, renderer: Renderer, size_px: 
         lights=(Light("key", "sun", direction=(-0.36, -0.48, -0.8), illuminance_lux=600.0),),
         environment=Environment(luminance_cd_m2=120.0, visible=False),
     )
-    reading = renderer.render(scene, _camera(scene, library, size_px), frozenset({Channel.RGB}))
+    camera, channels = _camera(scene, library, size_px), frozenset({Channel.RGB})
+    rng = Streams(seed=0, scene=0).rng("thumbnail")
+    reading = capture_photograph(scene, renderer, camera, channels, ImagePipeline(), rng)
     return np.asarray(reading.channels[Channel.RGB], np.uint8)
 
 
