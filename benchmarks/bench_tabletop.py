@@ -1,8 +1,8 @@
 """Labelled samples per second to disk: ``python -m benchmarks.bench_tabletop``.
 
 640x480, the shipped tabletop with the arm and exactly ten objects, two soft-shadow lights and
-environment light; RGB, depth, instance and category PNGs and COCO and KITTI labels on disk. PyBullet's
-TinyRenderer draws the same scenes for comparison.
+environment light; RGB, depth, instance and category PNGs and COCO and KITTI labels on disk.
+PyBullet's TinyRenderer draws the same scenes for comparison.
 """
 
 from __future__ import annotations
