@@ -1,10 +1,10 @@
 """CPU milliseconds per laser sweep in a street: ``python -m benchmarks.bench_lidar``.
 
-An HDL-64E, 133,312 pulses, in samples of ``kitti_rig.yaml``: everything from directions to records
-with position, intensity, time, ring, labels and returns. One process, one core; the best of
-several sweeps, each of a scene of its own, as the steps of a sequence are: it is packed and traced
-anew, and only its assets are known. "Moving" is the same street with the scanner and every vehicle
-and person under way.
+An HDL-64E, 133,312 pulses, in samples of ``kitti_rig.yaml``, from directions to records with
+position, intensity, time, ring, labels and returns. One process, one core; the best of several
+sweeps, each in a scene of its own, as in a sequence: the scene is packed and traced anew, its
+assets are cached. "Moving" is the same street with the scanner and all vehicles and people in
+motion.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from gen_data.generator.sensors.lidar.scan_pattern import make_sweep
 
 
 def best_s(work: Callable[[], object], repeats: int) -> float:
-    """Least CPU time of one call."""
+    """Least CPU time of one call [s]."""
     spent = []
     for _ in range(repeats):
         started = time.process_time()
@@ -38,8 +38,8 @@ def best_s(work: Callable[[], object], repeats: int) -> float:
     return min(spent)
 
 
-def under_way(scene: Scene) -> Scene:
-    """The scene with its scanner, its vehicles and its people moving; each turns a little."""
+def set_in_motion(scene: Scene) -> Scene:
+    """Return the scene with scanner, vehicles and people in motion; each turns slightly."""
     cart = Body("cart", scene.bodies[0].asset, SE3((0.0, 0.0, -1000.0)))
     T_cart_lidar = cart.T_world_body.inverse() @ scene.lidar("velodyne").T_world_lidar
     lidar = replace(scene.lidar("velodyne"), rig="rig", T_rig_lidar=T_cart_lidar)
@@ -71,9 +71,9 @@ def main() -> None:
     model = lidar_model(arguments.model)
     sweep = make_sweep(model, 0.0)
     beams = LidarRays(sweep.directions, 0.0, 1, model.range_m[1], order=sweep.order)
-    spec = load_config("kitti_rig.yaml", overrides=["sensors[0].size_px=[64, 32]"])
+    config = load_config("kitti_rig.yaml", overrides=["sensors[0].size_px=[64, 32]"])
     print(f"{machine()}; {arguments.model}, {len(sweep.ring)} pulses")
-    with open_pipeline(spec) as pipeline:
+    with open_pipeline(config) as pipeline:
         for index in range(0, 5 * arguments.samples, 5):
             scene = pipeline.sample(index).scene
             renderer, lidar = pipeline.renderer, scene.lidar("velodyne")
@@ -93,7 +93,7 @@ def main() -> None:
                 spent = best_s(capture, arguments.repeats)
                 kind = "7 rays, dual" if sensor.divergence else "1 ray, strongest"
                 print(f"sample {index}, {kind}: {1e3 * spent:.0f} ms, {points} points")
-            moving = under_way(scene)
+            moving = set_in_motion(scene)
             sensor = LidarSensor(name="velodyne", model=arguments.model)
 
             def capture_moving(sensor: LidarSensor = sensor) -> PointCloud:

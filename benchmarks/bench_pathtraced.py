@@ -1,12 +1,12 @@
 """CPU seconds until a path-traced image looks converged: ``python -m benchmarks.bench_pathtraced``.
 
-The scenes of the tests against Mitsuba, 128x96; half an hour for all twelve. Each renderer makes a
-reference of its own, then images of 1, 2, 4, ... samples until their FLIP against it (Andersson et
-al. 2020) falls below 0.05; between two of them time is interpolated on logarithmic axes. Beside
-this project's tier on the CPU, as it is and with its denoiser, runs Mitsuba 3: vectorised
-(``llvm_ad_rgb``, which loads an LLVM of the system, see DRJIT_LIBLLVM_PATH), and ``scalar_rgb``;
-its denoiser needs a GPU of one make. Every renderer runs in a process of its own; time is the
-process's CPU time of one image, kernels being ready.
+The scenes of the tests against Mitsuba at 128x96; all twelve take half an hour. Each renderer
+renders its own reference, then images of 1, 2, 4, ... samples until their FLIP against it
+(Andersson et al. 2020) falls below 0.05; time is interpolated on logarithmic axes. Compared are
+the path-traced tier on the CPU, with and without denoiser, and Mitsuba 3: ``llvm_ad_rgb``
+(vectorised; loads an LLVM of the system, see DRJIT_LIBLLVM_PATH) and ``scalar_rgb``; the denoiser
+of Mitsuba runs on GPUs of one vendor only. Each renderer has a process of its own; time is the CPU
+time of one image with compiled kernels.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ Render = Callable[[int, int], np.ndarray]
 """Samples and seed to radiance."""
 
 
-def picture_of(name: str) -> Picture:
-    """A scene of the tests, in the size of the benchmark."""
+def load_picture(name: str) -> Picture:
+    """Scene of the tests at the size of the benchmark."""
     picture = PICTURES[name]()
     k = picture.camera.intrinsics
     width_px, height_px = SIZE_PX
@@ -48,8 +48,8 @@ def picture_of(name: str) -> Picture:
     return replace(picture, camera=replace(picture.camera, intrinsics=intrinsics))
 
 
-def own(picture: Picture, *, denoise: bool = False) -> Render:
-    """This project's tier; images of other names have other noise."""
+def own_render(picture: Picture, *, denoise: bool = False) -> Render:
+    """Path-traced tier; the noise depends on the name of the camera."""
 
     @cache
     def renderer_of(samples: int) -> WarpRenderer:
@@ -65,8 +65,8 @@ def own(picture: Picture, *, denoise: bool = False) -> Render:
     return render
 
 
-def theirs(picture: Picture, variant: str) -> Render:
-    """Mitsuba."""
+def mitsuba_render(picture: Picture, variant: str) -> Render:
+    """Mitsuba 3 with a variant."""
     import mitsuba as mi
 
     mi.set_variant(variant)
@@ -77,8 +77,8 @@ def theirs(picture: Picture, variant: str) -> Render:
     return lambda samples, seed: np.array(mi.render(loaded, spp=samples, seed=seed), np.float64)
 
 
-def measured(render: Render, reference: np.ndarray) -> list[tuple[int, float, float]]:
-    """(samples, CPU seconds, FLIP) until the goal is reached."""
+def measure_convergence(render: Render, reference: np.ndarray) -> list[tuple[int, float, float]]:
+    """(samples, CPU time [s], FLIP) of each image until the goal is reached."""
     rows = []
     for samples in SAMPLES:
         render(samples, 2)
@@ -94,7 +94,7 @@ def measured(render: Render, reference: np.ndarray) -> list[tuple[int, float, fl
 
 
 def seconds_to_goal(rows: list[tuple[int, float, float]]) -> float:
-    """CPU seconds at which FLIP reaches the goal; that of the first image if it does at once."""
+    """CPU time at which FLIP reaches the goal [s]; at least that of the first image."""
     if len(rows) == 1 or rows[-1][2] >= GOAL:
         return rows[-1][1] if rows[-1][2] < GOAL else math.inf
     (_, t0, f0), (_, t1, f1) = rows[-2:]
@@ -102,10 +102,10 @@ def seconds_to_goal(rows: list[tuple[int, float, float]]) -> float:
     return math.exp(math.log(t0) + part * math.log(t1 / t0))
 
 
-def in_a_process(
+def run_in_process(
     renderer: str, scenes: Sequence[str], reference_samples: int
 ) -> dict[str, list] | None:
-    """Scenes by one renderer; None if it cannot run here."""
+    """Figures of one renderer by scene; None if it cannot run here."""
     command = [sys.executable, "-m", "benchmarks.bench_pathtraced", "--renderer", renderer]
     command += ["--reference", str(reference_samples), "--scenes", *scenes]
     finished = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -114,7 +114,7 @@ def in_a_process(
 
 
 def main() -> None:
-    """Print a table, or one renderer's figures as JSON."""
+    """Print a table, or the figures of one renderer as JSON."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--reference", type=int, default=4096, help="samples of references")
     parser.add_argument("--renderer", help="one of OWN or a variant of Mitsuba: that one alone")
@@ -123,15 +123,15 @@ def main() -> None:
     if arguments.renderer:
         figures = {}
         for scene in arguments.scenes:
-            picture = picture_of(scene)
+            picture = load_picture(scene)
             ours = arguments.renderer in OWN
-            plain = own(picture) if ours else theirs(picture, arguments.renderer)
-            render = own(picture, denoise=True) if arguments.renderer == OWN[1] else plain
-            figures[scene] = measured(render, plain(arguments.reference, 1))
+            plain = own_render(picture) if ours else mitsuba_render(picture, arguments.renderer)
+            render = own_render(picture, denoise=True) if arguments.renderer == OWN[1] else plain
+            figures[scene] = measure_convergence(render, plain(arguments.reference, 1))
         print(json.dumps(figures))
         return
     table = {
-        renderer: in_a_process(renderer, arguments.scenes, arguments.reference)
+        renderer: run_in_process(renderer, arguments.scenes, arguments.reference)
         for renderer in (*OWN, "llvm_ad_rgb", "scalar_rgb")
     }
     for renderer, figures in table.items():

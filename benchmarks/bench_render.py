@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.bench_tabletop import spec_of
+from benchmarks.bench_tabletop import make_config
 from gen_data.generator.assemble.pipeline_factory import open_pipeline
 from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.interfaces import AssetLibrary
@@ -28,16 +28,16 @@ from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capt
 LABELLED = frozenset({Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY})
 
 
-def tabletops(count: int) -> tuple[list[Scene], AssetLibrary]:
-    """Settled scenes, and the library that their assets are in."""
-    with open_pipeline(spec_of(1)) as pipeline:
+def settle_tabletops(count: int) -> tuple[list[Scene], AssetLibrary]:
+    """Settled scenes and the library of their assets."""
+    with open_pipeline(make_config(1)) as pipeline:
         return [pipeline.sample(i).scene for i in range(count)], pipeline.assets
 
 
 def frame_ms(
     renderer: WarpRenderer, scenes: list[Scene], channels: frozenset[Channel], repeats: int
 ) -> list[float]:
-    """CPU milliseconds of each scene, the best of some repetitions."""
+    """CPU time of each scene, the best of several repetitions [ms]."""
     spent = np.zeros((repeats, len(scenes)))
     for row in spent:
         for k, scene in enumerate(scenes):
@@ -49,14 +49,14 @@ def frame_ms(
 
 
 def photograph(renderer: WarpRenderer, scene: Scene, channels: frozenset[Channel]) -> SensorReading:
-    """An ideal camera's reading: rendered, then developed."""
+    """Render a scene and develop it with an ideal camera."""
     rng = Streams(seed=0, scene=0).rng("camera")
     return capture_photograph(scene, renderer, scene.cameras[0], channels, ImagePipeline(), rng)
 
 
 @contextmanager
 def timed_launches() -> Iterator[dict[str, float]]:
-    """CPU milliseconds by kernel, while the context lasts."""
+    """CPU time by kernel within the context [ms]."""
     import warp as wp
 
     spent_ms: dict[str, float] = defaultdict(float)
@@ -81,7 +81,7 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=5)
     arguments = parser.parse_args()
 
-    scenes, assets = tabletops(arguments.scenes)
+    scenes, assets = settle_tabletops(arguments.scenes)
     started_s = time.perf_counter()
     renderer = WarpRenderer(assets, "cpu")
     photograph(renderer, scenes[0], LABELLED)

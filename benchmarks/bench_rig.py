@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import argparse
 
-from benchmarks.runs import described, machine, measured_run
+from benchmarks.runs import format_summary, machine, measure_run
 from gen_data.generator.assemble.config import load_config
 
 
 def main() -> None:
-    """Print the table that the README records."""
+    """Print the figures of docs/performance.md."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--n", type=int, default=400, help="frames; sequences have 20")
     parser.add_argument("--workers", type=int, default=2)
@@ -22,9 +22,9 @@ def main() -> None:
     arguments = parser.parse_args()
 
     print(f"{machine()}, {arguments.workers} workers, {arguments.n} frames")
-    spec = load_config(arguments.rig, seed=1)
-    summary = measured_run(spec, arguments.n, arguments.workers)
-    print(f"{spec.name}: {described(summary)}")
+    config = load_config(arguments.rig, seed=1)
+    summary = measure_run(config, arguments.n, arguments.workers)
+    print(f"{config.name}: {format_summary(summary)}")
 
 
 if __name__ == "__main__":

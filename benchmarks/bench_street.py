@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 
-from benchmarks.runs import described, machine, measured_run
+from benchmarks.runs import format_summary, machine, measure_run
 from gen_data.generator.assemble.config import Config, load_config
 
 OVERRIDES = (
@@ -22,14 +22,14 @@ OVERRIDES = (
 )
 
 
-def spec_of(weather: str) -> Config:
-    """The benchmark's street: 30 vehicles and 40 people; ``weather`` empty = as configured."""
+def make_config(weather: str) -> Config:
+    """Street with 30 vehicles and 40 people; an empty ``weather`` keeps the configured one."""
     given = (f"shared.weather={weather}",) if weather else ()
     return load_config("street.yaml", seed=1, overrides=(*OVERRIDES, *given))
 
 
 def main() -> None:
-    """Print the table that the README records."""
+    """Print the figures of docs/performance.md."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--n", type=int, default=500)
     parser.add_argument("--workers", type=int, default=2)
@@ -37,8 +37,8 @@ def main() -> None:
     arguments = parser.parse_args()
 
     print(f"{machine()}, {arguments.workers} workers, {arguments.n} samples")
-    summary = measured_run(spec_of(arguments.weather), arguments.n, arguments.workers)
-    print(f"street, {arguments.weather or 'all weathers'}: {described(summary)}")
+    summary = measure_run(make_config(arguments.weather), arguments.n, arguments.workers)
+    print(f"street, {arguments.weather or 'all weathers'}: {format_summary(summary)}")
 
 
 if __name__ == "__main__":

@@ -3,7 +3,7 @@
 1242x375 as in KITTI, sun and sky; about 400 bodies and 0.7 million triangles within 100 m: 30
 vehicles of 6,000 triangles, 40 people of 5,000, 30 houses of 4,000, 40 trees of 5,000, 250 poles
 and signs, and a road. RGB, depth, instance, category and amodal silhouettes. The shapes stand in
-for real assets of the same size: they are made of arithmetic, so that the benchmark needs no files
+for real assets of the same size: they are computed, so that the benchmark needs no files
 and its scenes never change. One process, one core.
 """
 
@@ -44,11 +44,11 @@ STREET_LENGTH_M = 100.0
 
 @dataclass(frozen=True)
 class Kind:
-    """One kind of thing in the street.
+    """One kind of object in the street.
 
     Attributes:
-        shapes: How many different meshes there are of it.
-        rows_m: Distances from the middle of the street at which it stands.
+        shapes: Number of different meshes.
+        rows_m: Distances of its rows from the middle of the street.
         squareness: 1 is an ellipsoid, towards 0 a box.
     """
 
@@ -72,34 +72,34 @@ KINDS = {
 
 
 class Street:
-    """An AssetLibrary whose meshes are made when asked for, from the kind and a number."""
+    """An AssetLibrary that computes meshes on demand, from the kind and a number."""
 
     def get(self, asset_id: str) -> Asset:
-        """No asset has an entry."""
+        """Raise: no asset has an entry."""
         raise AssetError(f"unknown asset '{asset_id}'")
 
     def find(self, tags: object, kind: str = "object") -> tuple[Asset, ...]:  # noqa: ARG002
-        """No asset has tags."""
+        """Return nothing: no asset has tags."""
         return ()
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
-        """One per mesh slot."""
+        """Materials of the mesh, one per slot."""
         return self.mesh(asset_id).materials
 
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
-        """Of the mesh."""
+        """Bounds of the mesh."""
         return self.mesh(asset_id).bounds_m()
 
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:  # noqa: ARG002
-        """None."""
+        """Return no keypoints."""
         return ()
 
     def robot(self, asset_id: str) -> RobotModel:
-        """There is none."""
+        """Raise: there is no robot."""
         raise AssetError(f"'{asset_id}' is no robot")
 
     def convex_parts(self, asset_id: str) -> ConvexParts:
-        """The vertices."""
+        """One part with all vertices."""
         return ConvexParts((self.mesh(asset_id).vertices_m.astype(np.float64),))
 
     def mesh(self, asset_id: str) -> MeshData:
@@ -132,7 +132,7 @@ def street_mesh(asset_id: str) -> MeshData:
 
 
 def lumpy_mesh(kind: Kind, rng: Rng, number: int) -> MeshData:
-    """A superellipsoid with lumps, its materials in ten bands."""
+    """Lumpy superellipsoid with its materials in ten bands."""
     rows = max(int(np.sqrt(kind.triangles / 4)), 4)
     polar, azimuth = np.meshgrid(
         np.linspace(0.02, np.pi - 0.02, rows + 1),
@@ -178,11 +178,11 @@ def grid_mesh(
         ]
     )
     slots = np.tile((i * len(materials) // rows).reshape(-1), 2)
-    return finished(vertices, faces, slots, materials)
+    return with_normals(vertices, faces, slots, materials)
 
 
 def tree_mesh(kind: Kind, rng: Rng) -> MeshData:
-    """Leaves: single triangles all over a crown."""
+    """Crown of leaves, each a single triangle."""
     n = kind.triangles
     way = rng.normal(size=(n, 3))
     way /= np.sqrt((way * way).sum(axis=1, keepdims=True))
@@ -191,13 +191,13 @@ def tree_mesh(kind: Kind, rng: Rng) -> MeshData:
     corners = crown[:, None] + rng.uniform(-0.15, 0.15, (n, 3, 3))
     faces = np.arange(3 * n).reshape(n, 3)
     leaf = Material((0.1, 0.3, 0.05), 0.8)
-    return finished(corners.reshape(-1, 3), faces, np.zeros(n), (leaf,))
+    return with_normals(corners.reshape(-1, 3), faces, np.zeros(n), (leaf,))
 
 
-def finished(
+def with_normals(
     vertices: Array, faces: Array, slots: Array, materials: tuple[Material, ...]
 ) -> MeshData:
-    """The mesh with its normals."""
+    """Return the mesh with its normals."""
     corners = vertices[faces]
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals = np.zeros_like(vertices)
@@ -215,7 +215,7 @@ def finished(
 
 
 def street_scene(number: int) -> Scene:
-    """One street with other assets, places and camera for every number."""
+    """Street whose assets, places and camera depend on the number."""
     rng = Streams(0, number).rng("street")
     bodies = [Body("road", "road", collides=False)]
     instances = []

@@ -1,8 +1,8 @@
 """Labelled samples per second to disk: ``python -m benchmarks.bench_tabletop``.
 
 640x480, the shipped tabletop with the arm and exactly ten objects, two soft-shadow lights and
-environment light; RGB, depth, instance and category PNGs and COCO and KITTI labels on disk. The
-same scenes are drawn by PyBullet's TinyRenderer in the same run, for a ratio.
+environment light; RGB, depth, instance and category PNGs and COCO and KITTI labels on disk.
+PyBullet's TinyRenderer draws the same scenes for comparison.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.runs import described, machine, measured_run
+from benchmarks.runs import format_summary, machine, measure_run
 from gen_data.generator.assemble.config import Config, load_config
 from gen_data.generator.assemble.pipeline_factory import open_pipeline
 
@@ -25,8 +25,8 @@ OVERRIDES = (
 )
 
 
-# All that lights and materials can do: balls, spots, rectangles and disks, panels that are seen;
-# coats, panes, solid glass, metal, bumps. Mirrors, panoramas and exposure are in the scene anyway.
+# All features of lights and materials: balls, spots, rectangles, disks and visible panels; coats,
+# panes, solid glass, metal, bumps. Mirrors, panoramas and metering are in the scene anyway.
 EVERYTHING = (
     *OVERRIDES,
     "randomizers.lamps.kind={choice: [sphere, spot, rectangle, disk]}",
@@ -37,21 +37,21 @@ EVERYTHING = (
 )
 
 
-def spec_of(views_per_scene: int) -> Config:
-    """The benchmark's scene."""
+def make_config(views_per_scene: int) -> Config:
+    """Tabletop with ten objects and two lamps."""
     overrides = (*OVERRIDES, f"views_per_scene={views_per_scene}")
     return load_config("tabletop.yaml", seed=1, overrides=overrides)
 
 
-def everything() -> Config:
+def every_effect_config() -> Config:
     """The tabletop with every effect of the realtime tier."""
     return load_config("tabletop.yaml", seed=1, overrides=EVERYTHING)
 
 
 def first_sample_s() -> float:
-    """Seconds from nothing to the first sample in this process."""
+    """Time to the first sample in this process [s]."""
     started_s = time.perf_counter()
-    with open_pipeline(spec_of(5)) as pipeline:
+    with open_pipeline(make_config(5)) as pipeline:
         pipeline.sample(0)
     return time.perf_counter() - started_s
 
@@ -63,7 +63,7 @@ def tiny_renderer_s(samples: int) -> float:
     """
     import pybullet
 
-    with open_pipeline(spec_of(1)) as pipeline, tempfile.TemporaryDirectory() as folder:
+    with open_pipeline(make_config(1)) as pipeline, tempfile.TemporaryDirectory() as folder:
         taken = [pipeline.sample(i) for i in range(samples)]
         client = pybullet.connect(pybullet.DIRECT)
         spent_s = 0.0
@@ -78,7 +78,7 @@ def tiny_renderer_s(samples: int) -> float:
 
 
 def _load_bodies(pybullet: Any, client: int, bodies: Any, assets: Any, folder: Path) -> None:
-    """Make every body of a scene in the engine, from our own meshes; not part of the timing."""
+    """Load the meshes of all bodies into the engine; not part of the timing."""
     for body in bodies:
         path = folder / (body.asset.replace("/", "_").replace("?", "_") + ".obj")
         if not path.exists():
@@ -136,7 +136,7 @@ def _draw(pybullet: Any, client: int, camera: Any, folder: Path) -> None:
 
 
 def main() -> None:
-    """Print the table that the README records."""
+    """Print the figures of docs/performance.md."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--n", type=int, default=1500)
     parser.add_argument("--workers", type=int, default=2)
@@ -146,11 +146,11 @@ def main() -> None:
     print(f"first sample in this process: {first_sample_s():.1f} s")
     ours_s = {}
     for views_per_scene in (5, 1):
-        summary = measured_run(spec_of(views_per_scene), arguments.n, arguments.workers)
+        summary = measure_run(make_config(views_per_scene), arguments.n, arguments.workers)
         ours_s[views_per_scene] = sum(summary.cpu_s.values())
-        print(f"views_per_scene {views_per_scene}: {described(summary)}")
-    summary = measured_run(everything(), arguments.n, arguments.workers)
-    print(f"every effect, views_per_scene 5: {described(summary)}")
+        print(f"views_per_scene {views_per_scene}: {format_summary(summary)}")
+    summary = measure_run(every_effect_config(), arguments.n, arguments.workers)
+    print(f"every effect, views_per_scene 5: {format_summary(summary)}")
     tiny_s = tiny_renderer_s(20)
     print(
         f"TinyRenderer, same scenes: {1e3 * tiny_s:.0f} CPU ms/sample (render, encode, write; no"

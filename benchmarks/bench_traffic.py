@@ -1,8 +1,8 @@
 """CPU milliseconds of traffic in a street: ``python -m benchmarks.bench_traffic``.
 
 Five seconds of thirty vehicles and forty people in the town street: routes and paths, the
-simulation of 100 steps, tracks of 51 knots each, and the test for overlaps. One process, one core;
-the best of several runs. Scenes of ``street_sequence.yaml``, thinned to the asked numbers.
+simulation of 100 steps, trajectories of 51 knots each, and the test for overlaps. One process, one
+core; the best of several runs. Scenes of ``street_sequence.yaml``, reduced to these numbers.
 """
 
 from __future__ import annotations
@@ -27,17 +27,17 @@ FULL = {"traffic": ("gap_m=3", "count=29"), "people": ("gap_m=2", "count=40")}
 
 
 def full_street(library: Library, seed: int) -> tuple[Scene, TrafficFlow]:
-    """A street with 30 vehicles, the ego vehicle among them, and 40 people, before it moves."""
-    spec = load_config("street_sequence.yaml", seed=seed)
-    names = [randomizer.name for randomizer in spec.randomizers]
+    """Street at rest with 30 vehicles, including the ego vehicle, and 40 people."""
+    config = load_config("street_sequence.yaml", seed=seed)
+    names = [randomizer.name for randomizer in config.randomizers]
     overrides = [
         f"randomizers[{names.index(group)}].{text}"
         for group, texts in FULL.items()
         for text in texts
     ]
-    spec = load_config("street_sequence.yaml", seed=seed, overrides=overrides)
+    config = load_config("street_sequence.yaml", seed=seed, overrides=overrides)
     streams = Streams(seed, 0)
-    scene, randomizers = scene_source(spec, library)(streams)
+    scene, randomizers = scene_source(config, library)(streams)
     for randomizer in randomizers:
         if isinstance(randomizer, TrafficFlow):
             return scene, randomizer.model_copy(update={"duration_s": 5.0})
@@ -45,8 +45,8 @@ def full_street(library: Library, seed: int) -> tuple[Scene, TrafficFlow]:
     raise AssertionError("street_sequence.yaml has no traffic_flow")
 
 
-def spent_ms(scene: Scene, flow: TrafficFlow, library: Library) -> Iterator[dict[str, float]]:
-    """CPU time of everything the randomizer does, and of the simulation in it, again and again."""
+def measure_ms(scene: Scene, flow: TrafficFlow, library: Library) -> Iterator[dict[str, float]]:
+    """Yield CPU times of the randomizer and of its simulation [ms], for each repetition."""
     simulating = 0.0
 
     def timed(*arguments: Any) -> SimulatedMotion:
@@ -78,7 +78,7 @@ def main() -> None:
     vehicles = sum(b.group == "traffic" or b.name == "ego" for b in scene.bodies)
     people = sum(b.group == "people" for b in scene.bodies)
     print(f"{machine()}; {vehicles} vehicles, {people} people, {flow.duration_s:g} s")
-    runs = list(spent_ms(scene, flow, library))
+    runs = list(measure_ms(scene, flow, library))
     for part in ("simulation", "all"):
         print(f"    {part:<11} {min(run[part] for run in runs):6.1f} CPU ms")
 

@@ -1,4 +1,4 @@
-"""What the benchmarks of whole runs share."""
+"""Helpers of the benchmarks that measure whole runs."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from gen_data.generator.runner.identity import format_licences, make_plan
 from gen_data.generator.runner.run import Summary, run
 
 
-def measured_run(spec: Config, n: int, workers: int) -> Summary:
-    """A whole run into a temporary folder."""
-    factory = PipelineFactory(spec, n)
+def measure_run(config: Config, n: int, workers: int) -> Summary:
+    """Generate a data set in a temporary folder."""
+    factory = PipelineFactory(config, n)
     with tempfile.TemporaryDirectory() as folder:
         return run(
             make_plan(factory),
@@ -28,14 +28,14 @@ def measured_run(spec: Config, n: int, workers: int) -> Summary:
 
 
 def machine() -> str:
-    """Processor and architecture, as a table names them."""
+    """Architecture and processor, for the heading of a table."""
     for line in Path("/proc/cpuinfo").read_text().splitlines():
         if line.startswith("model name"):
             return f"{platform.machine()}, {line.partition(':')[2].strip()}"
     return platform.machine()
 
 
-def described(summary: Summary) -> str:
+def format_summary(summary: Summary) -> str:
     """Speed, memory, and CPU milliseconds per sample by stage."""
     lines = [
         f"{summary.samples_per_s:.1f} samples/s, {1e3 * sum(summary.cpu_s.values()):.0f} CPU"

@@ -17,7 +17,7 @@ from gen_data.generator.core.scene import Articulation, Body, Camera, Environmen
 from gen_data.generator.core.se3 import SE3, look_at
 from gen_data.generator.core.streams import Streams
 from gen_data.generator.preview.overlay import Image
-from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, develop
+from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 
 _HALF_FIELD_RAD = math.radians(15.0)
 _AZIMUTH_RAD, _ELEVATION_RAD = math.radians(35.0), math.radians(25.0)
@@ -42,11 +42,10 @@ def thumbnail(asset: Asset, library: AssetLibrary, renderer: Renderer, size_px: 
         lights=(Light("key", "sun", direction=(-0.36, -0.48, -0.8), illuminance_lux=600.0),),
         environment=Environment(luminance_cd_m2=120.0, visible=False),
     )
-    camera = _camera(scene, library, size_px)
-    reading = renderer.render(scene, camera, frozenset({Channel.RADIANCE}))
+    camera, channels = _camera(scene, library, size_px), frozenset({Channel.RGB})
     rng = Streams(seed=0, scene=0).rng("thumbnail")
-    radiance = reading.channels[Channel.RADIANCE]
-    return develop(radiance, None, camera, scene.weather, ImagePipeline(), rng).rgb
+    reading = capture_photograph(scene, renderer, camera, channels, ImagePipeline(), rng)
+    return np.asarray(reading.channels[Channel.RGB], np.uint8)
 
 
 def _bodies(asset: Asset, library: AssetLibrary) -> tuple[Body, ...]:

@@ -112,7 +112,7 @@ def test_a_requested_channel_has_the_documented_type(name: str, channel: Channel
     assert reading.channels[channel].dtype == np.dtype(dtype)
     assert reading.channels[channel].shape == (HEIGHT_PX, WIDTH_PX, *last)
     assert not reading.silhouettes
-    assert reading.ev100 is None, "cameras set the exposure"
+    assert reading.ev100 is None  # Cameras set it when they develop the radiance.
 
 
 @each

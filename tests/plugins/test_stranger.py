@@ -1,4 +1,4 @@
-"""A package of third-party plug-ins, one of every kind, installed and used from the command line.
+"""A third-party package with one plug-in of every kind, installed and run from the command line.
 
 It is written from the Protocols of ``gen_data.generator.core.interfaces`` and inherits nothing but
 ``Strict``; ``mypy`` checks it with the rest of the project (``pyproject.toml``).
@@ -43,7 +43,7 @@ render: {renderer: stranger_boxes, luminance_cd_m2: 250.0}
 
 
 def run(*arguments: str, path: str, cwd: Path) -> subprocess.CompletedProcess[str]:
-    """``gen-data`` in a process that finds a folder of installed packages."""
+    """Run ``gen-data`` with a folder of installed packages on its path."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), path])}
     return subprocess.run(
         command(*arguments),
@@ -58,7 +58,7 @@ def run(*arguments: str, path: str, cwd: Path) -> subprocess.CompletedProcess[st
 
 @pytest.fixture(scope="session")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """The folder that the package is installed in, offline."""
+    """Folder into which the package was installed, offline."""
     folder = tmp_path_factory.mktemp("stranger")
     source, target = folder / "source", folder / "site"
     shutil.copytree(PACKAGE, source, ignore=shutil.ignore_patterns("__pycache__"))
@@ -75,7 +75,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.fixture(scope="session")
 def dataset(installed: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two samples in which every plug-in of the package takes part."""
+    """Two samples made with every plug-in of the package."""
     folder = tmp_path_factory.mktemp("strangers-data")
     (folder / "strange.yaml").write_text(CONFIG)
     arguments = ("--config", "strange.yaml", "--n", "2", "--workers", "1", "--out", "out")
@@ -85,13 +85,13 @@ def dataset(installed: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def scenes(dataset: Path) -> list[dict[str, object]]:
-    """The scene of every sample, as the data set keeps it."""
+    """Scene of every sample, as stored in the data set."""
     paths = sorted(dataset.glob("shards/*/scenes.jsonl"))
     return [json.loads(line)["scene"] for path in paths for line in path.read_text().splitlines()]
 
 
 def lines(dataset: Path) -> list[dict[str, object]]:
-    """What the third-party exporter wrote."""
+    """Lines written by the third-party exporter."""
     text = (dataset / "stranger_lines/objects.jsonl").read_text()
     return [json.loads(line) for line in text.splitlines()]
 
@@ -103,7 +103,7 @@ def test_the_data_set_verifies(dataset: Path, installed: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_the_element_is_in_every_scene_with_an_asset_that_the_randomizer_drew(
+def test_the_element_is_in_every_scene_with_a_drawn_asset(
     dataset: Path,
 ) -> None:
     """A mug 1 m above the floor; the plan names every mug that might have been drawn."""
@@ -125,12 +125,16 @@ def test_the_texture_covers_the_table_and_keeps_its_licence(dataset: Path) -> No
     assert "| stranger | CC0-1.0 | A stranger | texture/stranger_stripes |" in licences
 
 
-def test_the_renderer_makes_the_images_that_the_sensor_measures(dataset: Path) -> None:
-    """A box is 250 cd/m^2 and grey, the background black: the meter reads their mean."""
+def test_the_sensor_measures_the_images_of_the_renderer(dataset: Path) -> None:
+    """A box is 250 cd/m^2, the background black: the light meter reads their mean.
+
+    The camera meters the boxes to middle grey: 18 %, which is 118 in sRGB.
+    """
     for index in range(2):
         image = np.array(Image.open(next(dataset.glob(f"shards/*/color/rgb/{index:09d}.png"))))
         black, grey = np.unique(image)
-        assert black == 0 < grey
+        assert black == 0
+        assert grey == pytest.approx(118, abs=2)
         share = (image[..., 0] == grey).mean()
         row = (dataset / f"tables/meter/{index:06d}.csv").read_text().splitlines()[1]
         assert float(row.split(",")[2]) == pytest.approx(250.0 * share, rel=1e-6)
@@ -138,8 +142,8 @@ def test_the_renderer_makes_the_images_that_the_sensor_measures(dataset: Path) -
     assert [column["name"] for column in columns] == ["sample", "time_s", "luminance_cd_m2"]
 
 
-def test_the_exporter_writes_what_the_annotation_found(dataset: Path) -> None:
-    """Each distance is that from the camera to the mug's place."""
+def test_the_exporter_writes_the_annotations(dataset: Path) -> None:
+    """Each distance is the one from the camera to the mug."""
     cups = [line for line in lines(dataset) if line["category"] == "mug"]
     for line, scene in zip(cups, scenes(dataset), strict=True):
         (camera,) = scene["cameras"]  # type: ignore[misc]
@@ -147,20 +151,20 @@ def test_the_exporter_writes_what_the_annotation_found(dataset: Path) -> None:
         assert line["distance_m"] == pytest.approx(np.linalg.norm(eye_m - [0, 0, 1]), abs=1e-5)
 
 
-def test_the_plan_names_the_package_so_that_another_release_does_not_resume(
+def test_the_plan_names_the_package(
     dataset: Path,
 ) -> None:
-    """Its release can change every byte."""
+    """Another release may change every byte and is not resumed."""
     assert json.loads((dataset / "plan.json").read_text())["versions"]["stranger"] == "1.0"
 
 
-def test_plug_ins_explain_themselves(installed: str, tmp_path: Path) -> None:
-    """Fields and docstrings are read like our own."""
+def test_describe_and_schema_include_the_plug_ins(installed: str, tmp_path: Path) -> None:
+    """Fields and docstrings of third parties appear like those of the project."""
     done = run("describe", "stranger_boxes", path=installed, cwd=tmp_path)
 
     assert done.returncode == 0, done.stderr
     assert "renderer stranger_boxes" in done.stdout
-    assert "Of every box; the background is black." in done.stdout
+    assert "Luminance of every box; the background is black." in done.stdout
     schema = json.loads(run("schema", path=installed, cwd=tmp_path).stdout)
     assert {f"{kind}.stranger_{name}" for kind, name in (
         ("element", "pedestal"), ("randomizer", "swap"), ("sensor", "light_meter"),
@@ -169,7 +173,7 @@ def test_plug_ins_explain_themselves(installed: str, tmp_path: Path) -> None:
 
 
 def test_an_unknown_field_is_refused_at_its_place(installed: str, tmp_path: Path) -> None:
-    """File, line and column, and the field that was meant."""
+    """With file, line, column, and the field that was probably meant."""
     (tmp_path / "strange.yaml").write_text(CONFIG.replace("luminance_cd_m2", "luminance"))
     done = run("--config", "strange.yaml", "--n", "1", path=installed, cwd=tmp_path)
 
@@ -179,7 +183,7 @@ def test_an_unknown_field_is_refused_at_its_place(installed: str, tmp_path: Path
 
 
 def test_the_examples_of_the_contributors_guide_are_those_of_the_package() -> None:
-    """Each block of code with a file's name in its first line is a part of that file."""
+    """Each code block that names a file in its first line is part of that file."""
     guide = (ROOT / "CONTRIBUTING.md").read_text()
     blocks = re.findall(r"^```\w+\n# (tests/\S+)\n(.*?)^```$", guide, re.MULTILINE | re.DOTALL)
 

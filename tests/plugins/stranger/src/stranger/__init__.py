@@ -1,1 +1,1 @@
-"""One plug-in of every kind, written from the Protocols of ``core.interfaces`` alone."""
+"""One third-party plug-in of every kind, written from ``core.interfaces`` alone."""

@@ -1,4 +1,4 @@
-"""An annotation: the distance from the camera to every object."""
+"""Annotation: distance from the camera to every object."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from gen_data.generator.core.scene import Scene
 
 
 class Distance(Strict):
-    """Distance from the camera to the origin of each object, under ``extra``."""
+    """Distance from the camera to the origin of each object, in ``extra``."""
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
     type: Literal["stranger_distance"] = "stranger_distance"
@@ -23,8 +23,8 @@ class Distance(Strict):
     def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``extra["stranger_distance"]`` [m]."""
         eye_m = np.array(reading.camera.T_world_camera.translation_m)
-        there_m = np.array(truth.instance.T_world_instance.translation_m)
-        distance_m = round(float(np.linalg.norm(there_m - eye_m)), 6)
+        origin_m = np.array(truth.instance.T_world_instance.translation_m)
+        distance_m = round(float(np.linalg.norm(origin_m - eye_m)), 6)
         return replace(truth, extra={**truth.extra, self.type: distance_m})
 
 

@@ -1,4 +1,4 @@
-"""An element: one object at a given place."""
+"""Element that places one object at a fixed position."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from gen_data.generator.core.se3 import SE3
 
 
 class Pedestal(Strict):
-    """An object that stands free in space.
+    """An object at a fixed position.
 
     Attributes:
-        name: Unique in the template.
+        name: Unique name in the template.
         asset: Id of the object.
-        at_m: Its place in the world.
+        at_m: Position in the world frame [m].
     """
 
     type: Literal["stranger_pedestal"] = "stranger_pedestal"
@@ -27,11 +27,11 @@ class Pedestal(Strict):
 
     @property
     def follows_others(self) -> bool:
-        """It keeps clear of nothing."""
+        """False: its place does not depend on other elements."""
         return False
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """The scene with the object and its instance."""
+        """Return the scene with the object and its instance."""
         instance_id = max((i.instance_id for i in scene.instances), default=0) + 1
         body = Body(self.name, self.asset, SE3(self.at_m), instance_id=instance_id)
         category = assets.get(self.asset).category

@@ -1,4 +1,4 @@
-"""An exporter: one JSON line per object and image."""
+"""Exporter that writes one JSON line per object and image."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from gen_data.generator.core.serialization import canonical_json
 
 
 class Lines(Strict):
-    """``objects.jsonl``: index, camera, category and distance of every object."""
+    """``objects.jsonl`` with index, camera, category and distance of every object."""
 
     type: Literal["stranger_lines"] = "stranger_lines"
 
     @property
     def needs(self) -> frozenset[str]:
-        """The distance."""
+        """Names of the required annotations."""
         return frozenset({"stranger_distance"})
 
     def check(self, info: DatasetInfo) -> None:
@@ -29,12 +29,12 @@ class Lines(Strict):
             raise ConfigError(f"exporter '{self.type}': there is no camera")
 
     def with_assets(self, assets: AssetLibrary) -> Lines:
-        """It writes no geometry."""
+        """Return itself; it writes no geometry."""
         del assets
         return self
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """The lines of one shard."""
+        """Write the lines of one shard."""
         rows = [
             {
                 "index": sample.index,
@@ -52,7 +52,7 @@ class Lines(Strict):
         (folder / "objects.jsonl").write_text(text, encoding="utf-8")
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
-        """All shards' lines in one file."""
+        """Concatenate the lines of all shards."""
         del info
         dataset_dir.mkdir(parents=True, exist_ok=True)
         parts = [(folder / self.type / "objects.jsonl").read_text("utf-8") for folder in shard_dirs]

@@ -1,4 +1,4 @@
-"""A randomizer: exchanges the asset of one object."""
+"""Randomizer that replaces the asset of one object."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ class Swap(Strict):
     """Draws another asset for one object.
 
     Attributes:
-        name: The key of its random stream.
-        target: Name of the body.
-        tags: The asset carries all of these.
+        name: Key of the random stream.
+        target: Name of the body to change.
+        tags: Tags that an asset must have, all of them.
     """
 
     type: Literal["stranger_swap"] = "stranger_swap"
@@ -27,19 +27,19 @@ class Swap(Strict):
 
     @property
     def stage(self) -> Stage:
-        """Before physics: another asset has another shape."""
+        """Before physics, since the shape changes."""
         return Stage.BUILD
 
     @property
     def motion_duration_s(self) -> None:
-        """Nothing moves."""
+        """None: nothing moves."""
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
-        """All that it draws from."""
+        """Ids of all assets with these tags."""
         return tuple(asset.asset_id for asset in assets.find(self.tags))
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """The scene with another asset on the target and its instance."""
+        """Return the scene with a drawn asset on the target and its instance."""
         options = self.possible_assets(assets)
         drawn = options[int(rng.integers(len(options)))]
         body = replace(scene.body(self.target), asset=drawn)

@@ -1,4 +1,4 @@
-"""A renderer in numpy: every instance is its bounding box, every surface has one colour."""
+"""A renderer in numpy that shows every instance as its bounding box, in one colour."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ class BoxesPlugin(Strict):
     """Flat boxes instead of meshes.
 
     Attributes:
-        luminance_cd_m2: Of every box; the background is black.
+        luminance_cd_m2: Luminance of every box; the background is black.
     """
 
     renderer: Literal["stranger_boxes"] = "stranger_boxes"
     luminance_cd_m2: float = 100.0
 
     def open(self, assets: AssetLibrary) -> Renderer:
-        """It takes no asset."""
+        """Open the renderer; it reads no assets."""
         del assets
         return Boxes(self.luminance_cd_m2)
 
 
 class Boxes:
-    """A pure function of its arguments; keeps nothing."""
+    """Renders bounding boxes; keeps no state."""
 
     def __init__(self, luminance_cd_m2: float) -> None:
         self._luminance = luminance_cd_m2
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
-        """Every requested channel, from the nearest box on each pixel's ray."""
+        """Return the requested channels, from the nearest box on the ray of each pixel."""
         pinhole = camera.intrinsics
         if not pinhole.straight:
             raise ConfigError("renderer 'stranger_boxes': pinholes only")
@@ -57,7 +57,7 @@ class Boxes:
         return SensorReading(camera.name, camera, images, outlines, scene.time_s)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
-        """The nearest box on each beam, white and seen square on."""
+        """Return the nearest box on each beam: white, at normal incidence."""
         hits = _nearest(scene.instances, lidar.T_world_lidar, beams.directions.astype(np.float64))
         range_m = np.where(hits["z"] > beams.range_max_m, np.inf, hits["z"])[:, None]
         there = np.isfinite(range_m)
@@ -94,14 +94,14 @@ class Boxes:
 
 
 def _rays(camera: Camera, x_px: Image, y_px: Image) -> Image:
-    """Rays through image points in the camera's frame, z = 1, [..., 3]."""
+    """Rays through image points in the camera frame, with z = 1; shape [..., 3]."""
     lens = camera.intrinsics
     x, y = (x_px - lens.cx_px) / lens.fx_px, (y_px - lens.cy_px) / lens.fy_px
     return np.stack([x, y, np.ones_like(x)], axis=-1)
 
 
 def _nearest(instances: Iterable[Instance], T_world_eye: SE3, rays: Image) -> dict[str, Image]:
-    """The nearest box on each ray; ``z`` counts lengths of the ray, inf where there is nothing."""
+    """Nearest box on each ray; ``z`` in multiples of the ray, inf where nothing is hit."""
     shape = rays.shape[:-1]
     found: dict[str, Image] = {
         "z": np.full(shape, np.inf),
@@ -122,23 +122,23 @@ def _nearest(instances: Iterable[Instance], T_world_eye: SE3, rays: Image) -> di
 
 
 def _hit(instance: Instance, T_world_eye: SE3, rays: Image) -> tuple[Image, Image, Image]:
-    """Where rays enter a box by the method of slabs; normals are in the eye's frame."""
+    """Entry points of rays into a box (slab method); normals are in the frame of the eye."""
     T_box_eye = instance.T_world_instance.inverse() @ T_world_eye
     low, high = np.array(instance.box_min_m), np.array(instance.box_max_m)
-    eye, ways = np.array(T_box_eye.translation_m), rays @ T_box_eye.rotation().T
-    ways = np.where(np.abs(ways) < 1e-12, 1e-12, ways)
-    first, second = (low - eye) / ways, (high - eye) / ways
+    eye, directions = np.array(T_box_eye.translation_m), rays @ T_box_eye.rotation().T
+    directions = np.where(np.abs(directions) < 1e-12, 1e-12, directions)
+    first, second = (low - eye) / directions, (high - eye) / directions
     enters, leaves = np.minimum(first, second), np.maximum(first, second)
     axis, z = enters.argmax(axis=-1), enters.max(axis=-1)
     z = np.where((z <= leaves.min(axis=-1)) & (z > 0.0), z, np.inf)
-    normal = -np.sign(ways) * np.eye(3)[axis]
+    normal = -np.sign(directions) * np.eye(3)[axis]
     with np.errstate(invalid="ignore"):
-        coordinates = (eye + ways * z[..., None] - low) / np.maximum(high - low, 1e-12)
+        coordinates = (eye + directions * z[..., None] - low) / np.maximum(high - low, 1e-12)
     return z, normal @ T_box_eye.rotation(), np.clip(np.nan_to_num(coordinates), 0.0, 1.0)
 
 
 def _silhouette(instance: Instance, camera: Camera) -> Silhouette:
-    """One box alone, on a canvas three images wide and high."""
+    """Silhouette of one box, on a canvas three images wide and high."""
     width, height = camera.intrinsics.width_px, camera.intrinsics.height_px
     columns, rows = np.meshgrid(
         np.arange(-width, 2 * width) + 0.5, np.arange(-height, 2 * height) + 0.5

@@ -1,4 +1,4 @@
-"""A sensor: a device that measures the mean luminance in front of a camera."""
+"""Sensor that measures the mean luminance in the image of a camera."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ COLUMNS = (TIME, Column("luminance_cd_m2", "<f8", "mean over the image, with noi
 
 
 class LightMeter(Strict):
-    """A light meter that rides with a camera.
+    """A light meter mounted on a camera.
 
     Attributes:
-        name: What files call it.
-        camera: Name of the camera.
+        name: Unique name, also of its files.
+        camera: Name of the camera that carries it.
         noise: Relative standard deviation of a reading.
     """
 
@@ -32,21 +32,21 @@ class LightMeter(Strict):
     noise: float = 0.01
 
     def describe(self) -> SensorInfo:
-        """A device with a table of its own."""
+        """Describe a device with its own columns."""
         return SensorInfo(self.name, Modality.DEVICE, "light_meter", columns=COLUMNS)
 
     def mount(self, scene: Scene) -> Scene:
-        """The scene with the device at its camera."""
+        """Return the scene with the device at its camera."""
         device = Device(self.name, "light_meter", "", camera=self.camera)
         return replace(scene, devices=(*scene.devices, device))
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Measurements:
-        """One row."""
+        """Measure once: one row."""
         del channels
-        seen = renderer.render(scene, scene.camera(self.camera), frozenset({Channel.RADIANCE}))
-        mean = float(seen.channels[Channel.RADIANCE].mean(dtype=np.float64))
+        reading = renderer.render(scene, scene.camera(self.camera), frozenset({Channel.RADIANCE}))
+        mean = float(reading.channels[Channel.RADIANCE].mean(dtype=np.float64))
         rows = np.zeros(1, columns_dtype(COLUMNS))
         rows["time_s"] = scene.time_s
         rows["luminance_cd_m2"] = mean * (1.0 + self.noise * rng.standard_normal())

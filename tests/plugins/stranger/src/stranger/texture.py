@@ -1,4 +1,4 @@
-"""An asset family: striped textures."""
+"""Asset family of striped textures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from gen_data.generator.core.asset_types import TextureData
 
 
 def stripes(seed: int) -> TextureData:
-    """Vertical stripes in two shades of one colour; more of them the larger the seed."""
+    """Draw vertical stripes in two shades of red; their number grows with the seed."""
     columns = np.arange(64) * (seed + 1) // 16 % 2
     row = np.where(columns[:, None] == 1, [200, 40, 40], [90, 20, 20]).astype(np.uint8)
     return TextureData(np.ascontiguousarray(np.broadcast_to(row, (64, 64, 3))))

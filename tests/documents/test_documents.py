@@ -1,0 +1,97 @@
+"""Documents: configurations in them are valid, links and names of modules exist."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("examples/**/*.md")])
+OLD_NAMES = {ROOT / "docs/migration.md", ROOT / "CHANGELOG.md"}
+"""Pages that list names which no longer exist."""
+
+EXAMPLES = [
+    (page, number, text)
+    for page in PAGES
+    for number, text in enumerate(
+        re.findall(r"^```yaml\n(.*?)^```$", page.read_text("utf-8"), re.MULTILINE | re.DOTALL)
+    )
+    if page not in OLD_NAMES
+    and "licence:" not in text  # an index of assets, which has its own test
+]
+
+
+def completed(text: str, props: Path) -> str:
+    """An excerpt of a configuration with the sections that it leaves out."""
+    sections = yaml.safe_load(text)
+    if not {"template", "extends"} & sections.keys() and not isinstance(
+        sections.get("elements"), list
+    ):
+        in_street = any(word in text for word in ("lane_objects", "rig:"))
+        text += f"template: {'street' if in_street else 'tabletop'}\n"
+    if not {"sensors", "extends"} & sections.keys():
+        text += "sensors: [{type: rgb_camera, name: color}]\n"
+    return text.replace("~/props", str(props)).replace("user, metal", "user")
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize(
+    ("page", "text"),
+    [pytest.param(page, text, id=f"{page.name}-{number}") for page, number, text in EXAMPLES],
+)
+def test_configurations_are_valid(page: Path, text: str, tmp_path: Path) -> None:
+    """Every field is known and in range, no word is old, and all names are defined."""
+    props = tmp_path / "props"
+    props.mkdir()
+    (props / "one.obj").write_text(
+        "v 0 0 0\nv .05 0 0\nv 0 .05 0\nv 0 0 .05\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+    )
+    path = tmp_path / "excerpt.yaml"
+    path.write_text(completed(text, props))
+
+    assert PipelineFactory(load_config(str(path)), n=1).nominal
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_to_files(page: Path) -> None:
+    """Relative links and pictures exist; an anchor is a heading of its page."""
+    for target in re.findall(r"\]\(([^)\s]+)\)", page.read_text("utf-8")):
+        if target.startswith("http"):
+            continue
+        name, _, anchor = target.partition("#")
+        file = page.parent / name if name else page
+        assert file.exists(), target
+        if anchor:
+            headings = re.findall(r"^#+ (.*)$", file.read_text("utf-8"), re.MULTILINE)
+            slugs = {
+                re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings
+            }
+            assert anchor in slugs, target
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if page not in OLD_NAMES], ids=lambda page: page.name
+)
+def test_modules_exist(page: Path) -> None:
+    """Dotted names below ``gen_data``, and paths of files in the repository."""
+    text = page.read_text("utf-8")
+    for dotted in set(
+        re.findall(r"\bgen_data\.(?:generator|randomizers|exporters|scene_templates)[\w.]*", text)
+    ):
+        parts = dotted.rstrip(".").split(".")
+        while parts and not (parts[-1][0].islower() and importlib.util.find_spec(".".join(parts))):
+            attribute = parts.pop()
+            assert attribute[0].isupper() or attribute.isupper(), dotted
+    for name in set(
+        re.findall(
+            r"`((?:generator|randomizers|exporters|configs|tests|docs|examples)/[\w./]+)`", text
+        )
+    ):
+        assert (ROOT / name).exists(), name
