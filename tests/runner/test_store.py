@@ -474,7 +474,7 @@ def plain_write(path: Path, data: bytes, scratch: Path) -> None:
         ("finalize.sync_tree", lambda folder, synced: None),
         ("store.write_durably", plain_write),
         ("finalize.write_durably", plain_write),
-        ("files.sync", lambda path: None),
+        ("durable_files.sync_path", lambda path: None),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
