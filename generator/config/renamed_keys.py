@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 from gen_data.generator.config.merging import merge_nodes
@@ -147,7 +148,7 @@ def _rename_selections(node: Node, path: str) -> Node:
     if not isinstance(node.content, Mapping):
         return node
     if "given" in node.content:
-        node = _rename_keys(node, SELECTIONS, path)
+        node = _rename_keys(node, path, SELECTIONS)
     assert isinstance(node.content, Mapping)
     content = {key: _rename_selections(n, f"{path}.{key}") for key, n in node.content.items()}
     return replace(node, content=content)
@@ -156,17 +157,17 @@ def _rename_selections(node: Node, path: str) -> Node:
 def _rename_plugin(item: Node, section: str, path: str) -> Node:
     """Rename the type, the fields and their values."""
     type_words = TYPES.get(section, {})
-    item = _at(item, "type", path, lambda node, at: _rename_value(node, type_words, at))
+    item = _at(item, "type", path, partial(_rename_value, words=type_words))
     kind = item.get("type")
     if kind is None or not isinstance(kind.content, str):
         return item
     renames = PLUGINS.get((section, kind.content), Renames())
     if section == "randomizers":
-        item = _rename_keys(item, RANDOMIZERS, path)
+        item = _rename_keys(item, path, RANDOMIZERS)
     for place, words in renames.keys.items():
-        item = _at(item, place, path, lambda node, at, words=words: _rename_keys(node, words, at))
+        item = _at(item, place, path, partial(_rename_keys, words=words))
     for place, words in renames.values.items():
-        item = _at(item, place, path, lambda node, at, words=words: _rename_value(node, words, at))
+        item = _at(item, place, path, partial(_rename_value, words=words))
     return item
 
 
@@ -186,12 +187,12 @@ def _at(node: Node, place: str, path: str, change: Callable[[Node, str], Node]) 
     return replace(node, content=content)
 
 
-def _rename_keys(node: Node, words: Words, path: str) -> Node:
+def _rename_keys(node: Node, path: str, words: Words) -> Node:
     """Rename keys of a mapping, in their order; nothing else has keys."""
     if not isinstance(node.content, Mapping):
         return node
     if SWITCH in node.content and words is not SELECTIONS:
-        content = {k: _rename_keys(n, words, f"{path}.{k}") for k, n in node.content.items()}
+        content = {k: _rename_keys(n, f"{path}.{k}", words) for k, n in node.content.items()}
         return replace(node, content=content)
     if not words.keys() & node.content.keys():
         return node
@@ -209,11 +210,11 @@ def _rename_keys(node: Node, words: Words, path: str) -> Node:
     return replace(node, content=content, key_positions=positions)
 
 
-def _rename_value(node: Node, words: Words, path: str) -> Node:
+def _rename_value(node: Node, path: str, words: Words) -> Node:
     """Rename a word; in a selection, that of every entry."""
     if isinstance(node.content, Mapping) and SWITCH in node.content:
         entries = {
-            key: entry if key == SWITCH else _rename_value(entry, words, f"{path}.{key}")
+            key: entry if key == SWITCH else _rename_value(entry, f"{path}.{key}", words)
             for key, entry in node.content.items()
         }
         return replace(node, content=entries)

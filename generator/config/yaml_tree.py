@@ -335,8 +335,8 @@ class _Reader:
         return text
 
     def _alias_target(self, event: AliasEvent, depth: int) -> Node:
-        where, name = self._start_of(event), abbreviate(event.anchor)
-        if event.anchor not in self._anchors:
+        where, name = self._start_of(event), abbreviate(event.anchor or "")
+        if event.anchor is None or event.anchor not in self._anchors:
             self._abort(where, f"alias *{name} has no anchor &{name} before it")
         target = self._anchors[event.anchor]
         if target is None:
