@@ -36,7 +36,7 @@ def clip_mask(silhouette: Silhouette, width_px: int, height_px: int) -> MaskPx:
     """The part of a silhouette inside an image, tight; shape [0, 0] when there is none."""
     outer = silhouette_box(silhouette)
     inner = outer.clipped(width_px, height_px) if outer else None
-    # Clipping an outline can leave empty margins: what is inside may be smaller than the clip.
+    # The part inside the image may be smaller than the clipped box.
     box = tight_box(silhouette_crop(silhouette, inner), inner.x_min, inner.y_min) if inner else None
     if box is None:
         return MaskPx(0, 0, np.zeros((0, 0), dtype=bool))

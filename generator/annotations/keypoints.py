@@ -70,7 +70,7 @@ def _locate(
 
     Args:
         reading: The image.
-        instance_id: What the point belongs to.
+        instance_id: Instance of the point.
         point: Which.
         p_camera: Where it is at the image's instant.
         seen: Where it is when its row is exposed: camera frame, and image.

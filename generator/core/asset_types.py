@@ -34,11 +34,11 @@ class Material:
         transmission: Share in [0, 1] of the light under the specular layer that goes through
             instead of being scattered back; tinted by the base colour.
         ior: Refractive index of what transmits.
-        thin: What transmits is a pane that bends nothing; else a solid body that refracts.
-        opacity: Share in [0, 1] of what is behind that it hides; labels take it for solid.
+        thin: Whether a transmitting slot is a pane without refraction; else a solid that refracts.
+        opacity: Share in [0, 1] of the background that it hides; labels treat it as solid.
         printed: The texture is part of what the object *is* (a label, a book cover);
             randomizers leave colour and texture alone.
-        role: What the slot is on its object, for randomizers that know more than "any surface":
+        role: Function of the slot on its object, for randomizers that target it:
             ``paint``, ``glass``, ``headlight``, ``lens_red``, ``skin``, ...; empty = nothing
             special.
     """
@@ -261,10 +261,10 @@ class Asset:
     """One entry of the library.
 
     Attributes:
-        asset_id: What YAML and scenes name it by: ``mug?seed=3``, ``pybullet/teddy``.
+        asset_id: Its name in YAML and scenes: ``mug?seed=3``, ``pybullet/teddy``.
         kind: ``object`` (a mesh), ``robot``, ``texture`` or ``environment``.
-        category: What it is called in labels.
-        tags: What YAML selects by, sorted.
+        category: Its category in labels.
+        tags: Tags for selection in YAML, sorted.
         mass_kg: Nominal mass; 0 = unknown.
         sha256: Content hash of the files or of the generator's version and parameters.
         stackable: Flat above and below: may be stacked.

@@ -1,4 +1,4 @@
-"""Caches: one bounded by bytes, one by number."""
+"""Caches bounded by bytes and by number of values."""
 
 from __future__ import annotations
 

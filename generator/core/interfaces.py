@@ -340,7 +340,7 @@ class Annotator(Protocol):
 
     @property
     def channels(self) -> frozenset[Channel]:
-        """What it needs to have been rendered."""
+        """Channels that it requires."""
         ...
 
     def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
@@ -354,7 +354,7 @@ class ImageAnnotator(Protocol):
 
     @property
     def channels(self) -> frozenset[Channel]:
-        """What it needs to have been rendered."""
+        """Channels that it requires."""
         ...
 
     def annotate_image(
@@ -370,7 +370,7 @@ class FrameAnnotator(Protocol):
 
     @property
     def channels(self) -> frozenset[Channel]:
-        """What it needs to have been rendered."""
+        """Channels that it requires."""
         ...
 
     def annotate_frame(

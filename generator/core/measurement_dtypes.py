@@ -85,7 +85,7 @@ ODOMETER = (
 )
 
 OCCURRENCES = ("collision", "lane_invasion", "obstacle", "traffic_light", "proximity")
-"""What a watcher reports, by number."""
+"""Events that a watcher (event detector) reports, by index."""
 
 LIGHT_STATES = ("dark", "red", "red_yellow", "yellow", "green")
 """``value`` of the occurrence ``traffic_light``, by number."""

@@ -1,4 +1,4 @@
-"""Plug-in tables: a name in YAML -> ``module:Class``, imported when first asked for."""
+"""Plug-in tables: a name in YAML -> ``module:Class``, imported on first use."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class PluginTable(Generic[P]):
     a name of our own wins over theirs.
 
     Attributes:
-        kind: What the plug-ins are, in the singular: ``randomizer``.
+        kind: Kind of the plug-ins, in the singular: ``randomizer``.
         entries: ``{name: "module:Class"}``.
         protocols: A plug-in has every member of at least one of these.
         tag: Field that holds the plug-in's own name.
@@ -92,7 +92,7 @@ def loaded(path: str, what: str) -> Any:
     """The object at ``module:Name``.
 
     Raises:
-        ConfigError: there is none; ``what`` says what it is for.
+        ConfigError: there is none; the message begins with ``what``.
     """
     module, _, attribute = path.partition(":")
     try:

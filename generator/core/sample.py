@@ -170,7 +170,7 @@ class BirdseyeMap:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class EgoTruth:
-    """What is true of all sensors' readings together.
+    """Annotations of a sample as a whole.
 
     A field is None when its annotator was not asked for.
 

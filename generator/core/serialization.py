@@ -75,7 +75,7 @@ def _field_names(kind: type) -> tuple[str, ...] | None:
 
 @cache
 def _builder(kind: Any) -> Callable[[Any], Any]:
-    """What makes values of an annotation from plain ones; the annotation is looked at once."""
+    """Function that builds values of an annotation from plain ones; compiled once."""
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
     if dataclasses.is_dataclass(kind) and isinstance(kind, type):
         return _dataclass_builder(kind)

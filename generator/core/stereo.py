@@ -15,7 +15,7 @@ from gen_data.generator.core.scene import Camera
 ALIGNED = 1e-6
 """Largest deviation, in metres and as a sine, of cameras that look the same way."""
 NEARER_PX = 1.0
-"""What hides a point is nearer by more than this: as in left-right checks of stereo matching."""
+"""Occluders are nearer by more than this disparity, as in left-right checks of stereo matching."""
 
 
 def baseline_m(left: Camera, right: Camera) -> float:

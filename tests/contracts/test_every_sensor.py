@@ -136,8 +136,7 @@ def test_it_is_where_its_description_says(kind: str) -> None:
 @each
 def test_an_unknown_rig_is_named_with_those_there_are(kind: str) -> None:
     """Before anything is made."""
-    message = r"sensor 'unit': the scene has no rig 'eg'; its rigs: ego"
-    with pytest.raises(ConfigError, match=message):
+    with pytest.raises(ConfigError, match=r"'unit': the scene has no rig 'eg'; its rigs: ego"):
         made(kind, rig="eg").mount(street())
 
 
