@@ -109,7 +109,7 @@ def test_a_randomizer_of_poses_does_not_know_a_camera_on_a_rig() -> None:
     """Asked for by name, it says which it could move."""
     scene = driven(RgbCamera(name="front", rig="ego"), RgbCamera(name="free"))
 
-    with pytest.raises(ConfigError, match=r"there is no camera 'front' off a rig; expected .*free"):
+    with pytest.raises(ConfigError, match=r"no camera 'front' without a rig; expected .*free"):
         CameraPose(name="p", camera="front")(scene, FakeAssets(), rng_of("poses"))
 
 

@@ -226,7 +226,7 @@ def checked_and_moving(wrong: Config) -> Scene:
 
 BAD = {
     "duration_s: 3 s is shorter than the sequences": ("flow", "duration_s=3"),
-    "no vehicle 'ega' is on a driving lane": ("flow", "routes={ega: [main/forward0]}"),
+    "there is no vehicle 'ega' on a driving lane": ("flow", "routes={ega: [main/forward0]}"),
     "none lead from 'main/forward0' to 'left/backward0'": (
         "flow", "routes={ego: [main/forward0, left/backward0]}",
     ),
