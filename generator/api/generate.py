@@ -54,6 +54,8 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     Warns:
         ConfigWarning: ``n`` is so small that a split of the configuration stays empty.
     """
+    from threadpoolctl import threadpool_limits
+
     from gen_data.generator.assemble.pipeline_factory import PipelineFactory
     from gen_data.generator.pipeline.splits import warn_of_empty_splits
     from gen_data.generator.runner.identity import format_licences, make_plan
@@ -70,13 +72,14 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     scenes = -(-n // (general.views_per_scene * general.steps_per_scene))
     warn_of_empty_splits(scenes, loaded.split_shares, general.splits.assign, general.seed)
     factory = PipelineFactory(loaded, n)
-    return run(
-        make_plan(factory),
-        factory,
-        Path(out) if out is not None else Path("out") / loaded.name,
-        workers=len(os.sched_getaffinity(0)) if workers is None else workers,
-        resume_command=resume_command,
-        licences=partial(format_licences, factory),
-        settings=Settings(full_check=repair),
-        progress=on_progress,
-    )
+    with threadpool_limits(limits=1):
+        return run(
+            make_plan(factory),
+            factory,
+            Path(out) if out is not None else Path("out") / loaded.name,
+            workers=len(os.sched_getaffinity(0)) if workers is None else workers,
+            resume_command=resume_command,
+            licences=partial(format_licences, factory),
+            settings=Settings(full_check=repair),
+            progress=on_progress,
+        )

@@ -17,15 +17,8 @@ import click
 
 from gen_data.generator import __version__
 from gen_data.generator.cli.options import ConfigurationOptions, configuration_options
+from gen_data.generator.core.child_processes import SINGLE_THREADED
 from gen_data.generator.core.errors import ConfigError, ConfigWarning, GenDataError, Interrupted
-
-SINGLE_THREADED = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "MKL_NUM_THREADS",
-    "NUMEXPR_NUM_THREADS",
-)
-"""Limits on threads: workers use all cores, and one thread fixes the order of sums."""
 
 
 class LazyCommands(click.Group):

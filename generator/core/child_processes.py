@@ -1,4 +1,4 @@
-"""Child processes that do not outlive their parent."""
+"""Settings of processes: one thread for sums, and no child that outlives its parent."""
 
 from __future__ import annotations
 
@@ -6,6 +6,17 @@ import ctypes
 import os
 import signal
 import sys
+
+SINGLE_THREADED = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+)
+"""Environment variables that limit threads, read when numpy is imported.
+
+Sums in BLAS depend on the number of threads, and with them the last bits of a pose.
+"""
 
 PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 

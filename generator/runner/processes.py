@@ -22,6 +22,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
 
+from gen_data.generator.core.child_processes import SINGLE_THREADED
 from gen_data.generator.core.errors import GenDataError
 from gen_data.generator.runner.shard import Job
 from gen_data.generator.runner.supervisor import Supervisor
@@ -45,10 +46,14 @@ JOIN_S = 3.0
 must not block the run; its parent-death signal is pending."""
 
 START_WORKER = (
-    "import sys; sys.path[:] = sys.argv[5:]; "
+    "import os, sys; sys.path[:] = sys.argv[5:]; "
+    f"os.environ.update(dict.fromkeys({SINGLE_THREADED!r}, '1')); "
     "from gen_data.generator.runner.worker import main; main(*map(int, sys.argv[1:5]))"
 )
-"""Program of a worker; it has the module search path of this process, and so its plug-ins."""
+"""Program of a worker; it has the module search path of this process, and so its plug-ins.
+
+It is single-threaded whatever the environment of the host program.
+"""
 
 
 @dataclass

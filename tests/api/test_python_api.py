@@ -18,6 +18,7 @@ from gen_data.generator.assemble.config import parse_config
 from gen_data.generator.assemble.pipeline_factory import PipelineFactory
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.serialization import to_plain
+from gen_data.generator.runner.processes import START_WORKER
 from tests.end_to_end.running import environment
 
 SMALL = (
@@ -189,6 +190,18 @@ def test_an_unfinished_folder_cannot_be_opened(tmp_path: Path) -> None:
     """The message names what is missing."""
     with pytest.raises(gen_data.StorageError, match=r"plan\.json: missing"):
         gen_data.open(tmp_path)
+
+
+def test_workers_have_one_thread_whatever_the_host_programs_environment(tmp_path: Path) -> None:
+    """Sums in BLAS depend on the number of threads: the program of a worker sets it itself."""
+    program = START_WORKER.partition("from gen_data")[0] + "print(os.environ['OMP_NUM_THREADS'])"
+    done = subprocess.run(
+        [sys.executable, "-c", program, "0", "0", "0", "0", *sys.path],
+        env={**environment(), "OMP_NUM_THREADS": "8"},
+        capture_output=True, text=True, check=True, cwd=tmp_path,
+    )  # fmt: skip
+
+    assert done.stdout.strip() == "1"
 
 
 def test_progress_is_reported(tmp_path: Path) -> None:
