@@ -31,7 +31,7 @@ def load_config(
 
     choice: dict[str, Any] = {"seed": seed, "overrides": overrides, "without": without}
     if isinstance(config, Mapping):
-        return parse_config(_yaml_text(config), "<config>", **choice)
+        return parse_config(_yaml_text(config), "<config>", "config", **choice)
     return load_source_config(fspath(config), **choice)
 
 

@@ -273,28 +273,26 @@ def load_source_config(
         text, name = json.dumps(kept["config"], ensure_ascii=False), str(kept["name"])
     except (ValueError, KeyError, TypeError, OSError) as error:
         raise ConfigError(f"{plan}: is not the plan of a data set: {error}") from error
-    document = parse_yaml(text, str(plan))
-    return _make_config(
-        resolve_document(document, seed=seed, overrides=overrides, without=without), name
-    )
+    return parse_config(text, str(plan), name, seed=seed, overrides=overrides, without=without)
 
 
 def parse_config(
     text: str,
+    file: str,
     name: str,
     *,
     seed: int | None = None,
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
 ) -> Config:
-    """Parse a configuration in a YAML text; ``name`` is its name in messages.
+    """Parse a configuration in a YAML text; messages call the text ``file``.
 
     Raises:
         ConfigError: the message lists all errors with their positions.
     """
-    document = parse_yaml(text, name)
+    document = parse_yaml(text, file)
     document = resolve_document(document, seed=seed, overrides=overrides, without=without)
-    return _make_config(document, name.strip("<>"))
+    return _make_config(document, name)
 
 
 def _make_config(document: Node, name: str) -> Config:

@@ -16,9 +16,7 @@ from gen_data.generator.core.sample import Sample
 from gen_data.generator.preview.device_views import event_view, radar_view
 from gen_data.generator.preview.overlay import Image, channel_image, draw_labels
 from gen_data.generator.preview.point_cloud_views import range_view, top_view
-
-PSEUDO_LIDAR = "pseudo_lidar"
-"""Model of scanners whose points are pixels of a camera."""
+from gen_data.generator.sensors.lidar import pseudo_lidar
 
 GAP_PX = 4
 BACKGROUND = 24
@@ -64,7 +62,7 @@ def make_tiles(
                 else:
                     yield Tile(caption, channel_image(reading, channel))
         for name, cloud in sorted(sample.capture.clouds.items()):
-            if cloud.lidar.model == PSEUDO_LIDAR:
+            if cloud.lidar.model == pseudo_lidar.MODEL:
                 # The depth image of its camera says the same.
                 continue
             yield Tile(name, top_view(cloud, sample.scene, aspect))

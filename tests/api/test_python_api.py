@@ -230,7 +230,7 @@ def readme_block(language: str) -> str:
 
 def test_the_yaml_of_the_readme_is_valid() -> None:
     """All of its names refer to something, and its exporters fit its sensors."""
-    config = parse_config(readme_block("yaml"), "README.md")
+    config = parse_config(readme_block("yaml"), "README.md", "README")
 
     assert [sensor.name for sensor in config.sensors] == ["color"]
     with PipelineFactory(config, n=1)() as pipeline:

@@ -23,6 +23,9 @@ from gen_data.generator.core.shutter import INSTANT
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.mounting import Mounted, add_lidar, find_camera
 
+MODEL = "pseudo_lidar"
+"""Model of these scanners in scenes; their points are pixels of a camera."""
+
 CHANNELS = frozenset({Channel.RANGE, Channel.INSTANCE, Channel.CATEGORY})
 
 
@@ -66,7 +69,7 @@ class PseudoLidar(Mounted):
         Raises:
             ConfigError: the scene has no such rig or camera, or no pixel of its image is selected.
         """
-        lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=self.type)
+        lidar = Lidar(self.name, self.camera, self.T_rig_sensor, model=MODEL)
         image = find_camera(scene, self.name, self.camera).intrinsics
         if self.stride_px > min(image.width_px, image.height_px):
             raise ConfigError(
