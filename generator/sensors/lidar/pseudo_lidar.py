@@ -13,20 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.core.capture import POINT, Channel, PointCloud
+from gen_data.generator.core.capture import POINT, Channel, LidarRays, PointCloud
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.scene import Lidar, Scene
 from gen_data.generator.core.se3 import Vec3
-from gen_data.generator.core.shutter import INSTANT
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.mounting import Mounted, add_lidar, find_camera
 
 MODEL = "pseudo_lidar"
 """Model of these scanners in scenes; their points are pixels of a camera."""
-
-CHANNELS = frozenset({Channel.RANGE, Channel.INSTANCE, Channel.CATEGORY})
 
 
 class PseudoLidar(Mounted):
@@ -85,18 +82,21 @@ class PseudoLidar(Mounted):
         del channels, rng
         lidar, camera = scene.lidar(self.name), scene.camera(self.camera)
         intrinsics = every_nth_pixel(camera.intrinsics, self.stride_px)
-        # All rows at one instant, as a cloud has a single pose.
-        coarse = replace(camera, intrinsics=intrinsics, shutter=INSTANT)
-        seen = renderer.render(scene, coarse, CHANNELS).channels
-        rows, columns = np.nonzero(seen[Channel.RANGE] <= self.range_max_m)
-        range_m = seen[Channel.RANGE][rows, columns].astype(np.float64)
-        p_camera = intrinsics.pixel_rays()[rows, columns] * range_m[:, None]
+        # One ray per selected pixel costs far less than an image of its own. All rays leave at
+        # one instant, whatever the camera's shutter, as a cloud has a single pose.
+        rays = intrinsics.pixel_rays().reshape(-1, 3)
+        in_field = np.flatnonzero(np.isfinite(rays).all(axis=1))
+        beams = LidarRays(rays[in_field].astype(np.float32), 0.0, 1, self.range_max_m)
+        eye = Lidar(self.name, self.camera, T_world_lidar=camera.T_world_camera)
+        hits = renderer.scan(scene, eye, beams)
+        hit = np.flatnonzero(np.isfinite(hits.range_m[:, 0]))
+        p_camera = rays[in_field[hit]] * hits.range_m[hit].astype(np.float64)
         T_lidar_camera = lidar.T_world_lidar.inverse() @ camera.T_world_camera
-        points: NDArray[Any] = np.zeros(len(rows), POINT)
+        points: NDArray[Any] = np.zeros(len(hit), POINT)
         points["position_m"] = T_lidar_camera.apply(p_camera)
-        points["ring"] = rows
-        points["instance_id"] = seen[Channel.INSTANCE][rows, columns]
-        points["category_id"] = seen[Channel.CATEGORY][rows, columns]
+        points["ring"] = in_field[hit] // intrinsics.width_px
+        points["instance_id"] = hits.instance_id[hit, 0]
+        points["category_id"] = hits.category_id[hit, 0]
         points["return_number"] = points["return_count"] = 1
         return PointCloud(self.name, lidar, points, scene.time_s)
 
