@@ -140,7 +140,7 @@ class Kitti(ExporterBase):
                 continue
             truth = sample.truth[camera]
             frame = _frame_name(sample.index)
-            unseen: frozenset[int] = frozenset()
+            rows = label_rows(truth, self)
             T_camera_velo = self._velodyne_pose(info, sample)
             calib = calib_text(truth.camera.intrinsics, T_camera_velo)
             write_text(folder / f"calib/{frame}.txt", calib)
@@ -148,10 +148,11 @@ class Kitti(ExporterBase):
             if has_scans(shard_dir, lidar, sample.index):
                 points = read_points(shard_dir, lidar, sample.index)
                 write_bytes(folder / f"velodyne/{frame}.bin", xyzi_bytes(points))
-                members, unseen = point_members(points, truth, self, T_camera_velo)
-                labels = point_labels(points, members, label_rows(truth, self, unseen))
+                members, unseen = point_members(points, truth, rows, T_camera_velo)
+                rows = without_returns(rows, unseen, truth)
+                labels = point_labels(points, members, rows)
                 write_bytes(folder / f"velodyne_labels/{frame}.label", labels.tobytes())
-            write_text(folder / f"label_2/{frame}.txt", label_text(truth, self, unseen))
+            write_text(folder / f"label_2/{frame}.txt", "".join(f"{row}\n" for row, _ in rows))
             frames.append(f"{sample.index} {sample.split}\n")
         write_text(folder / "frames.txt", "".join(frames))
 
@@ -238,31 +239,40 @@ class LabelStyle(Protocol):
         ...
 
 
-def label_text(truth: ImageTruth, style: LabelStyle, unseen: frozenset[int] = frozenset()) -> str:
-    """Format one label file; DontCare rows come last, as readers expect."""
-    return "".join(f"{row}\n" for row, _ in label_rows(truth, style, unseen))
+LabelRow = tuple[str, int]
+"""A row of a label file, and the id of its instance."""
 
 
-def label_rows(
-    truth: ImageTruth, style: LabelStyle, unseen: frozenset[int] = frozenset()
-) -> list[tuple[str, int]]:
-    """Rows of a label file with their instance ids; ``unseen`` instances are DontCare."""
-    rows = []
-    for thing in truth.objects:
-        if thing.box is not None:
-            number = thing.instance.instance_id
-            row = label_row(thing, truth, style)
-            if number in unseen and not row.startswith(DONT_CARE):
-                row = dont_care(thing.box, truth.camera.intrinsics)
-            rows.append((row, number))
-    rows.sort(key=lambda row: row[0].startswith(DONT_CARE))
-    return rows
+def label_rows(truth: ImageTruth, style: LabelStyle) -> list[LabelRow]:
+    """Rows of a label file; DontCare rows come last, as readers expect."""
+    rows = [
+        (label_row(thing, truth, style), thing.instance.instance_id)
+        for thing in truth.objects
+        if thing.box is not None
+    ]
+    return sorted(rows, key=_is_dont_care)
+
+
+def without_returns(
+    rows: Sequence[LabelRow], unseen: frozenset[int], truth: ImageTruth
+) -> list[LabelRow]:
+    """The rows, with those of the ``unseen`` instances, which no laser pulse hit, as DontCare."""
+    boxes = {thing.instance.instance_id: thing.box for thing in truth.objects}
+    changed = []
+    for row, number in rows:
+        box = boxes[number] if number in unseen and not row.startswith(DONT_CARE) else None
+        changed.append((row if box is None else dont_care(box, truth.camera.intrinsics), number))
+    return sorted(changed, key=_is_dont_care)
+
+
+def _is_dont_care(row: LabelRow) -> bool:
+    return row[0].startswith(DONT_CARE)
 
 
 def point_members(
     points: NDArray[np.void],
     truth: ImageTruth,
-    style: LabelStyle,
+    rows: Sequence[LabelRow],
     T_camera_velo: Array,
 ) -> tuple[NDArray[np.int64], frozenset[int]]:
     """Assign points to instances; also return the labelled instances without a point.
@@ -270,10 +280,10 @@ def point_members(
     Args:
         points: Records of ``POINT`` [n].
         truth: Truth of the image; DontCare objects keep the points that they reflect.
-        style: Options of the labels.
+        rows: Result of ``label_rows``.
         T_camera_velo: Transform of the points to the camera frame, [3, 4].
     """
-    labelled = {i for row, i in label_rows(truth, style) if not row.startswith(DONT_CARE)}
+    labelled = {number for row, number in rows if not row.startswith(DONT_CARE)}
     boxes = {
         thing.instance.instance_id: upright_box(thing.box3d_camera)
         for thing in truth.objects
@@ -288,7 +298,7 @@ def point_members(
 
 
 def point_labels(
-    points: NDArray[np.void], members: NDArray[np.int64], rows: Sequence[tuple[str, int]]
+    points: NDArray[np.void], members: NDArray[np.int64], rows: Sequence[LabelRow]
 ) -> NDArray[np.uint32]:
     """Label each point: category id in the lower half, row in label_2 in the upper half.
 

@@ -15,10 +15,10 @@ import pytest
 from gen_data.exporters.kitti import (
     Kitti,
     label_rows,
-    label_text,
     official_type,
     point_labels,
     point_members,
+    without_returns,
     upright_box,
 )
 from gen_data.exporters.point_cloud_io import read_points
@@ -132,10 +132,10 @@ def kitti_rows(world: Any) -> np.ndarray:
     points["position_m"] = [face, face + 0.02 * ahead, face + 0.04 * ahead, middle]
     points["instance_id"] = [1, 1, 1, 0]
     points["category_id"] = [1, 1, 1, 0]
-    style = Kitti(far_m=100.0)
-    members, unseen = point_members(points, alone, style, np.eye(3, 4))
+    rows = label_rows(alone, Kitti(far_m=100.0))
+    members, unseen = point_members(points, alone, rows, np.eye(3, 4))
     assert unseen == frozenset()
-    both = point_labels(points, members, label_rows(alone, style))
+    both = point_labels(points, members, rows)
     np.testing.assert_array_equal(both & 0xFFFF, points["category_id"])
     return both >> 16
 
@@ -150,16 +150,17 @@ def test_what_the_scanner_did_not_see_is_dont_care(world: Any) -> None:
     sample = world.samples[0]
     truth = sample.truth["color"]
     alone = replace(truth, objects=truth.objects[:1])
-    style = Kitti(far_m=100.0)
+    rows = label_rows(alone, Kitti(far_m=100.0))
     points = sample.capture.clouds["top"].points
     mine = points[points["instance_id"] == 1].copy()
     T_camera_velo = np.array([[0, -1, 0, 0], [0, 0, -1, 0], [1, 0, 0, 0]], float)
 
-    _, unseen = point_members(mine[:0], alone, style, T_camera_velo)
+    _, unseen = point_members(mine[:0], alone, rows, T_camera_velo)
 
     assert unseen == {1}
-    assert label_text(alone, style, unseen).startswith("DontCare -1 -1 -10 ")
-    assert label_text(alone, style).startswith("Car ")
+    ((changed, _),) = without_returns(rows, unseen, alone)
+    assert changed.startswith("DontCare -1 -1 -10 ")
+    assert rows[0][0].startswith("Car ")
 
 
 def test_semantic_scans_are_numbered_without_gaps_in_official_splits(semantic: Path) -> None:
