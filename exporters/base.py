@@ -18,6 +18,11 @@ class ExporterBase(Strict):
         """Names of the annotators that it reads."""
         return frozenset()
 
+    @property
+    def has_own_classes(self) -> bool:
+        """Whether the format prescribes its classes; see ``Exporter``."""
+        return False
+
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that the format cannot represent.
 

@@ -68,6 +68,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.rle import encode_rle
 from gen_data.exporters.sensor_selection import instant_s, rgb_cameras
@@ -150,8 +151,7 @@ class Coco(ExporterBase):
         folder = shard_dir / self.type
         folder.mkdir(parents=True, exist_ok=True)
         for stem, lines in rows.items():
-            text = "".join(canonical_json(line) + "\n" for line in lines)
-            (folder / f"{stem}.jsonl").write_text(text, encoding="utf-8", newline="\n")
+            write_fragment(folder, stem, lines)
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Join the lines of all shards, given in index order, and link the images."""
@@ -161,19 +161,18 @@ class Coco(ExporterBase):
         folder = dataset_dir / "annotations"
         folder.mkdir(parents=True, exist_ok=True)
         for split in splits:
-            images = partial(_join_fragments, fragments, f"{split}.images.jsonl")
-            rows = _join_fragments(fragments, f"{split}.annotations.jsonl")
+            images = partial(fragment_lines, fragments, f"{split}.images")
+            rows = fragment_lines(fragments, f"{split}.annotations")
             header = _header(info, _categories(info))
             _write_dataset(folder / f"instances_{split}.json", header, images(), rows)
             for category_id, skeleton in skeletons.items():
-                lines = _join_fragments(fragments, f"{split}.keypoints.{category_id}.jsonl")
+                lines = fragment_lines(fragments, f"{split}.keypoints.{category_id}")
                 name = info.categories[category_id - 1]
                 path = folder / f"{'_'.join(name.split())}_keypoints_{split}.json"
                 header = _header(info, [_keypoint_category(category_id, name, skeleton)])
                 _write_dataset(path, header, images(), _keypoint_rows(lines, skeleton))
-            for shard_dir in shard_dirs:
-                for line in _lines(shard_dir / self.type / f"{split}.images.jsonl"):
-                    _link_images(json.loads(line), split, shard_dir, dataset_dir)
+            for shard_dir, image in fragment_rows(shard_dirs, self.type, f"{split}.images"):
+                _link_images(image, split, shard_dir, dataset_dir)
 
     def _annotation(
         self, info: DatasetInfo, sample: Sample, sensor: str, thing: ObjectTruth
@@ -329,7 +328,7 @@ def _skeletons(fragments: Sequence[Path]) -> dict[int, Skeleton]:
     for fragment in fragments:
         for path in sorted(fragment.glob("*.keypoints.*.jsonl")):
             listed = names.setdefault(int(path.name.split(".")[2]), {})
-            for line in _lines(path):
+            for line in fragment_lines([fragment], path.stem):
                 listed.update(dict.fromkeys(point[0] for point in json.loads(line)["points"]))
     return {number: find_skeleton(names[number]) for number in sorted(names) if names[number]}
 
@@ -399,19 +398,6 @@ def _link_images(image: Mapping[str, Any], split: str, shard_dir: Path, dataset_
     for channel, target in targets.items():
         source = media_path(shard_dir, image["sensor"], Channel(channel), image["sample"])
         link_or_copy(source, dataset_dir / target)
-
-
-def _join_fragments(fragments: Sequence[Path], name: str) -> Iterator[str]:
-    for fragment in fragments:
-        yield from _lines(fragment / name)
-
-
-def _lines(path: Path) -> Iterator[str]:
-    """Lines of a fragment without line ends; none if the shard lacks the split."""
-    if path.exists():
-        with path.open(encoding="utf-8", newline="\n") as file:
-            for line in file:
-                yield line.rstrip("\n")
 
 
 def _xywh(box: BoxPx) -> list[int]:

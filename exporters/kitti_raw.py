@@ -119,6 +119,11 @@ class KittiRaw(ExporterBase):
         """Names of the annotators that it reads."""
         return frozenset({"visibility"})
 
+    @property
+    def has_own_classes(self) -> bool:
+        """Tracklets have KITTI's types."""
+        return True
+
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
 

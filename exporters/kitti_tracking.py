@@ -87,6 +87,11 @@ class KittiTracking(ExporterBase):
         """Names of the annotators that it reads."""
         return frozenset({"boxes3d", "visibility"})
 
+    @property
+    def has_own_classes(self) -> bool:
+        """Whether the types are KITTI's."""
+        return self.types == "official"
+
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
 

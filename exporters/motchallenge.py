@@ -76,6 +76,11 @@ class MotChallenge(ExporterBase):
         """Names of the annotators that it reads."""
         return frozenset({"boxes2d", "visibility"})
 
+    @property
+    def has_own_classes(self) -> bool:
+        """Classes are those of the benchmark."""
+        return True
+
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
 

@@ -119,6 +119,11 @@ class SemanticKitti(ExporterBase):
     camera: str = ""
     """Sensor that becomes camera 0; empty = the first one by name."""
 
+    @property
+    def has_own_classes(self) -> bool:
+        """Classes are those of the benchmark."""
+        return True
+
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set without the sensors, or whose camera is no pinhole.
 

@@ -8,22 +8,21 @@ merging the shards numbers the frames.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
+from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.scene_time import RIG_AXES
 from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.core.serialization import canonical_json
 
-FRAMES_NAME = "frames.jsonl"
+FRAMES = "frames"
 _FRAMES_MAX = 1_000_000
 
 
@@ -93,17 +92,14 @@ def frame_facts(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
 
 def write_frames(folder: Path, rows: Iterable[Mapping[str, Any]]) -> None:
     """Write the lines of one shard."""
-    write_text(folder / FRAMES_NAME, "".join(canonical_json(row) + "\n" for row in rows))
+    write_fragment(folder, FRAMES, rows)
 
 
 def read_sequences(shard_dirs: Sequence[Path], exporter: str) -> dict[int, list[Frame]]:
     """Read the frames of all shards by sequence, both in order."""
     sequences: dict[int, list[Frame]] = {}
-    for shard_dir in shard_dirs:
-        with (shard_dir / exporter / FRAMES_NAME).open(encoding="utf-8") as lines:
-            for line in lines:
-                row = json.loads(line)
-                sequences.setdefault(row["sequence"], []).append(Frame(shard_dir, row))
+    for shard_dir, row in fragment_rows(shard_dirs, exporter, FRAMES):
+        sequences.setdefault(row["sequence"], []).append(Frame(shard_dir, row))
     return sequences
 
 

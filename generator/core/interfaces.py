@@ -465,6 +465,14 @@ class Exporter(Protocol):
         """Names of the annotators it depends on."""
         ...
 
+    @property
+    def has_own_classes(self) -> bool:
+        """Whether the format prescribes its classes, which it derives from our categories.
+
+        A label map then drops and ignores objects but renames none.
+        """
+        ...
+
     def check(self, info: DatasetInfo) -> None:
         """Refuse a data set that the format cannot hold.
 

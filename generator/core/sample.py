@@ -94,6 +94,8 @@ class ObjectTruth:
         lidar_points: Points of each laser scanner on the instance, by sensor; None without one.
         motion: How it moves at the image's instant (motion).
         extra: Results of third-party annotators, plain data by the annotator's type.
+        ignored: Set by a label map: a region that is neither object nor background, which training
+            and evaluation leave out.
     """
 
     instance: Instance
@@ -113,6 +115,7 @@ class ObjectTruth:
     lidar_points: Mapping[str, int] | None = None
     motion: MotionTruth | None = None
     extra: Mapping[str, object] = field(default_factory=dict)
+    ignored: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -66,7 +66,8 @@ class Labels:
 
 
 _IMAGE_FIELDS = tuple(f.name for f in fields(ImageTruth) if f.name != "objects")
-_OBJECT_FIELDS = tuple(f.name for f in fields(ObjectTruth) if f.name != "instance")
+# Label maps, which set `ignored`, apply to exports only.
+_OBJECT_FIELDS = tuple(f.name for f in fields(ObjectTruth) if f.name not in ("instance", "ignored"))
 
 
 def labels_line(sample: Sample) -> str:

@@ -23,6 +23,11 @@ class Lines(Strict):
         """Names of the required annotations."""
         return frozenset({"stranger_distance"})
 
+    @property
+    def has_own_classes(self) -> bool:
+        """It writes the categories of the data set."""
+        return False
+
     def check(self, info: DatasetInfo) -> None:
         """Refuse a data set without a camera."""
         if not info.cameras:
