@@ -325,8 +325,8 @@ def point_labels(
 def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
     """Format the fifteen columns of one visible object.
 
-    The row is DontCare if the object is too far or too small for ``style``, less than two pixels
-    wide, or if its box reaches behind the camera: readers disagree about that projection.
+    The row is DontCare if the object is ignored, too far or too small for ``style``, less than two
+    pixels wide, or if its box reaches behind the camera: readers disagree about that projection.
     """
     assert thing.box is not None, "invisible objects are not listed"
     assert thing.box3d_camera is not None, "the annotation boxes3d is in `needs`"
@@ -336,7 +336,8 @@ def label_row(thing: ObjectTruth, truth: ImageTruth, style: LabelStyle) -> str:
     x, y, z = box.bottom_m
     k = truth.camera.intrinsics
     tiny = thing.box.width_px < 2 or thing.box.height_px < style.low_px
-    if tiny or not 0 < z <= style.far_m or box.corners()[:, 2].min() < NEAR_M:
+    unlabelled = thing.ignored or tiny or not 0 < z <= style.far_m
+    if unlabelled or box.corners()[:, 2].min() < NEAR_M:
         return dont_care(thing.box, k)
     instance = thing.instance
     kind = official_type(instance) if style.types == "official" else _join_words(instance.category)

@@ -145,7 +145,7 @@ def gt_columns(thing: ObjectTruth, boxes: Literal["visible", "whole"]) -> str:
     if thing.box is None or box is None or not number:
         return ""
     assert thing.visible_fraction is not None, "the annotation visibility is in `needs`"
-    flag = int(number == PEDESTRIAN)
+    flag = int(number == PEDESTRIAN and not thing.ignored)
     corner = f"{box.x_min + 1},{box.y_min + 1},{box.width_px},{box.height_px}"
     visibility = f"{min(thing.visible_fraction, 1.0):.6f}"
     return f"{thing.instance.instance_id},{corner},{flag},{number},{visibility}"

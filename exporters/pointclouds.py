@@ -58,6 +58,11 @@ class PointClouds(ExporterBase):
     type: Literal["pointclouds"] = "pointclouds"
     format: Literal["ply", "pcd"] = "ply"
 
+    @property
+    def has_own_classes(self) -> bool:
+        """Points keep the category ids of the data set."""
+        return True
+
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set without a laser scanner.
 

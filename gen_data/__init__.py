@@ -5,6 +5,7 @@
     >>> data[17].cameras["color"].rgb
     >>> gen_data.generate("tabletop.yaml", n=1000, out="out/tabletop")
     >>> gen_data.open("out/tabletop")[17].boxes2d
+    >>> gen_data.export("out/tabletop", ["coco", "kitti"], "out/tabletop-formats")
 
 Only the names in ``__all__`` are public; everything else may change between releases.
 """
@@ -19,6 +20,7 @@ from gen_data.generator import __version__
 if TYPE_CHECKING:
     from gen_data.generator.api.dataset import Dataset, StoredDataset
     from gen_data.generator.api.dataset import open_dataset as open  # noqa: A004
+    from gen_data.generator.api.export import export
     from gen_data.generator.api.generate import generate
     from gen_data.generator.api.sample import Box2d, Box3d, CameraReading, Sample
     from gen_data.generator.core.errors import (
@@ -45,6 +47,7 @@ _HOMES = {
     "Sample": "gen_data.generator.api.sample",
     "Scene": "gen_data.generator.core.scene",
     "StoredDataset": "gen_data.generator.api.dataset",
+    "export": "gen_data.generator.api.export",
     "generate": "gen_data.generator.api.generate",
     "AssetError": "gen_data.generator.core.errors",
     "ConfigError": "gen_data.generator.core.errors",
@@ -82,6 +85,7 @@ __all__ = [
     "UnknownNameError",
     "VerificationError",
     "__version__",
+    "export",
     "generate",
     "open",
 ]

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
 from gen_data.generator.api.config import ConfigLike, load_config
 from gen_data.generator.api.sample import Sample
-from gen_data.generator.api.stored import StoredSamples
 from gen_data.generator.core.errors import ConfigError, SampleIndexError, did_you_mean
 from gen_data.generator.core.sample import Sample as CoreSample
+from gen_data.generator.runner.stored import StoredSamples
 
 if TYPE_CHECKING:
     from gen_data.generator.core.capture import Channel

@@ -10,6 +10,7 @@ from typing import Any, Protocol, TypeVar
 
 from pydantic import Field, model_validator
 
+from gen_data.exporters.label_map import LabelMap
 from gen_data.generator.annotations.annotate import Thresholds
 from gen_data.generator.assemble.documents import load_config_document, resolve_document
 from gen_data.generator.assemble.plugin_tables import (
@@ -82,6 +83,12 @@ class AssetFolders(Strict):
     folders: tuple[str, ...] = Field((), description="Folders of OBJ, GLB, PLY, STL or URDF files.")
 
 
+class LabelSettings(Thresholds):
+    """Thresholds for annotating an instance, and the label map of all exports."""
+
+    map: LabelMap = LabelMap()
+
+
 class GeneralSettings(Strict):
     """Settings of a configuration, without its plug-ins."""
 
@@ -101,7 +108,7 @@ class GeneralSettings(Strict):
     )
     template: str = Field("", description="Name of a scene template.")
     physics: PhysicsConfig = PhysicsConfig()
-    labels: Thresholds = Thresholds()
+    labels: LabelSettings = LabelSettings()
     splits: Splits = Splits()
     assets: AssetFolders = AssetFolders()
 

@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache, partial
 
 import cv2
 
+from gen_data.exporters.label_map import MappedExporter
 from gen_data.generator.annotations.annotate import annotate_ego, annotate_reading
 from gen_data.generator.assemble.config import Config, SceneConfig
 from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, default_plugin
@@ -121,7 +122,7 @@ def pipeline_config(
         split_shares=config.split_shares,
         split_assignment=config.general.splits.assign,
         layout_attempts_max=config.general.physics.layout_attempts_max,
-        exporters=_exporters(config, info, library),
+        exporters=ready_exporters(config, info, library),
         strides=_strides(info),
     )
 
@@ -232,15 +233,23 @@ def collect_categories(scenes: Sequence[Scene], assets: AssetIndex) -> tuple[str
 def annotators_of(config: Config) -> Sequence[AnyAnnotator]:
     """Annotators of the configuration, then the others that exporters need."""
     annotators = dict(config.annotations)
-    for exporter in config.exporters:
-        for name in sorted(exporter.needs - annotators.keys()):
+    label_map = config.general.labels.map
+    for needs in (label_map.needs, *(exporter.needs for exporter in config.exporters)):
+        for name in sorted(needs - annotators.keys()):
             annotators[name] = default_plugin(ANNOTATIONS, name)
     return list(annotators.values())
 
 
-def _exporters(config: Config, info: DatasetInfo, library: Library) -> dict[str, Exporter]:
+def ready_exporters(config: Config, info: DatasetInfo, library: Library) -> dict[str, Exporter]:
+    """Exporters of a configuration by name, with its label map and the library.
+
+    Raises:
+        ConfigError: a format cannot hold the data set, or is listed twice.
+    """
     exporters: dict[str, Exporter] = {}
-    for exporter in config.exporters:
+    label_map = config.general.labels.map
+    for own in config.exporters:
+        exporter = own if label_map.is_identity else MappedExporter(own, label_map)
         if exporter.type in exporters:
             raise ConfigError(f"exporters: '{exporter.type}' is listed twice")
         exporter.check(info)

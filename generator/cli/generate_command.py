@@ -37,7 +37,7 @@ def generate_with_progress(
         GenDataError: see ``gen_data.generator.api.generate``, which has the same arguments.
     """
     console = Console(stderr=True)
-    with _progress_bar(console, n) as show:
+    with progress_bar(console, n) as show:
         summary = generate(
             choice.source,
             n,
@@ -50,11 +50,12 @@ def generate_with_progress(
             on_progress=show,
             resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
         )
-    _print_summary(console, summary)
+    print_summary(console, summary)
 
 
 @contextmanager
-def _progress_bar(console: Console, n: int) -> Iterator[Callable[[RunProgress], None]]:
+def progress_bar(console: Console, n: int) -> Iterator[Callable[[RunProgress], None]]:
+    """Show the progress of a run of ``n`` samples."""
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -83,7 +84,8 @@ def _progress_bar(console: Console, n: int) -> Iterator[Callable[[RunProgress], 
             bar.stop()
 
 
-def _print_summary(console: Console, summary: Summary) -> None:
+def print_summary(console: Console, summary: Summary) -> None:
+    """Print the summary of a run as a table."""
     table = Table(title=summary.folder, show_header=False)
     for name, value in summary.rows():
         table.add_row(name, value)

@@ -25,6 +25,7 @@ class LazyCommands(click.Group):
     """A group of commands that are imported on demand."""
 
     modules = {  # noqa: RUF012
+        "export": "gen_data.generator.cli.export_command:export",
         "preview": "gen_data.generator.cli.preview_commands:preview",
         "contact-sheet": "gen_data.generator.cli.preview_commands:contact_sheet",
         "assets": "gen_data.generator.cli.asset_commands:assets",
@@ -35,6 +36,7 @@ class LazyCommands(click.Group):
         "doctor": "gen_data.generator.cli.doctor:doctor",
     }
     summaries = {  # noqa: RUF012
+        "export": "Write a finished data set in other formats, without rendering.",
         "preview": "Show samples in Rerun: live, in a browser, or as a .rrd file.",
         "contact-sheet": "Draw samples with their labels on one PNG.",
         "assets": "Install, list, show, verify and remove packs of assets.",

@@ -95,6 +95,8 @@ def _builder(kind: Any) -> Callable[[Any], Any]:
         return _mapping_builder(*arguments)
     if origin is np.ndarray:
         return _decode_runs
+    if isinstance(kind, type) and issubclass(kind, Enum):
+        return kind
     return float if kind is float else _itself
 
 

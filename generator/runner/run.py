@@ -18,8 +18,10 @@ from gen_data.generator.runner.shard import (
     EnteredPipeline,
     Job,
     MediaWriter,
+    RecordWriter,
     make_shard,
     write_images,
+    write_records,
 )
 from gen_data.generator.runner.store import FolderState, LocalStore, Scan
 from gen_data.generator.runner.supervisor import Limits, Supervisor
@@ -42,12 +44,13 @@ class Settings:
         full_check: On resumption, hash existing files instead of comparing sizes. This also
             repairs a damaged data set: damaged shards are generated again.
         limits: Limits on silence, deaths and memory of workers.
-        write_media: Writes the images of one sample; picklable.
+        write_media, write_records: See ``Job``; picklable.
     """
 
     full_check: bool = False
     limits: Limits = field(default_factory=Limits)
     write_media: MediaWriter = write_images
+    write_records: RecordWriter = write_records
 
 
 def _silent(progress: RunProgress) -> None:
@@ -91,7 +94,7 @@ def run(  # noqa: PLR0913  (every argument is the choice of the caller)
         with interruption.immediate(), store.errors():
             store.state(plan)
         with store.locked():
-            job = Job(plan, store, make_pipeline, settings.write_media)
+            job = Job(plan, store, make_pipeline, settings.write_media, settings.write_records)
             run_ = _Run(job, workers, progress or _silent, settings, interruption)
             return replace(run_.execute(licences), folder=str(out))
 

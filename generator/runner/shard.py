@@ -20,6 +20,10 @@ from gen_data.generator.runner.shard_record import ShardRecord, describe_shard
 from gen_data.generator.runner.store import LocalStore
 
 MediaWriter = Callable[[DatasetInfo, Sample, Path], object]
+"""Writes the images of a sample to their places in a shard folder."""
+
+RecordWriter = Callable[[Sample, Sample | None, Path], object]
+"""Adds scene and labels of a sample to a shard folder; the second is the scene's first sample."""
 
 
 class PipelineLike(Protocol):
@@ -63,6 +67,13 @@ def write_images(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
     write_media(info, sample, shard_dir)
 
 
+def write_records(sample: Sample, base: Sample | None, shard_dir: Path) -> None:
+    """Add the lines of a sample to ``scenes.jsonl`` and ``labels.jsonl``."""
+    for name, line in ((SCENES_NAME, scene_line(sample, base)), (LABELS_NAME, labels_line(sample))):
+        with (shard_dir / name).open("a", encoding="utf-8") as file:
+            file.write(line + "\n")
+
+
 @dataclass(frozen=True)
 class Job:
     """Everything needed to generate a shard, except its number; picklable.
@@ -70,12 +81,14 @@ class Job:
     Attributes:
         make_pipeline: Makes the same pipeline in any process.
         write_media: Writes the images of one sample.
+        write_records: Adds scene and labels of one sample.
     """
 
     plan: Plan
     store: LocalStore
     make_pipeline: Callable[[], EnteredPipeline]
     write_media: MediaWriter = write_images
+    write_records: RecordWriter = write_records
 
 
 @dataclass(frozen=True)
@@ -136,11 +149,8 @@ def _make_sample(
         started_s = time.process_time()
         with job.store.errors():
             job.write_media(pipeline.info, sample, folder)
-            with (folder / SCENES_NAME).open("a", encoding="utf-8") as scenes:
-                base = next((s for s in before if s.scene_index == sample.scene_index), None)
-                scenes.write(scene_line(sample, base) + "\n")
-            with (folder / LABELS_NAME).open("a", encoding="utf-8") as labels:
-                labels.write(labels_line(sample) + "\n")
+            base = next((s for s in before if s.scene_index == sample.scene_index), None)
+            job.write_records(sample, base, folder)
         encode_s = time.process_time() - started_s
     on_sample(replace(sample, timings_s={**sample.timings_s, "encode": encode_s}))
     return drop_pixels(sample)

@@ -20,8 +20,9 @@ from gen_data.generator.core.capture import (
     SensorReading,
 )
 from gen_data.generator.core.errors import StorageError
-from gen_data.generator.core.interfaces import Modality, cloud_path, media_path, table_path
+from gen_data.generator.core.interfaces import DatasetInfo, cloud_path, media_path, table_path
 from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.serialization import from_plain
 from gen_data.generator.runner.labels import LABELS_NAME, Labels, read_labels
 from gen_data.generator.runner.plan import load_plan
 from gen_data.generator.runner.provenance import SCENES_NAME, KeptScene, read_scenes
@@ -40,29 +41,24 @@ class StoredSamples:
 
     def __init__(self, folder: str | PathLike[str]) -> None:
         self.folder = Path(folder)
-        self._plan = load_plan(self.folder)
-        self._info = self._manifest()["info"]
-        self._channels = {
-            sensor["name"]: tuple(Channel(name) for name in sensor["channels"])
-            for sensor in self._info["sensors"]
-            if sensor["modality"] == Modality.CAMERA.value
-        }
+        self.plan = load_plan(self.folder)
+        self.info = self._read_info()
         self._shard = lru_cache(SHARDS_KEPT)(self._read_shard)
 
     @property
     def n(self) -> int:
         """Number of samples."""
-        return self._plan.n
+        return self.plan.n
 
     @property
     def categories(self) -> tuple[str, ...]:
         """Sorted names of all categories."""
-        return tuple(self._info["categories"])
+        return self.info.categories
 
     @property
     def config(self) -> Mapping[str, Any]:
         """The resolved configuration of the data set."""
-        config: Mapping[str, Any] = self._plan.config
+        config: Mapping[str, Any] = self.plan.config
         return config
 
     def sample(self, index: int) -> Sample:
@@ -71,9 +67,9 @@ class StoredSamples:
         Raises:
             StorageError: a file of the sample's shard is missing or damaged.
         """
-        shard = index // self._plan.shard_size
-        folder = self._shard_dir(shard)
-        kept, labels = self._shard(shard)[index - shard * self._plan.shard_size]
+        shard = index // self.plan.shard_size
+        folder = self.shard_dir(shard)
+        kept, labels = self._shard(shard)[index - shard * self.plan.shard_size]
         return Sample(
             index=kept.index,
             scene_index=kept.scene_index,
@@ -84,7 +80,7 @@ class StoredSamples:
             capture=self._capture(folder, labels),
             truth=labels.truth,
             attempts=kept.attempts,
-            cameras=tuple(self._channels),
+            cameras=self.info.cameras,
             frame=labels.frame,
         )
 
@@ -98,7 +94,7 @@ class StoredSamples:
             name: SensorReading(
                 name,
                 labels.truth[name].camera,
-                ImageFiles(folder, name, index, self._channels[name], self._info["depth_scale_m"]),
+                ImageFiles(folder, name, index, self.info.media[name], self.info.depth_scale_m),
                 time_s=image.time_s,
                 ev100=image.ev100,
             )
@@ -117,7 +113,7 @@ class StoredSamples:
         return Capture(readings, clouds, tables)
 
     def _read_shard(self, shard: int) -> list[tuple[KeptScene, Labels]]:
-        folder = self._shard_dir(shard)
+        folder = self.shard_dir(shard)
         try:
             scenes = list(read_scenes(folder / SCENES_NAME))
             by_index = {kept.index: kept.scene for kept in scenes}
@@ -128,20 +124,20 @@ class StoredSamples:
                 f"\n    gen-data verify {self.folder} --full"
             ) from error
 
-    def _shard_dir(self, shard: int) -> Path:
+    def shard_dir(self, shard: int) -> Path:
+        """Folder of the files of a shard."""
         return self.folder / SHARDS_NAME / f"{shard:06d}"
 
-    def _manifest(self) -> dict[str, Any]:
+    def _read_info(self) -> DatasetInfo:
         path = self.folder / MANIFEST_NAME
         try:
-            manifest: dict[str, Any] = json.loads(path.read_bytes())
+            return from_plain(DatasetInfo, json.loads(path.read_bytes())["info"])
         except FileNotFoundError:
             raise StorageError(
                 f"{path}: missing; the data set is unfinished: run the command that began it again"
             ) from None
-        except ValueError as error:
+        except (ValueError, KeyError, TypeError) as error:
             raise StorageError(f"{path}: damaged ({error})") from None
-        return manifest
 
     def __getstate__(self) -> dict[str, Any]:
         """Pickle only the folder."""

@@ -1,0 +1,277 @@
+"""Label maps: which objects an export has, and under which names.
+
+A label map works between the samples and an exporter: shards and ``labels.jsonl`` keep every object
+of the data set under its own category.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, cached_property
+from importlib.resources import files
+from pathlib import Path
+from typing import Literal
+
+import yaml
+from pydantic import Field, field_validator, model_validator
+
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError, ConfigWarning, did_you_mean
+from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, Exporter
+from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
+from gen_data.generator.core.scene import Instance, Scene
+
+Sources = tuple[str, ...]
+"""Categories of the data set."""
+
+
+class LabelMap(Strict):
+    """Which objects exports have, and under which class names.
+
+    Formats with classes of their own, such as KITTI's eight types, leave out and ignore the same
+    objects, but keep their own names.
+
+    Attributes:
+        classes: ``{class: categories}``, in the order of class ids; a class without categories
+            takes the category of its own name. Or the name of a public list: ``coco80``,
+            ``kitti``, ``nuscenes``, ``cityscapes``. Without it, all categories keep their names.
+        others: Objects of all other categories: left out, or kept as ignored regions (in formats
+            that have such regions without a class, such as KITTI's DontCare).
+        ignore: Categories whose objects become ignored regions.
+        min_visible_fraction: Smallest visible share of the silhouette (annotation ``visibility``).
+        min_box_px: Smallest side of the box of the visible pixels.
+        max_truncation: Largest share of the silhouette outside the image (annotation
+            ``visibility``).
+        below: Objects that miss one of these limits: left out, or kept as ignored regions.
+    """
+
+    classes: (
+        Literal["coco80", "kitti", "nuscenes", "cityscapes"] | Mapping[str, Sources | None] | None
+    ) = None
+    others: Literal["drop", "ignore"] = "drop"
+    ignore: tuple[str, ...] = ()
+    min_visible_fraction: float = Field(0.0, ge=0.0, le=1.0)
+    min_box_px: int = Field(1, ge=1)
+    max_truncation: float = Field(1.0, ge=0.0, le=1.0)
+    below: Literal["drop", "ignore"] = "drop"
+
+    @field_validator("classes", mode="before")
+    @classmethod
+    def _listed(cls, classes: object) -> object:
+        """A single category needs no list. Tuples, as strict validation takes no lists here."""
+        if not isinstance(classes, Mapping):
+            return classes
+        return {
+            name: (own,) if isinstance(own, str) else tuple(own) if isinstance(own, list) else own
+            for name, own in classes.items()
+        }
+
+    @model_validator(mode="after")
+    def _has_each_category_once(self) -> LabelMap:
+        seen: dict[str, str] = {}
+        for name, categories in self.classes_of.items():
+            for category in categories:
+                if category in seen:
+                    raise ValueError(
+                        f"category '{category}' belongs to the classes '{seen[category]}' and "
+                        f"'{name}'; expected one class"
+                    )
+                seen[category] = name
+        for category in self.ignore:
+            if isinstance(self.classes, Mapping) and category in seen:
+                raise ValueError(
+                    f"category '{category}' is ignored and belongs to the class "
+                    f"'{seen[category]}'; expected one of the two"
+                )
+        return self
+
+    @property
+    def is_identity(self) -> bool:
+        """Whether it changes nothing."""
+        return self == LabelMap()
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Names of the annotators that its limits read."""
+        limited = self.min_visible_fraction > 0.0 or self.max_truncation < 1.0
+        return frozenset({"visibility"} if limited else ())
+
+    @property
+    def classes_of(self) -> Mapping[str, Sources]:
+        """Categories by class; empty without ``classes``."""
+        if self.classes is None:
+            return {}
+        listed = public_classes(self.classes) if isinstance(self.classes, str) else self.classes
+        return {name: (name,) if own is None else own for name, own in listed.items()}
+
+    def check(self, categories: Sequence[str]) -> None:
+        """Compare the map with the categories of a data set.
+
+        Raises:
+            ConfigError: no class has a category of the data set.
+
+        Warns:
+            ConfigWarning: the user named a category that the data set does not have. A map may
+                serve several data sets, so this is no error.
+        """
+        named = self.classes if isinstance(self.classes, Mapping) else {}
+        for category in (*(c for own in named.values() for c in own or ()), *self.ignore):
+            if category not in categories:
+                text = f"labels.map: the data set has no category '{category}'"
+                warnings.warn(
+                    text + did_you_mean(category, categories), ConfigWarning, stacklevel=2
+                )
+        used = {c for own in self.classes_of.values() for c in own}
+        if self.classes is not None and not used & set(categories):
+            raise ConfigError(
+                "labels.map.classes: no class has a category of the data set; expected some of: "
+                f"{', '.join(categories)}"
+            )
+
+
+@cache
+def public_classes(name: str) -> Mapping[str, Sources | None]:
+    """Classes of a public data set, in order, with our categories; see ``label_maps.yaml``."""
+    text = files("gen_data.exporters").joinpath("label_maps.yaml").read_text("utf-8")
+    listed: Mapping[str, list[str] | None] = yaml.safe_load(text)[name]
+    return {k: None if v is None else tuple(v) for k, v in listed.items()}
+
+
+@dataclass(frozen=True)
+class MappedExporter:
+    """An exporter that sees a data set through a label map."""
+
+    exporter: Exporter
+    label_map: LabelMap
+
+    @property
+    def type(self) -> str:
+        """Name of the exporter."""
+        return self.exporter.type
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Annotators of the exporter and of the limits."""
+        return self.exporter.needs | self.label_map.needs
+
+    @property
+    def has_own_classes(self) -> bool:
+        """As the exporter."""
+        return self.exporter.has_own_classes
+
+    def check(self, info: DatasetInfo) -> None:
+        """Refuse what the exporter refuses, and categories that do not exist."""
+        self.label_map.check(info.categories)
+        self.exporter.check(self._mapping(info).info)
+
+    def with_assets(self, assets: AssetLibrary) -> MappedExporter:
+        """The exporter with access to the library."""
+        return replace(self, exporter=self.exporter.with_assets(assets))
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write the mapped labels of one shard."""
+        mapping = self._mapping(info)
+        self.exporter.write_shard(mapping.info, map(mapping.map_sample, samples), shard_dir)
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Merge all shards."""
+        self.exporter.finalize(self._mapping(info).info, shard_dirs, dataset_dir)
+
+    def _mapping(self, info: DatasetInfo) -> AppliedLabelMap:
+        return AppliedLabelMap(self.label_map, info, renames=not self.exporter.has_own_classes)
+
+
+@dataclass(frozen=True)
+class AppliedLabelMap:
+    """A label map of one data set.
+
+    Attributes:
+        renames: Whether objects take the names of their classes.
+    """
+
+    label_map: LabelMap
+    dataset: DatasetInfo
+    renames: bool = True
+
+    @cached_property
+    def info(self) -> DatasetInfo:
+        """The data set as the exporter sees it.
+
+        It has no images of category ids if the classes differ, as their pixels hold those of the
+        data set.
+        """
+        if not self._has_classes:
+            return self.dataset
+        sensors = tuple(
+            replace(s, channels=tuple(c for c in s.channels if c is not Channel.CATEGORY))
+            for s in self.dataset.sensors
+        )
+        return replace(self.dataset, categories=tuple(self.label_map.classes_of), sensors=sensors)
+
+    def map_sample(self, sample: Sample) -> Sample:
+        """The sample with mapped labels."""
+        truth = {name: self._map_image(image) for name, image in sample.truth.items()}
+        instants = {name: self._map_scene(scene) for name, scene in sample.instants.items()}
+        return replace(sample, truth=truth, scene=self._map_scene(sample.scene), instants=instants)
+
+    @property
+    def _has_classes(self) -> bool:
+        return self.renames and self.label_map.classes is not None
+
+    @cached_property
+    def _class_of(self) -> Mapping[str, tuple[str, int]]:
+        """Class and its id by category."""
+        listed = enumerate(self.label_map.classes_of.items(), 1)
+        return {category: (name, k) for k, (name, own) in listed for category in own}
+
+    def _map_image(self, truth: ImageTruth) -> ImageTruth:
+        return replace(truth, objects=tuple(self._map_objects(truth.objects)))
+
+    def _map_objects(self, objects: Iterable[ObjectTruth]) -> Iterator[ObjectTruth]:
+        for thing in objects:
+            fate = self._fate(thing)
+            if fate != "drop":
+                instance = self._map_instance(thing.instance)
+                yield replace(thing, instance=instance, ignored=fate == "ignore")
+
+    def _fate(self, thing: ObjectTruth) -> Literal["keep", "ignore", "drop"]:
+        label_map, category = self.label_map, thing.instance.category
+        if category in label_map.ignore:
+            return "ignore"
+        if label_map.classes is not None and category not in self._class_of:
+            return label_map.others
+        return label_map.below if self._is_below(thing) else "keep"
+
+    def _is_below(self, thing: ObjectTruth) -> bool:
+        limits, box = self.label_map, thing.box
+        if box is None:
+            return False
+        return (
+            min(box.width_px, box.height_px) < limits.min_box_px
+            or (
+                thing.visible_fraction is not None
+                and thing.visible_fraction < limits.min_visible_fraction
+            )
+            or (thing.truncation is not None and thing.truncation > limits.max_truncation)
+        )
+
+    def _map_instance(self, instance: Instance) -> Instance:
+        """The instance under its class; ignored ones without a class have id 0."""
+        if not self._has_classes:
+            return instance
+        name, number = self._class_of.get(instance.category, (instance.category, 0))
+        return replace(instance, category=name, category_id=number)
+
+    def _map_scene(self, scene: Scene) -> Scene:
+        """The scene whose instances are mapped; those of other categories are not annotated."""
+        known = self._class_of if self.label_map.classes is not None else None
+        instances = tuple(
+            self._map_instance(one)
+            if known is None or one.category in known
+            else replace(one, annotated=False, category_id=0)
+            for one in scene.instances
+        )
+        return replace(scene, instances=instances)

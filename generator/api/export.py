@@ -1,0 +1,113 @@
+"""Export of a finished data set: the function behind ``gen-data export``."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gen_data.generator.core.errors import ConfigError
+
+if TYPE_CHECKING:
+    from gen_data.generator.assemble.config import Config
+    from gen_data.generator.runner.progress import RunProgress, Summary
+
+Format = str | Mapping[str, Any]
+"""Name of an exporter, or its entry of a configuration: ``{"type": "coco", "amodal": False}``."""
+
+
+def export(
+    folder: str | PathLike[str],
+    formats: Sequence[Format],
+    out: str | PathLike[str],
+    *,
+    label_map: str | PathLike[str] | None = None,
+    workers: int | None = None,
+    on_progress: Callable[[RunProgress], None] | None = None,
+    resume_command: str = "the same call of gen_data.export",
+) -> Summary:
+    """Write a finished data set in other formats, without rendering it again.
+
+    The result is a data set of its own, with the same bytes as if it had been generated with these
+    exporters. Its images are hard links, or copies on another file system.
+
+    Args:
+        folder: A finished data set.
+        formats: Exporters, at least one.
+        out: Folder of the result.
+        label_map: YAML file with a label map, which replaces that of the data set.
+        workers: Processes; None = one per core, 0 = this process.
+        on_progress: Called after each sample and shard.
+        resume_command: Command that error messages give for resuming.
+
+    Raises:
+        StorageError: the folder holds no finished data set, or ``out`` cannot be written.
+        ConfigError: a format is unknown, or needs a sensor or an annotation that the data set does
+            not have.
+        Interrupted: Ctrl-C or SIGTERM; the same call goes on.
+    """
+    from gen_data.generator.assemble.config import load_source_config
+    from gen_data.generator.assemble.pipeline_factory import ready_exporters
+    from gen_data.generator.assets.library import open_library
+    from gen_data.generator.runner.exports import export as write_exports
+    from gen_data.generator.runner.stored import StoredSamples
+
+    if not formats:
+        raise ConfigError("formats: none given; expected at least one exporter, such as coco")
+    stored = StoredSamples(folder)
+    entries = [{"type": f} if isinstance(f, str) else dict(f) for f in formats]
+    overrides = [f"exporters={json.dumps(entries)}"]
+    if label_map is not None:
+        overrides.append(label_map_override(Path(label_map)))
+    source = os.fspath(folder)
+    config = load_source_config(source, overrides=overrides)
+    _check_annotations(load_source_config(source), config)
+    exporters = ready_exporters(config, stored.info, open_library(config.asset_folders))
+    return write_exports(
+        stored,
+        config.resolved,
+        exporters,
+        Path(out),
+        workers=len(os.sched_getaffinity(0)) if workers is None else workers,
+        resume_command=resume_command,
+        progress=on_progress,
+    )
+
+
+def label_map_override(path: Path) -> str:
+    """Override of a configuration with the label map of a file.
+
+    Raises:
+        ConfigError: the file is no label map; the message lists all errors with their positions.
+    """
+    from gen_data.exporters.label_map import LabelMap
+    from gen_data.generator.config.problems import Problems
+    from gen_data.generator.config.validation import validate
+    from gen_data.generator.config.yaml_tree import load_yaml
+
+    problems, document = Problems(), load_yaml(path)
+    validate(document, LabelMap, problems)
+    problems.raise_if_any()
+    return f"labels.map={json.dumps(document.plain())}"
+
+
+def _check_annotations(made: Config, wanted: Config) -> None:
+    """Reject exporters that read annotations which the data set was made without."""
+    exported: set[str] = set().union(*(e.needs for e in made.exporters))
+    known = {*made.annotations, *exported, *made.general.labels.map.needs}
+    for exporter in wanted.exporters:
+        missing = sorted(exporter.needs - known)
+        if missing:
+            raise ConfigError(
+                f"exporter '{exporter.type}' reads the annotations {', '.join(missing)}, which the "
+                f"data set does not have; add them to its configuration and generate it again"
+            )
+    missing = sorted(wanted.general.labels.map.needs - known)
+    if missing:
+        raise ConfigError(
+            f"labels.map: its limits read the annotations {', '.join(missing)}, which the data set "
+            "does not have; add them to its configuration and generate it again"
+        )

@@ -1,0 +1,72 @@
+"""``gen-data export``: a finished data set in other formats."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+HELP = """Write a finished data set in other formats, without rendering it again.
+
+The result is a data set with the same bytes as if it had been generated with these exporters; its
+images are hard links.
+
+\b
+gen-data export out/tabletop --format yolo --format voc --out out/tabletop-yolo
+"""
+
+
+@click.command("export", help=HELP)
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option(
+    "--format",
+    "-f",
+    "formats",
+    multiple=True,
+    required=True,
+    metavar="NAME",
+    help="Exporter, as in a configuration: coco, or '{type: coco, amodal: false}'. Repeatable.",
+)
+@click.option(
+    "--out", "-o", required=True, type=click.Path(path_type=Path), help="Folder of the result."
+)
+@click.option("--label-map", type=click.Path(path_type=Path), help="YAML file with a label map.")
+@click.option("--workers", "-w", type=int, help="Worker processes [default: one per core].")
+def export(
+    folder: Path,
+    formats: tuple[str, ...],
+    out: Path,
+    label_map: Path | None,
+    workers: int | None,
+) -> None:
+    """Export a finished data set."""
+    from rich.console import Console
+
+    from gen_data.generator.api.export import export as write_exports
+    from gen_data.generator.cli.generate_command import print_summary, progress_bar
+    from gen_data.generator.runner.stored import StoredSamples
+
+    console = Console(stderr=True)
+    with progress_bar(console, StoredSamples(folder).n) as show:
+        summary = write_exports(
+            folder,
+            [_parse_format(text) for text in formats],
+            out,
+            label_map=label_map,
+            workers=workers,
+            on_progress=show,
+            resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
+        )
+    print_summary(console, summary)
+
+
+def _parse_format(text: str) -> str | Mapping[str, Any]:
+    """Parse a name, or a YAML mapping as in a configuration."""
+    from gen_data.generator.config.yaml_tree import parse_yaml
+
+    entry: Any = parse_yaml(text, "--format").plain() if text.lstrip().startswith("{") else text
+    return entry

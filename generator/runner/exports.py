@@ -1,0 +1,130 @@
+"""Export of a finished data set in further formats, without a renderer.
+
+It is a run like any other, whose samples are read instead of generated and whose images are linked
+instead of encoded: with the same interruptions, resumption, workers and manifest. Its plan is that
+of the data set with other exporters, so that the result has the same bytes as the data set that
+generation with these exporters gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.generator.core.interfaces import (
+    DatasetInfo,
+    Exporter,
+    cloud_path,
+    media_path,
+    table_path,
+)
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.runner.labels import LABELS_NAME
+from gen_data.generator.runner.progress import RunProgress, Summary
+from gen_data.generator.runner.provenance import SCENES_NAME
+from gen_data.generator.runner.run import Settings, run
+from gen_data.generator.runner.store import LICENCES_NAME
+from gen_data.generator.runner.stored import StoredSamples
+
+
+@dataclass(frozen=True)
+class StoredPipeline:
+    """A pipeline that reads its samples from a finished data set; picklable."""
+
+    stored: StoredSamples
+    exporters: Mapping[str, Exporter]
+
+    @property
+    def info(self) -> DatasetInfo:
+        """Facts about the data set."""
+        return self.stored.info
+
+    def sample(self, index: int) -> Sample:
+        """Read a sample; its images are decoded on access."""
+        return self.stored.sample(index)
+
+    def __call__(self) -> StoredPipeline:
+        """Make the pipeline of a process."""
+        return self
+
+    def __enter__(self) -> StoredPipeline:
+        """Start; there are no engines."""
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Drop what was read."""
+        self.stored.close()
+
+
+@dataclass(frozen=True)
+class LinkedFiles:
+    """Links the files of a data set into the shards of its export."""
+
+    stored: StoredSamples
+
+    def link_media(self, info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
+        """Link images, laser scans and measurements of a sample."""
+        index, capture = sample.index, sample.capture
+        source_dir = self._source_dir(index)
+        pairs = [
+            (media_path(source_dir, name, c, index), media_path(shard_dir, name, c, index))
+            for name in capture.readings
+            for c in info.media[name]
+        ]
+        for names, path_of in ((capture.clouds, cloud_path), (capture.tables, table_path)):
+            pairs += [(path_of(source_dir, n, index), path_of(shard_dir, n, index)) for n in names]
+        for source, target in pairs:
+            link_or_copy(source, target)
+
+    def link_records(self, sample: Sample, base: Sample | None, shard_dir: Path) -> None:
+        """Link the scenes and labels of the whole shard, with its first sample."""
+        del base
+        if not (shard_dir / SCENES_NAME).exists():
+            for name in (SCENES_NAME, LABELS_NAME):
+                link_or_copy(self._source_dir(sample.index) / name, shard_dir / name)
+
+    def _source_dir(self, index: int) -> Path:
+        return self.stored.shard_dir(index // self.stored.plan.shard_size)
+
+
+def export(
+    stored: StoredSamples,
+    config: Mapping[str, Any],
+    exporters: Mapping[str, Exporter],
+    out: Path,
+    *,
+    workers: int,
+    resume_command: str,
+    progress: Callable[[RunProgress], None] | None = None,
+) -> Summary:
+    """Write a finished data set in other formats, as a data set of its own.
+
+    Args:
+        stored: The data set.
+        config: Its resolved configuration, with these exporters.
+        exporters: By name; checked.
+        out: Folder of the new data set. Its shards are hard links to those of the old one, or
+            copies on another file system.
+        workers: See ``run``.
+        resume_command: See ``run``.
+        progress: See ``run``.
+
+    Raises:
+        GenDataError: see ``run``.
+    """
+    licences = stored.folder / LICENCES_NAME
+    text = licences.read_text("utf-8") if licences.exists() else None
+    files = LinkedFiles(stored)
+    return run(
+        replace(stored.plan, config=config),
+        StoredPipeline(stored, exporters),
+        out,
+        workers=workers,
+        resume_command=resume_command,
+        progress=progress,
+        licences=None if text is None else lambda _: text,
+        settings=Settings(write_media=files.link_media, write_records=files.link_records),
+    )

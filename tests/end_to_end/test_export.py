@@ -1,0 +1,89 @@
+"""Export of a finished data set in other formats."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+import gen_data as package
+from tests.end_to_end.running import digest, gen_data
+
+
+def test_an_export_equals_generation_with_the_same_exporters(dataset: Path, tmp_path: Path) -> None:
+    """Byte for byte, identity included, by two workers."""
+    one = gen_data(
+        "export", str(dataset), "--format", "coco", "--out", "one", "--workers", "1", cwd=tmp_path
+    )
+    both = gen_data("export", "one", "-f", "kitti", "-f", "coco", "-o", "both", cwd=tmp_path)
+
+    assert one.returncode == both.returncode == 0, one.stderr + both.stderr
+    assert not (tmp_path / "one/kitti").exists()
+    made, exported = digest(dataset), digest(tmp_path / "both")
+    # The order of exporters is part of the plan.
+    differing = {path for path in made if exported.get(path) != made[path]}
+    assert differing == {"plan.json", "manifest.json", "SHA256SUMS"}
+    again = gen_data("export", "one", "-f", "coco", "-f", "kitti", "-o", "all", cwd=tmp_path)
+    assert again.returncode == 0, again.stderr
+    assert digest(tmp_path / "all") == made
+
+
+def test_images_are_hard_links(dataset: Path, tmp_path: Path) -> None:
+    """An export takes no further space for them."""
+    package.export(dataset, ["kitti"], tmp_path / "out", workers=0)
+
+    image = Path("shards/000000/color/rgb/000000000.png")
+    assert (dataset / image).samefile(tmp_path / "out" / image)
+
+
+def test_a_label_map_makes_a_data_set_of_the_users_classes(dataset: Path, tmp_path: Path) -> None:
+    """With the same map, generation gives the same result."""
+    (tmp_path / "map.yaml").write_text("classes: {kitchen: [mug, bowl, cup, plate, bottle]}\n")
+    done = gen_data(
+        "export", str(dataset), "-f", "{type: coco, amodal: false}",
+        "--label-map", "map.yaml", "-o", "out", cwd=tmp_path,
+    )  # fmt: skip
+
+    assert done.returncode == 0, done.stderr
+    files = sorted((tmp_path / "out/coco/annotations").glob("*.json"))
+    data = json.loads(files[0].read_text())
+    assert data["categories"] == [{"id": 1, "name": "kitchen", "supercategory": "object"}]
+    assert json.loads((tmp_path / "out/plan.json").read_text())["config"]["labels"]["map"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "text"),
+    [
+        (("-f", "coconut"), 2, "unknown exporter 'coconut'.*did you mean 'coco'"),
+        (("-f", "kitti_stereo"), 2, "camera"),
+        (("-f", "birdseye"), 2, "reads the annotations .*which the data set does not have"),
+        (("-f", "coco", "--label-map", "bad.yaml"), 2, "bad.yaml:1:9: others: unknown value"),
+    ],
+)
+def test_what_cannot_be_exported_is_refused_before_anything_is_written(
+    dataset: Path, tmp_path: Path, arguments: tuple[str, ...], code: int, text: str
+) -> None:
+    """Place, fact, remedy, and no folder."""
+    (tmp_path / "bad.yaml").write_text("others: away\n")
+    done = gen_data("export", str(dataset), *arguments, "-o", "out", cwd=tmp_path)
+
+    assert done.returncode == code
+    assert re.search(text, done.stderr), done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_foreign_or_damaged_folder_is_named(dataset: Path, tmp_path: Path) -> None:
+    """No traceback."""
+    foreign = gen_data("export", str(tmp_path), "-f", "coco", "-o", "out", cwd=tmp_path)
+    damaged = tmp_path / "damaged"
+    shutil.copytree(dataset, damaged)
+    labels = damaged / "shards/000001/labels.jsonl"
+    labels.write_text(labels.read_text()[:-200])
+    broken = gen_data("export", str(damaged), "-f", "coco", "-o", "out", cwd=tmp_path)
+
+    assert foreign.returncode == broken.returncode == 4
+    assert "is not a gen-data data set" in foreign.stderr
+    assert "000001: its scenes or labels cannot be read" in broken.stderr

@@ -1,0 +1,164 @@
+"""Label maps: which objects an export has, and under which names."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from gen_data.exporters.coco import Coco
+from gen_data.exporters.kitti import Kitti
+from gen_data.exporters.label_map import AppliedLabelMap, LabelMap, MappedExporter, public_classes
+from gen_data.generator.core.errors import ConfigError, ConfigWarning
+
+CITYSCAPES_THINGS = ["person", "rider", "car", "truck", "bus", "train", "motorcycle", "bicycle"]
+"""Classes with instances, in the order of their ids: Cordts et al., CVPR 2016, table 1."""
+
+
+def truths(world: Any, label_map: LabelMap, *, renames: bool = True) -> list[Any]:
+    """Mapped objects of all frames."""
+    applied = AppliedLabelMap(label_map, world.info(7), renames)
+    mapped = [applied.map_sample(sample) for sample in world.samples]
+    return [thing for s in mapped for image in s.truth.values() for thing in image.objects]
+
+
+def categories(world: Any) -> Counter[str]:
+    """Objects of the world by category."""
+    return Counter(t.instance.category for t in truths(world, LabelMap()))
+
+
+def parse(text: str) -> LabelMap:
+    """A label map as in a configuration, which is validated strictly as JSON."""
+    return LabelMap.model_validate_json(text)
+
+
+def test_two_classes_give_a_data_set_of_two_classes(world: Any) -> None:
+    """With the ids of their order; everything else is left out."""
+    first, second, *_ = sorted(categories(world))
+    label_map = parse(json.dumps({"classes": {"b": second, "a": [first]}}))
+    applied = AppliedLabelMap(label_map, world.info(7))
+    things = truths(world, label_map)
+
+    assert applied.info.categories == ("b", "a")
+    assert {(t.instance.category, t.instance.category_id) for t in things} == {("b", 1), ("a", 2)}
+    assert len(things) == categories(world)[first] + categories(world)[second]
+
+
+def test_several_categories_become_one_class(world: Any) -> None:
+    """And a class without categories takes the category of its own name."""
+    first, second, *_ = sorted(categories(world))
+    merged = parse(json.dumps({"classes": {"all": [first, second]}}))
+    own = parse(json.dumps({"classes": {first: None}}))
+
+    counts = categories(world)
+    assert len(truths(world, merged)) == counts[first] + counts[second]
+    assert len(truths(world, own)) == counts[first]
+
+
+def test_other_and_ignored_categories_can_stay_as_ignored_regions(world: Any) -> None:
+    """Neither object nor background."""
+    first, second, *_ = sorted(categories(world))
+    others = parse(json.dumps({"classes": {first: None}, "others": "ignore"}))
+    ignored = parse(json.dumps({"ignore": [second]}))
+
+    for label_map in (others, ignored):
+        things = truths(world, label_map)
+        assert len(things) == categories(world).total()
+        is_ignored = {t.instance.category for t in things if t.ignored}
+        assert second in is_ignored
+        assert first not in is_ignored
+
+
+def test_limits_apply_to_the_visible_part(world: Any) -> None:
+    """An object that misses one of them is dropped, or ignored."""
+    every = truths(world, LabelMap())
+    for limits, missed in (
+        ({"min_box_px": 12}, [min(t.box.width_px, t.box.height_px) < 12 for t in every if t.box]),
+        ({"min_visible_fraction": 0.6}, [t.visible_fraction < 0.6 for t in every if t.box]),
+        ({"max_truncation": 0.05}, [t.truncation > 0.05 for t in every if t.box]),
+    ):
+        assert any(missed), limits
+        dropped = [t for t in truths(world, LabelMap(**limits)) if t.box]
+        ignored = [t for t in truths(world, LabelMap(**limits, below="ignore")) if t.box]
+        assert len(dropped) == missed.count(False)
+        assert [t.ignored for t in ignored] == missed
+
+
+def test_formats_with_classes_of_their_own_keep_their_names(world: Any, tmp_path: Path) -> None:
+    """KITTI: types follow the categories, objects of other categories have no row."""
+    first, *_ = sorted(categories(world))
+    label_map = parse(json.dumps({"classes": {"thing": [first]}}))
+    info = world.info(7, lidars=("top",))
+    plain = world.export(Kitti(), info, world.samples, tmp_path / "a")
+    folder = world.export(MappedExporter(Kitti(), label_map), info, world.samples, tmp_path / "b")
+
+    def rows(folder: Path) -> Counter[str]:
+        texts = (p.read_text() for p in folder.glob("training/label_2/*.txt"))
+        return Counter(line.split()[0] for text in texts for line in text.splitlines())
+
+    del rows(plain)["DontCare"]
+    assert set(rows(folder)) - {"DontCare"} < set(rows(plain))
+    assert "thing" not in rows(folder)
+
+
+def test_ignored_objects_are_dont_care_regions_in_kitti(world: Any, tmp_path: Path) -> None:
+    """As many rows as before."""
+    ignore_all = LabelMap(ignore=tuple(categories(world)))
+    info = world.info(7, lidars=("top",))
+    folder = world.export(
+        MappedExporter(Kitti(), ignore_all), info, world.samples, tmp_path / "mapped"
+    )
+
+    lines = "".join(p.read_text() for p in folder.glob("training/label_2/*.txt")).splitlines()
+    assert lines
+    assert all(line.startswith("DontCare -1 -1 -10 ") for line in lines)
+
+
+def test_images_of_category_ids_are_left_out_if_classes_differ(world: Any, tmp_path: Path) -> None:
+    """Their pixels hold the ids of the data set."""
+    first, *_ = sorted(categories(world))
+    label_map = parse(json.dumps({"classes": {first: None}}))
+    exporter = MappedExporter(Coco(), label_map)
+    folder = world.export(exporter, world.info(7), world.samples, tmp_path)
+
+    data = json.loads((folder / "annotations/instances_train.json").read_text())
+    assert [c["name"] for c in data["categories"]] == [first]
+    assert all("category" not in image["files"] for image in data["images"])
+    assert not (folder / "category").exists()
+
+
+def test_public_lists_have_the_published_classes() -> None:
+    """COCO's number and ends; Cityscapes' order; nuScenes' ten."""
+    coco = list(public_classes("coco80"))
+    assert (len(coco), coco[0], coco[-1]) == (80, "person", "toothbrush")
+    assert coco[39:47] == [
+        "bottle", "wine glass", "cup", "fork", "knife", "spoon", "bowl", "banana",
+    ]  # fmt: skip
+    assert list(public_classes("cityscapes")) == CITYSCAPES_THINGS
+    assert len(public_classes("nuscenes")) == 10
+    assert len(public_classes("kitti")) == 8
+
+
+def test_a_category_in_two_places_is_refused() -> None:
+    """Two classes, or a class and the ignored ones."""
+    with pytest.raises(ValidationError, match="'mug' belongs to the classes 'a' and 'b'"):
+        parse('{"classes": {"a": "mug", "b": ["mug"]}}')
+    with pytest.raises(ValidationError, match="'mug' is ignored and belongs to the class 'a'"):
+        parse('{"classes": {"a": "mug"}, "ignore": ["mug"]}')
+
+
+def test_categories_that_the_data_set_lacks_are_named(world: Any) -> None:
+    """One of several: a warning with the nearest name. All of them: an error."""
+    first, *_ = sorted(categories(world))
+    known = world.info(7).categories
+    with pytest.warns(ConfigWarning, match=f"no category '{first}x' .did you mean '{first}'"):
+        parse(json.dumps({"classes": {"a": [first, first + "x"]}})).check(known)
+    with (
+        pytest.warns(ConfigWarning),
+        pytest.raises(ConfigError, match="no class has a category of the data set; expected some"),
+    ):
+        parse('{"classes": {"a": ["unheard"]}}').check(known)
