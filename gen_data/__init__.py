@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from gen_data.generator.api.dataset import open_dataset as open  # noqa: A004
     from gen_data.generator.api.export import export
     from gen_data.generator.api.generate import generate
+    from gen_data.generator.api.rerender import rerender
     from gen_data.generator.api.sample import Box2d, Box3d, CameraReading, Sample
+    from gen_data.generator.api.write_sample import write_sample
     from gen_data.generator.core.errors import (
         AssetError,
         ConfigError,
@@ -49,6 +51,8 @@ _HOMES = {
     "StoredDataset": "gen_data.generator.api.dataset",
     "export": "gen_data.generator.api.export",
     "generate": "gen_data.generator.api.generate",
+    "write_sample": "gen_data.generator.api.write_sample",
+    "rerender": "gen_data.generator.api.rerender",
     "AssetError": "gen_data.generator.core.errors",
     "ConfigError": "gen_data.generator.core.errors",
     "ConfigWarning": "gen_data.generator.core.errors",
@@ -88,6 +92,8 @@ __all__ = [
     "export",
     "generate",
     "open",
+    "rerender",
+    "write_sample",
 ]
 
 

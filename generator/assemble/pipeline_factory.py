@@ -44,11 +44,14 @@ class PipelineFactory:
     Attributes:
         n: Number of samples of the data set, for exporters.
         extra_channels: Channels to render beyond what sensors and annotators need.
+        known_categories: Categories of a finished data set, if its scenes are used; None = those
+            that the configuration's scenes may contain.
     """
 
     config: Config
     n: int
     extra_channels: frozenset[Channel] = frozenset()
+    known_categories: tuple[str, ...] | None = None
 
     def __call__(self) -> Pipeline:
         """Make a pipeline, which is used as a context manager."""
@@ -79,6 +82,8 @@ class PipelineFactory:
     @cached_property
     def categories(self) -> tuple[str, ...]:
         """Sorted names of all categories that a sample may contain."""
+        if self.known_categories is not None:
+            return self.known_categories
         return collect_categories(self.nominal, open_library(self.config.asset_folders))
 
     def __getstate__(self) -> dict[str, object]:

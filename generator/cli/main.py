@@ -25,7 +25,9 @@ class LazyCommands(click.Group):
     """A group of commands that are imported on demand."""
 
     modules = {  # noqa: RUF012
+        "sample": "gen_data.generator.cli.sample_command:sample",
         "export": "gen_data.generator.cli.export_command:export",
+        "rerender": "gen_data.generator.cli.rerender_command:rerender",
         "preview": "gen_data.generator.cli.preview_commands:preview",
         "contact-sheet": "gen_data.generator.cli.preview_commands:contact_sheet",
         "assets": "gen_data.generator.cli.asset_commands:assets",
@@ -36,7 +38,9 @@ class LazyCommands(click.Group):
         "doctor": "gen_data.generator.cli.doctor:doctor",
     }
     summaries = {  # noqa: RUF012
+        "sample": "Write one sample of a configuration or of a data set.",
         "export": "Write a finished data set in other formats, without rendering.",
+        "rerender": "Render the scenes of a data set again: other sensors, weather, light.",
         "preview": "Show samples in Rerun: live, in a browser, or as a .rrd file.",
         "contact-sheet": "Draw samples with their labels on one PNG.",
         "assets": "Install, list, show, verify and remove packs of assets.",

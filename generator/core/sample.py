@@ -209,6 +209,7 @@ class Sample:
         truth: Annotations by sensor name.
         frame: Annotations of no single image; None where none was asked for.
         attempts: How many layouts were drawn before this one was accepted.
+        view_attempts: How many views were drawn before this one was accepted.
         timings_s: Seconds of CPU by stage. Never written to a data file.
         cameras: Sorted names of all cameras of the data set, also of those that do not read at
             this step; empty = those that do.
@@ -223,6 +224,7 @@ class Sample:
     capture: Capture
     truth: Mapping[str, ImageTruth]
     attempts: int = 1
+    view_attempts: int = 1
     timings_s: Mapping[str, float] = field(default_factory=dict)
     step_index: int = 0
     cameras: tuple[str, ...] = ()

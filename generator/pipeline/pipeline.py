@@ -174,26 +174,50 @@ class Pipeline:
         timings: dict[str, float] = dict(accepted.timings_s) if first else {}
         with _timed(timings, "randomize"):
             view = self.drawn_view(accepted, view_index)
+        sample = self.read_sensors(view, accepted.sensors, step_index, timings)
+        return replace(sample, attempts=accepted.attempt + 1)
+
+    def read_sensors(
+        self,
+        view: DrawnView,
+        sensors: Sequence[Sensor],
+        step_index: int,
+        timings_s: Mapping[str, float] | None = None,
+    ) -> Sample:
+        """Read all sensors at one instant of a view, and annotate the readings.
+
+        Args:
+            view: The view at time 0, with these sensors in their places.
+            sensors: In the order in which they read.
+            step_index: Number of the instant.
+            timings_s: CPU seconds spent before, by stage.
+
+        Raises:
+            SampleError: the labels contradict each other.
+        """
+        timings = dict(timings_s or {})
+        with _timed(timings, "randomize"):
             timeline = Timeline(view.scene, self.assets, self._category_ids)
             time_s = step_index * self.info.step_s
             scene = timeline.at(time_s)
             streams = replace(view.streams, step=step_index)
-        capture, truth = self._capture(timeline, time_s, accepted.sensors, streams, timings)
+        capture, truth = self._capture(timeline, time_s, sensors, streams, timings)
         with _timed(timings, "annotate"):
             swept = {name: timeline.at(c.time_s) for name, c in capture.clouds.items()}
             seen = {name: timeline.at(r.time_s) for name, r in capture.readings.items()}
             described = self.config.frame_truth
             frame = described({"": scene, **swept}) if described is not None else None
+        view_number = view.scene_index * self.info.views_per_scene + view.view_index
         return Sample(
-            index=index,
-            scene_index=scene_index,
-            view_index=view_index,
+            index=view_number * self.info.steps_per_scene + step_index,
+            scene_index=view.scene_index,
+            view_index=view.view_index,
             step_index=step_index,
-            split=self.split(scene_index),
+            split=self.split(view.scene_index),
             scene=scene,
             capture=capture,
             truth=count_lidar_points(truth, capture.clouds),
-            attempts=accepted.attempt + 1,
+            view_attempts=streams.attempt + 1,
             timings_s=timings,
             cameras=self.info.cameras,
             frame=frame,

@@ -28,6 +28,8 @@ class Plan:
         shard_size: Samples per shard, >= 1; the last shard may hold fewer.
         versions: ``{package: release}`` of everything that can change a byte.
         assets: ``{asset id: sha256}``.
+        scenes_of: Id of the finished data set whose scenes were rendered again; empty for
+            scenes that were generated.
     """
 
     config: Any
@@ -38,6 +40,7 @@ class Plan:
     versions: Mapping[str, str]
     assets: Mapping[str, str]
     format_version: int = FORMAT_VERSION
+    scenes_of: str = ""
 
     def __post_init__(self) -> None:
         """Check the sizes."""

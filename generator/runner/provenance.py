@@ -30,6 +30,7 @@ class KeptScene:
     step_index: int
     split: str
     attempts: int
+    view_attempts: int
     scene: Scene
 
 
@@ -51,6 +52,7 @@ def scene_line(sample: Sample, base: Sample | None) -> str:
             "step_index": sample.step_index,
             "split": sample.split,
             "attempts": sample.attempts,
+            "view_attempts": sample.view_attempts,
             "base": None if base is None else base.index,
             "scene": fields,
         }

@@ -42,7 +42,9 @@ class StoredSamples:
     def __init__(self, folder: str | PathLike[str]) -> None:
         self.folder = Path(folder)
         self.plan = load_plan(self.folder)
-        self.info = self._read_info()
+        manifest = self._read_manifest()
+        self.info: DatasetInfo = manifest[0]
+        self.dataset_id: str = manifest[1]
         self._shard = lru_cache(SHARDS_KEPT)(self._read_shard)
 
     @property
@@ -80,6 +82,7 @@ class StoredSamples:
             capture=self._capture(folder, labels),
             truth=labels.truth,
             attempts=kept.attempts,
+            view_attempts=kept.view_attempts,
             cameras=self.info.cameras,
             frame=labels.frame,
         )
@@ -128,10 +131,12 @@ class StoredSamples:
         """Folder of the files of a shard."""
         return self.folder / SHARDS_NAME / f"{shard:06d}"
 
-    def _read_info(self) -> DatasetInfo:
+    def _read_manifest(self) -> tuple[DatasetInfo, str]:
+        """Facts about the data set, and its id."""
         path = self.folder / MANIFEST_NAME
         try:
-            return from_plain(DatasetInfo, json.loads(path.read_bytes())["info"])
+            manifest = json.loads(path.read_bytes())
+            return from_plain(DatasetInfo, manifest["info"]), str(manifest["dataset_id"])
         except FileNotFoundError:
             raise StorageError(
                 f"{path}: missing; the data set is unfinished: run the command that began it again"

@@ -1,0 +1,88 @@
+"""Rendering of a finished data set's scenes again: the function behind ``gen-data rerender``."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gen_data.generator.core.errors import ConfigError
+
+if TYPE_CHECKING:
+    from gen_data.generator.runner.progress import RunProgress, Summary
+
+
+def rerender(  # noqa: PLR0913  (keywords of one front door)
+    folder: str | PathLike[str],
+    out: str | PathLike[str],
+    *,
+    sensors: str | PathLike[str] | None = None,
+    overrides: Sequence[str] = (),
+    redraw: Sequence[str] = (),
+    workers: int | None = None,
+    on_progress: Callable[[RunProgress], None] | None = None,
+    resume_command: str = "the same call of gen_data.rerender",
+) -> Summary:
+    """Render the scenes of a finished data set again with other sensors, weather, light or quality.
+
+    Objects keep their ids, shapes and poses. Randomizers with changed settings are drawn again, all
+    others are not, so that the two data sets are counterfactual pairs. A changed camera without a
+    rig keeps its pose; a new one has the pose of the first camera without a rig.
+
+    Args:
+        folder: A finished data set.
+        out: Folder of the result.
+        sensors: Configuration file whose ``sensors`` replace those of the data set.
+        overrides: ``KEY=VALUE`` texts, as for ``gen-data --set``. A key may begin with the name of
+            a randomizer: ``weather.preset=WetNight``.
+        redraw: Names of further randomizers to draw again, because they depend on a changed one.
+        workers: Processes; None = one per core, 0 = this process.
+        on_progress: Called after each sample and shard.
+        resume_command: Command that error messages give for resuming.
+
+    Raises:
+        StorageError: the folder holds no finished data set, or ``out`` cannot be written.
+        ConfigError: the change is invalid, or would change the scenes.
+        Interrupted: Ctrl-C or SIGTERM; the same call goes on.
+    """
+    from threadpoolctl import threadpool_limits
+
+    from gen_data.generator.assemble.config import load_source_config
+    from gen_data.generator.runner.rerender import rerender as render_again
+    from gen_data.generator.runner.stored import StoredSamples
+
+    stored, source = StoredSamples(folder), os.fspath(folder)
+    was = load_source_config(source)
+    names = {randomizer.name for randomizer in was.probes[0].randomizers}
+    texts = [_complete(text, names) for text in overrides]
+    if sensors is not None:
+        texts.insert(0, _sensors_override(Path(sensors)))
+    with threadpool_limits(limits=1):
+        return render_again(
+            stored,
+            was,
+            load_source_config(source, overrides=texts),
+            Path(out),
+            redraw=redraw,
+            workers=len(os.sched_getaffinity(0)) if workers is None else workers,
+            resume_command=resume_command,
+            progress=on_progress,
+        )
+
+
+def _complete(override: str, randomizers: set[str]) -> str:
+    """Complete ``weather.preset=...`` to ``randomizers.weather.preset=...``."""
+    name = override.split(".", maxsplit=1)[0]
+    return f"randomizers.{override}" if name in randomizers else override
+
+
+def _sensors_override(path: Path) -> str:
+    from gen_data.generator.config.yaml_tree import load_yaml
+
+    listed = load_yaml(path).plain().get("sensors")
+    if not listed:
+        raise ConfigError(f"{path}: sensors: missing; expected a list of sensors")
+    return f"sensors={json.dumps(listed)}"
