@@ -6,14 +6,14 @@ import copy
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
+from dataclasses import dataclass
 from os import PathLike
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
 from gen_data.generator.api.config import ConfigLike, load_config
-from gen_data.generator.api.sample import Sample
+from gen_data.generator.api.sample import Sample, SampleRecord
 from gen_data.generator.core.errors import ConfigError, SampleIndexError, did_you_mean
-from gen_data.generator.core.sample import Sample as CoreSample
 from gen_data.generator.runner.stored import StoredSamples
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ UNBOUNDED = range(sys.maxsize)
 class SampleSource(Protocol):
     """Source of the samples of a sequence."""
 
-    def sample(self, index: int) -> CoreSample:
+    def sample(self, index: int) -> SampleRecord:
         """Return the sample of that number."""
         ...
 
@@ -186,7 +186,7 @@ class GeneratedSamples:
         self._pipeline: Pipeline | None = None
         self._resources = ExitStack()
 
-    def sample(self, index: int) -> CoreSample:
+    def sample(self, index: int) -> SampleRecord:
         """Return the sample of that number."""
         from threadpoolctl import threadpool_limits
 
@@ -219,13 +219,38 @@ class GeneratedSamples:
         return {**self.__dict__, "_pipeline": None, "_resources": ExitStack()}
 
 
+@dataclass(frozen=True)
+class ReadSamples:
+    """Samples of a finished data set, whose parts are read on access."""
+
+    stored: StoredSamples
+
+    def sample(self, index: int) -> SampleRecord:
+        """Return the sample of that number."""
+        return self.stored.labelled(index)
+
+    @property
+    def categories(self) -> tuple[str, ...]:
+        """Sorted names of all categories."""
+        return self.stored.categories
+
+    @property
+    def config(self) -> Mapping[str, Any]:
+        """The resolved configuration of the data set."""
+        return self.stored.config
+
+    def close(self) -> None:
+        """Forget what was read."""
+        self.stored.close()
+
+
 class StoredDataset(SampleSequence):
     """Samples of a finished data set on disk."""
 
     def __init__(self, folder: str | PathLike[str]) -> None:
-        source = StoredSamples(folder)
-        super().__init__(source, range(source.n))
-        self.folder = source.folder
+        stored = StoredSamples(folder)
+        super().__init__(ReadSamples(stored), range(stored.n))
+        self.folder = stored.folder
 
     def __repr__(self) -> str:
         """Folder and size."""

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.core.boxes import BoxPx, OrientedBox
-from gen_data.generator.core.capture import Channel, PointCloud, SensorReading
+from gen_data.generator.core.capture import Capture, Channel, PointCloud, SensorReading
 from gen_data.generator.core.errors import UnknownNameError, did_you_mean
 from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth
-from gen_data.generator.core.sample import Sample as CoreSample
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import Array
 
@@ -222,14 +221,48 @@ class _ChannelNames(Mapping[str, NDArray[Any]]):
         return len(self._images)
 
 
+class SampleRecord(Protocol):
+    """The parts of a sample that the Python API shows; those of a stored one are read on access."""
+
+    @property
+    def index(self) -> int:
+        """Number in the data set, from 0."""
+        ...
+
+    @property
+    def split(self) -> str:
+        """``train``, ``val`` or ``test``."""
+        ...
+
+    @property
+    def scene(self) -> Scene:
+        """The world."""
+        ...
+
+    @property
+    def capture(self) -> Capture:
+        """Readings of all sensors."""
+        ...
+
+    @property
+    def truth(self) -> Mapping[str, ImageTruth]:
+        """Annotations by camera."""
+        ...
+
+    @property
+    def frame(self) -> EgoTruth | None:
+        """Annotations of the sample as a whole."""
+        ...
+
+
 class Sample:
     """One element of a data set, generated or read from disk.
 
     Attributes:
-        core: The sample as the generator's internal record, with all of its data.
+        core: The sample as the generator's internal record.
     """
 
-    def __init__(self, core: CoreSample) -> None:
+    def __init__(self, core: SampleRecord) -> None:
         self.core = core
 
     @property

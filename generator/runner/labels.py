@@ -1,22 +1,20 @@
 """``labels.jsonl``: one line per sample of a shard, with its annotations.
 
 With the images, point clouds, tables and ``scenes.jsonl`` of the shard, it is the whole sample:
-exporters can write their formats from these files without a renderer.
-
-The ``instance`` of an object is an instance id if the instance equals that of the sample's scene,
-else (in an image of another instant) the whole instance.
+exporters can write their formats from these files without a renderer. Training needs no scenes: a
+line has the ``instances`` of its objects, to which the objects refer by id. An object in an image
+of another instant has its whole instance instead.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from pathlib import Path
 from typing import Any
 
 from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth, Sample
-from gen_data.generator.core.scene import Device, Instance, Lidar, Scene
+from gen_data.generator.core.scene import Device, Instance, Lidar
 from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
 
 LABELS_NAME = "labels.jsonl"
@@ -51,13 +49,14 @@ class Labels:
     """The annotations of one sample, and the instants of its sensors.
 
     Attributes:
-        index: Number of the sample.
+        index, split: See ``Sample``.
         truth: Annotations by camera.
         frame: Annotations of the sample as a whole; None if there are none.
         images, scans, tables: By sensor, for those with a reading in this sample.
     """
 
     index: int
+    split: str
     truth: Mapping[str, ImageTruth]
     frame: EgoTruth | None
     images: Mapping[str, ImageInfo]
@@ -74,9 +73,12 @@ def labels_line(sample: Sample) -> str:
     """Format the line of a sample, without line break."""
     capture = sample.capture
     instances = {i.instance_id: i for i in sample.scene.instances}
+    shown = {o.instance.instance_id for t in sample.truth.values() for o in t.objects}
     return canonical_json(
         {
             "index": sample.index,
+            "split": sample.split,
+            "instances": [i for number, i in instances.items() if number in shown],
             "truth": {name: _plain_image(t, instances) for name, t in sample.truth.items()},
             "frame": sample.frame,
             "images": {n: ImageInfo(r.time_s, r.ev100) for n, r in capture.readings.items()},
@@ -86,30 +88,19 @@ def labels_line(sample: Sample) -> str:
     )
 
 
-def read_labels(path: Path, scenes: Mapping[int, Scene]) -> Iterator[Labels]:
-    """Read the annotations of a shard, in order.
-
-    Args:
-        path: Of the file.
-        scenes: The scene of each sample by its index.
+def parse_labels(line: bytes | str) -> Labels:
+    """The inverse of ``labels_line``.
 
     Raises:
-        ValueError, KeyError, TypeError: the file is damaged.
+        ValueError, KeyError, TypeError: the line is damaged.
     """
-    with path.open(encoding="utf-8") as lines:
-        for line in lines:
-            plain = json.loads(line)
-            _resolve_instances(plain, scenes[plain["index"]])
-            yield from_plain(Labels, plain)
-
-
-def _resolve_instances(plain: Mapping[str, Any], scene: Scene) -> None:
-    """Replace instance ids by the instances of the scene."""
-    instances = {i.instance_id: i for i in scene.instances}
+    plain = json.loads(line)
+    instances = {i["instance_id"]: from_plain(Instance, i) for i in plain.pop("instances")}
     for image in plain["truth"].values():
         for item in image["objects"]:
             if isinstance(item["instance"], int):
                 item["instance"] = instances[item["instance"]]
+    return from_plain(Labels, plain)
 
 
 def _plain_image(truth: ImageTruth, instances: Mapping[int, Instance]) -> dict[str, Any]:

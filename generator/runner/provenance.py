@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Scene
@@ -59,21 +57,20 @@ def scene_line(sample: Sample, base: Sample | None) -> str:
     )
 
 
-def read_scenes(path: Path) -> Iterator[KeptScene]:
-    """Read the scenes of a shard, in order.
+def parse_scene(line: bytes | str, read_line: Callable[[int], bytes]) -> KeptScene:
+    """The inverse of ``scene_line``.
+
+    Args:
+        line: Line of the sample.
+        read_line: Returns the line of another sample of the shard, by its index.
 
     Raises:
-        ValueError, KeyError, TypeError: the file is damaged.
+        ValueError, KeyError, TypeError: a line is damaged.
     """
-    complete: dict[int, Mapping[str, Any]] = {}
-    with path.open(encoding="utf-8") as lines:
-        for line in lines:
-            row = json.loads(line)
-            base = row.pop("base")
-            plain = {**(complete[base] if base is not None else {}), **row.pop("scene")}
-            if base is None:
-                complete = {row["index"]: plain}
-            yield KeptScene(**row, scene=from_plain(Scene, plain))
+    row = json.loads(line)
+    base, own = row.pop("base"), row.pop("scene")
+    shared = {} if base is None else json.loads(read_line(base))["scene"]
+    return KeptScene(**row, scene=from_plain(Scene, {**shared, **own}))
 
 
 def _same(one: object, other: object) -> bool:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from functools import lru_cache
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property, lru_cache, partial
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,15 +23,40 @@ from gen_data.generator.core.capture import (
 )
 from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.interfaces import DatasetInfo, cloud_path, media_path, table_path
-from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
+from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import from_plain
-from gen_data.generator.runner.labels import LABELS_NAME, Labels, read_labels
+from gen_data.generator.runner.labels import LABELS_NAME, Labels, parse_labels
 from gen_data.generator.runner.plan import load_plan
-from gen_data.generator.runner.provenance import SCENES_NAME, KeptScene, read_scenes
+from gen_data.generator.runner.provenance import SCENES_NAME, KeptScene, parse_scene
 from gen_data.generator.runner.store import MANIFEST_NAME, SHARDS_NAME
 
-SHARDS_KEPT = 4
-"""Number of shards whose scenes and labels stay in memory; images are read on access."""
+T = TypeVar("T")
+
+SHARDS_KEPT = 16
+"""Number of shards whose line positions stay in memory; lines and images are read on access."""
+
+
+class JsonLines:
+    """Lines of a file by number, read on access."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        data = np.frombuffer(path.read_bytes(), np.uint8)
+        self._ends = np.flatnonzero(data == ord("\n")) + 1
+
+    def line(self, number: int) -> bytes:
+        """Read a line.
+
+        Raises:
+            ValueError: the file ends before.
+        """
+        if number >= len(self._ends):
+            raise ValueError(f"{self._path}: has {len(self._ends)} lines, expected more")
+        start = int(self._ends[number - 1]) if number else 0
+        with self._path.open("rb") as file:
+            file.seek(start)
+            return file.read(int(self._ends[number]) - start)
 
 
 class StoredSamples:
@@ -45,7 +72,7 @@ class StoredSamples:
         manifest = self._read_manifest()
         self.info: DatasetInfo = manifest[0]
         self.dataset_id: str = manifest[1]
-        self._shard = lru_cache(SHARDS_KEPT)(self._read_shard)
+        self._lines = lru_cache(2 * SHARDS_KEPT)(JsonLines)
 
     @property
     def n(self) -> int:
@@ -63,15 +90,24 @@ class StoredSamples:
         config: Mapping[str, Any] = self.plan.config
         return config
 
-    def sample(self, index: int) -> Sample:
-        """Return the sample of that number; its images are decoded on access.
+    def labelled(self, index: int) -> LabelledImages:
+        """The sample of that number, whose scene, images and points are read on access.
 
         Raises:
             StorageError: a file of the sample's shard is missing or damaged.
         """
-        shard = index // self.plan.shard_size
-        folder = self.shard_dir(shard)
-        kept, labels = self._shard(shard)[index - shard * self.plan.shard_size]
+        folder = self._folder_of(index)
+        with self._damage(folder):
+            labels = parse_labels(self._line(LABELS_NAME, index))
+        return LabelledImages(self, labels, self._capture(folder, labels))
+
+    def sample(self, index: int) -> Sample:
+        """The whole sample of that number; its images and points are read on access.
+
+        Raises:
+            StorageError: a file of the sample's shard is missing or damaged.
+        """
+        light, kept = self.labelled(index), self.kept_scene(index)
         return Sample(
             index=kept.index,
             scene_index=kept.scene_index,
@@ -79,17 +115,45 @@ class StoredSamples:
             step_index=kept.step_index,
             split=kept.split,
             scene=kept.scene,
-            capture=self._capture(folder, labels),
-            truth=labels.truth,
+            capture=light.capture,
+            truth=light.truth,
             attempts=kept.attempts,
             view_attempts=kept.view_attempts,
             cameras=self.info.cameras,
-            frame=labels.frame,
+            frame=light.frame,
         )
 
+    def kept_scene(self, index: int) -> KeptScene:
+        """Read the scene of a sample.
+
+        Raises:
+            StorageError: it is missing or damaged.
+        """
+        with self._damage(self._folder_of(index)):
+            line = self._line(SCENES_NAME, index)
+            return parse_scene(line, partial(self._line, SCENES_NAME))
+
     def close(self) -> None:
-        """Drop the shards from memory."""
-        self._shard.cache_clear()
+        """Forget the positions of lines."""
+        self._lines.cache_clear()
+
+    def _line(self, name: str, index: int) -> bytes:
+        lines = self._lines(self._folder_of(index) / name)
+        return lines.line(index % self.plan.shard_size)
+
+    def _folder_of(self, index: int) -> Path:
+        return self.shard_dir(index // self.plan.shard_size)
+
+    @contextmanager
+    def _damage(self, folder: Path) -> Iterator[None]:
+        """Turn errors of damaged files into a StorageError with a remedy."""
+        try:
+            yield
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise StorageError(
+                f"{folder}: its scenes or labels cannot be read ({error}); check the data set with:"
+                f"\n    gen-data verify {self.folder} --full"
+            ) from error
 
     def _capture(self, folder: Path, labels: Labels) -> Capture:
         index = labels.index
@@ -103,29 +167,19 @@ class StoredSamples:
             )
             for name, image in labels.images.items()
         }
-        clouds = {
-            name: PointCloud(name, scan.lidar, _load(cloud_path(folder, name, index)), scan.time_s)
-            for name, scan in labels.scans.items()
-        }
-        tables = {
-            name: Measurements(
-                name, table.device, _load(table_path(folder, name, index)), table.time_s
-            )
-            for name, table in labels.tables.items()
-        }
-        return Capture(readings, clouds, tables)
 
-    def _read_shard(self, shard: int) -> list[tuple[KeptScene, Labels]]:
-        folder = self.shard_dir(shard)
-        try:
-            scenes = list(read_scenes(folder / SCENES_NAME))
-            by_index = {kept.index: kept.scene for kept in scenes}
-            return list(zip(scenes, read_labels(folder / LABELS_NAME, by_index), strict=True))
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise StorageError(
-                f"{folder}: its scenes or labels cannot be read ({error}); check the data set with:"
-                f"\n    gen-data verify {self.folder} --full"
-            ) from error
+        def cloud(name: str) -> PointCloud:
+            scan = labels.scans[name]
+            return PointCloud(name, scan.lidar, _load(cloud_path(folder, name, index)), scan.time_s)
+
+        def table(name: str) -> Measurements:
+            info = labels.tables[name]
+            rows = _load(table_path(folder, name, index))
+            return Measurements(name, info.device, rows, info.time_s)
+
+        return Capture(
+            readings, ReadOnAccess(labels.scans, cloud), ReadOnAccess(labels.tables, table)
+        )
 
     def shard_dir(self, shard: int) -> Path:
         """Folder of the files of a shard."""
@@ -151,6 +205,69 @@ class StoredSamples:
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Open the folder."""
         self.__init__(state["folder"])  # type: ignore[misc]
+
+
+@dataclass(frozen=True, eq=False)
+class LabelledImages:
+    """A stored sample, which is read in parts: training needs no scene.
+
+    Attributes: see ``Sample``.
+    """
+
+    stored: StoredSamples
+    labels: Labels
+    capture: Capture
+
+    @property
+    def index(self) -> int:
+        """Number of the sample."""
+        return self.labels.index
+
+    @property
+    def split(self) -> str:
+        """Its split."""
+        return self.labels.split
+
+    @property
+    def truth(self) -> Mapping[str, ImageTruth]:
+        """Annotations by camera."""
+        return self.labels.truth
+
+    @property
+    def frame(self) -> EgoTruth | None:
+        """Annotations of the sample as a whole."""
+        return self.labels.frame
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The scene; read on first access."""
+        return self.stored.kept_scene(self.index).scene
+
+
+class ReadOnAccess(Mapping[str, T], Generic[T]):
+    """Values by name, read from disk at each access."""
+
+    def __init__(self, names: Iterable[str], read: Callable[[str], T]) -> None:
+        self._names = tuple(names)
+        self._read = read
+
+    def __getitem__(self, name: str) -> T:
+        """Read one value."""
+        if name not in self._names:
+            raise KeyError(name)
+        return self._read(name)
+
+    def __contains__(self, name: object) -> bool:
+        """Whether there is such a value; reads nothing."""
+        return name in self._names
+
+    def __iter__(self) -> Iterator[str]:
+        """The names."""
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        """Number of values."""
+        return len(self._names)
 
 
 class ImageFiles(Mapping[Channel, NDArray[Any]]):
