@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from gen_data.generator.api.dataset import open_dataset as open  # noqa: A004
     from gen_data.generator.api.export import export
     from gen_data.generator.api.generate import generate
+    from gen_data.generator.api.loader import Loader
     from gen_data.generator.api.rerender import rerender
     from gen_data.generator.api.sample import Box2d, Box3d, CameraReading, Sample
     from gen_data.generator.api.write_sample import write_sample
@@ -46,6 +47,7 @@ _HOMES = {
     "Box3d": "gen_data.generator.api.sample",
     "CameraReading": "gen_data.generator.api.sample",
     "Dataset": "gen_data.generator.api.dataset",
+    "Loader": "gen_data.generator.api.loader",
     "Sample": "gen_data.generator.api.sample",
     "Scene": "gen_data.generator.core.scene",
     "StoredDataset": "gen_data.generator.api.dataset",
@@ -79,6 +81,7 @@ __all__ = [
     "DeterminismError",
     "GenDataError",
     "Interrupted",
+    "Loader",
     "Sample",
     "SampleError",
     "SampleIndexError",
@@ -99,6 +102,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import a public name."""
+    if name in ("targets", "torch"):
+        return import_module(f"gen_data.{name}")
     if name == "open":
         return import_module("gen_data.generator.api.dataset").open_dataset
     if name not in _HOMES:

@@ -11,6 +11,9 @@ from os import PathLike
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gen_data.generator.api.config import ConfigLike, load_config
 from gen_data.generator.api.sample import Sample, SampleRecord
 from gen_data.generator.core.errors import ConfigError, SampleIndexError, did_you_mean
@@ -76,7 +79,7 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
             part = copy.copy(self)
             part._indices = self._indices[index]
             return part
-        if index < 0 and not self._is_bounded:
+        if index < 0 and not self.is_bounded:
             raise SampleIndexError(f"index {index}: a data set without a size has no end; give n=")
         try:
             number = self._indices[index]
@@ -92,7 +95,7 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
         Raises:
             TypeError: the data set has no size.
         """
-        if not self._is_bounded:
+        if not self.is_bounded:
             raise TypeError("a data set without a size has no length; give n=, or take a slice")
         return len(self._indices)
 
@@ -111,6 +114,17 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
         """The resolved configuration as plain dictionaries, lists, strings and numbers."""
         return self._source.config
 
+    def scene_indices(self, positions: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Numbers of the scenes of samples, which are cheapest to read one scene after the other.
+
+        Args:
+            positions: Indices into this sequence.
+        """
+        config = self._source.config
+        per_scene = config.get("views_per_scene", 1) * config.get("steps_per_scene", 1)
+        numbers = self._indices.start + self._indices.step * positions
+        return np.asarray(numbers // per_scene)
+
     def close(self) -> None:
         """Release the engines; further use restarts them."""
         self._source.close()
@@ -125,7 +139,8 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
         self.close()
 
     @property
-    def _is_bounded(self) -> bool:
+    def is_bounded(self) -> bool:
+        """Whether it has a number of samples."""
         return self._indices.stop != UNBOUNDED.stop
 
 
@@ -172,7 +187,7 @@ class Dataset(SampleSequence):
 
     def __repr__(self) -> str:
         """Name and size."""
-        size = f"{len(self)} samples" if self._is_bounded else "no end"
+        size = f"{len(self)} samples" if self.is_bounded else "no end"
         return f"<Dataset '{self.config.get('template', '')}': {size}>"
 
 

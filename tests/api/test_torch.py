@@ -1,0 +1,133 @@
+"""PyTorch: tensors of samples, from a finished data set and while rendering."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import gen_data
+
+pytestmark = pytest.mark.slow
+"""PyTorch is an optional dependency, which CI installs for its slow tests."""
+
+SMALL = ("sensors[0].size_px=[96, 72]", "splits={train: 1, val: 0, test: 0}")
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> gen_data.StoredDataset:
+    """Ten samples of two scenes."""
+    folder = tmp_path_factory.mktemp("torch") / "set"
+    gen_data.generate("tabletop.yaml", 10, out=folder, seed=3, overrides=SMALL, workers=0)
+    return gen_data.open(folder)
+
+
+def test_detection_targets_are_those_of_torchvisions_reference(stored: Any) -> None:
+    """Types, shapes and ranges; boxes and labels of the data set."""
+    import torch
+
+    import gen_data.torch as gt
+
+    image, target = gt.SampleDataset(stored)[4]
+    camera = stored[4].cameras["color"]
+
+    assert (image.dtype, tuple(image.shape)) == (torch.uint8, (3, 72, 96))
+    assert np.array_equal(image.permute(1, 2, 0).numpy(), camera.rgb)
+    assert target["boxes"].dtype == torch.float32
+    assert target["labels"].dtype == torch.int64
+    assert target["boxes"].tolist() == [list(map(float, b.xyxy)) for b in camera.boxes2d]
+    assert target["labels"].tolist() == [b.category_id for b in camera.boxes2d]
+    assert bool((target["boxes"][:, 2:] > target["boxes"][:, :2]).all())
+    assert int(target["image_id"]) == 4
+
+
+def test_masks_lie_in_their_boxes_and_have_their_areas(stored: Any) -> None:
+    """One mask per box: its extent is the box, its sum the area."""
+    import gen_data.torch as gt
+    from gen_data.targets import segmentation_target
+
+    checked = 0
+    for _, target in gt.SampleDataset(stored, segmentation_target):
+        for mask, box, area in zip(target["masks"], target["boxes"], target["area"], strict=True):
+            rows, columns = mask.nonzero(as_tuple=True)
+            extent = [columns.min(), rows.min(), columns.max() + 1, rows.max() + 1]
+            assert [int(v) for v in extent] == box.int().tolist()
+            assert int(mask.sum()) == int(area)
+            checked += 1
+    assert checked > 20
+
+
+def test_the_data_loader_of_torch_reads_a_finished_set(stored: Any) -> None:
+    """With its own workers and shuffling."""
+    from torch.utils.data import DataLoader
+
+    import gen_data.torch as gt
+
+    batches = list(
+        DataLoader(
+            gt.SampleDataset(stored), batch_size=4, shuffle=True, num_workers=1,
+            collate_fn=gt.collate,
+        )
+    )  # fmt: skip
+    numbers = [int(t["image_id"]) for _, targets in batches for t in targets]
+
+    assert sorted(numbers) == list(range(10))
+
+
+def test_rendering_while_training_gives_the_samples_of_the_finished_set(
+    stored: Any, tmp_path: Path
+) -> None:
+    """The same tensors in the same order, by worker processes, resumed in mid-epoch."""
+    import torch
+
+    import gen_data.torch as gt
+    from gen_data.targets import depth_target
+
+    live = gen_data.Dataset("tabletop.yaml", seed=3, n=10, overrides=SMALL)
+    options: dict[str, Any] = {"batch_size": 3, "shuffle": True, "seed": 5}
+    expected = list(gt.loader(stored, depth_target, **options))
+    first = gt.loader(live, depth_target, workers=2, **options)
+    batches = iter(first)
+    got = [next(batches), next(batches)]
+    second = gt.loader(live, depth_target, workers=1, **options)
+    second.load_state_dict(first.state_dict())
+    got += list(second)
+
+    assert len(got) == len(expected) == 4
+    for (images, depths), (stored_images, stored_depths) in zip(got, expected, strict=True):
+        assert all(map(torch.equal, images, stored_images))
+        for one, other in zip(depths, stored_depths, strict=True):
+            # Files hold depth in units of 0.1 mm.
+            assert torch.equal(one.isfinite(), other.isfinite())
+            assert torch.allclose(one.nan_to_num(posinf=0), other.nan_to_num(posinf=0), atol=6e-5)
+
+
+def test_laser_boxes_hold_their_points() -> None:
+    """Points in the box's frame are inside; as many as counted."""
+    import gen_data.torch as gt
+    from gen_data.targets import lidar_target
+
+    data = gen_data.Dataset("tabletop.yaml", seed=3, n=1)
+    points, target = gt.to_tensors(lidar_target(data[0]))
+
+    assert points.shape[1] == 4
+    assert len(target["boxes"]) > 3
+    for box, count in zip(target["boxes"], target["points"], strict=True):
+        local = points[:, :3] - box[:3]
+        c, s = box[6].cos(), box[6].sin()
+        x, y = local[:, 0] * c + local[:, 1] * s, local[:, 1] * c - local[:, 0] * s
+        reach = 0.5 * box[3:6].norm()
+        near = (x.abs() < reach) & (y.abs() < reach) & (local[:, 2].abs() < reach)
+        assert int(near.sum()) >= int(count) > 0
+
+
+def test_importing_the_package_does_not_import_torch() -> None:
+    """Only ``gen_data.torch`` does."""
+    import subprocess
+    import sys
+
+    code = "import sys, gen_data, gen_data.targets; gen_data.Loader; print('torch' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
