@@ -140,8 +140,9 @@ class LocalStore:
             raise StorageError(f"{self.root}: is not a folder; {REMEDY}")
         names = {path.name for path in self.root.iterdir()}
         if PLAN_NAME in names:
-            self._check_plan(plan)
-            return FolderState.FINISHED if MANIFEST_NAME in names else FolderState.STARTED
+            grows = self._check_plan(plan)
+            is_finished = MANIFEST_NAME in names and not grows
+            return FolderState.FINISHED if is_finished else FolderState.STARTED
         if names - {RUN_NAME} or not _is_run_dir(self.run_dir):
             raise StorageError(
                 f"{self.root}: not empty and not a gen-data data set; "
@@ -301,8 +302,20 @@ class LocalStore:
             if path.exists() and not path.is_dir():
                 raise StorageError(f"{path}: is not a folder; {REMEDY}")
 
-    def _check_plan(self, plan: Plan) -> None:
-        differences = compare_plans(load_plan(self.root), plan)
+    def _check_plan(self, plan: Plan) -> bool:
+        """Compare with the plan of the folder; return whether this one only has more samples.
+
+        A data set may grow, as its samples do not depend on their number.
+        """
+        old = load_plan(self.root)
+        differences = compare_plans(old, plan)
+        if len(differences) == 1 and plan.n != old.n:
+            if plan.n > old.n:
+                return True
+            raise StorageError(
+                f"{self.root}: holds {old.n} samples; nothing was changed. Expected --n {old.n} or "
+                "more, which extends the data set; or choose another folder with --out."
+            )
         if differences:
             listed = "\n".join(f"  {line}" for line in differences[:20])
             more = f"\n  and {len(differences) - 20} more" if len(differences) > 20 else ""
@@ -311,6 +324,7 @@ class LocalStore:
                 f"{listed}{more}\n"
                 "  Choose another folder with --out, or use the old configuration."
             )
+        return False
 
     def _lock(self, descriptor: int) -> None:
         try:

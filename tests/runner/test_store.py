@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from gen_data.generator.core.capture import Capture
-from gen_data.generator.core.errors import ConfigError, DeterminismError, StorageError
+from gen_data.generator.core.errors import ConfigError, DeterminismError, SampleError, StorageError
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Body, Camera, Scene
@@ -26,6 +26,7 @@ from gen_data.generator.runner.provenance import parse_scene, scene_line
 from gen_data.generator.runner.run import Settings, run
 from gen_data.generator.runner.shard import Job, make_shard
 from gen_data.generator.runner.store import FolderState, LocalStore
+from gen_data.generator.runner.verify import verify
 from tests.runner.doubles import (
     RESUME,
     FakeFactory,
@@ -205,6 +206,46 @@ def test_another_plan_is_refused_naming_the_field(tmp_path: Path) -> None:
             workers=0,
             resume_command=RESUME,
         )
+
+    assert tree_digest(tmp_path / "out") == before
+
+
+@pytest.mark.parametrize(("first", "more"), [(10, 11), (8, 17), (10, 30)])
+def test_a_larger_n_extends_a_finished_data_set(tmp_path: Path, first: int, more: int) -> None:
+    """It equals a new data set of that size; whole shards of the old one are kept."""
+    make(tmp_path / "out", first)
+    whole = [f"shards/{k:06d}" for k in range(first // 4)]
+    before = {p: p.stat().st_mtime_ns for k in whole for p in (tmp_path / "out" / k).rglob("*")}
+
+    summary = make(tmp_path / "out", more)
+    make(tmp_path / "new", more)
+
+    assert tree_digest(tmp_path / "out") == tree_digest(tmp_path / "new")
+    assert summary.made == more - 4 * (first // 4)
+    assert before == {path: path.stat().st_mtime_ns for path in before}
+    verify(tmp_path / "out", full=True)
+
+
+def test_an_extension_can_be_interrupted(tmp_path: Path) -> None:
+    """The plan is renewed first: the same command goes on."""
+    make(tmp_path / "out", 10)
+    with pytest.raises(SampleError):
+        make(tmp_path / "out", 20, trouble=Trouble(wrong_at=14))
+    make(tmp_path / "out", 20)
+    make(tmp_path / "new", 20)
+
+    assert tree_digest(tmp_path / "out") == tree_digest(tmp_path / "new")
+
+
+def test_a_smaller_n_is_refused(tmp_path: Path) -> None:
+    """Nothing is removed."""
+    make(tmp_path / "out", 10)
+    before = tree_digest(tmp_path / "out")
+
+    with pytest.raises(
+        StorageError, match=r"holds 10 samples; nothing was changed\. Expected --n 10"
+    ):
+        make(tmp_path / "out", 9)
 
     assert tree_digest(tmp_path / "out") == before
 
