@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from pathlib import Path
 
@@ -22,16 +23,53 @@ def verify(folder: Path, full: bool) -> None:
 @click.command()
 @click.argument("name", required=False)
 def describe(name: str | None) -> None:
-    """Explain a plug-in from its own fields; without NAME, list them all."""
+    """Explain a plug-in, distribution, template or configuration; without NAME, list them all."""
     from gen_data.generator.assemble.plugin_tables import TABLES, find_plugin
     from gen_data.generator.config.describe import describe as text_of
 
+    shipped = _shipped_texts()
     if name is None:
         for kind, table in TABLES.items():
             click.echo(f"{kind}: {', '.join(table)}")
+        for kind, texts in shipped.items():
+            click.echo(f"{kind}: {', '.join(texts)}")
         return
-    kind, plugin = find_plugin(name)
-    click.echo(f"{kind} {name}\n{text_of(plugin)}")
+    # A name may be that of a template and of the configuration that uses it.
+    found = [(kind, texts[name]) for kind, texts in shipped.items() if name in texts]
+    for kind, text in found:
+        click.echo(f"{kind} {name}\n{text}")
+    if not found:
+        kind, plugin = find_plugin(name)
+        click.echo(f"{kind} {name}\n{text_of(plugin)}")
+
+
+def _shipped_texts() -> dict[str, dict[str, str]]:
+    """Texts of distributions, templates and configurations, by kind and name."""
+    from importlib.resources import files
+
+    from gen_data.generator.config.distributions import DISTRIBUTIONS
+
+    documented = {name: DISTRIBUTIONS.load(name).__doc__ or "" for name in DISTRIBUTIONS}
+    texts = {"distribution": {name: inspect.cleandoc(text) for name, text in documented.items()}}
+    for kind, package in (
+        ("template", "gen_data.scene_templates"),
+        ("configuration", "gen_data.configs"),
+    ):
+        paths = sorted(Path(str(files(package))).glob("*.yaml"))
+        texts[kind] = {path.stem: path.read_text("utf-8") for path in paths}
+    return texts
+
+
+@click.command()
+def formats() -> None:
+    """List the output formats."""
+    from gen_data.exporters import TABLE
+    from gen_data.generator.config.describe import docstring_summary
+
+    width = max(map(len, TABLE))
+    for name in TABLE:
+        click.echo(f"{name:<{width}}  {docstring_summary(TABLE.load(name))}")
+    click.echo("\ngen-data describe NAME lists the fields of a format.")
 
 
 @click.command()

@@ -25,6 +25,8 @@ class LazyCommands(click.Group):
     """A group of commands that are imported on demand."""
 
     modules = {  # noqa: RUF012
+        "init": "gen_data.generator.cli.init_command:init",
+        "plan": "gen_data.generator.cli.plan_command:plan",
         "sample": "gen_data.generator.cli.sample_command:sample",
         "export": "gen_data.generator.cli.export_command:export",
         "rerender": "gen_data.generator.cli.rerender_command:rerender",
@@ -34,10 +36,14 @@ class LazyCommands(click.Group):
         "report": "gen_data.generator.cli.report_command:report",
         "verify": "gen_data.generator.cli.info_commands:verify",
         "describe": "gen_data.generator.cli.info_commands:describe",
+        "formats": "gen_data.generator.cli.info_commands:formats",
         "schema": "gen_data.generator.cli.info_commands:schema",
+        "completion": "gen_data.generator.cli.init_command:completion",
         "doctor": "gen_data.generator.cli.doctor:doctor",
     }
     summaries = {  # noqa: RUF012
+        "init": "Write a commented configuration and template to start from.",
+        "plan": "Print shards, size, categories and exports of a run, without rendering.",
         "sample": "Write one sample of a configuration or of a data set.",
         "export": "Write a finished data set in other formats, without rendering.",
         "rerender": "Render the scenes of a data set again: other sensors, weather, light.",
@@ -46,8 +52,10 @@ class LazyCommands(click.Group):
         "assets": "Install, list, show, verify and remove packs of assets.",
         "report": "Statistics of a data set, compared with KITTI's.",
         "verify": "Check a data set against its manifest.",
-        "describe": "Explain a plug-in: what it does, its fields, an example.",
+        "describe": "Explain a plug-in, distribution, template or configuration.",
+        "formats": "List the output formats.",
         "schema": "Print the JSON Schema of configurations.",
+        "completion": "Print the completion script of a shell.",
         "doctor": "Check this machine: load and try every engine.",
     }
 
