@@ -68,5 +68,7 @@ def _parse_format(text: str) -> str | Mapping[str, Any]:
     """Parse a name, or a YAML mapping as in a configuration."""
     from gen_data.generator.config.yaml_tree import parse_yaml
 
-    entry: Any = parse_yaml(text, "--format").plain() if text.lstrip().startswith("{") else text
+    if not text.lstrip().startswith("{"):
+        return text
+    entry: Mapping[str, Any] = parse_yaml(text, "--format").plain()
     return entry

@@ -76,7 +76,7 @@ def starter_files(template: str, mesh: Path | None, category: str) -> Iterator[t
     if mesh is None:
         yield f"{name}.yaml", text
     else:
-        groups = [e.name for e in config.probes[0].elements if e.type == "objects"]
+        groups = [e["name"] for e in config.resolved["elements"] if e["type"] == "objects"]
         if not groups or re.search(r"(?m)^(assets|elements|labels):", text):
             raise ConfigError(
                 f"--mesh: the scenes of '{name}' take no objects of your own; expected --template "
