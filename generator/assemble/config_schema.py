@@ -11,7 +11,7 @@ from gen_data.generator.assemble.config import (
     VARYING,
     GeneralSettings,
 )
-from gen_data.generator.assemble.inheritance import ALL, NAMED
+from gen_data.generator.assemble.documents import ALL, NAMED
 from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, RENDERERS
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.config.schema import json_schema, with_shared_values

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.assemble.config import load_config, load_source_config
+from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.plugin_tables import find_plugin
 from gen_data.generator.core.errors import ConfigError
 
@@ -109,7 +109,7 @@ def test_resolved_document_makes_the_same_spec_again(tmp_path: Path) -> None:
     plan = {"config": first.resolved, "name": first.name}
     (tmp_path / "plan.json").write_text(json.dumps(plan))
 
-    again = load_source_config(str(tmp_path))
+    again = load_config(str(tmp_path))
 
     assert again == first
 
