@@ -69,19 +69,13 @@ def validate(
 def _position(node: Node, fault: Fault) -> Position:
     """Position of the value; of its key if that is wrong; of its parent if it is missing."""
     path = (*fault.path, *fault.below)
-    if fault.at_key and path and isinstance(path[-1], str):
-        return _nearest(node, path[:-1]).key_position(path[-1])
-    return _nearest(node, path).position
-
-
-def _nearest(node: Node, path: FieldPath) -> Node:
-    """The deepest existing node on a path."""
-    for part in path:
+    key = path[-1] if fault.at_key and path and isinstance(path[-1], str) else None
+    for part in path if key is None else path[:-1]:
         child = node.get(part)
         if child is None:
             break
         node = child
-    return node
+    return node.position if key is None else node.key_position(key)
 
 
 @dataclass(frozen=True)
@@ -176,9 +170,7 @@ def child_type(annotation: Any, part: str | int) -> Owner:
     """Type of a field of a model, or of an item of a collection; Any if unknown."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         info = annotation.model_fields.get(str(part))
-        return (
-            (Any, ()) if info is None else unwrap_annotated(info.annotation, tuple(info.metadata))
-        )
+        return unwrap_annotated(info.annotation, tuple(info.metadata)) if info else (Any, ())
     origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is tuple and isinstance(part, int) and Ellipsis not in arguments:
         return unwrap_annotated(arguments[part]) if part < len(arguments) else (Any, ())
@@ -235,14 +227,6 @@ def error_text(fault: Fault) -> str:
     return f"{message[:1].lower()}{message[1:]}, got {quote_value(fault.detail['input'])}"
 
 
-def _fact(fault: Fault) -> str:
-    return str(fault.context["fact"])
-
-
-def _validator_text(fault: Fault) -> str:
-    return str(fault.context["error"])
-
-
 def _wrong_type(fault: Fault) -> str:
     value, annotation = fault.detail["input"], fault.owner[0]
     hint = ""
@@ -289,9 +273,9 @@ def _unknown_tag(fault: Fault) -> str:
 
 def _unknown_value(fault: Fault) -> str:
     annotation = fault.owner[0]
-    if isinstance(annotation, type) and issubclass(annotation, Enum):
-        return _unknown(fault.detail["input"], [str(member.value) for member in annotation])
-    return _unknown(fault.detail["input"], [str(v) for v in typing.get_args(annotation)])
+    is_enum = isinstance(annotation, type) and issubclass(annotation, Enum)
+    known = [m.value for m in annotation] if is_enum else typing.get_args(annotation)
+    return _unknown(fault.detail["input"], [str(value) for value in known])
 
 
 def _unknown(wrong: object, known: list[str]) -> str:
@@ -301,12 +285,10 @@ def _unknown(wrong: object, known: list[str]) -> str:
 
 def _wrong_length(fault: Fault) -> str:
     unit = "character" if fault.kind.startswith("string") else "item"
-    value: Any = fault.detail["input"]
-    annotation: Any = fault.owner[0]
-    count = (
-        _counted(len(value), unit) if isinstance(value, (str, list, dict)) else quote_value(value)
-    )
-    if _has_fixed_length(annotation):
+    value, annotation = fault.detail["input"], fault.owner[0]
+    is_sized = isinstance(value, (str, list, dict))
+    count = _counted(len(value), unit) if is_sized else quote_value(value)
+    if typing.get_origin(annotation) is tuple and Ellipsis not in typing.get_args(annotation):
         return f"expected {describe_type(*fault.owner)}, got {count}"
     least, most = fault.context.get("min_length"), fault.context.get("max_length")
     if least == 1:
@@ -316,23 +298,14 @@ def _wrong_length(fault: Fault) -> str:
     return f"expected at most {_counted(most, unit)}, got {count}"
 
 
-def _has_fixed_length(annotation: Any) -> bool:
-    return typing.get_origin(annotation) is tuple and Ellipsis not in typing.get_args(annotation)
-
-
 def _wrong_pattern(fault: Fault) -> str:
-    return (
-        f"{quote_value(fault.detail['input'])} does not match the pattern "
-        f"{fault.context['pattern']}"
-    )
+    value = quote_value(fault.detail["input"])
+    return f"{value} does not match the pattern {fault.context['pattern']}"
 
 
 def _one_of(known: list[str]) -> str:
-    return (
-        to_flow_yaml(known[0])
-        if len(known) == 1
-        else f"one of {', '.join(to_flow_yaml(k) for k in known)}"
-    )
+    words = ", ".join(to_flow_yaml(k) for k in known)
+    return words if len(known) == 1 else f"one of {words}"
 
 
 def _counted(count: object, unit: str) -> str:
@@ -340,9 +313,9 @@ def _counted(count: object, unit: str) -> str:
 
 
 _FACTS: dict[str, Callable[[Fault], str]] = {
-    "fact": _fact,
-    "value_error": _validator_text,
-    "assertion_error": _validator_text,
+    "fact": lambda fault: str(fault.context["fact"]),
+    "value_error": lambda fault: str(fault.context["error"]),
+    "assertion_error": lambda fault: str(fault.context["error"]),
     "missing": _missing,
     "extra_forbidden": _unknown_key,
     "literal_error": _unknown_value,

@@ -7,7 +7,8 @@ give its constructor, its YAML form, its messages and its JSON Schema.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache, wraps
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar, cast
@@ -282,15 +283,17 @@ def _read_mapping(value: Mapping[str, Any], kind: Kind[T]) -> Distribution[T]:
     ((name, argument),) = value.items()
     if name not in known:
         raise _unknown(name, kind, (name,))
-    try:
+    with inside(name):
         return distribution(name).from_yaml(argument, kind)
+
+
+@contextmanager
+def inside(*path: str | int) -> Iterator[None]:
+    """Extend the path of a fault in a part of a value by the path to that part."""
+    try:
+        yield
     except Malformed as error:
-        raise below(error, name) from None
-
-
-def below(error: Malformed, *path: str | int) -> Malformed:
-    """The same fault, seen from further up."""
-    return Malformed(error.fact, (*path, *error.path), at_key=error.at_key)
+        raise Malformed(error.fact, (*path, *error.path), at_key=error.at_key) from None
 
 
 def _unknown(name: str, kind: Kind[Any], path: tuple[str, ...] = ()) -> Malformed:
@@ -363,7 +366,7 @@ def _malformed(error: ValidationError, cls: type[Distribution[Any]] | None = Non
         path = path[1:]
     cause = detail.get("ctx", {}).get("error")
     if isinstance(cause, Malformed):
-        return below(cause, *path)
+        return Malformed(cause.fact, (*path, *cause.path), at_key=cause.at_key)
     if cls is not None and detail["type"] == unknown_key:
         known = list(cls.field_names().values())
         key = str(path[-1])
