@@ -38,7 +38,7 @@ def bind_materials(
     # All prims, because children of a class are abstract and filtered out by default.
     children = mesh.GetFilteredChildren(Usd.PrimAllPrimsPredicate)
     subsets = [child for child in children if child.IsA(UsdGeom.Subset)]
-    parts = {_slot_number(part.GetName()): part for part in subsets} or {0: mesh}
+    parts = {int(part.GetName().removeprefix(SLOT)): part for part in subsets} or {0: mesh}
     UsdGeom.Scope.Define(stage, scope)
     for slot, part in parts.items():
         material = define_material(stage, f"{scope}/{SLOT}{slot}", materials[slot], textures)
@@ -46,10 +46,6 @@ def bind_materials(
         if part is not mesh and slot == min(parts):
             # For readers without support for subsets.
             UsdShade.MaterialBindingAPI.Apply(mesh).Bind(material)
-
-
-def _slot_number(subset: str) -> int:
-    return int(subset.removeprefix(SLOT))
 
 
 def _define_mesh(stage: Any, path: str, mesh: MeshData) -> None:
@@ -92,8 +88,6 @@ def _box_uvs(mesh: MeshData) -> Float32:
     axis = np.abs(crosses).argmax(axis=1)
     # X and Y faces keep Z upright.
     u, v = np.array([1, 0, 0])[axis], np.array([2, 2, 1])[axis]
-    face = np.arange(len(corners))[:, None]
-    corner = np.arange(3)[None, :]
-    pairs = [corners[face, corner, u[:, None]], corners[face, corner, v[:, None]]]
-    uvs: Float32 = np.stack(pairs, axis=-1).reshape(-1, 2).astype(np.float32)
+    chosen = np.stack([u, v], axis=-1)[:, None, :]
+    uvs: Float32 = np.take_along_axis(corners, chosen, axis=2).reshape(-1, 2).astype(np.float32)
     return uvs

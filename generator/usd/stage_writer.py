@@ -132,13 +132,11 @@ class _Writer:
 
         path = self.path(parent, steps[0].name)
         prim = self._stage.DefinePrim(path, "Xform")
-        set_transforms(
-            prim,
-            [
-                scale_pose(T_world_parent.inverse() @ body.T_world_body, body.scale)
-                for T_world_parent, body in zip(parents, steps, strict=True)
-            ],
-        )
+        placed = zip(parents, steps, strict=True)
+        poses = [
+            (T_world_parent.inverse() @ b.T_world_body, b.scale) for T_world_parent, b in placed
+        ]
+        set_transforms(prim, [scale_pose(pose, scale) for pose, scale in poses])
         looks = [self._find_look(body) for body in steps]
         for look in dict.fromkeys(looks):
             child = self._stage.DefinePrim(self.path(path, "look"), "Xform")
@@ -162,12 +160,12 @@ class _Writer:
 
     def _refer(self, prim: Any, look: Look) -> None:
         asset, materials = look
-        if not materials:
-            prim.GetReferences().AddReference(self._files.layer(asset))
-            return
-        if look not in self._prototypes:
+        if materials and look not in self._prototypes:
             self._prototypes[look] = self._prototype(asset, materials)
-        prim.GetReferences().AddInternalReference(self._prototypes[look])
+        if materials:
+            prim.GetReferences().AddInternalReference(self._prototypes[look])
+        else:
+            prim.GetReferences().AddReference(self._files.layer(asset))
 
     def _prototype(self, asset: str, materials: tuple[Material, ...]) -> str:
         path = self.path(f"{WORLD}/Prototypes", asset.rpartition("/")[2])
