@@ -17,7 +17,12 @@ from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, Validation
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 from typing_extensions import dataclass_transform
 
-from gen_data.generator.config.yaml_scalars import abbreviate, format_number, quote_value
+from gen_data.generator.config.yaml_scalars import (
+    abbreviate,
+    format_number,
+    quote_value,
+    resolve_scalar,
+)
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.plugins import PluginTable
 
@@ -79,19 +84,28 @@ class Kind(Generic[T]):
         name: Distributions list it in ``kinds``.
         expected: A constant of it in messages: ``a number``.
         read: The value of a plain constant; raises Malformed.
-        read_key: The same for a key of a mapping, which is always text.
         schema: JSON Schema of a constant.
-        example: A constant, as plain data.
         of_number: Name of the distribution that a plain number stands for, if it is no constant.
     """
 
     name: str
     expected: str
     read: Callable[[Any], T]
-    read_key: Callable[[str], T]
     schema: Mapping[str, Any]
-    example: Any
     of_number: str = ""
+
+    def read_key(self, text: str) -> T:
+        """The value of a key of a mapping, which is always text. Raises Malformed."""
+        if self.schema.get("type") == "string":
+            return self.read(text)
+        if self.schema.get("type") == "array":
+            wanted = "weights by value need a number or a name"
+            raise Malformed(f"{wanted}, got {quote_value(text)}; use a list")
+        try:
+            value = resolve_scalar(text)
+        except ValueError as error:
+            raise Malformed(str(error)) from None
+        return self.read(value)
 
 
 class Distribution(ABC, Generic[T_co]):

@@ -23,7 +23,7 @@ from gen_data.generator.config.distributions.base import (
     reader,
 )
 from gen_data.generator.config.distributions.space import UnitQuaternion, UnitVector
-from gen_data.generator.config.yaml_scalars import format_number, quote_value, resolve_scalar
+from gen_data.generator.config.yaml_scalars import format_number, quote_value
 from gen_data.generator.core.se3 import Quaternion, Vec3
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class FieldOf:
         del source, handler
         return core_schema.no_info_plain_validator_function(
             self._read,
-            serialization=core_schema.plain_serializer_function_ser_schema(_to_yaml),
+            serialization=core_schema.plain_serializer_function_ser_schema(lambda v: v.to_yaml()),
         )
 
     def __get_pydantic_json_schema__(
@@ -146,10 +146,6 @@ class Bounds:
         return str(self) if math.isinf(self.low) or math.isinf(self.high) else f"in {self}"
 
 
-def _to_yaml(value: Distribution[Any]) -> Any:
-    return value.to_yaml()
-
-
 def custom_error(error: Malformed) -> PydanticCustomError:
     """What carries our own words, and the path to the fault, through pydantic."""
     context = {"fact": error.fact, "path": error.path, "at_key": error.at_key}
@@ -208,27 +204,10 @@ def _flag_hint(value: Any) -> str:
     return f" (did you mean {meant}?)" if meant else ""
 
 
-def _as_key(kind_read: Any) -> Any:
-    def read_key(text: str) -> Any:
-        try:
-            value = resolve_scalar(text)
-        except ValueError as error:
-            raise Malformed(str(error)) from None
-        return kind_read(value)
-
-    return read_key
-
-
-def _no_key(text: str) -> Any:
-    raise Malformed(
-        f"weights by value need a number or a name, got {quote_value(text)}; use a list"
-    )
-
-
-def _spatial(name: str, expected: str, annotation: Any, example: list[float]) -> Kind[Any]:
+def _spatial(name: str, expected: str, annotation: Any) -> Kind[Any]:
     """A kind whose constants are lists of numbers."""
     schema = TypeAdapter(annotation).json_schema()
-    return Kind(name, expected, reader(annotation), _no_key, schema, example)
+    return Kind(name, expected, reader(annotation), schema)
 
 
 _read_scalar = _plain("a number or a distribution", (int, float), _range_hint("uniform"))
@@ -237,23 +216,20 @@ _read_name = _plain("a name or a distribution", (str,), _quote_hint)
 _read_flag = _plain("true, false or {probability: p}", (bool,), _flag_hint)
 _read_chance = _plain("a probability in [0, 1], true or false", (bool,), _flag_hint)
 
-NUMBER = Kind("number", "a number", _read_scalar, _as_key(_read_scalar), {"type": "number"}, 1)
-WHOLE_NUMBER = Kind(
-    "whole number", "a whole number", _read_count, _as_key(_read_count), {"type": "integer"}, 1
-)
-NAME = Kind("name", "a name", _read_name, _read_name, {"type": "string"}, "example")
-FLAG = Kind("flag", "true or false", _read_flag, _as_key(_read_flag), {"type": "boolean"}, True)
+NUMBER = Kind("number", "a number", _read_scalar, {"type": "number"})
+WHOLE_NUMBER = Kind("whole number", "a whole number", _read_count, {"type": "integer"})
+NAME = Kind("name", "a name", _read_name, {"type": "string"})
+FLAG = Kind("flag", "true or false", _read_flag, {"type": "boolean"})
 CHANCE = replace(
     FLAG,
     expected="a probability in [0, 1], true or false",
     read=_read_chance,
     schema={"anyOf": [{"type": "number", "minimum": 0, "maximum": 1}, FLAG.schema]},
-    example=0.5,
     of_number="probability",
 )
-ROTATION = _spatial("rotation", "a rotation [w, x, y, z]", UnitQuaternion, [1, 0, 0, 0])
-DIRECTION = _spatial("direction", "a direction [x, y, z]", UnitVector, [0, 0, 1])
-POSITION = _spatial("position", "a position [x, y, z]", Vector, [0, 0, 1])
+ROTATION = _spatial("rotation", "a rotation [w, x, y, z]", UnitQuaternion)
+DIRECTION = _spatial("direction", "a direction [x, y, z]", UnitVector)
+POSITION = _spatial("position", "a position [x, y, z]", Vector)
 
 Scalar = Annotated[Numeric[float], FieldOf(NUMBER)]
 """A number, or a distribution over numbers."""
