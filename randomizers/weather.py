@@ -15,8 +15,8 @@ from gen_data.generator.config.distributions import (
     Scalar,
     Uniform,
     UnitInterval,
+    custom_error,
 )
-from gen_data.generator.config.distributions.fields import custom_error
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene

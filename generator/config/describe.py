@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from gen_data.generator.config.distributions.fields import Bounds
+from gen_data.generator.config.distributions import Bounds
 from gen_data.generator.config.schema import (
     FieldSchema,
     docstring_summary,

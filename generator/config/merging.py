@@ -49,7 +49,9 @@ def merge_named(base: Node, override: Node) -> Node:
     for item in override.content:
         name = node_name(item)
         if name in items:
-            items[name] = merge_nodes(items[name], _with_name_of(item, items[name]))
+            # An item without a name keeps that of the inherited one, which it may replace.
+            named = item if item.get("name") else with_entry(item, "name", items[name].get("name"))
+            items[name] = merge_nodes(items[name], named)
             at = order.index(name)
             order[at:at], new = new, []
         else:
@@ -64,11 +66,6 @@ def node_name(item: Node) -> str:
         if node is not None and isinstance(node.content, str):
             return node.content
     return str(item.position)
-
-
-def _with_name_of(item: Node, inherited: Node) -> Node:
-    """Give an item without a name that of the inherited one, which it may replace."""
-    return item if item.get("name") else with_entry(item, "name", inherited.get("name"))
 
 
 def with_entry(node: Node, key: str, value: Node | None) -> Node:

@@ -15,8 +15,7 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema
 
-from gen_data.generator.config.distributions import Distribution
-from gen_data.generator.config.distributions.fields import DISTRIBUTION_TITLE, Bounds
+from gen_data.generator.config.distributions import DISTRIBUTION_TITLE, Bounds, Distribution
 from gen_data.generator.config.yaml_scalars import to_flow_yaml
 
 SHARED_VALUE = "shared_value"

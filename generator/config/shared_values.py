@@ -20,8 +20,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
+from gen_data.generator.config.distributions import FLAG, NAME, NUMBER, WHOLE_NUMBER
 from gen_data.generator.config.distributions.base import Kind, Malformed, read_distribution
-from gen_data.generator.config.distributions.fields import FLAG, NAME, NUMBER, WHOLE_NUMBER
 from gen_data.generator.config.problems import FieldPath, Position, refuse
 from gen_data.generator.config.yaml_scalars import quote_value, resolve_scalar
 from gen_data.generator.config.yaml_tree import Node, is_distribution

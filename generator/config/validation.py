@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from gen_data.generator.config.distributions.fields import MEANT
+from gen_data.generator.config.distributions import MEANT
 from gen_data.generator.config.problems import FieldPath, Position, Problems, format_path
 from gen_data.generator.config.schema import FieldSchema
 from gen_data.generator.config.yaml_scalars import quote_value, to_flow_yaml
@@ -254,16 +254,10 @@ _FACTS: dict[str, Callable[[Fault], str]] = {
     "enum": _unknown_value,
     "union_tag_invalid": _unknown_tag,
     "union_tag_not_found": _missing_tag,
-    "whole_union": _wrong_type,
-    "int_from_float": _wrong_type,
-    "is_instance_of": _wrong_type,
-    "greater_than": _out_of_range,
-    "greater_than_equal": _out_of_range,
-    "less_than": _out_of_range,
-    "less_than_equal": _out_of_range,
-    "too_short": _wrong_length,
-    "too_long": _wrong_length,
-    "string_too_short": _wrong_length,
-    "string_too_long": _wrong_length,
     "string_pattern_mismatch": _wrong_pattern,
+    **dict.fromkeys(("whole_union", "int_from_float", "is_instance_of"), _wrong_type),
+    **dict.fromkeys(("greater_than", "greater_than_equal"), _out_of_range),
+    **dict.fromkeys(("less_than", "less_than_equal"), _out_of_range),
+    **dict.fromkeys(("too_short", "too_long"), _wrong_length),
+    **dict.fromkeys(("string_too_short", "string_too_long"), _wrong_length),
 }

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Literal, get_args
 
 import cv2
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
 from gen_data.generator.core.asset_types import SURFACES
@@ -28,20 +31,9 @@ ROW_PX = 2
 """Height of a ring in the range view."""
 
 GREY = (120, 120, 120)
-COLORS = {
-    "air": (255, 80, 255),
-    "asphalt": (105, 105, 112),
-    "marking": (235, 235, 235),
-    "pavement": (150, 140, 130),
-    "kerb": (170, 160, 150),
-    "grass": (90, 130, 60),
-    "leaf": (60, 170, 60),
-    "bark": (140, 100, 60),
-    "sign": (255, 210, 0),
-    "facade": (170, 110, 80),
-    "roof": (150, 70, 60),
-    "window": (90, 130, 170),
-}
+COLORS: Mapping[str, Sequence[int]] = yaml.safe_load(
+    Path(__file__).with_name("surface_colors.yaml").read_text(encoding="utf-8")
+)
 """Colours of points without a category, by surface."""
 
 

@@ -134,7 +134,8 @@ class Recorder:
             if before[1] != place:
                 self.stream.log(path, transform(*place))
             if before[0] != look:
-                self.stream.log(path, self._mesh(body))
+                mesh = self.assets.mesh(body.asset)
+                self.stream.log(path, mesh_3d(mesh, self._slot_colors(body, mesh)))
         for path in sorted(set(self._sent) - paths):
             del self._sent[path]
             self.stream.log(path, rr.Clear(recursive=False))
@@ -155,10 +156,6 @@ class Recorder:
             remaining = self.info.steps_per_scene - 1 - sample.step_index
             until_s = sample.scene.time_s + remaining * self.info.step_s
             self.stream.log("world/ways", trajectory_strips(sample.scene, until_s))
-
-    def _mesh(self, body: Body) -> rr.Mesh3D:
-        mesh = self.assets.mesh(body.asset)
-        return mesh_3d(mesh, self._slot_colors(body, mesh))
 
     def _slot_colors(self, body: Body, mesh: MeshData) -> NDArray[np.uint8]:
         """SRGB colour per material slot: base colour times the texture's mean."""

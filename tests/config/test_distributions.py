@@ -13,6 +13,7 @@ import pytest
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.config.distributions import (
     DISTRIBUTIONS,
+    NUMBER,
     AboutZ,
     Bounds,
     Box,
@@ -40,7 +41,6 @@ from gen_data.generator.config.distributions import (
     Sphere,
     Uniform,
     UniformInteger,
-    fields,
     with_bounds,
 )
 from gen_data.generator.config.problems import Problems
@@ -436,7 +436,7 @@ def test_a_distribution_of_a_third_party_needs_fields_and_a_draw_only(
 
     monkeypatch.setattr(base, "distribution_names", lambda kind: ("triangular",))
     monkeypatch.setattr(base, "distribution", lambda name: Triangular)
-    kind = fields.NUMBER
+    kind = NUMBER
 
     assert base.read_distribution({"triangular": {"peak": 2}}, kind) == Triangular(2.0)
     assert Triangular(2.0).to_yaml() == {"triangular": {"peak": 2.0, "reach": 1.0}}
