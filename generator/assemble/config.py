@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol, TypedDict, TypeVar, cast
+from typing import Any, TypedDict, TypeVar, cast
 
 from pydantic import Field, model_validator
 from typing_extensions import Unpack
@@ -301,7 +301,7 @@ def _make_config(document: Node, name: str, changes: Changes) -> Config:
         head,
         render,
         annotations,
-        tuple(exporter for exporter in exporters if exporter is not None),
+        exporters,
         probes,
         document,
     )
@@ -346,47 +346,29 @@ def _scene_config(
     lists = {key: resolve_shared(document.entries[key], shared, key) for key in VARYING}
     return SceneConfig(
         tuple(sorted(shared.items())),
-        _named_plugins(lists["elements"], "elements", ELEMENTS, problems),
-        _named_plugins(lists["randomizers"], "randomizers", RANDOMIZERS, problems),
-        _named_plugins(lists["sensors"], "sensors", SENSORS, problems),
+        _plugins(lists["elements"], "elements", ELEMENTS, problems),
+        _plugins(lists["randomizers"], "randomizers", RANDOMIZERS, problems),
+        _plugins(lists["sensors"], "sensors", SENSORS, problems),
     )
 
 
-def _plugins(
-    listed: Node, key: str, table: PluginTable[P], problems: Problems
-) -> tuple[P | None, ...]:
-    """Make the plug-in of each item; None for an item with errors."""
+def _plugins(listed: Node, key: str, table: PluginTable[P], problems: Problems) -> tuple[P, ...]:
+    """Make the plug-in of each item without errors; names, if they have one, must be unique."""
     if not isinstance(listed.content, tuple):
         problems.add(listed.position, key, f"expected a list of {table.kind}s")
-        return ()
-    return tuple(
-        _plugin(node, f"{key}[{number}]", table, problems)
-        for number, node in enumerate(listed.content)
-    )
-
-
-class _Named(Protocol):
-    @property
-    def name(self) -> str: ...
-
-
-N = TypeVar("N", bound=_Named)
-
-
-def _named_plugins(
-    listed: Node, key: str, table: PluginTable[N], problems: Problems
-) -> tuple[N, ...]:
-    """Make plug-ins, whose names must be unique."""
-    made = _plugins(listed, key, table, problems)
+    made: list[P] = []
     names: set[str] = set()
-    for number, plugin in enumerate(made):
-        if plugin is not None and plugin.name in names:
-            node = listed.items[number]
-            fact = f"the name '{plugin.name}' is taken; expected a name of its own"
+    for number, node in enumerate(listed.items):
+        plugin = _plugin(node, f"{key}[{number}]", table, problems)
+        name = getattr(plugin, "name", None) if key in VARYING else None
+        if name is not None and name in names:
+            fact = f"the name '{name}' is taken; expected a name of its own"
             problems.add((node.get("name") or node).position, f"{key}[{number}].name", fact)
+        if name is not None:
+            names.add(name)
         if plugin is not None:
-            names.add(plugin.name)
-    return tuple(plugin for plugin in made if plugin is not None)
+            made.append(plugin)
+    return tuple(made)
 
 
 def _plugin(

@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from gen_data.generator.core.capture import (
     Capture,
@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
+T = TypeVar("T")
 SceneSource = Callable[[Streams], tuple[Scene, Sequence[Randomizer], Sequence[Sensor]]]
 """Pure function from streams to nominal scene (sensors mounted), randomizers and sensors."""
 
@@ -94,10 +95,13 @@ class AcceptedScene:
 
 @dataclass(frozen=True, slots=True)
 class DrawnView:
-    """A view of a scene at the beginning of its sequence, with the streams that drew it."""
+    """A view of a scene at the beginning of its sequence, with the streams that drew it.
 
-    scene_index: int
-    view_index: int
+    Attributes:
+        number: Of the view among those of all scenes.
+    """
+
+    number: int
     scene: Scene
     streams: Streams
 
@@ -242,51 +246,55 @@ class Pipeline:
         return split_of(scene_index, shares, assignment, self.info.seed)
 
     def _accept(self, scene_index: int) -> AcceptedScene:
+        """Draw and settle a scene."""
         assert self._physics is not None, "use the pipeline as a context manager"
+        physics = self._physics
         timings: dict[str, float] = {}
+
+        def settle(attempt: int) -> AcceptedScene:
+            streams = Streams(self.info.seed, scene_index, attempt=attempt, index=scene_index)
+            with _timed(timings, "randomize"):
+                nominal, randomizers, sensors = self.config.open_scene(streams)
+                scene = self._randomize(nominal, randomizers, Stage.BUILD, streams)
+            with _timed(timings, "physics"):
+                settled = physics.settle(scene)
+            if settled.rejection is not None:
+                raise LayoutRejected(settled.rejection)
+            scene = finalize_scene(settled.scene, self.assets, self._category_ids)
+            return AcceptedScene(scene_index, scene, randomizers, sensors, attempt, timings)
+
+        return self._first_accepted(scene_index, settle)
+
+    def _first_accepted(self, scene_index: int, draw: Callable[[int], T]) -> T:
+        """Result of the first attempt that no randomizer and no physics rejects.
+
+        Raises:
+            SceneRejected: none within the bounded number of attempts.
+        """
         rejections: list[Rejection] = []
         for attempt in range(self.config.layout_attempts_max):
-            streams = Streams(self.info.seed, scene_index, attempt=attempt, index=scene_index)
             try:
-                with _timed(timings, "randomize"):
-                    nominal, randomizers, sensors = self.config.open_scene(streams)
-                    scene = self._randomize(nominal, randomizers, Stage.BUILD, streams)
+                return draw(attempt)
             except LayoutRejected as refused:
                 rejections.append(refused.rejection)
-                continue
-            with _timed(timings, "physics"):
-                settled = self._physics.settle(scene)
-            if settled.rejection is None:
-                scene = finalize_scene(settled.scene, self.assets, self._category_ids)
-                return AcceptedScene(scene_index, scene, randomizers, sensors, attempt, timings)
-            rejections.append(settled.rejection)
         raise SceneRejected(scene_index, tuple(rejections))
 
     def drawn_view(self, accepted: AcceptedScene, view_index: int) -> DrawnView:
         """A view of a scene at time 0."""
-        latest = self._view
-        if latest is None or (latest.scene_index, latest.view_index) != (
-            accepted.index,
-            view_index,
-        ):
-            latest = self._view = self._draw_view(accepted, view_index)
-        return latest
-
-    def _draw_view(self, accepted: AcceptedScene, view_index: int) -> DrawnView:
-        """Draw a view, with a limited number of attempts."""
         number = accepted.index * self.info.views_per_scene + view_index
-        rejections: list[Rejection] = []
-        for attempt in range(self.config.layout_attempts_max):
+        latest = self._view
+        if latest is not None and latest.number == number:
+            return latest
+
+        def draw(attempt: int) -> DrawnView:
             streams = Streams(
                 self.info.seed, accepted.index, view=view_index, attempt=attempt, index=number
             )
-            try:
-                scene = self._randomize(accepted.scene, accepted.randomizers, Stage.VIEW, streams)
-            except LayoutRejected as refused:
-                rejections.append(refused.rejection)
-                continue
-            return DrawnView(accepted.index, view_index, place_sensors(scene), streams)
-        raise SceneRejected(accepted.index, tuple(rejections))
+            scene = self._randomize(accepted.scene, accepted.randomizers, Stage.VIEW, streams)
+            return DrawnView(number, place_sensors(scene), streams)
+
+        self._view = self._first_accepted(accepted.index, draw)
+        return self._view
 
     def _randomize(
         self, scene: Scene, randomizers: Sequence[Randomizer], stage: Stage, streams: Streams

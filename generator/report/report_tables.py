@@ -15,8 +15,8 @@ from gen_data.generator.report.kitti_statistics import (
     TYPES,
     Difficulty,
 )
+from gen_data.generator.report.label_files import Scan
 from gen_data.generator.report.label_statistics import Column, Survey
-from gen_data.generator.report.lidar_scans import Scan
 
 NOTHING = "-"
 TRUNCATED = 0.15

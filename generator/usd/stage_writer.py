@@ -24,10 +24,9 @@ from typing import Any
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.scene import Body, Instance, Scene
 from gen_data.generator.core.se3 import IDENTITY, SE3
-from gen_data.generator.usd.asset_layer import MESH, bind_materials
+from gen_data.generator.usd.asset_layer import MESH, TextureFinder, bind_materials
 from gen_data.generator.usd.cameras import define_camera
 from gen_data.generator.usd.lights import define_light, define_sky
-from gen_data.generator.usd.material_writer import TextureFinder
 from gen_data.generator.usd.prims import (
     open_stage_for_writing,
     scale_pose,

@@ -17,7 +17,7 @@ from gen_data.generator.core.sample import ImageTruth, Sample
 from gen_data.generator.core.scene import Camera, Device, Instance, Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.preview.contact_sheet import CAPTION_PX, Tile, make_tiles, render_tiles
-from gen_data.generator.preview.device_views import BRIGHTER, DARKER, GREY, event_view, radar_view
+from gen_data.generator.preview.sensor_views import BRIGHTER, DARKER, GREY, event_view, radar_view
 
 DOCS = Path(__file__).parents[2] / "docs"
 SHEETS = sorted((DOCS / "sheets").glob("*.yaml"))
