@@ -92,16 +92,7 @@ def load_config_document(name: str) -> Node:
 
 
 def _load_extended(path: Path, shipped: Sequence[Path], extending: tuple[Path, ...] = ()) -> Node:
-    """Load a configuration and merge it into the one that it extends.
-
-    Args:
-        path: Of the file.
-        shipped: Configurations of the package.
-        extending: Files on the way to this one, each of which extends the next.
-
-    Raises:
-        ConfigError: a file is missing or invalid, or extends itself.
-    """
+    """Load a file with everything that it extends; each of ``extending`` extends the next."""
     document = replace_old_words(load_yaml(path))
     base = document.get("extends")
     if base is None:
@@ -184,11 +175,7 @@ def _drop_items(
 
 
 def _override_elements(elements: Node, overrides: Node) -> Node:
-    """Merge overrides by name into a list of elements; an override with a type may be new.
-
-    Raises:
-        ConfigError: an override without a type names no element.
-    """
+    """Merge overrides by name into a list of elements; an override with a type may be new."""
     by_name = {node_name(node): node for node in elements.items}
     problems = Problems()
     if not isinstance(overrides.content, Mapping):
@@ -210,11 +197,7 @@ def _override_elements(elements: Node, overrides: Node) -> Node:
 
 
 def _mapping_of(node: Node) -> Mapping[str, Node]:
-    """The entries of a mapping.
-
-    Raises:
-        ConfigError: the node is not a mapping.
-    """
+    """The entries of a mapping; ConfigError for anything else."""
     if not isinstance(node.content, Mapping):
         raise ConfigError(f"{node.position}: expected a mapping of settings")
     return node.content

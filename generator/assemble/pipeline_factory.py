@@ -89,16 +89,7 @@ class PipelineFactory:
 
 
 def _check_references(config: Config, scenes: Sequence[Scene], assets: AssetIndex) -> None:
-    """Check that the groups, categories and textures that randomizers name exist.
-
-    Args:
-        config: The configuration.
-        scenes: Nominal scene of each of its probes.
-        assets: The library.
-
-    Raises:
-        ConfigError: some do not exist; each is reported with its position.
-    """
+    """Refuse names of groups, categories and textures in randomizers that do not exist."""
     problems = Problems()
     for probe, scene in zip(config.probes, scenes, strict=True):
         for number, randomizer in enumerate(probe.randomizers):

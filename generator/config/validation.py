@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from gen_data.generator.config.distributions import MEANT
+from gen_data.generator.config.distributions import MEANT, Malformed
 from gen_data.generator.config.problems import FieldPath, Position, Problems, format_path
 from gen_data.generator.config.schema import FieldSchema
 from gen_data.generator.config.yaml_scalars import quote_value, to_flow_yaml
@@ -72,7 +72,7 @@ class Fault:
     """One validation error.
 
     Attributes:
-        kind: Pydantic's type of error; ``fact`` for errors of distributions.
+        kind: Pydantic's type of error.
         detail: Pydantic's record of the error.
         path: Of the field, without the names of union branches.
         below: From the field to the wrong part of its distribution.
@@ -109,6 +109,8 @@ def locate_error(detail: ErrorDetails, model: type[BaseModel]) -> Fault:
     union: tuple[FieldPath, FieldSchema] | None = None
     branch = ""
     kind, context = detail["type"], detail.get("ctx", {})
+    cause = context.get("error")
+    malformed = cause if isinstance(cause, Malformed) else Malformed("")
     is_in_parent = kind in {"missing", "extra_forbidden"}
     last = len(detail["loc"]) - is_in_parent
     for number, part in enumerate(detail["loc"]):
@@ -128,8 +130,8 @@ def locate_error(detail: ErrorDetails, model: type[BaseModel]) -> Fault:
         detail,
         path,
         owner.without_nothing(),
-        below=tuple(context["path"]) if kind == "fact" else (),
-        at_key=kind == "extra_forbidden" or bool(context.get("at_key")),
+        below=malformed.path,
+        at_key=kind == "extra_forbidden" or malformed.at_key,
         union=union,
         branch=branch,
     )
@@ -245,7 +247,6 @@ def _counted(count: object, unit: str) -> str:
 
 
 _FACTS: dict[str, Callable[[Fault], str]] = {
-    "fact": lambda fault: str(fault.context["fact"]),
     "value_error": lambda fault: str(fault.context["error"]),
     "assertion_error": lambda fault: str(fault.context["error"]),
     "missing": _missing,

@@ -120,7 +120,7 @@ class Pipeline:
         open_physics: Callable[[], PhysicsEngine],
         open_renderer: Callable[[], Renderer],
     ) -> None:
-        self.config = config
+        self.config, self.info, self.exporters = config, config.info, config.exporters
         self.assets = assets
         self._open_physics = open_physics
         self._open_renderer = open_renderer
@@ -131,20 +131,10 @@ class Pipeline:
         self._offsets_s = {s.name: s.time_offset_s for s in config.info.sensors}
         self._category_ids = {name: i for i, name in enumerate(config.info.categories, 1)}
 
-    @property
-    def info(self) -> DatasetInfo:
-        """Facts about the data set, for exporters."""
-        return self.config.info
-
     @cached_property
     def renderer(self) -> Renderer:
         """The renderer, opened by the context or on first use; merging shards needs none."""
         return self._open_renderer()
-
-    @property
-    def exporters(self) -> Mapping[str, Exporter]:
-        """Exporters by name."""
-        return self.config.exporters
 
     def __enter__(self) -> Pipeline:
         """Start the engines."""
@@ -266,11 +256,7 @@ class Pipeline:
         return self._first_accepted(scene_index, settle)
 
     def _first_accepted(self, scene_index: int, draw: Callable[[int], T]) -> T:
-        """Result of the first attempt that no randomizer and no physics rejects.
-
-        Raises:
-            SceneRejected: none within the bounded number of attempts.
-        """
+        """Result of the first attempt that is not rejected; SceneRejected if all are."""
         rejections: list[Rejection] = []
         for attempt in range(self.config.layout_attempts_max):
             try:
@@ -282,9 +268,8 @@ class Pipeline:
     def drawn_view(self, accepted: AcceptedScene, view_index: int) -> DrawnView:
         """A view of a scene at time 0."""
         number = accepted.index * self.info.views_per_scene + view_index
-        latest = self._view
-        if latest is not None and latest.number == number:
-            return latest
+        if self._view is not None and self._view.number == number:
+            return self._view
 
         def draw(attempt: int) -> DrawnView:
             streams = Streams(

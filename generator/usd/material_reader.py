@@ -170,11 +170,7 @@ def _read_number(
 
 
 def _read_color(surface: Any, name: str, default: Vec3, where: str) -> tuple[Vec3, Any]:
-    """Read a colour input and the node of the image that it multiplies; None = no image.
-
-    Raises:
-        AssetError: if the colour comes from a node other than an image.
-    """
+    """Read a colour input and the node of the image that it multiplies; None = no image."""
     value, node = _find_source(surface, name)
     if _is_image(node):
         return _read_scale(node)[:3], node

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import TypeAdapter
-from pydantic_core import PydanticCustomError, core_schema
+from pydantic_core import core_schema
 
 from gen_data.generator.config.distributions.base import (
     DISTRIBUTIONS,
@@ -56,7 +56,7 @@ __all__ = [
     "Constant", "Count", "Direction", "Distribution", "EulerDeg", "FieldOf", "Flag", "LogUniform",
     "Malformed", "Name", "NonNegative", "Normal", "Numeric", "Position", "Positive", "Probability",
     "QuaternionWxyz", "Rotation", "Scalar", "Sequence", "Shell", "So3", "Sphere", "Uniform",
-    "UniformInteger", "UnitInterval", "custom_error", "distribution_schema", "with_bounds",
+    "UniformInteger", "UnitInterval", "distribution_schema", "with_bounds",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
@@ -94,10 +94,7 @@ class FieldOf:
         return distribution_schema(self.kind)
 
     def _read(self, value: Any) -> Distribution[Any]:
-        try:
-            return read_distribution(value, self.kind)
-        except Malformed as error:
-            raise custom_error(error) from None
+        return read_distribution(value, self.kind)
 
 
 @dataclass(frozen=True)
@@ -154,7 +151,7 @@ class Bounds:
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> core_schema.CoreSchema:
         """Check after reading."""
-        return core_schema.no_info_after_validator_function(self._check, handler(source))
+        return core_schema.no_info_after_validator_function(self.check, handler(source))
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
@@ -168,21 +165,9 @@ class Bounds:
             target["exclusiveMaximum" if self.open_high else "maximum"] = self.high
         return inner
 
-    def _check(self, value: Any) -> Any:
-        try:
-            return self.check(value)
-        except Malformed as error:
-            raise custom_error(error) from None
-
     def within(self) -> str:
         """The limits as part of a sentence: ``in (1, 170)``, ``>= 0``."""
         return str(self) if math.isinf(self.low) or math.isinf(self.high) else f"in {self}"
-
-
-def custom_error(error: Malformed) -> PydanticCustomError:
-    """What carries our own words, and the path to the fault, through pydantic."""
-    context = {"fact": error.fact, "path": error.path, "at_key": error.at_key}
-    return PydanticCustomError("fact", "{fact}", context)
 
 
 def distribution_schema(kind: Kind[Any]) -> dict[str, Any]:
