@@ -10,6 +10,8 @@ from functools import cached_property
 from types import TracebackType
 from typing import TYPE_CHECKING, TypeVar
 
+import numpy as np
+
 from gen_data.generator.core.capture import (
     Capture,
     Channel,
@@ -33,7 +35,6 @@ from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.scene_time import place_sensors
 from gen_data.generator.core.streams import Streams
 from gen_data.generator.pipeline.finalize_scene import Timeline, finalize_scene
-from gen_data.generator.pipeline.lidar_counts import count_lidar_points
 from gen_data.generator.pipeline.splits import Assignment, split_of
 
 if TYPE_CHECKING:
@@ -186,7 +187,7 @@ class Pipeline:
             split=self.split(scene_index),
             scene=scene,
             capture=capture,
-            truth=count_lidar_points(truth, capture.clouds),
+            truth=_count_lidar_points(truth, capture.clouds),
             attempts=accepted.attempt + 1,
             timings_s=timings,
             cameras=self.info.cameras,
@@ -289,6 +290,25 @@ class Pipeline:
                 rng = streams.rng(f"randomizer/{randomizer.name}")
                 scene = randomizer(scene, self.assets, rng)
         return scene
+
+
+def _count_lidar_points(
+    truth: Mapping[str, ImageTruth], clouds: Mapping[str, PointCloud]
+) -> Mapping[str, ImageTruth]:
+    """Add to each object its number of points in every scan."""
+    if not clouds:
+        return truth
+    counts = {name: np.bincount(c.points["instance_id"]) for name, c in sorted(clouds.items())}
+
+    def add_counts(image: ImageTruth) -> ImageTruth:
+        objects = []
+        for item in image.objects:
+            k = item.instance.instance_id
+            points = {name: int(n[k]) if k < len(n) else 0 for name, n in counts.items()}
+            objects.append(replace(item, lidar_points=points))
+        return replace(image, objects=tuple(objects))
+
+    return {name: add_counts(image) for name, image in truth.items()}
 
 
 @contextmanager

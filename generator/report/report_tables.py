@@ -4,19 +4,47 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
-from gen_data.generator.report.kitti_statistics import (
-    DIFFICULTIES,
-    IMAGES,
-    POINTS_PER_SCAN,
-    TYPES,
-    Difficulty,
-)
 from gen_data.generator.report.label_files import Scan
 from gen_data.generator.report.label_statistics import Column, Survey
+
+
+@dataclass(frozen=True, slots=True)
+class KittiType:
+    """One of KITTI's types: number of objects, and mean height, width and length [m]."""
+
+    objects: int
+    size_hwl_m: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Difficulty:
+    """Limits for an object to count at a difficulty.
+
+    Attributes:
+        height_px: Smallest height of its box.
+        occlusion_level, truncation: Largest values.
+    """
+
+    name: str
+    height_px: float
+    occlusion_level: int
+    truncation: float
+
+
+_KITTI = yaml.safe_load(
+    Path(__file__).with_name("kitti_statistics.yaml").read_text(encoding="utf-8")
+)
+KITTI_IMAGES: int = _KITTI["images"]
+POINTS_PER_SCAN: tuple[int, int] = tuple(_KITTI["points_per_scan"])
+"""Points per scan of the raw recordings, and of the odometry sequences."""
+TYPES = {name: KittiType(**row) for name, row in _KITTI["types"].items()}
+DIFFICULTIES = tuple(Difficulty(**row) for row in _KITTI["difficulties"])
 
 NOTHING = "-"
 TRUNCATED = 0.15
@@ -203,7 +231,7 @@ def _beside_kitti(found: Survey) -> Table:
         c = found.kind_columns(kind)
         n = c["width_px"].size
         row = [kind, f"{n}", f"{kitti.objects}", f"{n / images:.2f}"]
-        row.append(f"{kitti.objects / IMAGES:.2f}")
+        row.append(f"{kitti.objects / KITTI_IMAGES:.2f}")
         for side, theirs in zip(("height", "width", "length"), kitti.size_hwl_m, strict=True):
             row += [_number(c[f"{side}_m"], np.mean, 2), f"{theirs:.2f}"]
         rows.append(tuple(row))
@@ -212,8 +240,8 @@ def _beside_kitti(found: Survey) -> Table:
         "length m", "KITTI",
     )  # fmt: skip
     note = (
-        f"KITTI: the {IMAGES} training images of its object benchmark (Geiger et al., CVPR 2012); "
-        "mean sizes from Frustum PointNets (Qi et al., CVPR 2018)."
+        f"KITTI: the {KITTI_IMAGES} training images of its object benchmark (Geiger et al., CVPR "
+        "2012); mean sizes from Frustum PointNets (Qi et al., CVPR 2018)."
     )
     return Table("Beside KITTI", header, tuple(rows), note)
 

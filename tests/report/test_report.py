@@ -14,7 +14,6 @@ from click.testing import CliRunner
 from gen_data.generator.cli.report_command import report
 from gen_data.generator.core.errors import StorageError
 from gen_data.generator.report.html_page import format_page
-from gen_data.generator.report.kitti_statistics import DIFFICULTIES, TYPES
 from gen_data.generator.report.label_files import (
     SCANS_MAX,
     Label,
@@ -25,6 +24,8 @@ from gen_data.generator.report.label_files import (
 )
 from gen_data.generator.report.label_statistics import Survey, collect_statistics
 from gen_data.generator.report.report_tables import (
+    DIFFICULTIES,
+    TYPES,
     Histogram,
     Table,
     counts_at,
