@@ -171,16 +171,6 @@ class Config:
     document: Node = field(compare=False)
 
     @property
-    def elements(self) -> tuple[Element, ...]:
-        """Elements of the first scene."""
-        return self.probes[0].elements
-
-    @property
-    def randomizers(self) -> tuple[Randomizer, ...]:
-        """Randomizers of the first scene."""
-        return self.probes[0].randomizers
-
-    @property
     def sensors(self) -> tuple[Sensor, ...]:
         """Sensors of the first scene; those of other scenes differ in parameters only."""
         return self.probes[0].sensors

@@ -208,10 +208,6 @@ class Numeric(Distribution[T_co]):
     """A distribution over numbers, whose reach can be checked without drawing."""
 
     @abstractmethod
-    def mean(self) -> float:
-        """Expected value."""
-
-    @abstractmethod
     def support(self) -> tuple[float, float]:
         """Smallest and largest value that can be drawn."""
 

@@ -32,11 +32,6 @@ EVERY_KIND = ("number", "whole number", "name", "flag", "rotation", "direction",
 class Listed(Numeric[T_co], kinds=EVERY_KIND):
     """A distribution over few values, which are numbers where it has a mean and a range."""
 
-    def mean(self) -> float:
-        """Expected value if all outcomes are equally likely."""
-        values = self.outcomes()
-        return sum(_as_number(value) for value in values) / len(values)
-
     def support(self) -> tuple[float, float]:
         """Smallest and largest value that can be drawn."""
         numbers = [_as_number(value) for value in self.outcomes()]
@@ -113,11 +108,6 @@ class Choice(Listed[T_co], name="choice"):
         index = bisect_right(self._cumulative, rng.random() * total)
         # A product that rounds up to the total itself belongs to the last value that has weight.
         return self.values[min(index, bisect_right(self._cumulative, total * (1 - 2.0**-53)))]
-
-    def mean(self) -> float:
-        """Expected value."""
-        pairs = zip(self.values, self.weights, strict=True)
-        return sum(_as_number(v) * w for v, w in pairs) / self._cumulative[-1]
 
     def outcomes(self) -> tuple[T_co, ...]:
         """The values that have weight."""
@@ -218,10 +208,6 @@ class Probability(Listed[bool], name="probability", kinds=("flag",)):
     def draw(self, rng: Rng) -> bool:
         """One value."""
         return rng.random() < self.p
-
-    def mean(self) -> float:
-        """The probability itself."""
-        return self.p
 
     def outcomes(self) -> tuple[bool, ...]:
         """The values that can be drawn."""

@@ -39,10 +39,6 @@ class Interval(Numeric[T_co], needs="two numbers [low, high]"):
         """Refuse a reversed range."""
         require_order(self.name, self.low, self.high)
 
-    def mean(self) -> float:
-        """Expected value: the middle."""
-        return self.low + 0.5 * (self.high - self.low)
-
     def support(self) -> tuple[float, float]:
         """Smallest and largest value."""
         return self.low, self.high
@@ -96,11 +92,6 @@ class LogUniform(
         value = round_significant(math.exp(log_low + (math.log(self.high) - log_low) * u))
         return min(max(value, self.low), self.high)
 
-    def mean(self) -> float:
-        """Expected value: (high - low) / ln(high / low)."""
-        width = math.log(self.high) - math.log(self.low)
-        return self.low if width == 0 else (self.high - self.low) / width
-
 
 @parameters
 class Normal(Numeric[float], name="normal", kinds=("number",)):
@@ -153,16 +144,6 @@ class Normal(Numeric[float], name="normal", kinds=("number",)):
         below, above, sign = self._tail()
         z = sign * _STANDARD.inv_cdf(min(below + (above - below) * u, 1 - 2.0**-53))
         return min(max(round_significant(self.center + self.stddev * z), low), high)
-
-    def mean(self) -> float:
-        """Expected value, that of the truncated distribution where there is a clip."""
-        low, high = self.support()
-        if self.clip is None or self.stddev == 0 or low == high:
-            return min(max(self.center, low), high)
-        below, above, _ = self._tail()
-        a, b = ((v - self.center) / self.stddev for v in self.clip)
-        shift = (_STANDARD.pdf(a) - _STANDARD.pdf(b)) / (above - below)
-        return min(max(self.center + self.stddev * shift, low), high)
 
     def support(self) -> tuple[float, float]:
         """The clip range; without one, all numbers."""
