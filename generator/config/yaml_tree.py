@@ -39,6 +39,9 @@ MAX_NODES = 50_000
 MAX_ALIASED_NODES = 1_000
 MAX_STRING_BYTES = 4096
 
+ORIGIN = "--set"
+"""Name of overrides in messages, in place of a file."""
+
 # The C parser where PyYAML was built with it, else the (slower) one in Python.
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
@@ -135,7 +138,7 @@ def parse_yaml(text: str, file: str) -> Node:
     # A byte order mark is legal at the start of a document, and has no meaning in UTF-8.
     node = _Reader(text.removeprefix("\ufeff"), file).read()
     if not isinstance(node.content, Mapping):
-        what = "nothing" if node.content is None else _describe(node)
+        what = "a list" if isinstance(node.content, tuple) else quote_value(node.content)
         refuse(node.position, "", f"expected a mapping of settings, got {what}")
     return node
 
@@ -153,7 +156,7 @@ def find_text(node: Node, text: str, path: FieldPath = ()) -> tuple[Position, st
     return next((place for place in found if place), None)
 
 
-def with_override(node: Node, path: str, value: str, origin: str = "--set") -> Node:
+def with_override(node: Node, path: str, value: str) -> Node:
     """Replace one value of a document, as ``--set randomizers.clutter.count=5`` does.
 
     Args:
@@ -161,14 +164,13 @@ def with_override(node: Node, path: str, value: str, origin: str = "--set") -> N
         path: Keys joined by dots; list items by ``[index]`` or by their ``name``. Missing
             keys of mappings are added and left to validation.
         value: YAML, usually a scalar or a flow collection.
-        origin: Name of the source in messages.
 
     Raises:
         ConfigError: the path does not exist, or the value is no valid YAML.
     """
-    steps = _parse_path(path, value, origin)
+    steps = _parse_path(path, value)
     within = tuple(part for part, _ in steps)
-    replacement = _Reader(f"{path}={value}", origin, start=len(path) + 1, within=within).read()
+    replacement = _Reader(f"{path}={value}", ORIGIN, start=len(path) + 1, within=within).read()
     return _replace_value(node, steps, replacement, ())
 
 
@@ -391,18 +393,12 @@ def _printable(line: str) -> str:
     return _BAD_IN_SOURCE.sub(lambda bad: " " if bad[0] == "\t" else "\ufffd", line)
 
 
-def _describe(node: Node) -> str:
-    if isinstance(node.content, tuple):
-        return "a list"
-    return "a mapping" if isinstance(node.content, Mapping) else quote_value(node.content)
-
-
 _STEP = re.compile(r"\[(\d{1,6})\]|\.?([^.\[\]]+)")
 _Step = tuple[str | int, Position]
 """One part of the path of an override, with its position."""
 
 
-def _parse_path(path: str, value: str, origin: str) -> list[_Step]:
+def _parse_path(path: str, value: str) -> list[_Step]:
     source = _printable(_LINE_BREAK.split(f"{path}={value}")[0])
     steps: list[_Step] = []
     at = 0
@@ -410,17 +406,17 @@ def _parse_path(path: str, value: str, origin: str) -> list[_Step]:
         match = _STEP.match(path, at)
         if match is None or (match[0].startswith(".") and at == 0):
             refuse(
-                Position(origin, 1, at + 1, source),
+                Position(ORIGIN, 1, at + 1, source),
                 "",
                 f"'{abbreviate(path)}' is no path; expected something like a.b[0].c",
             )
         name_at = match.start(2) if match[2] else at
         part: str | int = match[2] if match[2] else int(match[1])
-        steps.append((part, Position(origin, 1, name_at + 1, source)))
+        steps.append((part, Position(ORIGIN, 1, name_at + 1, source)))
         at = match.end()
     if not 0 < len(steps) <= MAX_DEPTH:
         what = "an empty path" if not steps else f"a path of more than {MAX_DEPTH} parts"
-        refuse(Position(origin, 1, 1, source), "", what)
+        refuse(Position(ORIGIN, 1, 1, source), "", what)
     return steps
 
 

@@ -41,7 +41,6 @@ from gen_data.generator.config.distributions import (
     Sphere,
     Uniform,
     UniformInteger,
-    with_bounds,
 )
 from gen_data.generator.config.problems import Problems
 from gen_data.generator.config.validation import validate
@@ -444,7 +443,7 @@ def test_bounds_can_be_set_on_any_field_type() -> None:
     class Limited(Strict):
         a: Annotated[Scalar, Bounds(0, 1)] = Constant(0.5)
         b: Annotated[float, Bounds(0, 1)] = 0.5
-        c: with_bounds(Scalar, 2, 3) = Constant(2)  # type: ignore[valid-type]
+        c: Annotated[Scalar, Bounds(2, 3)] = Constant(2)
 
     problems = Problems()
     validate(parse_yaml("{a: {uniform: [0, 2]}, b: 2, c: 1}", "x.yaml"), Limited, problems)

@@ -56,7 +56,7 @@ __all__ = [
     "Constant", "Count", "Direction", "Distribution", "EulerDeg", "FieldOf", "Flag", "LogUniform",
     "Malformed", "Name", "NonNegative", "Normal", "Numeric", "Position", "Positive", "Probability",
     "QuaternionWxyz", "Rotation", "Scalar", "Sequence", "Shell", "So3", "Sphere", "Uniform",
-    "UniformInteger", "UnitInterval", "distribution_schema", "with_bounds",
+    "UniformInteger", "UnitInterval", "distribution_schema",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
@@ -272,8 +272,3 @@ NonNegative = Annotated[Scalar, Bounds(low=0)]
 """A Scalar that stays >= 0."""
 Positive = Annotated[Scalar, Bounds(low=0, open_low=True)]
 """A Scalar that stays > 0."""
-
-
-def with_bounds(field: Any, low: float, high: float) -> Any:
-    """``Annotated[field, Bounds(low, high)]``, for types that are made at run time."""
-    return Annotated[field, Bounds(low, high)]
