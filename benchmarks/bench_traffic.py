@@ -29,7 +29,7 @@ FULL = {"traffic": ("gap_m=3", "count=29"), "people": ("gap_m=2", "count=40")}
 def full_street(library: Library, seed: int) -> tuple[Scene, TrafficFlow]:
     """Street at rest with 30 vehicles, including the ego vehicle, and 40 people."""
     config = load_config("street_sequence.yaml", seed=seed)
-    names = [randomizer.name for randomizer in config.randomizers]
+    names = [randomizer.name for randomizer in config.probes[0].randomizers]
     overrides = [
         f"randomizers[{names.index(group)}].{text}"
         for group, texts in FULL.items()

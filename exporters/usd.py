@@ -37,8 +37,7 @@ from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene_time import scene_at
 from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.usd.asset_layer import write_asset_layer
-from gen_data.generator.usd.material_writer import TextureFiles
+from gen_data.generator.usd.asset_layer import TextureFiles, write_asset_layer
 from gen_data.generator.usd.stage_writer import StageFiles, write_stage
 
 STAGES = "stages.jsonl"

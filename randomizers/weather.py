@@ -9,14 +9,12 @@ from pydantic import Field, field_validator
 
 from gen_data.generator.config.distributions import (
     Choice,
-    Malformed,
     Name,
     NonNegative,
     Scalar,
     Uniform,
     UnitInterval,
 )
-from gen_data.generator.config.distributions.fields import custom_error
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
@@ -104,11 +102,9 @@ class Weather(RandomizerBase):
         """Reject unknown presets."""
         for name in preset.outcomes():
             if name not in PRESETS:
-                raise custom_error(
-                    Malformed(
-                        f"there is no weather '{name}'; expected a condition and a time such as "
-                        f"ClearNoon{did_you_mean(name, PRESETS)}"
-                    )
+                raise ValueError(
+                    f"there is no weather '{name}'; expected a condition and a time such as "
+                    f"ClearNoon{did_you_mean(name, PRESETS)}"
                 )
         return preset
 

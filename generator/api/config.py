@@ -27,12 +27,12 @@ def load_config(
     Raises:
         ConfigError: the message lists all errors with their positions.
     """
-    from gen_data.generator.assemble.config import load_source_config, parse_config
+    from gen_data.generator.assemble.config import load_config, parse_config
 
     choice: dict[str, Any] = {"seed": seed, "overrides": overrides, "without": without}
     if isinstance(config, Mapping):
         return parse_config(_yaml_text(config), "<config>", "config", **choice)
-    return load_source_config(fspath(config), **choice)
+    return load_config(fspath(config), **choice)
 
 
 def _yaml_text(config: Mapping[str, Any]) -> str:

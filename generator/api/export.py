@@ -49,7 +49,7 @@ def export(
             not have.
         Interrupted: Ctrl-C or SIGTERM; the same call goes on.
     """
-    from gen_data.generator.assemble.config import load_source_config
+    from gen_data.generator.assemble.config import load_config
     from gen_data.generator.assemble.pipeline_factory import ready_exporters
     from gen_data.generator.assets.library import open_library
     from gen_data.generator.runner.exports import export as write_exports
@@ -63,8 +63,8 @@ def export(
     if label_map is not None:
         overrides.append(label_map_override(Path(label_map)))
     source = os.fspath(folder)
-    config = load_source_config(source, overrides=overrides)
-    _check_annotations(load_source_config(source), config)
+    config = load_config(source, overrides=overrides)
+    _check_annotations(load_config(source), config)
     exporters = ready_exporters(config, stored.info, open_library(config.asset_folders))
     return write_exports(
         stored,

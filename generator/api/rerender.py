@@ -50,12 +50,12 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
     """
     from threadpoolctl import threadpool_limits
 
-    from gen_data.generator.assemble.config import load_source_config
+    from gen_data.generator.assemble.config import load_config
     from gen_data.generator.runner.rerender import rerender as render_again
     from gen_data.generator.runner.stored import StoredSamples
 
     stored, source = StoredSamples(folder), os.fspath(folder)
-    was = load_source_config(source)
+    was = load_config(source)
     names = {randomizer.name for randomizer in was.probes[0].randomizers}
     texts = [_complete(text, names) for text in overrides]
     if sensors is not None:
@@ -64,7 +64,7 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
         return render_again(
             stored,
             was,
-            load_source_config(source, overrides=texts),
+            load_config(source, overrides=texts),
             Path(out),
             redraw=redraw,
             workers=len(os.sched_getaffinity(0)) if workers is None else workers,

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypedDict, TypeVar, cast
 
 from pydantic import Field, model_validator
+from typing_extensions import Unpack
 
 from gen_data.exporters.label_map import LabelMap
 from gen_data.generator.annotations.annotate import Thresholds
@@ -20,10 +21,9 @@ from gen_data.generator.assemble.plugin_tables import (
     RANDOMIZERS,
     RENDERERS,
     SENSORS,
-    make_plugin,
 )
 from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.paths import find_path
+from gen_data.generator.config.paths import PLAN, find_path
 from gen_data.generator.config.problems import Problems
 from gen_data.generator.config.shared_values import (
     draw_shared,
@@ -144,18 +144,10 @@ CONSTANT = {
     "elements": ("type", "name"),
     "randomizers": ("type", "name"),
     "sensors": (
-        "type",
-        "name",
-        "model",
-        "size_px",
-        "channels",
-        "stereo_with",
-        "rate_hz",
-        "rotation_hz",
-        "time_offset_s",
-        "lens.model",
+        "type", "name", "model", "size_px", "channels", "stereo_with", "rate_hz", "rotation_hz",
+        "time_offset_s", "lens.model",
     ),
-}
+}  # fmt: skip
 """Fields that must not depend on shared values, by list.
 
 They are properties of the whole data set, such as the size of its images.
@@ -186,16 +178,6 @@ class Config:
     document: Node = field(compare=False)
 
     @property
-    def elements(self) -> tuple[Element, ...]:
-        """Elements of the first scene."""
-        return self.probes[0].elements
-
-    @property
-    def randomizers(self) -> tuple[Randomizer, ...]:
-        """Randomizers of the first scene."""
-        return self.probes[0].randomizers
-
-    @property
     def sensors(self) -> tuple[Sensor, ...]:
         """Sensors of the first scene; those of other scenes differ in parameters only."""
         return self.probes[0].sensors
@@ -209,10 +191,8 @@ class Config:
 
     def shared(self, streams: Streams) -> tuple[tuple[str, SharedValue], ...]:
         """Draw the shared values of one scene, sorted by name."""
-        section = self.document.get("shared")
-        if section is None or not section.content:
-            return ()
-        return tuple(sorted(draw_shared(section, streams).items()))
+        section = self.document.entries["shared"]
+        return tuple(sorted(draw_shared(section, streams).items())) if section.content else ()
 
     def scene_config(self, shared: tuple[tuple[str, SharedValue], ...]) -> SceneConfig:
         """Make the configuration of a scene with these shared values.
@@ -220,7 +200,12 @@ class Config:
         Raises:
             ConfigError: the shared values make a plug-in invalid.
         """
-        return _scene_config(self.document, dict(shared)) if shared else self.probes[0]
+        if not shared:
+            return self.probes[0]
+        problems = Problems()
+        config = _scene_config(self.document, dict(shared), problems)
+        problems.raise_if_any()
+        return config
 
     @property
     def asset_folders(self) -> tuple[Path, ...]:
@@ -230,99 +215,79 @@ class Config:
             ConfigError: a folder does not exist.
         """
         listed = self.document.get("assets", "folders")
-        nodes = listed.content if listed is not None and isinstance(listed.content, tuple) else ()
         return tuple(
             find_path(node.text, node.position, f"assets.folders[{k}]", "folder", is_folder=True)
-            for k, node in enumerate(nodes)
+            for k, node in enumerate(listed.items if listed else ())
         )
 
     @property
     def split_shares(self) -> dict[str, float]:
         """Shares of the splits that are above 0, in order."""
-        splits = self.general.splits
-        shares = {"train": splits.train, "val": splits.val, "test": splits.test}
+        shares = self.general.splits.model_dump(exclude={"assign"})
         return {name: share for name, share in shares.items() if share > 0}
 
 
-def load_config(
-    source: str,
-    *,
-    seed: int | None = None,
-    overrides: Sequence[str] = (),
-    without: Sequence[str] = (),
-) -> Config:
-    """Load a configuration by path or shipped name.
+class Changes(TypedDict, total=False):
+    """Changes of the command line to a configuration.
+
+    Attributes:
+        seed: Seed of the data set; None = the configuration's.
+        overrides: ``KEY=VALUE`` each.
+        without: Names of randomizers to leave out.
+    """
+
+    seed: int | None
+    overrides: Sequence[str]
+    without: Sequence[str]
+
+
+def load_config(source: str, **changes: Unpack[Changes]) -> Config:
+    """Load a configuration by path or shipped name; the folder of a data set stands for its own.
 
     Raises:
         ConfigError: the message lists all errors with their positions.
     """
-    if seed is not None and seed < 0:
-        raise ConfigError(f"--seed: {seed} is negative; expected 0 or more")
-    document = resolve_document(
-        load_config_document(source), seed=seed, overrides=overrides, without=without
-    )
-    return _make_config(document, Path(source).stem)
-
-
-def load_source_config(
-    source: str,
-    *,
-    seed: int | None = None,
-    overrides: Sequence[str] = (),
-    without: Sequence[str] = (),
-) -> Config:
-    """Like ``load_config``; the folder of a data set stands for its configuration."""
-    plan = Path(source) / "plan.json"
+    plan = Path(source) / PLAN
     if not plan.is_file():
-        return load_config(source, seed=seed, overrides=overrides, without=without)
+        return _make_config(load_config_document(source), Path(source).stem, changes)
     try:
         kept = json.loads(plan.read_bytes())
         text, name = json.dumps(kept["config"], ensure_ascii=False), str(kept["name"])
     except (ValueError, KeyError, TypeError, OSError) as error:
         raise ConfigError(f"{plan}: is not the plan of a data set: {error}") from error
-    return parse_config(text, str(plan), name, seed=seed, overrides=overrides, without=without)
+    return parse_config(text, str(plan), name, **changes)
 
 
-def parse_config(
-    text: str,
-    file: str,
-    name: str,
-    *,
-    seed: int | None = None,
-    overrides: Sequence[str] = (),
-    without: Sequence[str] = (),
-) -> Config:
+def parse_config(text: str, file: str, name: str, **changes: Unpack[Changes]) -> Config:
     """Parse a configuration in a YAML text; messages call the text ``file``.
 
     Raises:
         ConfigError: the message lists all errors with their positions.
     """
-    document = parse_yaml(text, file)
+    return _make_config(parse_yaml(text, file), name, changes)
+
+
+def _make_config(document: Node, name: str, changes: Changes) -> Config:
+    seed = changes.get("seed")
+    if seed is not None and seed < 0:
+        raise ConfigError(f"--seed: {seed} is negative; expected 0 or more")
+    overrides, without = changes.get("overrides", ()), changes.get("without", ())
     document = resolve_document(document, seed=seed, overrides=overrides, without=without)
-    return _make_config(document, name)
-
-
-def _make_config(document: Node, name: str) -> Config:
-    assert isinstance(document.content, Mapping)
-    problems = Problems()
+    sections, problems = document.entries, Problems()
     apart = {*PLUGIN_LISTS, "annotations", "shared", "render"}
-    head_node = Node(
-        document.position,
-        {key: node for key, node in document.content.items() if key not in apart},
-        document.key_positions,
-    )
-    head = validate(head_node, GeneralSettings, problems)
-    for key, node in document.content.items():
+    general = {key: node for key, node in sections.items() if key not in apart}
+    head = validate(replace(document, content=general), GeneralSettings, problems)
+    for key, node in sections.items():
         if key not in ("shared", *VARYING) and refers(node):
             fact = f"cannot depend on shared values; expected them in {', '.join(VARYING)} only"
             problems.add(node.position, key, fact)
-    render = _renderer_settings(document.content["render"], problems)
-    exporters = _plugins(document.content["exporters"], "exporters", EXPORTERS, problems)
-    annotations = _annotations(document.content["annotations"], problems)
-    if not document.content["sensors"].content and not len(problems):
+    render = _plugin(sections["render"], "render", RENDERERS, problems, DEFAULT_RENDERER)
+    exporters = _plugins(sections["exporters"], "exporters", EXPORTERS, problems)
+    annotations = _annotations(sections["annotations"], problems)
+    if not sections["sensors"].content and not len(problems):
         problems.add(document.position, "sensors", "at least one sensor is needed")
     for key, names in CONSTANT.items():
-        _refuse_varying(document.content[key], key, names)
+        _refuse_varying(sections[key], key, names)
     probes = _probe(document, head.seed if head else 0, problems)
     problems.raise_if_any()
     assert head is not None
@@ -333,7 +298,7 @@ def _make_config(document: Node, name: str) -> Config:
         head,
         render,
         annotations,
-        tuple(exporter for exporter in exporters if exporter is not None),
+        exporters,
         probes,
         document,
     )
@@ -346,7 +311,7 @@ def _refuse_varying(listed: Node, key: str, names: tuple[str, ...]) -> None:
     fact = "is the same in all scenes of a data set; "
     fact += "expected a value that does not depend on shared ones"
     problems = Problems()
-    for number, item in enumerate(listed.content if isinstance(listed.content, tuple) else ()):
+    for number, item in enumerate(listed.items):
         for name in names:
             place = varying_place(item, name)
             if place == item.position:
@@ -358,12 +323,12 @@ def _refuse_varying(listed: Node, key: str, names: tuple[str, ...]) -> None:
 
 def _probe(document: Node, seed: int, problems: Problems) -> tuple[SceneConfig, ...]:
     """Distinct configurations of scenes for probe values; stops at the first with errors."""
-    section = document.get("shared")
-    every = list(probe_values(section, seed)) if section is not None and section.content else [{}]
+    section = document.entries["shared"]
+    every = list(probe_values(section, seed)) if section.content else [{}]
     configs: list[SceneConfig] = []
     for shared in every:
         found = Problems()
-        config = _collect_scene_config(document, shared, found)
+        config = _scene_config(document, shared, found)
         if len(found):
             problems.extend(found)
             break
@@ -372,91 +337,59 @@ def _probe(document: Node, seed: int, problems: Problems) -> tuple[SceneConfig, 
     return tuple(configs)
 
 
-def _scene_config(document: Node, shared: Mapping[str, SharedValue]) -> SceneConfig:
-    problems = Problems()
-    config = _collect_scene_config(document, shared, problems)
-    problems.raise_if_any()
-    return config
-
-
-def _collect_scene_config(
+def _scene_config(
     document: Node, shared: Mapping[str, SharedValue], problems: Problems
 ) -> SceneConfig:
-    lists = {}
-    for key in VARYING:
-        listed = document.get(key)
-        assert listed is not None
-        lists[key] = resolve_shared(listed, shared, key) if refers(listed) else listed
+    lists = {key: resolve_shared(document.entries[key], shared, key) for key in VARYING}
     return SceneConfig(
         tuple(sorted(shared.items())),
-        _named_plugins(lists["elements"], "elements", ELEMENTS, problems),
-        _named_plugins(lists["randomizers"], "randomizers", RANDOMIZERS, problems),
-        _named_plugins(lists["sensors"], "sensors", SENSORS, problems),
+        _plugins(lists["elements"], "elements", ELEMENTS, problems),
+        _plugins(lists["randomizers"], "randomizers", RANDOMIZERS, problems),
+        _plugins(lists["sensors"], "sensors", SENSORS, problems),
     )
 
 
-def _plugins(
-    listed: Node, key: str, table: PluginTable[P], problems: Problems
-) -> tuple[P | None, ...]:
-    """Make the plug-in of each item; None for an item with errors."""
+def _plugins(listed: Node, key: str, table: PluginTable[P], problems: Problems) -> tuple[P, ...]:
+    """Make the plug-in of each item without errors; names, if they have one, must be unique."""
     if not isinstance(listed.content, tuple):
         problems.add(listed.position, key, f"expected a list of {table.kind}s")
-        return ()
-    return tuple(
-        _plugin(node, f"{key}[{number}]", table, problems)
-        for number, node in enumerate(listed.content)
-    )
-
-
-class _Named(Protocol):
-    @property
-    def name(self) -> str: ...
-
-
-N = TypeVar("N", bound=_Named)
-
-
-def _named_plugins(
-    listed: Node, key: str, table: PluginTable[N], problems: Problems
-) -> tuple[N, ...]:
-    """Make plug-ins, whose names must be unique."""
-    made = _plugins(listed, key, table, problems)
+    made: list[P] = []
     names: set[str] = set()
-    for number, plugin in enumerate(made):
-        if plugin is not None and plugin.name in names:
-            assert isinstance(listed.content, tuple)
-            node = listed.content[number]
-            fact = f"the name '{plugin.name}' is taken; expected a name of its own"
+    for number, node in enumerate(listed.items):
+        plugin = _plugin(node, f"{key}[{number}]", table, problems)
+        name = getattr(plugin, "name", None) if key in VARYING else None
+        if name is not None and name in names:
+            fact = f"the name '{name}' is taken; expected a name of its own"
             problems.add((node.get("name") or node).position, f"{key}[{number}].name", fact)
+        if name is not None:
+            names.add(name)
         if plugin is not None:
-            names.add(plugin.name)
-    return tuple(plugin for plugin in made if plugin is not None)
+            made.append(plugin)
+    return tuple(made)
 
 
-def _plugin(node: Node, field: str, table: PluginTable[P], problems: Problems) -> P | None:
+def _plugin(
+    node: Node, field: str, table: PluginTable[P], problems: Problems, default: str | None = None
+) -> P | None:
+    """Make the plug-in that an entry names, or else the default one; None if it has errors."""
     tag = node.get(table.tag)
-    if tag is None or not isinstance(tag.content, str):
-        where = node.position if tag is None else tag.position
+    name = default if tag is None else tag.content
+    where = (tag or node).position
+    if not isinstance(name, str):
         fact = f"expected a {table.kind}: one of {', '.join(table)}"
         problems.add(where, f"{field}.{table.tag}", fact)
         return None
     try:
-        return make_plugin(table, tag.content, node, problems, field)
+        model = cast("type[Strict]", table.load(name))
+        return cast("P | None", validate(node, model, problems, field))
     except ConfigError as refused:
-        problems.add(tag.position, f"{field}.{table.tag}", str(refused))
+        problems.add(where, f"{field}.{table.tag}", str(refused))
         return None
-
-
-def _renderer_settings(node: Node, problems: Problems) -> RendererSettings | None:
-    """Settings of the renderer in the section ``render``."""
-    if node.get(RENDERERS.tag) is not None:
-        return _plugin(node, "render", RENDERERS, problems)
-    return make_plugin(RENDERERS, DEFAULT_RENDERER, node, problems, "render")
 
 
 def _annotations(listed: Node, problems: Problems) -> dict[str, AnyAnnotator]:
     """Annotators by name; an item is a name, or a mapping with ``type`` and parameters."""
-    items = listed.content if isinstance(listed.content, tuple) else (listed,)
+    items = listed.items if isinstance(listed.content, tuple) else (listed,)
     made: dict[str, AnyAnnotator] = {}
     for number, node in enumerate(items):
         field = f"annotations[{number}]"

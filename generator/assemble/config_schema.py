@@ -11,9 +11,8 @@ from gen_data.generator.assemble.config import (
     VARYING,
     GeneralSettings,
 )
-from gen_data.generator.assemble.inheritance import ALL, NAMED
+from gen_data.generator.assemble.documents import ALL, NAMED
 from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, RENDERERS
-from gen_data.generator.config.base_model import Strict
 from gen_data.generator.config.schema import json_schema, with_shared_values
 from gen_data.generator.core.plugins import PluginTable
 
@@ -60,9 +59,16 @@ def config_schema() -> dict[str, Any]:
         "properties": dict.fromkeys(NAMED, names),
         "additionalProperties": False,
     }
+    # Annotators with parameters may be written as mappings.
+    annotators: dict[str, Any] = {name: ANNOTATIONS.load(name) for name in ANNOTATIONS}
+    parametric = [
+        _plugin(ANNOTATIONS, name, definitions)
+        for name, annotator in annotators.items()
+        if annotator.model_fields.keys() - {ANNOTATIONS.tag}
+    ]
     properties["annotations"] = {
         "type": "array",
-        "items": {"oneOf": [{"enum": list(ANNOTATIONS)}, *_parametric(definitions)]},
+        "items": {"oneOf": [{"enum": list(ANNOTATIONS)}, *parametric]},
         "description": "Labels to compute for every object, image and sample.",
     }
     return {
@@ -73,17 +79,8 @@ def config_schema() -> dict[str, Any]:
     }
 
 
-def _parametric(definitions: dict[str, Any]) -> list[dict[str, str]]:
-    """Schemas of the annotators with parameters, which may be written as mappings."""
-    return [
-        _plugin(ANNOTATIONS, name, definitions)
-        for name in ANNOTATIONS
-        if _model(ANNOTATIONS, name).model_fields.keys() - {ANNOTATIONS.tag}
-    ]
-
-
 def _plugin(table: PluginTable[Any], name: str, definitions: dict[str, Any]) -> dict[str, str]:
-    schema = json_schema(_model(table, name))
+    schema = json_schema(table.load(name))
     varying = next((key for key, known in VARYING.items() if known is table), None)
     if varying is not None:
         schema = with_shared_values(schema, CONSTANT[varying])
@@ -93,11 +90,6 @@ def _plugin(table: PluginTable[Any], name: str, definitions: dict[str, Any]) -> 
         schema["required"] = sorted({table.tag, *schema.get("required", ())})
     definitions[f"{table.kind}.{name}"] = schema
     return {"$ref": f"#/$defs/{table.kind}.{name}"}
-
-
-def _model(table: PluginTable[Any], name: str) -> type[Strict]:
-    model: type[Strict] = table.load(name)
-    return model
 
 
 def _hoist_definitions(schema: dict[str, Any], definitions: dict[str, Any]) -> dict[str, Any]:

@@ -1,29 +1,43 @@
-"""Loading of configurations and templates, and their merging into one document."""
+"""Loading of configurations and templates, and their merging into one document.
+
+A configuration extends others, and overrides elements of its template.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
 
 from gen_data import configs, scene_templates
-from gen_data.generator.assemble.inheritance import (
-    LISTS,
-    load_extended,
-    mapping_of,
-    override_elements,
-)
-from gen_data.generator.config.merging import merge_nodes
+from gen_data.generator.config.merging import merge_named, merge_nodes, node_name, with_entry
 from gen_data.generator.config.paths import find_path
-from gen_data.generator.config.problems import Position, Problems
+from gen_data.generator.config.problems import Position, Problems, refuse
 from gen_data.generator.config.renamed_keys import refuse_moved_keys, replace_old_words
+from gen_data.generator.config.yaml_scalars import quote_value
 from gen_data.generator.config.yaml_tree import Node, load_yaml, with_override
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.sensors.lidar.datasheets import load_sheets
 
+LISTS = ("randomizers", "sensors", "annotations", "exporters")
+"""Lists of plug-ins of a configuration, besides its elements."""
+
+NAMED = (*LISTS, "elements", "shared")
+"""Sections whose entries have names, by which ``without`` leaves them out."""
+
+ALL = "all"
+"""Keyword for all inherited items of a section, in place of a list of names."""
+
+EXTENDS_MAX = 8
+"""Longest chain of configurations that extend one another."""
+
 SECTIONS = ("render", "physics", "labels", "splits", "assets", "shared")
 """Optional mappings of a configuration; a resolved document has them all."""
+
+NOWHERE = Position("(default)", 1, 1)
+"""Position of values that are in no file."""
 
 TEMPLATE_KEYS = ("shared", "defaults", "elements")
 """Keys of a template."""
@@ -40,16 +54,14 @@ def resolve_document(
         ConfigError: the document, its template or an override is invalid.
     """
     document = replace_old_words(document)
-    content = dict(mapping_of(document))
+    content = dict(_mapping_of(document))
     template = _load_template(document)
     content["elements"] = _merge_elements(document, template)
     _inherit_shared(content, template)
-    for key in SECTIONS:
-        content.setdefault(key, _default_node({}))
-    for key in LISTS:
-        content.setdefault(key, _default_node(()))
+    for key in (*SECTIONS, *LISTS):
+        content.setdefault(key, Node(NOWHERE, () if key in LISTS else {}))
     if seed is not None:
-        content["seed"] = _default_node(seed)
+        content["seed"] = Node(NOWHERE, seed)
     resolved = Node(document.position, content, document.key_positions)
     for text in overrides:
         path, separator, value = text.partition("=")
@@ -63,11 +75,10 @@ def resolve_document(
 
 def _with_datasheets(document: Node) -> Node:
     """Replace references to datasheets in sensors by their contents."""
-    content, sensors = dict(mapping_of(document)), document.get("sensors")
-    if sensors is not None and isinstance(sensors.content, tuple):
-        listed = tuple(load_sheets(sensor) for sensor in sensors.content)
-        content["sensors"] = Node(sensors.position, listed, sensors.key_positions)
-    return Node(document.position, content, document.key_positions)
+    sensors = document.entries["sensors"]
+    if isinstance(sensors.content, tuple):
+        sensors = sensors.with_children(lambda _, sensor: load_sheets(sensor))
+    return replace(document, content={**document.entries, "sensors": sensors})
 
 
 def load_config_document(name: str) -> Node:
@@ -77,7 +88,119 @@ def load_config_document(name: str) -> Node:
         ConfigError: a file is missing or invalid, or extends itself.
     """
     shipped = _shipped_files(configs)
-    return load_extended(find_path(name, None, "", "configuration", shipped=shipped), shipped)
+    return _load_extended(find_path(name, None, "", "configuration", shipped=shipped), shipped)
+
+
+def _load_extended(path: Path, shipped: Sequence[Path], extending: tuple[Path, ...] = ()) -> Node:
+    """Load a file with everything that it extends; each of ``extending`` extends the next."""
+    document = replace_old_words(load_yaml(path))
+    base = document.get("extends")
+    if base is None:
+        return document
+    chain = (*extending, path)
+    if not isinstance(base.content, str):
+        refuse(base.position, "extends", "expected a configuration")
+    found = find_path(base.content, base.position, "extends", "configuration", shipped=shipped)
+    if found.resolve() in [file.resolve() for file in chain]:
+        fact = f"extends itself: {' -> '.join(str(file) for file in (*chain, found))}"
+        refuse(base.position, "extends", fact)
+    if len(chain) > EXTENDS_MAX:
+        fact = f"more than {EXTENDS_MAX} configurations extend one another"
+        refuse(base.position, "extends", fact)
+    merged = _merge_into_base(_load_extended(found, shipped, chain), document)
+    # Again, because overrides without a type have got one now.
+    return replace_old_words(merged)
+
+
+def _merge_into_base(base: Node, document: Node) -> Node:
+    """Merge a configuration into the one that it extends."""
+    content = dict(_mapping_of(_without(base, document.get("without"))))
+    for key, node in _mapping_of(document).items():
+        if key in ("extends", "without"):
+            continue
+        inherited = content.get(key)
+        if inherited is None:
+            content[key] = node
+        elif key in (*LISTS, "elements"):
+            content[key] = _merge_items(inherited, node)
+        else:
+            content[key] = merge_nodes(inherited, node)
+    positions = {**base.key_positions, **document.key_positions}
+    return Node(document.position, content, positions)
+
+
+def _merge_items(base: Node, override: Node) -> Node:
+    """Merge plug-ins into inherited ones; a mapping overrides elements by name."""
+    if isinstance(base.content, tuple) and isinstance(override.content, Mapping):
+        return _override_elements(base, override)
+    if isinstance(base.content, tuple):
+        return merge_named(base, override)
+    return merge_nodes(base, override)
+
+
+def _without(base: Node, dropped: Node | None) -> Node:
+    """Drop the inherited items that ``without`` names by section."""
+    if dropped is None:
+        return base
+    content, problems = dict(_mapping_of(base)), Problems()
+    for key, names in _mapping_of(dropped).items():
+        field = f"without.{key}"
+        if key not in NAMED:
+            fact = f"unknown key; expected one of {', '.join(NAMED)}"
+            problems.add(dropped.key_position(key), field, fact)
+        elif names.content == ALL:
+            content.pop(key, None)
+        elif not isinstance(names.content, tuple):
+            problems.add(names.position, field, f"expected a list of names, or {ALL}")
+        else:
+            content[key] = _drop_items(content.get(key), names.content, field, problems)
+    problems.raise_if_any()
+    return Node(base.position, content, base.key_positions)
+
+
+def _drop_items(
+    section: Node | None, names: tuple[Node, ...], field: str, problems: Problems
+) -> Node:
+    """Drop named items from a list or mapping of plug-ins."""
+    section = section or Node(NOWHERE, ())
+    kept = {**section.entries, **{node_name(item): item for item in section.items}}
+    for name in names:
+        if str(name.content) not in kept:
+            fact = f"nothing inherited is named {quote_value(name.content)}; expected one of "
+            fact += ", ".join(kept) + did_you_mean(str(name.content), kept)
+            problems.add(name.position, field, fact)
+        kept.pop(str(name.content), None)
+    is_mapping = isinstance(section.content, Mapping)
+    return Node(section.position, kept if is_mapping else tuple(kept.values()))
+
+
+def _override_elements(elements: Node, overrides: Node) -> Node:
+    """Merge overrides by name into a list of elements; an override with a type may be new."""
+    by_name = {node_name(node): node for node in elements.items}
+    problems = Problems()
+    if not isinstance(overrides.content, Mapping):
+        problems.add(overrides.position, "elements", "expected overrides by element name")
+    for name, given in overrides.entries.items():
+        name_node = Node(overrides.key_position(name), name, text=name)
+        node = given if given.get("name") else with_entry(given, "name", name_node)
+        if name in by_name:
+            by_name[name] = merge_nodes(by_name[name], node)
+        elif node.get("type") is not None:
+            # New elements come after those of the template.
+            by_name[name] = node
+        else:
+            fact = f"the template has no element '{name}'; expected one of "
+            fact += ", ".join(by_name) + did_you_mean(name, by_name)
+            problems.add(overrides.key_position(name), f"elements.{name}", fact)
+    problems.raise_if_any()
+    return Node(elements.position, tuple(by_name.values()))
+
+
+def _mapping_of(node: Node) -> Mapping[str, Node]:
+    """The entries of a mapping; ConfigError for anything else."""
+    if not isinstance(node.content, Mapping):
+        raise ConfigError(f"{node.position}: expected a mapping of settings")
+    return node.content
 
 
 def _shipped_files(package: ModuleType) -> list[Path]:
@@ -92,16 +215,13 @@ def _load_template(document: Node) -> Node | None:
     if given is not None and isinstance(given.content, tuple):
         return None
     if template is None or not isinstance(template.content, str):
-        problems = Problems()
-        where = document.position if template is None else template.position
-        problems.add(where, "template", "expected the name of a template, or a list of elements")
-        problems.raise_if_any()
-        raise AssertionError("unreachable")
+        fact = "expected the name of a template, or a list of elements"
+        refuse((template or document).position, "template", fact)
     shipped = _shipped_files(scene_templates)
     path = find_path(template.content, template.position, "template", "template", shipped=shipped)
     loaded = replace_old_words(load_yaml(path))
     problems = Problems()
-    for key in mapping_of(loaded):
+    for key in _mapping_of(loaded):
         if key not in TEMPLATE_KEYS:
             fact = f"unknown key; a template has {', '.join(TEMPLATE_KEYS)}"
             problems.add(loaded.key_position(key), key, fact + did_you_mean(key, TEMPLATE_KEYS))
@@ -117,7 +237,7 @@ def _inherit_shared(content: dict[str, Node], template: Node | None) -> None:
     own, inherited = content.get("shared"), template.get("shared") if template else None
     if inherited is None or (own is not None and not isinstance(own.content, Mapping)):
         return
-    entries = {**mapping_of(inherited), **(mapping_of(own) if own else {})}
+    entries = {**_mapping_of(inherited), **(_mapping_of(own) if own else {})}
     positions = {**inherited.key_positions, **(own.key_positions if own else {})}
     content["shared"] = Node((own or inherited).position, entries, positions)
 
@@ -134,52 +254,44 @@ def _merge_elements(document: Node, template: Node | None) -> Node:
     elements = _with_defaults(elements, template.get("defaults"))
     if given is None:
         return elements
-    return override_elements(elements, given)
+    return _override_elements(elements, given)
 
 
 def _with_defaults(elements: Node, defaults: Node | None) -> Node:
     """Apply a template's defaults to its elements of each type."""
     if defaults is None:
         return elements
-    assert isinstance(elements.content, tuple)
-    by_type, problems = mapping_of(defaults), Problems()
-    types = {str(_scalar(item, "type")) for item in elements.content}
+    by_type, problems = _mapping_of(defaults), Problems()
+    types = {_kind_of(item) for item in elements.items}
     for kind in by_type:
         if kind not in types:
             fact = f"no element is of this type; expected one of {', '.join(sorted(types))}"
             fact += did_you_mean(kind, types)
             problems.add(defaults.key_position(kind), f"defaults.{kind}", fact)
     problems.raise_if_any()
-    merged = tuple(
-        merge_nodes(by_type[kind], item)
-        if (kind := str(_scalar(item, "type"))) in by_type
-        else item
-        for item in elements.content
+    merged = (
+        merge_nodes(by_type[_kind_of(item)], item) if _kind_of(item) in by_type else item
+        for item in elements.items
     )
-    return Node(elements.position, merged)
+    return Node(elements.position, tuple(merged))
+
+
+def _kind_of(item: Node) -> str:
+    kind = item.get("type")
+    return str(kind.content if kind else None)
 
 
 def _without_randomizers(document: Node, names: Sequence[str]) -> Node:
-    listed = document.get("randomizers")
-    if not names or listed is None or not isinstance(listed.content, tuple):
+    listed = document.entries["randomizers"]
+    if not names or not isinstance(listed.content, tuple):
         return document
-    known = [str(_scalar(node, "name") or _scalar(node, "type")) for node in listed.content]
+    known = [str((node.get("name") or node.get("type") or node).content) for node in listed.items]
     for name in names:
         if name not in known:
             raise ConfigError(
                 f"--without {name}: there is no such randomizer; expected one of "
                 f"{', '.join(known)}{did_you_mean(name, known)}"
             )
-    kept = tuple(n for n, name in zip(listed.content, known, strict=True) if name not in names)
-    content = {**mapping_of(document), "randomizers": Node(listed.position, kept)}
-    return Node(document.position, content, document.key_positions)
-
-
-def _scalar(node: Node, key: str) -> object:
-    found = node.get(key)
-    return None if found is None else found.content
-
-
-def _default_node(content: dict[str, Node] | tuple[Node, ...] | int) -> Node:
-    """Node of a value that is in no file."""
-    return Node(Position("(default)", 1, 1), content)
+    kept = tuple(n for n, name in zip(listed.items, known, strict=True) if name not in names)
+    content = {**document.entries, "randomizers": Node(listed.position, kept)}
+    return replace(document, content=content)

@@ -12,8 +12,8 @@ from gen_data.exporters.label_map import MappedExporter
 from gen_data.generator.annotations.annotate import annotate_ego, annotate_reading
 from gen_data.generator.assemble.config import Config, SceneConfig
 from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, default_plugin
-from gen_data.generator.assemble.reference_checks import check_references
 from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.config.problems import Problems
 from gen_data.generator.config.yaml_tree import find_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError, UnknownAsset
@@ -32,6 +32,7 @@ from gen_data.generator.physics import open_engine
 from gen_data.generator.pipeline import Pipeline
 from gen_data.generator.pipeline.pipeline import PipelineConfig, SceneSource
 from gen_data.generator.sensors.mounting import check_not_buried, stride, within_steps
+from gen_data.randomizers.base import RandomizerBase
 from gen_data.scene_templates.builder import build_scene
 
 NOMINAL_SCENES_KEPT = 32
@@ -76,7 +77,7 @@ class PipelineFactory:
         """
         library = open_library(self.config.asset_folders)
         scenes = tuple(nominal_scene(self.config, scene, library) for scene in self.config.probes)
-        check_references(self.config, scenes, library)
+        _check_references(self.config, scenes, library)
         return scenes
 
     @cached_property
@@ -91,6 +92,25 @@ class PipelineFactory:
         categories = self.categories
         state = {name: value for name, value in self.__dict__.items() if name != "nominal"}
         return {**state, "categories": categories}
+
+
+def _check_references(config: Config, scenes: Sequence[Scene], assets: AssetIndex) -> None:
+    """Refuse names of groups, categories and textures in randomizers that do not exist."""
+    problems = Problems()
+    for probe, scene in zip(config.probes, scenes, strict=True):
+        for number, randomizer in enumerate(probe.randomizers):
+            if not isinstance(randomizer, RandomizerBase):
+                continue
+            try:
+                randomizer.check(scene, assets)
+            except ConfigError as error:
+                path, _, fact = str(error).partition(": ")
+                field = path.removeprefix(f"randomizers.{randomizer.name}.")
+                # A field with its default has no position of its own.
+                item = config.document.entries["randomizers"].items[number]
+                position = (item.get(field) or item).position
+                problems.add(position, f"randomizers[{number}].{field}", fact)
+    problems.raise_if_any()
 
 
 def open_pipeline(config: Config, extra_channels: frozenset[Channel] = frozenset()) -> Pipeline:

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import gen_data.generator.annotations
 from gen_data import exporters, randomizers, scene_templates
 from gen_data.generator import renderers, sensors
-from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.problems import Problems
-from gen_data.generator.config.validation import validate
-from gen_data.generator.config.yaml_tree import Node
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.plugins import PluginTable, package_of, third_party
 
@@ -32,18 +28,6 @@ ASSET_FAMILY = "asset_family"
 """Kind of the plug-ins that only the asset library loads."""
 
 P = TypeVar("P")
-
-
-def make_plugin(
-    table: PluginTable[P], name: str, node: Node, problems: Problems, field: str
-) -> P | None:
-    """Make a plug-in from its entry in YAML; None if the entry has errors.
-
-    Raises:
-        ConfigError: the name is unknown, or its class is not a plug-in of this kind.
-    """
-    model = cast("type[Strict]", table.load(name))
-    return cast("P | None", validate(node, model, problems, field))
 
 
 def default_plugin(table: PluginTable[P], name: str) -> P:

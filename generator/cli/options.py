@@ -31,9 +31,9 @@ class ConfigurationOptions:
 
     def config(self) -> Config:
         """Load and validate the configuration."""
-        from gen_data.generator.assemble.config import load_source_config
+        from gen_data.generator.assemble.config import load_config
 
-        return load_source_config(
+        return load_config(
             self.source, seed=self.seed, overrides=self.overrides, without=self.without
         )
 

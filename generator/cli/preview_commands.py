@@ -16,7 +16,7 @@ from gen_data.generator.core.sample import Sample
 
 if TYPE_CHECKING:
     from gen_data.generator.preview.overlay import Image
-    from gen_data.generator.preview.point_cloud_views import PointColors
+    from gen_data.generator.preview.sensor_views import PointColors
 
 
 WRITTEN = "written"

@@ -25,9 +25,8 @@ def report(folder: Path, html: Path | None) -> None:
     from rich.table import Table as RichTable
 
     from gen_data.generator.report.html_page import format_page
-    from gen_data.generator.report.label_files import read_records
+    from gen_data.generator.report.label_files import read_records, read_scans
     from gen_data.generator.report.label_statistics import collect_statistics
-    from gen_data.generator.report.lidar_scans import read_scans
     from gen_data.generator.report.report_tables import (
         make_histograms,
         make_scan_tables,

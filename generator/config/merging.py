@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from gen_data.generator.config.shared_values import is_reference
 from gen_data.generator.config.yaml_tree import Node, is_distribution
@@ -23,9 +24,8 @@ def merge_nodes(base: Node, override: Node) -> Node:
     """Merge ``override`` into ``base``."""
     if not isinstance(base.content, Mapping) or not isinstance(override.content, Mapping):
         return override
-    if any(is_distribution(node) or is_reference(node) for node in (base, override)):
-        return override
-    if _differ_in_kind(base, override):
+    is_one_value = any(is_distribution(node) or is_reference(node) for node in (base, override))
+    if is_one_value or _differ_in_kind(base, override):
         return override
     dropped = ASSET_KEYS if ASSET_KEYS & override.content.keys() else frozenset()
     content = {key: node for key, node in base.content.items() if key not in dropped}
@@ -49,7 +49,9 @@ def merge_named(base: Node, override: Node) -> Node:
     for item in override.content:
         name = node_name(item)
         if name in items:
-            items[name] = merge_nodes(items[name], _with_name_of(item, items[name]))
+            # An item without a name keeps that of the inherited one, which it may replace.
+            named = item if item.get("name") else with_entry(item, "name", items[name].get("name"))
+            items[name] = merge_nodes(items[name], named)
             at = order.index(name)
             order[at:at], new = new, []
         else:
@@ -66,21 +68,14 @@ def node_name(item: Node) -> str:
     return str(item.position)
 
 
-def _with_name_of(item: Node, inherited: Node) -> Node:
-    """Give an item without a name that of the inherited one, which it may replace."""
-    return item if item.get("name") else with_entry(item, "name", inherited.get("name"))
-
-
 def with_entry(node: Node, key: str, value: Node | None) -> Node:
     """Prepend an entry to a mapping; anything else is returned unchanged."""
     if value is None or not isinstance(node.content, Mapping):
         return node
-    return Node(node.position, {key: value, **node.content}, node.key_positions)
+    return replace(node, content={key: value, **node.content})
 
 
 def _differ_in_kind(base: Node, override: Node) -> bool:
     key = "type" if base.get("type") or override.get("type") else "model"
     old, new = base.get(key), override.get(key)
-    if old is None or new is None:
-        return False
-    return isinstance(new.content, str) and old.content != new.content
+    return bool(old and new and isinstance(new.content, str) and old.content != new.content)

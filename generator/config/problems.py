@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
+from typing import NoReturn
 
 from gen_data.generator.core.errors import ConfigError
 
@@ -52,6 +53,12 @@ class Problem:
         """``file:line:column: field: fact``, and the source line with a caret."""
         place = f"{self.position}: {self.field}" if self.field else str(self.position)
         return f"{place}: {self.fact}{_quote_source(self.position)}"
+
+
+def refuse(position: Position, field: str | FieldPath, fact: str) -> NoReturn:
+    """Raise a ConfigError for one problem."""
+    path = field if isinstance(field, str) else format_path(field)
+    raise ConfigError(str(Problem(position, path, fact)))
 
 
 class Problems:

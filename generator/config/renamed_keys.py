@@ -1,7 +1,7 @@
 """Deprecated words of configuration documents, and their replacements.
 
 Deprecated words are accepted for one release, each with a ``FutureWarning`` that names its place
-and the current word. All of them are in the tables below; plug-ins know only the current ones.
+and the current word. All of them are in ``renamed_keys.yaml``; plug-ins know only the current ones.
 """
 
 from __future__ import annotations
@@ -12,12 +12,20 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
+import yaml
+
 from gen_data.generator.config.merging import merge_nodes
 from gen_data.generator.config.paths import PLAN
-from gen_data.generator.config.problems import Position, Problem, Problems
+from gen_data.generator.config.problems import (
+    FieldPath,
+    Position,
+    Problem,
+    Problems,
+    format_path,
+    refuse,
+)
 from gen_data.generator.config.shared_values import SWITCH
 from gen_data.generator.config.yaml_tree import Node
-from gen_data.generator.core.errors import ConfigError
 
 Words = Mapping[str, str]
 """Current words by deprecated ones."""
@@ -39,60 +47,16 @@ class Renames:
     values: Mapping[str, Words] = field(default_factory=dict)
 
 
-SELECTIONS: Words = {"given": SWITCH, "otherwise": "default"}
-"""Renamed keys of selections by shared values."""
-
-TYPES: Mapping[str, Words] = {
-    "elements": {"along": "lane_objects"},
-    "randomizers": {"along": "lane_objects"},
-}
-"""Renamed plug-ins, by section."""
-
-RANDOMIZERS: Words = {"every": "stage"}
-"""Renamed fields of all randomizers."""
-
+_TABLES = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+SELECTIONS: Words = _TABLES["selections"]
+TYPES: Mapping[str, Words] = _TABLES["types"]
+RANDOMIZERS: Words = _TABLES["randomizers"]
+MOVED: Mapping[str, Words] = _TABLES["moved"]
 PLUGINS: Mapping[tuple[str, str], Renames] = {
-    ("randomizers", "lane_objects"): Renames(
-        {
-            "": {
-                "used": "occupancy",
-                "turned": "reversed",
-                "scattered": "uniform_area",
-                "at_least": "min_count",
-                "spare_m": "min_clearance_m",
-                "rows": "passes",
-            }
-        }
-    ),
-    ("randomizers", "ego_on_lane"): Renames({"": {"spare_m": "min_clearance_m"}}),
-    ("randomizers", "camera_on_lane"): Renames({"": {"turned": "reversed"}}),
-    ("randomizers", "lighting"): Renames({"": {"keep": "keep_existing", "panel_m": "width_m"}}),
-    ("randomizers", "ceiling_lights"): Renames({"": {"keep": "keep_existing"}}),
-    ("sensors", "watcher"): Renames({"": {"watches": "events"}}),
-    ("sensors", "lidar"): Renames(
-        {"": {"motion": "motion_distortion"}},
-        {"motion_distortion": {"compensated": "deskewed", "frozen": "none"}},
-    ),
-    ("sensors", "rgb_camera"): Renames(
-        {
-            "": {"formation": "image_pipeline"},
-            "image_pipeline": {
-                "bloom": "glare",
-                "photosites": "image_sensor",
-                "shutter": "exposure_control",
-            },
-        },
-        {"lens.model": {"published": "calibrated"}},
-    ),
+    (section, kind): Renames(**renames)
+    for section, plugins in _TABLES["plugins"].items()
+    for kind, renames in plugins.items()
 }
-"""Renamed words of single plug-ins, by section and current type."""
-
-MOVED: Mapping[tuple[str, ...], str] = {
-    ("render", key): f"sensors[].image_pipeline.{key}: it is a property of each camera"
-    for key in ("tone", "glare", "exposure_compensation_ev")
-}
-"""Current places of keys that were removed from another one."""
-
 SECTIONS = ("elements", "randomizers", "sensors", "shared")
 
 
@@ -106,13 +70,9 @@ def replace_old_words(document: Node) -> Node:
     Raises:
         ConfigError: a deprecated word and its replacement are in the same file.
     """
-    if not isinstance(document.content, Mapping):
-        return document
-    content = {
-        key: _replace_in_section(node, key) if key in SECTIONS else node
-        for key, node in document.content.items()
-    }
-    return replace(document, content=content)
+    return document.with_children(
+        lambda key, node: _replace_in_section(node, str(key)) if key in SECTIONS else node
+    )
 
 
 def refuse_moved_keys(document: Node) -> None:
@@ -122,39 +82,29 @@ def refuse_moved_keys(document: Node) -> None:
         ConfigError: it has some; each is reported with its current place.
     """
     problems = Problems()
-    for (*parents, key), place in MOVED.items():
-        node = document.get(*parents)
-        if node is not None and node.get(key) is not None:
-            problems.add(node.key_position(key), ".".join((*parents, key)), f"has moved to {place}")
+    for section, places in MOVED.items():
+        node = document.get(section)
+        for key, place in places.items():
+            if node is not None and node.get(key) is not None:
+                problems.add(node.key_position(key), f"{section}.{key}", f"has moved to {place}")
     problems.raise_if_any()
 
 
 def _replace_in_section(node: Node, section: str) -> Node:
-    node = _rename_selections(node, section)
-    if isinstance(node.content, tuple):
-        items = (_rename_plugin(n, section, f"{section}[{k}]") for k, n in enumerate(node.content))
-        return replace(node, content=tuple(items))
-    if isinstance(node.content, Mapping) and section != "shared":
-        entries = {k: _rename_plugin(n, section, f"{section}.{k}") for k, n in node.content.items()}
-        return replace(node, content=entries)
-    return node
-
-
-def _rename_selections(node: Node, path: str) -> Node:
-    """Rename the keys of all selections in a value."""
-    if isinstance(node.content, tuple):
-        items = (_rename_selections(n, f"{path}[{k}]") for k, n in enumerate(node.content))
-        return replace(node, content=tuple(items))
-    if not isinstance(node.content, Mapping):
+    node = _rename_selections(node, (section,))
+    if section == "shared":
         return node
-    if "given" in node.content:
+    return node.with_children(lambda part, item: _rename_plugin(item, section, (section, part)))
+
+
+def _rename_selections(node: Node, path: FieldPath) -> Node:
+    """Rename the keys of all selections in a value."""
+    if "given" in node.entries:
         node = _rename_keys(node, path, SELECTIONS)
-    assert isinstance(node.content, Mapping)
-    content = {key: _rename_selections(n, f"{path}.{key}") for key, n in node.content.items()}
-    return replace(node, content=content)
+    return node.with_children(lambda part, child: _rename_selections(child, (*path, part)))
 
 
-def _rename_plugin(item: Node, section: str, path: str) -> Node:
+def _rename_plugin(item: Node, section: str, path: FieldPath) -> Node:
     """Rename the type, the fields and their values."""
     type_words = TYPES.get(section, {})
     item = _at(item, "type", path, partial(_rename_value, words=type_words))
@@ -171,53 +121,46 @@ def _rename_plugin(item: Node, section: str, path: str) -> Node:
     return item
 
 
-def _at(node: Node, place: str, path: str, change: Callable[[Node, str], Node]) -> Node:
+def _at(node: Node, place: str, path: FieldPath, change: Callable[[Node, FieldPath], Node]) -> Node:
     """Change the node at a dotted place, if there is one; in a selection, that of every entry."""
     if not place:
         return change(node, path)
-    if not isinstance(node.content, Mapping):
-        return node
-    content = dict(node.content)
-    if SWITCH in content:
-        for key in content.keys() - {SWITCH}:
-            content[key] = _at(content[key], place, f"{path}.{key}", change)
     key, _, rest = place.partition(".")
-    if key in content:
-        content[key] = _at(content[key], rest, f"{path}.{key}", change)
-    return replace(node, content=content)
+
+    def change_child(part: str | int, child: Node) -> Node:
+        if SWITCH in node.entries and part != SWITCH:
+            child = _at(child, place, (*path, part), change)
+        return _at(child, rest, (*path, part), change) if part == key else child
+
+    return node.with_children(change_child)
 
 
-def _rename_keys(node: Node, path: str, words: Words) -> Node:
+def _rename_keys(node: Node, path: FieldPath, words: Words) -> Node:
     """Rename keys of a mapping, in their order; nothing else has keys."""
-    if not isinstance(node.content, Mapping):
+    if SWITCH in node.entries and words is not SELECTIONS:
+        return node.with_children(lambda part, child: _rename_keys(child, (*path, part), words))
+    if not words.keys() & node.entries.keys():
         return node
-    if SWITCH in node.content and words is not SELECTIONS:
-        content = {k: _rename_keys(n, f"{path}.{k}", words) for k, n in node.content.items()}
-        return replace(node, content=content)
-    if not words.keys() & node.content.keys():
-        return node
-    content = {}
+    content: dict[str, Node] = {}
     positions: dict[str, Position] = {}
-    for key, value in node.content.items():
+    for key, value in node.entries.items():
         new, place = words.get(key, key), node.key_position(key)
         if new != key:
-            if new in node.content and place.file == node.key_position(new).file:
+            if new in node.entries and place.file == node.key_position(new).file:
                 fact = f"is called '{new}' now, which is given, too; expected one of them"
-                raise ConfigError(str(Problem(place, f"{path}.{key}", fact)))
-            _warn(place, f"{path}.{key}", key, new)
+                refuse(place, (*path, key), fact)
+            _warn(place, (*path, key), key, new)
         content[new] = merge_nodes(content[new], value) if new in content else value
         positions[new] = place
     return replace(node, content=content, key_positions=positions)
 
 
-def _rename_value(node: Node, path: str, words: Words) -> Node:
+def _rename_value(node: Node, path: FieldPath, words: Words) -> Node:
     """Rename a word; in a selection, that of every entry."""
-    if isinstance(node.content, Mapping) and SWITCH in node.content:
-        entries = {
-            key: entry if key == SWITCH else _rename_value(entry, f"{path}.{key}", words)
-            for key, entry in node.content.items()
-        }
-        return replace(node, content=entries)
+    if SWITCH in node.entries:
+        return node.with_children(
+            lambda key, entry: entry if key == SWITCH else _rename_value(entry, (*path, key), words)
+        )
     if not isinstance(node.content, str) or node.content not in words:
         return node
     word = words[node.content]
@@ -225,9 +168,9 @@ def _rename_value(node: Node, path: str, words: Words) -> Node:
     return replace(node, content=word, text=word)
 
 
-def _warn(place: Position, path: str, old: str, new: str) -> None:
+def _warn(place: Position, path: FieldPath, old: str, new: str) -> None:
     if Path(place.file).name == PLAN:
         return  # The record of a data set, which nobody edits.
     fact = f"'{old}' is called '{new}' now; the old name will be refused by the next release"
-    message = str(Problem(Position(place.file, place.line, place.column), path, fact))
+    message = str(Problem(replace(place, source=""), format_path(path), fact))
     warnings.warn(message, FutureWarning, stacklevel=2)

@@ -7,23 +7,15 @@ its field, and states it in terms of the YAML file instead of pydantic's.
 from __future__ import annotations
 
 import json
-import typing
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from enum import Enum
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from gen_data.generator.config.distributions.fields import MEANT, FieldOf
+from gen_data.generator.config.distributions import MEANT, Malformed
 from gen_data.generator.config.problems import FieldPath, Position, Problems, format_path
-from gen_data.generator.config.type_names import (
-    describe_type,
-    is_union,
-    numeric_bounds,
-    union_branches,
-    unwrap_annotated,
-)
+from gen_data.generator.config.schema import FieldSchema
 from gen_data.generator.config.yaml_scalars import quote_value, to_flow_yaml
 from gen_data.generator.config.yaml_tree import Node
 from gen_data.generator.core.errors import did_you_mean
@@ -32,9 +24,6 @@ if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
 Model = TypeVar("Model", bound=BaseModel)
-
-Owner = tuple[Any, tuple[Any, ...]]
-"""A type and its metadata."""
 
 _WHOLE_UNION = "whole_union"
 
@@ -69,19 +58,13 @@ def validate(
 def _position(node: Node, fault: Fault) -> Position:
     """Position of the value; of its key if that is wrong; of its parent if it is missing."""
     path = (*fault.path, *fault.below)
-    if fault.at_key and path and isinstance(path[-1], str):
-        return _nearest(node, path[:-1]).key_position(path[-1])
-    return _nearest(node, path).position
-
-
-def _nearest(node: Node, path: FieldPath) -> Node:
-    """The deepest existing node on a path."""
-    for part in path:
+    key = path[-1] if fault.at_key and path and isinstance(path[-1], str) else None
+    for part in path if key is None else path[:-1]:
         child = node.get(part)
         if child is None:
             break
         node = child
-    return node
+    return node.position if key is None else node.key_position(key)
 
 
 @dataclass(frozen=True)
@@ -89,11 +72,11 @@ class Fault:
     """One validation error.
 
     Attributes:
-        kind: Pydantic's type of error; ``fact`` for errors of distributions.
+        kind: Pydantic's type of error.
         detail: Pydantic's record of the error.
         path: Of the field, without the names of union branches.
         below: From the field to the wrong part of its distribution.
-        owner: Type of the field; of the mapping or list, for an unknown or missing part.
+        owner: Schema of the field; of the mapping or list, for an unknown or missing part.
         at_key: The key is wrong, not its value.
         union: The innermost union on the path, with its own path; None if there is none.
         branch: The alternative of that union that pydantic tried.
@@ -102,10 +85,10 @@ class Fault:
     kind: str
     detail: ErrorDetails
     path: FieldPath
-    owner: Owner
+    owner: FieldSchema
     below: FieldPath = ()
     at_key: bool = False
-    union: tuple[FieldPath, Any] | None = None
+    union: tuple[FieldPath, FieldSchema] | None = None
     branch: str = ""
 
     @property
@@ -121,21 +104,23 @@ class Fault:
 
 def locate_error(detail: ErrorDetails, model: type[BaseModel]) -> Fault:
     """Follow an error's ``loc`` through the types, and drop the names of union branches from it."""
-    owner: Owner = (model, ())
+    owner = FieldSchema.of(model)
     path: FieldPath = ()
-    union: tuple[FieldPath, Any] | None = None
+    union: tuple[FieldPath, FieldSchema] | None = None
     branch = ""
     kind, context = detail["type"], detail.get("ctx", {})
+    cause = context.get("error")
+    malformed = cause if isinstance(cause, Malformed) else Malformed("")
     is_in_parent = kind in {"missing", "extra_forbidden"}
     last = len(detail["loc"]) - is_in_parent
     for number, part in enumerate(detail["loc"]):
-        owner = _without_none(owner)
-        if is_union(owner[0]):
-            union, branch = (path, owner[0]), str(part)
-            owner = unwrap_annotated(_branch(owner[0], branch))
+        owner = owner.without_nothing()
+        if owner.branches:
+            union, branch = (path, owner), str(part)
+            owner = max(owner.branches, key=lambda schema: schema.label_score(str(part)))
         elif part != "[key]":
             path = (*path, part)
-            owner = child_type(owner[0], part) if number < last else owner
+            owner = owner.child(part) if number < last else owner
     if kind == "missing" and isinstance(path[-1], int):
         path = path[:-1]
     if kind == "union_tag_invalid":
@@ -144,9 +129,9 @@ def locate_error(detail: ErrorDetails, model: type[BaseModel]) -> Fault:
         kind,
         detail,
         path,
-        _without_none(owner),
-        below=tuple(context["path"]) if kind == "fact" else (),
-        at_key=kind == "extra_forbidden" or bool(context.get("at_key")),
+        owner.without_nothing(),
+        below=malformed.path,
+        at_key=kind == "extra_forbidden" or malformed.at_key,
         union=union,
         branch=branch,
     )
@@ -169,60 +154,7 @@ def select_union_branch(faults: list[Fault]) -> Iterator[Fault]:
         elif deepest.depth > len(union[0]):
             yield from (fault for fault in group if fault.branch == deepest.branch)
         else:
-            yield Fault(_WHOLE_UNION, deepest.detail, union[0], (union[1], ()))
-
-
-def child_type(annotation: Any, part: str | int) -> Owner:
-    """Type of a field of a model, or of an item of a collection; Any if unknown."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        info = annotation.model_fields.get(str(part))
-        return (
-            (Any, ()) if info is None else unwrap_annotated(info.annotation, tuple(info.metadata))
-        )
-    origin, arguments = typing.get_origin(annotation), typing.get_args(annotation)
-    if origin is tuple and isinstance(part, int) and Ellipsis not in arguments:
-        return unwrap_annotated(arguments[part]) if part < len(arguments) else (Any, ())
-    if origin in (list, tuple, set, frozenset):
-        return unwrap_annotated(arguments[0])
-    if isinstance(origin, type) and issubclass(origin, Mapping):
-        return unwrap_annotated(arguments[1])
-    return (Any, ())
-
-
-def literal_tags(annotation: Any) -> list[str]:
-    """Values of the literal fields of a model, one of which may be its discriminator."""
-    fields = getattr(annotation, "model_fields", {})
-    return [
-        str(value)
-        for info in fields.values()
-        if typing.get_origin(info.annotation) is Literal
-        for value in typing.get_args(info.annotation)
-    ]
-
-
-def _without_none(owner: Owner) -> Owner:
-    """``X`` for ``X | None``: pydantic does not report it as a union."""
-    annotation, metadata = owner
-    if is_union(annotation) and len(union_branches(annotation)) == 1:
-        return unwrap_annotated(union_branches(annotation)[0], metadata)
-    return owner
-
-
-def _branch(union: Any, label: str) -> Any:
-    """The alternative of a union that a part of ``loc`` names by its type or its tag."""
-    candidates = union_branches(union)
-    scores = [_label_score(label, *unwrap_annotated(candidate)) for candidate in candidates]
-    return candidates[scores.index(max(scores))]
-
-
-def _label_score(label: str, annotation: Any, metadata: tuple[Any, ...]) -> int:
-    """How well pydantic's label of an alternative fits a type: 0 (not at all) to 3."""
-    name = getattr(annotation, "__name__", str(annotation))
-    if label == name or label.startswith(f"{name}[") or label in literal_tags(annotation):
-        return 3
-    if label.startswith("function-plain") and any(isinstance(m, FieldOf) for m in metadata):
-        return 2
-    return int(label.endswith((f"-{name}", f"{name}]")))
+            yield Fault(_WHOLE_UNION, deepest.detail, *union)
 
 
 def error_text(fault: Fault) -> str:
@@ -235,26 +167,18 @@ def error_text(fault: Fault) -> str:
     return f"{message[:1].lower()}{message[1:]}, got {quote_value(fault.detail['input'])}"
 
 
-def _fact(fault: Fault) -> str:
-    return str(fault.context["fact"])
-
-
-def _validator_text(fault: Fault) -> str:
-    return str(fault.context["error"])
-
-
 def _wrong_type(fault: Fault) -> str:
-    value, annotation = fault.detail["input"], fault.owner[0]
+    value, kind = fault.detail["input"], fault.owner.schema.get("type")
     hint = ""
-    if annotation is bool and isinstance(value, str) and value.lower() in MEANT:
+    if kind == "boolean" and isinstance(value, str) and value.lower() in MEANT:
         hint = f" (did you mean {MEANT[value.lower()]}?)"
-    if annotation is str and isinstance(value, (bool, int, float)):
+    if kind == "string" and isinstance(value, (bool, int, float)):
         hint = "; put it in quotes"
-    return f"expected {describe_type(*fault.owner)}, got {quote_value(value)}{hint}"
+    return f"expected {fault.owner.words()}, got {quote_value(value)}{hint}"
 
 
 def _out_of_range(fault: Fault) -> str:
-    limits = numeric_bounds(fault.owner[1])
+    limits = fault.owner.limits
     within = limits.within() if limits is not None else fault.detail["msg"]
     return f"{quote_value(fault.detail['input'])} is not {within}"
 
@@ -262,21 +186,18 @@ def _out_of_range(fault: Fault) -> str:
 def _missing(fault: Fault) -> str:
     part = fault.detail["loc"][-1]
     if isinstance(part, int):
-        return f"expected {describe_type(*fault.owner)}, got {_counted(part, 'item')}"
-    return f"missing key '{part}'; expected {describe_type(*child_type(fault.owner[0], part))}"
+        return f"expected {fault.owner.words()}, got {_counted(part, 'item')}"
+    return f"missing key '{part}'; expected {fault.owner.child(part).words()}"
 
 
 def _missing_tag(fault: Fault) -> str:
-    tags = [
-        tag
-        for branch in union_branches(fault.owner[0])
-        for tag in literal_tags(unwrap_annotated(branch)[0])
-    ]
-    return f"missing key {fault.context['discriminator']}; expected {_one_of(tags)}"
+    name = fault.context["discriminator"]
+    tags = [str(branch.tags[name.strip("'")]) for branch in fault.owner.branches]
+    return f"missing key {name}; expected {_one_of(tags)}"
 
 
 def _unknown_key(fault: Fault) -> str:
-    known = list(getattr(fault.owner[0], "model_fields", {}))
+    known = list(fault.owner.fields)
     key = str(fault.path[-1])
     expected = f"expected one of {', '.join(known)}" if known else "no keys are expected here"
     return f"unknown key {quote_value(key)}; {expected}{did_you_mean(key, known)}"
@@ -288,10 +209,7 @@ def _unknown_tag(fault: Fault) -> str:
 
 
 def _unknown_value(fault: Fault) -> str:
-    annotation = fault.owner[0]
-    if isinstance(annotation, type) and issubclass(annotation, Enum):
-        return _unknown(fault.detail["input"], [str(member.value) for member in annotation])
-    return _unknown(fault.detail["input"], [str(v) for v in typing.get_args(annotation)])
+    return _unknown(fault.detail["input"], [str(value) for value in fault.owner.choices])
 
 
 def _unknown(wrong: object, known: list[str]) -> str:
@@ -302,12 +220,10 @@ def _unknown(wrong: object, known: list[str]) -> str:
 def _wrong_length(fault: Fault) -> str:
     unit = "character" if fault.kind.startswith("string") else "item"
     value: Any = fault.detail["input"]
-    annotation: Any = fault.owner[0]
-    count = (
-        _counted(len(value), unit) if isinstance(value, (str, list, dict)) else quote_value(value)
-    )
-    if _has_fixed_length(annotation):
-        return f"expected {describe_type(*fault.owner)}, got {count}"
+    is_sized = isinstance(value, (str, list, dict))
+    count = _counted(len(value), unit) if is_sized else quote_value(value)
+    if "prefixItems" in fault.owner.schema:
+        return f"expected {fault.owner.words()}, got {count}"
     least, most = fault.context.get("min_length"), fault.context.get("max_length")
     if least == 1:
         return "must not be empty"
@@ -316,23 +232,14 @@ def _wrong_length(fault: Fault) -> str:
     return f"expected at most {_counted(most, unit)}, got {count}"
 
 
-def _has_fixed_length(annotation: Any) -> bool:
-    return typing.get_origin(annotation) is tuple and Ellipsis not in typing.get_args(annotation)
-
-
 def _wrong_pattern(fault: Fault) -> str:
-    return (
-        f"{quote_value(fault.detail['input'])} does not match the pattern "
-        f"{fault.context['pattern']}"
-    )
+    value = quote_value(fault.detail["input"])
+    return f"{value} does not match the pattern {fault.context['pattern']}"
 
 
 def _one_of(known: list[str]) -> str:
-    return (
-        to_flow_yaml(known[0])
-        if len(known) == 1
-        else f"one of {', '.join(to_flow_yaml(k) for k in known)}"
-    )
+    words = ", ".join(to_flow_yaml(k) for k in known)
+    return words if len(known) == 1 else f"one of {words}"
 
 
 def _counted(count: object, unit: str) -> str:
@@ -340,25 +247,18 @@ def _counted(count: object, unit: str) -> str:
 
 
 _FACTS: dict[str, Callable[[Fault], str]] = {
-    "fact": _fact,
-    "value_error": _validator_text,
-    "assertion_error": _validator_text,
+    "value_error": lambda fault: str(fault.context["error"]),
+    "assertion_error": lambda fault: str(fault.context["error"]),
     "missing": _missing,
     "extra_forbidden": _unknown_key,
     "literal_error": _unknown_value,
     "enum": _unknown_value,
     "union_tag_invalid": _unknown_tag,
     "union_tag_not_found": _missing_tag,
-    "whole_union": _wrong_type,
-    "int_from_float": _wrong_type,
-    "is_instance_of": _wrong_type,
-    "greater_than": _out_of_range,
-    "greater_than_equal": _out_of_range,
-    "less_than": _out_of_range,
-    "less_than_equal": _out_of_range,
-    "too_short": _wrong_length,
-    "too_long": _wrong_length,
-    "string_too_short": _wrong_length,
-    "string_too_long": _wrong_length,
     "string_pattern_mismatch": _wrong_pattern,
+    **dict.fromkeys(("whole_union", "int_from_float", "is_instance_of"), _wrong_type),
+    **dict.fromkeys(("greater_than", "greater_than_equal"), _out_of_range),
+    **dict.fromkeys(("less_than", "less_than_equal"), _out_of_range),
+    **dict.fromkeys(("too_short", "too_long"), _wrong_length),
+    **dict.fromkeys(("string_too_short", "string_too_long"), _wrong_length),
 }

@@ -7,7 +7,7 @@ each limit is checked before the memory or stack is used.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NoReturn
@@ -24,7 +24,7 @@ from yaml.events import (
 )
 
 from gen_data.generator.config.distributions.base import DISTRIBUTIONS
-from gen_data.generator.config.problems import FieldPath, Position, Problem, Problems, format_path
+from gen_data.generator.config.problems import FieldPath, Position, Problems, format_path, refuse
 from gen_data.generator.config.yaml_scalars import (
     PlainScalar,
     abbreviate,
@@ -38,6 +38,9 @@ MAX_DEPTH = 32
 MAX_NODES = 50_000
 MAX_ALIASED_NODES = 1_000
 MAX_STRING_BYTES = 4096
+
+ORIGIN = "--set"
+"""Name of overrides in messages, in place of a file."""
 
 # The C parser where PyYAML was built with it, else the (slower) one in Python.
 _LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -73,26 +76,39 @@ class Node:
             return {key: node.plain() for key, node in self.content.items()}
         return self.content
 
+    @property
+    def entries(self) -> Mapping[str, Node]:
+        """Entries of a mapping; none for anything else."""
+        return self.content if isinstance(self.content, Mapping) else {}
+
+    @property
+    def items(self) -> tuple[Node, ...]:
+        """Items of a list; none for anything else."""
+        return self.content if isinstance(self.content, tuple) else ()
+
+    @property
+    def children(self) -> Mapping[str | int, Node]:
+        """Values of a list or mapping by index or key; none for a scalar."""
+        return dict(enumerate(self.items)) | dict(self.entries)
+
+    def with_children(self, change: Callable[[str | int, Node], Node]) -> Node:
+        """The same list or mapping with changed values; a scalar stays as it is."""
+        if isinstance(self.content, tuple):
+            return replace(self, content=tuple(change(k, n) for k, n in enumerate(self.content)))
+        if isinstance(self.content, Mapping):
+            return replace(self, content={k: change(k, n) for k, n in self.content.items()})
+        return self
+
     def get(self, *path: str | int) -> Node | None:
         """The node at the end of a path of keys and indices, or None if there is none."""
-        node = self
+        node: Node | None = self
         for part in path:
-            child = node._child(part)
-            if child is None:
-                return None
-            node = child
+            node = node.children.get(part) if node else None
         return node
 
     def key_position(self, key: str) -> Position:
         """Position of a key of this mapping; of the mapping itself if it has no such key."""
         return self.key_positions.get(key, self.position)
-
-    def _child(self, part: str | int) -> Node | None:
-        if isinstance(self.content, Mapping):
-            return self.content.get(part) if isinstance(part, str) else None
-        if isinstance(self.content, tuple) and isinstance(part, int):
-            return self.content[part] if 0 <= part < len(self.content) else None
-        return None
 
 
 def load_yaml(path: Path) -> Node:
@@ -122,38 +138,25 @@ def parse_yaml(text: str, file: str) -> Node:
     # A byte order mark is legal at the start of a document, and has no meaning in UTF-8.
     node = _Reader(text.removeprefix("\ufeff"), file).read()
     if not isinstance(node.content, Mapping):
-        what = "nothing" if node.content is None else _describe(node)
-        _refuse(node.position, "", f"expected a mapping of settings, got {what}")
+        what = "a list" if isinstance(node.content, tuple) else quote_value(node.content)
+        refuse(node.position, "", f"expected a mapping of settings, got {what}")
     return node
 
 
 def is_distribution(node: Node) -> bool:
     """Whether a node is a one-key mapping that names a distribution."""
-    keys = list(node.content) if isinstance(node.content, Mapping) else []
-    return len(keys) == 1 and keys[0] in DISTRIBUTIONS
+    return len(node.entries) == 1 and next(iter(node.entries)) in DISTRIBUTIONS
 
 
-def find_text(document: Node, text: str) -> tuple[Position, str] | None:
-    """Position and dotted path of the first scalar with a text; None if there is none."""
-    for path, node in _scalars(document, ()):
-        if text in (node.text, node.content):
-            return node.position, format_path(path)
-    return None
+def find_text(node: Node, text: str, path: FieldPath = ()) -> tuple[Position, str] | None:
+    """Position and field of the first scalar with a text; None if there is none."""
+    if text in (node.text, node.content):
+        return node.position, format_path(path)
+    found = (find_text(child, text, (*path, part)) for part, child in node.children.items())
+    return next((place for place in found if place), None)
 
 
-def _scalars(node: Node, path: FieldPath) -> Iterator[tuple[FieldPath, Node]]:
-    """All scalars below a node with their paths, in the order of the source."""
-    if isinstance(node.content, Mapping):
-        for key, child in node.content.items():
-            yield from _scalars(child, (*path, key))
-    elif isinstance(node.content, tuple):
-        for number, child in enumerate(node.content):
-            yield from _scalars(child, (*path, number))
-    else:
-        yield path, node
-
-
-def with_override(node: Node, path: str, value: str, origin: str = "--set") -> Node:
+def with_override(node: Node, path: str, value: str) -> Node:
     """Replace one value of a document, as ``--set randomizers.clutter.count=5`` does.
 
     Args:
@@ -161,14 +164,13 @@ def with_override(node: Node, path: str, value: str, origin: str = "--set") -> N
         path: Keys joined by dots; list items by ``[index]`` or by their ``name``. Missing
             keys of mappings are added and left to validation.
         value: YAML, usually a scalar or a flow collection.
-        origin: Name of the source in messages.
 
     Raises:
         ConfigError: the path does not exist, or the value is no valid YAML.
     """
-    steps = _parse_path(path, value, origin)
-    within = tuple(step.part for step in steps)
-    replacement = _Reader(f"{path}={value}", origin, start=len(path) + 1, within=within).read()
+    steps = _parse_path(path, value)
+    within = tuple(part for part, _ in steps)
+    replacement = _Reader(f"{path}={value}", ORIGIN, start=len(path) + 1, within=within).read()
     return _replace_value(node, steps, replacement, ())
 
 
@@ -342,10 +344,11 @@ class _Reader:
         if target is None:
             self._abort(where, f"alias *{name} stands inside what it names")
         # Aliases of aliases grow exponentially, so what they stand for counts, not their number.
-        self._aliased += _size(target)
+        levels, count = _extent(target)
+        self._aliased += count
         if self._aliased > MAX_ALIASED_NODES:
             self._abort(where, f"aliases stand for more than {MAX_ALIASED_NODES} values")
-        if depth + _height(target) > MAX_DEPTH:
+        if depth + levels > MAX_DEPTH:
             self._abort(where, f"nested deeper than {MAX_DEPTH} levels")
         return target
 
@@ -366,128 +369,90 @@ class _Reader:
         raise _Abort
 
 
-def _children(node: Node) -> Iterable[Node]:
-    if isinstance(node.content, Mapping):
-        return node.content.values()
-    return node.content if isinstance(node.content, tuple) else ()
-
-
-def _size(node: Node) -> int:
-    """Number of values in a tree."""
-    return 1 + sum(_size(child) for child in _children(node))
-
-
-def _height(node: Node) -> int:
-    """Levels of lists and mappings in a tree; 0 for a scalar."""
-    if not isinstance(node.content, (tuple, Mapping)):
-        return 0
-    return 1 + max((_height(child) for child in _children(node)), default=0)
+def _extent(node: Node) -> tuple[int, int]:
+    """Levels of lists and mappings in a tree (0 for a scalar), and its number of values."""
+    extents = [_extent(child) for child in node.children.values()]
+    is_scalar = not isinstance(node.content, (tuple, Mapping))
+    levels = 0 if is_scalar else 1 + max((levels for levels, _ in extents), default=0)
+    return levels, 1 + sum(count for _, count in extents)
 
 
 def _decode(data: bytes, file: str) -> str:
     if len(data) > MAX_FILE_BYTES:
-        _refuse(Position(file, 1, 1), "", f"larger than {MAX_FILE_BYTES} bytes")
+        refuse(Position(file, 1, 1), "", f"larger than {MAX_FILE_BYTES} bytes")
     try:
         return data.decode("utf-8")
     except UnicodeDecodeError as error:
         before = data[: error.start].decode("utf-8")
         lines = _LINE_BREAK.split(before)
         where = Position(file, len(lines), len(lines[-1]) + 1)
-        _refuse(where, "", f"not UTF-8: byte 0x{data[error.start]:02x}; save the file as UTF-8")
-
-
-def _refuse(where: Position, path: str, fact: str) -> NoReturn:
-    raise ConfigError(str(Problem(where, path, fact)))
+        refuse(where, "", f"not UTF-8: byte 0x{data[error.start]:02x}; save the file as UTF-8")
 
 
 def _printable(line: str) -> str:
     return _BAD_IN_SOURCE.sub(lambda bad: " " if bad[0] == "\t" else "\ufffd", line)
 
 
-def _describe(node: Node) -> str:
-    if isinstance(node.content, tuple):
-        return "a list"
-    return "a mapping" if isinstance(node.content, Mapping) else quote_value(node.content)
-
-
-@dataclass(frozen=True, slots=True)
-class _Step:
-    """One part of the path of an override, with its position."""
-
-    part: str | int
-    position: Position
-
-
 _STEP = re.compile(r"\[(\d{1,6})\]|\.?([^.\[\]]+)")
+_Step = tuple[str | int, Position]
+"""One part of the path of an override, with its position."""
 
 
-def _parse_path(path: str, value: str, origin: str) -> list[_Step]:
+def _parse_path(path: str, value: str) -> list[_Step]:
     source = _printable(_LINE_BREAK.split(f"{path}={value}")[0])
     steps: list[_Step] = []
     at = 0
     while at < len(path):
         match = _STEP.match(path, at)
         if match is None or (match[0].startswith(".") and at == 0):
-            _refuse(
-                Position(origin, 1, at + 1, source),
+            refuse(
+                Position(ORIGIN, 1, at + 1, source),
                 "",
                 f"'{abbreviate(path)}' is no path; expected something like a.b[0].c",
             )
         name_at = match.start(2) if match[2] else at
         part: str | int = match[2] if match[2] else int(match[1])
-        steps.append(_Step(part, Position(origin, 1, name_at + 1, source)))
+        steps.append((part, Position(ORIGIN, 1, name_at + 1, source)))
         at = match.end()
     if not 0 < len(steps) <= MAX_DEPTH:
         what = "an empty path" if not steps else f"a path of more than {MAX_DEPTH} parts"
-        _refuse(Position(origin, 1, 1, source), "", what)
+        refuse(Position(ORIGIN, 1, 1, source), "", what)
     return steps
 
 
 def _replace_value(node: Node, steps: list[_Step], value: Node, path: FieldPath) -> Node:
     if not steps:
         return value
-    step, rest = steps[0], steps[1:]
+    (part, where), *rest = steps
     if isinstance(node.content, tuple):
-        index = _index(node, step, path)
-        items = list(node.content)
-        items[index] = _replace_value(items[index], rest, value, (*path, index))
-        return replace(node, content=tuple(items))
-    if isinstance(node.content, Mapping) or node.content is None:
-        key = str(step.part)
-        content = dict(node.content or {})
-        child = content.get(key, Node(step.position, None))
-        content[key] = _replace_value(child, rest, value, (*path, key))
-        positions = {**node.key_positions}
-        if key not in positions or not rest:
-            positions[key] = step.position
-        return replace(node, content=content, key_positions=positions, text="")
-    _refuse(
-        step.position,
-        format_path(path),
-        f"is {quote_value(node.content)}, so it has no '{abbreviate(str(step.part))}'",
-    )
+        index = _find_index(node.content, steps[0], path)
+        child = _replace_value(node.content[index], rest, value, (*path, index))
+        return node.with_children(lambda part, item: child if part == index else item)
+    if node.content is not None and not isinstance(node.content, Mapping):
+        fact = f"is {quote_value(node.content)}, so it has no '{abbreviate(str(part))}'"
+        refuse(where, path, fact)
+    key = str(part)
+    child = _replace_value(node.entries.get(key, Node(where, None)), rest, value, (*path, key))
+    positions = dict(node.key_positions)
+    if key not in positions or not rest:
+        positions[key] = where
+    content = {**node.entries, key: child}
+    return replace(node, content=content, key_positions=positions, text="")
 
 
-def _index(node: Node, step: _Step, path: FieldPath) -> int:
+def _find_index(items: tuple[Node, ...], step: _Step, path: FieldPath) -> int:
     """Index of the list item that a step gives by number or by the item's ``name``."""
-    items = node.content if isinstance(node.content, tuple) else ()
-    if isinstance(step.part, int) or step.part.isdecimal():
-        index = int(step.part)
-        if index < len(items):
-            return index
-        _refuse(step.position, format_path(path), f"has {len(items)} items, no [{index}]")
+    part, where = step
+    if isinstance(part, int) or part.isdecimal():
+        if int(part) < len(items):
+            return int(part)
+        refuse(where, path, f"has {len(items)} items, no [{int(part)}]")
     names: dict[str, int] = {}
-    for i, item in enumerate(items):
-        name = item.get("name")
-        if name is not None:
-            names.setdefault(name.text, i)
-    wrong = step.part
-    if wrong not in names:
+    for k, item in enumerate(items):
+        if name := item.get("name"):
+            names.setdefault(name.text, k)
+    if part not in names:
         expected = ", ".join(names) if names else "an index such as [0]"
-        _refuse(
-            step.position,
-            format_path(path),
-            f"no item is named '{abbreviate(wrong)}'; expected {expected}"
-            f"{did_you_mean(wrong, names)}",
-        )
-    return names[wrong]
+        fact = f"no item is named '{abbreviate(part)}'; expected {expected}"
+        refuse(where, path, fact + did_you_mean(part, names))
+    return names[part]

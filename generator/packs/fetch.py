@@ -10,16 +10,12 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
+import yaml
+
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.packs.pack_table import ClientName, Pack
 
 _TIMEOUT_S = 1800
-_NO_NETWORK = (
-    "could not resolve", "name resolution", "name or service", "newconnectionerror", "enotfound",
-    "eai_again", "econnrefused", "connection refused", "network is unreachable", "enetunreach",
-    "timed out", "etimedout", "connection failed", "could not connect", "max retries",
-)  # fmt: skip
-"""Parts of the clients' messages, in lower case, when their registry is unreachable."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,24 +30,12 @@ class Client:
     """
 
     program: str
-    arguments: tuple[str, ...]
+    arguments: list[str]
     remedy: str
 
 
-CLIENTS: dict[ClientName, Client] = {
-    "pip": Client(
-        "pip",
-        ("download", "--no-deps", "--only-binary=:all:", "--disable-pip-version-check",
-         "--no-input", "{package}=={version}"),
-        "install pip",
-    ),
-    "apt": Client(
-        "apt-get",
-        ("download", "{package}={version}"),
-        "it comes with Debian and Ubuntu only",
-    ),
-    "npm": Client("npm", ("pack", "--silent", "{package}@{version}"), "install Node.js"),
-}  # fmt: skip
+_TABLE = yaml.safe_load(Path(__file__).with_name("clients.yaml").read_text(encoding="utf-8"))
+CLIENTS: dict[ClientName, Client] = {k: Client(**row) for k, row in _TABLE["clients"].items()}
 
 
 def fetch(pack: Pack, folder: Path) -> Path:
@@ -71,7 +55,7 @@ def fetch(pack: Pack, folder: Path) -> Path:
     files = sorted(path for path in folder.iterdir() if path.is_file())
     if done.returncode != 0 or len(files) != 1:
         said = (done.stderr + done.stdout).strip()
-        if any(words in said.lower() for words in _NO_NETWORK):
+        if any(words in said.lower() for words in _TABLE["no_network"]):
             raise _client_error(pack, command, "found no network")
         raise _client_error(pack, command, f"failed: {said[-600:] or 'it fetched no file'}")
     return files[0]

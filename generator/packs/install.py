@@ -47,7 +47,15 @@ def install(pack: Pack, folder: Path, archive: Path | None = None) -> Record:
         source, target = _make_folder(scratch / "source"), _make_folder(scratch / "target")
         extract(archive, pack.wanted, source)
         pack.convert(source, target)
-        record = _make_record(pack, target)
+        record = Record(
+            name=pack.name,
+            version=pack.version,
+            revision=pack.revision,
+            archive_sha256=pack.sha256,
+            licence=pack.licence,
+            source=pack.source,
+            files=_list_files(target),
+        )
         (target / RECORD_NAME).write_text(canonical_json(record) + "\n", encoding="utf-8")
         # Without a sync, a power cut after the rename may leave a pack of empty files.
         os.sync()
@@ -99,18 +107,6 @@ def _require_installed(name: str, folder: Path) -> None:
         raise AssetError(
             f"pack '{name}': not installed in {folder}; gen-data assets install {name}"
         )
-
-
-def _make_record(pack: Pack, target: Path) -> Record:
-    return Record(
-        name=pack.name,
-        version=pack.version,
-        revision=pack.revision,
-        archive_sha256=pack.sha256,
-        licence=pack.licence,
-        source=pack.source,
-        files=_list_files(target),
-    )
 
 
 def _list_files(folder: Path) -> tuple[StoredFile, ...]:

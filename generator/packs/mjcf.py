@@ -101,7 +101,8 @@ def _add_joint(robot: Element, body: Element, parent: str) -> None:
     name, joints = body.attrib["name"], body.findall("joint")
     moving = joints[0] if joints else None
     kind = "fixed" if moving is None else _KINDS.get(moving.get("type", "hinge"), "")
-    if len(joints) > 1 or not kind or (moving is not None and _is_offset(moving)):
+    place = "0 0 0" if moving is None else moving.get("pos", "0 0 0")
+    if len(joints) > 1 or not kind or any(float(x) != 0.0 for x in place.split()):
         raise AssetError(f"body '{name}': only one hinge or slide through its origin is supported")
     joint = SubElement(
         robot, "joint", type=kind, name=f"{name}_mount" if moving is None else moving.attrib["name"]
@@ -113,10 +114,6 @@ def _add_joint(robot: Element, body: Element, parent: str) -> None:
         lower, upper = moving.attrib["range"].split()
         SubElement(joint, "axis", xyz=moving.get("axis", "0 0 1"))
         SubElement(joint, "limit", lower=lower, upper=upper, effort="0", velocity="0")
-
-
-def _is_offset(joint: Element) -> bool:
-    return any(float(x) != 0.0 for x in joint.get("pos", "0 0 0").split())
 
 
 def _add_shape(link: Element, mjcf: Mjcf, geom: Element) -> Iterator[str]:

@@ -213,11 +213,11 @@ def _first_given(*values: float | None) -> float:
 
 def _mirror_points(name: str, place: Place) -> tuple[Point, ...]:
     x, y, z = place
-    if y == 0.0:
-        return (Point(name=name, position_m=place, radius_m=_radius_m(name, place)),)
+    sides = (("", 1.0),) if y == 0.0 else (("_left", 1.0), ("_right", -1.0))
+    radius_m = _radius_m(name, place)
     return tuple(
-        Point(name=f"{name}_{side}", position_m=(x, sign * y, z), radius_m=_radius_m(name, place))
-        for side, sign in (("left", 1.0), ("right", -1.0))
+        Point(name=f"{name}{side}", position_m=(x, sign * y, z), radius_m=radius_m)
+        for side, sign in sides
     )
 
 

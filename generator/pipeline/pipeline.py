@@ -8,7 +8,9 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
 
 from gen_data.generator.core.capture import (
     Capture,
@@ -33,13 +35,13 @@ from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.scene_time import place_sensors
 from gen_data.generator.core.streams import Streams
 from gen_data.generator.pipeline.finalize_scene import Timeline, finalize_scene
-from gen_data.generator.pipeline.lidar_counts import count_lidar_points
 from gen_data.generator.pipeline.splits import Assignment, split_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
 
+T = TypeVar("T")
 SceneSource = Callable[[Streams], tuple[Scene, Sequence[Randomizer], Sequence[Sensor]]]
 """Pure function from streams to nominal scene (sensors mounted), randomizers and sensors."""
 
@@ -94,10 +96,13 @@ class AcceptedScene:
 
 @dataclass(frozen=True, slots=True)
 class DrawnView:
-    """A view of a scene at the beginning of its sequence, with the streams that drew it."""
+    """A view of a scene at the beginning of its sequence, with the streams that drew it.
 
-    scene_index: int
-    view_index: int
+    Attributes:
+        number: Of the view among those of all scenes.
+    """
+
+    number: int
     scene: Scene
     streams: Streams
 
@@ -116,7 +121,7 @@ class Pipeline:
         open_physics: Callable[[], PhysicsEngine],
         open_renderer: Callable[[], Renderer],
     ) -> None:
-        self.config = config
+        self.config, self.info, self.exporters = config, config.info, config.exporters
         self.assets = assets
         self._open_physics = open_physics
         self._open_renderer = open_renderer
@@ -127,20 +132,10 @@ class Pipeline:
         self._offsets_s = {s.name: s.time_offset_s for s in config.info.sensors}
         self._category_ids = {name: i for i, name in enumerate(config.info.categories, 1)}
 
-    @property
-    def info(self) -> DatasetInfo:
-        """Facts about the data set, for exporters."""
-        return self.config.info
-
     @cached_property
     def renderer(self) -> Renderer:
         """The renderer, opened by the context or on first use; merging shards needs none."""
         return self._open_renderer()
-
-    @property
-    def exporters(self) -> Mapping[str, Exporter]:
-        """Exporters by name."""
-        return self.config.exporters
 
     def __enter__(self) -> Pipeline:
         """Start the engines."""
@@ -216,7 +211,7 @@ class Pipeline:
             split=self.split(view.scene_index),
             scene=scene,
             capture=capture,
-            truth=count_lidar_points(truth, capture.clouds),
+            truth=_count_lidar_points(truth, capture.clouds),
             view_attempts=streams.attempt + 1,
             timings_s=timings,
             cameras=self.info.cameras,
@@ -266,51 +261,50 @@ class Pipeline:
         return split_of(scene_index, shares, assignment, self.info.seed)
 
     def _accept(self, scene_index: int) -> AcceptedScene:
+        """Draw and settle a scene."""
         assert self._physics is not None, "use the pipeline as a context manager"
+        physics = self._physics
         timings: dict[str, float] = {}
+
+        def settle(attempt: int) -> AcceptedScene:
+            streams = Streams(self.info.seed, scene_index, attempt=attempt, index=scene_index)
+            with _timed(timings, "randomize"):
+                nominal, randomizers, sensors = self.config.open_scene(streams)
+                scene = self._randomize(nominal, randomizers, Stage.BUILD, streams)
+            with _timed(timings, "physics"):
+                settled = physics.settle(scene)
+            if settled.rejection is not None:
+                raise LayoutRejected(settled.rejection)
+            scene = finalize_scene(settled.scene, self.assets, self._category_ids)
+            return AcceptedScene(scene_index, scene, randomizers, sensors, attempt, timings)
+
+        return self._first_accepted(scene_index, settle)
+
+    def _first_accepted(self, scene_index: int, draw: Callable[[int], T]) -> T:
+        """Result of the first attempt that is not rejected; SceneRejected if all are."""
         rejections: list[Rejection] = []
         for attempt in range(self.config.layout_attempts_max):
-            streams = Streams(self.info.seed, scene_index, attempt=attempt, index=scene_index)
             try:
-                with _timed(timings, "randomize"):
-                    nominal, randomizers, sensors = self.config.open_scene(streams)
-                    scene = self._randomize(nominal, randomizers, Stage.BUILD, streams)
+                return draw(attempt)
             except LayoutRejected as refused:
                 rejections.append(refused.rejection)
-                continue
-            with _timed(timings, "physics"):
-                settled = self._physics.settle(scene)
-            if settled.rejection is None:
-                scene = finalize_scene(settled.scene, self.assets, self._category_ids)
-                return AcceptedScene(scene_index, scene, randomizers, sensors, attempt, timings)
-            rejections.append(settled.rejection)
         raise SceneRejected(scene_index, tuple(rejections))
 
     def drawn_view(self, accepted: AcceptedScene, view_index: int) -> DrawnView:
         """A view of a scene at time 0."""
-        latest = self._view
-        if latest is None or (latest.scene_index, latest.view_index) != (
-            accepted.index,
-            view_index,
-        ):
-            latest = self._view = self._draw_view(accepted, view_index)
-        return latest
-
-    def _draw_view(self, accepted: AcceptedScene, view_index: int) -> DrawnView:
-        """Draw a view, with a limited number of attempts."""
         number = accepted.index * self.info.views_per_scene + view_index
-        rejections: list[Rejection] = []
-        for attempt in range(self.config.layout_attempts_max):
+        if self._view is not None and self._view.number == number:
+            return self._view
+
+        def draw(attempt: int) -> DrawnView:
             streams = Streams(
                 self.info.seed, accepted.index, view=view_index, attempt=attempt, index=number
             )
-            try:
-                scene = self._randomize(accepted.scene, accepted.randomizers, Stage.VIEW, streams)
-            except LayoutRejected as refused:
-                rejections.append(refused.rejection)
-                continue
-            return DrawnView(accepted.index, view_index, place_sensors(scene), streams)
-        raise SceneRejected(accepted.index, tuple(rejections))
+            scene = self._randomize(accepted.scene, accepted.randomizers, Stage.VIEW, streams)
+            return DrawnView(number, place_sensors(scene), streams)
+
+        self._view = self._first_accepted(accepted.index, draw)
+        return self._view
 
     def _randomize(
         self, scene: Scene, randomizers: Sequence[Randomizer], stage: Stage, streams: Streams
@@ -320,6 +314,25 @@ class Pipeline:
                 rng = streams.rng(f"randomizer/{randomizer.name}")
                 scene = randomizer(scene, self.assets, rng)
         return scene
+
+
+def _count_lidar_points(
+    truth: Mapping[str, ImageTruth], clouds: Mapping[str, PointCloud]
+) -> Mapping[str, ImageTruth]:
+    """Add to each object its number of points in every scan."""
+    if not clouds:
+        return truth
+    counts = {name: np.bincount(c.points["instance_id"]) for name, c in sorted(clouds.items())}
+
+    def add_counts(image: ImageTruth) -> ImageTruth:
+        objects = []
+        for item in image.objects:
+            k = item.instance.instance_id
+            points = {name: int(n[k]) if k < len(n) else 0 for name, n in counts.items()}
+            objects.append(replace(item, lidar_points=points))
+        return replace(image, objects=tuple(objects))
+
+    return {name: add_counts(image) for name, image in truth.items()}
 
 
 @contextmanager

@@ -13,15 +13,12 @@ import numpy as np
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError, StorageError
 from gen_data.generator.core.sample import Sample
-from gen_data.generator.preview.device_views import event_view, radar_view
 from gen_data.generator.preview.overlay import Image, channel_image, draw_labels
-from gen_data.generator.preview.point_cloud_views import range_view, top_view
+from gen_data.generator.preview.sensor_views import event_view, radar_view, range_view, top_view
 from gen_data.generator.sensors.lidar import pseudo_lidar
 
 GAP_PX = 4
 BACKGROUND = 24
-
-
 CAPTION_PX = 18
 """Height of the caption below a tile."""
 INK = (225, 225, 225)

@@ -107,9 +107,7 @@ def draw_box3d(image: Image, box: OrientedBox, intrinsics: Intrinsics, color: Rg
     for a, b in BOX_EDGES:
         segment = _in_front(corners[a], corners[b])
         if segment is not None:
-            (ua, va), (ub, vb) = np.clip(intrinsics.project(segment), -1e4, 1e4)
-            start, end = (round(ua), round(va)), (round(ub), round(vb))
-            cv2.line(image, start, end, color, 1, cv2.LINE_AA)
+            _draw_line(image, intrinsics.project(segment), color)
 
 
 def _draw_bent(
@@ -121,9 +119,12 @@ def _draw_bent(
     for start, end in pairwise(places):
         shown = np.isfinite([start, end]).all() and np.abs(end - start).max() < image.shape[1] / 2
         if shown:
-            (ua, va), (ub, vb) = np.clip([start, end], -1e4, 1e4)
-            ends = (round(ua), round(va)), (round(ub), round(vb))
-            cv2.line(image, *ends, color, 1, cv2.LINE_AA)
+            _draw_line(image, np.array([start, end]), color)
+
+
+def _draw_line(image: Image, ends_px: NDArray[Any], color: Rgb) -> None:
+    (ua, va), (ub, vb) = np.clip(ends_px, -1e4, 1e4)
+    cv2.line(image, (round(ua), round(va)), (round(ub), round(vb)), color, 1, cv2.LINE_AA)
 
 
 def draw_keypoints(image: Image, points: Sequence[KeypointTruth], color: Rgb) -> None:

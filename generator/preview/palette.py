@@ -86,7 +86,4 @@ def color_shares(shares: NDArray[np.floating]) -> NDArray[np.uint8]:
     """
     hue = 4.0 * (1.0 - np.clip(shares, 0.0, 1.0).astype(np.float64))
     ramps = [np.abs(hue - 3.0) - 1.0, 2.0 - np.abs(hue - 2.0), 2.0 - np.abs(hue - 4.0)]
-    colors: NDArray[np.uint8] = np.round(255.0 * np.clip(np.stack(ramps, -1), 0, 1)).astype(
-        np.uint8
-    )
-    return colors
+    return np.asarray(np.round(255.0 * np.clip(np.stack(ramps, -1), 0, 1)), np.uint8)

@@ -92,11 +92,7 @@ def _executable() -> Path:
 
 
 def _find_free_port(host: str, first: int) -> int:
-    """Find the first free port from ``first`` on.
-
-    Raises:
-        ConfigError: This machine does not have the address, or no port is free.
-    """
+    """Find the first free port from ``first`` on; ConfigError if this machine has none there."""
     for port in range(first, first + PORTS_TRIED):
         with socket.socket(socket.AF_INET) as probe:
             try:
@@ -112,11 +108,7 @@ def _find_free_port(host: str, first: int) -> int:
 
 
 def _wait_until_listening(process: subprocess.Popen[bytes], host: str, port: int) -> None:
-    """Wait until the viewer accepts connections.
-
-    Raises:
-        ConfigError: It ends, or does not listen within ``START_TIMEOUT_S``.
-    """
+    """Wait until the viewer accepts connections; ConfigError if it ends or takes too long."""
     deadline_s = time.monotonic() + START_TIMEOUT_S
     while process.poll() is None and time.monotonic() < deadline_s:
         try:

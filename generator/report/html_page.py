@@ -4,27 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from html import escape
+from pathlib import Path
 
 from gen_data.generator.report.report_tables import Histogram, Table
 
 BARS_PX = (300, 90)
 """Width and height of one histogram's bars."""
 
-STYLE = """
-body { font: 15px/1.45 system-ui, sans-serif; color: #1d2430; margin: 2em auto; max-width: 1100px;
-  padding: 0 1em; }
-h2 { margin: 1.8em 0 .4em; font-size: 1.15em; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: .2em .8em .2em 0; text-align: right; white-space: nowrap; }
-th { border-bottom: 1px solid #b8c0cc; font-weight: 600; }
-th:first-child, td:first-child { text-align: left; }
-p.note { color: #5b6675; margin: .3em 0; }
-div.plots { display: flex; flex-wrap: wrap; gap: 1.2em; }
-figure { margin: 0; }
-figcaption { font-size: .9em; }
-rect { fill: #3f72af; }
-text { font-size: 9px; fill: #5b6675; }
-"""
+STYLE = "\n" + Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 
 
 def format_page(title: str, tables: Iterable[Table], histograms: Iterable[Histogram]) -> str:

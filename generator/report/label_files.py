@@ -1,4 +1,4 @@
-"""Stream of the labels of an exported data set: COCO's files, or else KITTI's.
+"""Streams of the labels of an exported data set (COCO's, or else KITTI's) and of KITTI's scans.
 
 COCO files are read line by line, with an image or annotation per line as
 ``gen_data.exporters.coco`` writes them, so that memory does not grow with the data set.
@@ -13,12 +13,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from gen_data.exporters.kitti import occlusion_level, official_type
 from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.scene import Instance
 from gen_data.generator.core.se3 import Vec3
 
 INSTANCES = "instances_"
+SCANS_MAX = 200
+"""Largest number of scans to read, chosen evenly: scans are similar."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +63,21 @@ class Picture(NamedTuple):
 
     split: str
     name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """One sweep.
+
+    Attributes:
+        points: Number of points.
+        dark: Number of points with reflectance 0.
+        cars: Horizontal distance [m] and number of points of every unoccluded car.
+    """
+
+    points: int
+    dark: int
+    cars: tuple[tuple[float, int], ...]
 
 
 def read_records(folder: Path) -> Iterator[Picture | Label | Points]:
@@ -171,3 +190,34 @@ def _kitti_label(place: str, image: tuple[str, str], line: str) -> Label:
         distance_m=math.hypot(x, z),
         size_lwh_m=(length, w, h),
     )
+
+
+def read_scans(folder: Path) -> Iterator[Scan]:
+    """Read the scans of a data set, or of its ``kitti`` folder; none without a laser scanner.
+
+    Raises:
+        StorageError: a file does not have the expected layout.
+    """
+    for root in (folder / "kitti/training", folder / "training"):
+        labelled = sorted((root / "velodyne_labels").glob("*.label"))
+        for path in labelled[:: max(1, math.ceil(len(labelled) / SCANS_MAX))]:
+            yield _read_scan(root, path)
+
+
+def _read_scan(root: Path, path: Path) -> Scan:
+    try:
+        points = np.fromfile(root / f"velodyne/{path.stem}.bin", "<f4").reshape(-1, 4)
+        rows = np.fromfile(path, "<u4") >> np.uint32(16)
+        lines = (root / f"label_2/{path.stem}.txt").read_text(encoding="utf-8").splitlines()
+        if len(rows) != len(points):
+            raise ValueError(f"{len(rows)} labels for {len(points)} points")
+        counts = np.bincount(rows, minlength=len(lines) + 1)
+        labels = [line.split(" ") for line in lines]
+        cars = tuple(
+            (math.hypot(float(label[11]), float(label[13])), int(counts[number]))
+            for number, label in enumerate(labels, 1)
+            if label[0] == "Car" and label[2] == "0"
+        )
+    except (OSError, ValueError, IndexError) as error:
+        raise StorageError(f"{path}: not a scan with labels in KITTI's format: {error}") from error
+    return Scan(len(points), int((points[:, 3] == 0.0).sum()), cars)

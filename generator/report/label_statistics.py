@@ -79,13 +79,6 @@ def collect_statistics(records: Iterable[Picture | Label | Points]) -> Survey:
 
 def _row(label: Label) -> tuple[float, ...]:
     size_m = label.size_lwh_m or (None, None, None)
-    values = (
-        label.width_px,
-        label.height_px,
-        label.occlusion_level,
-        label.truncation,
-        label.visible_fraction,
-        label.distance_m,
-        *size_m,
-    )
+    in_image = (label.width_px, label.height_px, label.occlusion_level, label.truncation)
+    values = (*in_image, label.visible_fraction, label.distance_m, *size_m)
     return tuple(math.nan if value is None else float(value) for value in values)

@@ -4,19 +4,47 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
-from gen_data.generator.report.kitti_statistics import (
-    DIFFICULTIES,
-    IMAGES,
-    POINTS_PER_SCAN,
-    TYPES,
-    Difficulty,
-)
+from gen_data.generator.report.label_files import Scan
 from gen_data.generator.report.label_statistics import Column, Survey
-from gen_data.generator.report.lidar_scans import Scan
+
+
+@dataclass(frozen=True, slots=True)
+class KittiType:
+    """One of KITTI's types: number of objects, and mean height, width and length [m]."""
+
+    objects: int
+    size_hwl_m: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Difficulty:
+    """Limits for an object to count at a difficulty.
+
+    Attributes:
+        height_px: Smallest height of its box.
+        occlusion_level, truncation: Largest values.
+    """
+
+    name: str
+    height_px: float
+    occlusion_level: int
+    truncation: float
+
+
+_KITTI = yaml.safe_load(
+    Path(__file__).with_name("kitti_statistics.yaml").read_text(encoding="utf-8")
+)
+KITTI_IMAGES: int = _KITTI["images"]
+POINTS_PER_SCAN: tuple[int, int] = tuple(_KITTI["points_per_scan"])
+"""Points per scan of the raw recordings, and of the odometry sequences."""
+TYPES = {name: KittiType(**row) for name, row in _KITTI["types"].items()}
+DIFFICULTIES = tuple(Difficulty(**row) for row in _KITTI["difficulties"])
 
 NOTHING = "-"
 TRUNCATED = 0.15
@@ -84,33 +112,21 @@ def _car_points(scans: Sequence[Scan]) -> Table:
 def make_histograms(found: Survey) -> tuple[Histogram, ...]:
     """Histograms by category, and of the number of objects per image."""
     columns = {name: found.category_columns(name) for name in found.categories}
-    per_image = found.objects_per_image()
+    images = {"images": found.objects_per_image()}
+    most = max(images["images"].max(initial=0.0), 9.0)
+    heights = [0, 10, 15, 25, 40, 60, 90, 130, 190, 270, 400, 600, 900]
+    aspects = [0, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1, 1.25, 1.6, 2, 2.5, 3.2, 4, 6]
+    values: dict[str, dict[str, Column]] = {
+        column: {name: c[column] for name, c in columns.items()}
+        for column in ("height_px", "distance_m", "visible_fraction")
+    }
+    shapes = {name: c["width_px"] / c["height_px"] for name, c in columns.items()}
     return (
-        _histogram(
-            "Objects per image",
-            np.arange(0.0, max(per_image.max(initial=0.0), 9.0) + 2.0),
-            {"images": per_image},
-        ),
-        _histogram(
-            "Height of the box [px]",
-            np.array([0, 10, 15, 25, 40, 60, 90, 130, 190, 270, 400, 600, 900], float),
-            {name: c["height_px"] for name, c in columns.items()},
-        ),
-        _histogram(
-            "Aspect ratio of the box (width / height)",
-            np.array([0, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1, 1.25, 1.6, 2, 2.5, 3.2, 4, 6]),
-            {name: c["width_px"] / c["height_px"] for name, c in columns.items()},
-        ),
-        _histogram(
-            "Distance [m]",
-            _distance_edges(columns),
-            {name: c["distance_m"] for name, c in columns.items()},
-        ),
-        _histogram(
-            "Visible fraction",
-            np.linspace(0.0, 1.0, 11),
-            {name: c["visible_fraction"] for name, c in columns.items()},
-        ),
+        _histogram("Objects per image", np.arange(0.0, most + 2.0), images),
+        _histogram("Height of the box [px]", np.array(heights, float), values["height_px"]),
+        _histogram("Aspect ratio of the box (width / height)", np.array(aspects), shapes),
+        _histogram("Distance [m]", _distance_edges(columns), values["distance_m"]),
+        _histogram("Visible fraction", np.linspace(0.0, 1.0, 11), values["visible_fraction"]),
     )
 
 
@@ -148,16 +164,8 @@ def _images(found: Survey) -> Table:
     for name, split in [*((s, s) for s in splits), ("all", None)]:
         objects = found.objects_per_image(split)
         shown = f"{np.median(objects):.0f} / {objects.max():.0f}" if objects.size else NOTHING
-        rows.append(
-            (
-                name,
-                f"{objects.size}",
-                f"{objects.sum():.0f}",
-                _share(objects == 0),
-                _number(objects, np.mean, 1),
-                shown,
-            )
-        )
+        totals = (f"{objects.size}", f"{objects.sum():.0f}", _share(objects == 0))
+        rows.append((name, *totals, _number(objects, np.mean, 1), shown))
     header = ("split", "images", "objects", "empty", "objects/image", "median / most")
     return Table("Images", header, tuple(rows))
 
@@ -168,17 +176,9 @@ def _objects(found: Survey) -> Table:
     for name in found.categories:
         c = found.category_columns(name)
         n = c["width_px"].size
-        rows.append(
-            (
-                name,
-                f"{n}",
-                f"{100.0 * n / total:.1f} %",
-                f"{n / max(len(found.images), 1):.2f}",
-                _quantiles(c["width_px"], 0),
-                _quantiles(c["height_px"], 0),
-                _quantiles(c["width_px"] / c["height_px"], 2),
-            )
-        )
+        counts = (f"{n}", f"{100.0 * n / total:.1f} %", f"{n / max(len(found.images), 1):.2f}")
+        sizes = (_quantiles(c["width_px"], 0), _quantiles(c["height_px"], 0))
+        rows.append((name, *counts, *sizes, _quantiles(c["width_px"] / c["height_px"], 2)))
     header = ("category", "objects", "share", "per image", "width px", "height px", "aspect")
     note = "Boxes and distances: 5 %, 50 % and 95 % quantiles."
     return Table("Objects", header, tuple(rows), note)
@@ -189,15 +189,10 @@ def _hidden(found: Survey) -> Table:
     for name in found.categories:
         c = found.category_columns(name)
         level = _drop_missing(c["occlusion_level"])
-        rows.append(
-            (
-                name,
-                *(_share(level == k) for k in range(3)),
-                _share(_drop_missing(c["truncation"]) > TRUNCATED),
-                _quantiles(c["visible_fraction"], 2),
-                *(_share(counts_at(c, d)) if level.size else NOTHING for d in DIFFICULTIES),
-            )
-        )
+        occluded = (_share(level == k) for k in range(3))
+        truncated = _share(_drop_missing(c["truncation"]) > TRUNCATED)
+        counted = (_share(counts_at(c, d)) if level.size else NOTHING for d in DIFFICULTIES)
+        rows.append((name, *occluded, truncated, _quantiles(c["visible_fraction"], 2), *counted))
     header = (
         "category", "occluded 0", "1", "2", "truncated", "visible fraction",
         *(d.name for d in DIFFICULTIES),
@@ -236,7 +231,7 @@ def _beside_kitti(found: Survey) -> Table:
         c = found.kind_columns(kind)
         n = c["width_px"].size
         row = [kind, f"{n}", f"{kitti.objects}", f"{n / images:.2f}"]
-        row.append(f"{kitti.objects / IMAGES:.2f}")
+        row.append(f"{kitti.objects / KITTI_IMAGES:.2f}")
         for side, theirs in zip(("height", "width", "length"), kitti.size_hwl_m, strict=True):
             row += [_number(c[f"{side}_m"], np.mean, 2), f"{theirs:.2f}"]
         rows.append(tuple(row))
@@ -245,8 +240,8 @@ def _beside_kitti(found: Survey) -> Table:
         "length m", "KITTI",
     )  # fmt: skip
     note = (
-        f"KITTI: the {IMAGES} training images of its object benchmark (Geiger et al., CVPR 2012); "
-        "mean sizes from Frustum PointNets (Qi et al., CVPR 2018)."
+        f"KITTI: the {KITTI_IMAGES} training images of its object benchmark (Geiger et al., CVPR "
+        "2012); mean sizes from Frustum PointNets (Qi et al., CVPR 2018)."
     )
     return Table("Beside KITTI", header, tuple(rows), note)
 

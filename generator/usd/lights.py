@@ -14,7 +14,7 @@ from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.photometry import luminance_cd_m2
 from gen_data.generator.core.scene import Environment, Light
 from gen_data.generator.core.se3 import SE3, Array, Vec3
-from gen_data.generator.usd.prims import along_minus_z, set_transforms
+from gen_data.generator.usd.prims import along_minus_z, rotation_from_axes, set_transforms
 
 RADIUS_M_MIN = 1e-3
 """Smallest radius of exported spheres: USD gives radiance, which points do not have."""
@@ -81,15 +81,14 @@ def read_light(prim: Any, name: str, T_stage_light: Array) -> Light | None:
     """
     from pxr import UsdLux
 
-    if prim.IsA(UsdLux.DistantLight):
-        return _read_sun(UsdLux.DistantLight(prim), name, T_stage_light)
-    if prim.IsA(UsdLux.SphereLight):
-        return _read_sphere(UsdLux.SphereLight(prim), name, T_stage_light)
-    if prim.IsA(UsdLux.RectLight):
-        return _read_rectangle(UsdLux.RectLight(prim), name, T_stage_light)
-    if prim.IsA(UsdLux.DiskLight):
-        return _read_disk(UsdLux.DiskLight(prim), name, T_stage_light)
-    return None
+    readers = {
+        UsdLux.DistantLight: _read_sun,
+        UsdLux.SphereLight: _read_sphere,
+        UsdLux.RectLight: _read_rectangle,
+        UsdLux.DiskLight: _read_disk,
+    }
+    found = ((kind, read) for kind, read in readers.items() if prim.IsA(kind))
+    return next((read(kind(prim), name, T_stage_light) for kind, read in found), None)
 
 
 def check_light(light: Light, place: str) -> Light:
@@ -114,7 +113,7 @@ def check_light(light: Light, place: str) -> Light:
             )
     if (light.kind == "disk" and light.radius_m == 0.0) or min(light.size_m) == 0.0:
         raise AssetError(f"{place}: light '{light.name}' has no area; set its size or remove it")
-    if not all(math.isfinite(v) for v in (*light.color, *light.position_m, *light.direction)):
+    if not np.isfinite((*light.color, *light.position_m, *light.direction)).all():
         raise AssetError(
             f"{place}: light '{light.name}' is not finite; check its position and color"
         )
@@ -140,9 +139,9 @@ def _read_rectangle(panel: Any, name: str, T_stage_light: Array) -> Light:
     across = (_length(T_stage_light[:3, 0]), _length(T_stage_light[:3, 1]))
     width_m = float(panel.GetWidthAttr().Get()) * across[0]
     height_m = float(panel.GetHeightAttr().Get()) * across[1]
-    x, y, z = (float(v) for v in T_stage_light[:3, 0] / across[0])
     light = _read_panel(panel, Light(name, "rectangle"), T_stage_light, width_m * height_m)
-    return replace(light, size_m=(width_m, height_m), side=(x, y, z))
+    side = _vec3(T_stage_light[:3, 0] / across[0])
+    return replace(light, size_m=(width_m, height_m), side=side)
 
 
 def _read_disk(panel: Any, name: str, T_stage_light: Array) -> Light:
@@ -154,10 +153,9 @@ def _read_disk(panel: Any, name: str, T_stage_light: Array) -> Light:
 def _read_panel(panel: Any, light: Light, T_stage_light: Array, area_m2: float) -> Light:
     """Read a panel without its size; normalised panels emit the same power at any area."""
     color, strength = _read_color(panel)
-    x, y, z = (float(v) for v in T_stage_light[:3, 3])
     return replace(
         light,
-        position_m=(x, y, z),
+        position_m=_vec3(T_stage_light[:3, 3]),
         direction=_minus_z(T_stage_light),
         color=color,
         intensity_cd=strength if panel.GetNormalizeAttr().Get() else strength * area_m2,
@@ -169,14 +167,13 @@ def _read_sphere(ball: Any, name: str, T_stage_light: Array) -> Light:
     from pxr import UsdLux
 
     color, strength = _read_color(ball)
-    x, y, z = (float(v) for v in T_stage_light[:3, 3])
     radius_m = float(ball.GetRadiusAttr().Get()) * _length(T_stage_light[:3, 0])
     # Normalised power is per surface area of the sphere, four times its visible disc.
     disc_m2 = 0.25 if ball.GetNormalizeAttr().Get() else _disk_area_m2(radius_m)
     light = Light(
         name,
         "sphere",
-        position_m=(x, y, z),
+        position_m=_vec3(T_stage_light[:3, 3]),
         direction=_minus_z(T_stage_light),
         color=color,
         intensity_cd=strength * disc_m2,
@@ -197,22 +194,23 @@ def _approximate_cutoff(light: Light) -> Light:
         return light
     down = math.tan(DIPPED_RAD) + light.cutoff
     direction = np.array(light.direction) - (0.0, 0.0, down)
-    x, y, z = (float(v) for v in direction / _length(direction))
-    return replace(light, direction=(x, y, z), cone_rad=DIPPED_RAD, cutoff=0.0)
+    unit = _vec3(direction / _length(direction))
+    return replace(light, direction=unit, cone_rad=DIPPED_RAD, cutoff=0.0)
 
 
 def _minus_z(T_stage_light: Array) -> Vec3:
-    x, y, z = (float(-v) for v in T_stage_light[:3, 2] / _length(T_stage_light[:3, 2]))
+    return _vec3(-T_stage_light[:3, 2] / _length(T_stage_light[:3, 2]))
+
+
+def _vec3(values: Array) -> Vec3:
+    x, y, z = (float(v) for v in values)
     return (x, y, z)
 
 
 def _light_pose(light: Light) -> SE3:
     if light.kind == "rectangle":
-        z = -np.asarray(light.direction, dtype=np.float64)
-        x = np.asarray(light.side, dtype=np.float64)
-        matrix = np.eye(4)
-        matrix[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
-        return SE3(light.position_m, SE3.from_matrix(matrix).quaternion_wxyz)
+        z, x = -np.asarray(light.direction, np.float64), np.asarray(light.side, np.float64)
+        return SE3(light.position_m, rotation_from_axes(x, z).quaternion_wxyz)
     turn = along_minus_z(light.direction) if light.kind != "sphere" else SE3()
     at = (0.0, 0.0, 0.0) if light.kind == "sun" else light.position_m
     return SE3(at, turn.quaternion_wxyz)

@@ -50,15 +50,10 @@ class BoundMaterial:
     @property
     def has_images(self) -> bool:
         """Whether it uses any image."""
-        channels = (
-            self.roughness_image,
-            self.metallic_image,
-            self.occlusion_image,
-            self.alpha_image,
-            self.opacity_image,
-        )
+        channels = (self.roughness_image, self.metallic_image, self.occlusion_image)
+        cover = (self.alpha_image, self.opacity_image)
         whole = (self.texture, self.normal_image, self.emission_image)
-        return any(whole) or any(name for name, _ in channels)
+        return any(whole) or any(name for name, _ in (*channels, *cover))
 
 
 PLAIN = BoundMaterial()
@@ -88,8 +83,7 @@ def read_bound_material(prim: Any, mesh: Any, place: str) -> BoundMaterial:
 
 
 def _read_preview_surface(name: str, surface: Any, where: str) -> BoundMaterial:
-    numbers = {}
-    images = {}
+    numbers, images = {}, {}
     for key, default in _NUMBERS.items():
         numbers[key], images[key] = _read_number(surface, key, default, where)
     ior = numbers["ior"]
@@ -105,7 +99,7 @@ def _read_preview_surface(name: str, surface: Any, where: str) -> BoundMaterial:
     opacity = 1.0 if is_cutout else numbers["opacity"]
     present = _find_source(surface, "opacityMode")[0] == "presence"
     material = Material(
-        base_color=(_clamp_unit(color[0]), _clamp_unit(color[1]), _clamp_unit(color[2])),
+        base_color=_clamp_color(color),
         roughness=round(numbers["roughness"], 4),
         metallic=round(numbers["metallic"], 4),
         specular=round(_clamp_unit(((ior - 1.0) / (ior + 1.0)) ** 2 / 0.08), 4),
@@ -119,17 +113,18 @@ def _read_preview_surface(name: str, surface: Any, where: str) -> BoundMaterial:
     look = BoundMaterial(
         name,
         material,
-        texture=_image_path(image, where) if image is not None else "",
+        texture=_image_path(image, where),
         roughness_image=images["roughness"],
         metallic_image=images["metallic"],
         occlusion_image=images["occlusion"],
         alpha_image=images["opacity"] if is_cutout else ("", 0),
         opacity_image=("", 0) if is_cutout else images["opacity"],
-        normal_image=_image_path(bump, where) if _is_image(bump) else "",
-        emission_image=_image_path(glow_image, where) if glow_image is not None else "",
+        normal_image=_image_path(bump, where),
+        emission_image=_image_path(glow_image, where),
         cutoff=numbers["opacityThreshold"] if is_cutout else 0.5,
     )
-    first = image if image is not None else _first_image(surface)
+    others = (_find_source(surface, key)[1] for key in _IMAGED)
+    first = next((node for node in (image, *others) if _is_image(node)), None)
     if first is None:
         return look
     uv_name, uv_matrix = _read_coordinates(first)
@@ -137,23 +132,11 @@ def _read_preview_surface(name: str, surface: Any, where: str) -> BoundMaterial:
 
 
 _NUMBERS = {
-    "roughness": 0.5,
-    "metallic": 0.0,
-    "ior": 1.5,
-    "clearcoat": 0.0,
-    "clearcoatRoughness": 0.01,
-    "opacity": 1.0,
-    "opacityThreshold": 0.0,
-    "occlusion": 1.0,
-}
+    "roughness": 0.5, "metallic": 0.0, "ior": 1.5, "clearcoat": 0.0, "clearcoatRoughness": 0.01,
+    "opacity": 1.0, "opacityThreshold": 0.0, "occlusion": 1.0,
+}  # fmt: skip
 """Scalar inputs and their default values."""
 _IMAGED = ("roughness", "metallic", "occlusion", "opacity", "normal", "emissiveColor")
-
-
-def _first_image(surface: Any) -> Any:
-    """Node of the first image besides diffuseColor's; None if there is none."""
-    nodes = (_find_source(surface, name)[1] for name in _IMAGED)
-    return next((node for node in nodes if _is_image(node)), None)
 
 
 def _find_source(surface: Any, name: str) -> tuple[Any, Any]:
@@ -182,17 +165,12 @@ def _read_number(
             raise AssetError(f"{where}: {name} is {number:g}, not in [0, 1]; correct it")
         return number if name == "ior" else _clamp_unit(number), ("", 0)
     output = str(surface.GetInput(name).GetValueProducingAttributes()[0].GetName())
-    channel = "rgba".find(UsdShade.Utils.GetBaseNameAndType(output)[0][:1])
-    channel = max(channel, 0)
+    channel = max("rgba".find(UsdShade.Utils.GetBaseNameAndType(output)[0][:1]), 0)
     return _read_scale(node)[channel], (_image_path(node, where), channel)
 
 
 def _read_color(surface: Any, name: str, default: Vec3, where: str) -> tuple[Vec3, Any]:
-    """Read a colour input and the node of the image that it multiplies; None = no image.
-
-    Raises:
-        AssetError: if the colour comes from a node other than an image.
-    """
+    """Read a colour input and the node of the image that it multiplies; None = no image."""
     value, node = _find_source(surface, name)
     if _is_image(node):
         return _read_scale(node)[:3], node
@@ -215,7 +193,9 @@ def _read_scale(node: Any) -> Any:
 
 
 def _image_path(node: Any, where: str) -> str:
-    """Resolved path of an image node. Raises AssetError if the image is missing."""
+    """Resolved path of an image node; empty for any other. Raises AssetError if it is missing."""
+    if not _is_image(node):
+        return ""
     asset = _find_source(node, "file")[0]
     if asset is None or not asset.resolvedPath:
         name = asset.path[:80] if asset is not None else ""
@@ -246,8 +226,11 @@ def _read_display_color(mesh: Any) -> Material:
     colors = UsdGeom.Gprim(mesh).GetDisplayColorAttr().Get()
     if not colors:
         return Material()
-    red, green, blue = (_clamp_unit(float(c)) for c in colors[0])
-    return Material(base_color=(red, green, blue))
+    return Material(base_color=_clamp_color(colors[0]))
+
+
+def _clamp_color(color: Any) -> Vec3:
+    return (_clamp_unit(color[0]), _clamp_unit(color[1]), _clamp_unit(color[2]))
 
 
 def _clamp_unit(value: float) -> float:

@@ -130,17 +130,11 @@ def _read_normals(mesh: Any, topology: _Topology) -> Array | None:
     from pxr import Usd
 
     values = _read_primvar(mesh.GetPrim(), "normals", topology)
-    if values is None:
-        given = mesh.GetNormalsAttr().Get(Usd.TimeCode.EarliestTime())
-        if not given:
-            return None
-        values = _expand_to_corners(
-            np.array(given, dtype=np.float64), mesh.GetNormalsInterpolation(), topology
-        )
-    if values is None or values.shape[1] != 3:
-        return None
-    normals: Array = values[topology.fans]
-    return normals
+    given = mesh.GetNormalsAttr().Get(Usd.TimeCode.EarliestTime())
+    if values is None and given:
+        directions = np.array(given, dtype=np.float64)
+        values = _expand_to_corners(directions, mesh.GetNormalsInterpolation(), topology)
+    return None if values is None or values.shape[1] != 3 else np.asarray(values[topology.fans])
 
 
 def _read_primvar(prim: Any, name: str, topology: _Topology) -> Array | None:

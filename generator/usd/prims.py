@@ -47,7 +47,11 @@ def along_minus_z(direction: Sequence[float]) -> SE3:
     z = z / np.sqrt((z * z).sum())
     helper = np.array([1.0, 0.0, 0.0]) if abs(z[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
     x = np.cross(helper, z)
-    x = x / np.sqrt((x * x).sum())
+    return rotation_from_axes(x / np.sqrt((x * x).sum()), z)
+
+
+def rotation_from_axes(x: Array, z: Array) -> SE3:
+    """Rotation whose columns are a unit X axis, the cross product, and a unit Z axis."""
     matrix = np.eye(4)
     matrix[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
     return SE3.from_matrix(matrix)

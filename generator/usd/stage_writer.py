@@ -24,10 +24,9 @@ from typing import Any
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.scene import Body, Instance, Scene
 from gen_data.generator.core.se3 import IDENTITY, SE3
-from gen_data.generator.usd.asset_layer import MESH, bind_materials
+from gen_data.generator.usd.asset_layer import MESH, TextureFinder, bind_materials
 from gen_data.generator.usd.cameras import define_camera
 from gen_data.generator.usd.lights import define_light, define_sky
-from gen_data.generator.usd.material_writer import TextureFinder
 from gen_data.generator.usd.prims import (
     open_stage_for_writing,
     scale_pose,
@@ -132,13 +131,11 @@ class _Writer:
 
         path = self.path(parent, steps[0].name)
         prim = self._stage.DefinePrim(path, "Xform")
-        set_transforms(
-            prim,
-            [
-                scale_pose(T_world_parent.inverse() @ body.T_world_body, body.scale)
-                for T_world_parent, body in zip(parents, steps, strict=True)
-            ],
-        )
+        placed = zip(parents, steps, strict=True)
+        poses = [
+            (T_world_parent.inverse() @ b.T_world_body, b.scale) for T_world_parent, b in placed
+        ]
+        set_transforms(prim, [scale_pose(pose, scale) for pose, scale in poses])
         looks = [self._find_look(body) for body in steps]
         for look in dict.fromkeys(looks):
             child = self._stage.DefinePrim(self.path(path, "look"), "Xform")
@@ -162,12 +159,12 @@ class _Writer:
 
     def _refer(self, prim: Any, look: Look) -> None:
         asset, materials = look
-        if not materials:
-            prim.GetReferences().AddReference(self._files.layer(asset))
-            return
-        if look not in self._prototypes:
+        if materials and look not in self._prototypes:
             self._prototypes[look] = self._prototype(asset, materials)
-        prim.GetReferences().AddInternalReference(self._prototypes[look])
+        if materials:
+            prim.GetReferences().AddInternalReference(self._prototypes[look])
+        else:
+            prim.GetReferences().AddReference(self._files.layer(asset))
 
     def _prototype(self, asset: str, materials: tuple[Material, ...]) -> str:
         path = self.path(f"{WORLD}/Prototypes", asset.rpartition("/")[2])

@@ -111,7 +111,7 @@ def test_shipped_configurations_can_be_extended_even_by_one_of_the_same_name(
     spec = load_config(written(folder, "extends: tabletop.yaml\nseed: 99\n", "tabletop.yaml"))
 
     assert spec.general.seed == 99
-    assert spec.randomizers == load_config("tabletop").randomizers
+    assert spec.probes[0].randomizers == load_config("tabletop").probes[0].randomizers
 
 
 def test_an_error_in_an_inherited_value_points_to_its_own_file(folder: Path) -> None:
@@ -182,7 +182,7 @@ def template_of(folder: Path, defaults: str) -> str:
 def test_a_template_lays_down_what_elements_of_a_type_have_in_common(tmp_path: Path) -> None:
     """Each of them may differ, and a configuration overrides both."""
     spec = load_config(template_of(tmp_path, "{surface: {height_m: 0.7, style: bench}}"))
-    a, b = (e for e in spec.elements if e.type == "surface")
+    a, b = (e for e in spec.probes[0].elements if e.type == "surface")
 
     assert (a.height_m, a.style, b.height_m, b.style) == (0.7, "trestle", 0.4, "bench")
 

@@ -100,4 +100,4 @@ def test_elements_that_a_configuration_adds_can_be_overridden_by_name() -> None:
     """The ego is no element of the template."""
     spec = load_config("kitti_rig", overrides=("elements.ego.asset=car?seed=4",))
 
-    assert next(e for e in spec.elements if e.name == "ego").asset == "car?seed=4"
+    assert next(e for e in spec.probes[0].elements if e.name == "ego").asset == "car?seed=4"

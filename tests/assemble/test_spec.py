@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.assemble.config import load_config, load_source_config
+from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.plugin_tables import find_plugin
+from gen_data.generator.config.distributions import Constant
 from gen_data.generator.core.errors import ConfigError
 
 CAMERA = "sensors: [{type: rgb_camera, name: color, size_px: [64, 48], hfov_deg: 60}]\n"
@@ -39,7 +40,9 @@ def test_shipped_configurations_are_valid_from_any_folder(
     spec = load_config(name)
 
     assert spec.name == name.removesuffix(".yaml")
-    assert spec.elements and spec.randomizers and spec.sensors and spec.exporters
+    assert (
+        spec.probes[0].elements and spec.probes[0].randomizers and spec.sensors and spec.exporters
+    )
 
 
 def test_a_file_of_the_user_comes_before_a_shipped_one(
@@ -87,8 +90,8 @@ def test_command_line_wins_over_file_and_template() -> None:
     )
 
     assert spec.general.seed == 0
-    assert {e.name: e for e in spec.elements}["table"].height_m == 0.6
-    assert {r.name: r for r in spec.randomizers}["clutter"].count.mean() == 3
+    assert {e.name: e for e in spec.probes[0].elements}["table"].height_m == 0.6
+    assert {r.name: r for r in spec.probes[0].randomizers}["clutter"].count == Constant(3)
     assert spec.general.physics.settle_time_s_max == 2.5
     assert spec.general.views_per_scene == 2
 
@@ -109,7 +112,7 @@ def test_resolved_document_makes_the_same_spec_again(tmp_path: Path) -> None:
     plan = {"config": first.resolved, "name": first.name}
     (tmp_path / "plan.json").write_text(json.dumps(plan))
 
-    again = load_source_config(str(tmp_path))
+    again = load_config(str(tmp_path))
 
     assert again == first
 

@@ -1,4 +1,4 @@
-"""Distributions as values: construction, equality, mean, support, YAML form."""
+"""Distributions as values: construction, equality, support, YAML form."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import pytest
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.config.distributions import (
     DISTRIBUTIONS,
+    NUMBER,
     AboutZ,
     Bounds,
     Box,
@@ -40,8 +41,6 @@ from gen_data.generator.config.distributions import (
     Sphere,
     Uniform,
     UniformInteger,
-    fields,
-    with_bounds,
 )
 from gen_data.generator.config.problems import Problems
 from gen_data.generator.config.validation import validate
@@ -160,7 +159,7 @@ def test_each_distribution_is_a_picklable_hashable_value(
 def test_what_is_drawn_lies_in_the_support(
     field: str, text: str, expected: Distribution[Any]
 ) -> None:
-    """Numbers between both ends, the mean as well; listed values where they are listed."""
+    """Numbers between both ends; listed values where they are listed."""
     del field, text
     rng = rng_of(2)
     drawn = [expected.draw(rng) for _ in range(200)]
@@ -170,7 +169,6 @@ def test_what_is_drawn_lies_in_the_support(
     if isinstance(expected, Numeric) and not isinstance(drawn[0], (str, tuple)):
         low, high = expected.support()
         assert all(low <= value <= high for value in drawn)
-        assert low <= expected.mean() <= high
 
 
 def test_every_distribution_of_the_table_is_covered_here() -> None:
@@ -220,40 +218,6 @@ def test_a_range_of_zero_width_gives_the_constant(
     assert {distribution.draw(rng) for _ in range(20)} == {value}
 
 
-# Means: elementary integrals, or (truncated normal) scipy.stats.truncnorm 1.17.
-MEANS: list[tuple[Numeric[Any], float]] = [
-    (Constant(3.5), 3.5),
-    (Uniform(1, 4), 2.5),
-    (LogUniform(1, math.e), math.e - 1),
-    (LogUniform(2, 2), 2.0),
-    (Normal(3, 2), 3.0),
-    (Normal(0, 1, clip=(-1, 1)), 0.0),
-    (Normal(0, 1, clip=(0, 10)), math.sqrt(2 / math.pi)),
-    (Normal(5, 0), 5.0),
-    (UniformInteger(3, 12), 7.5),
-    (Choice((1.0, 2.0, 6.0)), 3.0),
-    (Choice({1.0: 3, 5.0: 1}), 2.0),
-    (Sequence((1.0, 2.0, 6.0)), 3.0),
-    (Probability(0.3), 0.3),
-]
-
-
-@pytest.mark.parametrize(("distribution", "mean"), MEANS)
-def test_means_are_known_without_drawing(distribution: Numeric[Any], mean: float) -> None:
-    """From formulas."""
-    assert distribution.mean() == pytest.approx(mean, rel=1e-12, abs=1e-12)
-
-
-def test_mean_of_a_truncated_normal_agrees_with_scipy() -> None:
-    """Also when the clip range lies far in a tail."""
-    from scipy.stats import truncnorm
-
-    for mean, stddev, low, high in [(0, 1, 0.5, 3), (2, 0.5, -1, 1), (0, 1, 6, 9), (0, 1, -9, -6)]:
-        a, b = (low - mean) / stddev, (high - mean) / stddev
-        expected = truncnorm(a, b, loc=mean, scale=stddev).mean()
-        assert Normal(mean, stddev, (low, high)).mean() == pytest.approx(expected, rel=1e-9)
-
-
 SUPPORTS: list[tuple[Numeric[Any], tuple[float, float]]] = [
     (Constant(3.5), (3.5, 3.5)),
     (Uniform(1, 4), (1, 4)),
@@ -286,10 +250,10 @@ def test_outcomes_lists_what_can_be_drawn_where_that_is_little() -> None:
     assert Uniform(0, 1).outcomes() == ()
 
 
-def test_names_have_no_mean() -> None:
+def test_names_have_no_range() -> None:
     """Asking for one is a mistake of the program, not of the user."""
     with pytest.raises(TypeError, match="'a' is no number"):
-        Choice(("a", "b")).mean()
+        Choice(("a", "b")).support()
 
 
 def test_a_sequence_steps_with_the_scene_and_has_no_memory() -> None:
@@ -426,17 +390,13 @@ def test_a_distribution_of_a_third_party_needs_fields_and_a_draw_only(
             """One value."""
             return self.peak + self.reach * (rng.random() - rng.random())
 
-        def mean(self) -> float:
-            """The peak."""
-            return self.peak
-
         def support(self) -> tuple[float, float]:
             """Both ends."""
             return self.peak - self.reach, self.peak + self.reach
 
     monkeypatch.setattr(base, "distribution_names", lambda kind: ("triangular",))
     monkeypatch.setattr(base, "distribution", lambda name: Triangular)
-    kind = fields.NUMBER
+    kind = NUMBER
 
     assert base.read_distribution({"triangular": {"peak": 2}}, kind) == Triangular(2.0)
     assert Triangular(2.0).to_yaml() == {"triangular": {"peak": 2.0, "reach": 1.0}}
@@ -483,7 +443,7 @@ def test_bounds_can_be_set_on_any_field_type() -> None:
     class Limited(Strict):
         a: Annotated[Scalar, Bounds(0, 1)] = Constant(0.5)
         b: Annotated[float, Bounds(0, 1)] = 0.5
-        c: with_bounds(Scalar, 2, 3) = Constant(2)  # type: ignore[valid-type]
+        c: Annotated[Scalar, Bounds(2, 3)] = Constant(2)
 
     problems = Problems()
     validate(parse_yaml("{a: {uniform: [0, 2]}, b: 2, c: 1}", "x.yaml"), Limited, problems)

@@ -81,7 +81,7 @@ def test_sample_made_alone_equals_the_one_in_its_shard(dataset: Path) -> None:
     program = (
         "import sys, numpy as np\n"
         "from gen_data.generator.assemble.pipeline_factory import open_pipeline\n"
-        "from gen_data.generator.assemble.config import load_source_config as config_of_source\n"
+        "from gen_data.generator.assemble.config import load_config as config_of_source\n"
         "from gen_data.generator.core.capture import Channel\n"
         f"with open_pipeline(config_of_source({str(dataset)!r})) as pipeline:\n"
         "    reading = pipeline.sample(7).capture.readings['color']\n"
@@ -102,7 +102,7 @@ def test_sample_made_alone_equals_the_one_in_its_shard(dataset: Path) -> None:
 
 def test_kept_scene_renders_to_the_same_pixels(dataset: Path) -> None:
     """The Scene in scenes.jsonl is the whole provenance: no randomizer, no physics needed."""
-    from gen_data.generator.assemble.config import load_source_config
+    from gen_data.generator.assemble.config import load_config
     from gen_data.generator.assemble.pipeline_factory import PipelineFactory
     from gen_data.generator.core.capture import Channel
     from gen_data.generator.core.streams import Streams
@@ -110,7 +110,7 @@ def test_kept_scene_renders_to_the_same_pixels(dataset: Path) -> None:
 
     kept = list(read_scenes(dataset / "shards" / "000002" / "scenes.jsonl"))[3]
     scene = kept.scene
-    config = load_source_config(str(dataset))
+    config = load_config(str(dataset))
     pipeline = PipelineFactory(config, n=15)()
     (camera,) = (sensor for sensor in config.sensors if sensor.name == "color")
     stream = Streams(seed=0, scene=0).rng("color")

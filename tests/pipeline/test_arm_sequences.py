@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gen_data.generator.assemble.config import load_source_config
+from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.pipeline_factory import open_pipeline
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.sample import Sample
@@ -19,13 +19,13 @@ SMALL = (
 @pytest.fixture(scope="module")
 def sequence() -> list[Sample]:
     """All ten instants, in order."""
-    with open_pipeline(load_source_config("tabletop_sequence.yaml", overrides=SMALL)) as pipeline:
+    with open_pipeline(load_config("tabletop_sequence.yaml", overrides=SMALL)) as pipeline:
         return [pipeline.sample(index) for index in range(10)]
 
 
 def test_a_sample_alone_equals_the_one_in_its_sequence(sequence: list[Sample]) -> None:
     """Scene, image and labels of the seventh instant."""
-    with open_pipeline(load_source_config("tabletop_sequence.yaml", overrides=SMALL)) as pipeline:
+    with open_pipeline(load_config("tabletop_sequence.yaml", overrides=SMALL)) as pipeline:
         alone = pipeline.sample(7)
 
     assert canonical_json(alone.scene) == canonical_json(sequence[7].scene)

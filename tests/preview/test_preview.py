@@ -24,8 +24,8 @@ from gen_data.generator.core.skeletons import PERSON
 from gen_data.generator.preview.contact_sheet import GAP_PX, arrange_tiles
 from gen_data.generator.preview.overlay import BOX_EDGES, draw_box3d, draw_keypoints
 from gen_data.generator.preview.palette import color_depth, color_ids, color_shares, id_color
-from gen_data.generator.preview.point_cloud_views import ROW_PX, point_colors, range_view, top_view
 from gen_data.generator.preview.rerun_recording import Recorder
+from gen_data.generator.preview.sensor_views import ROW_PX, point_colors, range_view, top_view
 
 
 def test_box_edges_join_corners_that_differ_in_one_axis() -> None:

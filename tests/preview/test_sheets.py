@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import load_source_config
+from gen_data.generator.assemble.config import load_config
 from gen_data.generator.core.capture import Capture, Channel, Measurements, SensorReading
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.measurement_dtypes import table_rows
@@ -17,7 +17,7 @@ from gen_data.generator.core.sample import ImageTruth, Sample
 from gen_data.generator.core.scene import Camera, Device, Instance, Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.preview.contact_sheet import CAPTION_PX, Tile, make_tiles, render_tiles
-from gen_data.generator.preview.device_views import BRIGHTER, DARKER, GREY, event_view, radar_view
+from gen_data.generator.preview.sensor_views import BRIGHTER, DARKER, GREY, event_view, radar_view
 
 DOCS = Path(__file__).parents[2] / "docs"
 SHEETS = sorted((DOCS / "sheets").glob("*.yaml"))
@@ -116,7 +116,7 @@ def test_things_are_outlined_around_a_radar() -> None:
 def test_sheets_of_the_documentation_are_valid_and_tell_their_command(path: Path) -> None:
     """Each is read without a fault; the picture that its command makes is there."""
     text = path.read_text("utf-8")
-    assert load_source_config(str(path)).sensors
+    assert load_config(str(path)).sensors
     source = path.with_name("sensors.yaml").read_text("utf-8") if path.stem == "depth" else text
     (out,) = re.findall(r"--out docs/(\S+)", source)
     assert (DOCS / out).exists()

@@ -14,11 +14,18 @@ from click.testing import CliRunner
 from gen_data.generator.cli.report_command import report
 from gen_data.generator.core.errors import StorageError
 from gen_data.generator.report.html_page import format_page
-from gen_data.generator.report.kitti_statistics import DIFFICULTIES, TYPES
-from gen_data.generator.report.label_files import Label, Picture, Points, read_records
+from gen_data.generator.report.label_files import (
+    SCANS_MAX,
+    Label,
+    Picture,
+    Points,
+    read_records,
+    read_scans,
+)
 from gen_data.generator.report.label_statistics import Survey, collect_statistics
-from gen_data.generator.report.lidar_scans import SCANS_MAX, read_scans
 from gen_data.generator.report.report_tables import (
+    DIFFICULTIES,
+    TYPES,
     Histogram,
     Table,
     counts_at,

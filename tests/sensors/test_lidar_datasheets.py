@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gen_data.generator.assemble.config import Config, load_config, load_source_config
+from gen_data.generator.assemble.config import Config, load_config
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.scene import Body, Rig, Scene
 from gen_data.generator.core.se3 import SE3
@@ -74,7 +74,7 @@ def test_a_plan_holds_the_data_sheet_and_needs_no_file(tmp_path: Path) -> None:
     plan = canonical_json({"config": made.resolved, "name": "mine"})
     (tmp_path / "plan.json").write_text(plan, encoding="utf-8")
 
-    assert load_source_config(str(tmp_path)).sensors == made.sensors
+    assert load_config(str(tmp_path)).sensors == made.sensors
 
 
 def test_a_table_of_beams_replaces_the_lasers_of_a_model(tmp_path: Path) -> None:

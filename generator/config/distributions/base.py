@@ -7,7 +7,8 @@ give its constructor, its YAML form, its messages and its JSON Schema.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache, wraps
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Generic, TypeVar, cast
@@ -16,7 +17,12 @@ from pydantic import BeforeValidator, ConfigDict, Field, TypeAdapter, Validation
 from pydantic.dataclasses import dataclass as pydantic_dataclass
 from typing_extensions import dataclass_transform
 
-from gen_data.generator.config.yaml_scalars import abbreviate, format_number, quote_value
+from gen_data.generator.config.yaml_scalars import (
+    abbreviate,
+    format_number,
+    quote_value,
+    resolve_scalar,
+)
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.plugins import PluginTable
 
@@ -78,19 +84,28 @@ class Kind(Generic[T]):
         name: Distributions list it in ``kinds``.
         expected: A constant of it in messages: ``a number``.
         read: The value of a plain constant; raises Malformed.
-        read_key: The same for a key of a mapping, which is always text.
         schema: JSON Schema of a constant.
-        example: A constant, as plain data.
         of_number: Name of the distribution that a plain number stands for, if it is no constant.
     """
 
     name: str
     expected: str
     read: Callable[[Any], T]
-    read_key: Callable[[str], T]
     schema: Mapping[str, Any]
-    example: Any
     of_number: str = ""
+
+    def read_key(self, text: str) -> T:
+        """The value of a key of a mapping, which is always text. Raises Malformed."""
+        if self.schema.get("type") == "string":
+            return self.read(text)
+        if self.schema.get("type") == "array":
+            wanted = "weights by value need a number or a name"
+            raise Malformed(f"{wanted}, got {quote_value(text)}; use a list")
+        try:
+            value = resolve_scalar(text)
+        except ValueError as error:
+            raise Malformed(str(error)) from None
+        return self.read(value)
 
 
 class Distribution(ABC, Generic[T_co]):
@@ -193,10 +208,6 @@ class Numeric(Distribution[T_co]):
     """A distribution over numbers, whose reach can be checked without drawing."""
 
     @abstractmethod
-    def mean(self) -> float:
-        """Expected value."""
-
-    @abstractmethod
     def support(self) -> tuple[float, float]:
         """Smallest and largest value that can be drawn."""
 
@@ -282,15 +293,17 @@ def _read_mapping(value: Mapping[str, Any], kind: Kind[T]) -> Distribution[T]:
     ((name, argument),) = value.items()
     if name not in known:
         raise _unknown(name, kind, (name,))
-    try:
+    with inside(name):
         return distribution(name).from_yaml(argument, kind)
+
+
+@contextmanager
+def inside(*path: str | int) -> Iterator[None]:
+    """Extend the path of a fault in a part of a value by the path to that part."""
+    try:
+        yield
     except Malformed as error:
-        raise below(error, name) from None
-
-
-def below(error: Malformed, *path: str | int) -> Malformed:
-    """The same fault, seen from further up."""
-    return Malformed(error.fact, (*path, *error.path), at_key=error.at_key)
+        raise Malformed(error.fact, (*path, *error.path), at_key=error.at_key) from None
 
 
 def _unknown(name: str, kind: Kind[Any], path: tuple[str, ...] = ()) -> Malformed:
@@ -363,7 +376,7 @@ def _malformed(error: ValidationError, cls: type[Distribution[Any]] | None = Non
         path = path[1:]
     cause = detail.get("ctx", {}).get("error")
     if isinstance(cause, Malformed):
-        return below(cause, *path)
+        return Malformed(cause.fact, (*path, *cause.path), at_key=cause.at_key)
     if cls is not None and detail["type"] == unknown_key:
         known = list(cls.field_names().values())
         key = str(path[-1])

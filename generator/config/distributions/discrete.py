@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from collections.abc import Sequence as Items
 from dataclasses import dataclass, field
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 from pydantic import Field
 
@@ -16,7 +16,7 @@ from gen_data.generator.config.distributions.base import (
     Malformed,
     Numeric,
     T_co,
-    below,
+    inside,
     parameters,
     read_number,
     to_plain,
@@ -29,8 +29,17 @@ if TYPE_CHECKING:
 EVERY_KIND = ("number", "whole number", "name", "flag", "rotation", "direction", "position")
 
 
+class Listed(Numeric[T_co], kinds=EVERY_KIND):
+    """A distribution over few values, which are numbers where it has a mean and a range."""
+
+    def support(self) -> tuple[float, float]:
+        """Smallest and largest value that can be drawn."""
+        numbers = [_as_number(value) for value in self.outcomes()]
+        return min(numbers), max(numbers)
+
+
 @dataclass(frozen=True)
-class Constant(Numeric[T_co], name="constant", kinds=EVERY_KIND):
+class Constant(Listed[T_co], name="constant"):
     """Always the same value. A plain value in YAML means this."""
 
     value: T_co
@@ -38,14 +47,6 @@ class Constant(Numeric[T_co], name="constant", kinds=EVERY_KIND):
     def draw(self, rng: Rng) -> T_co:  # noqa: ARG002
         """The value; uses no random number."""
         return self.value
-
-    def mean(self) -> float:
-        """The value."""
-        return _as_number(self.value)
-
-    def support(self) -> tuple[float, float]:
-        """The value, twice."""
-        return self.mean(), self.mean()
 
     def outcomes(self) -> tuple[T_co, ...]:
         """The value alone."""
@@ -67,7 +68,7 @@ class Constant(Numeric[T_co], name="constant", kinds=EVERY_KIND):
 
 
 @dataclass(frozen=True, init=False, repr=False)
-class Choice(Numeric[T_co], name="choice", kinds=EVERY_KIND):
+class Choice(Listed[T_co], name="choice"):
     """One of the given values, equally likely or in proportion to weights.
 
     Attributes:
@@ -108,15 +109,6 @@ class Choice(Numeric[T_co], name="choice", kinds=EVERY_KIND):
         # A product that rounds up to the total itself belongs to the last value that has weight.
         return self.values[min(index, bisect_right(self._cumulative, total * (1 - 2.0**-53)))]
 
-    def mean(self) -> float:
-        """Expected value."""
-        pairs = zip(self.values, self.weights, strict=True)
-        return sum(_as_number(v) * w for v, w in pairs) / self._cumulative[-1]
-
-    def support(self) -> tuple[float, float]:
-        """Smallest and largest value that has weight."""
-        return _extremes(self.outcomes())
-
     def outcomes(self) -> tuple[T_co, ...]:
         """The values that have weight."""
         return tuple(v for v, w in zip(self.values, self.weights, strict=True) if w > 0)
@@ -128,10 +120,8 @@ class Choice(Numeric[T_co], name="choice", kinds=EVERY_KIND):
             return cls(_read_items(argument, cls.name, kind))
         weighted: dict[Any, float] = {}
         for key, weight in argument.items():
-            try:
+            with inside(key):
                 weighted[kind.read_key(key)] = read_number(weight)
-            except Malformed as error:
-                raise below(error, key) from None
         return cls(weighted)
 
     def argument(self) -> Any:
@@ -170,7 +160,7 @@ class Choice(Numeric[T_co], name="choice", kinds=EVERY_KIND):
 
 
 @dataclass(frozen=True)
-class Sequence(Numeric[T_co], name="sequence", kinds=EVERY_KIND):
+class Sequence(Listed[T_co], name="sequence"):
     """The given values in turn, by the number of the scene or sample; uses no random number."""
 
     values: tuple[T_co, ...]
@@ -184,14 +174,6 @@ class Sequence(Numeric[T_co], name="sequence", kinds=EVERY_KIND):
     def draw(self, rng: Rng) -> T_co:
         """The value of this scene's or sample's turn."""
         return self.values[rng.index % len(self.values)]
-
-    def mean(self) -> float:
-        """Mean over one round."""
-        return sum(_as_number(v) for v in self.values) / len(self.values)
-
-    def support(self) -> tuple[float, float]:
-        """Smallest and largest value."""
-        return _extremes(self.values)
 
     def outcomes(self) -> tuple[T_co, ...]:
         """All values."""
@@ -213,7 +195,7 @@ class Sequence(Numeric[T_co], name="sequence", kinds=EVERY_KIND):
 
 
 @parameters
-class Probability(Numeric[bool], name="probability", kinds=("flag",)):
+class Probability(Listed[bool], name="probability", kinds=("flag",)):
     """True with the given probability, else false."""
 
     p: float = Field(json_schema_extra={"minimum": 0, "maximum": 1})
@@ -227,14 +209,6 @@ class Probability(Numeric[bool], name="probability", kinds=("flag",)):
         """One value."""
         return rng.random() < self.p
 
-    def mean(self) -> float:
-        """The probability itself."""
-        return self.p
-
-    def support(self) -> tuple[float, float]:
-        """False as 0 and true as 1, where they can be drawn."""
-        return float(self.p == 1), float(self.p > 0)
-
     def outcomes(self) -> tuple[bool, ...]:
         """The values that can be drawn."""
         return tuple(v for v, share in ((False, 1 - self.p), (True, self.p)) if share > 0)
@@ -244,11 +218,9 @@ def _read_items(argument: Any, name: str, kind: Kind[Any]) -> list[Any]:
     if not isinstance(argument, (list, tuple)):
         raise Malformed(f"{name} needs a list of values, got {quote_value(argument)}")
     items = []
-    for number_, item in enumerate(argument):
-        try:
+    for number, item in enumerate(argument):
+        with inside(number):
             items.append(kind.read(item))
-        except Malformed as error:
-            raise below(error, number_) from None
     return items
 
 
@@ -256,12 +228,7 @@ def _freeze(values: Any) -> tuple[Any, ...]:
     return tuple(tuple(value) if isinstance(value, list) else value for value in values)
 
 
-def _extremes(values: Items[object]) -> tuple[float, float]:
-    numbers = [_as_number(value) for value in values]
-    return min(numbers), max(numbers)
-
-
 def _as_number(value: object) -> float:
     if not isinstance(value, (int, float)):
         raise TypeError(f"{value!r} is no number: it has no mean and no range")
-    return cast("float", value)
+    return value

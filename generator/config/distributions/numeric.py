@@ -11,6 +11,7 @@ from pydantic import Field, WithJsonSchema
 from gen_data.generator.config.distributions.base import (
     Malformed,
     Numeric,
+    T_co,
     parameters,
     require_order,
     round_significant,
@@ -28,9 +29,8 @@ _PAIR = {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems"
 _Above0 = Annotated[float, WithJsonSchema({"type": "number", "exclusiveMinimum": 0})]
 
 
-@parameters
-class Uniform(Numeric[float], name="uniform", kinds=("number",), needs="two numbers [low, high]"):
-    """Every number between low and high is equally likely."""
+class Interval(Numeric[T_co], needs="two numbers [low, high]"):
+    """A distribution between two numbers."""
 
     low: float
     high: float
@@ -38,16 +38,6 @@ class Uniform(Numeric[float], name="uniform", kinds=("number",), needs="two numb
     def __post_init__(self) -> None:
         """Refuse a reversed range."""
         require_order(self.name, self.low, self.high)
-        if math.isinf(self.high - self.low):
-            raise Malformed(f"uniform needs a finite range, got {self.argument()}")
-
-    def draw(self, rng: Rng) -> float:
-        """One value."""
-        return min(self.low + (self.high - self.low) * rng.random(), self.high)
-
-    def mean(self) -> float:
-        """Expected value."""
-        return self.low + 0.5 * (self.high - self.low)
 
     def support(self) -> tuple[float, float]:
         """Smallest and largest value."""
@@ -55,8 +45,26 @@ class Uniform(Numeric[float], name="uniform", kinds=("number",), needs="two numb
 
 
 @parameters
+class Uniform(Interval[float], name="uniform", kinds=("number",)):
+    """Every number between low and high is equally likely."""
+
+    low: float
+    high: float
+
+    def __post_init__(self) -> None:
+        """Refuse a reversed range, and one whose width overflows."""
+        super().__post_init__()
+        if math.isinf(self.high - self.low):
+            raise Malformed(f"uniform needs a finite range, got {self.argument()}")
+
+    def draw(self, rng: Rng) -> float:
+        """One value."""
+        return min(self.low + (self.high - self.low) * rng.random(), self.high)
+
+
+@parameters
 class LogUniform(
-    Numeric[float],
+    Interval[float],
     name="log_uniform",
     kinds=("number",),
     needs="two numbers [low, high], both above 0",
@@ -73,7 +81,7 @@ class LogUniform(
                 f"log_uniform needs low > 0 and high > 0, "
                 f"got [{format_number(self.low)}, {format_number(self.high)}]"
             )
-        require_order(self.name, self.low, self.high)
+        super().__post_init__()
 
     def draw(self, rng: Rng) -> float:
         """One value."""
@@ -83,15 +91,6 @@ class LogUniform(
         log_low = math.log(self.low)
         value = round_significant(math.exp(log_low + (math.log(self.high) - log_low) * u))
         return min(max(value, self.low), self.high)
-
-    def mean(self) -> float:
-        """Expected value: (high - low) / ln(high / low)."""
-        width = math.log(self.high) - math.log(self.low)
-        return self.low if width == 0 else (self.high - self.low) / width
-
-    def support(self) -> tuple[float, float]:
-        """Smallest and largest value."""
-        return self.low, self.high
 
 
 @parameters
@@ -146,16 +145,6 @@ class Normal(Numeric[float], name="normal", kinds=("number",)):
         z = sign * _STANDARD.inv_cdf(min(below + (above - below) * u, 1 - 2.0**-53))
         return min(max(round_significant(self.center + self.stddev * z), low), high)
 
-    def mean(self) -> float:
-        """Expected value, that of the truncated distribution where there is a clip."""
-        low, high = self.support()
-        if self.clip is None or self.stddev == 0 or low == high:
-            return min(max(self.center, low), high)
-        below, above, _ = self._tail()
-        a, b = ((v - self.center) / self.stddev for v in self.clip)
-        shift = (_STANDARD.pdf(a) - _STANDARD.pdf(b)) / (above - below)
-        return min(max(self.center + self.stddev * shift, low), high)
-
     def support(self) -> tuple[float, float]:
         """The clip range; without one, all numbers."""
         if self.clip is not None:
@@ -177,7 +166,7 @@ class Normal(Numeric[float], name="normal", kinds=("number",)):
 
 @parameters
 class UniformInteger(
-    Numeric[int],
+    Interval[int],
     name="uniform_integer",
     kinds=("number", "whole number"),
     needs="two whole numbers [low, high]",
@@ -187,21 +176,9 @@ class UniformInteger(
     low: int
     high: int
 
-    def __post_init__(self) -> None:
-        """Refuse a reversed range."""
-        require_order(self.name, self.low, self.high)
-
     def draw(self, rng: Rng) -> int:
         """One value."""
         return int(rng.integers(self.low, self.high, endpoint=True))
-
-    def mean(self) -> float:
-        """Expected value."""
-        return 0.5 * (self.low + self.high)
-
-    def support(self) -> tuple[float, float]:
-        """Smallest and largest value."""
-        return self.low, self.high
 
 
 def _cumulative(z: float) -> float:

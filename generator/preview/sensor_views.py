@@ -1,16 +1,19 @@
-"""Views of laser scans: coloured points, a top view, and a range view."""
+"""Views of laser scans, radars and event cameras."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Literal, get_args
 
 import cv2
 import numpy as np
+import yaml
 from numpy.typing import NDArray
 
 from gen_data.generator.core.asset_types import SURFACES
 from gen_data.generator.core.boxes import OrientedBox
-from gen_data.generator.core.capture import PointCloud
+from gen_data.generator.core.capture import Measurements, PointCloud
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.preview.overlay import BOX_EDGES, Image
@@ -27,21 +30,16 @@ NEAR_M, FAR_M = 2.0, 100.0
 ROW_PX = 2
 """Height of a ring in the range view."""
 
-GREY = (120, 120, 120)
-COLORS = {
-    "air": (255, 80, 255),
-    "asphalt": (105, 105, 112),
-    "marking": (235, 235, 235),
-    "pavement": (150, 140, 130),
-    "kerb": (170, 160, 150),
-    "grass": (90, 130, 60),
-    "leaf": (60, 170, 60),
-    "bark": (140, 100, 60),
-    "sign": (255, 210, 0),
-    "facade": (170, 110, 80),
-    "roof": (150, 70, 60),
-    "window": (90, 130, 170),
-}
+FAST_M_S = 15.0
+"""Radial speed at which colours saturate."""
+DOT_PX = 6
+GREY = 40
+BRIGHTER, DARKER = (90, 170, 255), (255, 90, 70)
+
+UNLABELLED = (120, 120, 120)
+COLORS: Mapping[str, Sequence[int]] = yaml.safe_load(
+    Path(__file__).with_name("surface_colors.yaml").read_text(encoding="utf-8")
+)
 """Colours of points without a category, by surface."""
 
 
@@ -58,7 +56,7 @@ def point_colors(cloud: PointCloud, by: PointColors = "class") -> NDArray[np.uin
         return color_shares(np.sqrt(points["intensity"]))
     categories = points["category_id"]
     of_category = [id_color(k) for k in range(int(categories.max(initial=0)) + 1)]
-    of_surface = [COLORS.get(name, GREY) for name in SURFACES]
+    of_surface = [COLORS.get(name, UNLABELLED) for name in SURFACES]
     colors: NDArray[np.uint8] = np.array(of_surface, np.uint8)[points["surface"]]
     labelled = categories > 0
     colors[labelled] = np.array(of_category, np.uint8)[categories[labelled]]
@@ -153,3 +151,50 @@ def _outline(image: Image, box: OrientedBox, color: tuple[int, int, int]) -> Non
     for a, b in BOX_EDGES:
         start, end = (int(column[a]), int(row[a])), (int(column[b]), int(row[b]))
         cv2.line(image, start, end, color, 1, cv2.LINE_AA)
+
+
+def radar_view(table: Measurements, scene: Scene, aspect: float) -> Image:
+    """Draw detections from above, the radar's X axis to the right, uint8 [h, w, 3], with boxes.
+
+    Green is static, blue approaches, red recedes. The size of a dot shows its signal strength.
+
+    Args:
+        table: Rows of a radar.
+        scene: Scene of the annotated instances to outline.
+        aspect: Width over height.
+    """
+    image = empty_view(aspect)
+    outline_things(image, scene, table.device.T_world_device)
+    rows = table.rows
+    flat_m = rows["range_m"] * np.cos(rows["elevation_rad"])
+    azimuth = rows["azimuth_rad"]
+    place = np.stack([flat_m * np.cos(azimuth), flat_m * np.sin(azimuth)], axis=-1)
+    columns, lines = pixels_from_above(place, image)
+    colors = color_shares(0.5 + 0.5 * rows["velocity_compensated_m_s"] / FAST_M_S)
+    sizes = np.clip(np.rint(rows["snr_db"] / 30.0 * DOT_PX), 2, DOT_PX).astype(int)
+    for x, y, color, size in zip(columns, lines, colors, sizes, strict=True):
+        dot = (int(color[0]), int(color[1]), int(color[2]))
+        cv2.circle(image, (int(x), int(y)), int(size), dot, cv2.FILLED, cv2.LINE_AA)
+    return image
+
+
+def event_view(table: Measurements) -> Image:
+    """Draw all events of a reading, uint8 [h, w, 3], cropped to their extent.
+
+    Blue is brighter, red is darker; the last event of a pixel counts.
+    """
+    rows = table.rows
+    shape = (int(rows["y_px"].max(initial=7)) + 1, int(rows["x_px"].max(initial=7)) + 1)
+    image: Image = np.full((*shape, 3), GREY, np.uint8)
+    for sign, color in ((1, BRIGHTER), (-1, DARKER)):
+        last = _last_polarity(rows, shape) == sign
+        image[last] = color
+    return image
+
+
+def _last_polarity(rows: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Polarity of the last event of every pixel, int8 [h, w]; 0 = none."""
+    last: np.ndarray = np.zeros(shape, np.int8)
+    # Rows are in order of time, and assignment keeps the last of several values per pixel.
+    last[rows["y_px"], rows["x_px"]] = rows["polarity"]
+    return last
