@@ -65,7 +65,7 @@ UNAMBIGUOUS, RMS_UNKNOWN, RARELY_FALSE = 3, 31, 1
 """``ambig_state`` of a velocity without ambiguity; errors without a value; false alarm < 25 %."""
 
 MAP_PX_PER_M = 10
-MAP_MARGIN_M, MAP_SIDE_MAX_M, EMPTY_MAP_SIDE_M = 50, 4000, 200
+MAP_MARGIN_M, MAP_SIDE_MAX_M, EMPTY_MAP_SIDE_M = 50, 4000, 100
 DRIVEABLE = frozenset({"driving", "parking", "bicycle", "crosswalk"})
 """Kinds of lanes on the carriageway."""
 

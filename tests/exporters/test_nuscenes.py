@@ -32,7 +32,7 @@ from gen_data.generator.core.scene import Body, Lane, ObjectGroup, Scene
 from gen_data.generator.core.se3 import SE3
 from tests.exporters.drives import drive_info
 
-ORIGIN_M = (100.0, 100.0, 0.0)
+ORIGIN_M = (50.0, 50.0, 0.0)
 """Of a world without lanes, in the global frame."""
 
 
