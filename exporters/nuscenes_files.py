@@ -115,9 +115,11 @@ def radar_bytes(rows: NDArray[np.void]) -> bytes:
             if RADAR_POINT[name].kind == "f":
                 nothing[name] = np.nan
         return _pcd_bytes(nothing)
-    azimuth, elevation = rows["azimuth_rad"], rows["elevation_rad"]
+    azimuth, elevation = (rows[k].astype(np.float64) for k in ("azimuth_rad", "elevation_rad"))
     level = np.cos(elevation)
     towards = np.stack([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
+    # The last bits of sines depend on the processor.
+    towards = np.round(towards, 9)
     points = np.zeros(len(rows), RADAR_POINT)
     points["x"], points["y"], points["z"] = towards * rows["range_m"]
     points["vx"], points["vy"] = towards[:2] * rows["velocity_m_s"]

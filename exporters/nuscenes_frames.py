@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -185,23 +184,33 @@ class Points:
     radar: int = 0
 
 
+@dataclass(frozen=True, slots=True)
 class PulseTimes:
-    """Mean instants of the pulses of a sweep, by instance and by direction."""
+    """Mean instants of the pulses of a sweep, from its start.
 
-    def __init__(self, points: NDArray[np.void], time_s: float, sweep_s: float) -> None:
-        """Average the pulses of a sweep.
+    Attributes:
+        middle_s: Instant of the middle of the sweep.
+        sweep_s: Duration of the sweep.
+        by_instance: Mean of the pulses that hit an instance, by instance id.
+        by_sector: Mean of the pulses of a sector, by its number.
+    """
 
-        Args:
-            points: Records of ``POINT`` [n].
-            time_s: Instant of the middle of the sweep.
-            sweep_s: Duration of the sweep.
-        """
-        self._start_s, self._middle_s = time_s - 0.5 * sweep_s, time_s
+    middle_s: float
+    sweep_s: float
+    by_instance: Mapping[int, float]
+    by_sector: Mapping[int, float]
+
+    @classmethod
+    def measure(cls, points: NDArray[np.void], middle_s: float, sweep_s: float) -> PulseTimes:
+        """Average the pulses of a sweep; ``points`` are records of ``POINT`` [n]."""
         x, y = points["position_m"][:, 0], points["position_m"][:, 1]
-        turn = np.arctan2(y, x) / (2.0 * np.pi) + 0.5
-        sector = np.minimum((turn * AZIMUTH_BINS).astype(np.int64), AZIMUTH_BINS - 1)
-        self._by_instance = _means(points["instance_id"], points["time_s"])
-        self._by_sector = _means(sector, points["time_s"])
+        times_s = points["time_s"]
+        return cls(
+            middle_s,
+            sweep_s,
+            _means(points["instance_id"], times_s),
+            _means(_sectors(x, y), times_s),
+        )
 
     def instant_s(self, instance_id: int, center_m: Vec3) -> float:
         """When pulses hit an object, or else when they leave in its direction.
@@ -210,13 +219,21 @@ class PulseTimes:
             instance_id: Instance id of the object.
             center_m: Its centre in the lidar frame.
         """
-        found = self._by_instance.get(instance_id)
+        found = self.by_instance.get(instance_id)
         if found is None:
-            sector = int(
-                (math.atan2(center_m[1], center_m[0]) / (2.0 * math.pi) + 0.5) * AZIMUTH_BINS
-            )
-            found = self._by_sector.get(min(sector, AZIMUTH_BINS - 1))
-        return self._middle_s if found is None else round(self._start_s + found, 9)
+            x, y = (np.array([v]) for v in center_m[:2])
+            found = self.by_sector.get(int(_sectors(x, y)[0]))
+        start_s = self.middle_s - 0.5 * self.sweep_s
+        return self.middle_s if found is None else round(start_s + found, 9)
+
+
+def _sectors(x: NDArray[np.floating], y: NDArray[np.floating]) -> NDArray[np.int64]:
+    """Number of the sector of each direction; the first one begins behind the scanner."""
+    angle = np.arctan2(y.astype(np.float64), x.astype(np.float64))
+    # The last bits of angles depend on the processor.
+    turn = np.round(angle / (2.0 * np.pi) + 0.5, 9)
+    sectors: NDArray[np.int64] = (turn * AZIMUTH_BINS).astype(np.int64) % AZIMUTH_BINS
+    return sectors
 
 
 def _means(keys: NDArray[np.integer], values: NDArray[np.floating]) -> dict[int, float]:

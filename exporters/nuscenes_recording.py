@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -112,8 +113,8 @@ class Recording:
         for n, k in enumerate(read, 1):
             frame = self.frames[k]
             reading = frame.row["readings"][channel]
-            is_key = k in self.keys
-            following = next((i for i, key in enumerate(self.keys) if key >= k), -1)
+            following = min(bisect_left(self.keys, k), len(self.keys) - 1)
+            is_key = self.keys[following] == k
             time_us = self._time_us(reading["time_s"])
             ego_pose = {"token": tokens[n], "timestamp": time_us, **reading["ego"]}
             calibrated = {
@@ -128,7 +129,7 @@ class Recording:
                 "sample_data",
                 {
                     "token": tokens[n],
-                    "sample_token": self._sample_token(following % len(self.keys)),
+                    "sample_token": self._sample_token(following),
                     "ego_pose_token": ego_pose["token"],
                     "calibrated_sensor_token": calibrated["token"],
                     "timestamp": time_us,

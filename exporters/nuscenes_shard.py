@@ -149,7 +149,7 @@ class ShardWriter:
         scanner, time_s = scanner_at_sweep(sample, top), instant_s(sample, top)
         pulses = None
         if self.boxes_at == "pulse":
-            pulses = PulseTimes(points, time_s, scanner.sweep_s)
+            pulses = PulseTimes.measure(points, time_s, scanner.sweep_s)
         boxes = {k: self._box(thing, pulses, scanner.T_world_lidar) for k, thing in things.items()}
         found = points_in_boxes(points, scanner.T_world_lidar, boxes)
         labels = point_classes(points, found.members, sample.scene, _ego_instance(sample, ego))
