@@ -410,3 +410,18 @@ def test_a_data_set_without_a_scanner_is_refused(world: Any) -> None:
         NuScenes().check(world.info(8, ("CAM_LEFT", "left"), ("top",)))
     with pytest.raises(ConfigError, match="lens of the model"):
         NuScenes().check(world.info(8, ("left",), ("top",), lenses={"left": "kannala_brandt"}))
+
+
+def test_a_scan_without_returns_is_a_key_frame(world: Any, samples: Any, tmp_path: Path) -> None:
+    """Its files are empty; boxes that cameras see count no point."""
+    sample = samples[0]
+    cloud = sample.capture.clouds["top"]
+    clouds = {"top": replace(cloud, points=cloud.points[:0])}
+    empty = replace(sample, capture=replace(sample.capture, clouds=clouds))
+    folder = world.export(NuScenes(), drive_info(world), [empty], tmp_path)
+
+    (row,) = readings(folder, "LIDAR_TOP")
+    assert (folder / row["filename"]).stat().st_size == 0
+    assert {row["num_lidar_pts"] for row in table(folder, "sample_annotation")} == {0}
+    (labels,) = table(folder, "panoptic")
+    assert np.load(folder / labels["filename"])["data"].shape == (0,)
