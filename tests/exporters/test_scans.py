@@ -18,8 +18,8 @@ from gen_data.exporters.kitti import (
     official_type,
     point_labels,
     point_members,
-    without_returns,
     upright_box,
+    without_returns,
 )
 from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.pointclouds import PointClouds
