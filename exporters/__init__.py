@@ -19,6 +19,7 @@ TABLE = PluginTable[Exporter](
         "kitti_stereo": "gen_data.exporters.kitti_stereo:KittiStereo",
         "kitti_tracking": "gen_data.exporters.kitti_tracking:KittiTracking",
         "motchallenge": "gen_data.exporters.motchallenge:MotChallenge",
+        "nuscenes": "gen_data.exporters.nuscenes:NuScenes",
         "pointclouds": "gen_data.exporters.pointclouds:PointClouds",
         "semantickitti": "gen_data.exporters.semantickitti:SemanticKitti",
         "tables": "gen_data.exporters.measurement_tables:Tables",

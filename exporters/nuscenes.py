@@ -1,0 +1,201 @@
+"""nuScenes: keyframes and sweeps of a vehicle's sensors, with 3D boxes and point labels.
+
+::
+
+    v1.0-mini/*.json                     the 13 tables, lidarseg, panoptic, and splits.json
+    samples/CAM_FRONT/000000012_CAM_FRONT.png        key frames: images, scans, radar detections
+    samples/LIDAR_TOP/000000012_LIDAR_TOP.pcd.bin    (000000012 is the sample of the data set)
+    samples/RADAR_FRONT/000000012_RADAR_FRONT.pcd
+    sweeps/...                           the same between key frames
+    lidarseg/v1.0-mini/*_lidarseg.bin    panoptic/v1.0-mini/*_panoptic.npz    of key frames
+    maps/000003.png                      driveable surface of world 3
+
+* **Scenes** are sequences; a log is a world, with a map and a location of its own. ``splits.json``
+  lists the scenes of ``all`` and of each split of the data set: ``gen_train``, ``gen_val`` and
+  ``gen_test``. Official splits have none of their names.
+* **Key frames** are scans of LIDAR_TOP at least ``key_frame_s`` apart.
+* **The global frame** is the world, moved so that the map begins at (0, 0), as the devkit expects:
+  ``world_origin`` in ``log.json`` is the origin of the world in it.
+* **The ego** is the rig that carries LIDAR_TOP; every reading has the ego's pose at its instant.
+* **Images** are PNG: links to those of the shards. Pixel centres of ``camera_intrinsic`` are whole
+  numbers.
+* **Boxes** have the category of ``nuscenes_classes.yaml``, whatever the data set calls it. A box is
+  where the pulses of the scan hit the object, as annotators fit boxes to points; ``boxes_at: step``
+  puts it where the object is at the instant of the key frame. An object is annotated from the first
+  to the last key frame in which a camera, lidar or radar senses it.
+* **num_lidar_pts** counts the points in the box: within 2 cm of its faces only those that hit the
+  object. Point labels agree: points in a box belong to its object, also those of the road.
+* **num_radar_pts** counts the detections that the object caused.
+
+Reference: Caesar et al., "nuScenes: A multimodal dataset for autonomous driving", CVPR 2020, and
+the schema of nuscenes-devkit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field
+
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.fragments import fragment_rows
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.nuscenes_frames import Channel
+from gen_data.exporters.nuscenes_recording import LIDAR_TOP, Recording, key_frames
+from gen_data.exporters.nuscenes_shard import ShardWriter, label_path, map_file, reading_path
+from gen_data.exporters.nuscenes_tables import (
+    TableFiles,
+    Tokens,
+    constant_rows,
+    world_rows,
+    write_splits,
+)
+from gen_data.exporters.sensor_selection import check_pinholes, laser_scanner, rgb_cameras
+from gen_data.exporters.sequences import FRAMES, Frame, write_frames
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.sample import Sample
+
+SPLITS = ("train", "val", "test")
+
+
+class NuScenes(ExporterBase):
+    """nuScenes with lidarseg and panoptic labels: all cameras, laser scanners and radars."""
+
+    type: Literal["nuscenes"] = "nuscenes"
+    version: str = Field("v1.0-mini", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
+    """Folder of the tables."""
+    lidar: str = ""
+    """Sensor that becomes LIDAR_TOP; empty = the sensor of that name, else the first one by name.
+    Other sensors keep their names, in capitals and with CAM_, LIDAR_ or RADAR_ in front."""
+    key_frame_s: float = Field(0.5, gt=0)
+    """Smallest time between key frames; readings in between are sweeps."""
+    boxes_at: Literal["pulse", "step"] = "pulse"
+    """Instant of a moving object's box: when pulses hit it, or that of the step."""
+    box_margin_m: float = Field(0.002, ge=0, le=0.1)
+    """How much larger boxes are on every side, so that points on the surface are inside."""
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Names of the annotators that it reads."""
+        return frozenset({"visibility"})
+
+    @property
+    def has_own_classes(self) -> bool:
+        """Categories are those of nuScenes."""
+        return True
+
+    def check(self, info: DatasetInfo) -> None:
+        """Reject a data set that this format cannot represent.
+
+        Raises:
+            ConfigError: there is no laser scanner, a camera is no pinhole, or two sensors have the
+                same channel.
+        """
+        self._channels(info)
+        check_pinholes(info, rgb_cameras(info), self.type)
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write scans, detections, point labels and maps, and a line per sample.
+
+        Raises:
+            ConfigError: see ``check``, or too many objects of a category.
+        """
+        self.check(info)
+        writer = ShardWriter(
+            info, self._channels(info), shard_dir, self.boxes_at, self.box_margin_m
+        )
+        write_frames(shard_dir / self.type, [writer.write(sample) for sample in samples])
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Write the tables, sequence by sequence, and link all files."""
+        token = Tokens(info)
+        channels = {c.name: c.modality for c in self._channels(info)}
+        names: dict[str, list[str]] = {"all": [], **{f"gen_{split}": [] for split in SPLITS}}
+        worlds: set[int] = set()
+        with TableFiles(dataset_dir / self.version) as tables:
+            for table, row in constant_rows(token, channels):
+                tables.add(table, row)
+            for recording in self._recordings(token, shard_dirs):
+                first = recording.frames[0]
+                world, split = first.row["scene"], first.row["split"]
+                if world not in worlds:
+                    worlds.add(world)
+                    self._add_world(tables, token, first, dataset_dir)
+                for table, row in recording.rows():
+                    tables.add(table, row)
+                self._link_files(recording, dataset_dir)
+                names["all"].append(recording.name)
+                names.setdefault(f"gen_{split}", []).append(recording.name)
+        write_splits(dataset_dir / self.version, names)
+
+    def top(self, info: DatasetInfo) -> str:
+        """Sensor that becomes LIDAR_TOP.
+
+        Raises:
+            ConfigError: there is none.
+        """
+        named = LIDAR_TOP if not self.lidar and LIDAR_TOP in info.lidars else self.lidar
+        top = laser_scanner(info, named, self.type)
+        if not top:
+            raise ConfigError(
+                f"exporter '{self.type}': there is no lidar; add a sensor of that type, such as "
+                "{type: lidar, name: LIDAR_TOP, model: HDL-32E}"
+            )
+        return top
+
+    def _channels(self, info: DatasetInfo) -> tuple[Channel, ...]:
+        """Exported sensors, LIDAR_TOP first."""
+        top = self.top(info)
+        channels = [Channel(top, LIDAR_TOP, "lidar")]
+        for name in info.lidars:
+            if name != top:
+                channels.append(Channel(name, _channel_name("LIDAR_", name), "lidar"))
+        for name in rgb_cameras(info):
+            channels.append(Channel(name, _channel_name("CAM_", name), "camera"))
+        for name, kind in info.devices.items():
+            if kind == "radar":
+                channels.append(Channel(name, _channel_name("RADAR_", name), "radar"))
+        sensors: dict[str, str] = {}
+        for channel in channels:
+            if channel.name in sensors:
+                raise ConfigError(
+                    f"exporter '{self.type}': the sensors '{sensors[channel.name]}' and "
+                    f"'{channel.sensor}' both become {channel.name}; rename one"
+                )
+            sensors[channel.name] = channel.sensor
+        return tuple(channels)
+
+    def _recordings(self, token: Tokens, shard_dirs: Sequence[Path]) -> Iterator[Recording]:
+        """Yield the sequences that have key frames; one at a time is in memory."""
+        rows = fragment_rows(shard_dirs, self.type, FRAMES)
+        for _, group in groupby(rows, key=lambda item: item[1]["sequence"]):
+            frames = [Frame(shard_dir, row) for shard_dir, row in group]
+            if keys := key_frames(frames, self.key_frame_s):
+                yield Recording(token, self.version, frames, keys)
+
+    def _add_world(
+        self, tables: TableFiles, token: Tokens, frame: Frame, dataset_dir: Path
+    ) -> None:
+        """Add the log and the map of a world."""
+        file = map_file(frame.row["scene"])
+        link_or_copy(frame.shard_dir / self.type / file, dataset_dir / file)
+        for table, row in world_rows(token, frame, file):
+            tables.add(table, row)
+
+    def _link_files(self, recording: Recording, dataset_dir: Path) -> None:
+        for frame, channel, target in recording.files():
+            reading = frame.row["readings"][channel]
+            one = Channel(reading["sensor"], channel, reading["modality"])
+            link_or_copy(reading_path(frame.shard_dir, one, frame.index), dataset_dir / target)
+        for frame, table, target in recording.point_label_files():
+            source = label_path(frame.shard_dir, table, frame.index)
+            link_or_copy(source, dataset_dir / target)
+
+
+def _channel_name(prefix: str, sensor: str) -> str:
+    name = sensor.upper()
+    return name if name.startswith(prefix) else prefix + name

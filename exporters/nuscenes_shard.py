@@ -1,0 +1,184 @@
+"""Shards of nuScenes: files of scans, detections, point labels and maps, and a line per sample."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from gen_data.exporters.measurement_tables import read_rows
+from gen_data.exporters.nuscenes_classes import attribute_of, point_classes
+from gen_data.exporters.nuscenes_files import (
+    MapArea,
+    lidar_bytes,
+    map_area,
+    map_bytes,
+    panoptic_bytes,
+    panoptic_labels,
+    points_in_boxes,
+    quarter_turns,
+    radar_bytes,
+)
+from gen_data.exporters.nuscenes_frames import (
+    Channel,
+    Points,
+    PulseTimes,
+    Thing,
+    annotated_things,
+    box_row,
+    channel_mount,
+    reading_row,
+    reading_time_s,
+    views_by_instance,
+)
+from gen_data.exporters.nuscenes_recording import LIDAR_TOP, SUFFIXES
+from gen_data.exporters.point_cloud_io import read_points, scanner_at_sweep
+from gen_data.exporters.sensor_selection import has_scans, instant_s
+from gen_data.exporters.sequences import Mount, frame_facts, relative_pose, write_bytes
+from gen_data.generator.core.boxes import OrientedBox
+from gen_data.generator.core.capture import Channel as ImageChannel
+from gen_data.generator.core.interfaces import DatasetInfo, media_path, table_path
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.se3 import SE3
+
+FOLDER = "nuscenes"
+_LABEL_SUFFIXES = {"lidarseg": ".bin", "panoptic": ".npz"}
+
+
+def reading_path(shard_dir: Path, channel: Channel, index: int) -> Path:
+    """File of a reading in a shard; images are those that all formats share."""
+    if channel.modality == "camera":
+        return media_path(shard_dir, channel.sensor, ImageChannel.RGB, index)
+    suffix = SUFFIXES[channel.modality]
+    return shard_dir / FOLDER / channel.name / f"{index:09d}{suffix}"
+
+
+def label_path(shard_dir: Path, table: str, index: int) -> Path:
+    """File of the point labels of a sample in a shard; tables are ``lidarseg`` and ``panoptic``."""
+    return shard_dir / FOLDER / table / f"{index:09d}{_LABEL_SUFFIXES[table]}"
+
+
+def map_file(world: int) -> str:
+    """Path of the map of a world, in the data set and in the exporter's folder of a shard."""
+    return f"maps/{world:06d}.png"
+
+
+@dataclass(frozen=True, eq=False)
+class ShardWriter:
+    """Writes the samples of one shard.
+
+    Attributes:
+        channels: Exported sensors; the first one is LIDAR_TOP.
+        boxes_at, box_margin_m: Fields of the exporter.
+    """
+
+    info: DatasetInfo
+    channels: Sequence[Channel]
+    shard_dir: Path
+    boxes_at: Literal["pulse", "step"]
+    box_margin_m: float
+    _areas: dict[int, MapArea] = field(default_factory=dict)
+
+    def write(self, sample: Sample) -> dict[str, Any]:
+        """Write the files of a sample and return its line."""
+        top = self.channels[0]
+        T_global_world = self._write_map(sample).T_global_world
+        ego = channel_mount(sample.scene, top).rig
+        readings: dict[str, Any] = {}
+        detections: dict[int, int] = {}
+        for channel in self.channels:
+            if self._has_reading(sample, channel):
+                offset_s = self.info.sensor(channel.sensor).time_offset_s
+                time_s = reading_time_s(sample, channel, offset_s)
+                row = reading_row(sample, channel, ego, time_s, T_global_world)
+                readings[channel.name] = row
+                if channel.modality == "radar":
+                    self._write_radar(sample, channel, detections)
+                elif channel.modality == "lidar":
+                    self._write_lidar(sample, channel, ego)
+        boxes = []
+        if LIDAR_TOP in readings:
+            boxes = self._write_labels(sample, ego, detections, T_global_world)
+        return frame_facts(self.info, sample) | {
+            "scene": sample.scene_index,
+            "vehicle": ego.removeprefix("/"),
+            "world_origin": list(T_global_world.translation_m),
+            "readings": readings,
+            "boxes": boxes,
+        }
+
+    def _has_reading(self, sample: Sample, channel: Channel) -> bool:
+        if channel.modality == "camera":
+            return channel.sensor in sample.truth
+        if channel.modality == "lidar":
+            return has_scans(self.shard_dir, channel.sensor, sample.index)
+        return table_path(self.shard_dir, channel.sensor, sample.index).exists()
+
+    def _write_map(self, sample: Sample) -> MapArea:
+        """Write the map of a sample's world, once per shard, and return its area."""
+        world = sample.scene_index
+        if world not in self._areas:
+            area = self._areas[world] = map_area(sample.scene.lanes)
+            path = self.shard_dir / FOLDER / map_file(world)
+            write_bytes(path, map_bytes(sample.scene.lanes, area))
+        return self._areas[world]
+
+    def _write_radar(self, sample: Sample, channel: Channel, detections: dict[int, int]) -> None:
+        """Write a radar's detections, and add them to the number of each instance."""
+        path = table_path(self.shard_dir, channel.sensor, sample.index)
+        rows = read_rows(path, self.info.sensor(channel.sensor))
+        write_bytes(reading_path(self.shard_dir, channel, sample.index), radar_bytes(rows))
+        for instance_id in rows["instance_id"].tolist():
+            detections[instance_id] = detections.get(instance_id, 0) + 1
+
+    def _write_lidar(self, sample: Sample, channel: Channel, ego: str) -> None:
+        points = read_points(self.shard_dir, channel.sensor, sample.index)
+        mount = channel_mount(sample.scene, channel)
+        turns = quarter_turns(relative_pose(sample.scene, Mount(ego, SE3()), mount))
+        path = reading_path(self.shard_dir, channel, sample.index)
+        write_bytes(path, lidar_bytes(points, turns))
+
+    def _write_labels(
+        self, sample: Sample, ego: str, detections: Mapping[int, int], T_global_world: SE3
+    ) -> list[dict[str, Any]]:
+        """Write the point labels of LIDAR_TOP and return the rows of boxes."""
+        top = self.channels[0].sensor
+        points = read_points(self.shard_dir, top, sample.index)
+        things = annotated_things(sample)
+        scanner, time_s = scanner_at_sweep(sample, top), instant_s(sample, top)
+        pulses = None
+        if self.boxes_at == "pulse":
+            pulses = PulseTimes.measure(points, time_s, scanner.sweep_s)
+        boxes = {k: self._box(thing, pulses, scanner.T_world_lidar) for k, thing in things.items()}
+        found = points_in_boxes(points, scanner.T_world_lidar, boxes)
+        labels = point_classes(points, found.members, sample.scene, _ego_instance(sample, ego))
+        numbers = {k: thing.number for k, thing in things.items()}
+        panoptic = panoptic_labels(labels, found.members, numbers)
+        write_bytes(label_path(self.shard_dir, "lidarseg", sample.index), labels.tobytes())
+        write_bytes(label_path(self.shard_dir, "panoptic", sample.index), panoptic_bytes(panoptic))
+        views = views_by_instance(sample)
+        rows = []
+        for number, thing in things.items():
+            attribute = attribute_of(thing.category, thing.instance, thing.body, sample.scene)
+            counts = Points(found.counts[number], detections.get(number, 0))
+            box = boxes[number].seen_from(T_global_world)
+            rows.append(box_row(thing, box, attribute, views.get(number, ()), counts))
+        return rows
+
+    def _box(self, thing: Thing, pulses: PulseTimes | None, T_world_lidar: SE3) -> OrientedBox:
+        """Box of an object in the world, at the instant that the exporter's fields select."""
+        box = thing.box(None, self.box_margin_m)
+        if pulses is None or thing.track is None:
+            return box
+        center = T_world_lidar.inverse() @ box.T_frame_box
+        instant = pulses.instant_s(thing.instance.instance_id, center.translation_m)
+        return thing.box(instant, self.box_margin_m)
+
+
+def _ego_instance(sample: Sample, ego: str) -> int:
+    """Instance id of the body that carries the ego's rig; 0 = none."""
+    if ego.startswith("/"):
+        return 0
+    scene = sample.scene
+    return scene.body(scene.rig(ego).body).instance_id
