@@ -9,9 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gen_data.generator.assets.people.body import Array, BodyTemplate, Indices
-from gen_data.generator.assets.people.person import Person
-from gen_data.generator.assets.people.skinning import vertex_normals
-from gen_data.generator.assets.people.wardrobe import Outfit
+from gen_data.generator.assets.people.person import Outfit, Person
+from gen_data.generator.assets.people.posing import vertex_normals
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
 

@@ -11,8 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from gen_data.generator.assets.procedural import cans, cartons
-from gen_data.generator.assets.procedural.bottles import LABEL_ASPECT
+from gen_data.generator.assets.procedural import packaging
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.material_presets import hex_to_srgb8
 from gen_data.generator.assets.procedural.textures import artwork as art
@@ -48,26 +47,30 @@ class _Design:
 def label(seed: int) -> TextureData:
     """Wrap-around label of a bottle or jar; the front is in the middle. 512 x 256."""
     rng = variant_rng("label", seed)
-    image = _wrap(int(art.SIZE_PX * 1.5), LABEL_ASPECT, _design(seed, rng, _WORDS["volumes"]), rng)
+    image = _wrap(
+        int(art.SIZE_PX * 1.5), packaging.LABEL_ASPECT, _design(seed, rng, _WORDS["volumes"]), rng
+    )
     return art.resize_texture(image, art.SIZE_PX, art.SIZE_PX // 2)
 
 
 def can_label(seed: int) -> TextureData:
     """All around a can; the front is in the middle."""
     rng = variant_rng("can_label", seed)
-    sizes = _WORDS["weights"] if cans.can_size(seed).food else ("330 ml", "500 ml")
-    image = _wrap(int(art.SIZE_PX * 1.5), cans.label_aspect(seed), _design(seed, rng, sizes), rng)
+    sizes = _WORDS["weights"] if packaging.can_size(seed).food else ("330 ml", "500 ml")
+    image = _wrap(
+        int(art.SIZE_PX * 1.5), packaging.label_aspect(seed), _design(seed, rng, sizes), rng
+    )
     return art.resize_texture(image, art.SIZE_PX, art.SIZE_PX)
 
 
 def carton(seed: int) -> TextureData:
-    """The six faces of a folding box, laid out by ``cartons.CARTON_ATLAS``."""
-    return _box_print("carton", seed, cartons.carton_size_m(seed))
+    """The six faces of a folding box, laid out by ``packaging.CARTON_ATLAS``."""
+    return _box_print("carton", seed, packaging.carton_size_m(seed))
 
 
 def milk_label(seed: int) -> TextureData:
-    """The faces of a milk carton, laid out by ``cartons.CARTON_ATLAS``."""
-    return _box_print("milk_label", seed, cartons.milk_size_m(seed))
+    """The faces of a milk carton, laid out by ``packaging.CARTON_ATLAS``."""
+    return _box_print("milk_label", seed, packaging.milk_size_m(seed))
 
 
 def book_cover(seed: int) -> TextureData:
@@ -124,7 +127,7 @@ def _box_print(name: str, seed: int, size_m: tuple[float, float, float]) -> Text
         "top": art.canvas(w, d, design.second) if name == "milk_label" else _strip(w, d, design),
         "bottom": _strip(w, d, design),
     }
-    return art.atlas(faces, cartons.CARTON_ATLAS, design.ground)
+    return art.atlas(faces, packaging.CARTON_ATLAS, design.ground)
 
 
 def _wrap(width: int, aspect: float, design: _Design, rng: VariantRng) -> Image:
