@@ -1,4 +1,4 @@
-"""Joint angles of people who walk, run, stand or sit.
+"""Joint angles of people who walk, run, stand or sit, from ``poses.yaml`` and ``gaits.yaml``.
 
 Angles are degrees here, as in the tables of gait analysis: hip and knee flexion, ankle
 dorsiflexion and shoulder flexion (arm forward) are positive.
@@ -7,23 +7,15 @@ dorsiflexion and shoulder flexion (arm forward) are positive.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
+
+from gen_data.generator.assets.procedural.data_tables import load_table
 
 PoseName = Literal["walk", "run", "stand", "phone", "carry", "sit"]
-POSES: tuple[PoseName, ...] = ("walk", "run", "stand", "phone", "carry", "sit")
+POSES: tuple[PoseName, ...] = get_args(PoseName)
 PHASES = 16
 """A stride is divided into this many steps, from one heel strike to the next of the same foot."""
-
-BEHAVIOURS = {
-    "walk": "walking",
-    "run": "running",
-    "stand": "standing",
-    "phone": "using_phone",
-    "carry": "carrying",
-    "sit": "sitting",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,18 +66,37 @@ class Stance:
     twist: float = 0.0
 
 
-# Level walking, every 1/16 of a stride from heel strike, rounded from the mean curves of Winter,
-# "Biomechanics and motor control of human movement", 4th ed. 2009, ch. 2 and 4.
-_WALK_HIP = (25, 24, 20, 14, 8, 1, -6, -12, -17, -18, -12, -2, 9, 19, 25, 26)
-_WALK_KNEE = (5, 13, 18, 17, 13, 8, 5, 5, 9, 20, 38, 56, 62, 52, 30, 9)
-_WALK_ANKLE = (0, -5, -3, 3, 5, 7, 10, 12, 9, -4, -17, -13, -4, 0, 1, 1)
-_WALK_TOES = (0, 0, 0, 0, 0, 0, 0, 4, 16, 28, 20, 5, 0, 0, 0, 0)
-# Slow running, rounded from the mean curves of Novacheck, "The biomechanics of running",
-# Gait & Posture 7(1), 1998.
-_RUN_HIP = (38, 34, 28, 20, 10, 0, -8, -11, -8, 2, 16, 30, 42, 48, 46, 41)
-_RUN_KNEE = (20, 34, 42, 40, 32, 22, 16, 20, 38, 62, 84, 96, 92, 72, 44, 22)
-_RUN_ANKLE = (5, 12, 18, 20, 16, 6, -10, -20, -16, -8, -2, 2, 5, 6, 6, 5)
-_RUN_TOES = (0, 0, 0, 2, 10, 22, 24, 10, 0, 0, 0, 0, 0, 0, 0, 0)
+@dataclass(frozen=True, slots=True)
+class _Gait:
+    """A row of ``gaits.yaml``."""
+
+    hip: tuple[float, ...]
+    knee: tuple[float, ...]
+    ankle: tuple[float, ...]
+    toes: tuple[float, ...]
+    arm: Arm
+    arm_swing: float
+    elbow_swing: float
+    lean: float
+    twist: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Pose:
+    """A row of ``poses.yaml``."""
+
+    behaviour: str
+    gait: str = ""
+    leg: Leg = Leg()
+    arm: Arm = Arm()
+    right_arm: Arm | None = None
+    lean: float = 0.0
+    nod: float = 0.0
+
+
+_GAITS = load_table(__package__, "gaits", _Gait)
+_POSES = load_table(__package__, "poses", _Pose)
+BEHAVIOURS = {name: pose.behaviour for name, pose in _POSES.items()}
 
 
 def shorten_stride(stance: Stance, share: float) -> Stance:
@@ -104,57 +115,25 @@ def stance(pose: PoseName, step: int) -> Stance:
         pose: Name of the pose.
         step: Sixteenth of the stride of the left leg, 0 = its heel strikes; walk, carry, run.
     """
-    step %= PHASES
-    if pose == "walk":
-        return _walk(step)
-    if pose == "run":
-        return _run(step)
-    if pose == "carry":
-        still = Arm(swing=-2.0, out=11.0, elbow=14.0, curl=48.0)
-        return replace(_walk(step), right_arm=still)
-    if pose == "phone":
-        arm = Arm(swing=24.0, out=10.0, elbow=96.0, inward=32.0, curl=34.0)
-        return replace(_stand(), right_arm=arm, nod=24.0)
-    return _sit() if pose == "sit" else _stand()
+    row = _POSES[pose]
+    made = Stance(row.leg, row.leg, row.arm, row.arm, row.lean, row.nod)
+    if row.gait:
+        made = _stride(_GAITS[row.gait], step % PHASES)
+    return replace(made, right_arm=row.right_arm or made.right_arm)
 
 
-def _walk(step: int) -> Stance:
+def _stride(gait: _Gait, step: int) -> Stance:
     turn = math.cos(2.0 * math.pi * step / PHASES)
-    return Stance(
-        _leg(step, _WALK_HIP, _WALK_KNEE, _WALK_ANKLE, _WALK_TOES),
-        _leg(step + PHASES // 2, _WALK_HIP, _WALK_KNEE, _WALK_ANKLE, _WALK_TOES),
-        Arm(swing=-20.0 * turn + 1.0, out=9.0, elbow=17.0 - 9.0 * turn),
-        Arm(swing=20.0 * turn + 1.0, out=9.0, elbow=17.0 + 9.0 * turn),
-        lean=3.0,
-        twist=-5.0 * turn,
+    legs = (
+        Leg(gait.hip[k], gait.knee[k], gait.ankle[k], gait.toes[k])
+        for k in (step, (step + PHASES // 2) % PHASES)
     )
-
-
-def _run(step: int) -> Stance:
-    turn = math.cos(2.0 * math.pi * step / PHASES)
-    return Stance(
-        _leg(step, _RUN_HIP, _RUN_KNEE, _RUN_ANKLE, _RUN_TOES),
-        _leg(step + PHASES // 2, _RUN_HIP, _RUN_KNEE, _RUN_ANKLE, _RUN_TOES),
-        Arm(swing=-34.0 * turn - 4.0, out=14.0, elbow=84.0, inward=20.0, curl=45.0),
-        Arm(swing=34.0 * turn - 4.0, out=14.0, elbow=84.0, inward=20.0, curl=45.0),
-        lean=8.0,
-        twist=-8.0 * turn,
+    arms = (
+        replace(
+            gait.arm,
+            swing=sign * gait.arm_swing * turn + gait.arm.swing,
+            elbow=gait.arm.elbow + sign * gait.elbow_swing * turn,
+        )
+        for sign in (-1.0, 1.0)
     )
-
-
-def _stand() -> Stance:
-    leg = Leg(hip=0.0, knee=2.0, ankle=2.0)
-    return Stance(leg, leg, Arm(swing=1.0), Arm(swing=1.0))
-
-
-def _sit() -> Stance:
-    leg = Leg(hip=86.0, knee=88.0, ankle=2.0)
-    arm = Arm(swing=18.0, out=10.0, elbow=52.0, inward=14.0)
-    return Stance(leg, leg, arm, arm, lean=-4.0)
-
-
-def _leg(
-    step: int, hip: Sequence[int], knee: Sequence[int], ankle: Sequence[int], toes: Sequence[int]
-) -> Leg:
-    k = step % PHASES
-    return Leg(hip[k], knee[k], ankle[k], toes[k])
+    return Stance(*legs, *arms, lean=gait.lean, twist=-gait.twist * turn)

@@ -18,10 +18,9 @@ from gen_data.generator.core.se3 import Vec3
 STEEL: Vec3 = (0.56, 0.57, 0.58)
 STAINLESS: Vec3 = (0.66, 0.65, 0.63)
 ALUMINIUM: Vec3 = (0.91, 0.92, 0.92)
-BRASS: Vec3 = (0.89, 0.70, 0.37)
-BLACK_OXIDE: Vec3 = (0.045, 0.045, 0.048)
 ZINC: Vec3 = (0.66, 0.68, 0.70)
 
+METALS = load_table(__package__, "metals", tuple[tuple[Vec3, float], ...])
 PALETTES = load_table(__package__, "palettes", tuple[str, ...])
 GLAZES, PLASTICS, CAPS, WOODS = (PALETTES[name] for name in ("glazes", "plastics", "caps", "woods"))
 

@@ -9,9 +9,8 @@ import numpy as np
 from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
-    BLACK_OXIDE,
+    METALS,
     PLASTICS,
-    STEEL,
     WOODS,
     ZINC,
     draw_linear,
@@ -58,16 +57,10 @@ def screwdriver(seed: int) -> Solid:
     profile = [(0.55 * radius, 0.0), (0.97 * radius, 0.1 * grip), (0.97 * radius, 0.6 * grip),
                (0.7 * radius, 0.82 * grip), (0.6 * radius, grip)]  # fmt: skip
     parts = [*hulls.stack(profile, 16), hulls.frustum((shaft, grip), (shaft, end), 12)]
-    materials = (
-        plastic_material(rng),
-        metal_material(ZINC, rng.between(0.2, 0.35)),
-        plastic_material(rng, ("#202124",)),
-    )
-    return make_centred_solid(
-        [piece.rotated("y", _LAID) for piece in pieces],
-        materials,
-        [rotate(part, "y", _LAID) for part in parts],
-    )
+    plastic, steel = plastic_material(rng), metal_material(ZINC, rng.between(0.2, 0.35))
+    materials = (plastic, steel, plastic_material(rng, ("#202124",)))
+    laid = [piece.rotated("y", _LAID) for piece in pieces]
+    return make_centred_solid(laid, materials, [rotate(part, "y", _LAID) for part in parts])
 
 
 def hammer(seed: int) -> Solid:
@@ -78,14 +71,13 @@ def hammer(seed: int) -> Solid:
     head, head_hulls = _hammer_head()
     wood = Material(draw_linear(WOODS[:4], 0.1, rng), 0.55)
     grip = wood if rng.chance(0.6) else plastic_material(rng, PLASTICS)
-    steel = rng.choose((metal_material(STEEL, 0.35), metal_material(BLACK_OXIDE, 0.45)))
+    steel = metal_material(*rng.choose(METALS["hammers"]))
     at = length - 0.005
     share = handle.corners_m[:, :, 0].mean(axis=1) / length
     parts = [hulls.extreme(handle.corners_m[abs(share - m) < 0.2], 40) for m in (0.18, 0.5, 0.8)]
     parts += [hull * size + np.array([at, 0.0, 0.0]) for hull in head_hulls]
-    return make_centred_solid(
-        [handle, head.scaled(size, size, size).moved(at)], (grip, steel), parts
-    )
+    head = head.scaled(size, size, size).moved(at)
+    return make_centred_solid([handle, head], (grip, steel), parts)
 
 
 def wrench(seed: int) -> Solid:
@@ -101,20 +93,13 @@ def wrench(seed: int) -> Solid:
          (length - 1.75 * head, 0.85 * bar), (0.6 * ring, bar)]
     )  # fmt: skip
     bevel = 0.12 * thick
+    eye = extrude(circle(ring, 32), 1.3 * thick, bevel, [circle(0.57 * across, 24)])
     patches = [
         extrude(_turn_jaw(_jaw(across, head)) + centre, thick, bevel).moved(z=-0.5 * thick),
         extrude(shank, 0.8 * thick, 0.3 * thick).moved(z=-0.4 * thick),
-        extrude(circle(ring, 32), 1.3 * thick, bevel, [circle(0.57 * across, 24)]).moved(
-            z=-0.65 * thick
-        ),
+        eye.moved(z=-0.65 * thick),
     ]
-    finish = rng.choose(
-        (
-            metal_material((0.72, 0.73, 0.74), 0.18),
-            metal_material(STEEL, 0.35),
-            metal_material(BLACK_OXIDE, 0.4),
-        )
-    )
+    finish = metal_material(*rng.choose(METALS["wrenches"]))
     h = 0.5 * thick
     parts = [
         *(_slab(_turn_jaw(piece) + centre, h) for piece in _jaw_pieces(across, head)),
@@ -126,30 +111,29 @@ def wrench(seed: int) -> Solid:
 
 def _jaw(across: float, radius: float) -> Array:
     """Outline of an open jaw about the origin: a disc with a slot towards +X."""
-    start = math.asin(0.5 * across / radius)
-    turn = np.linspace(start, 2 * math.pi - start, 26)
-    arc = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    back = -0.35 * across
+    start, back = math.asin(0.5 * across / radius), -0.35 * across
+    arc = _arc(radius, start, 2 * math.pi - start, 26)
     return np.concatenate([arc, [(back, -0.5 * across), (back, 0.5 * across)]])
 
 
 def _jaw_pieces(across: float, radius: float) -> list[Array]:
     """The same jaw as convex outlines: two prongs and the palm behind the slot."""
     start = math.asin(0.5 * across / radius)
-    turn = np.linspace(start, math.pi - start, 12)
-    prong = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    prong = _arc(radius, start, math.pi - start, 12)
     open_ = math.acos(-0.35 * across / radius)
-    turn = np.linspace(open_, 2 * math.pi - open_, 12)
-    palm = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    return [prong, prong * np.array([1.0, -1.0]), palm]
+    return [prong, prong * np.array([1.0, -1.0]), _arc(radius, open_, 2 * math.pi - open_, 12)]
+
+
+def _arc(radius: float, start_rad: float, end_rad: float, count: int) -> Array:
+    """Points of an arc about the origin, shape [count, 2]."""
+    turn = np.linspace(start_rad, end_rad, count)
+    points: Array = radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    return points
 
 
 def _turn_jaw(points: Array) -> Array:
     """Points [n, 2] turned by the 15 degrees of a wrench's jaw."""
-    c, s = math.cos(math.radians(15.0)), math.sin(math.radians(15.0))
-    return np.stack(
-        [c * points[:, 0] - s * points[:, 1], s * points[:, 0] + c * points[:, 1]], axis=1
-    )
+    return rotate(np.insert(points, 2, 0.0, axis=1), "z", math.radians(15.0))[:, :2]
 
 
 def _slab(outline: Array, half: float) -> Array:
@@ -160,11 +144,8 @@ def _slab(outline: Array, half: float) -> Array:
 def _fluted_handle(radius: float, length: float, flutes: int) -> Patch:
     """A screwdriver's handle along Z: a bulb with a waist, grooved over most of its length."""
     t = np.linspace(0.0, 1.0, 22)
-    girth = np.interp(
-        t,
-        [0.0, 0.03, 0.1, 0.3, 0.6, 0.78, 0.88, 0.95, 1.0],
-        [0.55, 0.8, 0.97, 1.0, 0.95, 0.72, 0.66, 0.72, 0.5],
-    )
+    at = (0.0, 0.03, 0.1, 0.3, 0.6, 0.78, 0.88, 0.95, 1.0)
+    girth = np.interp(t, at, (0.55, 0.8, 0.97, 1.0, 0.95, 0.72, 0.66, 0.72, 0.5))
     turn = 2 * math.pi * np.arange(32) / 32
     depth = np.where((t > 0.08) & (t < 0.72), 0.09, 0.0)[:, None] * (flutes > 0)
     r = radius * girth[:, None] * (1 - depth * np.maximum(np.cos(flutes * turn), 0.0) ** 2)
@@ -211,20 +192,14 @@ def _flat_tip(radius: float, end: float) -> Patch:
     """Blade of a slotted screwdriver along Z: from round to a wide thin edge."""
     stations = [(-0.014, 1.0, 1.0), (-0.01, 1.35, 0.62), (-0.004, 1.25, 0.3), (0.0, 1.2, 0.16)]
     z, wide, thin = (np.array([s[i] for s in stations]) for i in range(3))
-    path = np.stack([0 * z, 0 * z, end + z], axis=1)
-    return sweep(
-        path, circle(radius, 12), up=(1.0, 0.0, 0.0), scale=np.stack([wide, thin], axis=1), slot=1
-    )
+    path, scale = np.stack([0 * z, 0 * z, end + z], axis=1), np.stack([wide, thin], axis=1)
+    return sweep(path, circle(radius, 12), up=(1.0, 0.0, 0.0), scale=scale, slot=1)
 
 
 def _peen() -> Patch:
     """The wedge at the back of a hammer's head, towards -Y."""
     stations = [(0.015, 0.013, 0.011), (0.03, 0.012, 0.009), (0.056, 0.0115, 0.0022),
                 (0.059, 0.0105, 0.0012)]  # fmt: skip
-    rows = []
-    for y, wide, thin in stations:
-        rows.append(
-            [(a * wide, -y, b * thin) for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))]
-        )
-    loops = np.array(rows)
+    corners = ((1, 1), (-1, 1), (-1, -1), (1, -1), (1, 1))
+    loops = np.array([[(a * w, -y, b * thin) for a, b in corners] for y, w, thin in stations])
     return join_patches([grid(loops), fan(loops[0, :0:-1]), fan(loops[-1, :-1])])
