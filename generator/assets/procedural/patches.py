@@ -66,6 +66,12 @@ class Patch:
         return flat.min(axis=0), flat.max(axis=0)
 
 
+def unit(vectors: Array) -> Array:
+    """Vectors, shape [..., k], of length 1; those without length stay zero."""
+    scaled: Array = vectors / np.maximum(np.sqrt((vectors**2).sum(axis=-1, keepdims=True)), 1e-300)
+    return scaled
+
+
 def rotate(points: Array, axis: str, angle_rad: float) -> Array:
     """Points, shape [..., 3], turned about a coordinate axis by the right-hand rule."""
     i = "xyz".index(axis)
@@ -170,7 +176,7 @@ def _corner_normals(cells: Indices, corners: Array, crease_deg: float) -> Array:
     face stays flat next to a small bevel.
     """
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    face_normals = np.repeat(_unit(cross), 3, axis=0)
+    face_normals = np.repeat(unit(cross), 3, axis=0)
     weighted = np.repeat(cross, 3, axis=0) * _corner_angles(corners).reshape(-1, 1)
     _, vertex = _unique_rows(cells)
     order = np.argsort(vertex, kind="stable")
@@ -186,24 +192,17 @@ def _corner_normals(cells: Indices, corners: Array, crease_deg: float) -> Array:
     sums = [
         np.bincount(mine[smooth], weighted[theirs[smooth], axis], len(cells)) for axis in range(3)
     ]
-    return _unit(np.stack(sums, axis=1))
+    return unit(np.stack(sums, axis=1))
 
 
 def _corner_angles(corners: Array) -> Array:
     """Interior angles [rad], shape [n, 3]."""
     angles = []
     for i in range(3):
-        a = _unit(corners[:, (i + 1) % 3] - corners[:, i])
-        b = _unit(corners[:, (i + 2) % 3] - corners[:, i])
+        a = unit(corners[:, (i + 1) % 3] - corners[:, i])
+        b = unit(corners[:, (i + 2) % 3] - corners[:, i])
         angles.append(np.arccos(np.clip((a * b).sum(axis=1), -1.0, 1.0)))
     return np.stack(angles, axis=1)
-
-
-def _unit(vectors: Array) -> Array:
-    lengths = np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
-    # Vectors without length stay zero.
-    unit: Array = vectors / np.maximum(lengths, 1e-300)
-    return unit
 
 
 def _unique_rows(rows: Indices) -> tuple[Indices, Indices]:

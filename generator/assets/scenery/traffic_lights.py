@@ -36,13 +36,9 @@ _FIRST_LENS = 3
 VEHICLE_LENSES = ("lens_red", "lens_yellow", "lens_green")
 PEDESTRIAN_LENSES = ("lens_stop", "lens_walk")
 FIGURES = load_table(__package__, "signal_figures", tuple[tuple[tuple[float, float], ...], ...])
-_OFF: dict[str, Vec3] = {
-    "lens_red": (0.09, 0.008, 0.006),
-    "lens_yellow": (0.11, 0.06, 0.006),
-    "lens_green": (0.006, 0.06, 0.035),
-    "lens_stop": (0.09, 0.008, 0.006),
-    "lens_walk": (0.006, 0.06, 0.035),
-}
+_RED, _YELLOW, _GREEN = (0.09, 0.008, 0.006), (0.11, 0.06, 0.006), (0.006, 0.06, 0.035)
+_OFF: dict[str, Vec3] = dict(zip(VEHICLE_LENSES, (_RED, _YELLOW, _GREEN), strict=True))
+_OFF |= zip(PEDESTRIAN_LENSES, (_RED, _GREEN), strict=True)
 
 
 def traffic_light(seed: int, mount: str) -> Solid:
@@ -106,11 +102,8 @@ def head(lenses: Sequence[str], lens_m: float) -> Patch:
         chamber = rounded_box((deep, 2 * half, cell - 0.006), 0.025, 1).moved(0.0, 0.0, z)
         x = 0.5 * deep
         lens = _figure(lens_m, role) if role in FIGURES else _bulge(lens_m)
-        parts += [
-            chamber,
-            lens.moved(x, 0.0, z).painted(_FIRST_LENS + k),
-            _visor(1.08 * lens_m, 1.7 * lens_m).moved(x - 0.002, 0.0, z),
-        ]
+        visor = _visor(1.08 * lens_m, 1.7 * lens_m).moved(x - 0.002, 0.0, z)
+        parts += [chamber, lens.moved(x, 0.0, z).painted(_FIRST_LENS + k), visor]
     return join_patches(parts)
 
 
@@ -137,14 +130,11 @@ def _visor(radius: float, reach: float) -> Patch:
 
 def _backboard(signal: Patch) -> Patch:
     """A dark plate behind a head, wider than it, so that lenses stand out against the sky."""
-    low, high = (bound.tolist() for bound in signal.bounds_m())
-    x, rim = float(low[0]) - 0.012, 0.14
-    outer = block((x, low[1] - rim, low[2] - rim), (x + 0.01, high[1] + rim, high[2] + rim))
-    inner = block(
-        (x + 0.003, low[1] - rim + 0.03, low[2] - rim + 0.03),
-        (x + 0.013, high[1] + rim - 0.03, high[2] + rim - 0.03),
-    )
-    return join_patches([outer.painted(BOARD), inner.painted(HOUSING)])
+    low, high = signal.bounds_m()
+    x, (y0, z0), (y1, z1) = float(low[0]) - 0.012, low[1:] - 0.14, high[1:] + 0.14
+    outer = block((x, y0, z0), (x + 0.01, y1, z1), slot=BOARD)
+    inner = block((x + 0.003, y0 + 0.03, z0 + 0.03), (x + 0.013, y1 - 0.03, z1 - 0.03))
+    return join_patches([outer, inner.painted(HOUSING)])
 
 
 def _materials(lenses: Sequence[str], housing: str) -> tuple[Material, ...]:
