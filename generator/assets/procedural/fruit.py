@@ -42,11 +42,8 @@ def apple(seed: int) -> Solid:
     skin = printed_material(f"texture/apple_skin?seed={seed}", rng.between(0.25, 0.4))
     stalk = _stalk((0.0, 0.0, dip - 0.002), rng.between(0.012, 0.02), 0.0013, rng)
     body = ball(shape, 22, 28)
-    return make_centred_solid(
-        [body, stalk.painted(1)],
-        (skin, _STALK),
-        [hulls.extreme(body.corners_m), hulls.extreme(stalk.corners_m, 16)],
-    )
+    parts = [hulls.extreme(body.corners_m), hulls.extreme(stalk.corners_m, 16)]
+    return make_centred_solid([body, stalk.painted(1)], (skin, _STALK), parts)
 
 
 def orange(seed: int) -> Solid:
@@ -110,11 +107,8 @@ def pear(seed: int) -> Solid:
     stalk = _stalk((lean, 0.0, 0.5 * height - 0.002), rng.between(0.014, 0.022), 0.0014, rng)
     points = body.corners_m.reshape(-1, 3)
     lower, upper = points[points[:, 2] < 0.12 * height], points[points[:, 2] > 0.02 * height]
-    return make_centred_solid(
-        [body, stalk.painted(1)],
-        (skin, _STALK),
-        [hulls.extreme(lower), hulls.extreme(upper), hulls.extreme(stalk.corners_m, 16)],
-    )
+    parts = [*map(hulls.extreme, (lower, upper)), hulls.extreme(stalk.corners_m, 16)]
+    return make_centred_solid([body, stalk.painted(1)], (skin, _STALK), parts)
 
 
 def banana(seed: int) -> Solid:
@@ -126,12 +120,9 @@ def banana(seed: int) -> Solid:
     radius = length / bend
     path = np.stack([radius * np.sin(arc), radius * (1 - np.cos(arc)), np.zeros_like(arc)], axis=1)
     # Five blunt edges; the stem end is long and thin, the blossom end short.
-    t = np.linspace(0.0, 1.0, 25)
-    girth = np.interp(
-        t,
-        [0, 0.04, 0.1, 0.18, 0.32, 0.5, 0.72, 0.88, 0.95, 0.985, 1.0],
-        [0.3, 0.26, 0.3, 0.62, 0.92, 1.0, 0.97, 0.78, 0.5, 0.3, 0.24],
-    )
+    at = (0, 0.04, 0.1, 0.18, 0.32, 0.5, 0.72, 0.88, 0.95, 0.985, 1.0)
+    widths = (0.3, 0.26, 0.3, 0.62, 0.92, 1.0, 0.97, 0.78, 0.5, 0.3, 0.24)
+    girth = np.interp(np.linspace(0.0, 1.0, 25), at, widths)
     turn = 2 * math.pi * np.arange(20) / 20
     edge = 1.0 + 0.045 * np.cos(5 * turn) + 0.008 * np.cos(10 * turn)
     section = thick * edge[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
@@ -175,9 +166,6 @@ def _stalk(foot: tuple[float, float, float], length: float, thick: float, rng: V
     """A bent, tapering twig."""
     x, y, z = foot
     lean = rng.between(-0.4, 0.4) * length
-    path = space_evenly(
-        spline([(x, y, z), (x, y, z + 0.5 * length), (x + lean, y, z + length)], 24), 6
-    )
-    return sweep(
-        path, circle(thick, 8), up=(1.0, 0.0, 0.0), scale=np.array([1.3, 1, 0.9, 0.9, 1.1, 1.5])
-    )
+    bend = spline([(x, y, z), (x, y, z + 0.5 * length), (x + lean, y, z + length)], 24)
+    path, scale = space_evenly(bend, 6), np.array([1.3, 1, 0.9, 0.9, 1.1, 1.5])
+    return sweep(path, circle(thick, 8), up=(1.0, 0.0, 0.0), scale=scale)

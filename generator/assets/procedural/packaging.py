@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -77,6 +77,7 @@ class BottleStyle:
 
 
 BOTTLES = load_table(__package__, "bottles", BottleStyle)
+_SIZES = load_table(__package__, "package_sizes", tuple[tuple[float, ...], ...])
 
 
 def bottle(seed: int) -> Solid:
@@ -98,15 +99,9 @@ def bottle(seed: int) -> Solid:
         lathe([(style.neck_m, neck_top), (0.0, neck_top)], 32, 0),
         _cap(cap_radius, cap_z, height),
     ]
-    stages = [
-        (0.93 * radius, 0.0),
-        (radius, 0.008),
-        (radius, z1),
-        *shoulder,
-        (max(style.neck_m, 0.96 * cap_radius), neck_z + 0.004),
-        (cap_radius, cap_z),
-        (0.97 * cap_radius, height),
-    ]
+    foot = [(0.93 * radius, 0.0), (radius, 0.008), (radius, z1)]
+    mouth = (max(style.neck_m, 0.96 * cap_radius), neck_z + 0.004)
+    stages = [*foot, *shoulder, mouth, (cap_radius, cap_z), (0.97 * cap_radius, height)]
     flat = np.array([1.0, style.depth, 1.0])
     parts = [hull * flat for hull in hulls.stack(_drop_level_stages(stages))]
     body = Material(draw_linear(style.colors, 0.1, rng), rng.between(*style.gloss))
@@ -130,13 +125,8 @@ def jar(seed: int) -> Solid:
     ]
     glass = Material(draw_linear(PALETTES["fillings"], 0.15, rng), rng.between(0.06, 0.12))
     label = printed_material(f"texture/label?seed={seed + 1000}", rng.between(0.45, 0.65))
-    lid = rng.choose(
-        (
-            metal_material((0.83, 0.69, 0.35), 0.3),
-            metal_material(STEEL, 0.3),
-            plastic_material(rng, CAPS),
-        )
-    )
+    metals = (metal_material(color, 0.3) for color in ((0.83, 0.69, 0.35), STEEL))
+    lid = rng.choose((*metals, plastic_material(rng, CAPS)))
     stages = [(0.92 * radius, 0.0), (radius, 0.008), (radius, 0.8 * height), (lid_radius, top),
               (lid_radius, height)]  # fmt: skip
     return make_centred_solid(patches, (glass, label, lid), hulls.stack(stages))
@@ -147,16 +137,13 @@ def _wall_with_label(
 ) -> list[Patch]:
     """Bottom and wall up to the last point of ``upper``, with a label between two heights."""
     z0, z1 = label
-    lower = fillet(
-        [(0.0, 0.004), (0.6 * radius, 0.003), (0.72 * radius, 0.0), (0.93 * radius, 0.0),
-         (radius, 0.008), (radius, z0 - _PROUD_M), (radius + _PROUD_M, z0)],
-        [0.0, 0.0, 0.0, 0.004, 0.01, 0.0, 0.0],
-        3,
-    )  # fmt: skip
-    rest = [(radius + _PROUD_M, z1), (radius, z1 + _PROUD_M), *upper]
+    proud = radius + _PROUD_M
+    foot = [(0.0, 0.004), (0.6 * radius, 0.003), (0.72 * radius, 0.0), (0.93 * radius, 0.0)]
+    lower = [*foot, (radius, 0.008), (radius, z0 - _PROUD_M), (proud, z0)]
+    rest = [(proud, z1), (radius, z1 + _PROUD_M), *upper]
     return [
-        lathe(lower, 32, 0),
-        lathe([(radius + _PROUD_M, z0), (radius + _PROUD_M, z1)], 32, 1, v=(0.0, 1.0)),
+        lathe(fillet(lower, [0.0, 0.0, 0.0, 0.004, 0.01, 0.0, 0.0], 3), 32, 0),
+        lathe([(proud, z0), (proud, z1)], 32, 1, v=(0.0, 1.0)),
         lathe(fillet(rest, [0.0, 0.0, *radii, 0.0], 3), 32, 0),
     ]
 
@@ -183,8 +170,7 @@ def _drop_level_stages(stages: list[Point2]) -> list[Point2]:
     return kept
 
 
-@dataclass(frozen=True, slots=True)
-class CanSize:
+class CanSize(NamedTuple):
     """Radius and height [m] of a common size; ``food`` cans have beaded ends."""
 
     radius_m: float
@@ -192,21 +178,10 @@ class CanSize:
     food: bool
 
 
-CANS = (
-    CanSize(0.0331, 0.1152, False),
-    CanSize(0.0331, 0.1152, False),
-    CanSize(0.0265, 0.1345, False),
-    CanSize(0.0331, 0.168, False),
-    CanSize(0.0365, 0.109, True),
-    CanSize(0.0365, 0.109, True),
-    CanSize(0.0495, 0.118, True),
-    CanSize(0.0425, 0.036, True),
-)
-
-
 def can_size(seed: int) -> CanSize:
-    """Size of a variant, from ``CANS``."""
-    return in_turn(CANS, seed)
+    """Size of a variant."""
+    kind = ("drink", "food")[seed // 4 % 2]
+    return CanSize(*in_turn(_SIZES[f"{kind}_cans"], seed % 4), kind == "food")
 
 
 def label_aspect(seed: int) -> float:
@@ -228,13 +203,9 @@ def can(seed: int) -> Solid:
     else:
         print_ = printed_material(texture, rng.between(0.25, 0.38), 0.35)
         patches, stages = _drink_can(r, h)
-        lid = _tab(0.68 * r)
-        lid = [piece.moved(z=h - 0.0045) for piece in lid]
-    materials = (
-        print_,
-        metal_material(STEEL if size.food else ALUMINIUM, rng.between(0.22, 0.35)),
-        metal_material(ALUMINIUM, 0.3),
-    )
+        lid = [piece.moved(z=h - 0.0045) for piece in _tab(0.68 * r)]
+    body = metal_material(STEEL if size.food else ALUMINIUM, rng.between(0.22, 0.35))
+    materials = (print_, body, metal_material(ALUMINIUM, 0.3))
     return make_centred_solid([*patches, *lid], materials, hulls.stack(stages))
 
 
@@ -243,22 +214,14 @@ def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
     neck, rim = r - 0.0062, r - 0.006
     z0, z1 = 0.1 * h, h - 0.024
     v1 = (z1 - z0) / (h - 0.004 - z0)
-    bottom = fillet(
-        [(0.0, 0.009), (0.55 * r, 0.006), (0.72 * r, 0.0), (0.76 * r, 0.0), (r, 0.012), (r, z0)],
-        [0.0, 0.03, 0.001, 0.002, 0.012, 0.0],
-        2,
-    )
-    side = [(r, z0), (r, z1)]
-    top = fillet(
-        [(r, z1), (r, h - 0.014), (neck, h - 0.0035), (neck, h - 0.002), (rim, h),
-         (rim - 0.002, h), (rim - 0.0028, h - 0.005), (0.0, h - 0.005)],
-        [0.0, 0.02, 0.004, 0.0, 0.0006, 0.0006, 0.0008, 0.0],
-        2,
-    )  # fmt: skip
+    dome = [(0.0, 0.009), (0.55 * r, 0.006), (0.72 * r, 0.0), (0.76 * r, 0.0), (r, 0.012), (r, z0)]
+    taper = [(r, z1), (r, h - 0.014), (neck, h - 0.0035), (neck, h - 0.002), (rim, h)]
+    lid = [(rim - 0.002, h), (rim - 0.0028, h - 0.005), (0.0, h - 0.005)]
+    top = fillet([*taper, *lid], [0.0, 0.02, 0.004, 0.0, 0.0006, 0.0006, 0.0008, 0.0], 2)
     split = next(i for i, (_, z) in enumerate(top) if z > h - 0.0045)
     patches = [
-        lathe(bottom, 32, 1),
-        lathe(side, 32, 0, v=(0.0, v1)),
+        lathe(fillet(dome, [0.0, 0.03, 0.001, 0.002, 0.012, 0.0], 2), 32, 1),
+        lathe([(r, z0), (r, z1)], 32, 0, v=(0.0, v1)),
         lathe(top[: split + 1], 32, 0, v=(v1, 1.0)),
         lathe(top[split:], 32, 1),
     ]
@@ -271,9 +234,8 @@ def _food_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
     seam = 0.0035
     end = [(0.0, 0.003), (0.8 * r, 0.003), (0.82 * r, 0.004), (0.9 * r, 0.004),
            (0.93 * r, 0.0), (r, 0.0), (r, seam), (r - 0.001, seam + 0.001)]  # fmt: skip
-    z0, z1 = seam + 0.001, h - seam - 0.001
     wall = r - 0.001
-    body = [(wall, z0), (wall, z1)]
+    body = [(wall, seam + 0.001), (wall, h - seam - 0.001)]
     top = [(radius, h - z) for radius, z in end[::-1]]
     patches = [lathe(end, 36, 1), lathe(body, 36, 0, v=(0.0, 1.0)), lathe(top, 36, 1)]
     return patches, [(r, 0.0), (r, h)]
@@ -282,32 +244,20 @@ def _food_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
 def _tab(length: float) -> list[Patch]:
     """Pull tab lying on the lid, its origin at the rivet."""
     ring_ = circle(1.0, 14) * np.array([0.5 * length, 0.3 * length])
-    hole = circle(1.0, 10) * np.array([0.22 * length, 0.17 * length]) + np.array(
-        [0.18 * length, 0.0]
-    )
+    hole = circle(1.0, 10) * np.array([0.22 * length, 0.17 * length])
+    hole = hole + np.array([0.18 * length, 0.0])
     plate = extrude(ring_, 0.0012, 0.0003, [hole], 2)
     rivet = lathe([(0.0, 0.0), (0.0035, 0.0), (0.0033, 0.002), (0.0, 0.0022)], 12, 2)
     return [plate.moved(x=0.18 * length), rivet.moved(x=-0.12 * length)]
 
 
-# Where each face of a carton lies in its image: four sides above, top and bottom below.
-CARTON_ATLAS: Mapping[str, UvRect] = {
-    "front": (0.002, 0.252, 0.338, 0.998),
-    "left": (0.342, 0.252, 0.498, 0.998),
-    "back": (0.502, 0.252, 0.838, 0.998),
-    "right": (0.842, 0.252, 0.998, 0.998),
-    "top": (0.002, 0.002, 0.498, 0.248),
-    "bottom": (0.502, 0.002, 0.998, 0.248),
-}
-_CARTONS: tuple[tuple[float, float, float], ...] = (
-    (0.065, 0.19, 0.28), (0.055, 0.17, 0.25), (0.07, 0.125, 0.075), (0.06, 0.09, 0.125),
-    (0.035, 0.155, 0.21), (0.05, 0.1, 0.17), (0.04, 0.13, 0.18), (0.075, 0.15, 0.07))  # fmt: skip
+CARTON_ATLAS = load_table(__package__, "carton_atlas", UvRect)
 
 
 def carton_size_m(seed: int) -> Vec3:
     """Depth (X), width (Y) and height of a carton; its front faces +X."""
     rng = variant_rng("carton/size", seed)
-    x, y, z = (side * rng.between(0.92, 1.08) for side in in_turn(_CARTONS, seed))
+    x, y, z = (side * rng.between(0.92, 1.08) for side in in_turn(_SIZES["cartons"], seed))
     return (x, y, z)
 
 
@@ -323,10 +273,9 @@ def carton(seed: int) -> Solid:
     rng = variant_rng("carton", seed)
     size = carton_size_m(seed)
     body = rounded_box(size, 0.0012, 1, uv=CARTON_ATLAS)
-    half = tuple(0.5 * side for side in size)
+    x, y, z = (0.5 * side for side in size)
     print_ = printed_material(f"texture/carton?seed={seed}", rng.between(0.35, 0.65))
-    low, high = (-half[0], -half[1], -half[2]), (half[0], half[1], half[2])
-    return make_centred_solid([body], (print_,), [hulls.box(low, high)])
+    return make_centred_solid([body], (print_,), [hulls.box((-x, -y, -z), (x, y, z))])
 
 
 def milk_carton(seed: int) -> Solid:
@@ -346,9 +295,9 @@ def milk_carton(seed: int) -> Solid:
         parts.append(rotate(cap, "y", tilt) + np.array(at))
     ridge = z + rise
     prism = np.array(
-        [(sx * 0.5 * x, sy * 0.5 * y, z) for sx in (-1, 1) for sy in (-1, 1)]
-        + [(sx * 0.002, sy * 0.5 * y, ridge) for sx in (-1, 1) for sy in (-1, 1)]
-    )
+        [(u, v, w) for a, w in ((0.5 * x, z), (0.002, ridge))
+         for u in (-a, a) for v in (-0.5 * y, 0.5 * y)]
+    )  # fmt: skip
     fin_hull = hulls.box((-0.002, -y / 2, ridge), (0.002, y / 2, ridge + fin))
     parts += [prism, fin_hull]
     return make_centred_solid(patches, (print_, plastic_material(rng, CAPS)), parts)
@@ -362,31 +311,20 @@ def _screw_cap() -> Patch:
 
 def _gable(x: float, y: float, rise: float, fin: float) -> Patch:
     """Roof of two slopes that meet in an upright fin along Y; the ends are tucked in."""
-    top = CARTON_ATLAS["top"]
-    u0, v0, u1, v1 = top
-    t, tuck = 0.0012, 0.12 * y
+    u0, v0, u1, v1 = CARTON_ATLAS["top"]
+    t, tuck, top = 0.0012, 0.12 * y, rise + fin
     made = []
     for s in (1.0, -1.0):
-        foot = [(s * x / 2, -s * y / 2, 0.0), (s * x / 2, s * y / 2, 0.0)]
-        head = [(s * t, -s * y / 2, rise), (s * t, s * y / 2, rise)]
-        tip = [(s * t, -s * y / 2, rise + fin), (s * t, s * y / 2, rise + fin)]
-        made.append(
-            grid(np.array([foot, head, tip]), np.array([u0, u1]), np.array([v0, 0.8 * v1, v1]))
-        )
-    crest = [
-        [(t, -y / 2, rise + fin), (t, y / 2, rise + fin)],
-        [(-t, -y / 2, rise + fin), (-t, y / 2, rise + fin)],
-    ]
-    made.append(grid(np.array(crest), np.array([u0, u0]), np.array([v0, v0])))
+        section = ((s * x / 2, 0.0), (s * t, rise), (s * t, top))
+        rows = np.array([[(u, v, w) for v in (-s * y / 2, s * y / 2)] for u, w in section])
+        made.append(grid(rows, np.array([u0, u1]), np.array([v0, 0.8 * v1, v1])))
+    crest = np.array([[(u, v, top) for v in (-y / 2, y / 2)] for u in (t, -t)])
+    made.append(grid(crest, np.array([u0, u0]), np.array([v0, v0])))
     for s in (1.0, -1.0):
-        inner = (0.0, s * (y / 2 - tuck), 0.55 * rise)
-        a, b = (-s * -x / 2, s * y / 2, 0.0), (-s * x / 2, s * y / 2, 0.0)
-        c, d = (-s * t, s * y / 2, rise), (s * t, s * y / 2, rise)
-        loop = [a, b, c, d]
-        e, f = (-s * t, s * y / 2, rise + fin), (s * t, s * y / 2, rise + fin)
-        corners = [(loop[i], loop[(i + 1) % 4], inner) for i in (0, 1, 3)]
-        corners += [(c, d, inner), (d, c, e), (d, e, f)]
-        n = len(corners)
-        uvs = np.broadcast_to(np.array([u0 + 0.1, 0.5 * v1]), (n, 3, 2))
-        made.append(Patch(np.array(corners), uvs.copy(), np.zeros(n, dtype=np.int64)))
+        inner, end = (0.0, s * (y / 2 - tuck), 0.55 * rise), s * y / 2
+        slopes = ((s * x / 2, 0.0), (-s * x / 2, 0.0), (-s * t, rise), (s * t, rise))
+        a, b, c, d, e, f = ((u, end, w) for u, w in (*slopes, (-s * t, top), (s * t, top)))
+        corners = [(a, b, inner), (b, c, inner), (d, a, inner), (c, d, inner), (d, c, e), (d, e, f)]
+        uvs = np.broadcast_to(np.array([u0 + 0.1, 0.5 * v1]), (6, 3, 2))
+        made.append(Patch(np.array(corners), uvs.copy(), np.zeros(6, dtype=np.int64)))
     return join_patches(made)

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
+from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches, unit
 from gen_data.generator.core.se3 import Vec3
 
 Point2 = tuple[float, float]
@@ -148,12 +148,8 @@ def ball(shape: Callable[[Array], Array], rings: int = 16, segments: int = 24) -
     turn = np.concatenate([turn, turn[:1]])
     radius = np.cos(polar)
     radius[[0, -1]] = 0.0
-    directions = np.stack(
-        np.broadcast_arrays(
-            radius[:, None] * np.cos(turn), radius[:, None] * np.sin(turn), np.sin(polar)[:, None]
-        ),
-        axis=2,
-    )
+    x, y = radius[:, None] * np.cos(turn), radius[:, None] * np.sin(turn)
+    directions = np.stack(np.broadcast_arrays(x, y, np.sin(polar)[:, None]), axis=2)
     return grid(shape(directions), v=np.linspace(0.0, 1.0, rings + 1))
 
 
@@ -218,11 +214,9 @@ def extrude(
     """
     loops = [_wind_loop(outline, 1.0), *(_wind_loop(hole, -1.0) for hole in holes)]
     inner = [_inset(loop, bevel_m) if bevel_m > 0 else loop for loop in loops]
-    levels = (
-        [(inner, 0.0), (loops, bevel_m), (loops, height_m - bevel_m), (inner, height_m)]
-        if bevel_m > 0
-        else [(loops, 0.0), (loops, height_m)]
-    )
+    levels = [(loops, bevel_m), (loops, height_m - bevel_m)]
+    if bevel_m > 0:
+        levels = [(inner, 0.0), *levels, (inner, height_m)]
     walls = []
     for i in range(len(loops)):
         rows = [_at_height(np.concatenate([level[i], level[i][:1]]), z) for level, z in levels]
@@ -268,9 +262,8 @@ def spline(points: Sequence[Sequence[float]], count: int) -> Array:
     i = np.minimum(t.astype(np.int64), len(points) - 2)
     f = (t - i)[:, None]
     a, b, c, d = (p[i + k] for k in range(4))
-    curve: Array = b + 0.5 * f * (
-        c - a + f * (2 * a - 5 * b + 4 * c - d + f * (3 * (b - c) + d - a))
-    )
+    bend = c - a + f * (2 * a - 5 * b + 4 * c - d + f * (3 * (b - c) + d - a))
+    curve: Array = b + 0.5 * f * bend
     return curve
 
 
@@ -309,22 +302,15 @@ def _quads(points: Array) -> Array:
 
 def _tangents(path: Array, closed: bool) -> Array:
     if closed:
-        steps = np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0)
-    else:
-        steps = np.gradient(path, axis=0)
-    unit: Array = steps / np.sqrt((steps**2).sum(axis=1, keepdims=True))
-    return unit
+        return unit(np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0))
+    return unit(np.gradient(path, axis=0))
 
 
 def _rounded_ticks(half: float, radius: float, steps: int) -> Array:
     """Positions along a face whose projection on the rounding is even in angle."""
     angles = np.linspace(0.25 * math.pi, 0.0, steps + 1)
     edge = -(half - radius) - radius * np.tan(angles)
-    return (
-        np.concatenate([edge, -edge[::-1]])
-        if half > radius + 1e-9
-        else np.concatenate([edge, -edge[-2::-1]])
-    )
+    return np.concatenate([edge, -edge[::-1] if half > radius + 1e-9 else -edge[-2::-1]])
 
 
 def _plain_box(size: Sequence[float]) -> Patch:
@@ -332,16 +318,8 @@ def _plain_box(size: Sequence[float]) -> Patch:
     patches = []
     for axes in BOX_FACES.values():
         outward, right, up = (np.array(axis) * half for axis in axes)
-        patches.append(
-            grid(
-                np.stack(
-                    [
-                        np.stack([outward - right + s * up, outward + right + s * up])
-                        for s in (-1.0, 1.0)
-                    ]
-                )
-            )
-        )
+        rows = [[outward - right + s * up, outward + right + s * up] for s in (-1.0, 1.0)]
+        patches.append(grid(np.array(rows)))
     return join_patches(patches)
 
 
@@ -351,8 +329,7 @@ def _wind_loop(loop: Array, sign: float) -> Array:
 
 def _inset(loop: Array, distance: float) -> Array:
     """The loop moved to its left by ``distance``, corners mitred."""
-    step = np.roll(loop, -1, axis=0) - loop
-    step = step / np.sqrt((step**2).sum(axis=1, keepdims=True))
+    step = unit(np.roll(loop, -1, axis=0) - loop)
     left = np.stack([-step[:, 1], step[:, 0]], axis=1)
     before = np.roll(left, 1, axis=0)
     mitre = (left + before) / np.maximum(1.0 + (left * before).sum(axis=1, keepdims=True), 0.3)
@@ -396,9 +373,8 @@ def triangulate(outline: Array, holes: Sequence[Array] = ()) -> Array:
 
 def _double_areas(a: Array, b: Array, c: Array) -> Array:
     """Twice the signed areas of triangles."""
-    doubled: Array = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
-        c[..., 0] - a[..., 0]
-    )
+    (ux, uy), (vx, vy) = (np.moveaxis(p - a, -1, 0) for p in (b, c))
+    doubled: Array = ux * vy - uy * vx
     return doubled
 
 
