@@ -36,12 +36,12 @@ class Cut:
     level: Level
 
 
-def _above(z_m: float, slope: float = 0.0) -> Level:
-    """Height over a plane that passes (x = 0, z) and rises towards the front."""
-    return lambda p: np.asarray(p[:, 2] - z_m - slope * p[:, 0])
+def _above(z_m: float) -> Level:
+    return lambda p: np.asarray(p[:, 2] - z_m)
 
 
 def _below(z_m: float, slope: float = 0.0) -> Level:
+    """Depth under a plane that passes (x = 0, z) and rises towards the front."""
     return lambda p: np.asarray(z_m + slope * p[:, 0] - p[:, 2])
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, cast
 
 from gen_data.generator.assets.people.animation import BEHAVIOURS, PHASES, POSES, PoseName
@@ -14,6 +14,7 @@ from gen_data.generator.assets.procedural.material_presets import (
     draw_linear,
     hex_to_linear,
     jitter_color,
+    patterned_material,
 )
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
@@ -90,9 +91,9 @@ def _top(kind: str, child: bool, rng: VariantRng) -> Material:
         return _plain_material(colors, rng.between(0.55, 0.9), "top", rng)
     pattern, seed = float(rng.random()), float(rng.random())
     if kind != "tshirt" and pattern < 0.12:
-        return _patterned_material(_WARM_FABRICS[int(seed * len(_WARM_FABRICS))], 0.22, "top")
+        return _patterned_top(_WARM_FABRICS[int(seed * len(_WARM_FABRICS))], 0.22)
     if pattern < 0.12:
-        return _patterned_material(_STRIPES[int(seed * len(_STRIPES))], 0.3, "top")
+        return _patterned_top(_STRIPES[int(seed * len(_STRIPES))], 0.3)
     colors = _COLORS["bright"] if rng.chance(0.4 if child else 0.1) else _COLORS["tops"]
     return _plain_material(colors, rng.between(0.75, 0.95), "top", rng)
 
@@ -105,19 +106,12 @@ def _bottom(kind: str, rng: VariantRng) -> Material:
 def _plain_material(
     colors: Sequence[str], roughness: float, role: str, rng: VariantRng
 ) -> Material:
-    color: Vec3 = draw_linear(colors, 0.12, rng)
-    return Material(base_color=color, roughness=roughness, specular=0.35, role=role)
+    return Material(draw_linear(colors, 0.12, rng), roughness, specular=0.35, role=role)
 
 
-def _patterned_material(texture: str, scale_m: float, role: str) -> Material:
-    return Material(
-        base_color=(0.9, 0.9, 0.9),
-        roughness=0.9,
-        specular=0.35,
-        texture=texture,
-        texture_scale_m=scale_m,
-        role=role,
-    )
+def _patterned_top(texture: str, scale_m: float) -> Material:
+    plain = patterned_material(texture, scale_m, 0.9, (0.9, 0.9, 0.9))
+    return replace(plain, specular=0.35, role="top")
 
 
 Sex = Literal["female", "male"]

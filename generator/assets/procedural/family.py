@@ -195,36 +195,16 @@ def load_families(package: str) -> FamilyTables:
     )
 
 
-def _object_family(  # noqa: PLR0913  (the columns of the table)
-    name: str,
-    *,
-    build: Lazy,
-    tags: tuple[str, ...],
-    version: int,
-    variants: int,
-    parameters: Mapping[str, object],
-    category: str = "",
-    mass_kg: float = 0.0,
-    stackable: bool = False,
-    subcategory: str = "",
-    facts: bool = False,
-    stored: bool = True,
+def _object_family(
+    name: str, *, category: str = "", subcategory: str = "", facts: bool = False, **row: Any
 ) -> Family:
-    return Family(
-        name=name,
-        category=category or name,
-        tags=tags,
-        variants=variants,
-        mass_kg=mass_kg,
-        stackable=stackable,
-        version=version,
-        parameters=parameters,
-        build=build,
-        facts=Lazy(f"{build.path}_facts")
-        if facts
-        else (ConstantFacts(subcategory) if subcategory else None),
-        stored=stored,
-    )
+    known: Callable[..., Facts] | None = None
+    if facts:
+        known = Lazy(f"{row['build'].path}_facts")
+    elif subcategory:
+        known = ConstantFacts(subcategory)
+    row = {"mass_kg": 0.0, "stackable": False, **row}
+    return Family(name=name, category=category or name, facts=known, **row)
 
 
 def _arguments(package: str, row: Mapping[str, Any]) -> dict[str, Any]:

@@ -81,7 +81,6 @@ def sweep(
     *,
     up: Vec3 = (0.0, 0.0, 1.0),
     scale: Array | None = None,
-    closed: bool = False,
     capped: bool = True,
     slot: int = 0,
 ) -> Patch:
@@ -92,30 +91,27 @@ def sweep(
         section: Counter-clockwise outline [m], shape [k, 2]; its first axis starts along ``up``.
         up: Direction of the section's first axis at the start.
         scale: Factors on the section per path point, shape [n] or [n, 2].
-        closed: Whether the path returns to its start.
         capped: Whether open ends are closed by flat caps.
         slot: Material slot.
     """
-    first, second = frames_along(path, up, closed)
+    first, second = frames_along(path, up)
     factors = np.ones((len(path), 2)) if scale is None else np.asarray(scale, dtype=np.float64)
     factors = np.repeat(factors[:, None], 2, axis=1) if factors.ndim == 1 else factors
     outline = np.concatenate([section, section[:1]])
     a = outline[None, :, :1] * factors[:, None, :1]
     b = outline[None, :, 1:] * factors[:, None, 1:]
     points = path[:, None, :] + a * first[:, None, :] + b * second[:, None, :]
-    if closed:
-        return grid(np.concatenate([points, points[:1]]), slot=slot)
     ends = [] if not capped else [fan(points[0, :0:-1], slot), fan(points[-1, :-1], slot)]
     return join_patches([grid(points, slot=slot), *ends])
 
 
-def frames_along(path: Array, up: Vec3, closed: bool = False) -> tuple[Array, Array]:
+def frames_along(path: Array, up: Vec3) -> tuple[Array, Array]:
     """Two unit normals per path point; normals x are carried without rotation about the path.
 
     Double reflection: Wang et al., "Computation of rotation minimizing frames", ACM TOG 27(1),
-    2008. Plane curves close exactly; that is all a closed path is used for here.
+    2008.
     """
-    tangents = _tangents(path, closed)
+    tangents = unit(np.gradient(path, axis=0))
     first = np.zeros_like(path)
     start = np.array(up) - (np.array(up) * tangents[0]).sum() * tangents[0]
     first[0] = start / math.sqrt(float((start * start).sum()))
@@ -159,7 +155,6 @@ def rounded_box(
     steps: int = 2,
     *,
     uv: Mapping[str, UvRect] | None = None,
-    slots: Mapping[str, int] | None = None,
 ) -> Patch:
     """A box about the origin with rounded edges.
 
@@ -168,7 +163,6 @@ def rounded_box(
         radius_m: Edge radius, at most half the smallest side.
         steps: Quads from a face's border to the middle of the edge.
         uv: Image rectangle ``(u0, v0, u1, v1)`` per face of ``BOX_FACES``; all of it by default.
-        slots: Material slot per face; 0 by default.
     """
     half = 0.5 * np.array(size_m)
     radius = min(radius_m, float(half.min()))
@@ -186,9 +180,7 @@ def rounded_box(
         points = core + radius * away / np.maximum(length, 1e-300)
         u0, v0, u1, v1 = (uv or {}).get(name, WHOLE_IMAGE)
         u, v = ((t - t[0]) / (t[-1] - t[0]) for t in (a, b))
-        patches.append(
-            grid(points, u0 + (u1 - u0) * u, v0 + (v1 - v0) * v, (slots or {}).get(name, 0))
-        )
+        patches.append(grid(points, u0 + (u1 - u0) * u, v0 + (v1 - v0) * v))
     return join_patches(patches)
 
 
@@ -298,12 +290,6 @@ def _quads(points: Array) -> Array:
     c, d = points[1:, 1:], points[1:, :-1]
     pairs = np.stack([np.stack([a, b, c], axis=2), np.stack([a, c, d], axis=2)], axis=2)
     return np.array(pairs.reshape(-1, 3, points.shape[2]))
-
-
-def _tangents(path: Array, closed: bool) -> Array:
-    if closed:
-        return unit(np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0))
-    return unit(np.gradient(path, axis=0))
 
 
 def _rounded_ticks(half: float, radius: float, steps: int) -> Array:

@@ -92,14 +92,14 @@ def reveal(opening: Opening, depth_m: float, slot: int = FACADE) -> Patch:
     return grid(np.array([[(x, y, z) for y, z in loop] for x in (0.0, -depth_m)]), slot=slot)
 
 
-def window(opening: Opening, rng: VariantRng, slot: int = FACADE) -> Patch:
+def window(opening: Opening, rng: VariantRng) -> Patch:
     """Reveal, frame with bars, and panes; behind some of them hang curtains."""
     depth_m = opening.recess_m + GLASS_SETBACK_M
-    sides = reveal(opening, depth_m, slot)
+    sides = reveal(opening, depth_m)
     return join_patches([sides, frame(opening), panes(opening, rng, -depth_m)])
 
 
-def frame(opening: Opening, slot: int = FRAME) -> Patch:
+def frame(opening: Opening) -> Patch:
     """The window's frame and glazing bars, flat at the bottom of the recess."""
     (y0, y1), (z0, z1) = opening.y_m, opening.z_m
     x, w = -opening.recess_m, min(_FRAME_WIDTH_M, 0.2 * opening.width_m)
@@ -113,7 +113,7 @@ def frame(opening: Opening, slot: int = FRAME) -> Patch:
         # Transoms sit high: the lower sash is the tall one.
         z = z0 + opening.height_m * (0.42 + 0.58 * k / opening.level)
         bars.append((x + 0.004, across, (z - 0.4 * w, z + 0.4 * w)))
-    return join_patches([facing_rectangle(*bar, slot) for bar in bars])
+    return join_patches([facing_rectangle(*bar, FRAME) for bar in bars])
 
 
 def panes(opening: Opening, rng: VariantRng, x: float) -> Patch:
@@ -132,19 +132,19 @@ def panes(opening: Opening, rng: VariantRng, x: float) -> Patch:
     return facing_rectangle(x, (y0, y1), z, curtain if drawn == "all" else glass)
 
 
-def sill(opening: Opening, out_m: float = 0.05, slot: int = TRIM) -> Patch:
+def sill(opening: Opening) -> Patch:
     """A ledge below a window; its back lies in the recess."""
     (y0, y1), z0 = opening.y_m, opening.z_m[0]
     x, top = -opening.recess_m, z0 + 0.005
-    ledge = block((0.0, y0 - 0.06, z0 - 0.06), (out_m, y1 + 0.06, top), slot=slot)
-    back = quad([(0.0, y0, top), (0.0, y1, top), (x, y1, top), (x, y0, top)], slot)
+    ledge = block((0.0, y0 - 0.06, z0 - 0.06), (0.05, y1 + 0.06, top), slot=TRIM)
+    back = quad([(0.0, y0, top), (0.0, y1, top), (x, y1, top), (x, y0, top)], TRIM)
     return join_patches([ledge, back])
 
 
-def lintel(opening: Opening, out_m: float = 0.05, height_m: float = 0.16) -> Patch:
+def lintel(opening: Opening) -> Patch:
     """A stone band above an opening."""
     (y0, y1), z1 = opening.y_m, opening.z_m[1]
-    return block((0.0, y0 - 0.12, z1), (out_m, y1 + 0.12, z1 + height_m), slot=TRIM)
+    return block((0.0, y0 - 0.12, z1), (0.05, y1 + 0.12, z1 + 0.16), slot=TRIM)
 
 
 def leaves(opening: Opening) -> Patch:
@@ -201,7 +201,7 @@ def shop_front(opening: Opening, rng: VariantRng, slot: int = FACADE) -> Patch:
     )
 
 
-def garage_door(opening: Opening, slot: int = FACADE) -> Patch:
+def garage_door(opening: Opening) -> Patch:
     """An up-and-over door of level panels."""
     x, rows = -opening.recess_m, 5
     edges = [opening.z_m[0] + opening.height_m * k / rows for k in range(rows + 1)]
@@ -210,12 +210,12 @@ def garage_door(opening: Opening, slot: int = FACADE) -> Patch:
         for k, (a, b) in enumerate(pairwise(edges))
     ]
     back = facing_rectangle(x - 0.01, opening.y_m, opening.z_m, METAL)
-    return join_patches([reveal(opening, opening.recess_m + 0.01, slot), back, *panels])
+    return join_patches([reveal(opening, opening.recess_m + 0.01), back, *panels])
 
 
-def railing(y_m: Span, z0: float, x: float, height_m: float = 0.95, pitch_m: float = 0.14) -> Patch:
+def railing(y_m: Span, z0: float, x: float, pitch_m: float = 0.14) -> Patch:
     """Upright bars between two rails, in the plane x."""
-    (y0, y1), top = y_m, z0 + height_m
+    (y0, y1), top = y_m, z0 + 0.95
     at = np.linspace(y0 + 0.02, y1 - 0.02, max(2, round((y1 - y0) / pitch_m)))
     bars = [facing_rectangle(x, (y - 0.008, y + 0.008), (z0 + 0.08, top), METAL) for y in at]
     for z in (z0 + 0.06, top):
@@ -273,10 +273,10 @@ def awning(y_m: Span, z1: float, out_m: float) -> Patch:
     return join_patches([quad(cloth, AWNING), lip, *ends])
 
 
-def sign_board(y_m: Span, z_m: Span, out_m: float = 0.1) -> Patch:
+def sign_board(y_m: Span, z_m: Span) -> Patch:
     """A shop's name on a board; the whole image lies on its front."""
-    board = block((0.0, y_m[0], z_m[0]), (out_m, y_m[1], z_m[1]), slot=METAL)
-    return join_patches([board, facing_rectangle(out_m + 0.004, y_m, z_m, SIGN)])
+    board = block((0.0, y_m[0], z_m[0]), (0.1, y_m[1], z_m[1]), slot=METAL)
+    return join_patches([board, facing_rectangle(0.104, y_m, z_m, SIGN)])
 
 
 def _holds(opening: Opening, y: float, z: float) -> bool:
