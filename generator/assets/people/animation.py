@@ -124,11 +124,11 @@ def stance(pose: PoseName, step: int) -> Stance:
 
 def _stride(gait: _Gait, step: int) -> Stance:
     turn = math.cos(2.0 * math.pi * step / PHASES)
-    legs = (
+    left_leg, right_leg = (
         Leg(gait.hip[k], gait.knee[k], gait.ankle[k], gait.toes[k])
         for k in (step, (step + PHASES // 2) % PHASES)
     )
-    arms = (
+    left_arm, right_arm = (
         replace(
             gait.arm,
             swing=sign * gait.arm_swing * turn + gait.arm.swing,
@@ -136,4 +136,5 @@ def _stride(gait: _Gait, step: int) -> Stance:
         )
         for sign in (-1.0, 1.0)
     )
-    return Stance(*legs, *arms, lean=gait.lean, twist=-gait.twist * turn)
+    twist = -gait.twist * turn
+    return Stance(left_leg, right_leg, left_arm, right_arm, lean=gait.lean, twist=twist)

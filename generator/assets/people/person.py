@@ -126,10 +126,6 @@ _ADULT_M = (1.5, 1.95)
 # children and adolescents", Bulletin of the WHO 85(9), 2007.
 _CHILD_M = (1.16, 1.5)
 
-# Light to dark, after the six types of Fitzpatrick, Archives of Dermatology 124(6), 1988.
-_SKIN = ("#f0cdb8", "#e3b797", "#cf9f78", "#b07f57", "#80543a", "#4f3527")
-_HAIR = ("#14100e", "#1f1713", "#32221a", "#4a3223", "#6b4a2f", "#8f6b42", "#b8935c", "#6d3a22")
-_GREY = ("#6f6c69", "#9b9894", "#c9c6c1")
 _HAIRCUTS = {
     "female": ("long", "long", "bob", "bob", "short", "long"),
     "male": ("short", "short", "short", "cropped", "cropped", "bald"),
@@ -176,16 +172,16 @@ def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
     sex: Sex = "female" if rng.chance(0.5) else "male"
     age_group = _drawn_age(rng)
     height_m = _drawn_height_m(sex, age_group, rng)
-    tone = min(int(rng.random() * len(_SKIN)), len(_SKIN) - 1)
+    tone = rng.choose(range(len(_COLORS["skin"])))
     figure = _drawn_figure(sex, age_group, height_m, tone, rng)
     action, step = _drawn_action(seed, pose, phase)
     return Person(
-        seed=seed,
-        sex=sex,
-        age_group=age_group,
-        height_m=height_m,
-        figure=figure,
-        skin=jitter_color(hex_to_linear(_SKIN[tone]), 0.07, rng),
+        seed,
+        sex,
+        age_group,
+        height_m,
+        figure,
+        skin=jitter_color(hex_to_linear(_COLORS["skin"][tone]), 0.07, rng),
         hair=_drawn_hair(age_group, tone, rng),
         haircut=rng.choose(_HAIRCUTS[sex][: 3 if age_group == "child" else None]),
         outfit=draw_outfit(sex, age_group == "child", rng),
@@ -263,16 +259,16 @@ def _three(word: str, value: float) -> dict[str, float]:
 
 def _drawn_hair(age_group: AgeGroup, tone: int, rng: VariantRng) -> Vec3:
     if age_group == "senior" and rng.chance(0.8):
-        return draw_linear(_GREY, 0.1, rng)
+        return draw_linear(_COLORS["grey_hair"], 0.1, rng)
     # Fair hair belongs to fair skin.
-    return draw_linear(_HAIR[: 8 if tone < 2 else 4 if tone < 4 else 2], 0.12, rng)
+    return draw_linear(_COLORS["hair"][: 8 if tone < 2 else 4 if tone < 4 else 2], 0.12, rng)
 
 
 def _drawn_action(seed: int, pose: str, phase: float) -> tuple[PoseName, int]:
     """Pose and step; they have a stream of their own, so that the same person can do anything."""
     rng = variant_rng("person/pose", seed)
     drawn = rng.choose(("walk",) * 12 + ("stand",) * 4 + ("phone",) * 2 + ("carry",) * 3)
-    step = min(int(rng.random() * PHASES), PHASES - 1)
+    step = rng.choose(range(PHASES))
     if not math.isfinite(phase):
         raise ValueError("phase is no number")
     if phase >= 0.0:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import product
 
 import numpy as np
 
@@ -71,13 +72,8 @@ def vertex_normals(points_m: Array, faces: Indices) -> Array:
     a, b, c = (points_m[faces[:, i]] for i in range(3))
     crosses = _cross(b - a, c - a)
     corners = faces.T.reshape(-1)
-    sums = np.stack(
-        [
-            np.bincount(corners, np.tile(crosses[:, axis], 3), minlength=len(points_m))
-            for axis in range(3)
-        ],
-        axis=1,
-    )
+    weights = np.tile(crosses, (3, 1)).T
+    sums = np.stack([np.bincount(corners, w, minlength=len(points_m)) for w in weights], axis=1)
     lengths = np.sqrt((sums * sums).sum(axis=1, keepdims=True))
     unit: Array = np.where(lengths > 1e-12, sums / np.maximum(lengths, 1e-12), (0.0, 0.0, 1.0))
     return unit
@@ -157,11 +153,8 @@ def _fingers(
 ) -> dict[str, Array]:
     """Fingers bent about the line of the knuckles."""
     across = _direction(body, heads_m, f"index_01_{side}", f"pinky_01_{side}")
-    made: dict[str, Array] = {}
-    for finger in _FINGERS:
-        for k in (1, 2, 3):
-            made[f"{finger}_0{k}_{side}"] = hand @ _about(across, k * curl)
-    return made
+    joints = product(_FINGERS, (1, 2, 3))
+    return {f"{name}_0{k}_{side}": hand @ _about(across, k * curl) for name, k in joints}
 
 
 def _direction(body: BodyTemplate, heads_m: Array, start: str, end: str) -> Array:
@@ -185,9 +178,7 @@ def _roll(angle_deg: float) -> Array:
 
 def _about(axis: Array, angle_deg: float) -> Array:
     """Rotation about a unit axis (Rodrigues 1840)."""
-    angle = math.radians(angle_deg)
-    x, y, z = axis
-    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    angle, k = math.radians(angle_deg), _cross_matrix(axis)
     rotation: Array = np.eye(3) + math.sin(angle) * k + (1.0 - math.cos(angle)) * (k @ k)
     return rotation
 
@@ -195,10 +186,15 @@ def _about(axis: Array, angle_deg: float) -> Array:
 def _between(start: Array, end: Array) -> Array:
     """The smallest rotation that turns one direction into another; not for opposite ones."""
     a, b = _unit(start), _unit(end)
-    x, y, z = np.cross(a, b)
-    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    k = _cross_matrix(np.cross(a, b))
     rotation: Array = np.eye(3) + k + (k @ k) / (1.0 + float((a * b).sum()))
     return rotation
+
+
+def _cross_matrix(vector: Array) -> Array:
+    """Matrix of the cross product with a vector."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def _unit(vector: Array) -> Array:

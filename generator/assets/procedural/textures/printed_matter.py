@@ -82,19 +82,18 @@ def book_cover(seed: int) -> TextureData:
     design = replace(_design(seed, rng), product=" ".join(words), note=rng.choose(_WORDS["praise"]))
     length, width, thickness = books.book_size_m(seed)
     scale = 560.0 / length
-    h = int(length * scale)
+    w, h = int(width * scale), int(length * scale)
     faces = {
-        "front": _front_cover(int(width * scale), h, words, design, rng),
+        "front": _front_cover(w, h, words, design, rng),
         "spine": _spine(max(24, int(thickness * scale)), h, design),
-        "back": _back_cover(int(width * scale), h, design, rng),
+        "back": _back_cover(w, h, design, rng),
     }
     return art.atlas(faces, books.COVER_ATLAS, design.ground)
 
 
 def _design(seed: int, rng: VariantRng, sizes: Sequence[str] = _WORDS["weights"]) -> _Design:
-    schemes = _WORDS["schemes"]
-    codes = in_turn(schemes, seed).split()
-    ground, second, accent, ink = (hex_to_srgb8(code) for code in codes)
+    scheme = in_turn(_WORDS["schemes"], seed)
+    ground, second, accent, ink = (hex_to_srgb8(code) for code in scheme.split())
     if rng.chance(0.3):
         second, accent = accent, second
     name = rng.choose(_WORDS["starts"]) + rng.choose(_WORDS["ends"])
@@ -156,13 +155,8 @@ def _front(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     on_ground = design.layout in (0, 3)
     if design.layout in (1, 4):
         art.panel(image, brand, design.second)
-    art.text(
-        image,
-        brand,
-        design.brand,
-        design.ink if on_ground else _readable(design, design.second),
-        design.bold,
-    )
+    ink = design.ink if on_ground else _readable(design, design.second)
+    art.text(image, brand, design.brand, ink, design.bold)
     art.text(image, product, design.product, design.ink, 1)
     note = (0.05, 0.9, 0.5, 0.97) if tall else (0.05, 0.76, 0.4, 0.88)
     size = (0.68, 0.91, 0.95, 0.97) if tall else (0.44, 0.78, 0.6, 0.88)
@@ -248,15 +242,14 @@ def _rings(pen: ImageDraw, at: Place, r: float, design: _Design, _: VariantRng) 
     cx, cy = at
     for i in range(5, 0, -1):
         s = r * i / 5
-        pen.ellipse(
-            [cx - s, cy - s, cx + s, cy + s], fill=design.accent if i % 2 else design.second
-        )
+        fill = design.accent if i % 2 else design.second
+        pen.ellipse([cx - s, cy - s, cx + s, cy + s], fill=fill)
 
 
 def _info(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     """Small print, a table of nutrition and a bar code."""
-    image = art.canvas(w, h, art.blend(design.ground, (255, 255, 255), 0.25))
     paper = art.blend(design.ground, (255, 255, 255), 0.25)
+    image = art.canvas(w, h, paper)
     ink = (25, 25, 28) if sum(paper) > 330 else (240, 240, 240)
     art.text(image, (0.08, 0.03, 0.92, 0.11), design.brand, ink, 1)
     art.lines(image, (0.08, 0.14, 0.92, 0.32), ink, paper, rng)
@@ -278,9 +271,8 @@ def _side(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
 
 def _strip(w: int, h: int, design: _Design) -> Image:
     image = art.canvas(w, h, design.second)
-    art.text(
-        image, (0.1, 0.2, 0.9, 0.8), design.brand, _readable(design, design.second), design.bold
-    )
+    ink = _readable(design, design.second)
+    art.text(image, (0.1, 0.2, 0.9, 0.8), design.brand, ink, design.bold)
     return image
 
 
@@ -292,13 +284,8 @@ def _front_cover(w: int, h: int, words: tuple[str, str], design: _Design, rng: V
     art.text(image, (0.1, 0.09, 0.9, 0.2), words[0], design.ink, 2)
     art.text(image, (0.1, 0.22, 0.9, 0.34), words[1], design.ink, 3)
     art.panel(image, (0.0, 0.87, 1.0, 0.97), design.second)
-    art.text(
-        image,
-        (0.2, 0.895, 0.8, 0.945),
-        f"{design.brand} {rng.choose(_WORDS['ends']).title()}",
-        _readable(design, design.second),
-        1,
-    )
+    author = f"{design.brand} {rng.choose(_WORDS['ends']).title()}"
+    art.text(image, (0.2, 0.895, 0.8, 0.945), author, _readable(design, design.second), 1)
     return image
 
 

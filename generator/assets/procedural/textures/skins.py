@@ -16,6 +16,7 @@ from gen_data.generator.assets.procedural.noise import (
     uniform,
     worley,
 )
+from gen_data.generator.assets.procedural.patches import unit
 from gen_data.generator.assets.procedural.textures.texture_images import (
     color,
     colors_in_turn,
@@ -85,18 +86,13 @@ def pear_skin(seed: int) -> TextureData:
     """Green to yellow or brown, freckled with lenticels."""
     rng = variant_rng("pear_skin", seed)
     codes = ("#b5b83a", "#c7b548", "#96a03a", "#9c7a45", "#b8bd58")
-    base, blush = (
-        draw_color(codes, 0.05, rng),
-        color(rng.choose(("#b0583a", "#a88a3a", "#8f9a3a"))),
-    )
+    base = draw_color(codes, 0.05, rng)
+    blush = color(rng.choose(("#b0583a", "#a88a3a", "#8f9a3a")))
     albedo = mix_colors(base, blush, 0.7 * smoothstep(0.0, 0.9, fbm((2, 2), 4, rng)))
     albedo = mix_colors(albedo, color("#6f5a2c"), 0.55 * _dots(56, 0.25, rng))
     y, _ = rows_and_columns()
-    russet = (
-        smoothstep(0.12, 0.0, y)
-        + smoothstep(0.88, 1.0, y)
-        + smoothstep(0.5, 1.2, fbm((6, 6), 4, rng))
-    )
+    russet = smoothstep(0.12, 0.0, y) + smoothstep(0.88, 1.0, y)
+    russet = russet + smoothstep(0.5, 1.2, fbm((6, 6), 4, rng))
     return texture(mix_colors(albedo, color("#8a6a3a"), 0.6 * russet))
 
 
@@ -155,9 +151,8 @@ def _basket(d: Float32, rng: VariantRng) -> Float32:
     bow = np.abs(np.abs(y) - 0.62 - 0.22 * x**2)
     line = smoothstep(0.03, 0.02, np.minimum(np.minimum(np.abs(x), np.abs(z)), bow))
     pebble = worley((64, 128), rng).nearest
-    leather = (
-        draw_color(("#c8682a", "#b5571f", "#d07a38"), 0.04, rng) * (1.04 - 0.12 * pebble)[..., None]
-    )
+    tan = draw_color(("#c8682a", "#b5571f", "#d07a38"), 0.04, rng)
+    leather = tan * (1.04 - 0.12 * pebble)[..., None]
     return mix_colors(leather, color("#1d1815"), line)
 
 
@@ -167,15 +162,10 @@ def _foot(d: Float32, rng: VariantRng) -> Float32:
     corners = np.array(
         [p for a in (-1, 1) for b in (-golden, golden) for p in ((0, a, b), (a, b, 0), (b, 0, a))]
     ) / math.sqrt(1 + golden**2)
-    close = [
-        (i, j, k)
-        for i in range(12)
-        for j in range(i)
-        for k in range(j)
-        if min(_dot(corners, i, j), _dot(corners, j, k), _dot(corners, i, k)) > 0.4
-    ]
-    faces = np.array([corners[list(t)].sum(axis=0) for t in close])
-    faces /= np.sqrt((faces**2).sum(axis=1, keepdims=True))
+    near = np.einsum("ik,jk->ij", corners, corners, optimize=False) > 0.4
+    triples = [(i, j, k) for i in range(12) for j in range(i) for k in range(j)]
+    close = [(i, j, k) for i, j, k in triples if near[i, j] and near[j, k] and near[i, k]]
+    faces = unit(np.array([corners[list(t)].sum(axis=0) for t in close]))
     heights = np.concatenate([corners / _PENTAGON, faces / _HEXAGON])
     reach = np.einsum("hwk,fk->hwf", d, heights.astype(np.float32), optimize=False)
     two = np.sort(reach, axis=2)[..., -2:]
@@ -184,7 +174,3 @@ def _foot(d: Float32, rng: VariantRng) -> Float32:
     albedo = mix_colors(np.broadcast_to(color("#efefec"), (SIZE_PX, SIZE_PX, 3)), patch, dark)
     seam = smoothstep(0.006, 0.002, two[..., 1] - two[..., 0])
     return mix_colors(albedo, color("#3a3a3c"), 0.8 * seam)
-
-
-def _dot(points: np.ndarray[tuple[int, ...], np.dtype[np.float64]], i: int, j: int) -> float:
-    return float((points[i] * points[j]).sum())

@@ -101,9 +101,7 @@ def marble(seed: int) -> TextureData:
 def terrazzo(seed: int) -> TextureData:
     """Stone chips in cement, ground flat; 0.6 m per repeat."""
     rng = variant_rng("terrazzo", seed)
-    ground = draw_color(
-        ("#d9d5cc", "#c5c3be", "#e7e2d6", "#6d6e70", "#b8a999", "#dadfdd"), 0.06, rng
-    )
+    ground = draw_color(PALETTES["cements"], 0.06, rng)
     palette = [color(rng.choose(PALETTES["chips"])) for _ in range(rng.choose((2, 3, 4)))]
     albedo = ground + 0.02 * fbm((16, 16), 4, rng)[..., None]
     chips_everywhere = np.zeros((SIZE_PX, SIZE_PX), dtype=np.float32)
@@ -136,19 +134,7 @@ def concrete(seed: int) -> TextureData:
 def plaster(seed: int) -> TextureData:
     """Painted wall plaster, smooth to rough-cast; 1.5 m per repeat."""
     rng = variant_rng("plaster", seed)
-    codes = (
-        "#efece4",
-        "#f3f1ec",
-        "#e8e2d4",
-        "#dfe3e2",
-        "#e9d9c3",
-        "#d6c7b0",
-        "#cfd8d3",
-        "#e7cfc4",
-        "#b9c4cb",
-        "#d8d4cd",
-    )
-    base = draw_color(codes, 0.04, rng)
+    base = draw_color(PALETTES["plasters"], 0.04, rng)
     grain = fbm((40, 40), 4, rng, 0.75)
     strokes = fbm((6, 9), 5, rng, 0.6)
     rough = rng.between(0.15, 1.0)
@@ -171,9 +157,8 @@ def brick(seed: int) -> TextureData:
     tone = 0.72 + 0.33 * uniform(bricks, rng)
     tints = (base + (other - base) * pick_other[:, None]) * tone[:, None]
     grit = fbm((48, 48), 4, rng, 0.7)
-    albedo = (
-        tints.astype(np.float32)[number] * (1 + 0.13 * grit + 0.1 * fbm((5, 5), 3, rng))[..., None]
-    )
+    shade = 1 + 0.13 * grit + 0.1 * fbm((5, 5), 3, rng)
+    albedo = tints.astype(np.float32)[number] * shade[..., None]
     mortar = draw_color(("#b9b2a6", "#cfcabf", "#8d8a85", "#d9d3c5"), 0.06, rng)
     mortar_image = mortar * (1 + 0.08 * fbm((64, 64), 3, rng))[..., None]
     height = 4.0 * face + 0.8 * grit + (uniform(bricks, rng).astype(np.float32)[number]) * face
@@ -200,9 +185,8 @@ def tiles(seed: int) -> TextureData:
     grout = draw_color(("#cfcbc3", "#9b9994", "#e6e3dc", "#6b6a68"), 0.05, rng)
     grout_image = grout * (1 + 0.06 * perlin((64, 64), rng))[..., None]
     pillow = smoothstep(joint, joint + 9.0, edge)
-    return texture(
-        mix_colors(grout_image, albedo, face), 1.0 - 0.6 * face, 2.0 * face + 0.6 * pillow
-    )
+    albedo = mix_colors(grout_image, albedo, face)
+    return texture(albedo, 1.0 - 0.6 * face, 2.0 * face + 0.6 * pillow)
 
 
 def _folded_noise(cells: tuple[int, int], rng: VariantRng) -> Float32:
@@ -210,9 +194,8 @@ def _folded_noise(cells: tuple[int, int], rng: VariantRng) -> Float32:
     y, x = rows_and_columns()
     bend = 0.9 * fbm(cells, 4, rng, 0.55)
     down, across = cells
-    wave = np.sin(
-        2 * np.pi * (down * 0.5 * (2 * y) + across * x) + 3.0 * bend + 1.5 * fbm(cells, 3, rng)
-    )
+    phase = 2 * np.pi * (down * 0.5 * (2 * y) + across * x)
+    wave = np.sin(phase + 3.0 * bend + 1.5 * fbm(cells, 3, rng))
     folded: Float32 = (wave + 0.35 * fbm((12, 12), 4, rng)).astype(np.float32)
     return folded
 
@@ -261,9 +244,8 @@ def fabric(seed: int) -> TextureData:
     thread = np.where(over[..., None], warp_colors[warp], weft_colors[weft])
     fuzz = 0.06 * fbm((64, 64), 3, rng, 0.7)
     albedo = thread * (0.62 + 0.42 * height + fuzz)[..., None]
-    return texture(
-        albedo.astype(np.float32), None, (256.0 / yarns * 0.5 * height).astype(np.float32)
-    )
+    relief = (256.0 / yarns * 0.5 * height).astype(np.float32)
+    return texture(albedo.astype(np.float32), None, relief)
 
 
 def carpet(seed: int) -> TextureData:
@@ -330,13 +312,9 @@ def _yarn_colors(yarns: int, rng: VariantRng) -> tuple[Float32, Float32]:
 def brushed_metal(seed: int) -> TextureData:
     """Brushed sheet, strokes across the image; 0.3 m per repeat."""
     rng = variant_rng("brushed_metal", seed)
-    strokes = sum(
-        (
-            weight * perlin(cells, rng)
-            for cells, weight in (((256, 2), 0.6), ((128, 4), 0.5), ((512, 8), 0.5), ((64, 1), 0.3))
-        ),
-        start=np.zeros((SIZE_PX, SIZE_PX), dtype=np.float32),
-    )
+    strokes = np.zeros((SIZE_PX, SIZE_PX), dtype=np.float32)
+    for cells, weight in (((256, 2), 0.6), ((128, 4), 0.5), ((512, 8), 0.5), ((64, 1), 0.3)):
+        strokes += weight * perlin(cells, rng)
     clouds = fbm((2, 3), 4, rng)
     base = draw_color(PALETTES["bare_metals"], 0.05, rng)
     shade = 1 + rng.between(0.05, 0.11) * strokes + 0.03 * clouds
@@ -357,9 +335,8 @@ def painted_metal(seed: int) -> TextureData:
     metal = mix_colors(steel, rust, smoothstep(-0.3, 0.6, fbm((9, 9), 4, rng)))
     scratches = _scratches(rng)
     albedo = paint * (1 + 0.015 * peel - 0.13 * grime)[..., None]
-    albedo = mix_colors(
-        albedo, np.minimum(paint * 1.5 + 0.12, 0.9), np.maximum(0.35 * rim, 0.5 * scratches)
-    )
+    worn = np.minimum(paint * 1.5 + 0.12, 0.9)
+    albedo = mix_colors(albedo, worn, np.maximum(0.35 * rim, 0.5 * scratches))
     albedo = mix_colors(albedo, metal, bare)
     rough = 0.55 + 0.2 * grime + 0.4 * bare + 0.15 * scratches
     return texture(albedo, rough, 0.35 * peel - 1.5 * bare - 0.5 * scratches)

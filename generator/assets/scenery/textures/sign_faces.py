@@ -95,14 +95,9 @@ class Face:
         """Draw an equilateral triangle about the plate's centroid, its sides ``size`` long."""
         # The plate's bounding box is centred, its centroid lies a sixth of its height off.
         middle = -up * math.sqrt(3.0) / 12.0
-        points = [
-            (size / math.sqrt(3.0) * math.cos(t), middle + up * size / math.sqrt(3.0) * math.sin(t))
-            for t in (
-                0.5 * math.pi,
-                0.5 * math.pi + 2 * math.pi / 3,
-                0.5 * math.pi + 4 * math.pi / 3,
-            )
-        ]
+        radius, third = size / math.sqrt(3.0), 2 * math.pi / 3
+        turns = (0.5 * math.pi + k * third for k in range(3))
+        points = [(radius * math.cos(t), middle + up * radius * math.sin(t)) for t in turns]
         self.polygon(points, fill)
 
     def arrow(self, start: Point, tip: Point, width: float) -> None:
