@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches, unit
+from gen_data.generator.assets.triangle_soup import face_crosses
 from gen_data.generator.core.se3 import Vec3
 
 Point2 = tuple[float, float]
@@ -275,8 +276,7 @@ def map_along_grain(patch: Patch, repeat_m: float) -> Patch:
     low, high = patch.bounds_m()
     axes = np.argsort(-np.round(high - low, 6), kind="stable")
     corners = patch.corners_m
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facing = np.abs(cross).argmax(axis=1)
+    facing = np.abs(face_crosses(corners)).argmax(axis=1)
     u_axis = np.where(facing == axes[0], axes[1], axes[0])
     v_axis = 3 - facing - u_axis
     place = corners - low + 1.618 * (low + high)
