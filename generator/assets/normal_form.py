@@ -63,14 +63,13 @@ def normal_form(
     if len(soup) > max_faces:
         soup, faces = _weld(decimate(soup, max_faces))
     soup, faces = _orient_outward(soup, faces)
-    soup = replace(soup, uvs=_reset_invalid_uvs(soup.uvs) if textured else None)
+    uvs = soup.uvs if textured else None
+    if uvs is not None:
+        # Far beyond any repetition: exporters write such values on unused corners.
+        uvs = np.where(np.abs(uvs) > _MAX_UV, 0.0, uvs)
+    soup = replace(soup, uvs=uvs)
     own = _valid_normals(soup)
     return make_mesh(soup, _crease_normals(soup, faces, crease_deg) if own is None else own)
-
-
-def _reset_invalid_uvs(uvs: Float64 | None) -> Float64 | None:
-    """Set UVs far beyond any repetition to zero: exporters write such values on unused corners."""
-    return None if uvs is None else np.where(np.abs(uvs) > _MAX_UV, 0.0, uvs)
 
 
 def check_coordinates(soup: TriangleSoup, place: str) -> None:

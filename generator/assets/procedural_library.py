@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeVar
 
 from gen_data.generator.assets.asset_arrays import (
@@ -114,22 +114,15 @@ class ProceduralLibrary:
     def texture(self, asset_id: AssetId) -> TextureData:
         """Images of a texture."""
         family = self._find(asset_id, TextureFamily, "a texture")
-        arguments = _merge_arguments(asset_id, family)
-        return self._result(
-            asset_id, family, lambda: family.build(**arguments), pack_texture, unpack_texture
-        )
+        compute = partial(family.build, **_merge_arguments(asset_id, family))
+        return self._result(asset_id, family, compute, pack_texture, unpack_texture)
 
     def environment(self, asset_id: AssetId) -> Float32:
         """Pixels of an environment."""
         family = self._find(asset_id, EnvironmentFamily, "an environment")
-        arguments = _merge_arguments(asset_id, family)
-        return self._result(
-            asset_id,
-            family,
-            lambda: family.build(**arguments),
-            lambda radiance: {"radiance": radiance},
-            lambda arrays: arrays["radiance"],
-        )
+        compute = partial(family.build, **_merge_arguments(asset_id, family))
+        pack, unpack = (lambda image: {"radiance": image}), (lambda arrays: arrays["radiance"])
+        return self._result(asset_id, family, compute, pack, unpack)
 
     def _find(self, asset_id: AssetId, kind: type[F], expected: str) -> F:
         """The id's family. Raises AssetError if it is of another kind."""
@@ -159,11 +152,8 @@ class ProceduralLibrary:
     def _key(self, asset_id: AssetId, family: AnyFamily) -> str:
         arguments = _merge_arguments(asset_id, family)
         parameters = {name: format_parameter(value) for name, value in arguments.items()}
-        content = {
-            "family": asset_id.name,
-            "version": [VERSION, family.version],
-            "parameters": parameters,
-        }
+        version = [VERSION, family.version]
+        content = {"family": asset_id.name, "version": version, "parameters": parameters}
         if asset_id.name in self._packages:
             # Another release of a package, or another package, may use the same version number.
             content["package"] = self._packages[asset_id.name]

@@ -78,9 +78,11 @@ class TriangleSoup:
         normals = self.normals
         if normals is not None:
             # Normals transform by the cofactor matrix, which unlike the inverse always exists.
-            normals = np.einsum("ij,...j->...i", _cofactors(linear), normals, optimize=False)
+            cofactors = np.cross(np.roll(linear, -1, axis=0), np.roll(linear, -2, axis=0))
+            normals = np.einsum("ij,...j->...i", cofactors, normals, optimize=False)
         moved = replace(self, corners=corners, normals=normals)
-        return moved.flipped() if _determinant(linear) < 0.0 else moved
+        mirrors = float((linear[0] * np.cross(linear[1], linear[2])).sum()) < 0.0
+        return moved.flipped() if mirrors else moved
 
     def flipped(self) -> TriangleSoup:
         """Reverse the winding of every triangle."""
@@ -135,14 +137,6 @@ def join_soups(soups: list[TriangleSoup]) -> TriangleSoup:
         face_groups=np.concatenate(groups),
         slots=tuple(slot for s in soups for slot in s.slots),
     )
-
-
-def _cofactors(m: Float64) -> Float64:
-    return np.stack([np.cross(m[1], m[2]), np.cross(m[2], m[0]), np.cross(m[0], m[1])])
-
-
-def _determinant(m: Float64) -> float:
-    return float((m[0] * np.cross(m[1], m[2])).sum())
 
 
 def face_crosses(corners: Float64) -> Float64:

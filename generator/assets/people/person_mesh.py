@@ -219,21 +219,18 @@ def _join_on_ground(
     first_slots = np.cumsum([0, *(len(sheet.materials) for sheet in sheets)])
     faces = [sheet.faces + first for sheet, first in zip(sheets, counts[:-1], strict=True)]
     slots = [sheet.slots + first for sheet, first in zip(sheets, first_slots[:-1], strict=True)]
+    normals = np.concatenate([sheet.normals for sheet in sheets])
     return (
         MeshData(
             vertices_m=(np.rint((vertices + shift) / _GRID_M) * _GRID_M + 0.0).astype(np.float32),
             faces=np.concatenate(faces).astype(np.int32),
-            normals=_round_normals(np.concatenate([sheet.normals for sheet in sheets])),
+            normals=(np.round(normals, 5) + 0.0).astype(np.float32),
             uvs=np.zeros((len(vertices), 2), np.float32),
             face_slots=np.concatenate(slots).astype(np.int32),
             materials=tuple(material for sheet in sheets for material in sheet.materials),
         ),
         shift,
     )
-
-
-def _round_normals(normals: Array) -> np.ndarray[tuple[int, int], np.dtype[np.float32]]:
-    return (np.round(normals, 5) + 0.0).astype(np.float32)
 
 
 def _index(body: BodyTemplate, mark: str) -> int:

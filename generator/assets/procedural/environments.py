@@ -183,8 +183,10 @@ def _panel(d: Array, azimuth: float, height: float, half_size: tuple[float, floa
     v = (d * up).sum(axis=2) / np.maximum(depth, 1e-6)
     w, h = half_size
     soft = 0.03
-    inside: Array = (depth > 0) * smoothstep(w + soft, w - soft, np.abs(u))
-    return inside * smoothstep(h + soft, h - soft, np.abs(v))
+    across = smoothstep(w + soft, w - soft, np.abs(u))
+    along = smoothstep(h + soft, h - soft, np.abs(v))
+    inside: Array = (depth > 0) * across * along
+    return inside
 
 
 def _window(hit: Array, side: Array, half: Array, axis: int, sign: float, rng: VariantRng) -> Array:

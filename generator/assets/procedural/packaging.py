@@ -29,7 +29,6 @@ from gen_data.generator.assets.procedural.patches import (
 )
 from gen_data.generator.assets.procedural.surface_shapes import (
     Point2,
-    UvRect,
     circle,
     extrude,
     fillet,
@@ -181,7 +180,8 @@ class CanSize(NamedTuple):
 def can_size(seed: int) -> CanSize:
     """Size of a variant."""
     kind = ("drink", "food")[seed // 4 % 2]
-    return CanSize(*in_turn(_SIZES[f"{kind}_cans"], seed % 4), kind == "food")
+    radius, height = in_turn(_SIZES[f"{kind}_cans"], seed % 4)
+    return CanSize(radius, height, kind == "food")
 
 
 def label_aspect(seed: int) -> float:
@@ -251,7 +251,7 @@ def _tab(length: float) -> list[Patch]:
     return [plate.moved(x=0.18 * length), rivet.moved(x=-0.12 * length)]
 
 
-CARTON_ATLAS = load_table(__package__, "carton_atlas", UvRect)
+CARTON_ATLAS = load_table(__package__, "carton_atlas", tuple[float, float, float, float])
 
 
 def carton_size_m(seed: int) -> Vec3:

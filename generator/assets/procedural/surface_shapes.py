@@ -16,6 +16,7 @@ from gen_data.generator.assets.triangle_soup import face_crosses
 from gen_data.generator.core.se3 import Vec3
 
 Point2 = tuple[float, float]
+Corner = Sequence[float] | Array
 UvRect = tuple[float, float, float, float]
 WHOLE_IMAGE: UvRect = (0.0, 0.0, 1.0, 1.0)
 
@@ -185,9 +186,14 @@ def rounded_box(
     return join_patches(patches)
 
 
-def block(low: Vec3, high: Vec3, radius_m: float = 0.0, slot: int = 0) -> Patch:
+def block(
+    low: Sequence[float] | Array,
+    high: Sequence[float] | Array,
+    radius_m: float = 0.0,
+    slot: int = 0,
+) -> Patch:
     """A box between two corners; a small edge radius catches highlights."""
-    size = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
+    size: Vec3 = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
     centre = [0.5 * (a + b) for a, b in zip(low, high, strict=True)]
     made = rounded_box(size, radius_m, 1) if radius_m > 0 else _plain_box(size)
     return made.moved(*centre).painted(slot)
@@ -212,7 +218,7 @@ def extrude(
         levels = [(inner, 0.0), *levels, (inner, height_m)]
     walls = []
     for i in range(len(loops)):
-        rows = [_at_height(np.concatenate([level[i], level[i][:1]]), z) for level, z in levels]
+        rows = [np.insert(np.concatenate([p[i], p[i][:1]]), 2, z, axis=1) for p, z in levels]
         walls.append(grid(np.stack(rows), slot=slot))
     top = _cap(inner, height_m, slot)
     return join_patches([*walls, top, _cap(inner, 0.0, slot).flipped()])
@@ -321,10 +327,6 @@ def _inset(loop: Array, distance: float) -> Array:
     mitre = (left + before) / np.maximum(1.0 + (left * before).sum(axis=1, keepdims=True), 0.3)
     moved: Array = loop + distance * mitre
     return moved
-
-
-def _at_height(loop: Array, z: float) -> Array:
-    return np.concatenate([loop, np.full((len(loop), 1), z)], axis=1)
 
 
 def _cap(loops: Sequence[Array], z: float, slot: int) -> Patch:

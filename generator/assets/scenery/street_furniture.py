@@ -126,8 +126,8 @@ def bollard(seed: int) -> Solid:
     if kind == "iron":
         r = 1.4 * r
         foot = [(0.0, 0.0), (1.5 * r, 0.0), (1.5 * r, 0.12), (r, 0.16)]
-        shares = ((0.85, 0.85), (1.1, 0.87), (1.1, 0.9), (0.6, 0.91), (0.95, 0.96), (0.0, 1.0))
-        parts = [lathe([*foot, *((x * r, z * h) for x, z in shares)], 16)]
+        upper = ((0.85, 0.85), (1.1, 0.87), (1.1, 0.9), (0.6, 0.91), (0.95, 0.96), (0.0, 1.0))
+        parts = [lathe([*foot, *((x * r, z * h) for x, z in upper)], 16)]
     else:
         rings = ((0.001, 0.72), (0.003, 0.73), (0.003, 0.84), (0.001, 0.85))
         band = lathe([(r + out, z * h) for out, z in rings], 14).painted(1)
