@@ -15,8 +15,8 @@ from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field, model_validator
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.discovery import (
+from gen_data.generator.assets.asset_folder import (
+    Folder,
     asset_id_from_path,
     category_from_path,
     is_pattern,

@@ -141,9 +141,8 @@ class ProceduralLibrary:
     ) -> S:
         key = self._key(asset_id, family)
         offered = family.variants > 0 and set(asset_id.parameters) <= {"seed"}
-        stored = offered or isinstance(family, TextureFamily) or family.stored
         try:
-            if not stored:
+            if not (offered or family.stored):
                 return self._store.computed(key, compute)
             return self._store.get(key, lambda: pack(compute()), unpack)
         except ValueError as error:

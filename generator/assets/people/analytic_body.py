@@ -20,8 +20,13 @@ import numpy as np
 from gen_data.generator.assets.people import body as template
 from gen_data.generator.assets.people import body_regions
 from gen_data.generator.assets.people.body import LANDMARKS, ZONES, Array, BodyTemplate, Indices
-from gen_data.generator.assets.people.body_regions import OUTLINES
-from gen_data.generator.assets.people.mesh_simplify import Level, MeshRows, grid_faces, make_rows
+from gen_data.generator.assets.people.body_regions import (
+    OUTLINES,
+    Level,
+    MeshRows,
+    grid_faces,
+    make_rows,
+)
 from gen_data.generator.core.se3 import Vec3
 
 _HEIGHT_M = 1.67

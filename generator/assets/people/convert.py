@@ -19,7 +19,7 @@ import numpy as np
 from gen_data.generator.assets.people import body as template
 from gen_data.generator.assets.people import body_regions
 from gen_data.generator.assets.people.body import LANDMARKS, ZONES, Array, BodyTemplate, Indices
-from gen_data.generator.assets.people.mesh_simplify import (
+from gen_data.generator.assets.people.body_regions import (
     MeshRows,
     grid_faces,
     make_rows,

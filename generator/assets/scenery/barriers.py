@@ -6,19 +6,17 @@ length join end to end.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
-from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
+from gen_data.generator.assets.procedural.family import Facts, Solid, choose_option
 from gen_data.generator.assets.procedural.material_presets import (
     painted_material,
     patterned_material,
 )
 from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.surface_shapes import block, extrude, grid
-from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import facing_rectangle, make_solid, post
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
 from gen_data.generator.core.asset_types import Material
@@ -36,7 +34,7 @@ def barrier(seed: int, style: str) -> Solid:
 
 def barrier_facts(seed: int, style: str) -> Facts:
     """Its kind. Raises AssetError for an unknown style."""
-    return Facts(_choose_style("barrier", seed, style, BARRIERS))
+    return Facts(choose_option("barrier", "style", style, BARRIERS, seed))
 
 
 def fence(seed: int, style: str) -> Solid:
@@ -71,14 +69,7 @@ def fence(seed: int, style: str) -> Solid:
 
 def fence_facts(seed: int, style: str) -> Facts:
     """Its kind. Raises AssetError for an unknown style."""
-    return Facts(_choose_style("fence", seed, style, FENCES))
-
-
-def _choose_style(family: str, seed: int, style: str, styles: Sequence[str]) -> str:
-    if style == "any":
-        return in_turn(styles, seed)
-    check_option(family, "style", style, ("any", *styles))
-    return style
+    return Facts(choose_option("fence", "style", style, FENCES, seed))
 
 
 def _guard_rail(seed: int) -> Solid:

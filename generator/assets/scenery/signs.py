@@ -14,11 +14,11 @@ import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.data_tables import load_table
-from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
+from gen_data.generator.assets.procedural.family import Facts, Solid, choose_option
 from gen_data.generator.assets.procedural.material_presets import painted_material, printed_material
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches, unit
 from gen_data.generator.assets.procedural.surface_shapes import circle, grid
-from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid, post
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
 
@@ -79,10 +79,7 @@ def traffic_sign_facts(seed: int, sign: str) -> Facts:
 
 def sign_name(seed: int, sign: str) -> str:
     """The name of a sign; by seed for ``any``. Raises AssetError for an unknown one."""
-    if sign == "any":
-        return in_turn(list(SIGNS), seed)
-    check_option("traffic_sign", "sign", sign, ("any", *SIGNS))
-    return sign
+    return choose_option("traffic_sign", "sign", sign, tuple(SIGNS), seed)
 
 
 def plate_outline(shape: Shape) -> Array:

@@ -13,7 +13,7 @@ import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.data_tables import load_table
-from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
+from gen_data.generator.assets.procedural.family import Facts, Solid, choose_option
 from gen_data.generator.assets.procedural.material_presets import painted_material
 from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import (
@@ -143,7 +143,5 @@ def _materials(lenses: Sequence[str], housing: str) -> tuple[Material, ...]:
 
 
 def _choose_mount(seed: int, mount: str) -> str:
-    if mount == "any":
-        return MOUNTS[1] if seed % 4 == 2 else MOUNTS[0]
-    check_option("traffic_light", "mount", mount, ("any", *MOUNTS))
-    return mount
+    # One variant in four has an arm.
+    return choose_option("traffic_light", "mount", mount, MOUNTS, int(seed % 4 == 2))
