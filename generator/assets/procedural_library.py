@@ -114,13 +114,13 @@ class ProceduralLibrary:
     def texture(self, asset_id: AssetId) -> TextureData:
         """Images of a texture."""
         family = self._find(asset_id, TextureFamily, "a texture")
-        compute = partial(family.build, **_merge_arguments(asset_id, family))
+        compute: Callable[[], TextureData] = partial(family.build, **_merge_arguments(asset_id, family))
         return self._result(asset_id, family, compute, pack_texture, unpack_texture)
 
     def environment(self, asset_id: AssetId) -> Float32:
         """Pixels of an environment."""
         family = self._find(asset_id, EnvironmentFamily, "an environment")
-        compute = partial(family.build, **_merge_arguments(asset_id, family))
+        compute: Callable[[], Float32] = partial(family.build, **_merge_arguments(asset_id, family))
         pack, unpack = (lambda image: {"radiance": image}), (lambda arrays: arrays["radiance"])
         return self._result(asset_id, family, compute, pack, unpack)
 

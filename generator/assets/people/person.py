@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, cast
 
-from gen_data.generator.assets.people.animation import BEHAVIOURS, PHASES, POSES, PoseName
+from gen_data.generator.assets.people.posing import BEHAVIOURS, PHASES, POSES, PoseName
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Facts
 from gen_data.generator.assets.procedural.material_presets import (

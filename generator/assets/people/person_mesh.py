@@ -11,7 +11,6 @@ import numpy as np
 
 from gen_data.generator.assets.paths import packs_dir
 from gen_data.generator.assets.people.analytic_body import simple_body
-from gen_data.generator.assets.people.animation import Stance, shorten_stride, stance
 from gen_data.generator.assets.people.body import (
     FILE,
     LANDMARKS,
@@ -23,9 +22,12 @@ from gen_data.generator.assets.people.body import (
 from gen_data.generator.assets.people.clothes import displace_layer, layers
 from gen_data.generator.assets.people.person import Person, draw_person
 from gen_data.generator.assets.people.posing import (
+    Stance,
     bone_rotations,
     bone_transforms,
+    shorten_stride,
     skin_points,
+    stance,
     vertex_normals,
 )
 from gen_data.generator.assets.procedural.collision_hulls import extreme

@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Solid, check_option
 from gen_data.generator.assets.procedural.material_presets import (
@@ -27,14 +28,6 @@ from gen_data.generator.assets.procedural.patches import (
     Patch,
     join_patches,
     make_solid_in_place,
-)
-from gen_data.generator.assets.procedural.surface_shapes import (
-    block,
-    circle,
-    fan,
-    grid,
-    lathe,
-    map_along_grain,
 )
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.errors import AssetError
@@ -68,8 +61,8 @@ def table(size_m: Vec3 = (1.2, 0.8, 0.74), style: str = "legs") -> Solid:
     top = (-x / 2, -y / 2, z - thick), (x / 2, y / 2, z)
     frame = {"legs": _four_legs, "trestle": _trestles, "bench": _bench}[style](x, y, z - thick)
     patches = [
-        map_along_grain(block(*top, 0.003), 0.9),
-        *(map_along_grain(block(low, high, 0.002, 1), 0.5) for low, high in frame),
+        shapes.map_along_grain(shapes.block(*top, 0.003), 0.9),
+        *(shapes.map_along_grain(shapes.block(low, high, 0.002, 1), 0.5) for low, high in frame),
     ]
     wood = patterned_material("texture/wood_grain?seed=1", 0.0, 0.45)
     legs = painted_material("#3b4046", 0.4) if style == "bench" else replace(wood, roughness=0.5)
@@ -100,8 +93,8 @@ def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookca
             ((-x / 2 + t, y / 2 - 0.008, _PLINTH_M - t), (x / 2 - t, y / 2 - 0.002, z)),
         ]
     patches = [
-        *(map_along_grain(block(*b, 0.0015), 0.6) for b in boards),
-        *(map_along_grain(block(*f, 0.0015, 1), 0.6) for f in frame),
+        *(shapes.map_along_grain(shapes.block(*b, 0.0015), 0.6) for b in boards),
+        *(shapes.map_along_grain(shapes.block(*f, 0.0015, 1), 0.6) for f in frame),
     ]
     wood = patterned_material("texture/wood_grain?seed=8", 0.0, 0.45)
     posts = painted_material("#2f3338", 0.4) if style == "rack" else wood
@@ -143,7 +136,7 @@ def bin_(size_m: Vec3 = (0.6, 0.4, 0.22), color: str = "blue") -> Solid:
     x, y, z = check_size("bin", size_m, 0.06)
     rim = 0.012
     shell = _bin_shell(x, y, z, rim)
-    ribs = [block(low, high, 0.001) for low, high in _bin_ribs(x, y, z, rim)]
+    ribs = [shapes.block(low, high, 0.001) for low, high in _bin_ribs(x, y, z, rim)]
     w = _BIN_WALL_M + rim
     walls = [
         ((-x / 2, -y / 2, 0.0), (-x / 2 + w, y / 2, z)),
@@ -173,7 +166,7 @@ def box_(size_m: Vec3 = (0.2, 0.2, 0.2), color: str = "grey") -> Solid:
     corners = (-x / 2, -y / 2, 0.0), (x / 2, y / 2, z)
     bevel = min(0.002, 0.1 * min(x, y, z))
     body = painted_material(_color("box", color), 0.6)
-    return make_solid_in_place([block(*corners, bevel)], (body,), [hulls.box(*corners)])
+    return make_solid_in_place([shapes.block(*corners, bevel)], (body,), [hulls.box(*corners)])
 
 
 def pedestal(size_m: Vec3 = (0.3, 0.3, 0.7)) -> Solid:
@@ -182,9 +175,11 @@ def pedestal(size_m: Vec3 = (0.3, 0.3, 0.7)) -> Solid:
     t = min(0.02, 0.2 * z)
     plates = [((-x / 2, -y / 2, z0), (x / 2, y / 2, z0 + t)) for z0 in (0.0, z - t)]
     body = (-0.38 * x, -0.38 * y, t), (0.38 * x, 0.38 * y, z - t)
-    bolt = lathe([(0.0, 0.0), (0.009, 0.0), (0.009, 0.007), (0.007, 0.009), (0.0, 0.009)], 6, 1)
+    bolt = shapes.lathe(
+        [(0.0, 0.0), (0.009, 0.0), (0.009, 0.007), (0.007, 0.009), (0.0, 0.009)], 6, 1
+    )
     bolts = [bolt.moved(sx * 0.44 * x, sy * 0.44 * y, t) for sx, sy in _CORNERS]
-    patches = [block(*body, 0.006), *(block(*p, 0.002, 1) for p in plates), *bolts]
+    patches = [shapes.block(*body, 0.006), *(shapes.block(*p, 0.002, 1) for p in plates), *bolts]
     materials = (painted_material("#d7d9d8", 0.4), metal_material((0.45, 0.46, 0.48), 0.42))
     return make_solid_in_place(patches, materials, [hulls.box(*b) for b in (body, *plates)])
 
@@ -206,7 +201,7 @@ def gantry(size_m: Vec3 = (1.6, 1.0, 1.8)) -> Solid:
         for sx, sy in _CORNERS
     ]
     materials = (metal_material(ALUMINIUM, 0.45), painted_material("#26282b", 0.5))
-    patches += [block(*foot, 0.001, 1) for foot in feet]
+    patches += [shapes.block(*foot, 0.001, 1) for foot in feet]
     return make_solid_in_place(patches, materials, [hulls.box(*bar) for bar in bars])
 
 
@@ -235,9 +230,9 @@ def light_panel(
     check_option("light_panel", "shape", shape, PANEL_SHAPES)
     if shape == "disk":
         y = x
-        rim = circle(0.5 * x, 64)
-        front = fan(np.concatenate([rim[::-1], np.zeros((64, 1))], axis=1), 1)
-        back = lathe([(0.5 * x, 0.0), (0.5 * x, z), (0.0, z)], 64)
+        rim = shapes.circle(0.5 * x, 64)
+        front = shapes.fan(np.concatenate([rim[::-1], np.zeros((64, 1))], axis=1), 1)
+        back = shapes.lathe([(0.5 * x, 0.0), (0.5 * x, z), (0.0, z)], 64)
     else:
         front = rectangle((-x / 2, -y / 2, 0.0), (0.0, y, 0.0), (x, 0.0, 0.0)).painted(1)
         back = join_patches(_plain_shell(x, y, z))
@@ -260,7 +255,7 @@ def backdrop(size_m: Vec3 = (3.0, 3.0, 2.2), radius_m: float = 0.6, color: str =
     ys = np.concatenate([[-y / 2], y / 2 - r + r * np.sin(turn), [y / 2]])
     zs = np.concatenate([[0.0], r - r * np.cos(turn), [z]])
     rows = [np.stack([np.full(len(ys), s * x / 2), ys, zs], axis=1) for s in (-1.0, 1.0)]
-    sheet = grid(np.stack(rows, axis=1))
+    sheet = shapes.grid(np.stack(rows, axis=1))
     parts = [
         hulls.box((-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0)),
         hulls.box((-x / 2, y / 2, 0.0), (x / 2, y / 2 + 0.2, z)),
@@ -316,7 +311,7 @@ def _bin_shell(x: float, y: float, z: float, rim: float) -> Patch:
               (rim + w, w + 0.008, 0.012), (rim + w + 0.008, w, 0.006)]  # fmt: skip
     loops = [_rounded_loop(x / 2 - inset, y / 2 - inset, r, level) for inset, level, r in levels]
     rows = np.stack([np.concatenate([loop, loop[:1]]) for loop in loops])
-    return join_patches([grid(rows), fan(loops[0][::-1]), fan(loops[-1])])
+    return join_patches([shapes.grid(rows), shapes.fan(loops[0][::-1]), shapes.fan(loops[-1])])
 
 
 def _bin_ribs(x: float, y: float, z: float, rim: float) -> list[Box]:
@@ -357,7 +352,7 @@ def _profile_bar(low: Vec3, high: Vec3) -> list[Patch]:
         for side, far in zip(sides, shares or (0.25, 0.25), strict=True):
             a[side] = low[side] + far * width[side]
             b[side] = a[side] + 0.4 * width[side] if shares else high[side] - 0.25 * width[side]
-        made.append(block(a, b))
+        made.append(shapes.block(a, b))
     return made
 
 
@@ -385,7 +380,7 @@ def _cove(x: float, y: float, r: float) -> list[Array]:
 def rectangle(corner: Vec3, right: Vec3, up: Vec3) -> Patch:
     """Two triangles; outward is right x up."""
     c, r, u = (np.array(v, dtype=np.float64) for v in (corner, right, up))
-    return grid(np.stack([np.stack([c, c + r]), np.stack([c + u, c + r + u])]))
+    return shapes.grid(np.stack([np.stack([c, c + r]), np.stack([c + u, c + r + u])]))
 
 
 def check_size(name: str, size_m: Sequence[float], least: float) -> Vec3:

@@ -3,14 +3,9 @@
 from __future__ import annotations
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural import material_presets as presets
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.furniture import check_size, rectangle
-from gen_data.generator.assets.procedural.material_presets import (
-    STAINLESS,
-    metal_material,
-    painted_material,
-    patterned_material,
-)
 from gen_data.generator.assets.procedural.patches import Patch, make_solid_in_place
 from gen_data.generator.assets.procedural.surface_shapes import block
 from gen_data.generator.core.asset_types import Material
@@ -54,14 +49,14 @@ def room(size_m: Vec3 = (5.0, 4.0, 2.8), door: int = 1, window: int = 1) -> Soli
 def _room_materials() -> tuple[Material, ...]:
     pane = Material((0.6, 0.7, 0.8), 0.08, emission_cd_m2=(230.0, 255.0, 290.0))
     return (
-        patterned_material("texture/wood_planks?seed=0", 1.6, 0.45),
-        painted_material("#f2f1ed", 0.9),
-        patterned_material("texture/plaster?seed=3", 1.5, 0.9),
-        painted_material("#eceae4", 0.5),
-        painted_material("#e9e7e1", 0.45),
-        painted_material("#f3f2ee", 0.4),
+        presets.patterned_material("texture/wood_planks?seed=0", 1.6, 0.45),
+        presets.painted_material("#f2f1ed", 0.9),
+        presets.patterned_material("texture/plaster?seed=3", 1.5, 0.9),
+        presets.painted_material("#eceae4", 0.5),
+        presets.painted_material("#e9e7e1", 0.45),
+        presets.painted_material("#f3f2ee", 0.4),
         pane,
-        metal_material(STAINLESS, 0.3),
+        presets.metal_material(presets.STAINLESS, 0.3),
     )
 
 

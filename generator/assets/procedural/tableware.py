@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     GLAZES,
@@ -16,14 +17,6 @@ from gen_data.generator.assets.procedural.material_presets import (
     plastic_material,
 )
 from gen_data.generator.assets.procedural.patches import Array, Patch, make_centred_solid, unit
-from gen_data.generator.assets.procedural.surface_shapes import (
-    Point2,
-    circle,
-    fillet,
-    lathe,
-    space_evenly,
-    sweep,
-)
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
@@ -43,8 +36,8 @@ def mug(seed: int) -> Solid:
     profile = _cup_profile(top, bottom, height, wall, bulge)
     path = _handle_path(top, bottom, height, wall, bulge, rng)
     across = rng.between(0.0045, 0.006), rng.between(0.0065, 0.0095)
-    section = circle(1.0, 12) * np.array(across)
-    handle = sweep(path, section, scale=_flare_factors(len(path)), slot=2)
+    section = shapes.circle(1.0, 12) * np.array(across)
+    handle = shapes.sweep(path, section, scale=_flare_factors(len(path)), slot=2)
     outside = ceramic_material(rng)
     inside = Material(lighten(outside.base_color, rng.between(0.5, 0.95)), outside.roughness)
     grip = inside if rng.chance(0.15) else outside
@@ -108,11 +101,13 @@ def plate(seed: int) -> Solid:
     well, foot = radius * rng.between(0.6, 0.72), radius * rng.between(0.5, 0.58)
     step = rise * rng.between(0.45, 0.7)
     bend, floor = well + 0.35 * (radius - well), 0.002 + wall
-    upper = fillet([(radius, rise), (bend, step + 0.002), (well, floor), (0.0, floor)], 0.014, 3)
+    upper = shapes.fillet(
+        [(radius, rise), (bend, step + 0.002), (well, floor), (0.0, floor)], 0.014, 3
+    )
     under = [(0.0, 0.002), (foot - 0.004, 0.002), (foot - 0.003, 0.0), (foot, 0.0),
              (foot + 0.002, 0.002), (well, 0.0025), (bend, step + 0.002 - wall),
              (radius, rise - 0.8 * wall)]  # fmt: skip
-    lower = fillet(under, [0.0] * 5 + [0.012, 0.012, 0.0], 3)
+    lower = shapes.fillet(under, [0.0] * 5 + [0.012, 0.012, 0.0], 3)
     edge = radius + 0.4 * wall
     profile = [*lower, (edge, rise - 0.4 * wall), *upper]
     outside = ceramic_material(rng, GLAZES[:5] + GLAZES[:3] + GLAZES)
@@ -136,10 +131,10 @@ def tumbler(seed: int) -> Solid:
     rim = 0.45 * wall
     outer = [(0.0, 0.001), (0.75 * bottom, 0.001), (0.85 * bottom, 0.0), (bottom, 0.0)]
     within = [(top, height), (top - wall, height), (inner, floor), (0.0, floor)]
-    profile = fillet([*outer, *within], [0.0, 0.0, 0.0, 0.003, rim, rim, 0.005, 0.0], 4)
+    profile = shapes.fillet([*outer, *within], [0.0, 0.0, 0.0, 0.003, rim, rim, 0.005, 0.0], 4)
     base = hulls.frustum((bottom, 0.0), (bottom + (top - bottom) * floor / height, floor))
     walls = hulls.ring((inner, bottom, floor), (top - wall, top, height), 14)
-    return make_centred_solid([lathe(profile, 48)], (_glass(rng),), [base, *walls])
+    return make_centred_solid([shapes.lathe(profile, 48)], (_glass(rng),), [base, *walls])
 
 
 def wine_glass(seed: int) -> Solid:
@@ -156,7 +151,7 @@ def wine_glass(seed: int) -> Solid:
     below = [(0.0, 0.0015), (0.8 * foot, 0.0015), (foot, 0.0), (foot, 0.002), (stem, 0.008)]
     rounded = [0.0, 0.0, 0.0004, 0.0004, 0.012, 0.02, 0.03, 0.05]
     within = [0.45 * wall, 0.45 * wall, 0.05, 0.025, 0.0]
-    profile = fillet([*below, *outer, *inner], [*rounded, *within], 2)
+    profile = shapes.fillet([*below, *outer, *inner], [*rounded, *within], 2)
     top, middle = (rim - wall, rim, height), (belly - wall, belly, wide)
     floor = (0.5 * belly, 0.62 * belly, low + 0.008)
     parts = [
@@ -165,18 +160,18 @@ def wine_glass(seed: int) -> Solid:
         *hulls.ring(floor, middle, 10),
         *hulls.ring(middle, top, 10),
     ]
-    return make_centred_solid([lathe(profile, 32)], (_glass(rng),), parts)
+    return make_centred_solid([shapes.lathe(profile, 32)], (_glass(rng),), parts)
 
 
-def _lathe_two_sided(profile: list[Point2], segments: int) -> list[Patch]:
+def _lathe_two_sided(profile: list[shapes.Point2], segments: int) -> list[Patch]:
     """The profile turned about Z: slot 0 up to the highest point, slot 1 from there inward."""
     k = max(range(len(profile)), key=lambda i: profile[i][1])
-    return [lathe(profile[: k + 1], segments, 0), lathe(profile[k:], segments, 1)]
+    return [shapes.lathe(profile[: k + 1], segments, 0), shapes.lathe(profile[k:], segments, 1)]
 
 
 def _cup_profile(
     top: float, bottom: float, height: float, wall: float, bulge: float
-) -> list[Point2]:
+) -> list[shapes.Point2]:
     """Closed profile of a beaker: foot, outer wall, rounded rim, inner wall."""
     middle, rim = 0.5 * (top + bottom) + bulge, 0.45 * wall
     rounded = [(0.0, 0.0015, 0.0), (0.78 * bottom, 0.0015, 0.0), (0.8 * bottom, 0.0, 0.0),
@@ -185,7 +180,7 @@ def _cup_profile(
                (bottom - wall, wall, 0.006), (0.0, wall, 0.0)]  # fmt: skip
     if bulge <= 0:
         del rounded[7], rounded[4]
-    return fillet([(r, z) for r, z, _ in rounded], [radius for _, _, radius in rounded], 4)
+    return shapes.fillet([(r, z) for r, z, _ in rounded], [radius for _, _, radius in rounded], 4)
 
 
 def _handle_path(
@@ -207,7 +202,7 @@ def _handle_path(
     z = low + (high - low) * 0.5 * (1.0 + np.sin(turn))
     x = np.array([wall_at(float(h)) for h in z]) + reach * out
     x[[0, -1]] = wall_at(high), wall_at(low)
-    return space_evenly(np.stack([x, np.zeros_like(x), z], axis=1), 23)
+    return shapes.space_evenly(np.stack([x, np.zeros_like(x), z], axis=1), 23)
 
 
 def _flare_factors(count: int) -> Array:
