@@ -114,13 +114,15 @@ class ProceduralLibrary:
     def texture(self, asset_id: AssetId) -> TextureData:
         """Images of a texture."""
         family = self._find(asset_id, TextureFamily, "a texture")
-        compute: Callable[[], TextureData] = partial(family.build, **_merge_arguments(asset_id, family))
+        arguments = _merge_arguments(asset_id, family)
+        compute: Callable[[], TextureData] = partial(family.build, **arguments)
         return self._result(asset_id, family, compute, pack_texture, unpack_texture)
 
     def environment(self, asset_id: AssetId) -> Float32:
         """Pixels of an environment."""
         family = self._find(asset_id, EnvironmentFamily, "an environment")
-        compute: Callable[[], Float32] = partial(family.build, **_merge_arguments(asset_id, family))
+        arguments = _merge_arguments(asset_id, family)
+        compute: Callable[[], Float32] = partial(family.build, **arguments)
         pack, unpack = (lambda image: {"radiance": image}), (lambda arrays: arrays["radiance"])
         return self._result(asset_id, family, compute, pack, unpack)
 
