@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
-from gen_data.generator.assets.people.animation import PHASES
+from gen_data.generator.assets.people.posing import PHASES
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.motion import StateChange

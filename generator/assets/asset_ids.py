@@ -68,11 +68,6 @@ def parse_asset_id(text: str) -> AssetId:
     return AssetId(name, parameters)
 
 
-def canonical_id(text: str) -> str:
-    """Canonical form of an asset id. Raises AssetError if it is malformed."""
-    return str(parse_asset_id(text)) if "?" in text else text
-
-
 def format_parameter(value: ParameterValue) -> str:
     """Format a parameter for an id; numbers in the shortest form that parses to the same value."""
     if isinstance(value, str):

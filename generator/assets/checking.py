@@ -69,21 +69,15 @@ def check_folder(root: Path, library: Library) -> Iterator[Finding]:
 def _inspect(one: IndexedAsset, library: Library) -> Finding:
     """Import an asset. Raises AssetError if it cannot be used."""
     origin = () if one.origin.licence not in ("", "unknown") else ("no licence is given",)
-    if one.kind == "texture":
-        library.texture(one.asset_id)
+    if one.kind in ("texture", "environment"):
+        (library.texture if one.kind == "texture" else library.environment)(one.asset_id)
         return Finding(one.asset_id, one.kind, "", warnings=origin)
-    if one.kind == "environment":
-        library.environment(one.asset_id)
-        return Finding(one.asset_id, one.kind, "", warnings=origin)
-    triangles, low, high = (_measure_robot if one.kind == "robot" else _measure_object)(
-        one, library
-    )
+    measure = _measure_robot if one.kind == "robot" else _measure_object
+    triangles, low, high = measure(one, library)
     size_m = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
     warnings = (*_find_doubts(one, max(size_m)), *origin)
-    unit, up = _describe_unit(one), _describe_up(one)
-    return Finding(
-        one.asset_id, one.kind, one.category(), triangles, size_m, unit, up, warnings=warnings
-    )
+    found = (triangles, size_m, _describe_unit(one), _describe_up(one))
+    return Finding(one.asset_id, one.kind, one.category(), *found, warnings=warnings)
 
 
 def _measure_object(one: IndexedAsset, library: Library) -> tuple[int, Vec3, Vec3]:

@@ -97,13 +97,7 @@ def _is_current(folder: Folder, row: Any) -> bool:
 
 def _state(status: stat_result) -> list[int]:
     """Device, inode, size [bytes], modification and change time [ns] of a file."""
-    return [
-        status.st_dev,
-        status.st_ino,
-        status.st_size,
-        status.st_mtime_ns,
-        status.st_ctime_ns,
-    ]
+    return [status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns]
 
 
 def _now_ns() -> int:

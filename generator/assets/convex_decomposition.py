@@ -14,7 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.assets.triangle_soup import Float64, TriangleSoup, first_occurrences
+from gen_data.generator.assets.triangle_soup import (
+    Float64,
+    TriangleSoup,
+    face_crosses,
+    first_occurrences,
+)
 from gen_data.generator.core.asset_types import ConvexParts
 from gen_data.generator.core.errors import AssetError
 
@@ -42,11 +47,8 @@ def convex_parts(soup: TriangleSoup, place: str, max_parts: int = MAX_PARTS) -> 
         AssetError: if no hull can be made.
     """
     groups = [soup.corners[soup.face_groups == g] for g in np.unique(soup.face_groups)]
-    if 1 < len(groups) <= MAX_PARTS:
-        return ConvexParts(tuple(hull_vertices(g.reshape(-1, 3), place) for g in groups))
-    return ConvexParts(
-        tuple(hull_vertices(piece.reshape(-1, 3), place) for piece in decompose(soup, max_parts))
-    )
+    pieces = groups if 1 < len(groups) <= MAX_PARTS else decompose(soup, max_parts)
+    return ConvexParts(tuple(hull_vertices(piece.reshape(-1, 3), place) for piece in pieces))
 
 
 def single_hull(soup: TriangleSoup, place: str) -> ConvexParts:
@@ -163,9 +165,7 @@ def _has_pocket(piece: _Piece) -> bool:
     hull = _hull(piece.corners.reshape(-1, 3))
     if hull is None:
         return False
-    crosses = np.cross(
-        piece.corners[:, 1] - piece.corners[:, 0], piece.corners[:, 2] - piece.corners[:, 0]
-    )
+    crosses = face_crosses(piece.corners)
     lengths = np.sqrt((crosses * crosses).sum(axis=1))
     centres = piece.corners.mean(axis=1)[lengths > 0.0]
     outward = crosses[lengths > 0.0] / lengths[lengths > 0.0, None]
@@ -173,10 +173,7 @@ def _has_pocket(piece: _Piece) -> bool:
     depth = -np.einsum("ij,kj->ik", centres, hull.equations[:, :3], optimize=False)
     depth = np.maximum(depth - hull.equations[:, 3], 0.0)
     exits = np.where(facing > 1e-6, depth / np.maximum(facing, 1e-6), np.inf).min(axis=1)
-    points = piece.corners.reshape(-1, 3)
-    return float(exits.max()) > _MIN_POCKET_DEPTH * float(
-        (points.max(axis=0) - points.min(axis=0)).max()
-    )
+    return float(exits.max()) > _MIN_POCKET_DEPTH * _extent(piece.corners.reshape(-1, 3))
 
 
 def _clip_triangles(corners: Float64, axis: int, at: float, side: float) -> Float64:
@@ -218,8 +215,13 @@ def _hull(points: Float64) -> Any:
         return None
 
 
+def _extent(points: Float64) -> float:
+    """Longest edge of the bounding box."""
+    return float((points.max(axis=0) - points.min(axis=0)).max())
+
+
 def _drop_duplicates(points: Float64) -> Float64:
-    extent = float((points.max(axis=0) - points.min(axis=0)).max())
+    extent = _extent(points)
     _, first = first_occurrences(np.rint(points / max(extent * 1e-6, 1e-12)).astype(np.int64))
     return points[first]
 
@@ -254,7 +256,7 @@ def _thicken_if_flat(points: Float64) -> Float64:
     centred = points - points.mean(axis=0)
     covariance = np.einsum("ni,nj->ij", centred, centred, optimize=False)
     values, vectors = np.linalg.eigh(covariance)
-    extent = float((points.max(axis=0) - points.min(axis=0)).max())
+    extent = _extent(points)
     normal = vectors[:, 0]
     heights = (centred * normal).sum(axis=1)
     missing = _MIN_THICKNESS * extent - float(heights.max() - heights.min())

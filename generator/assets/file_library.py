@@ -22,6 +22,7 @@ from gen_data.generator.assets.folder_index import (
     Entry,
     IndexedAsset,
     MeshEntry,
+    Origin,
     RobotEntry,
     TextureEntry,
     list_assets,
@@ -100,11 +101,9 @@ class FileLibrary:
     def get(self, asset_id: str) -> Asset:
         """Description of an asset; robot links and stage pieces count as objects."""
         part = self._part(asset_id)
-        if part is None:
-            asset = self._asset(self._entries()[asset_id])
-        else:
-            whole = self._asset(part[0])
-            asset = replace(whole, asset_id=asset_id, kind="object")
+        asset = self._asset(part[0] if part else self._entries()[asset_id])
+        if part:
+            asset = replace(asset, asset_id=asset_id, kind="object")
         self._digests.save()
         return asset
 
@@ -269,17 +268,15 @@ class FileLibrary:
     def _key(self, one: IndexedAsset) -> str:
         """Hash of the files and of all parameters of their import."""
         if one.asset_id not in self._keys:
-            self._keys[one.asset_id] = content_key(
-                {
-                    "format": FORMAT,
-                    "version": VERSION,
-                    "id": one.asset_id,
-                    "entry": one.entry.model_dump(
-                        exclude={"licence", "author", "source"}, exclude_defaults=True
-                    ),
-                    "files": self._files(one),
-                }
-            )
+            origin = set(Origin.model_fields)
+            content = {
+                "format": FORMAT,
+                "version": VERSION,
+                "id": one.asset_id,
+                "entry": one.entry.model_dump(exclude=origin, exclude_defaults=True),
+                "files": self._files(one),
+            }
+            self._keys[one.asset_id] = content_key(content)
         return self._keys[one.asset_id]
 
     def _files(self, one: IndexedAsset) -> dict[str, str]:

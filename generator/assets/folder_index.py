@@ -15,8 +15,8 @@ from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field, model_validator
 
-from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.discovery import (
+from gen_data.generator.assets.asset_folder import (
+    Folder,
     asset_id_from_path,
     category_from_path,
     is_pattern,
@@ -233,10 +233,8 @@ class MeshEntry(Origin):
 
     @model_validator(mode="after")
     def _check_choices(self) -> MeshEntry:
-        sizes = {"scale": self.scale != 1.0, "size_m": self.size_m is not None}
-        given = [
-            name for name, is_given in {**sizes, "unit": self.unit is not None}.items() if is_given
-        ]
+        scaled = {"scale": self.scale != 1.0, "size_m": self.size_m, "unit": self.unit}
+        given = [name for name, value in scaled.items() if value]
         if len(given) > 1:
             raise ValueError(f"give {' or '.join(given)}, not both")
         if self.front is not None and self.yaw_deg != 0.0:
@@ -348,6 +346,9 @@ class FolderIndex(Origin):
 Model = TypeVar("Model", bound=Strict)
 Entry = MeshEntry | RobotEntry | TextureEntry | ImageEntry
 Kind = Literal["object", "robot", "texture", "environment"]
+_SECTIONS: dict[Kind, str] = {
+    "object": "assets", "robot": "robots", "texture": "textures", "environment": "environments",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -399,8 +400,8 @@ def list_assets(
 ) -> Iterator[IndexedAsset]:
     """Yield every asset of an index, with series and patterns expanded."""
     files: tuple[str, ...] | None = None
-    for kind, entries in _sections(index):
-        for entry in entries:
+    for kind, section in _SECTIONS.items():
+        for entry in getattr(index, section):
             origin = Origin(
                 licence=entry.licence or index.licence,
                 author=entry.author or index.author,
@@ -439,9 +440,8 @@ def _user_index(root: Path, path: Path) -> FolderIndex:
 def _check_files(index: FolderIndex, root: Path, document: Node, problems: Problems) -> None:
     """Report every missing file and every pattern without a match."""
     folder, below = Folder(root), None
-    for section in ("assets", "robots", "textures", "environments"):
-        entries: tuple[Entry, ...] = getattr(index, section)
-        for number, entry in enumerate(entries):
+    for section in _SECTIONS.values():
+        for number, entry in enumerate(getattr(index, section)):
             missing = [
                 file
                 for file in {f for one in _expand_series(entry) for f in one.files()}
@@ -468,13 +468,10 @@ def _count_by_suffix(files: tuple[str, ...]) -> str:
 
 def _index_files(root: Path) -> FolderIndex:
     """Index a folder's files, except for meshes that a URDF uses."""
-    files, panoramas = [], []
-    for name in list_files(root):
-        suffix = PurePosixPath(name).suffix.lower()
-        if suffix in {*MESH_SUFFIXES, ".urdf", ROAD_SUFFIX}:
-            files.append(name)
-        elif suffix in PANORAMA_SUFFIXES:
-            panoramas.append(name)
+    suffixes = {name: PurePosixPath(name).suffix.lower() for name in list_files(root)}
+    meshes = {*MESH_SUFFIXES, ".urdf", ROAD_SUFFIX}
+    files = [name for name, suffix in suffixes.items() if suffix in meshes]
+    panoramas = [name for name, suffix in suffixes.items() if suffix in PANORAMA_SUFFIXES]
     used = {f for name in files if name.lower().endswith(".urdf") for f in _urdf_meshes(root, name)}
     return FolderIndex(
         licence="unknown",
@@ -506,15 +503,6 @@ def _urdf_meshes(root: Path, urdf: str) -> tuple[str, ...]:
         return ()
 
 
-def _sections(index: FolderIndex) -> tuple[tuple[Kind, tuple[Entry, ...]], ...]:
-    return (
-        ("object", index.assets),
-        ("robot", index.robots),
-        ("texture", index.textures),
-        ("environment", index.environments),
-    )
-
-
 def _unique_files(*parts: str | TextureMaps | None) -> tuple[str, ...]:
     """Files and images of maps, sorted and without duplicates."""
     names: set[str] = set()
@@ -525,11 +513,11 @@ def _unique_files(*parts: str | TextureMaps | None) -> tuple[str, ...]:
 
 def _expand(entry: Entry, files: tuple[str, ...]) -> Iterator[Entry]:
     """Yield one entry per file of a pattern or series."""
-    if not is_pattern(entry.file):
+    if is_pattern(entry.file):
+        for file in match_files(entry.file, files):
+            yield entry.model_copy(update={"id": asset_id_from_path(file), "file": file})
+    else:
         yield from _expand_series(entry)
-        return
-    for file in match_files(entry.file, files):
-        yield entry.model_copy(update={"id": asset_id_from_path(file), "file": file})
 
 
 def _expand_series(entry: Entry) -> Iterator[Entry]:

@@ -46,10 +46,6 @@ VERSION = 5
 """Increased whenever the same files are imported as different geometry."""
 SIZE_TOLERANCE = 0.05
 """Largest deviation of a mesh's edges from the stated ones, as a share of the longest edge."""
-_AXES = {
-    "x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0),
-    "-x": (-1.0, 0.0, 0.0), "-y": (0.0, -1.0, 0.0), "-z": (0.0, 0.0, -1.0),
-}  # fmt: skip
 _DEFAULT_FRONT = {"x": "-z", "y": "x", "z": "x"}
 _MAX_ALBEDO = 0.85
 """Upper bound on diffuse albedo, that of fresh snow; files often use 1 for white."""
@@ -102,27 +98,28 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
     decoded = {
         name: decode_image(data, f"{place}#{name}", alpha=True) for name, data in images.items()
     }
-    whole = trim_unreached_holes(
-        join_soups(looks),
-        lambda name: (
-            decoded[name]
-            if name in decoded
-            else decode_image(folder.read(name), str(folder.root / name), alpha=True)
-        ),
-    )
+
+    def image(name: str) -> UInt8:
+        if name in decoded:
+            return decoded[name]
+        return decode_image(folder.read(name), str(folder.root / name), alpha=True)
+
+    whole = trim_unreached_holes(join_soups(looks), image)
     soup = _apply_finishes(whole, entry.materials, place, asset_id)
     matrix = upright_transform(entry)
     soup = soup.transformed(matrix)
     scale, shift = scale_and_shift(soup, entry, place)
-    scaling = _scaling_matrix(scale, shift)
+    scaling = np.concatenate([scale * np.eye(3), shift[:, None]], axis=1)
     soup = _split_regions(soup.transformed(scaling), entry.regions, place, asset_id)
     mesh = normal_form(soup, place, max_faces=entry.max_faces)
     if collides:
         solid = join_soups(collides).transformed(matrix).transformed(scaling)
         check_coordinates(solid, place)
-        collision = convex_parts(solid, place, entry.parts)
     else:
-        collision = convex_parts(_collision_soup(mesh, entry.max_faces), place, entry.parts)
+        # Decimated, so that decomposition stays fast.
+        solid = TriangleSoup.of(mesh.vertices_m.astype(np.float64)[mesh.faces])
+        solid = decimate(solid, entry.max_faces) if len(solid) > entry.max_faces else solid
+    collision = convex_parts(solid, place, entry.parts)
     keypoints = tuple(Keypoint(p.name, p.position_m, p.radius_m) for p in entry.keypoints)
     return ImportedMesh(mesh, collision, decoded, keypoints)
 
@@ -145,20 +142,11 @@ def import_link(
         check_coordinates(join_soups(solids), place)
         # One hull per element and group, as simulators treat the collision meshes of a URDF.
         hulls = [
-            convex_parts(s, place, 1) if _has_groups(s) else single_hull(s, place) for s in solids
+            (convex_parts(s, place, 1) if np.ptp(s.face_groups) else single_hull(s, place))
+            for s in solids
         ]
         collision = ConvexParts(tuple(part for hull in hulls for part in hull.parts_m))
     return ImportedMesh(mesh, collision, {})
-
-
-def _collision_soup(mesh: MeshData, max_faces: int) -> TriangleSoup:
-    """Triangles of a mesh for collision, decimated so that decomposition stays fast."""
-    soup = TriangleSoup.of(mesh.vertices_m.astype(np.float64)[mesh.faces])
-    return decimate(soup, max_faces) if len(soup) > max_faces else soup
-
-
-def _has_groups(soup: TriangleSoup) -> bool:
-    return bool((soup.face_groups != soup.face_groups[0]).any())
 
 
 def _read_geometry(
@@ -252,7 +240,7 @@ def _apply_finishes(
         if material.texture:
             material = replace(material, texture=f"{owner}#{material.texture}")
         else:
-            material = replace(material, base_color=_limit_white(material))
+            material = _limit_white(material)
         if finish is not None:
             material = _apply_finish(material, finish, owner)
             _check_placeable(material, finish, soup, f"{place}: material '{slot.name}'")
@@ -318,11 +306,11 @@ def _apply_finish(material: Material, finish: Finish, owner: str) -> Material:
     return replace(material, **changes)
 
 
-def _limit_white(material: Material) -> tuple[float, float, float]:
+def _limit_white(material: Material) -> Material:
     if material.metallic > 0.5 or material.transmission > 0.5:
-        return material.base_color
+        return material
     red, green, blue = (min(c, _MAX_ALBEDO) for c in material.base_color)
-    return (red, green, blue)
+    return replace(material, base_color=(red, green, blue))
 
 
 def _palette_colors(folder: Folder, soup: TriangleSoup) -> TriangleSoup:
@@ -349,15 +337,19 @@ def _palette_colors(folder: Folder, soup: TriangleSoup) -> TriangleSoup:
 
 def upright_transform(entry: MeshEntry) -> Float64:
     """Affine map [3, 4] that turns the file's up axis to Z and its front to +X."""
-    up = np.array(_AXES[entry.up_axis()])
-    front = np.array(_AXES[entry.front or _DEFAULT_FRONT[entry.up_axis()]])
+    up = _axis_vector(entry.up_axis())
+    front = _axis_vector(entry.front or _DEFAULT_FRONT[entry.up_axis()])
     axes = np.stack([front, np.cross(up, front), up]) + 0.0
     yaw = math.radians(entry.yaw_deg)
     c, s = round(math.cos(yaw), 12), round(math.sin(yaw), 12)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    matrix = np.zeros((3, 4))
-    matrix[:, :3] = np.einsum("ij,jk->ik", turn, axes, optimize=False)
-    return matrix
+    return np.concatenate([np.einsum("ij,jk->ik", turn, axes, optimize=False), np.zeros((3, 1))], 1)
+
+
+def _axis_vector(name: str) -> Float64:
+    """Unit vector of an axis: ``x`` or ``-x``."""
+    vector: Float64 = np.eye(3)["xyz".index(name[-1])]
+    return -vector if name.startswith("-") else vector
 
 
 def scale_and_shift(soup: TriangleSoup, entry: MeshEntry, place: str) -> tuple[float, Float64]:
@@ -395,13 +387,6 @@ def _scale_to_size(extents: Float64, size_m: float | Vec3, place: str) -> float:
                 f"{' x '.join(f'{edge:g}' for edge in size_m)} m; correct size_m, up or front"
             )
     return scale
-
-
-def _scaling_matrix(scale: float, shift: Float64) -> Float64:
-    matrix = np.zeros((3, 4))
-    matrix[:, :3] = scale * np.eye(3)
-    matrix[:, 3] = shift
-    return matrix
 
 
 def import_road_network(folder: Folder, relative: str) -> ImportedMesh:

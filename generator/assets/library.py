@@ -71,12 +71,10 @@ class Library:
     def get(self, asset_id: str) -> Asset:
         """Description of an asset. Raises UnknownAsset if there is none."""
         if asset_id not in self._entries:
-            generated = self._is_generated(asset_id)
-            self._entries[asset_id] = (
-                self._generated.get(parse_asset_id(asset_id))
-                if generated
-                else self._files.get(asset_id)
-            )
+            if self._is_generated(asset_id):
+                self._entries[asset_id] = self._generated.get(parse_asset_id(asset_id))
+            else:
+                self._entries[asset_id] = self._files.get(asset_id)
         return self._entries[asset_id]
 
     def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:

@@ -9,11 +9,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from gen_data.generator.assets.mesh_decimation import decimate
-from gen_data.generator.assets.triangle_soup import Float64, Int64, TriangleSoup, first_occurrences
+from gen_data.generator.assets.triangle_soup import (
+    Bools,
+    Float64,
+    Int64,
+    TriangleSoup,
+    face_crosses,
+    first_occurrences,
+)
 from gen_data.generator.core.asset_types import Material, MeshData
 from gen_data.generator.core.errors import AssetError
 
@@ -55,14 +63,13 @@ def normal_form(
     if len(soup) > max_faces:
         soup, faces = _weld(decimate(soup, max_faces))
     soup, faces = _orient_outward(soup, faces)
-    soup = replace(soup, uvs=_reset_invalid_uvs(soup.uvs) if textured else None)
+    uvs = soup.uvs if textured else None
+    if uvs is not None:
+        # Far beyond any repetition: exporters write such values on unused corners.
+        uvs = np.where(np.abs(uvs) > _MAX_UV, 0.0, uvs)
+    soup = replace(soup, uvs=uvs)
     own = _valid_normals(soup)
     return make_mesh(soup, _crease_normals(soup, faces, crease_deg) if own is None else own)
-
-
-def _reset_invalid_uvs(uvs: Float64 | None) -> Float64 | None:
-    """Set UVs far beyond any repetition to zero: exporters write such values on unused corners."""
-    return None if uvs is None else np.where(np.abs(uvs) > _MAX_UV, 0.0, uvs)
 
 
 def check_coordinates(soup: TriangleSoup, place: str) -> None:
@@ -138,9 +145,7 @@ def _weld(soup: TriangleSoup) -> tuple[TriangleSoup, Int64]:
     points = soup.corners.reshape(-1, 3)
     vertex, first = first_occurrences(np.rint(points / _grid_size(soup.corners)).astype(np.int64))
     faces = vertex.reshape(-1, 3)
-    distinct = (
-        (faces[:, 0] != faces[:, 1]) & (faces[:, 1] != faces[:, 2]) & (faces[:, 2] != faces[:, 0])
-    )
+    distinct = (faces != np.roll(faces, -1, axis=1)).all(axis=1)
     soup = replace(soup, corners=points[first][faces])
     distinct &= (face_crosses(soup.corners) != 0.0).any(axis=1)
     soup, faces = soup.select(distinct), faces[distinct]
@@ -150,12 +155,6 @@ def _weld(soup: TriangleSoup) -> tuple[TriangleSoup, Int64]:
     chosen = np.zeros(len(faces), dtype=bool)
     chosen[originals] = True
     return soup.select(chosen), faces[chosen]
-
-
-def face_crosses(corners: Float64) -> Float64:
-    """Cross product of two edges of each triangle [m, 3]: normals of twice the area's length."""
-    crosses: Float64 = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return crosses
 
 
 def corner_angles(corners: Float64) -> Float64:
@@ -179,7 +178,7 @@ class _Edges:
     """
 
     corners: Int64
-    opposed: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+    opposed: Bools
 
 
 def _find_edges(faces: Int64) -> _Edges:
@@ -220,7 +219,7 @@ def signed_volume(corners: Float64) -> float:
     return float((centred[:, 0] * np.cross(centred[:, 1], centred[:, 2])).sum()) / 6.0
 
 
-def _winding_flips(face_count: int, edges: _Edges) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _winding_flips(face_count: int, edges: _Edges) -> Bools:
     """Mask [m] of the faces to flip so that neighbours agree; the majority of a piece stays."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -236,29 +235,20 @@ def _winding_flips(face_count: int, edges: _Edges) -> np.ndarray[tuple[int], np.
     as_is, turned = label[:face_count], label[face_count:]
     # If both states share a component, no consistent winding exists (Moebius strip): no flips.
     votes = np.bincount(as_is, minlength=count)
-    flips: np.ndarray[tuple[int], np.dtype[np.bool_]] = (votes[as_is] < votes[turned]) | (
-        (votes[as_is] == votes[turned]) & (turned < as_is)
-    )
+    tied = votes[as_is] == votes[turned]
+    flips: Bools = (votes[as_is] < votes[turned]) | (tied & (turned < as_is))
     return flips
 
 
-def _flip_faces(
-    soup: TriangleSoup, faces: Int64, flip: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
-) -> tuple[TriangleSoup, Int64]:
+def _flip_faces(soup: TriangleSoup, faces: Int64, flip: Bools) -> tuple[TriangleSoup, Int64]:
     turned = soup.flipped()
 
-    def chosen(new: Float64 | None, old: Float64 | None) -> Float64 | None:
-        return None if new is None or old is None else np.where(flip[:, None, None], new, old)
+    def chosen(name: str) -> Any:
+        old = getattr(soup, name)
+        return None if old is None else np.where(flip[:, None, None], getattr(turned, name), old)
 
-    return (
-        replace(
-            soup,
-            corners=np.where(flip[:, None, None], turned.corners, soup.corners),
-            uvs=chosen(turned.uvs, soup.uvs),
-            normals=chosen(turned.normals, soup.normals),
-        ),
-        np.where(flip[:, None], faces[:, ::-1], faces),
-    )
+    soup = replace(soup, **{name: chosen(name) for name in ("corners", "uvs", "normals")})
+    return soup, np.where(flip[:, None], faces[:, ::-1], faces)
 
 
 def _valid_normals(soup: TriangleSoup) -> Float64 | None:
@@ -289,9 +279,7 @@ def _crease_normals(soup: TriangleSoup, faces: Int64, crease_deg: float) -> Floa
     graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), (faces.size,) * 2)
     count, group = connected_components(graph, directed=False)
     weighted = (corner_angles(soup.corners)[..., None] * crosses[:, None]).reshape(-1, 3)
-    sums: Float64 = np.stack(
-        [np.bincount(group, weighted[:, k], minlength=count) for k in range(3)], axis=1
-    )
+    sums: Float64 = np.stack([np.bincount(group, w, minlength=count) for w in weighted.T], axis=1)
     normals = _normalize(sums)[group].reshape(-1, 3, 3)
     # Where the sum nearly cancels (a knife's edge), use the face's own normal.
     cancelled = (normals * units[:, None]).sum(axis=2) < 0.05

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterator, Mapping
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeVar
 
 from gen_data.generator.assets.asset_arrays import (
@@ -115,21 +115,16 @@ class ProceduralLibrary:
         """Images of a texture."""
         family = self._find(asset_id, TextureFamily, "a texture")
         arguments = _merge_arguments(asset_id, family)
-        return self._result(
-            asset_id, family, lambda: family.build(**arguments), pack_texture, unpack_texture
-        )
+        compute: Callable[[], TextureData] = partial(family.build, **arguments)
+        return self._result(asset_id, family, compute, pack_texture, unpack_texture)
 
     def environment(self, asset_id: AssetId) -> Float32:
         """Pixels of an environment."""
         family = self._find(asset_id, EnvironmentFamily, "an environment")
         arguments = _merge_arguments(asset_id, family)
-        return self._result(
-            asset_id,
-            family,
-            lambda: family.build(**arguments),
-            lambda radiance: {"radiance": radiance},
-            lambda arrays: arrays["radiance"],
-        )
+        compute: Callable[[], Float32] = partial(family.build, **arguments)
+        pack, unpack = (lambda image: {"radiance": image}), (lambda arrays: arrays["radiance"])
+        return self._result(asset_id, family, compute, pack, unpack)
 
     def _find(self, asset_id: AssetId, kind: type[F], expected: str) -> F:
         """The id's family. Raises AssetError if it is of another kind."""
@@ -148,9 +143,8 @@ class ProceduralLibrary:
     ) -> S:
         key = self._key(asset_id, family)
         offered = family.variants > 0 and set(asset_id.parameters) <= {"seed"}
-        stored = offered or isinstance(family, TextureFamily) or family.stored
         try:
-            if not stored:
+            if not (offered or family.stored):
                 return self._store.computed(key, compute)
             return self._store.get(key, lambda: pack(compute()), unpack)
         except ValueError as error:
@@ -159,11 +153,8 @@ class ProceduralLibrary:
     def _key(self, asset_id: AssetId, family: AnyFamily) -> str:
         arguments = _merge_arguments(asset_id, family)
         parameters = {name: format_parameter(value) for name, value in arguments.items()}
-        content = {
-            "family": asset_id.name,
-            "version": [VERSION, family.version],
-            "parameters": parameters,
-        }
+        version = [VERSION, family.version]
+        content = {"family": asset_id.name, "version": version, "parameters": parameters}
         if asset_id.name in self._packages:
             # Another release of a package, or another package, may use the same version number.
             content["package"] = self._packages[asset_id.name]

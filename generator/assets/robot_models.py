@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import combinations
 
 from gen_data.generator.assets.folder_index import RobotEntry
 from gen_data.generator.assets.urdf import Urdf
-from gen_data.generator.core.asset_types import Gripper, Joint, RobotModel
+from gen_data.generator.core.asset_types import Gripper, RobotModel
 from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.kinematics import POSITION_DECIMALS, finger_links, positions_of
 from gen_data.generator.core.se3 import SE3
@@ -36,22 +37,19 @@ def robot_model(robot_id: str, urdf: Urdf, entry: RobotEntry, place: str) -> Rob
 
 
 def _check_names(urdf: Urdf, entry: RobotEntry, place: str) -> None:
-    joints = [joint.name for joint in urdf.joints if joint.movable]
-    links = list(urdf.links)
-    gripper = entry.gripper
-    named_joints = [*entry.home, *(gripper.finger_joints if gripper else ())]
-    named_links = [*(link for pair in entry.touching for link in pair)]
-    named_links += [gripper.link] if gripper else []
-    for names, known, what in (
-        (named_joints, joints, "movable joint"),
-        (named_links, links, "link"),
-    ):
-        for name in names:
-            if name not in known:
-                raise AssetError(
-                    f"{place}: no {what} '{name}'{did_you_mean(name, known)}; "
-                    f"correct the entry '{entry.id}' of the asset index"
-                )
+    joints, links = [j.name for j in urdf.joints if j.movable], list(urdf.links)
+    named = [(name, joints, "movable joint") for name in entry.home]
+    if entry.gripper:
+        named += [(name, joints, "movable joint") for name in entry.gripper.finger_joints]
+    named += [(link, links, "link") for pair in entry.touching for link in pair]
+    if entry.gripper:
+        named.append((entry.gripper.link, links, "link"))
+    for name, known, what in named:
+        if name not in known:
+            raise AssetError(
+                f"{place}: no {what} '{name}'{did_you_mean(name, known)}; "
+                f"correct the entry '{entry.id}' of the asset index"
+            )
 
 
 def _home_positions(urdf: Urdf, entry: RobotEntry, place: str) -> tuple[float, ...]:
@@ -62,7 +60,9 @@ def _home_positions(urdf: Urdf, entry: RobotEntry, place: str) -> tuple[float, .
             position that contradicts its leader's.
     """
     movable = [joint for joint in urdf.joints if joint.movable]
-    given = {j.name: entry.home.get(j.name, _default_position(j)) for j in movable if not j.mimic}
+    middles = ((j, 0.5 * (j.lower + j.upper)) for j in movable)
+    middle = {j.name: 0.0 if j.lower <= 0.0 <= j.upper else m for j, m in middles}
+    given = {j.name: entry.home.get(j.name, middle[j.name]) for j in movable if not j.mimic}
     positions = positions_of(urdf.joints, given)
     for joint, position in zip(movable, positions, strict=True):
         correct = f"correct the entry '{entry.id}' of the asset index"
@@ -79,20 +79,12 @@ def _home_positions(urdf: Urdf, entry: RobotEntry, place: str) -> tuple[float, .
     return positions
 
 
-def _default_position(joint: Joint) -> float:
-    return 0.0 if joint.lower <= 0.0 <= joint.upper else 0.5 * (joint.lower + joint.upper)
-
-
 def _make_gripper(entry: RobotEntry) -> Gripper | None:
-    if entry.gripper is None:
+    gripper = entry.gripper
+    if gripper is None:
         return None
-    return Gripper(
-        link=entry.gripper.link,
-        T_link_grasp=SE3((0.0, 0.0, entry.gripper.grasp_offset_m)),
-        finger_joints=entry.gripper.finger_joints,
-        stroke_m=entry.gripper.stroke_m,
-        open_at=entry.gripper.open_at,
-    )
+    grasp = SE3((0.0, 0.0, gripper.grasp_offset_m))
+    return Gripper(gripper.link, grasp, gripper.finger_joints, gripper.stroke_m, gripper.open_at)
 
 
 def _permanent_contacts(robot: RobotModel) -> set[tuple[str, str]]:
@@ -103,13 +95,10 @@ def _permanent_contacts(robot: RobotModel) -> set[tuple[str, str]]:
         above = piece[joint.parent]
         piece[joint.child] = len(piece) if joint.movable else above
         connected |= {(above, piece[joint.child]), (piece[joint.child], above)}
-    names = list(piece)
     pairs = {
         (a, b)
-        for k, a in enumerate(names)
-        for b in names[k + 1 :]
+        for a, b in combinations(piece, 2)
         if piece[a] == piece[b] or (piece[a], piece[b]) in connected
     }
     # The bars of a finger linkage overlap at their pins.
-    fingers = finger_links(robot)
-    return pairs | {(a, b) for k, a in enumerate(fingers) for b in fingers[k + 1 :]}
+    return pairs | set(combinations(finger_links(robot), 2))

@@ -9,7 +9,13 @@ from urllib.parse import quote, unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.assets.triangle_soup import Float64, Int64, MaterialSlot, TriangleSoup
+from gen_data.generator.assets.triangle_soup import (
+    Float64,
+    Int64,
+    MaterialSlot,
+    TriangleSoup,
+    face_crosses,
+)
 from gen_data.generator.core.asset_types import TextureData, UInt8
 
 _MARK = "maps;"
@@ -46,8 +52,7 @@ class TextureMaps:
 
     def name(self) -> str:
         """Name that encodes all of them; the albedo's own name if it is the only image."""
-        images = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "cutoff"}
-        given = {key: image for key, image in images.items() if image}
+        given = self._given()
         if not set(given) - {"albedo"}:
             return self.albedo
         parts = [f"{key}={quote(image, safe='/!.')}" for key, image in given.items()]
@@ -55,8 +60,11 @@ class TextureMaps:
 
     def images(self) -> tuple[str, ...]:
         """Names of the images, each once, sorted."""
-        values = [getattr(self, f.name) for f in fields(self) if f.name != "cutoff"]
-        return tuple(sorted({value.partition("!")[0] for value in values if value}))
+        return tuple(sorted({image.partition("!")[0] for image in self._given().values()}))
+
+    def _given(self) -> dict[str, str]:
+        images = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "cutoff"}
+        return {key: image for key, image in images.items() if image}
 
 
 def find_maps(name: str) -> TextureMaps | None:
@@ -157,10 +165,9 @@ def _trim_slot(
 
 def _hole_share(corners: Float64, uvs: Float64, holes: NDArray[np.bool_]) -> float:
     """Share of the area of triangles [m, 3, 3] that lies in holes of an image."""
-    rows, columns = texel_indices(
-        np.einsum("sc,mcd->msd", _WEIGHTS, uvs, optimize=False), holes.shape
-    )
-    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    samples = np.einsum("sc,mcd->msd", _WEIGHTS, uvs, optimize=False)
+    rows, columns = texel_indices(samples, holes.shape)
+    sides = face_crosses(corners)
     areas = np.sqrt((sides * sides).sum(axis=1))
     face_shares = holes[rows, columns].mean(axis=1)
     return float((face_shares * areas).sum() / max(float(areas.sum()), 1e-30))

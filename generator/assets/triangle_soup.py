@@ -14,6 +14,7 @@ from gen_data.generator.core.se3 import Vec3
 
 Float64 = NDArray[np.float64]
 Int64 = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 SEGMENTS = 32
 _BOX_QUADS = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
 
@@ -77,9 +78,11 @@ class TriangleSoup:
         normals = self.normals
         if normals is not None:
             # Normals transform by the cofactor matrix, which unlike the inverse always exists.
-            normals = np.einsum("ij,...j->...i", _cofactors(linear), normals, optimize=False)
+            cofactors = np.cross(np.roll(linear, -1, axis=0), np.roll(linear, -2, axis=0))
+            normals = np.einsum("ij,...j->...i", cofactors, normals, optimize=False)
         moved = replace(self, corners=corners, normals=normals)
-        return moved.flipped() if _determinant(linear) < 0.0 else moved
+        mirrors = float((linear[0] * np.cross(linear[1], linear[2])).sum()) < 0.0
+        return moved.flipped() if mirrors else moved
 
     def flipped(self) -> TriangleSoup:
         """Reverse the winding of every triangle."""
@@ -90,7 +93,7 @@ class TriangleSoup:
             normals=None if self.normals is None else -self.normals[:, ::-1],
         )
 
-    def select(self, chosen: NDArray[np.bool_]) -> TriangleSoup:
+    def select(self, chosen: Bools) -> TriangleSoup:
         """Select triangles by a mask [m]."""
         return replace(
             self,
@@ -117,35 +120,29 @@ def join_soups(soups: list[TriangleSoup]) -> TriangleSoup:
     """
     if len(soups) == 1:
         return soups[0]
-    slot_starts = np.cumsum([0, *(len(s.slots) for s in soups)])
-    group_starts = np.cumsum(
-        [0, *(int(s.face_groups.max(initial=-1)) + 1 for s in soups)], dtype=np.int64
-    )
+    slots, groups, first_slot, first_group = [], [], 0, 0
+    for s in soups:
+        slots.append(s.face_slots + first_slot)
+        groups.append(s.face_groups + first_group)
+        first_slot += len(s.slots)
+        first_group += int(s.face_groups.max(initial=-1)) + 1
     has_uvs = any(s.uvs is not None for s in soups)
-    has_normals = all(s.normals is not None for s in soups)
     uvs = [np.zeros((len(s), 3, 2)) if s.uvs is None else s.uvs for s in soups]
+    normals = [s.normals for s in soups if s.normals is not None]
     return TriangleSoup(
         corners=np.concatenate([s.corners for s in soups]),
         uvs=np.concatenate(uvs) if has_uvs else None,
-        normals=np.concatenate([s.normals for s in soups if s.normals is not None])
-        if has_normals
-        else None,
-        face_slots=np.concatenate(
-            [s.face_slots + k for s, k in zip(soups, slot_starts, strict=False)]
-        ),
-        face_groups=np.concatenate(
-            [s.face_groups + k for s, k in zip(soups, group_starts, strict=False)]
-        ),
+        normals=np.concatenate(normals) if len(normals) == len(soups) else None,
+        face_slots=np.concatenate(slots),
+        face_groups=np.concatenate(groups),
         slots=tuple(slot for s in soups for slot in s.slots),
     )
 
 
-def _cofactors(m: Float64) -> Float64:
-    return np.stack([np.cross(m[1], m[2]), np.cross(m[2], m[0]), np.cross(m[0], m[1])])
-
-
-def _determinant(m: Float64) -> float:
-    return float((m[0] * np.cross(m[1], m[2])).sum())
+def face_crosses(corners: Float64) -> Float64:
+    """Cross product of two edges of each triangle [m, 3]: normals of twice the area's length."""
+    crosses: Float64 = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return crosses
 
 
 def first_occurrences(keys: Int64) -> tuple[Int64, Int64]:

@@ -146,11 +146,9 @@ def _read_shapes(
         if material is not None:
             color = material.find("color")
             name = material.get("name", "")
-            own = (
-                _parse_vector(color.attrib["rgba"].rsplit(None, 1)[0])
-                if color is not None
-                else None
-            )
+            own = None
+            if color is not None:
+                own = _parse_vector(color.attrib["rgba"].rsplit(None, 1)[0])
             shape = replace(shape, material=name, color=own or colors.get(name))
         yield shape
 
@@ -160,9 +158,8 @@ def _read_shape(folder: Folder, relative: str, element: Element, pose: SE3) -> S
     if element.tag == "mesh":
         file = _resolve_mesh(folder, relative, get["filename"])
         scale = get.get("scale", "1 1 1").split()
-        return Shape(
-            "mesh", file, _parse_vector(" ".join(scale * 3 if len(scale) == 1 else scale)), pose
-        )
+        size = _parse_vector(" ".join(scale * 3 if len(scale) == 1 else scale))
+        return Shape("mesh", file, size, pose)
     if element.tag == "box":
         return Shape("box", "", _parse_vector(get["size"]), pose)
     if element.tag in ("cylinder", "capsule"):

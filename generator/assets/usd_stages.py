@@ -39,16 +39,9 @@ def stage_model(folder: Folder, entry: MeshEntry, asset_id: str) -> StageModel:
             soup = file.source((piece,), materials=False).soup.transformed(matrix)
             _, shift = scale_and_shift(soup, entry, f"{place}: {piece.name}")
             x, y, z = (float(-v) for v in shift)
-            label = piece.label
-            pieces.append(
-                StagePiece(
-                    piece.name,
-                    f"{asset_id}/{piece.name}",
-                    SE3((x, y, z)),
-                    label.prim if label else "",
-                    label.category if label else "",
-                )
-            )
+            named = (piece.label.prim, piece.label.category) if piece.label else ("", "")
+            asset = f"{asset_id}/{piece.name}"
+            pieces.append(StagePiece(piece.name, asset, SE3((x, y, z)), *named))
         lights, cameras = file.stage.lights(), file.stage.cameras()
     scale = entry.metres_per_unit()
     return StageModel(

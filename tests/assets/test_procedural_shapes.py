@@ -50,15 +50,6 @@ def test_a_lathe_puts_the_middle_of_the_image_at_plus_x() -> None:
     assert np.allclose(points[:, 2], uvs[:, 1])
 
 
-def test_a_swept_ring_has_the_volume_of_a_torus() -> None:
-    """Pappus: area of the section times the way of its centre, up to the polygons' deficit."""
-    turn = 2 * math.pi * np.arange(96) / 96
-    path = np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
-    ring = sweep(path, circle(0.2, 48), closed=True)
-
-    assert _volume(ring) == pytest.approx(2 * math.pi * math.pi * 0.2**2, rel=0.01)
-
-
 def test_a_sweep_does_not_twist_along_a_helix() -> None:
     """Neighbouring sections turn with the path only: no face is turned inside out."""
     t = np.linspace(0.0, 4 * math.pi, 80)

@@ -8,8 +8,8 @@ import pytest
 import yaml
 
 from gen_data.generator import assets
-from gen_data.generator.assets.procedural.bottles import BOTTLES, BottleStyle
 from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.assets.procedural.packaging import BOTTLES, BottleStyle
 from gen_data.generator.assets.vehicles.bodywork import DESIGNS, Design
 
 VEHICLES = "gen_data.generator.assets.vehicles"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gen_data.generator.assets.procedural import TEXTURES
-from gen_data.generator.assets.procedural.cans import can_size
 from gen_data.generator.assets.procedural.noise import fbm, perlin, worley
+from gen_data.generator.assets.procedural.packaging import can_size
 from gen_data.generator.core.asset_types import TextureData
 from gen_data.generator.core.streams import Streams
 

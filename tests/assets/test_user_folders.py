@@ -12,7 +12,7 @@ import pytest
 import trimesh
 from PIL import Image
 
-from gen_data.generator.assets import discovery
+from gen_data.generator.assets import asset_folder
 from gen_data.generator.assets.folder_index import MeshEntry
 from gen_data.generator.assets.importer import upright_transform
 from gen_data.generator.assets.library import open_library
@@ -428,7 +428,7 @@ def test_a_tree_that_is_no_folder_of_assets_is_refused(
     """Every entry counts, not only meshes."""
     for k in range(6):
         (folder / f"{k}.txt").write_text("")
-    monkeypatch.setattr(discovery, "MAX_ENTRIES", 5)
+    monkeypatch.setattr(asset_folder, "MAX_ENTRIES", 5)
     with pytest.raises(AssetError, match="more than 5 files and folders"):
         open_library([folder], cache_dir=tmp_path / "cache").find({"user"})
 
@@ -446,7 +446,7 @@ def test_a_folder_that_cannot_be_read_is_named(
     error = PermissionError(13, "Permission denied", str(folder / "locked"))
     monkeypatch.setattr(os, "scandir", raising(error))
     with pytest.raises(AssetError, match=r"locked: Permission denied; all folders"):
-        discovery.list_files(folder)
+        asset_folder.list_files(folder)
 
 
 def raising(error: Exception) -> Callable[..., NoReturn]:

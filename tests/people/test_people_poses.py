@@ -5,9 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gen_data.generator.assets.people.animation import PHASES, POSES, stance
-from gen_data.generator.assets.people.bone_rotations import bone_rotations
-from gen_data.generator.assets.people.skinning import bone_transforms, skin_points, vertex_normals
+from gen_data.generator.assets.people.posing import (
+    PHASES,
+    POSES,
+    bone_rotations,
+    bone_transforms,
+    skin_points,
+    stance,
+    vertex_normals,
+)
 from tests.people.bodies import KINDS, body_of
 
 

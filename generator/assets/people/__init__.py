@@ -32,7 +32,7 @@ def _people(name: str, version: int, *tags: str) -> Family:
         stackable=False,
         version=version,
         parameters={"pose": "", "phase": -1.0},
-        build=Lazy(f"{_PACKAGE}.families:{name}"),
+        build=Lazy(f"{_PACKAGE}.person_mesh:{name}"),
         facts=Lazy(f"{_PACKAGE}.person:facts"),
         # There are too many poses to keep them all on disk.
         stored=False,

@@ -17,18 +17,17 @@ from itertools import product
 
 import numpy as np
 
+from gen_data.generator.assets.people import body as template
 from gen_data.generator.assets.people import body_regions
-from gen_data.generator.assets.people.body import (
-    DELTA_M,
-    LANDMARKS,
-    ZONES,
-    Array,
-    BodyTemplate,
-    Indices,
-    strongest_weights,
+from gen_data.generator.assets.people.body import LANDMARKS, ZONES, Array, BodyTemplate, Indices
+from gen_data.generator.assets.people.body_regions import (
+    OUTLINES,
+    Level,
+    MeshRows,
+    grid_faces,
+    make_rows,
 )
-from gen_data.generator.assets.people.body_regions import OUTLINES
-from gen_data.generator.assets.people.mesh_simplify import Level, MeshRows, grid_faces, make_rows
+from gen_data.generator.core.se3 import Vec3
 
 _HEIGHT_M = 1.67
 _SOLE_Z_M = -0.82
@@ -48,7 +47,9 @@ _HAND_M = 0.108 * _HEIGHT_M
 _LEG_Y = 0.088
 
 _SPINE = ("Root", "pelvis", "spine_01", "spine_02", "spine_03", "neck_01", "head")
-_SIDE_BONES: Mapping[str, tuple[str, Array]] = {
+Bones = Mapping[str, tuple[str, Array]]
+"""``{bone: (parent or "", head [m])}``, each after its parent."""
+_SIDE_BONES: Bones = {
     "clavicle": ("spine_03", np.array([0.03, 0.03, 0.52])),
     "upperarm": ("clavicle", _SHOULDER),
     "lowerarm": ("upperarm", _ELBOW),
@@ -81,7 +82,7 @@ def simple_body() -> BodyTemplate:
     marks[:, names.index("head")] = 1.0
     points = np.concatenate([heads, OUTLINES["landmarks"], *(p.values[:, :3] for p in parts)])
     table = np.concatenate([np.eye(len(names)), marks, *(p.values[:, 3:] for p in parts)])
-    weight_bones, weights = strongest_weights(table)
+    weight_bones, weights = template.strongest_weights(table)
     faces: dict[str, list[Indices]] = {}
     first = len(names) + len(LANDMARKS)
     for part in parts:
@@ -95,30 +96,24 @@ def simple_body() -> BodyTemplate:
         parents=np.array([names.index(parent) if parent else -1 for parent, _ in bones.values()]),
         points_m=points,
         targets=tuple(shapes),
-        deltas=np.stack(
-            [np.rint((s - points) / DELTA_M).astype(np.int16) for s in shapes.values()]
-        ),
+        deltas=np.stack([template.encode_deltas(shape - points) for shape in shapes.values()]),
         weight_bones=weight_bones,
         weights=weights,
         faces={zone: np.concatenate(faces[zone]) for zone in ZONES if zone in faces},
     )
 
 
-_SHAPES = tuple(
-    product(
-        ("female", "male"), ("child", "young", "old"), ("minweight", "averageweight", "maxweight")
-    )
-)
+_WEIGHTS = ("minweight", "averageweight", "maxweight")
+_SHAPES = tuple(product(("female", "male"), ("child", "young", "old"), _WEIGHTS))
 
 
 def _warp(p: Array, sex: str, age: str, weight: str) -> Array:
     """The points in the shape of a sex, an age and a weight."""
     x, y, z = p.T
     heights = (-0.3, 0.0, 0.17, 0.4, 0.52, 0.56)
-    hips, waist, bust, shoulders = (
-        (1.03, 0.9, 0.94, 0.9) if sex == "female" else (0.96, 0.97, 1.03, 1.03)
-    )
-    girth = {"minweight": 0.86, "averageweight": 1.0, "maxweight": 1.24}[weight]
+    widths = {"female": (1.03, 0.9, 0.94, 0.9), "male": (0.96, 0.97, 1.03, 1.03)}
+    hips, waist, bust, shoulders = widths[sex]
+    girth = dict(zip(_WEIGHTS, (0.86, 1.0, 1.24), strict=True))[weight]
     if age == "child":
         hips, bust, shoulders = 0.9 * hips, 0.86 * bust, 0.84 * shoulders
     half = 0.5 + 0.5 * girth
@@ -135,14 +130,12 @@ def _warp(p: Array, sex: str, age: str, weight: str) -> Array:
     if age == "child":
         head = np.clip((z - 0.6) / 0.02, 0.0, 1.0)
         moved_x, moved_y = moved_x * (1.0 + 0.2 * head), moved_y * (1.0 + 0.2 * head)
-        moved_z = np.where(
-            z > 0.6, 0.6 + 1.2 * (z - 0.6), np.where(z < 0.06, 0.06 + 0.93 * (z - 0.06), z)
-        )
+        legs = np.where(z < 0.06, 0.06 + 0.93 * (z - 0.06), z)
+        moved_z = np.where(z > 0.6, 0.6 + 1.2 * (z - 0.6), legs)
     return np.stack([moved_x, moved_y, moved_z], axis=1)
 
 
-def _bones() -> dict[str, tuple[str, Array]]:
-    """``{bone: (parent or "", head [m])}``, each after its parent."""
+def _bones() -> Bones:
     spine = zip(_SPINE, ("", *_SPINE), OUTLINES["spine"], strict=False)
     made = {name: (parent, np.array(head)) for name, parent, head in spine}
     for side, sign in (("l", 1.0), ("r", -1.0)):
@@ -152,21 +145,19 @@ def _bones() -> dict[str, tuple[str, Array]]:
     return made
 
 
-def _parts(bones: Mapping[str, tuple[str, Array]]) -> Sequence[MeshRows]:
+def _parts(bones: Bones) -> Sequence[MeshRows]:
     spine = ("pelvis", "spine_01", "spine_02", "spine_03")
     neck = ("spine_03", "neck_01", "head")
     head = _upright(bones, OUTLINES["head"], 28, neck)
     _model_face(head)
     trunk = _upright(bones, OUTLINES["trunk"], 24, spine)
+    lips = _ball(bones, (0.1515, 0.0, 0.661), (0.008, 0.023, 0.009))
+    skirt = _upright(bones, OUTLINES["skirt"], 24, ("pelvis",), split=True)
     made = [
         _divide(head, "face", (body_regions.HAIRLINE, body_regions.SHOULDERS)),
         _divide(trunk, "hips", (body_regions.WAIST, *body_regions.FRONT)),
-        _divide(_ball(bones, (0.1515, 0.0, 0.661), (0.008, 0.023, 0.009)), "lips", ()),
-        _divide(
-            _upright(bones, OUTLINES["skirt"], 24, ("pelvis",), split=True),
-            "skirt_top",
-            body_regions.SKIRT,
-        ),
+        _divide(lips, "lips", ()),
+        _divide(skirt, "skirt_top", body_regions.SKIRT),
         _curtain(bones),
     ]
     for side, sign in (("l", 1.0), ("r", -1.0)):
@@ -174,7 +165,7 @@ def _parts(bones: Mapping[str, tuple[str, Array]]) -> Sequence[MeshRows]:
     return made
 
 
-def _limbs(bones: Mapping[str, tuple[str, Array]], side: str, sign: float) -> Sequence[MeshRows]:
+def _limbs(bones: Bones, side: str, sign: float) -> Sequence[MeshRows]:
     arm, hand = _arm(bones, side), _hand(bones, side)
     leg = (f"thigh_{side}", f"calf_{side}", f"foot_{side}")
     bare = _upright(bones, OUTLINES["leg"], 12, leg, middle_y_m=_LEG_Y)
@@ -220,7 +211,7 @@ def _divide(loft: tuple[Array, Indices], zone: str, cuts: Sequence[body_regions.
 
 
 def _upright(
-    bones: Mapping[str, tuple[str, Array]],
+    bones: Bones,
     outline: Sequence[Sequence[float]],
     columns: int,
     chain: Sequence[str],
@@ -246,27 +237,25 @@ def _upright(
     return np.concatenate([values, weights], axis=1), faces
 
 
-def _arm(bones: Mapping[str, tuple[str, Array]], side: str) -> tuple[Array, Indices]:
+def _arm(bones: Bones, side: str) -> tuple[Array, Indices]:
     chain = ("spine_03", f"upperarm_{side}", f"lowerarm_{side}")
     length = float((_WRIST - _SHOULDER) @ _DOWN_OUT)
     share, across, depth = np.array(OUTLINES["arm"]).T
     return _along_arm(bones, _SHOULDER, share * length, np.stack([depth, across], 1), chain)
 
 
-def _hand(bones: Mapping[str, tuple[str, Array]], side: str) -> tuple[Array, Indices]:
+def _hand(bones: Bones, side: str) -> tuple[Array, Indices]:
     """A mitten with a thumb."""
     share, thick, broad = np.array(OUTLINES["hand"]).T
     halves = np.stack([broad, thick], axis=1)
     values, faces = _along_arm(bones, _WRIST, share * _HAND_M, halves, (f"hand_{side}",))
-    names = list(bones)
-    thumb, thumb_faces = _ball(bones, (0.0, 0.0, 0.0), (0.014, 0.014, 0.036))
+    thumb, thumb_faces = _ball(bones, (0.0, 0.0, 0.0), (0.014, 0.014, 0.036), f"hand_{side}")
     thumb[:, :3] += _WRIST + 0.35 * _HAND_M * _DOWN_OUT + (0.045, 0.0, 0.0)
-    thumb[:, 3:] = np.eye(len(names))[names.index(f"hand_{side}")]
     return np.concatenate([values, thumb]), np.concatenate([faces, thumb_faces + len(values)])
 
 
 def _along_arm(
-    bones: Mapping[str, tuple[str, Array]],
+    bones: Bones,
     start: Array,
     along_m: Array,
     halves_m: Array,
@@ -281,7 +270,7 @@ def _along_arm(
     return np.concatenate([values, weights], axis=1), faces
 
 
-def _foot(bones: Mapping[str, tuple[str, Array]], side: str) -> tuple[Array, Indices]:
+def _foot(bones: Bones, side: str) -> tuple[Array, Indices]:
     x, z, width, height = np.array(OUTLINES["foot"]).T
     middles = np.stack([x, np.full_like(x, _LEG_Y), z], axis=1)
     axes = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
@@ -295,22 +284,18 @@ def _foot(bones: Mapping[str, tuple[str, Array]], side: str) -> tuple[Array, Ind
     return np.concatenate([values, weights], axis=1), faces[:, ::-1]
 
 
-def _ball(
-    bones: Mapping[str, tuple[str, Array]],
-    middle_m: tuple[float, float, float],
-    radii_m: tuple[float, float, float],
-) -> tuple[Array, Indices]:
-    """An ellipsoid on the head."""
+def _ball(bones: Bones, middle_m: Vec3, radii_m: Vec3, bone: str = "head") -> tuple[Array, Indices]:
+    """An ellipsoid that moves with one bone."""
     polar = np.linspace(0.0, math.pi, 6)
     rings = np.stack([np.sin(polar)] * 2, axis=1) * radii_m[:2]
     middles = np.array(middle_m) + np.cos(polar)[:, None] * np.array([0.0, 0.0, radii_m[2]])
     values, faces = _loft(middles, np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), rings, 9)
     weights = np.zeros((len(values), len(bones)))
-    weights[:, list(bones).index("head")] = 1.0
+    weights[:, list(bones).index(bone)] = 1.0
     return np.concatenate([values, weights], axis=1), faces
 
 
-def _curtain(bones: Mapping[str, tuple[str, Array]]) -> MeshRows:
+def _curtain(bones: Bones) -> MeshRows:
     places = body_regions.curtain_points()
     weights = _along_chain(bones, places[:, 2], ("spine_03", "neck_01", "head"), 2)
     columns = body_regions.CURTAIN_COLUMNS
@@ -339,9 +324,7 @@ def _loft(middles: Array, axes: Array, halves: Array, columns: int) -> tuple[Arr
     return places, np.concatenate(faces)
 
 
-def _along_chain(
-    bones: Mapping[str, tuple[str, Array]], heights: Array, chain: Sequence[str], axis: int
-) -> Array:
+def _along_chain(bones: Bones, heights: Array, chain: Sequence[str], axis: int) -> Array:
     """Bone weights of points along a chain, blended around the head of each next bone.
 
     Args:

@@ -98,10 +98,9 @@ def load(path: Path) -> BodyTemplate:
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
             arrays: dict[str, NDArray[Any]] = {name: archive[name] for name in archive.files}
-        if int(arrays["format"]) != FORMAT:
-            raise AssetError(
-                f"{path}: is of format {int(arrays['format'])}, not {FORMAT}; {remedy}"
-            )
+        found = int(arrays["format"])
+        if found != FORMAT:
+            raise AssetError(f"{path}: is of format {found}, not {FORMAT}; {remedy}")
         return _body(arrays)
     except (OSError, ValueError, KeyError, EOFError) as error:
         raise AssetError(f"{path}: the people pack cannot be read ({error}); {remedy}") from error
@@ -124,6 +123,11 @@ def save(body: BodyTemplate, path: Path) -> None:
         "faces": np.concatenate(faces).astype(np.int32),
     }
     np.savez_compressed(path, allow_pickle=False, **arrays)
+
+
+def encode_deltas(deltas_m: Array) -> NDArray[np.int16]:
+    """Shape differences [m] in units of ``DELTA_M``."""
+    return np.rint(deltas_m / DELTA_M).astype(np.int16)
 
 
 def strongest_weights(weights: Array) -> tuple[Indices, Array]:

@@ -9,11 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gen_data.generator.assets.people.body import Array, BodyTemplate, Indices
-from gen_data.generator.assets.people.person import Person
-from gen_data.generator.assets.people.skinning import vertex_normals
-from gen_data.generator.assets.people.wardrobe import Outfit
+from gen_data.generator.assets.people.person import Outfit, Person
+from gen_data.generator.assets.people.posing import vertex_normals
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.se3 import Vec3
 
 Profile = Sequence[tuple[float, float]]
 """(height in the template [m], distance from the body [m]), heights rising."""
@@ -94,9 +92,8 @@ def _skin(person: Person) -> Layer:
     skin = Material(base_color=person.skin, roughness=0.5, specular=0.4, role="skin")
     r, g, b = person.skin
     lips = replace(skin, base_color=(0.82 * r, 0.55 * g, 0.55 * b), roughness=0.4)
-    brows = Material(
-        base_color=_mix_colors(person.hair, person.skin, 0.45), roughness=0.8, role="hair"
-    )
+    x, y, z = ((1.0 - 0.45) * p + 0.45 * q for p, q in zip(person.hair, person.skin, strict=True))
+    brows = Material(base_color=(x, y, z), roughness=0.8, role="hair")
     zones = [("face", skin), ("lips", lips), ("brows", brows), ("hands", skin)]
     if person.haircut == "bald" and not outfit.hat:
         zones.append(("scalp", skin))
@@ -158,16 +155,11 @@ def _tops(outfit: Outfit) -> tuple[Layer, ...]:
     elif not tucked:
         zones.append("hips")
     thick = _THICKNESS_M[outfit.top]
-    profile = (
-        (-0.02, thick + 0.009),
-        (0.14, 0.002 if tucked else thick + 0.006),
-        (0.22, thick),
-        (0.48, thick),
-        (0.54, 0.3 * thick),
-    )
-    painted = tuple(
-        (zone, outfit.front_material if zone == "front" else outfit.top_material) for zone in zones
-    )
+    waist = 0.002 if tucked else thick + 0.006
+    profile = ((-0.02, thick + 0.009), (0.14, waist), (0.22, thick), (0.48, thick),
+               (0.54, 0.3 * thick))  # fmt: skip
+    materials = {"front": outfit.front_material}
+    painted = tuple((zone, materials.get(zone, outfit.top_material)) for zone in zones)
     return (Layer(painted, profile, 0.32 * thick, 5.0, smoothings=5),)
 
 
@@ -216,8 +208,3 @@ def _border(faces: Indices) -> Indices:
     )
     alone = edges[counts == 1]
     return np.unique(np.concatenate([alone // size, alone % size]))
-
-
-def _mix_colors(a: Vec3, b: Vec3, share: float) -> Vec3:
-    x, y, z = ((1.0 - share) * p + share * q for p, q in zip(a, b, strict=True))
-    return (x, y, z)

@@ -16,20 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from gen_data.generator.assets.people import body as template
 from gen_data.generator.assets.people import body_regions
-from gen_data.generator.assets.people.body import (
-    BONES_PER_POINT,
-    DELTA_M,
-    FILE,
-    LANDMARKS,
-    ZONES,
-    Array,
-    BodyTemplate,
-    Indices,
-    save,
-    strongest_weights,
-)
-from gen_data.generator.assets.people.mesh_simplify import (
+from gen_data.generator.assets.people.body import LANDMARKS, ZONES, Array, BodyTemplate, Indices
+from gen_data.generator.assets.people.body_regions import (
     MeshRows,
     grid_faces,
     make_rows,
@@ -73,11 +63,10 @@ def convert(source: Path, target: Path) -> None:
     try:
         body = _body(_read(found[0].parent.parent))
     except (OSError, KeyError, ValueError) as error:
-        raise AssetError(
-            f"{found[0].parent.parent}: not the body data expected: {error}"
-        ) from error
+        place = found[0].parent.parent
+        raise AssetError(f"{place}: not the body data expected: {error}") from error
     target.mkdir(parents=True, exist_ok=True)
-    save(body, target / FILE)
+    template.save(body, target / template.FILE)
 
 
 def _body(base: _Base) -> BodyTemplate:
@@ -95,7 +84,7 @@ def _body(base: _Base) -> BodyTemplate:
     columns = 3 + 3 * len(base.targets)
     weights = values[:, columns:].copy()
     weights[: len(bones)] = np.eye(len(bones))
-    weight_bones, shares = strongest_weights(weights)
+    weight_bones, shares = template.strongest_weights(weights)
     deltas = values[:, 3:columns].reshape(len(values), -1, 3).transpose(1, 0, 2)
     parents = [
         bones.index(bone["parent"]) if bone["parent"] else -1 for bone in base.bones.values()
@@ -105,8 +94,8 @@ def _body(base: _Base) -> BodyTemplate:
         parents=np.array(parents),
         points_m=values[:, :3],
         targets=base.targets,
-        deltas=np.rint(deltas / DELTA_M).astype(np.int16),
-        weight_bones=weight_bones[:, :BONES_PER_POINT],
+        deltas=template.encode_deltas(deltas),
+        weight_bones=weight_bones,
         weights=shares,
         faces=faces,
     )
@@ -171,29 +160,19 @@ def _landmarks(base: _Base) -> Array:
     skin = np.unique(base.groups["body"])
     positions = base.values[skin, :3]
 
-    def extreme(score: Array) -> Array:
-        row: Array = base.values[skin[int(np.argmax(score))]]
-        return row
-
-    def eye(group: str) -> Array:
-        mean: Array = base.values[np.unique(base.groups[group])].mean(axis=0)
-        return mean
-
     x, y, z = positions.T
-    at_ear = (
-        np.hypot(x - body_regions.EAR_XZ_M[0], z - body_regions.EAR_XZ_M[1])
-        < body_regions.EAR_RADIUS_M
-    )
-    made = {
-        "nose": extreme(np.where(z > body_regions.CHIN_Z_M, x, -1.0)),
-        "left_eye": eye("helper-l-eye"),
-        "right_eye": eye("helper-r-eye"),
-        "left_ear": base.values[skin[at_ear & (y > 0.0)]].mean(axis=0),
-        "right_ear": base.values[skin[at_ear & (y < 0.0)]].mean(axis=0),
-        "crown": extreme(z),
-        "sole": extreme(-z),
+    ear_x, ear_z = body_regions.EAR_XZ_M
+    at_ear = np.hypot(x - ear_x, z - ear_z) < body_regions.EAR_RADIUS_M
+    rows: dict[str, Any] = {
+        "nose": skin[[np.where(z > body_regions.CHIN_Z_M, x, -1.0).argmax()]],
+        "left_eye": np.unique(base.groups["helper-l-eye"]),
+        "right_eye": np.unique(base.groups["helper-r-eye"]),
+        "left_ear": skin[at_ear & (y > 0.0)],
+        "right_ear": skin[at_ear & (y < 0.0)],
+        "crown": skin[[z.argmax()]],
+        "sole": skin[[z.argmin()]],
     }
-    return np.stack([made[name] for name in LANDMARKS])
+    return np.stack([base.values[rows[name]].mean(axis=0) for name in LANDMARKS])
 
 
 def _read(folder: Path) -> _Base:

@@ -1,23 +1,118 @@
-"""Properties of a person, drawn from a seed before any mesh is built."""
+"""Properties of a person and their outfit, drawn from a seed before any mesh is built."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Literal, cast
 
-from gen_data.generator.assets.people.animation import BEHAVIOURS, PHASES, POSES, PoseName
-from gen_data.generator.assets.people.wardrobe import Outfit, draw_outfit
+from gen_data.generator.assets.people.posing import BEHAVIOURS, PHASES, POSES, PoseName
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Facts
 from gen_data.generator.assets.procedural.material_presets import (
     draw_linear,
     hex_to_linear,
     jitter_color,
+    patterned_material,
 )
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
+from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.se3 import Vec3
+
+_COLORS = load_table(__package__, "wardrobe", tuple[str, ...])
+_WARM_FABRICS = tuple(f"texture/fabric?seed={k}" for k in (2, 5, 9))
+_STRIPES = tuple(f"texture/stripes?seed={k}" for k in (3, 6))
+"""Few textures, shared by all people: each texture in an image has to be uploaded."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outfit:
+    """Outfit of one person.
+
+    Attributes:
+        top: ``tshirt``, ``shirt``, ``jacket``, ``coat`` or ``dress``.
+        bottom: ``trousers``, ``shorts``, ``skirt`` or, under a dress, ``none``.
+        skirt_zones: How many of the skirt's three zones skirt, dress or coat reach down to.
+        bag: ``""``, ``backpack`` or ``handbag``.
+        front_material: Of the chest, where an open jacket shows a shirt.
+        hat: Whether a knitted hat is worn.
+        stockings: Whether legs that show are covered.
+    """
+
+    top: str
+    bottom: str
+    skirt_zones: int
+    sleeves: bool
+    bag: str
+    hat: bool
+    stockings: bool
+    top_material: Material
+    front_material: Material
+    bottom_material: Material
+    shoe_material: Material
+    bag_material: Material
+    hat_material: Material
+
+
+def draw_outfit(sex: str, child: bool, rng: VariantRng) -> Outfit:
+    """Draw an outfit that fits sex and age."""
+    woman = sex == "female"
+    tops = ("jacket",) * 5 + ("shirt",) * 4 + ("tshirt",) * 3 + ("coat",) * (0 if child else 3)
+    top = rng.choose(tops + ("dress",) * (2 if woman else 0))
+    bottoms = ("trousers",) * 9 + ("shorts",) * (2 if top in ("tshirt", "shirt") else 0)
+    bottom = rng.choose(bottoms + ("skirt",) * (3 if woman else 0))
+    if top == "dress":
+        bottom = "none"
+    outer = _top(top, child, rng)
+    open_front = top in ("jacket", "coat") and rng.chance(0.6)
+    reach = rng.choose((1, 1, 1, 2, 2, 2, 3))
+    return Outfit(
+        top=top,
+        bottom=bottom,
+        skirt_zones=min(reach, 2) if top == "coat" else reach,
+        sleeves=top in ("shirt", "jacket", "coat") or (top == "dress" and rng.chance(0.4)),
+        bag=rng.choose(("", "", "", "backpack", "handbag" if woman and not child else "")),
+        hat=top in ("jacket", "coat") and rng.chance(0.2),
+        stockings=top == "coat" or rng.chance(0.5),
+        top_material=outer,
+        front_material=_top("shirt", child, rng) if open_front else outer,
+        bottom_material=_bottom(bottom, rng),
+        shoe_material=_plain_material(_COLORS["shoes"], rng.between(0.35, 0.7), "shoes", rng),
+        bag_material=_plain_material(_COLORS["bags"], rng.between(0.45, 0.8), "bag", rng),
+        hat_material=_plain_material(_COLORS["hats"], 0.95, "hat", rng),
+    )
+
+
+def _top(kind: str, child: bool, rng: VariantRng) -> Material:
+    if kind in ("jacket", "coat"):
+        colors = _COLORS["bright"] if rng.chance(0.35 if child else 0.07) else _COLORS["jackets"]
+        return _plain_material(colors, rng.between(0.55, 0.9), "top", rng)
+    pattern, seed = float(rng.random()), float(rng.random())
+    if kind != "tshirt" and pattern < 0.12:
+        return _patterned_top(_WARM_FABRICS[int(seed * len(_WARM_FABRICS))], 0.22)
+    if pattern < 0.12:
+        return _patterned_top(_STRIPES[int(seed * len(_STRIPES))], 0.3)
+    colors = _COLORS["bright"] if rng.chance(0.4 if child else 0.1) else _COLORS["tops"]
+    return _plain_material(colors, rng.between(0.75, 0.95), "top", rng)
+
+
+def _bottom(kind: str, rng: VariantRng) -> Material:
+    colors = "skirts" if kind == "skirt" else "denim" if rng.chance(0.42) else "trousers"
+    return _plain_material(_COLORS[colors], rng.between(0.75, 0.95), "bottom", rng)
+
+
+def _plain_material(
+    colors: Sequence[str], roughness: float, role: str, rng: VariantRng
+) -> Material:
+    return Material(draw_linear(colors, 0.12, rng), roughness, specular=0.35, role=role)
+
+
+def _patterned_top(texture: str, scale_m: float) -> Material:
+    plain = patterned_material(texture, scale_m, 0.9, (0.9, 0.9, 0.9))
+    return replace(plain, specular=0.35, role="top")
+
 
 Sex = Literal["female", "male"]
 AgeGroup = Literal["child", "adult", "senior"]
@@ -31,10 +126,6 @@ _ADULT_M = (1.5, 1.95)
 # children and adolescents", Bulletin of the WHO 85(9), 2007.
 _CHILD_M = (1.16, 1.5)
 
-# Light to dark, after the six types of Fitzpatrick, Archives of Dermatology 124(6), 1988.
-_SKIN = ("#f0cdb8", "#e3b797", "#cf9f78", "#b07f57", "#80543a", "#4f3527")
-_HAIR = ("#14100e", "#1f1713", "#32221a", "#4a3223", "#6b4a2f", "#8f6b42", "#b8935c", "#6d3a22")
-_GREY = ("#6f6c69", "#9b9894", "#c9c6c1")
 _HAIRCUTS = {
     "female": ("long", "long", "bob", "bob", "short", "long"),
     "male": ("short", "short", "short", "cropped", "cropped", "bald"),
@@ -81,16 +172,16 @@ def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
     sex: Sex = "female" if rng.chance(0.5) else "male"
     age_group = _drawn_age(rng)
     height_m = _drawn_height_m(sex, age_group, rng)
-    tone = min(int(rng.random() * len(_SKIN)), len(_SKIN) - 1)
+    tone = rng.choose(range(len(_COLORS["skin"])))
     figure = _drawn_figure(sex, age_group, height_m, tone, rng)
     action, step = _drawn_action(seed, pose, phase)
     return Person(
-        seed=seed,
-        sex=sex,
-        age_group=age_group,
-        height_m=height_m,
-        figure=figure,
-        skin=jitter_color(hex_to_linear(_SKIN[tone]), 0.07, rng),
+        seed,
+        sex,
+        age_group,
+        height_m,
+        figure,
+        skin=jitter_color(hex_to_linear(_COLORS["skin"][tone]), 0.07, rng),
         hair=_drawn_hair(age_group, tone, rng),
         haircut=rng.choose(_HAIRCUTS[sex][: 3 if age_group == "child" else None]),
         outfit=draw_outfit(sex, age_group == "child", rng),
@@ -168,16 +259,16 @@ def _three(word: str, value: float) -> dict[str, float]:
 
 def _drawn_hair(age_group: AgeGroup, tone: int, rng: VariantRng) -> Vec3:
     if age_group == "senior" and rng.chance(0.8):
-        return draw_linear(_GREY, 0.1, rng)
+        return draw_linear(_COLORS["grey_hair"], 0.1, rng)
     # Fair hair belongs to fair skin.
-    return draw_linear(_HAIR[: 8 if tone < 2 else 4 if tone < 4 else 2], 0.12, rng)
+    return draw_linear(_COLORS["hair"][: 8 if tone < 2 else 4 if tone < 4 else 2], 0.12, rng)
 
 
 def _drawn_action(seed: int, pose: str, phase: float) -> tuple[PoseName, int]:
     """Pose and step; they have a stream of their own, so that the same person can do anything."""
     rng = variant_rng("person/pose", seed)
     drawn = rng.choose(("walk",) * 12 + ("stand",) * 4 + ("phone",) * 2 + ("carry",) * 3)
-    step = min(int(rng.random() * PHASES), PHASES - 1)
+    step = rng.choose(range(PHASES))
     if not math.isfinite(phase):
         raise ValueError("phase is no number")
     if phase >= 0.0:

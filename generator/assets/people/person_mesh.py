@@ -1,33 +1,42 @@
-"""Meshes of people: shaped, dressed, posed and placed on the ground."""
+"""Meshes of people: shaped, dressed, posed, with all they carry, and placed on the ground."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 
-from gen_data.generator.assets.people import props
-from gen_data.generator.assets.people.animation import Stance, shorten_stride, stance
-from gen_data.generator.assets.people.body import LANDMARKS, Array, BodyTemplate, Indices
-from gen_data.generator.assets.people.bone_rotations import bone_rotations
+from gen_data.generator.assets.paths import packs_dir
+from gen_data.generator.assets.people.analytic_body import simple_body
+from gen_data.generator.assets.people.body import (
+    FILE,
+    LANDMARKS,
+    Array,
+    BodyTemplate,
+    Indices,
+    load,
+)
 from gen_data.generator.assets.people.clothes import displace_layer, layers
-from gen_data.generator.assets.people.person import Person
-from gen_data.generator.assets.people.skinning import bone_transforms, skin_points, vertex_normals
+from gen_data.generator.assets.people.person import Person, draw_person
+from gen_data.generator.assets.people.posing import (
+    Stance,
+    bone_rotations,
+    bone_transforms,
+    shorten_stride,
+    skin_points,
+    stance,
+    vertex_normals,
+)
 from gen_data.generator.assets.procedural.collision_hulls import extreme
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.core.asset_types import ConvexParts, Keypoint, Material, MeshData
 
-_GRID_M = 1e-5
-"""Vertices lie on this grid, so that the last bits of sines do not reach the mesh."""
-_PHASES = 7
-_NARROW_STRIDE = 0.7
-"""What a long skirt leaves of a stride."""
-_HULL_POINTS = 40
-
-KEYPOINTS = load_table(__package__, "keypoints", tuple[str, float])
+_PHONE = Material((0.012, 0.012, 0.014), 0.15, role="bag")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -39,6 +48,83 @@ class _Sheet:
     faces: Indices
     slots: Indices
     materials: tuple[Material, ...]
+
+
+def _make_props(
+    person: Person, body: BodyTemplate, posed_m: Array, transforms: Array, scale: float
+) -> list[_Sheet]:
+    """Everything a person carries: backpack, handbag, telephone.
+
+    ``posed_m`` are the bone heads and landmarks after the pose [m], ``transforms`` those of every
+    bone [bones, 3, 4], ``scale`` the person's against the template.
+    """
+    made = []
+    material = person.outfit.bag_material
+    if person.outfit.bag == "backpack":
+        trunk = transforms[body.bone("spine_03"), :, :3]
+        middle = posed_m[body.bone("spine_03")] + trunk @ (np.array([-0.172, 0.0, 0.03]) * scale)
+        size = np.array([0.17, 0.3, 0.42]) * scale
+        made.append(_pillow(middle, size, trunk, material))
+    if person.pose == "carry" or (person.outfit.bag == "handbag" and person.pose != "phone"):
+        # Bags hang from the hand and keep upright.
+        grip = 0.5 * (posed_m[body.bone("hand_r")] + posed_m[body.bone("middle_03_r")])
+        middle = grip - np.array([0.0, 0.0, 0.25 * scale])
+        made.append(_pillow(middle, np.array([0.32, 0.1, 0.3]) * scale, np.eye(3), material))
+        handle = grip - np.array([0.0, 0.0, 0.06 * scale])
+        made.append(_pillow(handle, np.array([0.1, 0.02, 0.16]) * scale, np.eye(3), material))
+    if person.pose == "phone":
+        hand = transforms[body.bone("hand_r"), :, :3]
+        grip = posed_m[body.bone("middle_01_r")]
+        thumb = posed_m[body.bone("thumb_03_r")]
+        made.append(_pillow(0.6 * grip + 0.4 * thumb, np.array([0.14, 0.075, 0.01]), hand, _PHONE))
+    return made
+
+
+def _pillow(middle: Array, size_m: Array, axes: Array, material: Material) -> _Sheet:
+    """A box with round edges."""
+    n = 5
+    t = np.linspace(-1.0, 1.0, n)
+    u, v = (grid.ravel() for grid in np.meshgrid(t, t, indexing="ij"))
+    quads = [
+        (i * n + j, (i + 1) * n + j, (i + 1) * n + j + 1, i * n + j + 1)
+        for i in range(n - 1)
+        for j in range(n - 1)
+    ]
+    faces = np.array([tri for a, b, c, d in quads for tri in ((a, b, c), (a, c, d))])
+    places: list[Array] = []
+    triangles: list[Indices] = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            p = np.zeros((n * n, 3))
+            p[:, axis], p[:, (axis + 1) % 3], p[:, (axis + 2) % 3] = sign, u, v
+            triangles.append((faces if sign > 0 else faces[:, ::-1]) + n * n * len(places))
+            places.append(p)
+    cube = np.concatenate(places)
+    # A superellipsoid of degree six: flat sides, soft edges.
+    around = cube / ((cube**6).sum(axis=1, keepdims=True) ** (1.0 / 6.0))
+    vertices = (0.5 * size_m * around) @ axes.T + middle
+    index = np.concatenate(triangles)
+    normals = _across_seams(around, vertices, index)
+    return _Sheet(vertices, normals, index, np.zeros(len(index), np.int64), (material,))
+
+
+def _across_seams(around: Array, vertices: Array, faces: Indices) -> Array:
+    """Normals that vertices in the same place share."""
+    _, first, inverse = np.unique(
+        np.rint(around * 1e6), axis=0, return_index=True, return_inverse=True
+    )
+    normals: Array = vertex_normals(vertices[first], inverse.reshape(-1)[faces])
+    return normals[inverse.reshape(-1)]
+
+
+_GRID_M = 1e-5
+"""Vertices lie on this grid, so that the last bits of sines do not reach the mesh."""
+_PHASES = 7
+_NARROW_STRIDE = 0.7
+"""What a long skirt leaves of a stride."""
+_HULL_POINTS = 40
+
+KEYPOINTS = load_table(__package__, "keypoints", tuple[str, float])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -99,10 +185,7 @@ def build_person(person: Person, figure: Figure) -> Solid:
     sheets = [_pose_piece(piece, body, transforms) for piece in figure.pieces]
     marks = slice(0, bones + len(LANDMARKS))
     posed = skin_points(points[marks], body.weight_bones[marks], body.weights[marks], transforms)
-    sheets += [
-        _Sheet(prop.vertices_m, prop.normals, prop.faces, prop.slots, prop.materials)
-        for prop in props.make_props(person, body, posed, transforms, scale)
-    ]
+    sheets += _make_props(person, body, posed, transforms, scale)
     mesh, shift = _join_on_ground(sheets, body, posed)
     keypoints = tuple(
         Keypoint(name, _vec(posed[_index(body, mark)] + shift), round(radius * scale, 4))
@@ -138,21 +221,18 @@ def _join_on_ground(
     first_slots = np.cumsum([0, *(len(sheet.materials) for sheet in sheets)])
     faces = [sheet.faces + first for sheet, first in zip(sheets, counts[:-1], strict=True)]
     slots = [sheet.slots + first for sheet, first in zip(sheets, first_slots[:-1], strict=True)]
+    normals = np.concatenate([sheet.normals for sheet in sheets])
     return (
         MeshData(
             vertices_m=(np.rint((vertices + shift) / _GRID_M) * _GRID_M + 0.0).astype(np.float32),
             faces=np.concatenate(faces).astype(np.int32),
-            normals=_round_normals(np.concatenate([sheet.normals for sheet in sheets])),
+            normals=(np.round(normals, 5) + 0.0).astype(np.float32),
             uvs=np.zeros((len(vertices), 2), np.float32),
             face_slots=np.concatenate(slots).astype(np.int32),
             materials=tuple(material for sheet in sheets for material in sheet.materials),
         ),
         shift,
     )
-
-
-def _round_normals(normals: Array) -> np.ndarray[tuple[int, int], np.dtype[np.float32]]:
-    return (np.round(normals, 5) + 0.0).astype(np.float32)
 
 
 def _index(body: BodyTemplate, mark: str) -> int:
@@ -162,3 +242,33 @@ def _index(body: BodyTemplate, mark: str) -> int:
 def _vec(values: Array) -> tuple[float, float, float]:
     x, y, z = (round(float(v), 5) + 0.0 for v in values)
     return (x, y, z)
+
+
+_FIGURES = 64
+"""Kept in memory: as many as one scene shows, half a megabyte each."""
+
+
+def pack_file() -> Path:
+    """Path of the people pack's body; the file exists only if the pack is installed."""
+    return packs_dir() / "people" / FILE
+
+
+def person(seed: int, pose: str, phase: float) -> Solid:
+    """A person from the pack. Raises AssetError if the pack cannot be read."""
+    return build_person(draw_person(seed, pose, phase), _figure(seed, str(pack_file())))
+
+
+def simple_person(seed: int, pose: str, phase: float) -> Solid:
+    """A person from formulas."""
+    return build_person(draw_person(seed, pose, phase), _figure(seed, ""))
+
+
+@lru_cache(maxsize=_FIGURES)
+def _figure(seed: int, path: str) -> Figure:
+    """Figure of a seed; someone who walks takes many poses in the same figure."""
+    return dress_person(draw_person(seed), _body(path) if path else simple_body())
+
+
+@lru_cache(maxsize=2)
+def _body(path: str) -> BodyTemplate:
+    return load(Path(path))

@@ -25,10 +25,9 @@ from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
 
 COVER_ATLAS: Mapping[str, UvRect] = {
-    "back": (0.002, 0.002, 0.438, 0.998),
-    "spine": (0.442, 0.002, 0.558, 0.998),
+    "back": (0.002, 0.002, 0.438, 0.998), "spine": (0.442, 0.002, 0.558, 0.998),
     "front": (0.562, 0.002, 0.998, 0.998),
-}
+}  # fmt: skip
 _FORMATS = ((0.178, 0.11), (0.198, 0.129), (0.21, 0.148), (0.234, 0.156), (0.19, 0.19),
             (0.297, 0.21))  # fmt: skip
 

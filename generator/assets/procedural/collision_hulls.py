@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence, Set
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -17,15 +17,7 @@ from gen_data.generator.core.se3 import Vec3
 
 def box(low: Vec3, high: Vec3) -> Array:
     """The eight corners of an axis-aligned box."""
-    return np.array(
-        [
-            [x, y, z]
-            for x in (low[0], high[0])
-            for y in (low[1], high[1])
-            for z in (low[2], high[2])
-        ],
-        dtype=np.float64,
-    )
+    return np.array(list(product(*zip(low, high, strict=True))), dtype=np.float64)
 
 
 def frustum(low: tuple[float, float], high: tuple[float, float], sides: int = 20) -> Array:
@@ -46,12 +38,9 @@ def ring(
     The inner faces are flat: they lie half outside and half inside the true inner surface.
     """
     factor = 2.0 / (1.0 + math.cos(math.pi / count))
-    profile = [
-        point
-        for inner, outer, z in (low, high)
-        for point in ((min(inner * factor, outer), z), (outer, z))
-    ]
-    return wedges(profile, count, {outer for _, outer, _ in (low, high)})
+    levels = [(min(inner * factor, outer), outer, z) for inner, outer, z in (low, high)]
+    profile = [(radius, z) for *radii, z in levels for radius in radii]
+    return wedges(profile, count, {outer for _, outer, _ in levels})
 
 
 def wedges(
@@ -102,16 +91,8 @@ def tube(path: Array, radius: float) -> list[Array]:
         length = math.sqrt(float((along * along).sum()))
         across = np.array([-along[2], 0.0, along[0]]) / length * radius
         side = np.array([0.0, radius, 0.0])
-        boxes.append(
-            np.array(
-                [
-                    p + s * across + t * side
-                    for p in (a, b)
-                    for s in (-1.0, 1.0)
-                    for t in (-1.0, 1.0)
-                ]
-            )
-        )
+        corners = product((a, b), (-1.0, 1.0), (-1.0, 1.0))
+        boxes.append(np.array([p + s * across + t * side for p, s, t in corners]))
     return boxes
 
 

@@ -7,7 +7,6 @@ middle lies, how thick it is, and how deep it is hollowed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -29,25 +28,9 @@ from gen_data.generator.assets.procedural.surface_shapes import fan, grid, splin
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
 
-
-@dataclass(frozen=True, slots=True)
-class _Station:
-    """A cross-section, all in millimetres.
-
-    Attributes:
-        x: Place along the length.
-        right, left: Reach towards -Y and +Y.
-        z: Height of the middle of the sheet.
-        thick: Thickness.
-        hollow: How far the middle lies below the rims.
-    """
-
-    x: float
-    right: float
-    left: float
-    z: float
-    thick: float
-    hollow: float = 0.0
+Station = tuple[float, float, float, float, float, float]
+"""A cross-section [mm]: place along the length (x), reach towards -Y and towards +Y, height of the
+middle of the sheet (z), thickness, and how far the middle lies below the rims."""
 
 
 def spoon(seed: int) -> Solid:
@@ -58,7 +41,7 @@ def spoon(seed: int) -> Solid:
     bowl = [(-32, 3.0, 12.0, 0.5), (-22, 12.0, 9.5, 4.0), (-8, 19.5, 7.0, 7.5),
             (8, 21.0, 6.5, 8.0), (20, 17.5, 7.5, 6.5), (28, 10.5, 9.0, 3.0),
             (31.5, 4.0, 10.0, 0.5)]  # fmt: skip
-    head = [_Station(67 + x, wide * w, wide * w, z + h, 1.6, h) for x, w, z, h in bowl]
+    head = [(67 + x, wide * w, wide * w, z + h, 1.6, h) for x, w, z, h in bowl]
     stations = [*_handle(tail, 13.0, 36.0, rng), *head]
     return _cutlery([_sheet(stations, 40)], size, 36.0, rng)
 
@@ -67,17 +50,10 @@ def fork(seed: int) -> Solid:
     """A table or dessert fork with three or four tines. Slots: head, handle."""
     rng = variant_rng("fork", seed)
     size = (1.0, 0.86)[seed % 2] * rng.between(0.97, 1.03)
-    tail, half, count = (
-        rng.between(0.85, 1.2),
-        rng.between(11.5, 13.0),
-        3 if rng.chance(0.25) else 4,
-    )
-    head = [
-        _Station(40, 4.0, 4.0, 14.5, 2.2),
-        _Station(48, 10.5, 10.5, 12.0, 2.0, 1.0),
-        _Station(56, half, half, 9.0, 1.9, 2.0),
-        _Station(63, half, half, 6.0, 1.9, 2.0),
-    ]
+    tail, half = rng.between(0.85, 1.2), rng.between(11.5, 13.0)
+    count = 3 if rng.chance(0.25) else 4
+    head = [(40, 4.0, 4.0, 14.5, 2.2, 0.0), (48, 10.5, 10.5, 12.0, 2.0, 1.0),
+            (56, half, half, 9.0, 1.9, 2.0), (63, half, half, 6.0, 1.9, 2.0)]  # fmt: skip
     root = _sheet([*_handle(tail, 15.5, 32.0, rng), *head], 36)
     pitch = 2 * half / (count - 0.36)
     tines = []
@@ -88,13 +64,8 @@ def fork(seed: int) -> Solid:
         lift = 2.0 * (middle / half) ** 2 - 2.0
         line = [(60, 7.3, w), (75, 3.6, 0.97 * w), (90, 3.0, 0.9 * w), (104, 5.2, 0.72 * w),
                 (110, 7.0, 0.25 * w)]  # fmt: skip
-        tines.append(
-            _sheet(
-                [_Station(x, w_ - middle, w_ + middle, z + lift + 2.0, 1.8) for x, z, w_ in line],
-                10,
-                2,
-            )
-        )
+        rows = [(x, a - middle, a + middle, z + lift + 2.0, 1.8, 0.0) for x, z, a in line]
+        tines.append(_sheet(rows, 10, 2))
     return _cutlery([root, *tines], size, 36.0, rng)
 
 
@@ -103,42 +74,32 @@ def knife(seed: int) -> Solid:
     rng = variant_rng("knife", seed)
     size = rng.between(0.94, 1.06)
     grip, tip = rng.between(0.9, 1.15), rng.between(0.0, 5.0)
-    handle = [
-        _Station(-112, 3.0, 3.0, 3.2, 3.4),
-        _Station(-108, 8.0 * grip, 8.0 * grip, 3.4, 5.0),
-        _Station(-80, 8.8 * grip, 8.8 * grip, 3.6, 6.4),
-        _Station(-40, 8.0 * grip, 8.0 * grip, 3.6, 6.2),
-        _Station(-8, 6.6, 6.6, 3.4, 5.4),
-        _Station(-2, 6.2, 6.2, 3.2, 4.2),
-    ]
-    blade = [
-        _Station(-4, 6.0, 6.0, 3.0, 2.4),
-        _Station(4, 7.5, 7.0, 3.0, 1.8),
-        _Station(30, 11.0, 8.5, 3.0, 1.5),
-        _Station(70, 11.5, 9.0, 3.0, 1.3),
-        _Station(95, 9.0 - tip, 9.0, 3.0, 1.2),
-        _Station(107, 2.0 - tip, 8.0, 3.0, 1.1),
-        _Station(112, -4.5, 6.0, 3.0, 1.0),
-    ]
+    wide, middle = 8.0 * grip, 8.8 * grip
+    handle = _even((-112, 3.0, 3.2, 3.4), (-108, wide, 3.4, 5.0), (-80, middle, 3.6, 6.4),
+                   (-40, wide, 3.6, 6.2), (-8, 6.6, 3.4, 5.4), (-2, 6.2, 3.2, 4.2))  # fmt: skip
+    blade = [(-4, 6.0, 6.0, 3.0, 2.4, 0.0), (4, 7.5, 7.0, 3.0, 1.8, 0.0),
+             (30, 11.0, 8.5, 3.0, 1.5, 0.0), (70, 11.5, 9.0, 3.0, 1.3, 0.0),
+             (95, 9.0 - tip, 9.0, 3.0, 1.2, 0.0), (107, 2.0 - tip, 8.0, 3.0, 1.1, 0.0),
+             (112, -4.5, 6.0, 3.0, 1.0, 0.0)]  # fmt: skip
     return _cutlery([_sheet(handle, 22), _sheet(blade, 26)], size, -3.0, rng)
 
 
-def _handle(tail: float, neck_z: float, neck_x: float, rng: VariantRng) -> list[_Station]:
+def _handle(tail: float, neck_z: float, neck_x: float, rng: VariantRng) -> list[Station]:
     """From the broad end on the table to the slender raised neck."""
     end = rng.between(8.0, 10.5) * tail
-    return [
-        _Station(-98, 0.35 * end, 0.35 * end, 3.4, 1.4),
-        _Station(-95, 0.75 * end, 0.75 * end, 3.0, 1.9),
-        _Station(-84, end, end, 2.6, 2.2),
-        _Station(-45, 0.66 * end, 0.66 * end, 4.5, 2.4),
-        _Station(0, 3.6, 3.6, 0.75 * neck_z, 2.9),
-        _Station(neck_x - 10, 2.7, 2.7, neck_z, 3.1),
-    ]
+    return _even((-98, 0.35 * end, 3.4, 1.4), (-95, 0.75 * end, 3.0, 1.9), (-84, end, 2.6, 2.2),
+                 (-45, 0.66 * end, 4.5, 2.4), (0, 3.6, 0.75 * neck_z, 2.9),
+                 (neck_x - 10, 2.7, neck_z, 3.1))  # fmt: skip
 
 
-def _sheet(stations: Sequence[_Station], count: int, across: int = 6) -> Patch:
+def _even(*rows: tuple[float, float, float, float]) -> list[Station]:
+    """Flat stations that reach as far to both sides."""
+    return [(x, w, w, z, thick, 0.0) for x, w, z, thick in rows]
+
+
+def _sheet(stations: Sequence[Station], count: int, across: int = 6) -> Patch:
     """The closed surface of a sheet through the stations [mm], rounded at its rims."""
-    line = spline([(s.x, s.right, s.left, s.z, s.thick, s.hollow) for s in stations], count)
+    line = spline(stations, count)
     x, right, left, z, thick, hollow = (line[:, i : i + 1] for i in range(6))
     side = np.linspace(1.0, -1.0, across + 1)[None, :]
     y = 0.5 * (left - right) + 0.5 * (left + right) * side

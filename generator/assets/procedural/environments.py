@@ -17,7 +17,6 @@ from gen_data.generator.assets.procedural.noise import fbm, smoothstep, uniform
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.se3 import Vec3
 
 Array = NDArray[np.float64]
 
@@ -51,10 +50,9 @@ def indoor(seed: int) -> Float32:
     reach = half / np.maximum(np.abs(d), 1e-6)
     hit = d * reach.min(axis=2, keepdims=True)
     side = reach.argmin(axis=2)
-    wall = np.array(
-        hex_to_linear(rng.choose(("#e8e2d6", "#dfe3e3", "#d9cbb5", "#c9d3cf", "#efeae0")))
-    )
-    floor = np.array(hex_to_linear(rng.choose(("#8a6242", "#6b4a33", "#9a9a97", "#a9865e"))))
+    walls = ("#e8e2d6", "#dfe3e3", "#d9cbb5", "#c9d3cf", "#efeae0")
+    floors = ("#8a6242", "#6b4a33", "#9a9a97", "#a9865e")
+    wall, floor = (np.array(hex_to_linear(rng.choose(codes))) for codes in (walls, floors))
     # Light falls off towards corners.
     corner = np.prod(1.0 - 0.5 * (np.abs(hit) / half) ** 6, axis=2)[..., None]
     image = np.where((side == 2)[..., None], np.where(d[..., 2:] > 0, 0.9, floor), wall) * corner
@@ -133,9 +131,8 @@ def night_city(seed: int) -> Float32:
     building = (elevation < roof) & (elevation > -0.02)
     window = uniform((rows, columns), rng)
     shade = np.array((0.05, 0.05, 0.06))
-    warm = np.array((1.0, 0.72, 0.4)) + np.array((-0.25, 0.15, 0.5)) * (
-        uniform((rows, columns), rng)[..., None] > 0.8
-    )
+    cold = uniform((rows, columns), rng)[..., None] > 0.8
+    warm = np.array((1.0, 0.72, 0.4)) + np.array((-0.25, 0.15, 0.5)) * cold
     lit = (window > rng.between(0.75, 0.9))[..., None] * 6.0 * warm
     image = np.where(building[..., None], shade + lit, image)
     below = d[..., 2] < -0.02
@@ -144,11 +141,9 @@ def night_city(seed: int) -> Float32:
     for _ in range(rng.choose((5, 8, 12))):
         lamp = _direction(rng.between(-math.pi, math.pi), rng.between(0.08, 0.5))
         away = np.arccos(np.clip((d * lamp).sum(axis=2), -1, 1))
-        image += (
-            rng.between(20.0, 50.0)
-            * np.exp(-((away / 0.035) ** 2))[..., None]
-            * np.array(rng.choose(((1.0, 0.66, 0.3), (1.0, 0.85, 0.62), (0.85, 0.95, 1.0))))
-        )
+        glow = rng.between(20.0, 50.0) * np.exp(-((away / 0.035) ** 2))[..., None]
+        tint = rng.choose(((1.0, 0.66, 0.3), (1.0, 0.85, 0.62), (0.85, 0.95, 1.0)))
+        image += glow * np.array(tint)
     return normalize_luminance(image)
 
 
@@ -174,9 +169,8 @@ def normalize_luminance(image: Array | Float32) -> Float32:
 
 def _direction(azimuth_rad: float, elevation_rad: float) -> Array:
     flat = math.cos(elevation_rad)
-    return np.array(
-        [flat * math.cos(azimuth_rad), flat * math.sin(azimuth_rad), math.sin(elevation_rad)]
-    )
+    x, y = flat * math.cos(azimuth_rad), flat * math.sin(azimuth_rad)
+    return np.array([x, y, math.sin(elevation_rad)])
 
 
 def _panel(d: Array, azimuth: float, height: float, half_size: tuple[float, float]) -> Array:
@@ -189,11 +183,9 @@ def _panel(d: Array, azimuth: float, height: float, half_size: tuple[float, floa
     v = (d * up).sum(axis=2) / np.maximum(depth, 1e-6)
     w, h = half_size
     soft = 0.03
-    inside: Array = (
-        (depth > 0)
-        * smoothstep(w + soft, w - soft, np.abs(u))
-        * smoothstep(h + soft, h - soft, np.abs(v))
-    )
+    across = smoothstep(w + soft, w - soft, np.abs(u))
+    along = smoothstep(h + soft, h - soft, np.abs(v))
+    inside: Array = (depth > 0) * across * along
     return inside
 
 
@@ -205,9 +197,8 @@ def _window(hit: Array, side: Array, half: Array, axis: int, sign: float, rng: V
     u = np.abs(along - centre)
     pane = smoothstep(width, width - 0.04, u) * smoothstep(0.03, 0.07, u)
     pane = pane * smoothstep(-0.4, -0.34, z) * smoothstep(0.85, 0.79, z)
-    sky: Vec3 = (0.85, 0.97, 1.12)
     outside = rng.between(4.0, 14.0) * (0.45 + 0.55 * smoothstep(-0.1, 0.25, z))
-    daylight: Array = (pane * on_wall * outside)[..., None] * np.array(sky)
+    daylight: Array = (pane * on_wall * outside)[..., None] * np.array((0.85, 0.97, 1.12))
     return daylight
 
 
@@ -227,10 +218,9 @@ def _perez(d: Array, sun: Array, c: tuple[float, float, float, float, float]) ->
     up = np.maximum(d[..., 2], 0.02)
     angle = np.arccos(np.clip((d * sun).sum(axis=2), -1.0, 1.0))
     gradation = 1 + c[0] * np.exp(c[1] / up)
-    scattering = (
-        1 + c[2] * (np.exp(c[3] * angle) - math.exp(c[3] * math.pi / 2)) + c[4] * np.cos(angle) ** 2
-    )
-    sky: Array = np.minimum(gradation * scattering, 8.0 * float((gradation * scattering).mean()))
+    forward = c[2] * (np.exp(c[3] * angle) - math.exp(c[3] * math.pi / 2))
+    light = gradation * (1 + forward + c[4] * np.cos(angle) ** 2)
+    sky: Array = np.minimum(light, 8.0 * float(light.mean()))
     return sky
 
 

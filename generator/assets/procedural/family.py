@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
 from typing import Any, NamedTuple
 
 import yaml
 
+from gen_data.generator.assets.procedural.variant_rng import in_turn
 from gen_data.generator.core.asset_types import (
     ConvexParts,
-    Float32,
     Keypoint,
     MeshData,
-    TextureData,
 )
 from gen_data.generator.core.errors import AssetError, did_you_mean
 
@@ -96,30 +95,11 @@ class Family:
 
 
 @dataclass(frozen=True)
-class TextureFamily:
-    """A generator of textures; ``build(seed, **parameters)`` is a pure function.
+class ImageFamily:
+    """A generator of images; ``build(seed, **parameters)`` is a pure function.
 
     Attributes:
         variants: Seeds ``range(variants)`` are offered for selection; any other seed works too.
-        origin: Source and licence, if it is not ours.
-    """
-
-    name: str
-    tags: tuple[str, ...]
-    variants: int
-    version: int
-    build: Callable[..., TextureData]
-    parameters: Mapping[str, object] = field(default_factory=dict)
-    origin: Provenance = OURS
-
-
-@dataclass(frozen=True)
-class EnvironmentFamily:
-    """A generator of equirectangular images of relative luminance; see ``AssetLibrary``.
-
-    ``build(seed, **parameters)`` is a pure function.
-
-    Attributes:
         stored: Whether the disk cache also keeps images that are not offered for selection;
             false where hardly any is used twice.
         origin: Source and licence, if it is not ours.
@@ -129,10 +109,18 @@ class EnvironmentFamily:
     tags: tuple[str, ...]
     variants: int
     version: int
-    build: Callable[..., Float32]
+    build: Callable[..., Any]
     parameters: Mapping[str, object] = field(default_factory=dict)
     stored: bool = True
     origin: Provenance = OURS
+
+
+class TextureFamily(ImageFamily):
+    """A generator of textures: ``TextureData``."""
+
+
+class EnvironmentFamily(ImageFamily):
+    """A generator of equirectangular images of relative luminance; see ``AssetLibrary``."""
 
 
 @dataclass(frozen=True)
@@ -160,6 +148,20 @@ class ConstantFacts:
     def __call__(self, **_: Any) -> Facts:
         """The facts, whatever the arguments."""
         return Facts(self.subcategory)
+
+
+def choose_option(
+    family: str, parameter: str, value: str, options: Sequence[str], seed: int
+) -> str:
+    """The value of a parameter; ``any`` takes the options in turn by seed.
+
+    Raises:
+        AssetError: if it is neither ``any`` nor one of the options.
+    """
+    if value == "any":
+        return in_turn(options, seed)
+    check_option(family, parameter, value, ("any", *options))
+    return value
 
 
 def check_option(family: str, parameter: str, value: str, options: Iterable[str]) -> None:
@@ -195,36 +197,16 @@ def load_families(package: str) -> FamilyTables:
     )
 
 
-def _object_family(  # noqa: PLR0913  (the columns of the table)
-    name: str,
-    *,
-    build: Lazy,
-    tags: tuple[str, ...],
-    version: int,
-    variants: int,
-    parameters: Mapping[str, object],
-    category: str = "",
-    mass_kg: float = 0.0,
-    stackable: bool = False,
-    subcategory: str = "",
-    facts: bool = False,
-    stored: bool = True,
+def _object_family(
+    name: str, *, category: str = "", subcategory: str = "", facts: bool = False, **row: Any
 ) -> Family:
-    return Family(
-        name=name,
-        category=category or name,
-        tags=tags,
-        variants=variants,
-        mass_kg=mass_kg,
-        stackable=stackable,
-        version=version,
-        parameters=parameters,
-        build=build,
-        facts=Lazy(f"{build.path}_facts")
-        if facts
-        else (ConstantFacts(subcategory) if subcategory else None),
-        stored=stored,
-    )
+    known: Callable[..., Facts] | None = None
+    if facts:
+        known = Lazy(f"{row['build'].path}_facts")
+    elif subcategory:
+        known = ConstantFacts(subcategory)
+    row = {"mass_kg": 0.0, "stackable": False, **row}
+    return Family(name=name, category=category or name, facts=known, **row)
 
 
 def _arguments(package: str, row: Mapping[str, Any]) -> dict[str, Any]:

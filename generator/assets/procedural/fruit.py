@@ -8,16 +8,10 @@ from collections.abc import Callable
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear, printed_material
 from gen_data.generator.assets.procedural.patches import Array, Patch, make_centred_solid
-from gen_data.generator.assets.procedural.surface_shapes import (
-    ball,
-    circle,
-    space_evenly,
-    spline,
-    sweep,
-)
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
 
@@ -41,12 +35,9 @@ def apple(seed: int) -> Solid:
     dip = radius * slim * (1 - pinch) * 1.07
     skin = printed_material(f"texture/apple_skin?seed={seed}", rng.between(0.25, 0.4))
     stalk = _stalk((0.0, 0.0, dip - 0.002), rng.between(0.012, 0.02), 0.0013, rng)
-    body = ball(shape, 22, 28)
-    return make_centred_solid(
-        [body, stalk.painted(1)],
-        (skin, _STALK),
-        [hulls.extreme(body.corners_m), hulls.extreme(stalk.corners_m, 16)],
-    )
+    body = shapes.ball(shape, 22, 28)
+    parts = [hulls.extreme(body.corners_m), hulls.extreme(stalk.corners_m, 16)]
+    return make_centred_solid([body, stalk.painted(1)], (skin, _STALK), parts)
 
 
 def orange(seed: int) -> Solid:
@@ -62,8 +53,8 @@ def orange(seed: int) -> Solid:
         return np.stack([r * d[..., 0], r * d[..., 1], flat * r * z], axis=2)
 
     peel = printed_material(f"texture/citrus_peel?seed={seed}", rng.between(0.4, 0.55))
-    body = ball(shape, 24, 36)
-    button = ball(lambda d: 0.0035 * d * np.array([1.0, 1.0, 0.4]), 6, 10).painted(1)
+    body = shapes.ball(shape, 24, 36)
+    button = shapes.ball(lambda d: 0.0035 * d * np.array([1.0, 1.0, 0.4]), 6, 10).painted(1)
     button = button.moved(z=radius * flat * 0.955)
     green = Material(hex_to_linear("#6d7a3a"), 0.8)
     return make_centred_solid([body, button], (peel, green), [hulls.extreme(body.corners_m)])
@@ -83,7 +74,7 @@ def lemon(seed: int) -> Solid:
         return np.stack([x, r * d[..., 1], -r * d[..., 0]], axis=2)
 
     peel = printed_material(f"texture/citrus_peel?seed={seed + 1000}", rng.between(0.35, 0.5))
-    body = ball(shape, 24, 24)
+    body = shapes.ball(shape, 24, 24)
     return make_centred_solid([body], (peel,), [hulls.extreme(body.corners_m)])
 
 
@@ -106,15 +97,12 @@ def pear(seed: int) -> Solid:
         return np.stack([r * unit[..., 0] + lean * t**2, r * unit[..., 1], up], axis=2)
 
     skin = printed_material(f"texture/pear_skin?seed={seed}", rng.between(0.35, 0.5))
-    body = ball(shape, 24, 24)
+    body = shapes.ball(shape, 24, 24)
     stalk = _stalk((lean, 0.0, 0.5 * height - 0.002), rng.between(0.014, 0.022), 0.0014, rng)
     points = body.corners_m.reshape(-1, 3)
     lower, upper = points[points[:, 2] < 0.12 * height], points[points[:, 2] > 0.02 * height]
-    return make_centred_solid(
-        [body, stalk.painted(1)],
-        (skin, _STALK),
-        [hulls.extreme(lower), hulls.extreme(upper), hulls.extreme(stalk.corners_m, 16)],
-    )
+    parts = [*map(hulls.extreme, (lower, upper)), hulls.extreme(stalk.corners_m, 16)]
+    return make_centred_solid([body, stalk.painted(1)], (skin, _STALK), parts)
 
 
 def banana(seed: int) -> Solid:
@@ -126,16 +114,13 @@ def banana(seed: int) -> Solid:
     radius = length / bend
     path = np.stack([radius * np.sin(arc), radius * (1 - np.cos(arc)), np.zeros_like(arc)], axis=1)
     # Five blunt edges; the stem end is long and thin, the blossom end short.
-    t = np.linspace(0.0, 1.0, 25)
-    girth = np.interp(
-        t,
-        [0, 0.04, 0.1, 0.18, 0.32, 0.5, 0.72, 0.88, 0.95, 0.985, 1.0],
-        [0.3, 0.26, 0.3, 0.62, 0.92, 1.0, 0.97, 0.78, 0.5, 0.3, 0.24],
-    )
+    at = (0, 0.04, 0.1, 0.18, 0.32, 0.5, 0.72, 0.88, 0.95, 0.985, 1.0)
+    widths = (0.3, 0.26, 0.3, 0.62, 0.92, 1.0, 0.97, 0.78, 0.5, 0.3, 0.24)
+    girth = np.interp(np.linspace(0.0, 1.0, 25), at, widths)
     turn = 2 * math.pi * np.arange(20) / 20
     edge = 1.0 + 0.045 * np.cos(5 * turn) + 0.008 * np.cos(10 * turn)
     section = thick * edge[:, None] * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    skin = sweep(path, section, scale=_smooth(girth))
+    skin = shapes.sweep(path, section, scale=_smooth(girth))
     peel = printed_material(f"texture/banana_peel?seed={seed}", rng.between(0.4, 0.55))
     parts = []
     for a, b in ((0, 4), (4, 9), (9, 15), (15, 20), (20, 24)):
@@ -175,9 +160,6 @@ def _stalk(foot: tuple[float, float, float], length: float, thick: float, rng: V
     """A bent, tapering twig."""
     x, y, z = foot
     lean = rng.between(-0.4, 0.4) * length
-    path = space_evenly(
-        spline([(x, y, z), (x, y, z + 0.5 * length), (x + lean, y, z + length)], 24), 6
-    )
-    return sweep(
-        path, circle(thick, 8), up=(1.0, 0.0, 0.0), scale=np.array([1.3, 1, 0.9, 0.9, 1.1, 1.5])
-    )
+    bend = shapes.spline([(x, y, z), (x, y, z + 0.5 * length), (x + lean, y, z + length)], 24)
+    path, scale = shapes.space_evenly(bend, 6), np.array([1.3, 1, 0.9, 0.9, 1.1, 1.5])
+    return shapes.sweep(path, shapes.circle(thick, 8), up=(1.0, 0.0, 0.0), scale=scale)

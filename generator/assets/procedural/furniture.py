@@ -1,17 +1,20 @@
 """Furniture and other static objects.
 
 Origin on the floor at the centre of the footprint, Z up; ``size_m`` is the extent along X, Y, Z.
+All builders raise AssetError if a size, a style, a shape or a colour is not usable.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Solid, check_option
 from gen_data.generator.assets.procedural.material_presets import (
@@ -26,14 +29,6 @@ from gen_data.generator.assets.procedural.patches import (
     join_patches,
     make_solid_in_place,
 )
-from gen_data.generator.assets.procedural.surface_shapes import (
-    block,
-    circle,
-    fan,
-    grid,
-    lathe,
-    map_along_grain,
-)
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.se3 import Vec3
@@ -45,17 +40,8 @@ PANEL_SHAPES = ("rectangle", "disk")
 TABLE_STYLES = ("legs", "trestle", "bench")
 SHELF_STYLES = ("bookcase", "rack")
 
-COLORS: Mapping[str, str] = {
-    "white": "#dededb",
-    "grey": "#8a8f94",
-    "black": "#2b2d30",
-    "blue": "#3f5f8f",
-    "green": "#4f7f5a",
-    "red": "#a8382f",
-    "yellow": "#d9b23c",
-    "brown": "#8a6a4a",
-}
-
+COLORS = load_table(__package__, "furniture_colors", str)
+_CORNERS = ((-1, -1), (-1, 1), (1, -1), (1, 1))
 _BOARD_M = 0.02
 _PLINTH_M = 0.06
 _BIN_WALL_M = 0.008
@@ -68,9 +54,6 @@ def table(size_m: Vec3 = (1.2, 0.8, 0.74), style: str = "legs") -> Solid:
         size_m: Length, width, height of the top's surface.
         style: ``legs`` (four of wood), ``trestle`` (two wooden end frames) or ``bench`` (steel
             workbench frame with a lower shelf).
-
-    Raises:
-        AssetError: if a size or the style is not usable.
     """
     x, y, z = check_size("table", size_m, 0.2)
     check_option("table", "style", style, TABLE_STYLES)
@@ -78,18 +61,12 @@ def table(size_m: Vec3 = (1.2, 0.8, 0.74), style: str = "legs") -> Solid:
     top = (-x / 2, -y / 2, z - thick), (x / 2, y / 2, z)
     frame = {"legs": _four_legs, "trestle": _trestles, "bench": _bench}[style](x, y, z - thick)
     patches = [
-        map_along_grain(block(*top, 0.003), 0.9),
-        *(map_along_grain(block(low, high, 0.002, 1), 0.5) for low, high in frame),
+        shapes.map_along_grain(shapes.block(*top, 0.003), 0.9),
+        *(shapes.map_along_grain(shapes.block(low, high, 0.002, 1), 0.5) for low, high in frame),
     ]
     wood = patterned_material("texture/wood_grain?seed=1", 0.0, 0.45)
-    legs = (
-        painted_material("#3b4046", 0.4)
-        if style == "bench"
-        else patterned_material("texture/wood_grain?seed=1", 0.0, 0.5)
-    )
-    return make_solid_in_place(
-        patches, (wood, legs), [hulls.box(*top), *(hulls.box(*f) for f in frame)]
-    )
+    legs = painted_material("#3b4046", 0.4) if style == "bench" else replace(wood, roughness=0.5)
+    return make_solid_in_place(patches, (wood, legs), [hulls.box(*b) for b in (top, *frame)])
 
 
 def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookcase") -> Solid:
@@ -99,9 +76,6 @@ def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookca
         size_m: Width (X), depth (Y), height.
         levels: Number of boards that carry objects; see ``shelf_levels_m``.
         style: ``bookcase`` (side and back panels) or ``rack`` (steel posts, open all around).
-
-    Raises:
-        AssetError: if a size, the style or the number of levels is not usable.
     """
     x, y, z = check_size("shelf", size_m, 0.1)
     check_option("shelf", "style", style, SHELF_STYLES)
@@ -111,7 +85,7 @@ def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookca
         for top in (*shelf_levels_m(size_m, levels), z)
     ]
     if style == "rack":
-        frame = [_post(sx * x / 2, sy * y / 2, t, z) for sx in (-1, 1) for sy in (-1, 1)]
+        frame = [_post(sx * x / 2, sy * y / 2, t, z) for sx, sy in _CORNERS]
     else:
         frame = [
             ((-x / 2, -y / 2, 0.0), (-x / 2 + t, y / 2, z)),
@@ -119,8 +93,8 @@ def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookca
             ((-x / 2 + t, y / 2 - 0.008, _PLINTH_M - t), (x / 2 - t, y / 2 - 0.002, z)),
         ]
     patches = [
-        *(map_along_grain(block(*b, 0.0015), 0.6) for b in boards),
-        *(map_along_grain(block(*f, 0.0015, 1), 0.6) for f in frame),
+        *(shapes.map_along_grain(shapes.block(*b, 0.0015), 0.6) for b in boards),
+        *(shapes.map_along_grain(shapes.block(*f, 0.0015, 1), 0.6) for f in frame),
     ]
     wood = patterned_material("texture/wood_grain?seed=8", 0.0, 0.45)
     posts = painted_material("#2f3338", 0.4) if style == "rack" else wood
@@ -158,14 +132,11 @@ def bin_(size_m: Vec3 = (0.6, 0.4, 0.22), color: str = "blue") -> Solid:
     Args:
         size_m: Outer length, width, height.
         color: One of ``COLORS``.
-
-    Raises:
-        AssetError: if a size or the colour is not usable.
     """
     x, y, z = check_size("bin", size_m, 0.06)
     rim = 0.012
     shell = _bin_shell(x, y, z, rim)
-    ribs = [block(low, high, 0.001) for low, high in _bin_ribs(x, y, z, rim)]
+    ribs = [shapes.block(low, high, 0.001) for low, high in _bin_ribs(x, y, z, rim)]
     w = _BIN_WALL_M + rim
     walls = [
         ((-x / 2, -y / 2, 0.0), (-x / 2 + w, y / 2, z)),
@@ -174,11 +145,8 @@ def bin_(size_m: Vec3 = (0.6, 0.4, 0.22), color: str = "blue") -> Solid:
         ((-x / 2, y / 2 - w, 0.0), (x / 2, y / 2, z)),
         ((-x / 2, -y / 2, 0.0), (x / 2, y / 2, _BIN_WALL_M)),
     ]
-    return make_solid_in_place(
-        [shell, *ribs],
-        (painted_material(_color("bin", color), 0.5),),
-        [hulls.box(*wall) for wall in walls],
-    )
+    body = painted_material(_color("bin", color), 0.5)
+    return make_solid_in_place([shell, *ribs], (body,), [hulls.box(*wall) for wall in walls])
 
 
 def bin_interior_m(size_m: Vec3) -> tuple[float, float, float]:
@@ -193,53 +161,34 @@ def box_(size_m: Vec3 = (0.2, 0.2, 0.2), color: str = "grey") -> Solid:
     Args:
         size_m: Length, width, height.
         color: One of ``COLORS``.
-
-    Raises:
-        AssetError: if a size or the colour is not usable.
     """
     x, y, z = check_size("box", size_m, 0.001)
     corners = (-x / 2, -y / 2, 0.0), (x / 2, y / 2, z)
     bevel = min(0.002, 0.1 * min(x, y, z))
-    return make_solid_in_place(
-        [block(*corners, bevel)],
-        (painted_material(_color("box", color), 0.6),),
-        [hulls.box(*corners)],
-    )
+    body = painted_material(_color("box", color), 0.6)
+    return make_solid_in_place([shapes.block(*corners, bevel)], (body,), [hulls.box(*corners)])
 
 
 def pedestal(size_m: Vec3 = (0.3, 0.3, 0.7)) -> Solid:
-    """A plinth for a robot: steel column between two plates. Slots: body, plates.
-
-    Raises:
-        AssetError: if a size is not usable.
-    """
+    """A plinth for a robot: steel column between two plates. Slots: body, plates."""
     x, y, z = check_size("pedestal", size_m, 0.05)
     t = min(0.02, 0.2 * z)
     plates = [((-x / 2, -y / 2, z0), (x / 2, y / 2, z0 + t)) for z0 in (0.0, z - t)]
     body = (-0.38 * x, -0.38 * y, t), (0.38 * x, 0.38 * y, z - t)
-    bolts = [
-        lathe([(0.0, 0.0), (0.009, 0.0), (0.009, 0.007), (0.007, 0.009), (0.0, 0.009)], 6, 1).moved(
-            sx * 0.44 * x, sy * 0.44 * y, t
-        )
-        for sx in (-1, 1)
-        for sy in (-1, 1)
-    ]
-    patches = [block(*body, 0.006), *(block(*p, 0.002, 1) for p in plates), *bolts]
-    materials = (painted_material("#d7d9d8", 0.4), metal_material((0.45, 0.46, 0.48), 0.42))
-    return make_solid_in_place(
-        patches, materials, [hulls.box(*body), *(hulls.box(*p) for p in plates)]
+    bolt = shapes.lathe(
+        [(0.0, 0.0), (0.009, 0.0), (0.009, 0.007), (0.007, 0.009), (0.0, 0.009)], 6, 1
     )
+    bolts = [bolt.moved(sx * 0.44 * x, sy * 0.44 * y, t) for sx, sy in _CORNERS]
+    patches = [shapes.block(*body, 0.006), *(shapes.block(*p, 0.002, 1) for p in plates), *bolts]
+    materials = (painted_material("#d7d9d8", 0.4), metal_material((0.45, 0.46, 0.48), 0.42))
+    return make_solid_in_place(patches, materials, [hulls.box(*b) for b in (body, *plates)])
 
 
 def gantry(size_m: Vec3 = (1.6, 1.0, 1.8)) -> Solid:
-    """A camera frame of aluminium profiles: four posts and a beam along X. Slots: profiles, joints.
-
-    Raises:
-        AssetError: if a size is not usable.
-    """
+    """A camera frame of aluminium profiles: four posts, a beam along X. Slots: profiles, joints."""
     x, y, z = check_size("gantry", size_m, 0.3)
     w = 0.04
-    posts = [_post(sx * x / 2, sy * y / 2, w, z) for sx in (-1, 1) for sy in (-1, 1)]
+    posts = [_post(sx * x / 2, sy * y / 2, w, z) for sx, sy in _CORNERS]
     rails = [
         ((sx * x / 2 - w * (sx > 0), -y / 2 + w, z - w), (sx * x / 2 + w * (sx < 0), y / 2 - w, z))
         for sx in (-1, 1)
@@ -248,32 +197,21 @@ def gantry(size_m: Vec3 = (1.6, 1.0, 1.8)) -> Solid:
     bars = [*posts, *rails, *beam]
     patches = [piece for bar in bars for piece in _profile_bar(*bar)]
     feet = [
-        block(
-            *_between(
-                (sx * x / 2, sy * y / 2), (sx * (x / 2 - 0.1), sy * (y / 2 - 0.1)), 0.0, 0.008
-            ),
-            0.001,
-            1,
-        )
-        for sx in (-1, 1)
-        for sy in (-1, 1)
+        _between((sx * x / 2, sy * y / 2), (sx * (x / 2 - 0.1), sy * (y / 2 - 0.1)), 0.0, 0.008)
+        for sx, sy in _CORNERS
     ]
     materials = (metal_material(ALUMINIUM, 0.45), painted_material("#26282b", 0.5))
-    return make_solid_in_place([*patches, *feet], materials, [hulls.box(*bar) for bar in bars])
+    patches += [shapes.block(*foot, 0.001, 1) for foot in feet]
+    return make_solid_in_place(patches, materials, [hulls.box(*bar) for bar in bars])
 
 
 def plane(size_m: Sequence[float] = (4.0, 4.0)) -> Solid:
-    """Flat ground at z = 0, without sides. Slot: ground.
-
-    Raises:
-        AssetError: if a size is not usable.
-    """
+    """Flat ground at z = 0, without sides. Slot: ground."""
     x, y, _ = check_size("plane", (*size_m, 1.0), 0.1)
     ground = rectangle((-x / 2, -y / 2, 0.0), (x, 0.0, 0.0), (0.0, y, 0.0))
     slab = hulls.box((-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0))
-    return make_solid_in_place(
-        [ground], (patterned_material("texture/concrete?seed=0", 2.0, 0.8),), [slab]
-    )
+    concrete = patterned_material("texture/concrete?seed=0", 2.0, 0.8)
+    return make_solid_in_place([ground], (concrete,), [slab])
 
 
 def light_panel(
@@ -287,17 +225,14 @@ def light_panel(
         size_m: Of the bright part; a disk has the first for its diameter.
         shape: rectangle or disk.
         depth_m: Of the housing, which is as wide as the panel.
-
-    Raises:
-        AssetError: if a size or the shape is not usable.
     """
     x, y, z = check_size("light_panel", (*size_m[:2], depth_m), 0.005)
     check_option("light_panel", "shape", shape, PANEL_SHAPES)
     if shape == "disk":
         y = x
-        rim = circle(0.5 * x, 64)
-        front = fan(np.concatenate([rim[::-1], np.zeros((64, 1))], axis=1), 1)
-        back = lathe([(0.5 * x, 0.0), (0.5 * x, z), (0.0, z)], 64)
+        rim = shapes.circle(0.5 * x, 64)
+        front = shapes.fan(np.concatenate([rim[::-1], np.zeros((64, 1))], axis=1), 1)
+        back = shapes.lathe([(0.5 * x, 0.0), (0.5 * x, z), (0.0, z)], 64)
     else:
         front = rectangle((-x / 2, -y / 2, 0.0), (0.0, y, 0.0), (x, 0.0, 0.0)).painted(1)
         back = join_patches(_plain_shell(x, y, z))
@@ -313,9 +248,6 @@ def backdrop(size_m: Vec3 = (3.0, 3.0, 2.2), radius_m: float = 0.6, color: str =
         size_m: Width (X), depth (Y), height.
         radius_m: Radius of the curve.
         color: One of ``COLORS``.
-
-    Raises:
-        AssetError: if a size or the colour is not usable.
     """
     x, y, z = check_size("backdrop", size_m, 0.1)
     r = min(radius_m, 0.9 * y, 0.9 * z)
@@ -323,7 +255,7 @@ def backdrop(size_m: Vec3 = (3.0, 3.0, 2.2), radius_m: float = 0.6, color: str =
     ys = np.concatenate([[-y / 2], y / 2 - r + r * np.sin(turn), [y / 2]])
     zs = np.concatenate([[0.0], r - r * np.cos(turn), [z]])
     rows = [np.stack([np.full(len(ys), s * x / 2), ys, zs], axis=1) for s in (-1.0, 1.0)]
-    sheet = grid(np.stack(rows, axis=1))
+    sheet = shapes.grid(np.stack(rows, axis=1))
     parts = [
         hulls.box((-x / 2, -y / 2, -0.2), (x / 2, y / 2, 0.0)),
         hulls.box((-x / 2, y / 2, 0.0), (x / 2, y / 2 + 0.2, z)),
@@ -335,16 +267,11 @@ def backdrop(size_m: Vec3 = (3.0, 3.0, 2.2), radius_m: float = 0.6, color: str =
 def _four_legs(x: float, y: float, z: float) -> list[Box]:
     w, inset, rail, apron = 0.06, 0.03, 0.02, 0.08
     ax, ay = x / 2 - inset, y / 2 - inset
-    legs = [_post(sx * ax, sy * ay, w, z) for sx in (-1, 1) for sy in (-1, 1)]
-    long_rails = [
-        _between((-ax + w, s * (ay - 0.01)), (ax - w, s * (ay - 0.01 - rail)), z - apron, z)
-        for s in (-1, 1)
-    ]
-    short_rails = [
-        _between((s * (ax - 0.01), -ay + w), (s * (ax - 0.01 - rail), ay - w), z - apron, z)
-        for s in (-1, 1)
-    ]
-    return [*legs, *long_rails, *short_rails]
+    legs = [_post(sx * ax, sy * ay, w, z) for sx, sy in _CORNERS]
+    out_x, out_y = ax - 0.01, ay - 0.01
+    along = [((-ax + w, s * out_y), (ax - w, s * (out_y - rail))) for s in (-1, 1)]
+    across = [((s * out_x, -ay + w), (s * (out_x - rail), ay - w)) for s in (-1, 1)]
+    return [*legs, *(_between(*span, z - apron, z) for span in (*along, *across))]
 
 
 def _trestles(x: float, y: float, z: float) -> list[Box]:
@@ -352,16 +279,14 @@ def _trestles(x: float, y: float, z: float) -> list[Box]:
     made = []
     for s in (-1, 1):
         made += [_post(s * ax, t * ay, w, z) for t in (-1, 1)]
-        made += [
-            _between((s * ax, -ay + w), (s * (ax - w), ay - w), level - w, level)
-            for level in (z, 0.25 * z)
-        ]
+        span = (s * ax, -ay + w), (s * (ax - w), ay - w)
+        made += [_between(*span, level - w, level) for level in (z, 0.25 * z)]
     return [*made, _between((-ax + w, -0.02), (ax - w, 0.02), 0.25 * z - w, 0.25 * z)]
 
 
 def _bench(x: float, y: float, z: float) -> list[Box]:
     w, ax, ay = 0.045, x / 2 - 0.02, y / 2 - 0.02
-    posts = [_post(sx * ax, sy * ay, w, z) for sx in (-1, 1) for sy in (-1, 1)]
+    posts = [_post(sx * ax, sy * ay, w, z) for sx, sy in _CORNERS]
     rails = [_between((-ax + w, s * ay), (ax - w, s * (ay - w)), z - w, z) for s in (-1, 1)]
     ends = [_between((s * ax, -ay + w), (s * (ax - w), ay - w), z - w, z) for s in (-1, 1)]
     return [*posts, *rails, *ends, _between((-ax + w, -ay), (ax - w, ay), 0.15, 0.17)]
@@ -386,7 +311,7 @@ def _bin_shell(x: float, y: float, z: float, rim: float) -> Patch:
               (rim + w, w + 0.008, 0.012), (rim + w + 0.008, w, 0.006)]  # fmt: skip
     loops = [_rounded_loop(x / 2 - inset, y / 2 - inset, r, level) for inset, level, r in levels]
     rows = np.stack([np.concatenate([loop, loop[:1]]) for loop in loops])
-    return join_patches([grid(rows), fan(loops[0][::-1]), fan(loops[-1])])
+    return join_patches([shapes.grid(rows), shapes.fan(loops[0][::-1]), shapes.fan(loops[-1])])
 
 
 def _bin_ribs(x: float, y: float, z: float, rim: float) -> list[Box]:
@@ -396,11 +321,9 @@ def _bin_ribs(x: float, y: float, z: float, rim: float) -> list[Box]:
     for length, other, along_x in ((x, y, True), (y, x, False)):
         count = max(2, round(length / 0.12))
         places = [length * ((i + 0.5) / count - 0.5) for i in range(count)]
+        end = length / 2 - rim - 0.02
         spans = [(p - 0.0025, p + 0.0025, 0.006, top) for p in places]
-        spans.append(
-            (-length / 2 + rim + 0.02, length / 2 - rim - 0.02, 0.68 * z, 0.68 * z + 0.005)
-        )
-        for low, high, z0, z1 in spans:
+        for low, high, z0, z1 in (*spans, (-end, end, 0.68 * z, 0.68 * z + 0.005)):
             for s in (-1, 1):
                 face, tip = s * (other / 2 - rim - 0.001), s * (other / 2 - rim + depth)
                 a, b = ((low, face), (high, tip)) if along_x else ((face, low), (tip, high))
@@ -412,15 +335,9 @@ def _rounded_loop(half_x: float, half_y: float, radius: float, z: float) -> Arra
     """Counter-clockwise rounded rectangle, five points per corner."""
     points = []
     for quarter, (sx, sy) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
-        for i in range(5):
-            turn = 0.5 * math.pi * (quarter + i / 4)
-            points.append(
-                (
-                    sx * (half_x - radius) + radius * math.cos(turn),
-                    sy * (half_y - radius) + radius * math.sin(turn),
-                    z,
-                )
-            )
+        x, y = sx * (half_x - radius), sy * (half_y - radius)
+        for turn in (0.5 * math.pi * (quarter + i / 4) for i in range(5)):
+            points.append((x + radius * math.cos(turn), y + radius * math.sin(turn), z))
     return np.array(points)
 
 
@@ -429,19 +346,14 @@ def _profile_bar(low: Vec3, high: Vec3) -> list[Patch]:
     axis = max(range(3), key=lambda i: high[i] - low[i])
     sides = [i for i in range(3) if i != axis]
     made = []
-    for i in (0, 1):
-        for j in (0, 1):
-            a, b = list(low), list(high)
-            for side, far in zip(sides, (i, j), strict=True):
-                width = high[side] - low[side]
-                a[side] = low[side] + far * 0.6 * width
-                b[side] = a[side] + 0.4 * width
-            made.append(block((a[0], a[1], a[2]), (b[0], b[1], b[2])))
-    a, b = list(low), list(high)
-    for side in sides:
-        inset = 0.25 * (high[side] - low[side])
-        a[side], b[side] = low[side] + inset, high[side] - inset
-    return [*made, block((a[0], a[1], a[2]), (b[0], b[1], b[2]))]
+    for shares in ((0.0, 0.0), (0.0, 0.6), (0.6, 0.0), (0.6, 0.6), None):
+        a, b = np.array(low), np.array(high)
+        width = b - a
+        for side, far in zip(sides, shares or (0.25, 0.25), strict=True):
+            a[side] = low[side] + far * width[side]
+            b[side] = a[side] + 0.4 * width[side] if shares else high[side] - 0.25 * width[side]
+        made.append(shapes.block(a, b))
+    return made
 
 
 def _plain_shell(x: float, y: float, z: float) -> list[Patch]:
@@ -468,7 +380,7 @@ def _cove(x: float, y: float, r: float) -> list[Array]:
 def rectangle(corner: Vec3, right: Vec3, up: Vec3) -> Patch:
     """Two triangles; outward is right x up."""
     c, r, u = (np.array(v, dtype=np.float64) for v in (corner, right, up))
-    return grid(np.stack([np.stack([c, c + r]), np.stack([c + u, c + r + u])]))
+    return shapes.grid(np.stack([np.stack([c, c + r]), np.stack([c + u, c + r + u])]))
 
 
 def check_size(name: str, size_m: Sequence[float], least: float) -> Vec3:

@@ -7,15 +7,11 @@ import math
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
-    ALUMINIUM,
-    BLACK_OXIDE,
-    BRASS,
+    METALS,
     PALETTES,
-    STAINLESS,
-    STEEL,
-    ZINC,
     metal_material,
     plastic_material,
 )
@@ -29,6 +25,7 @@ from gen_data.generator.assets.procedural.patches import (
 from gen_data.generator.assets.procedural.surface_shapes import (
     Point2,
     circle,
+    cone,
     extrude,
     fillet,
     lathe,
@@ -38,27 +35,19 @@ from gen_data.generator.assets.procedural.surface_shapes import (
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.core.asset_types import Material
 
-# Thread, width across flats, height of head, of nut, pitch [mm]: ISO 4014 and ISO 4032.
-_HEX = ((8, 13, 5.3, 6.8, 1.25), (10, 16, 6.4, 8.4, 1.5), (12, 18, 7.5, 10.8, 1.75),
-        (16, 24, 10, 14.8, 2.0), (20, 30, 12.5, 18, 2.5))  # fmt: skip
-# Thread, inner and outer diameter, thickness [mm]: ISO 7089.
-_WASHERS = ((8, 8.4, 16, 1.6), (10, 10.5, 20, 2.0), (12, 13, 24, 2.5), (16, 17, 30, 3.0),
-            (20, 21, 37, 3.0))  # fmt: skip
+_SIZES = load_table(__package__, "metric_parts", tuple[tuple[float, ...], ...])
 
 
 def hex_bolt(seed: int) -> Solid:
     """A hexagon bolt standing on its head. Slot: body."""
     rng = variant_rng("hex_bolt", seed)
-    d, flats, head, _, pitch = (0.001 * v for v in in_turn(_HEX, seed))
+    d, flats, head, _, pitch = (0.001 * v for v in in_turn(_SIZES["hexagons"], seed))
     length = d * rng.choose((2.0, 3.0, 4.0, 5.0))
     threaded = min(length - d, max(2 * d, 0.55 * length))
     corner = flats / math.sqrt(3)
     end = head + length
-    profile: list[Point2] = [
-        (0.0, head - 0.0005),
-        (0.5 * d, head - 0.0005),
-        (0.5 * d, end - threaded),
-    ]
+    foot = head - 0.0005
+    profile: list[Point2] = [(0.0, foot), (0.5 * d, foot), (0.5 * d, end - threaded)]
     root, turns = 0.5 * d - 0.61 * pitch, max(3, int((threaded - pitch) / pitch))
     step = (threaded - pitch) / turns
     for i in range(turns):
@@ -66,50 +55,40 @@ def hex_bolt(seed: int) -> Solid:
         profile += [(root, z + 0.5 * step), (0.5 * d, z + step)]
     profile += [(root, end), (0.0, end)]
     patches = [extrude(circle(corner, 6), head, 0.06 * flats), lathe(profile, 20)]
-    parts = [
-        hulls.frustum((corner, 0.0), (corner, head), 6),
-        hulls.frustum((0.5 * d, head), (0.5 * d, end), 12),
-    ]
-    return make_centred_solid(patches, (_fastener_metal(rng),), parts, crease_deg=25.0)
+    shank = hulls.frustum((0.5 * d, head), (0.5 * d, end), 12)
+    parts = [hulls.frustum((corner, 0.0), (corner, head), 6), shank]
+    return make_centred_solid(patches, (_worn_metal("fasteners", rng),), parts, crease_deg=25.0)
 
 
 def nut(seed: int) -> Solid:
     """A hexagon nut. Slot: body."""
     rng = variant_rng("nut", seed)
-    d, flats, _, height, _ = (0.001 * v for v in in_turn(_HEX, seed))
+    d, flats, _, height, _ = (0.001 * v for v in in_turn(_SIZES["hexagons"], seed))
     corner = flats / math.sqrt(3)
     body = extrude(circle(corner, 6), height, 0.05 * flats, [circle(0.46 * d, 24)])
     wedges = hulls.ring((0.46 * d, corner, 0.0), (0.46 * d, corner, height), 6)
     # A hexagon's flats are its wedges: leave out the round middle point.
     flat = [hull[[0, 1, 2, 4, 5, 6, 7, 9]] for hull in wedges]
     turned = [rotate(hull, "z", math.pi / 6) for hull in flat]
-    return make_centred_solid([body], (_fastener_metal(rng),), turned, crease_deg=25.0)
+    return make_centred_solid([body], (_worn_metal("fasteners", rng),), turned, crease_deg=25.0)
 
 
 def washer(seed: int) -> Solid:
     """A flat washer. Slot: body."""
     rng = variant_rng("washer", seed)
-    _, inner, outer, thick = (0.001 * v for v in in_turn(_WASHERS, seed))
+    _, inner, outer, thick = (0.001 * v for v in in_turn(_SIZES["washers"], seed))
     r, big = 0.5 * inner, 0.5 * outer
-    profile = fillet(
-        [(r, 0.5 * thick), (r, 0.0), (big, 0.0), (big, thick), (r, thick), (r, 0.5 * thick)],
-        0.12 * thick,
-        1,
-    )
+    seam = (r, 0.5 * thick)
+    section = [seam, (r, 0.0), (big, 0.0), (big, thick), (r, thick), seam]
     wedges = hulls.ring((r, big, 0.0), (r, big, thick), 8)
-    return make_centred_solid([lathe(profile, 36)], (_fastener_metal(rng),), wedges)
+    body = lathe(fillet(section, 0.12 * thick, 1), 36)
+    return make_centred_solid([body], (_worn_metal("fasteners", rng),), wedges)
 
 
 def stepped_shaft(seed: int) -> Solid:
     """A turned shaft of several diameters, lying along X. Slot: body."""
     rng = variant_rng("stepped_shaft", seed)
-    radii = [
-        rng.between(0.005, 0.008),
-        rng.between(0.007, 0.011),
-        rng.between(0.01, 0.016),
-        rng.between(0.007, 0.01),
-        rng.between(0.004, 0.007),
-    ][: rng.choose((3, 4, 5))]
+    radii = [rng.between(*bounds) for bounds in _SIZES["shaft_radii"]][: rng.choose((3, 4, 5))]
     chamfer, z = 0.0008, 0.0
     profile: list[Point2] = [(0.0, 0.0)]
     parts = []
@@ -121,9 +100,8 @@ def stepped_shaft(seed: int) -> Solid:
         z += length
     profile.append((0.0, z))
     turned = [rotate(part, "y", 0.5 * math.pi) for part in parts]
-    return make_centred_solid(
-        [lathe(profile, 40).rotated("y", 0.5 * math.pi)], (_machined_metal(rng),), turned
-    )
+    body = lathe(profile, 40).rotated("y", 0.5 * math.pi)
+    return make_centred_solid([body], (_worn_metal("machined", rng),), turned)
 
 
 def pipe_elbow(seed: int) -> Solid:
@@ -148,14 +126,8 @@ def pipe_elbow(seed: int) -> Solid:
         rotate(band, "y", -0.5 * math.pi) + np.array([-straight, 0, 0]),
         rotate(band, "x", -0.5 * math.pi) + np.array([bend, bend + straight, 0]),
     ]
-    finish = rng.choose(
-        (
-            metal_material(BRASS, 0.3),
-            metal_material((0.72, 0.45, 0.33), 0.35),
-            metal_material(ZINC, 0.4),
-            plastic_material(rng, PALETTES["abs"]),
-        )
-    )
+    plastic = plastic_material(rng, PALETTES["abs"])
+    finish = rng.choose((*(metal_material(*metal) for metal in METALS["pipes"]), plastic))
     return make_centred_solid([wall, bore, first, second], (finish,), parts)
 
 
@@ -167,19 +139,10 @@ def bracket(seed: int) -> Solid:
     hole = min(0.16 * width, 0.004)
     foot = _holed_plate(a, width, thick, hole)
     upright = _holed_plate(b, width, thick, hole).rotated("y", -0.5 * math.pi).moved(thick)
-    finish = rng.choose(
-        (
-            metal_material(ZINC, 0.35),
-            metal_material(STAINLESS, 0.3),
-            metal_material(BLACK_OXIDE, 0.5),
-            metal_material(ALUMINIUM, 0.4),
-        )
-    )
+    finish = metal_material(*rng.choose(METALS["brackets"]))
     half = 0.5 * width
-    parts = [
-        hulls.box((0.0, -half, 0.0), (a, half, thick)),
-        hulls.box((0.0, -half, 0.0), (thick, half, b)),
-    ]
+    ends = ((a, half, thick), (thick, half, b))
+    parts = [hulls.box((0.0, -half, 0.0), end) for end in ends]
     return make_centred_solid([foot, upright], (finish,), parts)
 
 
@@ -190,18 +153,10 @@ def gear(seed: int) -> Solid:
     thick, pitch = rng.between(0.006, 0.014), 0.5 * teeth * module
     tip, root = pitch + module, pitch - 1.2 * module
     bore = rng.between(0.25, 0.35) * pitch
-    outline = []
-    for i in range(teeth):
-        for share, r in (
-            (-0.34, root),
-            (-0.25, pitch),
-            (-0.13, tip),
-            (0.13, tip),
-            (0.25, pitch),
-            (0.34, root),
-        ):
-            turn = 2 * math.pi * (i + share) / teeth
-            outline.append((r * math.cos(turn), r * math.sin(turn)))
+    flank = ((-0.34, root), (-0.25, pitch), (-0.13, tip))
+    tooth = (*flank, *((-share, r) for share, r in flank[::-1]))
+    turns = [(2 * math.pi * (i + share) / teeth, r) for i in range(teeth) for share, r in tooth]
+    outline = [(r * math.cos(turn), r * math.sin(turn)) for turn, r in turns]
     disc = extrude(np.array(outline), thick, 0.0004, [circle(bore, 28)])
     hub = thick + rng.between(0.004, 0.01) if rng.chance(0.6) else 0.0
     patches, parts = [disc], [hulls.frustum((tip, 0.0), (tip, thick), 24)]
@@ -209,8 +164,7 @@ def gear(seed: int) -> Solid:
         outer = 0.5 * (bore + root)
         patches.append(_collar(bore, outer, hub - thick).moved(z=thick))
         parts.append(hulls.frustum((outer, thick), (outer, hub)))
-    finish = plastic_material(rng, PALETTES["abs"]) if rng.chance(0.3) else _machined_metal(rng)
-    return make_centred_solid(patches, (finish,), parts, crease_deg=30.0)
+    return make_centred_solid(patches, (_machined(rng, 0.3),), parts, crease_deg=30.0)
 
 
 def flange(seed: int) -> Solid:
@@ -231,7 +185,7 @@ def flange(seed: int) -> Solid:
         *hulls.ring((bore, radius, 0.0), (bore, radius, thick), 12),
         *hulls.ring((bore, neck, thick), (bore, neck, thick + rise), 8),
     ]
-    return make_centred_solid([disc, collar], (_machined_metal(rng),), parts)
+    return make_centred_solid([disc, collar], (_worn_metal("machined", rng),), parts)
 
 
 def connector(seed: int) -> Solid:
@@ -242,47 +196,31 @@ def connector(seed: int) -> Solid:
     body = rounded_box((side, side, side), 0.06 * side, 2)
     stub = _collar(0.7 * port, port, reach, 22).moved(z=0.5 * side)
     level = 0.5 * side + 0.3 * reach
-    plug = lathe(
-        [(0.0, 0.5 * side - 0.001), (0.72 * port, 0.5 * side - 0.001), (0.72 * port, level),
-         (0.0, level)],
-        22,
-    )  # fmt: skip
+    plug = cone((0.72 * port, 0.5 * side - 0.001), (0.72 * port, level), 22)
     pieces = join_patches([stub.painted(1), plug])
     band = hulls.frustum((port, 0.5 * side), (port, 0.5 * side + reach), 16)
-    turns = [
-        ("y", 0.0),
-        ("y", 0.5 * math.pi),
-        ("y", -0.5 * math.pi),
-        ("x", 0.5 * math.pi),
-        ("x", -0.5 * math.pi),
-        ("y", math.pi),
-    ][: rng.choose((3, 4, 5, 6))]
-    half = 0.5 * side
-    parts = [
-        hulls.box((-half, -half, -half), (half, half, half)),
-        *(rotate(band, axis, turn) for axis, turn in turns),
-    ]
-    block = plastic_material(rng, PALETTES["abs"]) if rng.chance(0.5) else _machined_metal(rng)
-    finish = rng.choose((metal_material(BRASS, 0.3), metal_material(ZINC, 0.35), block))
-    return make_centred_solid(
-        [body, *(pieces.rotated(axis, turn) for axis, turn in turns)], (block, finish), parts
-    )
+    quarter, half = 0.5 * math.pi, 0.5 * side
+    turns = [("y", 0.0), ("y", quarter), ("y", -quarter), ("x", quarter), ("x", -quarter),
+             ("y", math.pi)][: rng.choose((3, 4, 5, 6))]  # fmt: skip
+    cube = hulls.box((-half, -half, -half), (half, half, half))
+    parts = [cube, *(rotate(band, axis, turn) for axis, turn in turns)]
+    block = _machined(rng, 0.5)
+    finish = rng.choose((*(metal_material(*metal) for metal in METALS["ports"]), block))
+    stubs = (pieces.rotated(axis, turn) for axis, turn in turns)
+    return make_centred_solid([body, *stubs], (block, finish), parts)
 
 
-def _fastener_metal(rng: VariantRng) -> Material:
-    """Fastener: zinc-plated, stainless, black or brass."""
-    color, rough = rng.choose(
-        ((ZINC, 0.3), (ZINC, 0.35), (STAINLESS, 0.25), (BLACK_OXIDE, 0.5), (BRASS, 0.3))
-    )
+def _worn_metal(kind: str, rng: VariantRng) -> Material:
+    """One of the metals that are usual for a kind of part."""
+    color, rough = rng.choose(METALS[kind])
     return metal_material(color, rough * rng.between(0.85, 1.2))
 
 
-def _machined_metal(rng: VariantRng) -> Material:
-    """Turned or milled steel, aluminium or brass."""
-    color, rough = rng.choose(
-        ((STEEL, 0.35), (STEEL, 0.4), (ALUMINIUM, 0.35), (BRASS, 0.3), (BLACK_OXIDE, 0.45))
-    )
-    return metal_material(color, rough * rng.between(0.85, 1.2))
+def _machined(rng: VariantRng, plastic: float) -> Material:
+    """Turned or milled metal, or plastic with the given probability."""
+    if rng.chance(plastic):
+        return plastic_material(rng, PALETTES["abs"])
+    return _worn_metal("machined", rng)
 
 
 def _collar(bore: float, outer: float, height: float, segments: int = 28) -> Patch:
@@ -296,17 +234,14 @@ def _collar(bore: float, outer: float, height: float, segments: int = 28) -> Pat
 def _holed_plate(length: float, width: float, thick: float, hole: float) -> Patch:
     """A plate from x = 0, its far corners rounded, with two holes."""
     half, r = 0.5 * width, 0.3 * width
-    near = [(0.0, half), (0.0, -half)]
-    corners = []
+    outline = [(0.0, half), (0.0, -half)]
     for sign, start in ((-1.0, -0.5 * math.pi), (1.0, 0.0)):
-        for i in range(6):
-            turn = start + 0.5 * math.pi * i / 5
-            corners.append(
-                (length - r + r * math.cos(turn), sign * (half - r) + r * math.sin(turn))
-            )
+        for turn in (start + 0.5 * math.pi * i / 5 for i in range(6)):
+            x, y = length - r, sign * (half - r)
+            outline.append((x + r * math.cos(turn), y + r * math.sin(turn)))
     # Turned a little, so that no three points of the triangulation are in line.
     holes = [circle(hole, 14, (share * length, 0.0), share) for share in (0.42, 0.78)]
-    return extrude(np.array([*near, *corners]), thick, 0.12 * thick, holes)
+    return extrude(np.array(outline), thick, 0.12 * thick, holes)
 
 
 def _tube_piece(path: Array, radius: float) -> Array:

@@ -18,10 +18,9 @@ from gen_data.generator.core.se3 import Vec3
 STEEL: Vec3 = (0.56, 0.57, 0.58)
 STAINLESS: Vec3 = (0.66, 0.65, 0.63)
 ALUMINIUM: Vec3 = (0.91, 0.92, 0.92)
-BRASS: Vec3 = (0.89, 0.70, 0.37)
-BLACK_OXIDE: Vec3 = (0.045, 0.045, 0.048)
 ZINC: Vec3 = (0.66, 0.68, 0.70)
 
+METALS = load_table(__package__, "metals", tuple[tuple[Vec3, float], ...])
 PALETTES = load_table(__package__, "palettes", tuple[str, ...])
 GLAZES, PLASTICS, CAPS, WOODS = (PALETTES[name] for name in ("glazes", "plastics", "caps", "woods"))
 
@@ -64,12 +63,10 @@ def ceramic_material(rng: VariantRng, colors: Sequence[str] = GLAZES) -> Materia
     return Material(base_color=color, roughness=rng.between(0.1, 0.3))
 
 
-def plastic_material(
-    rng: VariantRng, colors: Sequence[str] = PLASTICS, gloss: tuple[float, float] = (0.25, 0.5)
-) -> Material:
+def plastic_material(rng: VariantRng, colors: Sequence[str] = PLASTICS) -> Material:
     """Injection-moulded plastic."""
     color = draw_linear(colors, 0.06, rng)
-    return Material(base_color=color, roughness=rng.between(*gloss))
+    return Material(base_color=color, roughness=rng.between(0.25, 0.5))
 
 
 def metal_material(color: Vec3, roughness: float) -> Material:
@@ -84,19 +81,11 @@ def painted_material(color: str, roughness: float) -> Material:
 
 def printed_material(texture_id: str, roughness: float, metallic: float = 0.0) -> Material:
     """A label or cover: the texture belongs to the object and follows its UVs."""
-    return Material(
-        base_color=(1.0, 1.0, 1.0),
-        roughness=roughness,
-        metallic=metallic,
-        texture=texture_id,
-        printed=True,
-    )
+    return Material((1.0, 1.0, 1.0), roughness, metallic, texture=texture_id, printed=True)
 
 
 def patterned_material(
     texture_id: str, scale_m: float, roughness: float, color: Vec3 = (1.0, 1.0, 1.0)
 ) -> Material:
     """A material texture projected along the axes, one repeat per ``scale_m``."""
-    return Material(
-        base_color=color, roughness=roughness, texture=texture_id, texture_scale_m=scale_m
-    )
+    return Material(color, roughness, texture=texture_id, texture_scale_m=scale_m)

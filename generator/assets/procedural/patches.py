@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.triangle_soup import face_crosses, first_occurrences
 from gen_data.generator.core.asset_types import ConvexParts, Material, MeshData
 
 Array = NDArray[np.float64]
@@ -66,6 +67,12 @@ class Patch:
         return flat.min(axis=0), flat.max(axis=0)
 
 
+def unit(vectors: Array) -> Array:
+    """Vectors, shape [..., k], of length 1; those without length stay zero."""
+    scaled: Array = vectors / np.maximum(np.sqrt((vectors**2).sum(axis=-1, keepdims=True)), 1e-300)
+    return scaled
+
+
 def rotate(points: Array, axis: str, angle_rad: float) -> Array:
     """Points, shape [..., 3], turned about a coordinate axis by the right-hand rule."""
     i = "xyz".index(axis)
@@ -111,9 +118,8 @@ def make_solid_in_place(
 ) -> Solid:
     """A solid that keeps its frame (furniture: the centre of the footprint on the floor)."""
     mesh = finish_mesh(join_patches(patches), materials, crease_deg)
-    return Solid(
-        mesh, ConvexParts(tuple(np.round(round_values(hull), 6) + 0.0 for hull in hulls_m))
-    )
+    parts = tuple(np.round(round_values(hull), 6) + 0.0 for hull in hulls_m)
+    return Solid(mesh, ConvexParts(parts))
 
 
 def finish_mesh(patch: Patch, materials: Sequence[Material], crease_deg: float) -> MeshData:
@@ -122,15 +128,9 @@ def finish_mesh(patch: Patch, materials: Sequence[Material], crease_deg: float) 
     corners, keep = _whole_triangles(cells)
     cells, uvs, slots = cells[keep], round_values(patch.uvs[keep]), patch.slots[keep]
     normals = round_values(_corner_normals(cells.reshape(-1, 3), corners, crease_deg))
-    key = np.concatenate(
-        [
-            cells.reshape(-1, 3),
-            np.round(normals * 2048).astype(np.int64),
-            np.round(uvs.reshape(-1, 2) * 65536).astype(np.int64),
-        ],
-        axis=1,
-    )
-    first, inverse = _unique_rows(key)
+    shading = [np.round(normals * 2048), np.round(uvs.reshape(-1, 2) * 65536)]
+    key = np.concatenate([cells.reshape(-1, 3), *(s.astype(np.int64) for s in shading)], axis=1)
+    inverse, first = first_occurrences(key)
     return MeshData(
         vertices_m=(cells.reshape(-1, 3)[first] * GRID_M).astype(np.float32),
         faces=inverse.reshape(-1, 3).astype(np.int32),
@@ -155,7 +155,7 @@ def round_values(values: Array) -> Array:
 def _whole_triangles(cells: Indices) -> tuple[Array, NDArray[np.bool_]]:
     """Corners of the triangles that have an area [grid cells], and which those are."""
     corners = cells.astype(np.float64)
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = face_crosses(corners)
     longest = np.max([((corners[:, i] - corners[:, i - 1]) ** 2).sum(axis=1) for i in range(3)], 0)
     # Height below half a cell: a triangle that rounding has flattened to a line.
     keep = np.sqrt((cross**2).sum(axis=1)) > 0.5 * np.sqrt(longest) + 1e-9
@@ -169,10 +169,10 @@ def _corner_normals(cells: Indices, corners: Array, crease_deg: float) -> Array:
     normals from polygonal facets", J. Graphics Tools 3(1), 1998) and by its area, so that a flat
     face stays flat next to a small bevel.
     """
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    face_normals = np.repeat(_unit(cross), 3, axis=0)
+    cross = face_crosses(corners)
+    face_normals = np.repeat(unit(cross), 3, axis=0)
     weighted = np.repeat(cross, 3, axis=0) * _corner_angles(corners).reshape(-1, 1)
-    _, vertex = _unique_rows(cells)
+    vertex, _ = first_occurrences(cells)
     order = np.argsort(vertex, kind="stable")
     counts = np.bincount(vertex)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
@@ -180,43 +180,17 @@ def _corner_normals(cells: Indices, corners: Array, crease_deg: float) -> Array:
     mine = np.repeat(order, fan)
     steps = np.arange(fan.sum()) - np.repeat(np.cumsum(fan) - fan, fan)
     theirs = order[np.repeat(starts[vertex[order]], fan) + steps]
-    smooth = (face_normals[mine] * face_normals[theirs]).sum(axis=1) > math.cos(
-        math.radians(crease_deg)
-    )
-    sums = [
-        np.bincount(mine[smooth], weighted[theirs[smooth], axis], len(cells)) for axis in range(3)
-    ]
-    return _unit(np.stack(sums, axis=1))
+    cosine = (face_normals[mine] * face_normals[theirs]).sum(axis=1)
+    smooth = cosine > math.cos(math.radians(crease_deg))
+    parts = weighted[theirs[smooth]].T
+    return unit(np.stack([np.bincount(mine[smooth], p, len(cells)) for p in parts], axis=1))
 
 
 def _corner_angles(corners: Array) -> Array:
     """Interior angles [rad], shape [n, 3]."""
     angles = []
     for i in range(3):
-        a = _unit(corners[:, (i + 1) % 3] - corners[:, i])
-        b = _unit(corners[:, (i + 2) % 3] - corners[:, i])
+        a = unit(corners[:, (i + 1) % 3] - corners[:, i])
+        b = unit(corners[:, (i + 2) % 3] - corners[:, i])
         angles.append(np.arccos(np.clip((a * b).sum(axis=1), -1.0, 1.0)))
     return np.stack(angles, axis=1)
-
-
-def _unit(vectors: Array) -> Array:
-    lengths = np.sqrt((vectors * vectors).sum(axis=-1, keepdims=True))
-    # Vectors without length stay zero.
-    unit: Array = vectors / np.maximum(lengths, 1e-300)
-    return unit
-
-
-def _unique_rows(rows: Indices) -> tuple[Indices, Indices]:
-    """First index of each distinct row, and each row's number; in order of first appearance."""
-    order = np.lexsort(rows.T[::-1])
-    ranked = rows[order]
-    new = np.concatenate([[True], (ranked[1:] != ranked[:-1]).any(axis=1)])
-    group = np.cumsum(new) - 1
-    # lexsort is stable: the first of each run is the first appearance.
-    first = order[new]
-    number = np.zeros(len(rows), dtype=np.int64)
-    number[order] = group
-    appearance = np.argsort(first, kind="stable")
-    rank = np.zeros(len(first), dtype=np.int64)
-    rank[appearance] = np.arange(len(first))
-    return first[appearance], rank[number]

@@ -11,10 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
+from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches, unit
+from gen_data.generator.assets.triangle_soup import face_crosses
 from gen_data.generator.core.se3 import Vec3
 
 Point2 = tuple[float, float]
+Corner = Sequence[float] | Array
 UvRect = tuple[float, float, float, float]
 WHOLE_IMAGE: UvRect = (0.0, 0.0, 1.0, 1.0)
 
@@ -81,7 +83,6 @@ def sweep(
     *,
     up: Vec3 = (0.0, 0.0, 1.0),
     scale: Array | None = None,
-    closed: bool = False,
     capped: bool = True,
     slot: int = 0,
 ) -> Patch:
@@ -92,30 +93,27 @@ def sweep(
         section: Counter-clockwise outline [m], shape [k, 2]; its first axis starts along ``up``.
         up: Direction of the section's first axis at the start.
         scale: Factors on the section per path point, shape [n] or [n, 2].
-        closed: Whether the path returns to its start.
         capped: Whether open ends are closed by flat caps.
         slot: Material slot.
     """
-    first, second = frames_along(path, up, closed)
+    first, second = frames_along(path, up)
     factors = np.ones((len(path), 2)) if scale is None else np.asarray(scale, dtype=np.float64)
     factors = np.repeat(factors[:, None], 2, axis=1) if factors.ndim == 1 else factors
     outline = np.concatenate([section, section[:1]])
     a = outline[None, :, :1] * factors[:, None, :1]
     b = outline[None, :, 1:] * factors[:, None, 1:]
     points = path[:, None, :] + a * first[:, None, :] + b * second[:, None, :]
-    if closed:
-        return grid(np.concatenate([points, points[:1]]), slot=slot)
     ends = [] if not capped else [fan(points[0, :0:-1], slot), fan(points[-1, :-1], slot)]
     return join_patches([grid(points, slot=slot), *ends])
 
 
-def frames_along(path: Array, up: Vec3, closed: bool = False) -> tuple[Array, Array]:
+def frames_along(path: Array, up: Vec3) -> tuple[Array, Array]:
     """Two unit normals per path point; normals x are carried without rotation about the path.
 
     Double reflection: Wang et al., "Computation of rotation minimizing frames", ACM TOG 27(1),
-    2008. Plane curves close exactly; that is all a closed path is used for here.
+    2008.
     """
-    tangents = _tangents(path, closed)
+    tangents = unit(np.gradient(path, axis=0))
     first = np.zeros_like(path)
     start = np.array(up) - (np.array(up) * tangents[0]).sum() * tangents[0]
     first[0] = start / math.sqrt(float((start * start).sum()))
@@ -148,12 +146,8 @@ def ball(shape: Callable[[Array], Array], rings: int = 16, segments: int = 24) -
     turn = np.concatenate([turn, turn[:1]])
     radius = np.cos(polar)
     radius[[0, -1]] = 0.0
-    directions = np.stack(
-        np.broadcast_arrays(
-            radius[:, None] * np.cos(turn), radius[:, None] * np.sin(turn), np.sin(polar)[:, None]
-        ),
-        axis=2,
-    )
+    x, y = radius[:, None] * np.cos(turn), radius[:, None] * np.sin(turn)
+    directions = np.stack(np.broadcast_arrays(x, y, np.sin(polar)[:, None]), axis=2)
     return grid(shape(directions), v=np.linspace(0.0, 1.0, rings + 1))
 
 
@@ -163,7 +157,6 @@ def rounded_box(
     steps: int = 2,
     *,
     uv: Mapping[str, UvRect] | None = None,
-    slots: Mapping[str, int] | None = None,
 ) -> Patch:
     """A box about the origin with rounded edges.
 
@@ -172,7 +165,6 @@ def rounded_box(
         radius_m: Edge radius, at most half the smallest side.
         steps: Quads from a face's border to the middle of the edge.
         uv: Image rectangle ``(u0, v0, u1, v1)`` per face of ``BOX_FACES``; all of it by default.
-        slots: Material slot per face; 0 by default.
     """
     half = 0.5 * np.array(size_m)
     radius = min(radius_m, float(half.min()))
@@ -190,15 +182,18 @@ def rounded_box(
         points = core + radius * away / np.maximum(length, 1e-300)
         u0, v0, u1, v1 = (uv or {}).get(name, WHOLE_IMAGE)
         u, v = ((t - t[0]) / (t[-1] - t[0]) for t in (a, b))
-        patches.append(
-            grid(points, u0 + (u1 - u0) * u, v0 + (v1 - v0) * v, (slots or {}).get(name, 0))
-        )
+        patches.append(grid(points, u0 + (u1 - u0) * u, v0 + (v1 - v0) * v))
     return join_patches(patches)
 
 
-def block(low: Vec3, high: Vec3, radius_m: float = 0.0, slot: int = 0) -> Patch:
+def block(
+    low: Sequence[float] | Array,
+    high: Sequence[float] | Array,
+    radius_m: float = 0.0,
+    slot: int = 0,
+) -> Patch:
     """A box between two corners; a small edge radius catches highlights."""
-    size = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
+    size: Vec3 = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
     centre = [0.5 * (a + b) for a, b in zip(low, high, strict=True)]
     made = rounded_box(size, radius_m, 1) if radius_m > 0 else _plain_box(size)
     return made.moved(*centre).painted(slot)
@@ -218,14 +213,12 @@ def extrude(
     """
     loops = [_wind_loop(outline, 1.0), *(_wind_loop(hole, -1.0) for hole in holes)]
     inner = [_inset(loop, bevel_m) if bevel_m > 0 else loop for loop in loops]
-    levels = (
-        [(inner, 0.0), (loops, bevel_m), (loops, height_m - bevel_m), (inner, height_m)]
-        if bevel_m > 0
-        else [(loops, 0.0), (loops, height_m)]
-    )
+    levels = [(loops, bevel_m), (loops, height_m - bevel_m)]
+    if bevel_m > 0:
+        levels = [(inner, 0.0), *levels, (inner, height_m)]
     walls = []
     for i in range(len(loops)):
-        rows = [_at_height(np.concatenate([level[i], level[i][:1]]), z) for level, z in levels]
+        rows = [np.insert(np.concatenate([p[i], p[i][:1]]), 2, z, axis=1) for p, z in levels]
         walls.append(grid(np.stack(rows), slot=slot))
     top = _cap(inner, height_m, slot)
     return join_patches([*walls, top, _cap(inner, 0.0, slot).flipped()])
@@ -268,9 +261,8 @@ def spline(points: Sequence[Sequence[float]], count: int) -> Array:
     i = np.minimum(t.astype(np.int64), len(points) - 2)
     f = (t - i)[:, None]
     a, b, c, d = (p[i + k] for k in range(4))
-    curve: Array = b + 0.5 * f * (
-        c - a + f * (2 * a - 5 * b + 4 * c - d + f * (3 * (b - c) + d - a))
-    )
+    bend = c - a + f * (2 * a - 5 * b + 4 * c - d + f * (3 * (b - c) + d - a))
+    curve: Array = b + 0.5 * f * bend
     return curve
 
 
@@ -290,8 +282,7 @@ def map_along_grain(patch: Patch, repeat_m: float) -> Patch:
     low, high = patch.bounds_m()
     axes = np.argsort(-np.round(high - low, 6), kind="stable")
     corners = patch.corners_m
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    facing = np.abs(cross).argmax(axis=1)
+    facing = np.abs(face_crosses(corners)).argmax(axis=1)
     u_axis = np.where(facing == axes[0], axes[1], axes[0])
     v_axis = 3 - facing - u_axis
     place = corners - low + 1.618 * (low + high)
@@ -307,24 +298,11 @@ def _quads(points: Array) -> Array:
     return np.array(pairs.reshape(-1, 3, points.shape[2]))
 
 
-def _tangents(path: Array, closed: bool) -> Array:
-    if closed:
-        steps = np.roll(path, -1, axis=0) - np.roll(path, 1, axis=0)
-    else:
-        steps = np.gradient(path, axis=0)
-    unit: Array = steps / np.sqrt((steps**2).sum(axis=1, keepdims=True))
-    return unit
-
-
 def _rounded_ticks(half: float, radius: float, steps: int) -> Array:
     """Positions along a face whose projection on the rounding is even in angle."""
     angles = np.linspace(0.25 * math.pi, 0.0, steps + 1)
     edge = -(half - radius) - radius * np.tan(angles)
-    return (
-        np.concatenate([edge, -edge[::-1]])
-        if half > radius + 1e-9
-        else np.concatenate([edge, -edge[-2::-1]])
-    )
+    return np.concatenate([edge, -edge[::-1] if half > radius + 1e-9 else -edge[-2::-1]])
 
 
 def _plain_box(size: Sequence[float]) -> Patch:
@@ -332,16 +310,8 @@ def _plain_box(size: Sequence[float]) -> Patch:
     patches = []
     for axes in BOX_FACES.values():
         outward, right, up = (np.array(axis) * half for axis in axes)
-        patches.append(
-            grid(
-                np.stack(
-                    [
-                        np.stack([outward - right + s * up, outward + right + s * up])
-                        for s in (-1.0, 1.0)
-                    ]
-                )
-            )
-        )
+        rows = [[outward - right + s * up, outward + right + s * up] for s in (-1.0, 1.0)]
+        patches.append(grid(np.array(rows)))
     return join_patches(patches)
 
 
@@ -351,17 +321,12 @@ def _wind_loop(loop: Array, sign: float) -> Array:
 
 def _inset(loop: Array, distance: float) -> Array:
     """The loop moved to its left by ``distance``, corners mitred."""
-    step = np.roll(loop, -1, axis=0) - loop
-    step = step / np.sqrt((step**2).sum(axis=1, keepdims=True))
+    step = unit(np.roll(loop, -1, axis=0) - loop)
     left = np.stack([-step[:, 1], step[:, 0]], axis=1)
     before = np.roll(left, 1, axis=0)
     mitre = (left + before) / np.maximum(1.0 + (left * before).sum(axis=1, keepdims=True), 0.3)
     moved: Array = loop + distance * mitre
     return moved
-
-
-def _at_height(loop: Array, z: float) -> Array:
-    return np.concatenate([loop, np.full((len(loop), 1), z)], axis=1)
 
 
 def _cap(loops: Sequence[Array], z: float, slot: int) -> Patch:
@@ -396,9 +361,8 @@ def triangulate(outline: Array, holes: Sequence[Array] = ()) -> Array:
 
 def _double_areas(a: Array, b: Array, c: Array) -> Array:
     """Twice the signed areas of triangles."""
-    doubled: Array = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (
-        c[..., 0] - a[..., 0]
-    )
+    (ux, uy), (vx, vy) = (np.moveaxis(p - a, -1, 0) for p in (b, c))
+    doubled: Array = ux * vy - uy * vx
     return doubled
 
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     GLAZES,
@@ -15,15 +16,7 @@ from gen_data.generator.assets.procedural.material_presets import (
     lighten,
     plastic_material,
 )
-from gen_data.generator.assets.procedural.patches import Array, Patch, make_centred_solid
-from gen_data.generator.assets.procedural.surface_shapes import (
-    Point2,
-    circle,
-    fillet,
-    lathe,
-    space_evenly,
-    sweep,
-)
+from gen_data.generator.assets.procedural.patches import Array, Patch, make_centred_solid, unit
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
@@ -43,25 +36,21 @@ def mug(seed: int) -> Solid:
     profile = _cup_profile(top, bottom, height, wall, bulge)
     path = _handle_path(top, bottom, height, wall, bulge, rng)
     across = rng.between(0.0045, 0.006), rng.between(0.0065, 0.0095)
-    section = circle(1.0, 12) * np.array(across)
-    handle = sweep(path, section, scale=_flare_factors(len(path)), slot=2)
+    section = shapes.circle(1.0, 12) * np.array(across)
+    handle = shapes.sweep(path, section, scale=_flare_factors(len(path)), slot=2)
     outside = ceramic_material(rng)
     inside = Material(lighten(outside.base_color, rng.between(0.5, 0.95)), outside.roughness)
     grip = inside if rng.chance(0.15) else outside
-    rings = hulls.ring((bottom - wall, bottom, wall), (top - wall, top, height), 14)
+    low, high = (bottom - wall, bottom, wall), (top - wall, top, height)
+    rings = hulls.ring(low, high, 14)
     if bulge > 0:
         middle = 0.5 * (top + bottom) + bulge
-        rings = [
-            *hulls.ring((bottom - wall, bottom, wall), (middle - wall, middle, 0.5 * height), 8),
-            *hulls.ring((middle - wall, middle, 0.5 * height), (top - wall, top, height), 9),
-        ]
+        waist = (middle - wall, middle, 0.5 * height)
+        rings = [*hulls.ring(low, waist, 8), *hulls.ring(waist, high, 9)]
     base = hulls.frustum((bottom, 0.0), (bottom, wall + 0.001))
     grip_hulls = hulls.tube(path[[0, 4, 9, 13, 18, 22]], 0.8 * across[1])
-    return make_centred_solid(
-        [*_lathe_two_sided(profile, 32), handle],
-        (outside, inside, grip),
-        [base, *rings, *grip_hulls],
-    )
+    patches, parts = [*_lathe_two_sided(profile, 32), handle], [base, *rings, *grip_hulls]
+    return make_centred_solid(patches, (outside, inside, grip), parts)
 
 
 def cup(seed: int) -> Solid:
@@ -86,23 +75,15 @@ def bowl(seed: int) -> Solid:
     wall, fullness = rng.between(0.003, 0.005), rng.between(0.55, 0.85)
     outer = _bowl_curve(foot, radius, lift, height, fullness)
     inner = _offset(outer, wall)
-    profile = [
-        (0.0, 0.6 * lift),
-        (foot - 0.005, 0.6 * lift),
-        (foot - 0.004, 0.0),
-        (foot, 0.0),
-        *((float(r), float(z)) for r, z in outer),
-        (radius - 0.5 * wall, height + 0.5 * wall),
-        *((float(r), float(z)) for r, z in inner[::-1]),
-        (0.0, float(inner[0, 1])),
-    ]
+    below = [(0.0, 0.6 * lift), (foot - 0.005, 0.6 * lift), (foot - 0.004, 0.0), (foot, 0.0)]
+    rim = height + 0.5 * wall
+    within = [*inner[::-1].tolist(), (0.0, float(inner[0, 1]))]
+    profile = [*below, *outer.tolist(), (radius - 0.5 * wall, rim), *within]
     outside = ceramic_material(rng)
-    inside = (
-        outside if rng.chance(0.5) else ceramic_material(rng, ("#f4f1ea", "#e9e4d8", "#d9dfe2"))
-    )
+    inside = outside if rng.chance(0.5) else ceramic_material(rng, GLAZES[:3])
     # The floor lies about as high as the wall's outside after a fifth of its curve.
     levels = []
-    for i, z in ((2, float(outer[2, 1])), (5, float(outer[5, 1])), (9, height + 0.5 * wall)):
+    for i, z in ((2, float(outer[2, 1])), (5, float(outer[5, 1])), (9, rim)):
         levels.append((float(np.interp(z, inner[:, 1], inner[:, 0])), float(outer[i, 0]), z))
     parts = [
         hulls.frustum((foot, 0.0), (levels[0][1], levels[0][2])),
@@ -119,29 +100,24 @@ def plate(seed: int) -> Solid:
     rise, wall = rng.between(0.016, 0.026), rng.between(0.0035, 0.005)
     well, foot = radius * rng.between(0.6, 0.72), radius * rng.between(0.5, 0.58)
     step = rise * rng.between(0.45, 0.7)
-    upper = fillet(
-        [(radius, rise), (well + 0.35 * (radius - well), step + 0.002), (well, 0.002 + wall),
-         (0.0, 0.002 + wall)],
-        0.014,
-        3,
-    )  # fmt: skip
-    lower = fillet(
-        [(0.0, 0.002), (foot - 0.004, 0.002), (foot - 0.003, 0.0), (foot, 0.0),
-         (foot + 0.002, 0.002), (well, 0.0025),
-         (well + 0.35 * (radius - well), step + 0.002 - wall), (radius, rise - 0.8 * wall)],
-        [0.0] * 5 + [0.012, 0.012, 0.0],
-        3,
-    )  # fmt: skip
-    profile = [*lower, (radius + 0.4 * wall, rise - 0.4 * wall), *upper]
-    outside = ceramic_material(rng, GLAZES[:5] + GLAZES[:3] + GLAZES)
-    inside = (
-        outside if rng.chance(0.7) else Material(draw_linear(GLAZES, 0.08, rng), outside.roughness)
+    bend, floor = well + 0.35 * (radius - well), 0.002 + wall
+    upper = shapes.fillet(
+        [(radius, rise), (bend, step + 0.002), (well, floor), (0.0, floor)], 0.014, 3
     )
-    rim = [(well - 0.004, 0.0015), (well - 0.004, 0.002 + wall),
-           (well + 0.35 * (radius - well), step + 0.002), (radius + 0.4 * wall, rise),
-           (radius + 0.4 * wall, rise - 0.8 * wall)]  # fmt: skip
+    under = [(0.0, 0.002), (foot - 0.004, 0.002), (foot - 0.003, 0.0), (foot, 0.0),
+             (foot + 0.002, 0.002), (well, 0.0025), (bend, step + 0.002 - wall),
+             (radius, rise - 0.8 * wall)]  # fmt: skip
+    lower = shapes.fillet(under, [0.0] * 5 + [0.012, 0.012, 0.0], 3)
+    edge = radius + 0.4 * wall
+    profile = [*lower, (edge, rise - 0.4 * wall), *upper]
+    outside = ceramic_material(rng, GLAZES[:5] + GLAZES[:3] + GLAZES)
+    inside = outside
+    if not rng.chance(0.7):
+        inside = Material(draw_linear(GLAZES, 0.08, rng), outside.roughness)
+    rim = [(well - 0.004, 0.0015), (well - 0.004, floor), (bend, step + 0.002), (edge, rise),
+           (edge, rise - 0.8 * wall)]  # fmt: skip
     walls = hulls.wedges(rim, 20)
-    base = hulls.frustum((foot, 0.0), (well, 0.002 + wall), 24)
+    base = hulls.frustum((foot, 0.0), (well, floor), 24)
     return make_centred_solid(_lathe_two_sided(profile, 48), (outside, inside), [base, *walls])
 
 
@@ -152,15 +128,13 @@ def tumbler(seed: int) -> Solid:
     bottom, wall = top * rng.between(0.74, 0.98), rng.between(0.0016, 0.0026)
     floor = rng.between(0.006, 0.013)
     inner = bottom - wall + (top - bottom) * floor / height
-    profile = fillet(
-        [(0.0, 0.001), (0.75 * bottom, 0.001), (0.85 * bottom, 0.0), (bottom, 0.0),
-         (top, height), (top - wall, height), (inner, floor), (0.0, floor)],
-        [0.0, 0.0, 0.0, 0.003, 0.45 * wall, 0.45 * wall, 0.005, 0.0],
-        4,
-    )  # fmt: skip
+    rim = 0.45 * wall
+    outer = [(0.0, 0.001), (0.75 * bottom, 0.001), (0.85 * bottom, 0.0), (bottom, 0.0)]
+    within = [(top, height), (top - wall, height), (inner, floor), (0.0, floor)]
+    profile = shapes.fillet([*outer, *within], [0.0, 0.0, 0.0, 0.003, rim, rim, 0.005, 0.0], 4)
     base = hulls.frustum((bottom, 0.0), (bottom + (top - bottom) * floor / height, floor))
     walls = hulls.ring((inner, bottom, floor), (top - wall, top, height), 14)
-    return make_centred_solid([lathe(profile, 48)], (_glass(rng),), [base, *walls])
+    return make_centred_solid([shapes.lathe(profile, 48)], (_glass(rng),), [base, *walls])
 
 
 def wine_glass(seed: int) -> Solid:
@@ -177,39 +151,36 @@ def wine_glass(seed: int) -> Solid:
     below = [(0.0, 0.0015), (0.8 * foot, 0.0015), (foot, 0.0), (foot, 0.002), (stem, 0.008)]
     rounded = [0.0, 0.0, 0.0004, 0.0004, 0.012, 0.02, 0.03, 0.05]
     within = [0.45 * wall, 0.45 * wall, 0.05, 0.025, 0.0]
-    profile = fillet([*below, *outer, *inner], [*rounded, *within], 2)
-    levels = [_ring_section(rim, wall, height), _ring_section(belly, wall, wide)]
+    profile = shapes.fillet([*below, *outer, *inner], [*rounded, *within], 2)
+    top, middle = (rim - wall, rim, height), (belly - wall, belly, wide)
     floor = (0.5 * belly, 0.62 * belly, low + 0.008)
     parts = [
         hulls.frustum((foot, 0.0), (foot, 0.003)),
-        hulls.frustum((stem, 0.003), (stem, low - 0.008)),
-        hulls.frustum((stem, low - 0.008), (0.62 * belly, low + 0.008)),
-        *hulls.ring(floor, levels[1], 10),
-        *hulls.ring(levels[1], levels[0], 10),
+        *hulls.stack([(stem, 0.003), (stem, low - 0.008), floor[1:]]),
+        *hulls.ring(floor, middle, 10),
+        *hulls.ring(middle, top, 10),
     ]
-    return make_centred_solid([lathe(profile, 32)], (_glass(rng),), parts)
+    return make_centred_solid([shapes.lathe(profile, 32)], (_glass(rng),), parts)
 
 
-def _lathe_two_sided(profile: list[Point2], segments: int) -> list[Patch]:
+def _lathe_two_sided(profile: list[shapes.Point2], segments: int) -> list[Patch]:
     """The profile turned about Z: slot 0 up to the highest point, slot 1 from there inward."""
     k = max(range(len(profile)), key=lambda i: profile[i][1])
-    return [lathe(profile[: k + 1], segments, 0), lathe(profile[k:], segments, 1)]
+    return [shapes.lathe(profile[: k + 1], segments, 0), shapes.lathe(profile[k:], segments, 1)]
 
 
 def _cup_profile(
     top: float, bottom: float, height: float, wall: float, bulge: float
-) -> list[Point2]:
+) -> list[shapes.Point2]:
     """Closed profile of a beaker: foot, outer wall, rounded rim, inner wall."""
-    middle = 0.5 * (top + bottom) + bulge
-    waist = [(middle, 0.5 * height)] if bulge > 0 else []
-    inner_waist = [(middle - wall, 0.5 * height)] if bulge > 0 else []
-    points = [(0.0, 0.0015), (0.78 * bottom, 0.0015), (0.8 * bottom, 0.0), (bottom, 0.0),
-              *waist, (top, height), (top - wall, height), *inner_waist, (bottom - wall, wall),
-              (0.0, wall)]  # fmt: skip
-    rim = 0.45 * wall
-    radii = [0.0, 0.0, 0.0, 0.007, *([0.12] if waist else []), rim, rim,
-             *([0.12] if waist else []), 0.006, 0.0]  # fmt: skip
-    return fillet(points, radii, 4)
+    middle, rim = 0.5 * (top + bottom) + bulge, 0.45 * wall
+    rounded = [(0.0, 0.0015, 0.0), (0.78 * bottom, 0.0015, 0.0), (0.8 * bottom, 0.0, 0.0),
+               (bottom, 0.0, 0.007), (middle, 0.5 * height, 0.12), (top, height, rim),
+               (top - wall, height, rim), (middle - wall, 0.5 * height, 0.12),
+               (bottom - wall, wall, 0.006), (0.0, wall, 0.0)]  # fmt: skip
+    if bulge <= 0:
+        del rounded[7], rounded[4]
+    return shapes.fillet([(r, z) for r, z, _ in rounded], [radius for _, _, radius in rounded], 4)
 
 
 def _handle_path(
@@ -231,7 +202,7 @@ def _handle_path(
     z = low + (high - low) * 0.5 * (1.0 + np.sin(turn))
     x = np.array([wall_at(float(h)) for h in z]) + reach * out
     x[[0, -1]] = wall_at(high), wall_at(low)
-    return space_evenly(np.stack([x, np.zeros_like(x), z], axis=1), 23)
+    return shapes.space_evenly(np.stack([x, np.zeros_like(x), z], axis=1), 23)
 
 
 def _flare_factors(count: int) -> Array:
@@ -250,14 +221,9 @@ def _bowl_curve(foot: float, radius: float, lift: float, height: float, fullness
 
 def _offset(curve: Array, distance: float) -> Array:
     """The curve moved to its left (inward, upward)."""
-    step = np.gradient(curve, axis=0)
-    step = step / np.sqrt((step**2).sum(axis=1, keepdims=True))
+    step = unit(np.gradient(curve, axis=0))
     moved: Array = curve + distance * np.stack([-step[:, 1], step[:, 0]], axis=1)
     return moved
-
-
-def _ring_section(radius: float, wall: float, z: float) -> tuple[float, float, float]:
-    return (radius - wall, radius, z)
 
 
 def _glass(rng: VariantRng) -> Material:

@@ -3,16 +3,8 @@
 from __future__ import annotations
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural import material_presets as presets
 from gen_data.generator.assets.procedural.family import Solid
-from gen_data.generator.assets.procedural.material_presets import (
-    GLAZES,
-    PLASTICS,
-    WOODS,
-    ceramic_material,
-    draw_linear,
-    plastic_material,
-    printed_material,
-)
 from gen_data.generator.assets.procedural.patches import make_centred_solid, make_solid_in_place
 from gen_data.generator.assets.procedural.surface_shapes import ball as sphere
 from gen_data.generator.assets.procedural.surface_shapes import fillet, lathe, rounded_box, spline
@@ -27,28 +19,24 @@ def block(seed: int) -> Solid:
     """A wooden or plastic building block. Slot: body."""
     rng = variant_rng("block", seed)
     x, y, z = (side * rng.between(0.95, 1.05) for side in in_turn(_SHAPES, seed))
-    bare = rng.chance(0.25)
-    paint = (
-        Material(draw_linear(WOODS, 0.08, rng), 0.6)
-        if bare
-        else plastic_material(rng, PLASTICS[:8])
-    )
+    if rng.chance(0.25):
+        paint = Material(presets.draw_linear(presets.WOODS, 0.08, rng), 0.6)
+    else:
+        paint = presets.plastic_material(rng, presets.PLASTICS[:8])
     body = rounded_box((x, y, z), 0.0025, 2)
-    return make_centred_solid(
-        [body], (paint,), [hulls.box((-x / 2, -y / 2, -z / 2), (x / 2, y / 2, z / 2))]
-    )
+    hull = hulls.box((-x / 2, -y / 2, -z / 2), (x / 2, y / 2, z / 2))
+    return make_centred_solid([body], (paint,), [hull])
 
 
 def ball(seed: int) -> Solid:
     """A tennis, rubber, beach, basket or foot ball; the small ones are toys. Slot: cover."""
     rng = variant_rng("ball", seed)
     kind = ball_kind(seed)
-    radius = {"tennis": 0.0334, "rubber": rng.between(0.02, 0.035)}.get(
-        kind, rng.between(0.05, 0.09)
-    )
+    small, large = rng.between(0.02, 0.035), rng.between(0.05, 0.09)
+    radius = {"tennis": 0.0334, "rubber": small}.get(kind, large)
     rough = {"tennis": 0.9, "basket": 0.65}.get(kind, rng.between(0.3, 0.5))
     body = sphere(lambda d: radius * d, 22, 36)
-    cover = printed_material(f"texture/ball_cover?seed={seed}", rough)
+    cover = presets.printed_material(f"texture/ball_cover?seed={seed}", rough)
     # A single small hull has flat sides that a ball would rest on; four rotated ones roll.
     parts = [hulls.extreme(body.corners_m, turn_rad=turn) for turn in (0.0, 0.5, 1.1, 1.7)]
     return make_centred_solid([body], (cover,), parts)
@@ -77,28 +65,16 @@ def candle(seed: int) -> Solid:
     """A pillar candle with a wick. Slots: wax, wick."""
     rng = variant_rng("candle", seed)
     radius, height = rng.between(0.022, 0.04), rng.between(0.05, 0.15)
-    wax = fillet(
-        [(0.0, 0.0), (radius, 0.0), (radius, height), (0.75 * radius, height - 0.003),
-         (0.0, height - 0.006)],
-        [0.0, 0.002, 0.003, 0.004, 0.0],
-        3,
-    )  # fmt: skip
-    wick = lathe(
-        [(0.0, height - 0.008), (0.001, height - 0.008), (0.001, height + 0.007),
-         (0.0, height + 0.0075)],
-        8,
-        1,
-    )  # fmt: skip
+    rim = [(radius, height), (0.75 * radius, height - 0.003), (0.0, height - 0.006)]
+    wax = fillet([(0.0, 0.0), (radius, 0.0), *rim], [0.0, 0.002, 0.003, 0.004, 0.0], 3)
+    thread = ((0.0, -0.008), (0.001, -0.008), (0.001, 0.007), (0.0, 0.0075))
+    wick = lathe([(r, height + z) for r, z in thread], 8, 1)
     colors = ("#f1e8d2", "#e9dcc0", "#a83a34", "#3f5a4a", "#d9a441", "#7d8fa3", "#c58b8b")
-    material = Material(draw_linear(colors, 0.05, rng), rng.between(0.4, 0.6))
-    return make_centred_solid(
-        [lathe(wax, 32), wick],
-        (material, Material((0.02, 0.02, 0.02), 0.9)),
-        [
-            hulls.frustum((radius, 0.0), (radius, height)),
-            hulls.frustum((0.001, height), (0.001, height + 0.0075), 6),
-        ],
-    )
+    material = Material(presets.draw_linear(colors, 0.05, rng), rng.between(0.4, 0.6))
+    soot = Material((0.02, 0.02, 0.02), 0.9)
+    tip = hulls.frustum((0.001, height), (0.001, height + 0.0075), 6)
+    parts = [hulls.frustum((radius, 0.0), (radius, height)), tip]
+    return make_centred_solid([lathe(wax, 32), wick], (material, soot), parts)
 
 
 def vase(seed: int) -> Solid:
@@ -107,24 +83,15 @@ def vase(seed: int) -> Solid:
     height, belly = rng.between(0.15, 0.27), rng.between(0.04, 0.06)
     foot, neck = belly * rng.between(0.55, 0.75), belly * rng.between(0.3, 0.6)
     mouth, widest = neck * rng.between(1.1, 1.6), rng.between(0.3, 0.55)
-    curve = spline(
-        [(foot, 0.004), (belly, widest * height),
-         (0.5 * (belly + neck), 0.5 * (widest + 0.8) * height), (neck, 0.82 * height),
-         (mouth, height)],
-        17,
-    )  # fmt: skip
+    waist = (0.5 * (belly + neck), 0.5 * (widest + 0.8) * height)
+    knots = [(foot, 0.004), (belly, widest * height), waist, (neck, 0.82 * height), (mouth, height)]
     wall = 0.004
-    inner = [(float(r) - wall, float(z)) for r, z in curve[::-1] if z > 0.02]
-    outer = [(float(r), float(z)) for r, z in curve]
+    outer = [(float(r), float(z)) for r, z in spline(knots, 17)]
+    inner = [(r - wall, z) for r, z in outer[::-1] if z > 0.02]
     profile = [(0.0, 0.001), (foot - 0.004, 0.001), (foot - 0.003, 0.0), (foot, 0.0), *outer]
-    outside = ceramic_material(rng, GLAZES)
+    outside = presets.ceramic_material(rng, presets.GLAZES)
     inside = Material(outside.base_color, 0.4)
     stages = [(foot, 0.0), *outer[2:16:2], (mouth, height + 0.0015)]
-    return make_centred_solid(
-        [
-            lathe(profile, 32),
-            lathe([outer[-1], (mouth - 0.5 * wall, height + 0.0015), *inner, (0.0, 0.018)], 32, 1),
-        ],
-        (outside, inside),
-        hulls.stack(stages),
-    )
+    within = [outer[-1], (mouth - 0.5 * wall, height + 0.0015), *inner, (0.0, 0.018)]
+    patches = [lathe(profile, 32), lathe(within, 32, 1)]
+    return make_centred_solid(patches, (outside, inside), hulls.stack(stages))

@@ -6,19 +6,17 @@ length join end to end.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
-from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
+from gen_data.generator.assets.procedural.family import Facts, Solid, choose_option
 from gen_data.generator.assets.procedural.material_presets import (
     painted_material,
     patterned_material,
 )
 from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.surface_shapes import block, extrude, grid
-from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import facing_rectangle, make_solid, post
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
 from gen_data.generator.core.asset_types import Material
@@ -36,7 +34,7 @@ def barrier(seed: int, style: str) -> Solid:
 
 def barrier_facts(seed: int, style: str) -> Facts:
     """Its kind. Raises AssetError for an unknown style."""
-    return Facts(_choose_style("barrier", seed, style, BARRIERS))
+    return Facts(choose_option("barrier", "style", style, BARRIERS, seed))
 
 
 def fence(seed: int, style: str) -> Solid:
@@ -47,48 +45,31 @@ def fence(seed: int, style: str) -> Solid:
     hull = hulls.box((-0.06, -half, 0.0), (0.06, half, h))
     if kind == "wall":
         return _garden_wall(half, h, seed)
-    posts = [
-        block((-0.035, y - 0.035, 0.0), (0.035, y + 0.035, h)) for y in (-half + 0.04, half - 0.04)
-    ]
+    ends = (-half + 0.04, half - 0.04)
+    posts = [block((-0.035, y - 0.035, 0.0), (0.035, y + 0.035, h)) for y in ends]
     if kind == "pickets":
         bars = np.linspace(-half + 0.14, half - 0.14, round(2 * half / 0.13))
         parts = [block((0.03, y - 0.04, 0.06), (0.05, y + 0.04, h)) for y in bars]
         parts += [block((-0.01, -half, z), (0.03, half, z + 0.07)) for z in (0.25, h - 0.3)]
-        wood = patterned_material(
-            "texture/wood_grain?seed=5", 1.2, 0.8, rng.choose(((0.6, 0.56, 0.5), (0.85, 0.83, 0.8)))
-        )
+        tint = rng.choose(((0.6, 0.56, 0.5), (0.85, 0.83, 0.8)))
+        wood = patterned_material("texture/wood_grain?seed=5", 1.2, 0.8, tint)
         return make_solid([*posts, *parts], (wood,), [hull])
     if kind == "panel":
         panel = block((-0.015, -half + 0.08, 0.08), (0.015, half - 0.08, h + 0.3))
-        tall = [
-            block((-0.04, y - 0.04, 0.0), (0.04, y + 0.04, h + 0.34))
-            for y in (-half + 0.04, half - 0.04)
-        ]
+        tall = [block((-0.04, y - 0.04, 0.0), (0.04, y + 0.04, h + 0.34), slot=1) for y in ends]
         wood = patterned_material("texture/wood_planks?seed=2", 1.4, 0.8, (0.7, 0.66, 0.62))
-        return make_solid(
-            [panel, *(p.painted(1) for p in tall)], (wood, painted_material("#5b4a3c", 0.7)), [hull]
-        )
-    wires = [
-        facing_rectangle(0.0, (y - 0.004, y + 0.004), (0.05, h))
-        for y in np.arange(-half + 0.1, half - 0.05, 0.06)
-    ]
-    wires += [
-        block((-0.008, -half, z), (0.008, half, z + 0.012)) for z in np.linspace(0.06, h - 0.03, 5)
-    ]
+        return make_solid([panel, *tall], (wood, painted_material("#5b4a3c", 0.7)), [hull])
+    at = np.arange(-half + 0.1, half - 0.05, 0.06)
+    wires = [facing_rectangle(0.0, (y - 0.004, y + 0.004), (0.05, h)) for y in at]
+    levels = np.linspace(0.06, h - 0.03, 5)
+    wires += [block((-0.008, -half, z), (0.008, half, z + 0.012)) for z in levels]
     paint = painted_material(rng.choose(("#2f4236", "#3b3d3f")), 0.5)
     return make_solid([*posts, *wires], (paint,), [hull])
 
 
 def fence_facts(seed: int, style: str) -> Facts:
     """Its kind. Raises AssetError for an unknown style."""
-    return Facts(_choose_style("fence", seed, style, FENCES))
-
-
-def _choose_style(family: str, seed: int, style: str, styles: Sequence[str]) -> str:
-    if style == "any":
-        return in_turn(styles, seed)
-    check_option(family, "style", style, ("any", *styles))
-    return style
+    return Facts(choose_option("fence", "style", style, FENCES, seed))
 
 
 def _guard_rail(seed: int) -> Solid:
@@ -110,10 +91,8 @@ def _jersey(seed: int) -> Solid:
     """A concrete safety shape, 2 m long: foot 0.6 m, 0.8-0.9 m high."""
     rng = variant_rng("barrier/jersey", seed)
     half, h = 1.0, rng.between(0.8, 0.9)
-    section = np.array(
-        [(0.0, -0.3), (0.08, -0.3), (0.33, -0.17), (h, -0.09), (h, 0.09), (0.33, 0.17),
-         (0.08, 0.3), (0.0, 0.3)]
-    )  # fmt: skip
+    flank = [(0.0, 0.3), (0.08, 0.3), (0.33, 0.17), (h, 0.09)]
+    section = np.array([*((z, -y) for z, y in flank), *flank[::-1]])
     prism = extrude(section, 2 * half, 0.008).rotated("y", -0.5 * np.pi)
     # The section's first axis has become Z, the extrusion runs along -X: turn it to Y.
     lying = prism.rotated("z", 0.5 * np.pi)
@@ -121,8 +100,7 @@ def _jersey(seed: int) -> Solid:
     x, y, _ = (0.5 * (low + high)).tolist()
     body = lying.moved(-x, -y, -float(low[2]))
     concrete = patterned_material("texture/concrete?seed=3", 2.0, 0.92, (0.95, 0.94, 0.92))
-    hull = hulls.extreme(body.corners_m, 32)
-    return make_solid([body], (concrete,), [hull])
+    return make_solid([body], (concrete,), [hulls.extreme(body.corners_m, 32)])
 
 
 def _construction(seed: int) -> Solid:
@@ -132,16 +110,11 @@ def _construction(seed: int) -> Solid:
     boards = []
     for low in ((z, z + 0.2), (0.25, 0.35))[: rng.choose((1, 2, 2))]:
         boards += _striped_board(half, low, fields)
-    legs = [
-        block((-0.02, y - 0.02, 0.05), (0.01, y + 0.02, 1.1)) for y in (-half + 0.15, half - 0.15)
-    ]
-    feet = [
-        block((-0.4, y - 0.13, 0.0), (0.4, y + 0.13, 0.1), 0.01)
-        for y in (-half + 0.15, half - 0.15)
-    ]
-    parts = [*boards, *(p.painted(2) for p in legs), *(p.painted(3) for p in feet)]
-    for y in (-half + 0.15, half - 0.15) if seed % 2 else ():
-        parts.append(post(0.075, (1.1, 1.26), (0.0, y, 0.0), 12).painted(4))
+    ends = (-half + 0.15, half - 0.15)
+    legs = [block((-0.02, y - 0.02, 0.05), (0.01, y + 0.02, 1.1), slot=2) for y in ends]
+    feet = [block((-0.4, y - 0.13, 0.0), (0.4, y + 0.13, 0.1), 0.01, 3) for y in ends]
+    lamps = [post(0.075, (1.1, 1.26), (0.0, y, 0.0), 12).painted(4) for y in ends]
+    parts = [*boards, *legs, *feet, *(lamps if seed % 2 else ())]
     slots = (
         painted_material("#b9261c", 0.4),
         painted_material("#e8e7e2", 0.4),
@@ -157,12 +130,10 @@ def _striped_board(half: float, z_m: tuple[float, float], fields: int) -> list[P
     (z0, z1), step = z_m, 2 * half / fields
     lean = 0.35 * step
     board = block((0.012, -half, z0), (0.03, half, z1), slot=1)
-    stripes = []
+    x, stripes = 0.032, []
     for k in range(0, fields, 2):
         a, b = -half + k * step, -half + (k + 1) * step
-        corners = np.array(
-            [[(0.032, a, z0), (0.032, b, z0)], [(0.032, a + lean, z1), (0.032, b + lean, z1)]]
-        )
+        corners = np.array([[(x, a, z0), (x, b, z0)], [(x, a + lean, z1), (x, b + lean, z1)]])
         stripes.append(grid(np.clip(corners, None, np.array([1.0, half, 2.0]))))
     return [board, *stripes]
 
@@ -172,12 +143,9 @@ def _garden_wall(half: float, h: float, seed: int) -> Solid:
     low: Vec3 = (-0.12, -half, 0.0)
     body = block(low, (0.12, half, h - 0.06))
     cap = block((-0.16, -half, h - 0.06), (0.16, half, h), 0.01).painted(1)
-    kind = (
-        ("brick", 4, 1.1, (0.9, 0.88, 0.86))
-        if seed % 8 < 4
-        else ("plaster", 5, 2.5, (0.62, 0.58, 0.5))
-    )
-    name, k, scale, color = kind
-    skin = patterned_material(f"texture/{name}?seed={k}", scale, 0.92, color)
+    if seed % 8 < 4:
+        skin = patterned_material("texture/brick?seed=4", 1.1, 0.92, (0.9, 0.88, 0.86))
+    else:
+        skin = patterned_material("texture/plaster?seed=5", 2.5, 0.92, (0.62, 0.58, 0.5))
     stone = patterned_material("texture/concrete?seed=3", 1.5, 0.9)
     return make_solid([body, cap], (skin, stone), [hulls.box(low, (0.12, half, h))])

@@ -12,7 +12,6 @@ import numpy as np
 
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import (
-    CREASE_DEG,
     Array,
     Patch,
     join_patches,
@@ -31,7 +30,6 @@ def make_solid(
     materials: Sequence[Material],
     hulls_m: Iterable[Array],
     keypoints: Sequence[Keypoint] = (),
-    crease_deg: float = CREASE_DEG,
 ) -> Solid:
     """A solid that keeps its frame; materials that no triangle uses are left out."""
     patch = join_patches(patches)
@@ -39,7 +37,7 @@ def make_solid(
     numbers = np.zeros(len(materials), dtype=np.int64)
     numbers[used] = np.arange(len(used))
     compact = replace(patch, slots=numbers[patch.slots])
-    made = make_solid_in_place((compact,), [materials[k] for k in used], hulls_m, crease_deg)
+    made = make_solid_in_place((compact,), [materials[k] for k in used], hulls_m)
     return replace(made, keypoints=tuple(keypoints))
 
 
@@ -63,10 +61,10 @@ def post(radius_m: float, z_m: Span, at: Vec3 = (0.0, 0.0, 0.0), sides: int = 10
     return cone((radius_m, z_m[0]), (radius_m, z_m[1]), sides).moved(*at)
 
 
-def tube(path: Sequence[Vec3], radius_m: float, sides: int = 8, slot: int = 0) -> Patch:
+def tube(path: Sequence[Vec3], radius_m: float, sides: int = 8) -> Patch:
     """A round bar along a path."""
     points = np.array(path, dtype=np.float64)
     start = points[1] - points[0]
     # The section's first axis must not lie along the path.
     up = (0.0, 0.0, 1.0) if abs(start[2]) < 0.9 * np.sqrt((start**2).sum()) else (0.0, 1.0, 0.0)
-    return sweep(points, circle(radius_m, sides), up=up, slot=slot)
+    return sweep(points, circle(radius_m, sides), up=up)

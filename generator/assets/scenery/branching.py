@@ -19,6 +19,7 @@ from gen_data.generator.assets.procedural.patches import (
     Patch,
     join_patches,
     round_values,
+    unit,
 )
 from gen_data.generator.assets.procedural.surface_shapes import circle, sweep
 from gen_data.generator.core.se3 import Vec3
@@ -130,8 +131,7 @@ def _shoots(
     nodes: Array, parents: Sequence[int], free: Array, nearest: Indices, step_m: float
 ) -> list[tuple[int, Array]]:
     """New nodes: one step from each node towards the mean of the points it is nearest to."""
-    towards = free - nodes[nearest]
-    towards = towards / np.sqrt((towards**2).sum(axis=1, keepdims=True))
+    towards = unit(free - nodes[nearest])
     mean = np.stack([np.bincount(nearest, towards[:, i], len(nodes)) for i in range(3)], axis=1)
     shoots = []
     for k in np.unique(nearest).tolist():

@@ -7,7 +7,7 @@ houses, windows of 1.0-1.5 m by 1.2-1.9 m, sills 0.8-0.95 m above the floor.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from gen_data.generator.assets.procedural.data_tables import load_table
@@ -16,6 +16,7 @@ from gen_data.generator.assets.procedural.material_presets import (
     draw_linear,
     hex_to_linear,
     jitter_color,
+    printed_material,
 )
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
@@ -140,13 +141,7 @@ def building_materials(plan: Design, seed: int) -> tuple[Material, ...]:
         _plain_material(rng.choose(_COLORS["doors"]), 0.5, "trim"),
         Material(hex_to_linear(seam), roughness=0.5, metallic=0.6, role="chrome"),
         _roof(rng),
-        Material(
-            (1.0, 1.0, 1.0),
-            roughness=0.5,
-            texture=f"texture/shop_sign?seed={seed % 12}",
-            printed=True,
-            role="sign",
-        ),
+        replace(printed_material(f"texture/shop_sign?seed={seed % 12}", 0.5), role="sign"),
         _plain_material(rng.choose(cloth), 0.7, "trim"),
         _textured_material("brick", 4, (0.8, 0.78, 0.76), 1.1, "trim"),
     )
@@ -155,12 +150,10 @@ def building_materials(plan: Design, seed: int) -> tuple[Material, ...]:
 def _wall(cladding: Cladding, tints: Sequence[str], rng: VariantRng) -> Material:
     if cladding == "brick":
         seed, level = rng.choose((4, 9, 12)), rng.between(0.75, 1.0)
-        return _textured_material("brick", seed, (level, level, level), 1.1, "facade")
+        return _textured_material("brick", seed, (level, level, level), 1.1)
     if cladding == "concrete":
         level = rng.between(0.8, 1.0)
-        return _textured_material(
-            "concrete", rng.choose((0, 3)), (level, level, level), 2.6, "facade"
-        )
+        return _textured_material("concrete", rng.choose((0, 3)), (level, level, level), 2.6)
     if cladding == "stone":
         return _textured_material("ashlar", 0, draw_linear(_COLORS["stones"], 0.06, rng), 2.4)
     return _textured_material("plaster", 5, draw_linear(tints, 0.05, rng), 2.5)

@@ -33,9 +33,13 @@ def building(seed: int, style: str) -> Solid:
     """A building of a style; see ``facade`` for its material slots."""
     plan = draw_design(style, seed)
     rng = variant_rng(f"building/{style}/details", seed)
-    turned = ((0.0, _front(plan, rng), plan.depth_m), (math.pi, _back(plan, rng), plan.depth_m))
-    ends = [(k * 0.5 * math.pi, _side(plan, rng), plan.width_m) for k in (1, -1)]
-    walls = [wall.moved(0.5 * across).rotated("z", turn) for turn, wall, across in (*turned, *ends)]
+    # The rear has plain windows in every second bay or so.
+    sides = [
+        (0.0, _front(plan, rng), plan.depth_m),
+        (math.pi, _plain_wall(plan, plan.width_m, max(2, plan.bays - 2), rng), plan.depth_m),
+        *((k * 0.5 * math.pi, _side(plan, rng), plan.width_m) for k in (1, -1)),
+    ]
+    walls = [wall.moved(0.5 * across).rotated("z", turn) for turn, wall, across in sides]
     x, y = 0.5 * plan.depth_m, 0.5 * plan.width_m
     floor = quad([(-x, -y, 0.0), (-x, y, 0.0), (x, y, 0.0), (x, -y, 0.0)], BASE)
     roof = _roof(plan, rng).moved(z=plan.eaves_m)
@@ -60,15 +64,11 @@ def garage(seed: int) -> Solid:
     ]
     front = [facade.cut_openings((-half, half), (0.0, high), holes)]
     front += [facade.garage_door(hole) for hole in holes]
-    plain = facade.cut_openings((-half, half), (0.0, high))
-    side = facade.cut_openings((-0.5 * deep, 0.5 * deep), (0.0, high))
-    walls = [
-        join_patches(front).moved(0.5 * deep),
-        plain.moved(0.5 * deep).rotated("z", math.pi),
-        side.moved(half).rotated("z", 0.5 * math.pi),
-        side.moved(half).rotated("z", -0.5 * math.pi),
-    ]
     x = 0.5 * deep
+    plain = facade.cut_openings((-half, half), (0.0, high))
+    side = facade.cut_openings((-x, x), (0.0, high)).moved(half)
+    walls = [join_patches(front).moved(x), plain.moved(x).rotated("z", math.pi)]
+    walls += [side.rotated("z", k * 0.5 * math.pi) for k in (1, -1)]
     floor = quad([(-x, -half, 0.0), (-x, half, 0.0), (x, half, 0.0), (x, -half, 0.0)], BASE)
     roof = block((-x - 0.05, -half - 0.05, high), (x + 0.12, half + 0.05, high + 0.16), slot=METAL)
     hull = hulls.box((-x, -half, 0.0), (x, half, high + 0.16))
@@ -164,10 +164,11 @@ def _upper(plan: Design, rng: VariantRng) -> tuple[list[Opening], list[Patch]]:
             if k == plan.oriel:
                 continue
             tall = plan.balconies != "none" and k in outside
-            hole = _window(plan, y, level + (0.1 if tall else plan.sill_m), plan.window_m)
+            w, h = plan.window_m
+            hole = _window(plan, y, level + plan.sill_m, (w, h))
             if tall:
-                head = level + plan.sill_m + plan.window_m[1]
-                hole = _window(plan, y, level + 0.1, (plan.window_m[0], head - level - 0.1))
+                head = level + plan.sill_m + h
+                hole = _window(plan, y, level + 0.1, (w, head - level - 0.1))
             holes.append(hole)
             parts.append(_fitted_window(plan, hole, rng, bare=tall))
             if tall:
@@ -204,7 +205,9 @@ def _fitted_window(plan: Design, hole: Opening, rng: VariantRng, *, bare: bool =
         parts.append(facade.sill(hole))
     if plan.trimmed:
         parts.append(facade.lintel(hole))
-    if plan.shutters == "leaves" and not bare and _room_beside(plan) > 0.5 * hole.width_m:
+    # Half of the wall between two windows may be covered by one shutter.
+    free = 0.5 * (plan.width_m / plan.bays - plan.window_m[0]) - 0.02
+    if plan.shutters == "leaves" and not bare and free > 0.5 * hole.width_m:
         parts.append(facade.leaves(hole))
     if plan.shutters == "roller" and rng.chance(0.35):
         parts.append(facade.roller(hole, rng.choose((0.2, 0.35, 0.6, 0.96))))
@@ -214,14 +217,11 @@ def _fitted_window(plan: Design, hole: Opening, rng: VariantRng, *, bare: bool =
 def _bands(plan: Design, rng: VariantRng) -> list[Patch]:
     """String courses, cornice and a downpipe on the street side."""
     half = 0.5 * plan.width_m
-    parts = []
-    if plan.trimmed or plan.shops:
-        level = plan.ground_m - 0.02
-        parts.append(block((0.0, -half, level), (0.1, half, level + 0.16), slot=TRIM))
+    level, top = plan.ground_m - 0.02, plan.eaves_m
+    bands = [(level, level + 0.16, 0.1)] if plan.trimmed or plan.shops else []
     if plan.trimmed:
-        top = plan.eaves_m
-        parts.append(block((0.0, -half, top - 0.42), (0.14, half, top - 0.3), slot=TRIM))
-        parts.append(block((0.0, -half, top - 0.3), (0.3, half, top - 0.08), slot=TRIM))
+        bands += [(top - 0.42, top - 0.3, 0.14), (top - 0.3, top - 0.08, 0.3)]
+    parts = [block((0.0, -half, z0), (out, half, z1), slot=TRIM) for z0, z1, out in bands]
     if plan.roof != "flat":
         side = rng.choose((-1.0, 1.0)) * (half - 0.15)
         pipe = post(0.05, (0.0, plan.eaves_m - 0.1), (0.08, side, 0.0), 6)
@@ -234,11 +234,6 @@ def _canopy(plan: Design, y: float, top: float, rng: VariantRng) -> list[Patch]:
         return []
     low, high = (0.0, y - 0.85, top + 0.1), (rng.between(0.8, 1.1), y + 0.85, top + 0.2)
     return [block(low, high, slot=METAL)]
-
-
-def _back(plan: Design, rng: VariantRng) -> Patch:
-    """The rear: plain windows in every second bay or so."""
-    return _plain_wall(plan, plan.width_m, max(2, plan.bays - 2), rng)
 
 
 def _side(plan: Design, rng: VariantRng) -> Patch:
@@ -265,11 +260,9 @@ def _plain_wall(plan: Design, width_m: float, bays: int, rng: VariantRng) -> Pat
 
 def _roof(plan: Design, rng: VariantRng) -> Patch:
     if plan.roof == "flat":
-        unit = roofs.unit(
-            rng.between(-0.2, 0.1) * plan.depth_m,
-            rng.between(-0.25, 0.25) * plan.width_m,
-            (rng.between(2.0, 3.5), rng.between(2.5, 4.0), rng.between(1.2, 2.4)),
-        )
+        x, y = rng.between(-0.2, 0.1) * plan.depth_m, rng.between(-0.25, 0.25) * plan.width_m
+        size_m = (rng.between(2.0, 3.5), rng.between(2.5, 4.0), rng.between(1.2, 2.4))
+        unit = roofs.unit(x, y, size_m)
         return join_patches([roofs.flat(plan.depth_m, plan.width_m, rng.between(0.35, 0.8)), unit])
     if plan.roof == "hip":
         pitch, depth_m = 0.85 * plan.pitch_rad, min(plan.depth_m, plan.width_m)
@@ -321,8 +314,3 @@ def _window(plan: Design, y: float, z0: float, size_m: tuple[float, float]) -> O
 def _bay_centres(plan: Design) -> Sequence[float]:
     pitch = plan.width_m / plan.bays
     return [(k + 0.5) * pitch - 0.5 * plan.width_m for k in range(plan.bays)]
-
-
-def _room_beside(plan: Design) -> float:
-    """Width of wall between two windows that one shutter may cover."""
-    return 0.5 * (plan.width_m / plan.bays - plan.window_m[0]) - 0.02

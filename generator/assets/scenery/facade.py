@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -92,38 +92,28 @@ def reveal(opening: Opening, depth_m: float, slot: int = FACADE) -> Patch:
     return grid(np.array([[(x, y, z) for y, z in loop] for x in (0.0, -depth_m)]), slot=slot)
 
 
-def window(opening: Opening, rng: VariantRng, slot: int = FACADE) -> Patch:
+def window(opening: Opening, rng: VariantRng) -> Patch:
     """Reveal, frame with bars, and panes; behind some of them hang curtains."""
     depth_m = opening.recess_m + GLASS_SETBACK_M
-    return join_patches(
-        [reveal(opening, depth_m, slot), frame(opening), panes(opening, rng, -depth_m)]
-    )
+    sides = reveal(opening, depth_m)
+    return join_patches([sides, frame(opening), panes(opening, rng, -depth_m)])
 
 
-def frame(opening: Opening, slot: int = FRAME) -> Patch:
+def frame(opening: Opening) -> Patch:
     """The window's frame and glazing bars, flat at the bottom of the recess."""
     (y0, y1), (z0, z1) = opening.y_m, opening.z_m
     x, w = -opening.recess_m, min(_FRAME_WIDTH_M, 0.2 * opening.width_m)
-    parts = [
-        facing_rectangle(x, (y0, y0 + w), (z0, z1), slot),
-        facing_rectangle(x, (y1 - w, y1), (z0, z1), slot),
-        facing_rectangle(x, (y0 + w, y1 - w), (z0, z0 + w), slot),
-        facing_rectangle(x, (y0 + w, y1 - w), (z1 - w, z1), slot),
-    ]
+    across, upright = (y0 + w, y1 - w), (z0 + w, z1 - w)
+    bars = [(x, (y0, y0 + w), (z0, z1)), (x, (y1 - w, y1), (z0, z1)),
+            (x, across, (z0, z0 + w)), (x, across, (z1 - w, z1))]  # fmt: skip
     for k in range(1, opening.upright):
-        middle = y0 + opening.width_m * k / opening.upright
-        parts.append(
-            facing_rectangle(x, (middle - 0.5 * w, middle + 0.5 * w), (z0 + w, z1 - w), slot)
-        )
+        y = y0 + opening.width_m * k / opening.upright
+        bars.append((x, (y - 0.5 * w, y + 0.5 * w), upright))
     for k in range(1, opening.level):
         # Transoms sit high: the lower sash is the tall one.
-        middle = z0 + opening.height_m * (0.42 + 0.58 * k / opening.level)
-        parts.append(
-            facing_rectangle(
-                x + 0.004, (y0 + w, y1 - w), (middle - 0.4 * w, middle + 0.4 * w), slot
-            )
-        )
-    return join_patches(parts)
+        z = z0 + opening.height_m * (0.42 + 0.58 * k / opening.level)
+        bars.append((x + 0.004, across, (z - 0.4 * w, z + 0.4 * w)))
+    return join_patches([facing_rectangle(*bar, FRAME) for bar in bars])
 
 
 def panes(opening: Opening, rng: VariantRng, x: float) -> Patch:
@@ -137,42 +127,32 @@ def panes(opening: Opening, rng: VariantRng, x: float) -> Patch:
         return join_patches([facing_rectangle(x, (a, b), z, slot) for a, b, slot in strips])
     if drawn == "blind":
         level = z[1] - rng.between(0.15, 0.6) * opening.height_m
-        return join_patches(
-            [
-                facing_rectangle(x, (y0, y1), (z[0], level), glass),
-                facing_rectangle(x, (y0, y1), (level, z[1]), curtain),
-            ]
-        )
+        bands = (((z[0], level), glass), ((level, z[1]), curtain))
+        return join_patches([facing_rectangle(x, (y0, y1), span, slot) for span, slot in bands])
     return facing_rectangle(x, (y0, y1), z, curtain if drawn == "all" else glass)
 
 
-def sill(opening: Opening, out_m: float = 0.05, slot: int = TRIM) -> Patch:
+def sill(opening: Opening) -> Patch:
     """A ledge below a window; its back lies in the recess."""
     (y0, y1), z0 = opening.y_m, opening.z_m[0]
-    return join_patches(
-        [
-            block((0.0, y0 - 0.06, z0 - 0.06), (out_m, y1 + 0.06, z0 + 0.005), slot=slot),
-            quad(_level(z0 + 0.005, (-opening.recess_m, 0.0), (y0, y1)), slot),
-        ]
-    )
+    x, top = -opening.recess_m, z0 + 0.005
+    ledge = block((0.0, y0 - 0.06, z0 - 0.06), (0.05, y1 + 0.06, top), slot=TRIM)
+    back = quad([(0.0, y0, top), (0.0, y1, top), (x, y1, top), (x, y0, top)], TRIM)
+    return join_patches([ledge, back])
 
 
-def lintel(opening: Opening, out_m: float = 0.05, height_m: float = 0.16) -> Patch:
+def lintel(opening: Opening) -> Patch:
     """A stone band above an opening."""
     (y0, y1), z1 = opening.y_m, opening.z_m[1]
-    return block((0.0, y0 - 0.12, z1), (out_m, y1 + 0.12, z1 + height_m), slot=TRIM)
+    return block((0.0, y0 - 0.12, z1), (0.05, y1 + 0.12, z1 + 0.16), slot=TRIM)
 
 
 def leaves(opening: Opening) -> Patch:
     """Hinged shutters, folded back against the wall on both sides."""
     (y0, y1), z = opening.y_m, opening.z_m
     w = 0.5 * opening.width_m
-    return join_patches(
-        [
-            block((0.005, a, z[0]), (0.045, b, z[1]), slot=AWNING)
-            for a, b in ((y0 - w, y0 - 0.02), (y1 + 0.02, y1 + w))
-        ]
-    )
+    sides = ((y0 - w, y0 - 0.02), (y1 + 0.02, y1 + w))
+    return join_patches([block((0.005, a, z[0]), (0.045, b, z[1]), slot=AWNING) for a, b in sides])
 
 
 def roller(opening: Opening, share: float) -> Patch:
@@ -193,66 +173,54 @@ def door(opening: Opening, rng: VariantRng, slot: int = FACADE) -> Patch:
     field = GLASS if rng.chance(0.5) else DOOR
     low = z0 + (0.25 if field == GLASS and rng.chance(0.5) else 1.0)
     step = block((x, y0, 0.0), (0.25, y1, z0 + 0.01), slot=BASE)
-    return join_patches(
-        [
-            *([step] if z0 > 0.05 else []),
-            reveal(opening, opening.recess_m + GLASS_SETBACK_M, slot),
-            facing_rectangle(x, (y0, y1), (z0, head), DOOR),
-            facing_rectangle(x, (y0, y1), (head, head + 0.06), FRAME),
-            facing_rectangle(x - GLASS_SETBACK_M, (y0, y1), (head + 0.06, z1), GLASS),
-            block((x, y0 + inset, low), (x + 0.012, y1 - inset, head - 0.2), slot=field),
-            block((x, y1 - 0.16, z0 + 0.95), (x + 0.06, y1 - 0.12, z0 + 1.2), slot=METAL),
-        ]
-    )
+    parts = [
+        reveal(opening, opening.recess_m + GLASS_SETBACK_M, slot),
+        facing_rectangle(x, (y0, y1), (z0, head), DOOR),
+        facing_rectangle(x, (y0, y1), (head, head + 0.06), FRAME),
+        facing_rectangle(x - GLASS_SETBACK_M, (y0, y1), (head + 0.06, z1), GLASS),
+        block((x, y0 + inset, low), (x + 0.012, y1 - inset, head - 0.2), slot=field),
+        block((x, y1 - 0.16, z0 + 0.95), (x + 0.06, y1 - 0.12, z0 + 1.2), slot=METAL),
+    ]
+    return join_patches([step, *parts] if z0 > 0.05 else parts)
 
 
 def shop_front(opening: Opening, rng: VariantRng, slot: int = FACADE) -> Patch:
     """A display window: stall riser, frame, large panes."""
     (y0, y1), (z0, z1) = opening.y_m, opening.z_m
     riser = z0 + rng.between(0.12, 0.5)
-    glazed = Opening((y0, y1), (riser, z1), opening.recess_m, opening.upright, opening.level)
     depth_m = opening.recess_m + GLASS_SETBACK_M
-    shown = [(GLASS, z1), (rng.choose((GLASS_TOO, CURTAIN)), riser + 0.28 * (z1 - riser))]
+    shown, level = rng.choose((GLASS_TOO, CURTAIN)), riser + 0.28 * (z1 - riser)
     return join_patches(
         [
             reveal(opening, depth_m, slot),
             facing_rectangle(-opening.recess_m, (y0, y1), (z0, riser), FRAME),
-            frame(glazed),
-            facing_rectangle(-depth_m, (y0, y1), (shown[1][1], z1), shown[0][0]),
-            facing_rectangle(-depth_m, (y0, y1), (riser, shown[1][1]), shown[1][0]),
+            frame(replace(opening, z_m=(riser, z1))),
+            facing_rectangle(-depth_m, (y0, y1), (level, z1), GLASS),
+            facing_rectangle(-depth_m, (y0, y1), (riser, level), shown),
         ]
     )
 
 
-def garage_door(opening: Opening, slot: int = FACADE) -> Patch:
+def garage_door(opening: Opening) -> Patch:
     """An up-and-over door of level panels."""
-    z0, z1 = opening.z_m
-    rows = 5
+    x, rows = -opening.recess_m, 5
+    edges = [opening.z_m[0] + opening.height_m * k / rows for k in range(rows + 1)]
     panels = [
-        facing_rectangle(
-            -opening.recess_m + (0.0 if k % 2 else 0.012),
-            opening.y_m,
-            (z0 + (z1 - z0) * k / rows, z0 + (z1 - z0) * (k + 1) / rows - 0.012),
-            DOOR,
-        )
-        for k in range(rows)
+        facing_rectangle(x + (0.0 if k % 2 else 0.012), opening.y_m, (a, b - 0.012), DOOR)
+        for k, (a, b) in enumerate(pairwise(edges))
     ]
-    back = facing_rectangle(-opening.recess_m - 0.01, opening.y_m, opening.z_m, METAL)
-    return join_patches([reveal(opening, opening.recess_m + 0.01, slot), back, *panels])
+    back = facing_rectangle(x - 0.01, opening.y_m, opening.z_m, METAL)
+    return join_patches([reveal(opening, opening.recess_m + 0.01), back, *panels])
 
 
-def railing(y_m: Span, z0: float, x: float, height_m: float = 0.95, pitch_m: float = 0.14) -> Patch:
+def railing(y_m: Span, z0: float, x: float, pitch_m: float = 0.14) -> Patch:
     """Upright bars between two rails, in the plane x."""
-    count = max(2, round((y_m[1] - y_m[0]) / pitch_m))
-    at = np.linspace(y_m[0] + 0.02, y_m[1] - 0.02, count)
-    bars = [
-        facing_rectangle(x, (y - 0.008, y + 0.008), (z0 + 0.08, z0 + height_m), METAL) for y in at
-    ]
-    rails = [
-        block((x - 0.02, y_m[0], z), (x + 0.02, y_m[1], z + 0.035), slot=METAL)
-        for z in (z0 + 0.06, z0 + height_m)
-    ]
-    return join_patches([*bars, *rails])
+    (y0, y1), top = y_m, z0 + 0.95
+    at = np.linspace(y0 + 0.02, y1 - 0.02, max(2, round((y1 - y0) / pitch_m)))
+    bars = [facing_rectangle(x, (y - 0.008, y + 0.008), (z0 + 0.08, top), METAL) for y in at]
+    for z in (z0 + 0.06, top):
+        bars.append(block((x - 0.02, y0, z), (x + 0.02, y1, z + 0.035), slot=METAL))
+    return join_patches(bars)
 
 
 def balcony(y_m: Span, z0: float, out_m: float, *, solid: bool) -> Patch:
@@ -260,12 +228,10 @@ def balcony(y_m: Span, z0: float, out_m: float, *, solid: bool) -> Patch:
     (y0, y1), t = y_m, 0.06
     slab = block((0.0, y0, z0 - 0.18), (out_m, y1, z0), slot=TRIM)
     if solid:
-        sides = [
-            block((out_m - t, y0, z0), (out_m, y1, z0 + 0.95), slot=AWNING),
-            block((0.0, y0, z0), (out_m - t, y0 + t, z0 + 0.95), slot=AWNING),
-            block((0.0, y1 - t, z0), (out_m - t, y1, z0 + 0.95), slot=AWNING),
-        ]
-        return join_patches([slab, *sides])
+        x, top = out_m - t, z0 + 0.95
+        sides = (((x, y0, z0), (out_m, y1, top)), ((0.0, y0, z0), (x, y0 + t, top)),
+                 ((0.0, y1 - t, z0), (x, y1, top)))  # fmt: skip
+        return join_patches([slab, *(block(*side, slot=AWNING) for side in sides)])
     side = railing((-out_m + 0.04, 0.0), z0, 0.0, pitch_m=0.2).rotated("z", 0.5 * math.pi)
     ends = [side.moved(y=y) for y in (y0 + 0.02, y1 - 0.02)]
     return join_patches([slab, railing(y_m, z0, out_m - 0.04), *ends])
@@ -280,16 +246,12 @@ def oriel(
     front += [sill(o) for o in openings]
     lid = block((0.0, y0 - 0.08, z1), (out_m + 0.1, y1 + 0.08, z1 + 0.14), slot=TRIM)
     corbel = block((0.0, y0 + 0.1, z0 - 0.3), (0.7 * out_m, y1 - 0.1, z0), slot=TRIM)
-    return join_patches(
-        [
-            join_patches(front).moved(out_m),
-            quad([(0.0, y0, z0), (out_m, y0, z0), (out_m, y0, z1), (0.0, y0, z1)]),
-            quad([(out_m, y1, z0), (0.0, y1, z0), (0.0, y1, z1), (out_m, y1, z1)]),
-            quad([(0.0, y0, z0), (0.0, y1, z0), (out_m, y1, z0), (out_m, y0, z0)], TRIM),
-            lid,
-            corbel,
-        ]
-    )
+    sides = [
+        quad([(0.0, y0, z0), (out_m, y0, z0), (out_m, y0, z1), (0.0, y0, z1)]),
+        quad([(out_m, y1, z0), (0.0, y1, z0), (0.0, y1, z1), (out_m, y1, z1)]),
+        quad([(0.0, y0, z0), (0.0, y1, z0), (out_m, y1, z0), (out_m, y0, z0)], TRIM),
+    ]
+    return join_patches([join_patches(front).moved(out_m), *sides, lid, corbel])
 
 
 def attic_window(y_m: Span, z_m: Span, rng: VariantRng) -> Patch:
@@ -306,27 +268,17 @@ def awning(y_m: Span, z1: float, out_m: float) -> Patch:
     (y0, y1), low = y_m, z1 - 0.32 * out_m
     cloth = [(0.02, y0, z1), (out_m, y0, low), (out_m, y1, low), (0.02, y1, z1)]
     lip = facing_rectangle(out_m, y_m, (low - 0.18, low), AWNING)
-    ends = [
-        quad([(0.02, y, z1 - 0.12), (out_m, y, low - 0.18), (out_m, y, low), (0.02, y, z1)], AWNING)
-        for y in (y0, y1)
-    ]
+    end = [(0.02, z1 - 0.12), (out_m, low - 0.18), (out_m, low), (0.02, z1)]
+    ends = [quad([(x, y, z) for x, z in end], AWNING) for y in y_m]
     return join_patches([quad(cloth, AWNING), lip, *ends])
 
 
-def sign_board(y_m: Span, z_m: Span, out_m: float = 0.1) -> Patch:
+def sign_board(y_m: Span, z_m: Span) -> Patch:
     """A shop's name on a board; the whole image lies on its front."""
-    low, high = (0.0, y_m[0], z_m[0]), (out_m, y_m[1], z_m[1])
-    board = block(low, high, slot=METAL)
-    face = facing_rectangle(out_m + 0.004, y_m, z_m, SIGN)
-    return join_patches([board, face])
+    board = block((0.0, y_m[0], z_m[0]), (0.1, y_m[1], z_m[1]), slot=METAL)
+    return join_patches([board, facing_rectangle(0.104, y_m, z_m, SIGN)])
 
 
 def _holds(opening: Opening, y: float, z: float) -> bool:
     (y0, y1), (z0, z1) = opening.y_m, opening.z_m
     return y0 < y < y1 and z0 < z < z1
-
-
-def _level(z: float, x_m: Span, y_m: Span) -> list[tuple[float, float, float]]:
-    """Corners of a level rectangle that faces up."""
-    (x0, x1), (y0, y1) = x_m, y_m
-    return [(x1, y0, z), (x1, y1, z), (x0, y1, z), (x0, y0, z)]

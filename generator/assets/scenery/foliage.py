@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gen_data.generator.assets.procedural.noise import uniform
-from gen_data.generator.assets.procedural.patches import GRID_M, Array, Indices, round_values
+from gen_data.generator.assets.procedural.patches import GRID_M, Array, Indices, round_values, unit
 from gen_data.generator.core.asset_types import Material, MeshData
 from gen_data.generator.core.streams import Rng
 
@@ -42,24 +42,21 @@ class Sprays:
 
 def leaf_mesh(sprays: Sprays, materials: Sequence[Material], width: float, rng: Rng) -> MeshData:
     """Triangles ``width`` times as wide as long, turned about their own axis by chance."""
-    across = _unit(
-        np.cross(sprays.along, sprays.outward + 0.9 * _directions(len(sprays.slots), rng))
-    )
+    aside = sprays.outward + 0.9 * directions(len(sprays.slots), rng)
+    across = unit(np.cross(sprays.along, aside))
     half = 0.5 * width * sprays.length_m[:, None] * across
     # A third of the way along a spray is widest: a kite that lost one wing reads as foliage.
     skew = (uniform((len(sprays.slots), 1), rng) - 0.5) * sprays.length_m[:, None] * sprays.along
-    tip = sprays.at_m + sprays.length_m[:, None] * sprays.along
-    corners = np.stack(
-        [sprays.at_m + half + 0.4 * skew, tip, sprays.at_m - half - 0.4 * skew], axis=1
-    )
+    foot, tip = sprays.at_m, sprays.at_m + sprays.length_m[:, None] * sprays.along
+    corners = np.stack([foot + half + 0.4 * skew, tip, foot - half - 0.4 * skew], axis=1)
     # Nothing grows into the ground.
     corners[..., 2] = np.maximum(corners[..., 2], 0.0)
     corners = np.round(round_values(corners) / GRID_M) * GRID_M
     own = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     inward = (own * sprays.outward).sum(axis=1) < 0.0
     corners[inward] = corners[inward][:, ::-1]
-    own = _unit(np.where(inward[:, None], -own, own))
-    normals = _unit(OUTWARD * sprays.outward + (1.0 - OUTWARD) * own)
+    own = unit(np.where(inward[:, None], -own, own))
+    normals = unit(OUTWARD * sprays.outward + (1.0 - OUTWARD) * own)
     n = len(corners)
     return MeshData(
         vertices_m=corners.reshape(-1, 3).astype(np.float32),
@@ -101,12 +98,11 @@ def sprays_about(anchors_m: Array, centre_m: Array, habit: Habit, rng: Rng) -> S
     """
     count, shades = habit.count, habit.shades
     which = np.arange(count) % len(anchors_m)
-    offset = _directions(count, rng) * habit.spread_m * uniform((count, 1), rng) ** 0.5
+    offset = directions(count, rng) * habit.spread_m * uniform((count, 1), rng) ** 0.5
     at = anchors_m[which] + offset
-    outward = _unit(at - centre_m + 0.25 * offset)
-    along = _unit(
-        0.55 * outward + 0.8 * _directions(count, rng) - np.array([0.0, 0.0, habit.droop])
-    )
+    outward = unit(at - centre_m + 0.25 * offset)
+    along = 0.55 * outward + 0.8 * directions(count, rng)
+    along = unit(along - np.array([0.0, 0.0, habit.droop]))
     reach = np.sqrt(((at - centre_m) ** 2).sum(axis=1))
     depth = reach / max(float(reach.max()), 1e-9) + 0.12 * offset[:, 2] / habit.spread_m
     # Deep sprays are large and close the crown, outer ones are small and draw its outline.
@@ -119,26 +115,20 @@ def sprays_about(anchors_m: Array, centre_m: Array, habit: Habit, rng: Rng) -> S
 
 def merge_meshes(first: MeshData, second: MeshData) -> MeshData:
     """Both meshes as one; the second's slots follow the first's."""
+    slots = second.face_slots + np.int32(len(first.materials))
     return MeshData(
         vertices_m=np.concatenate([first.vertices_m, second.vertices_m]),
         faces=np.concatenate([first.faces, second.faces + np.int32(len(first.vertices_m))]),
         normals=np.concatenate([first.normals, second.normals]),
         uvs=np.concatenate([first.uvs, second.uvs]),
-        face_slots=np.concatenate(
-            [first.face_slots, second.face_slots + np.int32(len(first.materials))]
-        ),
+        face_slots=np.concatenate([first.face_slots, slots]),
         materials=(*first.materials, *second.materials),
     )
 
 
-def _directions(count: int, rng: Rng) -> Array:
+def directions(count: int, rng: Rng) -> Array:
     """Unit vectors, even over the sphere, [count, 3]."""
     z = 2.0 * uniform(count, rng) - 1.0
     turn = 2.0 * math.pi * uniform(count, rng)
     flat = np.sqrt(1.0 - z * z)
     return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
-
-
-def _unit(vectors: Array) -> Array:
-    unit: Array = vectors / np.maximum(np.sqrt((vectors**2).sum(axis=-1, keepdims=True)), 1e-12)
-    return unit

@@ -16,20 +16,9 @@ import numpy as np
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block, fan
 from gen_data.generator.assets.procedural.variant_rng import VariantRng
+from gen_data.generator.assets.scenery import facade
 from gen_data.generator.assets.scenery.basic_shapes import Span, post, quad
-from gen_data.generator.assets.scenery.facade import (
-    BASE,
-    CHIMNEY,
-    FACADE,
-    METAL,
-    ROOF,
-    TRIM,
-    Opening,
-    cut_openings,
-    frame,
-    panes,
-    reveal,
-)
+from gen_data.generator.assets.scenery.facade import BASE, CHIMNEY, FACADE, METAL, ROOF, TRIM
 
 TILE_REPEAT_M = 1.8
 Point = tuple[float, float]
@@ -76,9 +65,9 @@ def over_profile(profile: Sequence[Point], width_m: float, verge_m: float, thick
             edge = [(p[0], side, p[1]) for p in ((b, a, d, c) if side < 0 else (a, b, c, d))]
             parts.append(quad(edge, TRIM))
         run += length
-    for (x, z), sign in ((profile[0], 1.0), (profile[-1], -1.0)):
-        rows = [(x, -sign * y, z - thick_m), (x, sign * y, z - thick_m)]
-        parts.append(quad([*rows, (x, sign * y, z), (x, -sign * y, z)], METAL))
+    for (x, z), y1 in ((profile[0], y), (profile[-1], -y)):
+        low = z - thick_m
+        parts.append(quad([(x, -y1, low), (x, y1, low), (x, y1, z), (x, -y1, z)], METAL))
     return join_patches([*parts, *_gables(profile, width_m, thick_m)])
 
 
@@ -93,11 +82,8 @@ def hip(depth_m: float, width_m: float, pitch_rad: float, eaves_m: float) -> Pat
     u = (0.0, 2 * y / TILE_REPEAT_M)
     front = quad([(x, -y, low), (x, y, low), (0, ridge, top), (0, -ridge, top)], ROOF, (u, (0, 1)))
     front = _map_slope(front, axis=1, v_top=slope, z_m=(low, top))
-    side = Patch(
-        np.array([[(x, y, low), (-x, y, low), (0.0, ridge, top)]]),
-        np.zeros((1, 3, 2)),
-        np.array([ROOF]),
-    )
+    corners = np.array([[(x, y, low), (-x, y, low), (0.0, ridge, top)]])
+    side = Patch(corners, np.zeros((1, 3, 2)), np.array([ROOF]))
     side = _map_slope(side, axis=0, v_top=slope, z_m=(low, top))
     half = join_patches([front, side])
     rim = block((-x, -y, low - thick), (x, y, low - 0.001), slot=METAL)
@@ -138,23 +124,20 @@ def dormer(x: float, y: float, z0: float, reach_m: float, rng: VariantRng) -> Pa
         rng: Draws its curtains.
     """
     w, h = 0.75, 1.45
-    hole = Opening((-0.5, 0.5), (0.2, 1.35), 0.08)
-    front = join_patches(
-        [
-            cut_openings((-w, w), (0.0, h), (hole,), TRIM),
-            reveal(hole, 0.11, TRIM),
-            frame(hole),
-            panes(hole, rng, -0.11),
-        ]
-    ).moved(x, y, z0)
-    cheeks = []
-    for side in (-1.0, 1.0):
-        ys = y + side * w
-        low, high = (x - reach_m, ys, z0), (x, ys, z0 + h)
-        corners = [low, (x, ys, z0), high, (x - reach_m, ys, z0 + h)]
-        cheeks.append(quad(corners[::-1] if side > 0 else corners, ROOF))
-    lid = block((x - reach_m, y - w - 0.12, z0 + h), (x + 0.18, y + w + 0.12, z0 + h + 0.12))
-    return join_patches([front, *cheeks, lid.painted(METAL)])
+    hole = facade.Opening((-0.5, 0.5), (0.2, 1.35), 0.08)
+    parts = [
+        facade.cut_openings((-w, w), (0.0, h), (hole,), TRIM),
+        facade.reveal(hole, 0.11, TRIM),
+        facade.frame(hole),
+        facade.panes(hole, rng, -0.11),
+    ]
+    parts = [join_patches(parts).moved(x, y, z0)]
+    back, top = x - reach_m, z0 + h
+    for side in (-1, 1):
+        corners = [(u, y + side * w, v) for u, v in ((back, z0), (x, z0), (x, top), (back, top))]
+        parts.append(quad(corners[::-side], ROOF))
+    lid = block((back, y - w - 0.12, top), (x + 0.18, y + w + 0.12, top + 0.12), slot=METAL)
+    return join_patches([*parts, lid])
 
 
 def unit(x: float, y: float, size_m: tuple[float, float, float]) -> Patch:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,13 @@ from gen_data.generator.assets.procedural.noise import uniform
 from gen_data.generator.assets.procedural.patches import Array, Patch, finish_mesh, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import ball, block, rounded_box
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
-from gen_data.generator.assets.scenery.foliage import Habit, leaf_mesh, merge_meshes, sprays_about
+from gen_data.generator.assets.scenery.foliage import (
+    Habit,
+    directions,
+    leaf_mesh,
+    merge_meshes,
+    sprays_about,
+)
 from gen_data.generator.assets.scenery.trees import leaf_greens
 from gen_data.generator.core.asset_types import ConvexParts, Material
 
@@ -32,9 +39,8 @@ def hedge(seed: int) -> Solid:
     core = rounded_box((size[0] - 0.1, size[1] - 0.08, size[2] - 0.05), 0.12, 2)
     core = core.moved(z=0.5 * (size[2] - 0.05))
     anchors = _skin(size, 700, rng)
-    middle = np.array([0.0, 0.0, 0.4 * size[2]])
     hull = hulls.box((-0.5 * size[0], -0.5 * size[1], 0.0), (0.5 * size[0], 0.5 * size[1], size[2]))
-    return _leafy(core, anchors, middle, 2600, 0.1, hull, rng)
+    return _leafy(core, anchors, 0.4 * size[2], Habit(2600, 0.1, 0.6 * 0.1), hull, rng)
 
 
 def bush(seed: int) -> Solid:
@@ -51,21 +57,18 @@ def bush(seed: int) -> Solid:
     core = join_patches([_round(x, y, z, 0.82 * r) for x, y, z, r in lobes])
     anchors = np.concatenate([_shell(x, y, z, r, 90, rng) for x, y, z, r in lobes])
     hull = hulls.frustum((0.45 * h, 0.0), (0.4 * h, 0.9 * h), 12)
-    middle = np.array([0.0, 0.0, 0.3 * h])
-    return _leafy(core, anchors, middle, 2400, 0.12 + 0.03 * h, hull, rng)
+    length = 0.12 + 0.03 * h
+    return _leafy(core, anchors, 0.3 * h, Habit(2400, length, 0.6 * length), hull, rng)
 
 
 def planter(seed: int) -> Solid:
     """A tub or trough with a plant, flowering in some. Slots: tub, soil and core, leaves."""
     rng = variant_rng("planter", seed)
     w, long, h = (rng.between(0.45, 0.6), rng.between(0.6, 1.4), rng.between(0.4, 0.6))
+    x, y = 0.5 * w + 0.03, 0.5 * long + 0.03
     tub = [
         block((-0.5 * w, -0.5 * long, 0.0), (0.5 * w, 0.5 * long, h - 0.05), 0.012),
-        block(
-            (-0.5 * w - 0.03, -0.5 * long - 0.03, h - 0.05),
-            (0.5 * w + 0.03, 0.5 * long + 0.03, h),
-            0.01,
-        ),
+        block((-x, -y, h - 0.05), (x, y, h), 0.01),
     ]
     spots = max(2, round(long / 0.35))
     heads = [
@@ -86,23 +89,16 @@ def planter(seed: int) -> Solid:
         greens = (*greens[:3], blossom)
     mesh = finish_mesh(core, (rng.choose(stuff), _core_material(greens)), 50.0)
     sprays = sprays_about(anchors, np.array([0.0, 0.0, h - 0.2]), Habit(620, 0.095, 0.07), rng)
-    return Solid(
-        merge_meshes(mesh, leaf_mesh(sprays, greens, 0.7, rng)), ConvexParts((np.round(hull, 6),))
-    )
+    leaves = leaf_mesh(sprays, greens, 0.7, rng)
+    return Solid(merge_meshes(mesh, leaves), ConvexParts((np.round(hull, 6),)))
 
 
 def _leafy(
-    core: Patch,
-    anchors: Array,
-    middle: Array,
-    count: int,
-    length: float,
-    hull: Array,
-    rng: VariantRng,
+    core: Patch, anchors: Array, middle_z: float, habit: Habit, hull: Array, rng: VariantRng
 ) -> Solid:
     greens = _shades(rng)
     mesh = finish_mesh(core, (_core_material(greens),), 70.0)
-    sprays = sprays_about(anchors, middle, Habit(count, length, 0.6 * length), rng)
+    sprays = sprays_about(anchors, np.array([0.0, 0.0, middle_z]), habit, rng)
     leaves = leaf_mesh(sprays, greens, 0.7, rng)
     return Solid(merge_meshes(mesh, leaves), ConvexParts((np.round(hull, 6),)))
 
@@ -114,14 +110,9 @@ def _shades(rng: VariantRng) -> tuple[Material, ...]:
 def _core_material(greens: tuple[Material, ...]) -> Material:
     """Material that shows between the leaves: the same green, darker."""
     r, g, b = greens[1].base_color
-    return Material(
-        (1.1 * r, 1.1 * g, 1.1 * b),
-        roughness=0.9,
-        specular=0.2,
-        texture="texture/foliage?seed=0",
-        texture_scale_m=0.8,
-        role="leaf",
-    )
+    color = (1.1 * r, 1.1 * g, 1.1 * b)
+    plain = patterned_material("texture/foliage?seed=0", 0.8, 0.9, color)
+    return replace(plain, specular=0.2, role="leaf")
 
 
 def _skin(size: tuple[float, float, float], count: int, rng: VariantRng) -> Array:
@@ -140,11 +131,7 @@ def _skin(size: tuple[float, float, float], count: int, rng: VariantRng) -> Arra
 
 def _shell(x: float, y: float, z: float, r: float, count: int, rng: VariantRng) -> Array:
     """Points on a ball."""
-    level = 2.0 * uniform(count, rng) - 1.0
-    turn = 2.0 * math.pi * uniform(count, rng)
-    flat = np.sqrt(1.0 - level**2)
-    ball_points = np.stack([flat * np.cos(turn), flat * np.sin(turn), level], axis=1)
-    points: Array = np.array([x, y, z]) + r * ball_points
+    points: Array = np.array([x, y, z]) + r * directions(count, rng)
     points[:, 2] = np.maximum(points[:, 2], 0.05)
     return points
 

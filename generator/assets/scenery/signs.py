@@ -7,21 +7,20 @@ size 2 (discs of 600 mm, triangles with sides of 900 mm). Faces point to +X.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.data_tables import load_table
-from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
-from gen_data.generator.assets.procedural.material_presets import painted_material
-from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
+from gen_data.generator.assets.procedural.family import Facts, Solid, choose_option
+from gen_data.generator.assets.procedural.material_presets import painted_material, printed_material
+from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches, unit
 from gen_data.generator.assets.procedural.surface_shapes import circle, grid
-from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid, post
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
-from gen_data.generator.core.asset_types import Material
 
 Shape = Literal["disc", "octagon", "triangle", "yield", "diamond", "square", "wide"]
 Kind = Literal["regulatory", "mandatory", "warning", "information"]
@@ -66,13 +65,8 @@ def traffic_sign(seed: int, sign: str) -> Solid:
     centre_z = rng.between(2.0, 2.2) + foot
     face = _plate(outline, made.size_m).moved(0.045, 0.0, centre_z)
     pole = post(0.03, (0.0, centre_z + half_high - 0.02), sides=10).painted(2)
-    image = Material(
-        (1.0, 1.0, 1.0),
-        roughness=0.35,
-        texture=f"texture/traffic_sign?seed={seed % 3}&sign={name}",
-        printed=True,
-        role="sign",
-    )
+    texture = f"texture/traffic_sign?seed={seed % 3}&sign={name}"
+    image = replace(printed_material(texture, 0.35), role="sign")
     hull = hulls.frustum((0.03, 0.0), (0.03, centre_z + half_high - 0.02), 8)
     return make_solid([face, pole], (image, painted_material("#8c8f90", 0.6), GALVANISED), [hull])
 
@@ -85,10 +79,7 @@ def traffic_sign_facts(seed: int, sign: str) -> Facts:
 
 def sign_name(seed: int, sign: str) -> str:
     """The name of a sign; by seed for ``any``. Raises AssetError for an unknown one."""
-    if sign == "any":
-        return in_turn(list(SIGNS), seed)
-    check_option("traffic_sign", "sign", sign, ("any", *SIGNS))
-    return sign
+    return choose_option("traffic_sign", "sign", sign, tuple(SIGNS), seed)
 
 
 def plate_outline(shape: Shape) -> Array:
@@ -125,13 +116,8 @@ def _plate(outline: Array, size_m: float) -> Patch:
 
 def _round_corners(corners: Array, radius: float) -> Array:
     """A polygon with its corners cut off by short arcs, [n * 4, 2]."""
-    made = []
-    for before, corner, after in zip(
-        np.roll(corners, 1, axis=0), corners, np.roll(corners, -1, axis=0), strict=True
-    ):
-        a = (before - corner) / np.sqrt(((before - corner) ** 2).sum())
-        b = (after - corner) / np.sqrt(((after - corner) ** 2).sum())
-        for t in (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0):
-            # A quadratic curve from one side to the other.
-            made.append(corner + radius * (a * (1 - t) ** 2 + b * t**2))
-    return np.array(made)
+    to_last, to_next = (unit(np.roll(corners, shift, axis=0) - corners) for shift in (1, -1))
+    # Quadratic curves from one side to the other.
+    shares = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
+    curves = [corners + radius * (to_last * (1 - t) ** 2 + to_next * t**2) for t in shares]
+    return np.stack(curves, axis=1).reshape(-1, 2)

@@ -12,18 +12,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.data_tables import load_table
-from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
+from gen_data.generator.assets.procedural.family import Facts, Solid, choose_option
 from gen_data.generator.assets.procedural.material_presets import painted_material
 from gen_data.generator.assets.procedural.patches import Patch, join_patches
-from gen_data.generator.assets.procedural.surface_shapes import (
-    block,
-    circle,
-    fan,
-    grid,
-    lathe,
-    rounded_box,
-)
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid, post, tube
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
@@ -36,13 +29,9 @@ _FIRST_LENS = 3
 VEHICLE_LENSES = ("lens_red", "lens_yellow", "lens_green")
 PEDESTRIAN_LENSES = ("lens_stop", "lens_walk")
 FIGURES = load_table(__package__, "signal_figures", tuple[tuple[tuple[float, float], ...], ...])
-_OFF: dict[str, Vec3] = {
-    "lens_red": (0.09, 0.008, 0.006),
-    "lens_yellow": (0.11, 0.06, 0.006),
-    "lens_green": (0.006, 0.06, 0.035),
-    "lens_stop": (0.09, 0.008, 0.006),
-    "lens_walk": (0.006, 0.06, 0.035),
-}
+_RED, _YELLOW, _GREEN = (0.09, 0.008, 0.006), (0.11, 0.06, 0.006), (0.006, 0.06, 0.035)
+_OFF: dict[str, Vec3] = dict(zip(VEHICLE_LENSES, (_RED, _YELLOW, _GREEN), strict=True))
+_OFF |= zip(PEDESTRIAN_LENSES, (_RED, _GREEN), strict=True)
 
 
 def traffic_light(seed: int, mount: str) -> Solid:
@@ -84,7 +73,7 @@ def pedestrian_signal(seed: int) -> Solid:
     rng = variant_rng("pedestrian_signal", seed)
     signal = head(PEDESTRIAN_LENSES, 0.1).moved(0.11, 0.0, rng.between(2.1, 2.3))
     top = float(signal.bounds_m()[1][2]) + 0.1
-    button = rounded_box((0.09, 0.11, 0.2), 0.02, 1).moved(0.06, 0.0, 1.05).painted(BOARD)
+    button = shapes.rounded_box((0.09, 0.11, 0.2), 0.02, 1).moved(0.06, 0.0, 1.05).painted(BOARD)
     parts = [signal, button, post(0.052, (0.0, top), sides=12).painted(POLE)]
     hull = hulls.frustum((0.052, 0.0), (0.052, top), 10)
     materials = list(_materials(PEDESTRIAN_LENSES, "#262829"))
@@ -103,27 +92,26 @@ def head(lenses: Sequence[str], lens_m: float) -> Patch:
     parts = []
     for k, role in enumerate(lenses):
         z = cell * (len(lenses) - k - 0.5)
-        chamber = rounded_box((deep, 2 * half, cell - 0.006), 0.025, 1).moved(0.0, 0.0, z)
+        chamber = shapes.rounded_box((deep, 2 * half, cell - 0.006), 0.025, 1).moved(0.0, 0.0, z)
         x = 0.5 * deep
         lens = _figure(lens_m, role) if role in FIGURES else _bulge(lens_m)
-        parts += [
-            chamber,
-            lens.moved(x, 0.0, z).painted(_FIRST_LENS + k),
-            _visor(1.08 * lens_m, 1.7 * lens_m).moved(x - 0.002, 0.0, z),
-        ]
+        visor = _visor(1.08 * lens_m, 1.7 * lens_m).moved(x - 0.002, 0.0, z)
+        parts += [chamber, lens.moved(x, 0.0, z).painted(_FIRST_LENS + k), visor]
     return join_patches(parts)
 
 
 def _bulge(radius: float) -> Patch:
     """A lens that curves out of its chamber."""
     profile = [(radius, 0.004), (0.8 * radius, 0.016), (0.45 * radius, 0.026), (0.0, 0.03)]
-    return lathe(profile, 20).rotated("y", 0.5 * math.pi)
+    return shapes.lathe(profile, 20).rotated("y", 0.5 * math.pi)
 
 
 def _figure(radius: float, role: str) -> Patch:
     """The luminous figure of a signal for people: its head, and convex pieces of its body."""
-    pieces = [circle(0.17, 12, (0.0, 0.62)), *(np.array(piece) for piece in FIGURES[role])]
-    return join_patches(fan(np.column_stack([np.full(len(p), 0.006), radius * p])) for p in pieces)
+    pieces = [shapes.circle(0.17, 12, (0.0, 0.62)), *(np.array(piece) for piece in FIGURES[role])]
+    return join_patches(
+        shapes.fan(np.column_stack([np.full(len(p), 0.006), radius * p])) for p in pieces
+    )
 
 
 def _visor(radius: float, reach: float) -> Patch:
@@ -132,19 +120,16 @@ def _visor(radius: float, reach: float) -> Patch:
     y, z = radius * np.cos(turn), radius * np.sin(turn)
     tip = reach * (0.45 + 0.55 * np.clip(0.5 + z / radius, 0.0, 1.0))
     rows = [np.stack([0.0 * y, y, z], axis=1), np.stack([tip, y, z], axis=1)]
-    return grid(np.stack(rows)).flipped()
+    return shapes.grid(np.stack(rows)).flipped()
 
 
 def _backboard(signal: Patch) -> Patch:
     """A dark plate behind a head, wider than it, so that lenses stand out against the sky."""
-    low, high = (bound.tolist() for bound in signal.bounds_m())
-    x, rim = float(low[0]) - 0.012, 0.14
-    outer = block((x, low[1] - rim, low[2] - rim), (x + 0.01, high[1] + rim, high[2] + rim))
-    inner = block(
-        (x + 0.003, low[1] - rim + 0.03, low[2] - rim + 0.03),
-        (x + 0.013, high[1] + rim - 0.03, high[2] + rim - 0.03),
-    )
-    return join_patches([outer.painted(BOARD), inner.painted(HOUSING)])
+    low, high = signal.bounds_m()
+    x, (y0, z0), (y1, z1) = float(low[0]) - 0.012, low[1:] - 0.14, high[1:] + 0.14
+    outer = shapes.block((x, y0, z0), (x + 0.01, y1, z1), slot=BOARD)
+    inner = shapes.block((x + 0.003, y0 + 0.03, z0 + 0.03), (x + 0.013, y1 - 0.03, z1 - 0.03))
+    return join_patches([outer, inner.painted(HOUSING)])
 
 
 def _materials(lenses: Sequence[str], housing: str) -> tuple[Material, ...]:
@@ -153,7 +138,5 @@ def _materials(lenses: Sequence[str], housing: str) -> tuple[Material, ...]:
 
 
 def _choose_mount(seed: int, mount: str) -> str:
-    if mount == "any":
-        return MOUNTS[1] if seed % 4 == 2 else MOUNTS[0]
-    check_option("traffic_light", "mount", mount, ("any", *MOUNTS))
-    return mount
+    # One variant in four has an arm.
+    return choose_option("traffic_light", "mount", mount, MOUNTS, int(seed % 4 == 2))

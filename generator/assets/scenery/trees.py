@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
-from gen_data.generator.assets.procedural.material_presets import hex_to_linear, jitter_color
+from gen_data.generator.assets.procedural.material_presets import (
+    hex_to_linear,
+    jitter_color,
+    patterned_material,
+)
 from gen_data.generator.assets.procedural.noise import uniform
-from gen_data.generator.assets.procedural.patches import Array, Patch, finish_mesh
+from gen_data.generator.assets.procedural.patches import Array, Patch, finish_mesh, unit
 from gen_data.generator.assets.procedural.surface_shapes import circle, sweep
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.assets.scenery.branching import (
@@ -32,8 +36,6 @@ from gen_data.generator.assets.scenery.foliage import (
 from gen_data.generator.core.asset_types import ConvexParts, Material, MeshData
 from gen_data.generator.core.errors import AssetError
 
-SPECIES = ("broad", "round", "columnar", "birch", "young", "conifer")
-
 _LEAVES = 4200
 """Triangles of foliage on a tree in full leaf."""
 _TWIGS = 2400
@@ -43,6 +45,36 @@ _LEAF_WIDTH = 0.62
 _ATTRACTORS = 900
 _STEP = 0.12
 """Length of an internode, of the widest lobe's radius."""
+
+
+@dataclass(frozen=True, slots=True)
+class Species:
+    """A row of ``species.yaml``: how trees of a kind vary, as (low, high).
+
+    Attributes:
+        overlap_m: How far the crown reaches below its lowest branches.
+        width: Radius of the crown, as a share of its height (of half of it for one lobe).
+        greens: Alternatives for ``Shape.green``.
+        boughs: Number of lobes around a body, whose middle lies ``middle`` of the crown below
+            the top; 0 = none.
+        stacked: (height, width) of lobes above one another, as shares of the crown's.
+    """
+
+    height_m: tuple[float, float]
+    clear_m: tuple[float, float]
+    overlap_m: float
+    width: tuple[float, float]
+    trunk_m: tuple[float, float]
+    greens: tuple[tuple[str, ...], ...]
+    bark: str
+    droop: float = 0.15
+    boughs: int = 0
+    middle: float = 0.5
+    stacked: tuple[tuple[float, float], ...] = ()
+
+
+_SPECIES = load_table(__package__, "species", Species)
+SPECIES = (*_SPECIES, "conifer")
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +96,7 @@ class Shape:
     lobes: tuple[Lobe, ...]
     green: tuple[str, ...]
     bark: str
-    droop: float = 0.15
+    droop: float
 
 
 def tree(seed: int, species: str, leaves: float) -> Solid:
@@ -82,7 +114,9 @@ def tree(seed: int, species: str, leaves: float) -> Solid:
     if not 0.0 <= leaves <= 1.0:
         raise AssetError(f"tree: leaves={leaves} is not a share between 0 and 1")
     rng = variant_rng(f"tree/{species}", seed)
-    return _conifer(rng) if species == "conifer" else _broadleaf(_SHAPES[species](rng), leaves, rng)
+    if species == "conifer":
+        return _conifer(rng)
+    return _broadleaf(_draw_shape(_SPECIES[species], rng), leaves, rng)
 
 
 def tree_facts(seed: int, species: str, leaves: float) -> Facts:  # noqa: ARG001
@@ -113,28 +147,23 @@ def _broadleaf(shape: Shape, leaves: float, rng: VariantRng) -> Solid:
 def _crown(shape: Shape, skeleton: Skeleton, count: int, shades: int, rng: VariantRng) -> Sprays:
     """Leaves at the twigs' ends, as large as it takes to fill the crown."""
     outer = np.array([lobe.centre_m for lobe in shape.lobes]).mean(axis=0)
-    radius = np.sqrt(
-        max(lobe.axes_m[0] for lobe in shape.lobes) * max(lobe.axes_m[2] for lobe in shape.lobes)
-    )
+    radius = math.sqrt(math.prod(max(lobe.axes_m[i] for lobe in shape.lobes) for i in (0, 2)))
     width = max(abs(lobe.centre_m[0]) + lobe.axes_m[0] for lobe in shape.lobes)
-    area = math.pi * float(max(radius, 0.7 * width)) ** 2
+    area = math.pi * max(radius, 0.7 * width) ** 2
     # Half of a leaf's area faces a line of sight, on average.
     each = 2.0 * _OPTICAL_DEPTH * area / _LEAVES
     length = math.sqrt(2.0 * each / _LEAF_WIDTH)
-    middle = outer - np.array([0.0, 0.0, 0.25 * float(radius)])
-    anchors = skeleton.twigs()
-    return sprays_about(
-        anchors, middle, Habit(count, length, 1.6 * length, shades, shape.droop), rng
-    )
+    middle = outer - np.array([0.0, 0.0, 0.25 * radius])
+    habit = Habit(count, length, 1.6 * length, shades, shape.droop)
+    return sprays_about(skeleton.twigs(), middle, habit, rng)
 
 
 def _bare_twigs(shape: Shape, skeleton: Skeleton, bark: Material, rng: VariantRng) -> MeshData:
     """The finest twigs of a winter crown, each a thin sliver."""
     middle = np.array([0.0, 0.0, shape.clear_m])
     length = 0.1 * (shape.height_m - shape.clear_m)
-    sprays = sprays_about(
-        skeleton.twigs(), middle, Habit(_TWIGS, length, 0.1 * length, 1, -0.3), rng
-    )
+    habit = Habit(_TWIGS, length, 0.1 * length, 1, -0.3)
+    sprays = sprays_about(skeleton.twigs(), middle, habit, rng)
     return leaf_mesh(sprays, (bark,), 0.03, rng)
 
 
@@ -175,14 +204,13 @@ def _conifer(rng: VariantRng) -> Solid:
     # The lowest sprays rest on the ground.
     growth[:, 2] = np.maximum(growth[:, 2], (0.03 - places[:, 2]) / reach_m)
     axis = places * np.array([1.0, 1.0, 0.0])
-    outward = axis / np.sqrt((axis**2).sum(axis=1, keepdims=True)) * 0.85 + np.array([0, 0, 0.53])
+    outward = unit(axis) * 0.85 + np.array([0, 0, 0.53])
     depth = np.sqrt((axis**2).sum(axis=1)) / (spread * np.clip(1 - places[:, 2] / height, 0.1, 1.0))
     slots = np.clip(np.floor(depth * 3.2 + uniform(len(depth), rng) - 0.5), 0, 3).astype(np.int64)
     sprays = Sprays(places, outward, growth, reach_m, slots)
     greens = leaf_greens(("#1f2b1c", "#2a3a25", "#35472d", "#425537"), rng)
-    mesh = merge_meshes(
-        finish_mesh(trunk, (_bark("#6a5a4c"),), 60.0), leaf_mesh(sprays, greens, 0.42, rng)
-    )
+    wooden = finish_mesh(trunk, (_bark("#6a5a4c"),), 60.0)
+    mesh = merge_meshes(wooden, leaf_mesh(sprays, greens, 0.42, rng))
     hull = hulls.frustum((base_m, 0.0), (0.6 * base_m, 0.5 * height), 10)
     return Solid(mesh, ConvexParts((np.round(hull, 6),)))
 
@@ -199,43 +227,49 @@ def _fan(
     wing = np.where(np.arange(count) % 2 == 0, 1.0, -1.0) * (0.3 + 0.7 * uniform(count, rng))
     spread = (0.26 * reach * t * (1.15 - t))[:, None] * (wing[:, None] * side)
     at = (reach * t)[:, None] * out + spread + np.stack([0 * t, 0 * t, z + dip], axis=1)
-    growth = (
-        out
-        + 0.9 * wing[:, None] * side
-        + np.array([0.0, 0.0, -0.45]) * (0.4 + uniform((count, 1), rng))
-    )
-    growth = growth / np.sqrt((growth**2).sum(axis=1, keepdims=True))
+    fall = np.array([0.0, 0.0, -0.45]) * (0.4 + uniform((count, 1), rng))
+    growth = unit(out + 0.9 * wing[:, None] * side + fall)
     return at, growth, (0.22 + 0.2 * reach) * (0.7 + 0.5 * uniform(count, rng))
 
 
 def _bark(code: str) -> Material:
-    texture = "texture/bark?seed=0"
-    return Material(
-        hex_to_linear(code), roughness=0.95, texture=texture, texture_scale_m=0.8, role="bark"
-    )
+    bark = patterned_material("texture/bark?seed=0", 0.8, 0.95, hex_to_linear(code))
+    return replace(bark, role="bark")
 
 
 def leaf_greens(codes: tuple[str, ...], rng: VariantRng) -> tuple[Material, ...]:
     """Shades of leaf that vary together from tree to tree."""
     r, g, b = jitter_color((1.0, 1.0, 1.0), 0.0, rng)
     warm, level = rng.between(0.85, 1.18), rng.between(0.85, 1.15)
-    return tuple(
-        Material(
-            (level * warm * c[0] * r, level * c[1] * g, level * c[2] * b),
-            roughness=0.75,
-            specular=0.35,
-            role="leaf",
-        )
-        for c in (hex_to_linear(code) for code in codes)
+    colors = (
+        (level * warm * c[0] * r, level * c[1] * g, level * c[2] * b)
+        for c in map(hex_to_linear, codes)
     )
+    return tuple(Material(c, roughness=0.75, specular=0.35, role="leaf") for c in colors)
 
 
-_LIME = ("#3c4726", "#4f5d30", "#637339", "#778746")
-_MAPLE = ("#384225", "#49572b", "#5d6c34", "#718141")
-_BIRCH = ("#45522f", "#56663a", "#697a45", "#7d8c54")
+def _draw_shape(species: Species, rng: VariantRng) -> Shape:
+    height, clear = rng.between(*species.height_m), rng.between(*species.clear_m)
+    crown = height - clear + species.overlap_m
+    wide = rng.between(*species.width) if species.width[0] < species.width[1] else species.width[0]
+    if species.boughs:
+        centre_z = height - species.middle * crown
+        lobes = _draw_boughs(crown * wide, crown, centre_z, species.boughs, rng)
+    elif species.stacked:
+        r = crown * wide
+        lobes = tuple(
+            Lobe((0.0, 0.0, clear + crown * z), (w * r, w * r, 0.24 * crown))
+            for z, w in species.stacked
+        )
+    else:
+        r = 0.5 * crown
+        lobes = (Lobe((0.0, 0.0, height - r), (wide * r, wide * r, r)),)
+    green = rng.choose(species.greens) if len(species.greens) > 1 else species.greens[0]
+    trunk = rng.between(*species.trunk_m)
+    return Shape(height, clear, trunk, lobes, green, species.bark, species.droop)
 
 
-def _draw_lobes(
+def _draw_boughs(
     radius: float, height: float, centre_z: float, count: int, rng: VariantRng
 ) -> tuple[Lobe, ...]:
     """A crown of one body and several overlapping boughs around it."""
@@ -246,56 +280,3 @@ def _draw_lobes(
         z = centre_z + rng.between(-0.24, 0.26) * height
         lobes.append(Lobe((away * math.cos(turn), away * math.sin(turn), z), (r, r, 0.8 * r)))
     return tuple(lobes)
-
-
-def _broad(rng: VariantRng) -> Shape:
-    height, clear = rng.between(8.5, 12.0), rng.between(2.9, 3.6)
-    crown = height - clear + 0.3
-    radius = crown * rng.between(0.42, 0.54)
-    lobes = _draw_lobes(radius, crown, height - 0.52 * crown, 7, rng)
-    green = rng.choose((_LIME, _MAPLE))
-    return Shape(height, clear, rng.between(0.16, 0.26), lobes, green, "#7d7263")
-
-
-def _round(rng: VariantRng) -> Shape:
-    height, clear = rng.between(5.0, 6.5), rng.between(2.2, 2.6)
-    r = 0.5 * (height - clear + 0.2)
-    lobes = (Lobe((0.0, 0.0, height - r), (1.02 * r, 1.02 * r, r)),)
-    return Shape(height, clear, rng.between(0.1, 0.15), lobes, _MAPLE, "#75695b")
-
-
-def _columnar(rng: VariantRng) -> Shape:
-    height, clear = rng.between(8.0, 12.0), rng.between(1.6, 2.4)
-    crown = height - clear + 0.3
-    r = crown * rng.between(0.15, 0.21)
-    lobes = tuple(
-        Lobe((0.0, 0.0, clear + crown * z), (w * r, w * r, 0.24 * crown))
-        for z, w in ((0.22, 0.85), (0.48, 1.0), (0.74, 0.72))
-    )
-    return Shape(height, clear, rng.between(0.13, 0.19), lobes, _LIME, "#7a7062", 0.0)
-
-
-def _birch(rng: VariantRng) -> Shape:
-    height, clear = rng.between(8.0, 11.5), rng.between(2.0, 3.0)
-    crown = height - clear + 0.3
-    radius = crown * rng.between(0.26, 0.34)
-    lobes = _draw_lobes(radius, crown, height - 0.5 * crown, 5, rng)
-    return Shape(height, clear, rng.between(0.1, 0.15), lobes, _BIRCH, "#cfccc4", 0.7)
-
-
-def _young(rng: VariantRng) -> Shape:
-    height, clear = rng.between(3.6, 4.8), rng.between(1.8, 2.2)
-    r = 0.5 * (height - clear)
-    wide = rng.between(0.55, 0.75)
-    lobes = (Lobe((0.0, 0.0, height - r), (wide * r, wide * r, r)),)
-    green = rng.choose((_LIME, _MAPLE, _BIRCH))
-    return Shape(height, clear, rng.between(0.04, 0.06), lobes, green, "#80746a")
-
-
-_SHAPES: dict[str, Callable[[VariantRng], Shape]] = {
-    "broad": _broad,
-    "round": _round,
-    "columnar": _columnar,
-    "birch": _birch,
-    "young": _young,
-}

@@ -97,9 +97,8 @@ def lines(image: Image, box: Box, ink: Color, ground: Color, rng: VariantRng) ->
         x = float(x0)
         while x < x1 - 6:
             word = rng.between(4, 22)
-            draw.rectangle(
-                [x, y, min(x + word, x1), y + max(1, pitch // 3)], fill=blend(ink, ground, 0.25)
-            )
+            dash = [x, y, min(x + word, x1), y + max(1, pitch // 3)]
+            draw.rectangle(dash, fill=blend(ink, ground, 0.25))
             x += word + 4
 
 
@@ -112,12 +111,9 @@ def table(image: Image, box: Box, ink: Color, rng: VariantRng) -> None:
     for i in range(1, rows):
         y = y0 + (y1 - y0) * i // rows
         draw.line([x0, y, x1, y], fill=(40, 40, 40), width=1)
-        h = max(1, (y1 - y0) // rows // 4)
-        draw.rectangle(
-            [x0 + 4, y + h, x0 + 4 + rng.between(0.2, 0.5) * (x1 - x0), y + 2 * h],
-            fill=(60, 60, 60),
-        )
-        draw.rectangle([x1 - 0.2 * (x1 - x0), y + h, x1 - 4, y + 2 * h], fill=(60, 60, 60))
+        h, name = max(1, (y1 - y0) // rows // 4), rng.between(0.2, 0.5)
+        for a, b in ((x0 + 4, x0 + 4 + name * (x1 - x0)), (x1 - 0.2 * (x1 - x0), x1 - 4)):
+            draw.rectangle([a, y + h, b, y + 2 * h], fill=(60, 60, 60))
 
 
 def barcode(image: Image, box: Box, rng: VariantRng) -> None:
@@ -132,13 +128,9 @@ def barcode(image: Image, box: Box, rng: VariantRng) -> None:
         draw.rectangle([x, y0 + 0.08 * (y1 - y0), x + bar - 1, foot], fill=(15, 15, 15))
         x += bar + gap
     digits = "".join(str(int(rng.between(0, 10))) for _ in range(13))
-    text(
-        image,
-        (x0 / image.width + 0.02, foot / image.height, x1 / image.width - 0.02, y1 / image.height),
-        digits,
-        (15, 15, 15),
-        0,
-    )
+    w, h = image.size
+    below = (x0 / w + 0.02, foot / h, x1 / w - 0.02, y1 / h)
+    text(image, below, digits, (15, 15, 15), 0)
 
 
 def panel(image: Image, box: Box, fill: Color) -> None:
@@ -150,23 +142,11 @@ def panel(image: Image, box: Box, fill: Color) -> None:
 def burst(image: Image, centre: Place, radius: float, fill: Color, ink: Color) -> None:
     """A star with a word in it."""
     cx, cy = centre[0] * image.width, centre[1] * image.height
-    points = [
-        (
-            cx + radius * (1.0 if i % 2 else 0.8) * math.cos(math.pi * i / 12),
-            cy + radius * (1.0 if i % 2 else 0.8) * math.sin(math.pi * i / 12),
-        )
-        for i in range(24)
-    ]
-    pen(image).polygon(points, fill=fill)
-    w, h = image.size
-    text(
-        image,
-        ((cx - 0.6 * radius) / w, (cy - 0.3 * radius) / h, (cx + 0.6 * radius) / w,
-         (cy + 0.3 * radius) / h),
-        "NEW",
-        ink,
-        2,
-    )  # fmt: skip
+    rays = [(radius * (1.0 if i % 2 else 0.8), math.pi * i / 12) for i in range(24)]
+    star = [(cx + r * math.cos(turn), cy + r * math.sin(turn)) for r, turn in rays]
+    pen(image).polygon(star, fill=fill)
+    (w, h), x, y = image.size, 0.6 * radius, 0.3 * radius
+    text(image, ((cx - x) / w, (cy - y) / h, (cx + x) / w, (cy + y) / h), "NEW", ink, 2)
 
 
 def gradient(image: Image, top: Color, bottom: Color) -> None:
@@ -182,9 +162,8 @@ def fruit(draw: ImageDraw, at: Place, r: float, fill: Color) -> None:
     draw.ellipse([x - r, y - r, x + r, y + r], fill=fill)
     light = blend(fill, (255, 255, 255), 0.45)
     draw.ellipse([x - 0.55 * r, y - 0.6 * r, x - 0.15 * r, y - 0.2 * r], fill=light)
-    draw.line(
-        [x, y - 0.8 * r, x + 0.1 * r, y - 1.25 * r], fill=(70, 50, 30), width=max(1, int(0.09 * r))
-    )
+    stalk = [x, y - 0.8 * r, x + 0.1 * r, y - 1.25 * r]
+    draw.line(stalk, fill=(70, 50, 30), width=max(1, int(0.09 * r)))
     leaf(draw, (x + 0.05 * r, y - r), (x + 0.7 * r, y - 1.3 * r), (60, 130, 60))
 
 

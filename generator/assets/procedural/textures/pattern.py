@@ -67,11 +67,8 @@ def voronoi_noise(seed: int) -> TextureData:
 
 def _vivid(rng: VariantRng) -> Float32:
     """A colour that is even over hue, from grey to saturated and from dark to light."""
-    hue, saturation, value = (
-        6.0 * float(rng.random()),
-        rng.between(0.1, 1.0),
-        rng.between(0.12, 0.97),
-    )
+    hue = 6.0 * float(rng.random())
+    saturation, value = rng.between(0.1, 1.0), rng.between(0.12, 0.97)
     channels = [
         value * (1 - saturation * min(max(abs(math.remainder(hue - shift, 6.0)) - 1.0, 0.0), 1.0))
         for shift in (0.0, 2.0, 4.0)

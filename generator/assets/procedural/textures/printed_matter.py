@@ -11,8 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from gen_data.generator.assets.procedural import cans, cartons
-from gen_data.generator.assets.procedural.bottles import LABEL_ASPECT
+from gen_data.generator.assets.procedural import packaging
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.material_presets import hex_to_srgb8
 from gen_data.generator.assets.procedural.textures import artwork as art
@@ -48,26 +47,30 @@ class _Design:
 def label(seed: int) -> TextureData:
     """Wrap-around label of a bottle or jar; the front is in the middle. 512 x 256."""
     rng = variant_rng("label", seed)
-    image = _wrap(int(art.SIZE_PX * 1.5), LABEL_ASPECT, _design(seed, rng, _WORDS["volumes"]), rng)
+    image = _wrap(
+        int(art.SIZE_PX * 1.5), packaging.LABEL_ASPECT, _design(seed, rng, _WORDS["volumes"]), rng
+    )
     return art.resize_texture(image, art.SIZE_PX, art.SIZE_PX // 2)
 
 
 def can_label(seed: int) -> TextureData:
     """All around a can; the front is in the middle."""
     rng = variant_rng("can_label", seed)
-    sizes = _WORDS["weights"] if cans.can_size(seed).food else ("330 ml", "500 ml")
-    image = _wrap(int(art.SIZE_PX * 1.5), cans.label_aspect(seed), _design(seed, rng, sizes), rng)
+    sizes = _WORDS["weights"] if packaging.can_size(seed).food else ("330 ml", "500 ml")
+    image = _wrap(
+        int(art.SIZE_PX * 1.5), packaging.label_aspect(seed), _design(seed, rng, sizes), rng
+    )
     return art.resize_texture(image, art.SIZE_PX, art.SIZE_PX)
 
 
 def carton(seed: int) -> TextureData:
-    """The six faces of a folding box, laid out by ``cartons.CARTON_ATLAS``."""
-    return _box_print("carton", seed, cartons.carton_size_m(seed))
+    """The six faces of a folding box, laid out by ``packaging.CARTON_ATLAS``."""
+    return _box_print("carton", seed, packaging.carton_size_m(seed))
 
 
 def milk_label(seed: int) -> TextureData:
-    """The faces of a milk carton, laid out by ``cartons.CARTON_ATLAS``."""
-    return _box_print("milk_label", seed, cartons.milk_size_m(seed))
+    """The faces of a milk carton, laid out by ``packaging.CARTON_ATLAS``."""
+    return _box_print("milk_label", seed, packaging.milk_size_m(seed))
 
 
 def book_cover(seed: int) -> TextureData:
@@ -79,19 +82,18 @@ def book_cover(seed: int) -> TextureData:
     design = replace(_design(seed, rng), product=" ".join(words), note=rng.choose(_WORDS["praise"]))
     length, width, thickness = books.book_size_m(seed)
     scale = 560.0 / length
-    h = int(length * scale)
+    w, h = int(width * scale), int(length * scale)
     faces = {
-        "front": _front_cover(int(width * scale), h, words, design, rng),
+        "front": _front_cover(w, h, words, design, rng),
         "spine": _spine(max(24, int(thickness * scale)), h, design),
-        "back": _back_cover(int(width * scale), h, design, rng),
+        "back": _back_cover(w, h, design, rng),
     }
     return art.atlas(faces, books.COVER_ATLAS, design.ground)
 
 
 def _design(seed: int, rng: VariantRng, sizes: Sequence[str] = _WORDS["weights"]) -> _Design:
-    schemes = _WORDS["schemes"]
-    codes = in_turn(schemes, seed).split()
-    ground, second, accent, ink = (hex_to_srgb8(code) for code in codes)
+    scheme = in_turn(_WORDS["schemes"], seed)
+    ground, second, accent, ink = (hex_to_srgb8(code) for code in scheme.split())
     if rng.chance(0.3):
         second, accent = accent, second
     name = rng.choose(_WORDS["starts"]) + rng.choose(_WORDS["ends"])
@@ -124,7 +126,7 @@ def _box_print(name: str, seed: int, size_m: tuple[float, float, float]) -> Text
         "top": art.canvas(w, d, design.second) if name == "milk_label" else _strip(w, d, design),
         "bottom": _strip(w, d, design),
     }
-    return art.atlas(faces, cartons.CARTON_ATLAS, design.ground)
+    return art.atlas(faces, packaging.CARTON_ATLAS, design.ground)
 
 
 def _wrap(width: int, aspect: float, design: _Design, rng: VariantRng) -> Image:
@@ -153,13 +155,8 @@ def _front(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     on_ground = design.layout in (0, 3)
     if design.layout in (1, 4):
         art.panel(image, brand, design.second)
-    art.text(
-        image,
-        brand,
-        design.brand,
-        design.ink if on_ground else _readable(design, design.second),
-        design.bold,
-    )
+    ink = design.ink if on_ground else _readable(design, design.second)
+    art.text(image, brand, design.brand, ink, design.bold)
     art.text(image, product, design.product, design.ink, 1)
     note = (0.05, 0.9, 0.5, 0.97) if tall else (0.05, 0.76, 0.4, 0.88)
     size = (0.68, 0.91, 0.95, 0.97) if tall else (0.44, 0.78, 0.6, 0.88)
@@ -245,15 +242,14 @@ def _rings(pen: ImageDraw, at: Place, r: float, design: _Design, _: VariantRng) 
     cx, cy = at
     for i in range(5, 0, -1):
         s = r * i / 5
-        pen.ellipse(
-            [cx - s, cy - s, cx + s, cy + s], fill=design.accent if i % 2 else design.second
-        )
+        fill = design.accent if i % 2 else design.second
+        pen.ellipse([cx - s, cy - s, cx + s, cy + s], fill=fill)
 
 
 def _info(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     """Small print, a table of nutrition and a bar code."""
-    image = art.canvas(w, h, art.blend(design.ground, (255, 255, 255), 0.25))
     paper = art.blend(design.ground, (255, 255, 255), 0.25)
+    image = art.canvas(w, h, paper)
     ink = (25, 25, 28) if sum(paper) > 330 else (240, 240, 240)
     art.text(image, (0.08, 0.03, 0.92, 0.11), design.brand, ink, 1)
     art.lines(image, (0.08, 0.14, 0.92, 0.32), ink, paper, rng)
@@ -275,9 +271,8 @@ def _side(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
 
 def _strip(w: int, h: int, design: _Design) -> Image:
     image = art.canvas(w, h, design.second)
-    art.text(
-        image, (0.1, 0.2, 0.9, 0.8), design.brand, _readable(design, design.second), design.bold
-    )
+    ink = _readable(design, design.second)
+    art.text(image, (0.1, 0.2, 0.9, 0.8), design.brand, ink, design.bold)
     return image
 
 
@@ -289,13 +284,8 @@ def _front_cover(w: int, h: int, words: tuple[str, str], design: _Design, rng: V
     art.text(image, (0.1, 0.09, 0.9, 0.2), words[0], design.ink, 2)
     art.text(image, (0.1, 0.22, 0.9, 0.34), words[1], design.ink, 3)
     art.panel(image, (0.0, 0.87, 1.0, 0.97), design.second)
-    art.text(
-        image,
-        (0.2, 0.895, 0.8, 0.945),
-        f"{design.brand} {rng.choose(_WORDS['ends']).title()}",
-        _readable(design, design.second),
-        1,
-    )
+    author = f"{design.brand} {rng.choose(_WORDS['ends']).title()}"
+    art.text(image, (0.2, 0.895, 0.8, 0.945), author, _readable(design, design.second), 1)
     return image
 
 

@@ -1,0 +1,334 @@
+"""Poses of people who walk, run, stand or sit: joint angles, bone rotations, points that move.
+
+Angles of ``poses.yaml`` and ``gaits.yaml`` are degrees, as in the tables of gait analysis: hip and
+knee flexion, ankle dorsiflexion and shoulder flexion (arm forward) are positive. Limbs take their
+direction from them, independent of the template's own pose: a bone is first turned so that it hangs
+straight down and then swung from there. Linear blend skinning: Magnenat-Thalmann, Laperrière and
+Thalmann, "Joint-dependent local deformations for hand animation and object grasping", Graphics
+Interface 1988.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Literal, get_args
+
+import numpy as np
+
+from gen_data.generator.assets.people.body import Array, BodyTemplate, Indices
+from gen_data.generator.assets.procedural.data_tables import load_table
+
+PoseName = Literal["walk", "run", "stand", "phone", "carry", "sit"]
+POSES: tuple[PoseName, ...] = get_args(PoseName)
+PHASES = 16
+"""A stride is divided into this many steps, from one heel strike to the next of the same foot."""
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """Joint angles of one leg [deg]; ``toes`` bends them up against the foot."""
+
+    hip: float = 0.0
+    knee: float = 0.0
+    ankle: float = 0.0
+    toes: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """Joint angles of one arm [deg].
+
+    Attributes:
+        swing: Upper arm forward.
+        out: Upper arm away from the body.
+        elbow: Flexion.
+        inward: How far the forearm turns to the body's middle.
+        curl: Of each finger joint.
+    """
+
+    swing: float = 0.0
+    out: float = 8.0
+    elbow: float = 12.0
+    inward: float = 8.0
+    curl: float = 16.0
+
+
+@dataclass(frozen=True, slots=True)
+class Stance:
+    """Joint angles of a whole body [deg].
+
+    Attributes:
+        lean: Trunk forward.
+        nod: Head downward.
+        twist: Pelvis to the left; the shoulders turn as far to the right.
+    """
+
+    left_leg: Leg = Leg()
+    right_leg: Leg = Leg()
+    left_arm: Arm = Arm()
+    right_arm: Arm = Arm()
+    lean: float = 0.0
+    nod: float = 0.0
+    twist: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Gait:
+    """A row of ``gaits.yaml``."""
+
+    hip: tuple[float, ...]
+    knee: tuple[float, ...]
+    ankle: tuple[float, ...]
+    toes: tuple[float, ...]
+    arm: Arm
+    arm_swing: float
+    elbow_swing: float
+    lean: float
+    twist: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Pose:
+    """A row of ``poses.yaml``."""
+
+    behaviour: str
+    gait: str = ""
+    leg: Leg = Leg()
+    arm: Arm = Arm()
+    right_arm: Arm | None = None
+    lean: float = 0.0
+    nod: float = 0.0
+
+
+_GAITS = load_table(__package__, "gaits", _Gait)
+_POSES = load_table(__package__, "poses", _Pose)
+BEHAVIOURS = {name: pose.behaviour for name, pose in _POSES.items()}
+
+
+def shorten_stride(stance: Stance, share: float) -> Stance:
+    """Shorten the steps of a stride, for narrow clothes."""
+    left, right = (
+        Leg(share * leg.hip, leg.knee * (0.5 + 0.5 * share), leg.ankle * share, leg.toes)
+        for leg in (stance.left_leg, stance.right_leg)
+    )
+    return replace(stance, left_leg=left, right_leg=right)
+
+
+def stance(pose: PoseName, step: int) -> Stance:
+    """Joint angles of a pose.
+
+    Args:
+        pose: Name of the pose.
+        step: Sixteenth of the stride of the left leg, 0 = its heel strikes; walk, carry, run.
+    """
+    row = _POSES[pose]
+    made = Stance(row.leg, row.leg, row.arm, row.arm, row.lean, row.nod)
+    if row.gait:
+        made = _stride(_GAITS[row.gait], step % PHASES)
+    return replace(made, right_arm=row.right_arm or made.right_arm)
+
+
+def _stride(gait: _Gait, step: int) -> Stance:
+    turn = math.cos(2.0 * math.pi * step / PHASES)
+    left_leg, right_leg = (
+        Leg(gait.hip[k], gait.knee[k], gait.ankle[k], gait.toes[k])
+        for k in (step, (step + PHASES // 2) % PHASES)
+    )
+    left_arm, right_arm = (
+        replace(
+            gait.arm,
+            swing=sign * gait.arm_swing * turn + gait.arm.swing,
+            elbow=gait.arm.elbow + sign * gait.elbow_swing * turn,
+        )
+        for sign in (-1.0, 1.0)
+    )
+    twist = -gait.twist * turn
+    return Stance(left_leg, right_leg, left_arm, right_arm, lean=gait.lean, twist=twist)
+
+
+Rotations = Mapping[str, Array]
+"""``{bone: rotation [3, 3] from the template to the pose, in the body's frame}``; bones that are
+not named turn with their parent."""
+
+
+def bone_transforms(body: BodyTemplate, heads_m: Array, rotations: Rotations) -> Array:
+    """Transform of each bone from the rest pose to the pose, float64 [bones, 3, 4].
+
+    Args:
+        body: Template with the bones.
+        heads_m: Bone heads before the pose [m], shape [bones, 3]; the root's stays where it is.
+        rotations: The pose.
+    """
+    turns = np.zeros((len(body.bones), 3, 3))
+    places = np.zeros((len(body.bones), 3))
+    for k, name in enumerate(body.bones):
+        parent = int(body.parents[k])
+        inherited = np.eye(3) if parent < 0 else turns[parent]
+        turns[k] = rotations.get(name, inherited)
+        places[k] = heads_m[k]
+        if parent >= 0:
+            places[k] = places[parent] + inherited @ (heads_m[k] - heads_m[parent])
+    shifts = places - np.einsum("bij,bj->bi", turns, heads_m, optimize=False)
+    return np.concatenate([turns, shifts[:, :, None]], axis=2)
+
+
+def skin_points(points_m: Array, bones: Indices, weights: Array, transforms: Array) -> Array:
+    """Points moved by their bones.
+
+    Args:
+        points_m: Before the pose [m], shape [n, 3].
+        bones: Of each point, shape [n, 4].
+        weights: Shares of those bones, shape [n, 4].
+        transforms: Of every bone, shape [bones, 3, 4].
+
+    Returns:
+        After the pose [m], float64 [n, 3].
+    """
+    flat = transforms.reshape(len(transforms), 12)
+    blended = weights[:, 0, None] * flat[bones[:, 0]]
+    for k in range(1, bones.shape[1]):
+        blended += weights[:, k, None] * flat[bones[:, k]]
+    matrices = blended.reshape(-1, 3, 4)
+    x, y, z = points_m.T[:, :, None]
+    moved: Array = (
+        matrices[:, :, 0] * x + matrices[:, :, 1] * y + matrices[:, :, 2] * z + matrices[:, :, 3]
+    )
+    return moved
+
+
+def vertex_normals(points_m: Array, faces: Indices) -> Array:
+    """Unit normals [n, 3], weighted by the area of the faces; (0, 0, 1) where there is none."""
+    a, b, c = (points_m[faces[:, i]] for i in range(3))
+    crosses = _cross(b - a, c - a)
+    corners = faces.T.reshape(-1)
+    weights = np.tile(crosses, (3, 1)).T
+    sums = np.stack([np.bincount(corners, w, minlength=len(points_m)) for w in weights], axis=1)
+    lengths = np.sqrt((sums * sums).sum(axis=1, keepdims=True))
+    unit: Array = np.where(lengths > 1e-12, sums / np.maximum(lengths, 1e-12), (0.0, 0.0, 1.0))
+    return unit
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """``np.cross`` of rows, without its overhead."""
+    ax, ay, az = a.T
+    bx, by, bz = b.T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
+
+
+_FINGERS = ("index", "middle", "ring", "pinky")
+_STANCE_IN_DEG = 3.0
+"""Thighs lean inward, so that the feet are nearer to each other than the hips."""
+_TOES_OUT_DEG = 6.0
+
+
+def bone_rotations(body: BodyTemplate, heads_m: Array, stance: Stance) -> Rotations:
+    """The rotation of every bone that a stance turns.
+
+    Args:
+        body: Template with the bones.
+        heads_m: Bone heads before the pose [m], shape [bones, 3].
+        stance: Joint angles.
+    """
+    rotations: dict[str, Array] = {
+        "pelvis": _yaw(stance.twist),
+        "spine_01": _yaw(stance.twist / 3.0) @ _pitch(-stance.lean / 2.0),
+        "spine_02": _yaw(-stance.twist / 3.0) @ _pitch(-stance.lean),
+        "spine_03": _yaw(-stance.twist) @ _pitch(-stance.lean),
+        "neck_01": _pitch(-(stance.lean + stance.nod) / 2.0),
+        "head": _pitch(-stance.nod),
+    }
+    for side, sign, leg, arm in (
+        ("l", 1.0, stance.left_leg, stance.left_arm),
+        ("r", -1.0, stance.right_leg, stance.right_arm),
+    ):
+        rotations |= _leg(body, heads_m, side, sign, leg)
+        rotations |= _arm(body, heads_m, side, sign, arm, rotations["spine_03"])
+    return rotations
+
+
+def _leg(body: BodyTemplate, heads_m: Array, side: str, sign: float, leg: Leg) -> Rotations:
+    thigh = _direction(body, heads_m, f"thigh_{side}", f"calf_{side}")
+    calf = _direction(body, heads_m, f"calf_{side}", f"foot_{side}")
+    inward = np.array([0.0, -sign * math.sin(math.radians(_STANCE_IN_DEG)), -1.0])
+    foot = leg.hip - leg.knee + leg.ankle
+    out = _yaw(sign * _TOES_OUT_DEG)
+    return {
+        f"thigh_{side}": _pitch(leg.hip) @ _between(thigh, inward),
+        f"calf_{side}": _pitch(leg.hip - leg.knee) @ _between(calf, inward * (1.0, 0.5, 1.0)),
+        f"foot_{side}": out @ _pitch(foot),
+        f"ball_{side}": out @ _pitch(foot + leg.toes),
+    }
+
+
+def _arm(
+    body: BodyTemplate, heads_m: Array, side: str, sign: float, arm: Arm, trunk: Array
+) -> Rotations:
+    down = np.array([0.0, 0.0, -1.0])
+    upper = _between(_direction(body, heads_m, f"upperarm_{side}", f"lowerarm_{side}"), down)
+    fore_direction = upper @ _direction(body, heads_m, f"lowerarm_{side}", f"hand_{side}")
+    fore = _between(fore_direction, down) @ upper
+    out = trunk @ _roll(sign * arm.out)
+    bend = _yaw(-sign * arm.inward) @ _pitch(arm.elbow)
+    lower = out @ _pitch(arm.swing) @ bend @ fore
+    return {
+        f"upperarm_{side}": out @ _pitch(arm.swing) @ upper,
+        f"lowerarm_{side}": lower,
+        **_fingers(body, heads_m, side, sign * arm.curl, lower),
+    }
+
+
+def _fingers(
+    body: BodyTemplate, heads_m: Array, side: str, curl: float, hand: Array
+) -> dict[str, Array]:
+    """Fingers bent about the line of the knuckles."""
+    across = _direction(body, heads_m, f"index_01_{side}", f"pinky_01_{side}")
+    joints = product(_FINGERS, (1, 2, 3))
+    return {f"{name}_0{k}_{side}": hand @ _about(across, k * curl) for name, k in joints}
+
+
+def _direction(body: BodyTemplate, heads_m: Array, start: str, end: str) -> Array:
+    return _unit(heads_m[body.bone(end)] - heads_m[body.bone(start)])
+
+
+def _pitch(angle_deg: float) -> Array:
+    """Turns front upward and down forward."""
+    return _about(np.array([0.0, -1.0, 0.0]), angle_deg)
+
+
+def _yaw(angle_deg: float) -> Array:
+    """Turns front to the left."""
+    return _about(np.array([0.0, 0.0, 1.0]), angle_deg)
+
+
+def _roll(angle_deg: float) -> Array:
+    """Turns down to the left."""
+    return _about(np.array([1.0, 0.0, 0.0]), angle_deg)
+
+
+def _about(axis: Array, angle_deg: float) -> Array:
+    """Rotation about a unit axis (Rodrigues 1840)."""
+    angle, k = math.radians(angle_deg), _cross_matrix(axis)
+    rotation: Array = np.eye(3) + math.sin(angle) * k + (1.0 - math.cos(angle)) * (k @ k)
+    return rotation
+
+
+def _between(start: Array, end: Array) -> Array:
+    """The smallest rotation that turns one direction into another; not for opposite ones."""
+    a, b = _unit(start), _unit(end)
+    k = _cross_matrix(np.cross(a, b))
+    rotation: Array = np.eye(3) + k + (k @ k) / (1.0 + float((a * b).sum()))
+    return rotation
+
+
+def _cross_matrix(vector: Array) -> Array:
+    """Matrix of the cross product with a vector."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def _unit(vector: Array) -> Array:
+    unit: Array = vector / math.sqrt(float((vector * vector).sum()))
+    return unit

@@ -1,0 +1,330 @@
+"""Packaging: bottles, jars, drink and food cans, folding boxes and milk cartons."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.material_presets import (
+    ALUMINIUM,
+    CAPS,
+    PALETTES,
+    STEEL,
+    draw_linear,
+    metal_material,
+    plastic_material,
+    printed_material,
+)
+from gen_data.generator.assets.procedural.patches import (
+    Patch,
+    join_patches,
+    make_centred_solid,
+    rotate,
+)
+from gen_data.generator.assets.procedural.surface_shapes import (
+    Point2,
+    circle,
+    extrude,
+    fillet,
+    grid,
+    lathe,
+    rounded_box,
+)
+from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.se3 import Vec3
+
+# Width by height of the unrolled label; its texture is drawn at this aspect.
+LABEL_ASPECT = 2.6
+
+_WATER_IOR = 1.33
+# Label paper stands this much proud of the wall.
+_PROUD_M = 0.0003
+
+
+@dataclass(frozen=True, slots=True)
+class BottleStyle:
+    """Ranges of the measures of one kind of bottle.
+
+    Attributes:
+        shoulder: (radius as a share of the body's beyond the neck's, height as a share of the way
+            from label to neck) of the points between body and neck.
+        depth: Extent along Y as a share of that along X.
+        colors: Of the body; of a clear bottle, the tint of light that has passed through it.
+        caps: Of the cap.
+        clear: Whether it is transparent and full of water: body and filling refract as one.
+    """
+
+    height_m: tuple[float, float]
+    radius_m: tuple[float, float]
+    neck_m: float
+    neck_share: tuple[float, float]
+    label_share: tuple[float, float]
+    shoulder: tuple[Point2, ...]
+    cap_m: tuple[float, float]
+    depth: float
+    colors: tuple[str, ...]
+    caps: tuple[str, ...]
+    gloss: tuple[float, float] = (0.06, 0.15)
+    clear: bool = False
+
+
+BOTTLES = load_table(__package__, "bottles", BottleStyle)
+_SIZES = load_table(__package__, "package_sizes", tuple[tuple[float, ...], ...])
+
+
+def bottle(seed: int) -> Solid:
+    """A bottle of one of the styles in ``BOTTLES``. Slots: body, label, cap."""
+    rng = variant_rng("bottle", seed)
+    style = BOTTLES[in_turn(tuple(BOTTLES), seed)]
+    height, radius = rng.between(*style.height_m), rng.between(*style.radius_m)
+    neck_z = height * rng.between(*style.neck_share)
+    z0, z1 = height * style.label_share[0], min(height * style.label_share[1], neck_z - 0.01)
+    shoulder = [
+        (style.neck_m + r * (radius - style.neck_m), z1 + t * (neck_z - z1))
+        for r, t in style.shoulder
+    ]
+    cap_radius, cap_height = style.cap_m
+    cap_z, neck_top = height - cap_height, height - 0.4 * cap_height
+    upper = [*shoulder, (style.neck_m, neck_z), (style.neck_m, neck_top)]
+    patches = [
+        *_wall_with_label(radius, (z0, z1), upper, [0.06] * (len(upper) - 1)),
+        lathe([(style.neck_m, neck_top), (0.0, neck_top)], 32, 0),
+        _cap(cap_radius, cap_z, height),
+    ]
+    foot = [(0.93 * radius, 0.0), (radius, 0.008), (radius, z1)]
+    mouth = (max(style.neck_m, 0.96 * cap_radius), neck_z + 0.004)
+    stages = [*foot, *shoulder, mouth, (cap_radius, cap_z), (0.97 * cap_radius, height)]
+    flat = np.array([1.0, style.depth, 1.0])
+    parts = [hull * flat for hull in hulls.stack(_drop_level_stages(stages))]
+    body = Material(draw_linear(style.colors, 0.1, rng), rng.between(*style.gloss))
+    if style.clear:
+        body = replace(body, roughness=0.04, transmission=1.0, ior=_WATER_IOR, thin=False)
+    label = printed_material(f"texture/label?seed={seed}", rng.between(0.35, 0.6))
+    flattened = [patch.scaled(1.0, style.depth, 1.0) for patch in patches]
+    return make_centred_solid(flattened, (body, label, plastic_material(rng, style.caps)), parts)
+
+
+def jar(seed: int) -> Solid:
+    """A filled preserving jar with a twist-off lid. Slots: body, label, lid."""
+    rng = variant_rng("jar", seed)
+    radius, height = rng.between(0.031, 0.043), rng.between(0.085, 0.14)
+    top, lid_radius, mouth = height - 0.014, 0.9 * radius, 0.86 * radius
+    upper = [(radius, 0.8 * height), (mouth, top - 0.003), (mouth, top + 0.004)]
+    patches = [
+        *_wall_with_label(radius, (0.2 * height, 0.66 * height), upper, [0.02, 0.006]),
+        lathe([(mouth, top + 0.004), (0.0, top + 0.004)], 32, 0),
+        _lid(lid_radius, top, height),
+    ]
+    glass = Material(draw_linear(PALETTES["fillings"], 0.15, rng), rng.between(0.06, 0.12))
+    label = printed_material(f"texture/label?seed={seed + 1000}", rng.between(0.45, 0.65))
+    metals = (metal_material(color, 0.3) for color in ((0.83, 0.69, 0.35), STEEL))
+    lid = rng.choose((*metals, plastic_material(rng, CAPS)))
+    stages = [(0.92 * radius, 0.0), (radius, 0.008), (radius, 0.8 * height), (lid_radius, top),
+              (lid_radius, height)]  # fmt: skip
+    return make_centred_solid(patches, (glass, label, lid), hulls.stack(stages))
+
+
+def _wall_with_label(
+    radius: float, label: Point2, upper: list[Point2], radii: list[float]
+) -> list[Patch]:
+    """Bottom and wall up to the last point of ``upper``, with a label between two heights."""
+    z0, z1 = label
+    proud = radius + _PROUD_M
+    foot = [(0.0, 0.004), (0.6 * radius, 0.003), (0.72 * radius, 0.0), (0.93 * radius, 0.0)]
+    lower = [*foot, (radius, 0.008), (radius, z0 - _PROUD_M), (proud, z0)]
+    rest = [(proud, z1), (radius, z1 + _PROUD_M), *upper]
+    return [
+        lathe(fillet(lower, [0.0, 0.0, 0.0, 0.004, 0.01, 0.0, 0.0], 3), 32, 0),
+        lathe([(proud, z0), (proud, z1)], 32, 1, v=(0.0, 1.0)),
+        lathe(fillet(rest, [0.0, 0.0, *radii, 0.0], 3), 32, 0),
+    ]
+
+
+def _cap(radius: float, low: float, high: float) -> Patch:
+    """A screw cap, closed below."""
+    profile = [(0.0, low), (radius, low), (0.97 * radius, high), (0.0, high)]
+    return lathe(fillet(profile, [0.0, 0.0008, 0.002, 0.0], 2), 24, 2)
+
+
+def _lid(radius: float, low: float, high: float) -> Patch:
+    """A twist-off lid with a sunken panel."""
+    profile = [(0.0, low), (radius, low), (radius, high), (radius - 0.006, high),
+               (radius - 0.008, high - 0.0012), (0.0, high - 0.0012)]  # fmt: skip
+    return lathe(fillet(profile, [0.0, 0.001, 0.002, 0.0, 0.0, 0.0], 2), 32, 2)
+
+
+def _drop_level_stages(stages: list[Point2]) -> list[Point2]:
+    """Return the stages that lie above the one before."""
+    kept = stages[:1]
+    for stage in stages[1:]:
+        if stage[1] > kept[-1][1] + 1e-4:
+            kept.append(stage)
+    return kept
+
+
+class CanSize(NamedTuple):
+    """Radius and height [m] of a common size; ``food`` cans have beaded ends."""
+
+    radius_m: float
+    height_m: float
+    food: bool
+
+
+def can_size(seed: int) -> CanSize:
+    """Size of a variant."""
+    kind = ("drink", "food")[seed // 4 % 2]
+    radius, height = in_turn(_SIZES[f"{kind}_cans"], seed % 4)
+    return CanSize(radius, height, kind == "food")
+
+
+def label_aspect(seed: int) -> float:
+    """Width by height of the unrolled print of a can."""
+    size = can_size(seed)
+    return 2 * math.pi * size.radius_m / (size.height_m * (0.9 if size.food else 0.8))
+
+
+def can(seed: int) -> Solid:
+    """A drink can or food can. Slots: print, metal, tab."""
+    rng = variant_rng("can", seed)
+    size = can_size(seed)
+    r, h = size.radius_m, size.height_m
+    texture = f"texture/can_label?seed={seed}"
+    if size.food:
+        print_ = printed_material(texture, rng.between(0.5, 0.7))
+        patches, stages = _food_can(r, h)
+        lid: list[Patch] = []
+    else:
+        print_ = printed_material(texture, rng.between(0.25, 0.38), 0.35)
+        patches, stages = _drink_can(r, h)
+        lid = [piece.moved(z=h - 0.0045) for piece in _tab(0.68 * r)]
+    body = metal_material(STEEL if size.food else ALUMINIUM, rng.between(0.22, 0.35))
+    materials = (print_, body, metal_material(ALUMINIUM, 0.3))
+    return make_centred_solid([*patches, *lid], materials, hulls.stack(stages))
+
+
+def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
+    """Two-piece aluminium can: domed base, necked top, recessed lid."""
+    neck, rim = r - 0.0062, r - 0.006
+    z0, z1 = 0.1 * h, h - 0.024
+    v1 = (z1 - z0) / (h - 0.004 - z0)
+    dome = [(0.0, 0.009), (0.55 * r, 0.006), (0.72 * r, 0.0), (0.76 * r, 0.0), (r, 0.012), (r, z0)]
+    taper = [(r, z1), (r, h - 0.014), (neck, h - 0.0035), (neck, h - 0.002), (rim, h)]
+    lid = [(rim - 0.002, h), (rim - 0.0028, h - 0.005), (0.0, h - 0.005)]
+    top = fillet([*taper, *lid], [0.0, 0.02, 0.004, 0.0, 0.0006, 0.0006, 0.0008, 0.0], 2)
+    split = next(i for i, (_, z) in enumerate(top) if z > h - 0.0045)
+    patches = [
+        lathe(fillet(dome, [0.0, 0.03, 0.001, 0.002, 0.012, 0.0], 2), 32, 1),
+        lathe([(r, z0), (r, z1)], 32, 0, v=(0.0, v1)),
+        lathe(top[: split + 1], 32, 0, v=(v1, 1.0)),
+        lathe(top[split:], 32, 1),
+    ]
+    stages = [(0.76 * r, 0.0), (r, 0.012), (r, h - 0.015), (neck, h - 0.0035), (rim, h)]
+    return patches, stages
+
+
+def _food_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
+    """Three-piece steel can: seamed ends, paper label between."""
+    seam = 0.0035
+    end = [(0.0, 0.003), (0.8 * r, 0.003), (0.82 * r, 0.004), (0.9 * r, 0.004),
+           (0.93 * r, 0.0), (r, 0.0), (r, seam), (r - 0.001, seam + 0.001)]  # fmt: skip
+    wall = r - 0.001
+    body = [(wall, seam + 0.001), (wall, h - seam - 0.001)]
+    top = [(radius, h - z) for radius, z in end[::-1]]
+    patches = [lathe(end, 36, 1), lathe(body, 36, 0, v=(0.0, 1.0)), lathe(top, 36, 1)]
+    return patches, [(r, 0.0), (r, h)]
+
+
+def _tab(length: float) -> list[Patch]:
+    """Pull tab lying on the lid, its origin at the rivet."""
+    ring_ = circle(1.0, 14) * np.array([0.5 * length, 0.3 * length])
+    hole = circle(1.0, 10) * np.array([0.22 * length, 0.17 * length])
+    hole = hole + np.array([0.18 * length, 0.0])
+    plate = extrude(ring_, 0.0012, 0.0003, [hole], 2)
+    rivet = lathe([(0.0, 0.0), (0.0035, 0.0), (0.0033, 0.002), (0.0, 0.0022)], 12, 2)
+    return [plate.moved(x=0.18 * length), rivet.moved(x=-0.12 * length)]
+
+
+CARTON_ATLAS = load_table(__package__, "carton_atlas", tuple[float, float, float, float])
+
+
+def carton_size_m(seed: int) -> Vec3:
+    """Depth (X), width (Y) and height of a carton; its front faces +X."""
+    rng = variant_rng("carton/size", seed)
+    x, y, z = (side * rng.between(0.92, 1.08) for side in in_turn(_SIZES["cartons"], seed))
+    return (x, y, z)
+
+
+def milk_size_m(seed: int) -> Vec3:
+    """Depth, width and height of a milk carton without its gable."""
+    rng = variant_rng("milk_carton/size", seed)
+    side = rng.between(0.066, 0.075)
+    return (side, side, side * rng.choose((1.4, 2.4, 2.7)))
+
+
+def carton(seed: int) -> Solid:
+    """A printed folding box; its front faces +X. Slot: print."""
+    rng = variant_rng("carton", seed)
+    size = carton_size_m(seed)
+    body = rounded_box(size, 0.0012, 1, uv=CARTON_ATLAS)
+    x, y, z = (0.5 * side for side in size)
+    print_ = printed_material(f"texture/carton?seed={seed}", rng.between(0.35, 0.65))
+    return make_centred_solid([body], (print_,), [hulls.box((-x, -y, -z), (x, y, z))])
+
+
+def milk_carton(seed: int) -> Solid:
+    """A gable-top carton with a screw cap; its front faces +X. Slots: print, cap."""
+    rng = variant_rng("milk_carton", seed)
+    x, y, z = milk_size_m(seed)
+    body = rounded_box((x, y, z), 0.0015, 1, uv=CARTON_ATLAS).moved(z=z / 2)
+    rise, fin = 0.33 * x, 0.016
+    roof = _gable(x, y, rise, fin).moved(z=z)
+    print_ = printed_material(f"texture/milk_label?seed={seed}", rng.between(0.35, 0.5))
+    patches, parts = [body, roof], [hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))]
+    if rng.chance(0.7):
+        tilt = math.atan2(rise, 0.5 * x)
+        at = (0.27 * x, 0.0, z + 0.46 * rise)
+        patches.append(_screw_cap().rotated("y", tilt).moved(*at))
+        cap = hulls.frustum((0.013, -0.004), (0.013, 0.009), 12)
+        parts.append(rotate(cap, "y", tilt) + np.array(at))
+    ridge = z + rise
+    prism = np.array(
+        [(u, v, w) for a, w in ((0.5 * x, z), (0.002, ridge))
+         for u in (-a, a) for v in (-0.5 * y, 0.5 * y)]
+    )  # fmt: skip
+    fin_hull = hulls.box((-0.002, -y / 2, ridge), (0.002, y / 2, ridge + fin))
+    parts += [prism, fin_hull]
+    return make_centred_solid(patches, (print_, plastic_material(rng, CAPS)), parts)
+
+
+def _screw_cap() -> Patch:
+    """A flat cap about Z, its foot below z = 0; slot 1."""
+    profile = [(0.0, -0.004), (0.013, -0.004), (0.013, 0.009), (0.0, 0.009)]
+    return lathe(fillet(profile, [0.0, 0.0, 0.0015, 0.0], 2), 24, 1)
+
+
+def _gable(x: float, y: float, rise: float, fin: float) -> Patch:
+    """Roof of two slopes that meet in an upright fin along Y; the ends are tucked in."""
+    u0, v0, u1, v1 = CARTON_ATLAS["top"]
+    t, tuck, top = 0.0012, 0.12 * y, rise + fin
+    made = []
+    for s in (1.0, -1.0):
+        section = ((s * x / 2, 0.0), (s * t, rise), (s * t, top))
+        rows = np.array([[(u, v, w) for v in (-s * y / 2, s * y / 2)] for u, w in section])
+        made.append(grid(rows, np.array([u0, u1]), np.array([v0, 0.8 * v1, v1])))
+    crest = np.array([[(u, v, top) for v in (-y / 2, y / 2)] for u in (t, -t)])
+    made.append(grid(crest, np.array([u0, u0]), np.array([v0, v0])))
+    for s in (1.0, -1.0):
+        inner, end = (0.0, s * (y / 2 - tuck), 0.55 * rise), s * y / 2
+        slopes = ((s * x / 2, 0.0), (-s * x / 2, 0.0), (-s * t, rise), (s * t, rise))
+        a, b, c, d, e, f = ((u, end, w) for u, w in (*slopes, (-s * t, top), (s * t, top)))
+        corners = [(a, b, inner), (b, c, inner), (d, a, inner), (c, d, inner), (d, c, e), (d, e, f)]
+        uvs = np.broadcast_to(np.array([u0 + 0.1, 0.5 * v1]), (6, 3, 2))
+        made.append(Patch(np.array(corners), uvs.copy(), np.zeros(6, dtype=np.int64)))
+    return join_patches(made)

@@ -1,0 +1,176 @@
+"""Skins of fruit, and covers of balls as functions of the direction: no distortion at the poles."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gen_data.generator.assets.procedural import toys
+from gen_data.generator.assets.procedural.noise import (
+    SIZE_PX,
+    fbm,
+    perlin,
+    rows_and_columns,
+    smoothstep,
+    uniform,
+    worley,
+)
+from gen_data.generator.assets.procedural.patches import unit
+from gen_data.generator.assets.procedural.textures.texture_images import (
+    color,
+    colors_in_turn,
+    draw_color,
+    mix_colors,
+    texture,
+)
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
+from gen_data.generator.core.asset_types import Float32, TextureData
+
+
+def apple_skin(seed: int) -> TextureData:
+    """Streaks from stalk to blossom over a paler ground, with pores."""
+    rng = variant_rng("apple_skin", seed)
+    ground, blush = colors_in_turn("apples", seed)
+    y, _ = rows_and_columns()
+    streaks = 0.6 * fbm((2, 40), 3, rng) + 0.3 * fbm((6, 90), 2, rng)
+    patches = fbm((2, 2), 3, rng) + rng.between(-0.2, 0.4)
+    cover = smoothstep(-0.5, 0.6, patches + 0.6 * streaks)
+    albedo = mix_colors(ground, blush, cover)
+    hollow = smoothstep(0.12, 0.02, y) + smoothstep(0.9, 1.0, y)
+    albedo = mix_colors(albedo, color("#9a8f4a"), 0.7 * hollow * (0.7 + 0.3 * streaks))
+    albedo = mix_colors(albedo, np.minimum(ground + 0.12, 0.95), 0.6 * _dots(40, 0.16, rng))
+    return texture(albedo * (1 + 0.03 * fbm((24, 24), 3, rng))[..., None])
+
+
+def citrus_peel(seed: int) -> TextureData:
+    """Dimpled by oil glands. Seeds below 1000 are oranges, others lemons."""
+    rng = variant_rng("citrus_peel", seed)
+    codes = (
+        ("#e8791a", "#f08c1e", "#e06a12", "#eb9a2a")
+        if seed < 1000
+        else ("#f0cf2c", "#f4da45", "#e6c21f")
+    )
+    base = draw_color(codes, 0.05, rng)
+    glands = worley((48, 72), rng, 0.9)
+    dimple = smoothstep(0.5, 0.1, glands.nearest)
+    shade = 1 + 0.05 * fbm((3, 3), 4, rng) - 0.07 * dimple
+    y, _ = rows_and_columns()
+    ends = smoothstep(0.1, 0.0, y) + smoothstep(0.94, 1.0, y)
+    albedo = mix_colors(base * shade[..., None], color("#a9a23a"), 0.45 * ends)
+    return texture(albedo, None, -1.3 * dimple)
+
+
+def banana_peel(seed: int) -> TextureData:
+    """Yellow, greener towards the ends, dark tips and ripening spots."""
+    rng = variant_rng("banana_peel", seed)
+    ripe = rng.between(0.0, 1.0)
+    base = mix_colors(
+        color("#d3c83c"), color("#ecc22c"), np.full((SIZE_PX, SIZE_PX), ripe, dtype=np.float32)
+    )
+    y, _ = rows_and_columns()
+    wander = 0.02 * fbm((4, 6), 3, rng)
+    ends = smoothstep(0.22, 0.05, y + wander) + smoothstep(0.8, 0.95, y + wander)
+    albedo = mix_colors(base, color("#a9b23e"), ends * (0.75 - 0.4 * ripe))
+    lines = smoothstep(0.55, 0.8, perlin((4, 70), rng)) * 0.12
+    spots = _dots(24, 0.3, rng) * smoothstep(0.3, 1.0, np.float32(ripe) + fbm((3, 3), 2, rng))
+    bruise = smoothstep(0.75, 1.1, fbm((5, 5), 4, rng) + 0.3 * np.float32(ripe))
+    albedo = mix_colors(
+        albedo, color("#6b4a1f"), np.clip(0.85 * spots + lines + 0.5 * bruise, 0, 1)
+    )
+    tips = smoothstep(0.028, 0.012, y + 0.5 * wander) + smoothstep(0.965, 0.985, y + 0.5 * wander)
+    return texture(mix_colors(albedo, color("#3f3119"), 0.95 * tips))
+
+
+def pear_skin(seed: int) -> TextureData:
+    """Green to yellow or brown, freckled with lenticels."""
+    rng = variant_rng("pear_skin", seed)
+    codes = ("#b5b83a", "#c7b548", "#96a03a", "#9c7a45", "#b8bd58")
+    base = draw_color(codes, 0.05, rng)
+    blush = color(rng.choose(("#b0583a", "#a88a3a", "#8f9a3a")))
+    albedo = mix_colors(base, blush, 0.7 * smoothstep(0.0, 0.9, fbm((2, 2), 4, rng)))
+    albedo = mix_colors(albedo, color("#6f5a2c"), 0.55 * _dots(56, 0.25, rng))
+    y, _ = rows_and_columns()
+    russet = smoothstep(0.12, 0.0, y) + smoothstep(0.88, 1.0, y)
+    russet = russet + smoothstep(0.5, 1.2, fbm((6, 6), 4, rng))
+    return texture(mix_colors(albedo, color("#8a6a3a"), 0.6 * russet))
+
+
+def _dots(cells: int, radius: float, rng: VariantRng) -> Float32:
+    """Scattered specks of varied size in [0, 1]."""
+    points = worley((cells, cells), rng)
+    size = radius * uniform(points.count, rng) ** 2
+    dots: Float32 = smoothstep(0.05, -0.05, points.nearest - points.of_each(size) - 0.02)
+    return dots
+
+
+_BRIGHT = ("#d7261e", "#f2a71b", "#f7d423", "#2e9e4f", "#1f6fb5", "#7b3fa0", "#f0f0ec", "#12a3a3")
+# Distance from the centre to the pentagons and hexagons of a truncated icosahedron of edge 1
+# (Weisstein, "Truncated icosahedron", MathWorld).
+_PENTAGON, _HEXAGON = 2.32744, 2.26728
+
+
+def ball_cover(seed: int) -> TextureData:
+    """The cover of ``toys.ball`` of the same seed."""
+    rng = variant_rng("ball_cover", seed)
+    kind = toys.ball_kind(seed)
+    if kind == "rubber":
+        return texture(draw_color(_BRIGHT, 0.05, rng) * (1 + 0.02 * fbm((8, 8), 3, rng))[..., None])
+    make = {"tennis": _tennis, "beach": _beach, "basket": _basket, "foot": _foot}[kind]
+    return texture(make(_directions(), rng))
+
+
+def _directions() -> Float32:
+    """Direction of each pixel as ``surface_shapes.ball`` lays out its UVs."""
+    y, x = rows_and_columns()
+    polar, turn = math.pi * (0.5 - y), 2 * math.pi * (x - 0.5)
+    flat = np.cos(polar)
+    parts = np.broadcast_arrays(flat * np.cos(turn), flat * np.sin(turn), np.sin(polar))
+    return np.stack(parts, axis=2).astype(np.float32)
+
+
+def _tennis(d: Float32, rng: VariantRng) -> Float32:
+    """Felt with the seam along a curve that winds around."""
+    turn = np.arctan2(d[..., 1], d[..., 0])
+    seam = smoothstep(0.075, 0.05, np.abs(d[..., 2] - 0.55 * np.cos(2 * turn)))
+    felt = color("#c5d833") * (0.92 + 0.09 * fbm((96, 96), 2, rng))[..., None]
+    return mix_colors(felt, color("#eceee0"), seam)
+
+
+def _beach(d: Float32, rng: VariantRng) -> Float32:
+    """Six gores in two or three colours, white caps."""
+    colors = np.stack([draw_color(_BRIGHT, 0.04, rng) for _ in range(rng.choose((2, 3)))])
+    gore = np.floor(np.arctan2(d[..., 1], d[..., 0]) / (math.pi / 3)).astype(np.int64) + 3
+    cap = smoothstep(0.955, 0.96, np.abs(d[..., 2]))
+    return mix_colors(colors[gore % len(colors)], color("#f2f2ee"), cap)
+
+
+def _basket(d: Float32, rng: VariantRng) -> Float32:
+    """Orange leather with black channels and pebbles."""
+    x, y, z = d[..., 0], d[..., 1], d[..., 2]
+    bow = np.abs(np.abs(y) - 0.62 - 0.22 * x**2)
+    line = smoothstep(0.03, 0.02, np.minimum(np.minimum(np.abs(x), np.abs(z)), bow))
+    pebble = worley((64, 128), rng).nearest
+    tan = draw_color(("#c8682a", "#b5571f", "#d07a38"), 0.04, rng)
+    leather = tan * (1.04 - 0.12 * pebble)[..., None]
+    return mix_colors(leather, color("#1d1815"), line)
+
+
+def _foot(d: Float32, rng: VariantRng) -> Float32:
+    """Twelve dark pentagons and twenty white hexagons."""
+    golden = 0.5 * (1 + math.sqrt(5))
+    corners = np.array(
+        [p for a in (-1, 1) for b in (-golden, golden) for p in ((0, a, b), (a, b, 0), (b, 0, a))]
+    ) / math.sqrt(1 + golden**2)
+    near = np.einsum("ik,jk->ij", corners, corners, optimize=False) > 0.4
+    triples = [(i, j, k) for i in range(12) for j in range(i) for k in range(j)]
+    close = [(i, j, k) for i, j, k in triples if near[i, j] and near[j, k] and near[i, k]]
+    faces = unit(np.array([corners[list(t)].sum(axis=0) for t in close]))
+    heights = np.concatenate([corners / _PENTAGON, faces / _HEXAGON])
+    reach = np.einsum("hwk,fk->hwf", d, heights.astype(np.float32), optimize=False)
+    two = np.sort(reach, axis=2)[..., -2:]
+    dark = (reach.argmax(axis=2) < 12).astype(np.float32)
+    patch = draw_color(("#1b1b1d", "#1b1b1d", "#1f4f9a", "#a8242a"), 0.03, rng)
+    albedo = mix_colors(np.broadcast_to(color("#efefec"), (SIZE_PX, SIZE_PX, 3)), patch, dark)
+    seam = smoothstep(0.006, 0.002, two[..., 1] - two[..., 0])
+    return mix_colors(albedo, color("#3a3a3c"), 0.8 * seam)
