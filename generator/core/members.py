@@ -60,11 +60,7 @@ def add_members(
         instances.append(
             Instance(instance_id, body.name, category, 0, member.asset, annotated=group.annotated)
         )
-    return replace(
-        scene,
-        bodies=(*scene.bodies, *bodies),
-        instances=(*scene.instances, *instances),
-    )
+    return replace(scene, bodies=(*scene.bodies, *bodies), instances=(*scene.instances, *instances))
 
 
 def remove_members(scene: Scene, group: str) -> Scene:

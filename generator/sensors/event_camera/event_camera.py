@@ -86,13 +86,7 @@ class EventCamera(Mounted):
         rig = check_rig(scene, self.name, self.rig) if self.rig else ""
         if not rig:
             find_camera(scene, self.name, self.camera)
-        device = Device(
-            self.name,
-            KIND,
-            rig,
-            self.T_rig_sensor,
-            camera="" if rig else self.camera,
-        )
+        device = Device(self.name, KIND, rig, self.T_rig_sensor, camera="" if rig else self.camera)
         return replace(scene, devices=(*scene.devices, device))
 
     def capture(

@@ -53,12 +53,7 @@ DIFFUSE = {
 """Diffuse reflectance of roles whose visible colour is irrelevant."""
 
 TEXTILES = frozenset({"top", "bottom", "bag"})
-RETRO = {
-    "sign": 785.0,
-    "plate": 220.0,
-    "taillight": 40.0,
-    "marking": 1.0,
-}
+RETRO = {"sign": 785.0, "plate": 220.0, "taillight": 40.0, "marking": 1.0}
 """Retro-reflectance of roles, relative to a white Lambertian surface; tail lights reflect."""
 
 ROUGH = frozenset(

@@ -73,13 +73,7 @@ def upload_mesh(data: MeshData, device: wp.Device) -> DeviceMesh:
     nbytes = 32 * len(data.vertices_m) + 16 * len(data.faces) + hierarchy_nbytes
     keep = (vertices, normals, uvs, faces, slots, lows, highs, hierarchy)
     return DeviceMesh(
-        to_record(record, Geometry),
-        keep,
-        low,
-        high,
-        len(data.vertices_m),
-        data.materials,
-        nbytes,
+        to_record(record, Geometry), keep, low, high, len(data.vertices_m), data.materials, nbytes
     )
 
 

@@ -81,10 +81,7 @@ def _rasterize_masks(
 
 
 def _boxes_px(
-    scene: Scene,
-    world: PackedWorld,
-    view: records.View,
-    projected: Projected,
+    scene: Scene, world: PackedWorld, view: records.View, projected: Projected
 ) -> dict[int, BoxPx]:
     """Pixels of the canvas that each annotated instance's vertices span; may be empty."""
     canvas = BoxPx(-view.width, -view.height, 2 * view.width, 2 * view.height)

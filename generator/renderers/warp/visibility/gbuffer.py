@@ -58,10 +58,7 @@ class GBuffer:
 
 
 def find_visible(
-    world: PackedWorld,
-    view: records.View,
-    cache: DeviceCache,
-    method: Method,
+    world: PackedWorld, view: records.View, cache: DeviceCache, method: Method
 ) -> GBuffer:
     """Find the surfaces at all pixel centres of a view."""
     n = view.width * view.height
@@ -144,11 +141,7 @@ def bodies_within(
 
 
 def _rasterise(
-    world: PackedWorld,
-    view: records.View,
-    cache: DeviceCache,
-    projected: Projected,
-    hits: wp.array,
+    world: PackedWorld, view: records.View, cache: DeviceCache, projected: Projected, hits: wp.array
 ) -> None:
     nearness = cache.scratch("nearness", view.width * view.height, float)
     nearness.zero_()

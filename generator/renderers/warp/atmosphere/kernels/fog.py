@@ -119,12 +119,7 @@ def glow_along(view: View, world: World, images: GBufferRecord, fog: Fog, i: int
 
 @wp.kernel
 def glow_at_points(
-    view: View,
-    world: World,
-    images: GBufferRecord,
-    fog: Fog,
-    columns: int,
-    glow: wp.array(dtype=wp.vec3),
+    view: View, world: World, images: GBufferRecord, fog: Fog, columns: int, glow: wp.array[wp.vec3]
 ):
     """The glow of lamps at the points of a sparse grid."""
     k = wp.tid()
@@ -140,7 +135,7 @@ def glow_between(
     images: GBufferRecord,
     fog: Fog,
     columns: int,
-    glow: wp.array(dtype=wp.vec3),
+    glow: wp.array[wp.vec3],
     i: int,
 ):
     """The glow at pixel i, interpolated from the grid; computed directly where depths differ."""
@@ -175,8 +170,8 @@ def fill_with_fog(
     images: GBufferRecord,
     fog: Fog,
     columns: int,
-    glow: wp.array(dtype=wp.vec3),
-    radiance: wp.array(dtype=wp.vec3),
+    glow: wp.array[wp.vec3],
+    radiance: wp.array[wp.vec3],
 ):
     """Attenuate every pixel by fog and add the fog's in-scattered light.
 

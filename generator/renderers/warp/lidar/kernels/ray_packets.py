@@ -36,10 +36,10 @@ class Boxes:
         enters_m: Smallest distance at which a ray of the run may enter the body's box, ascending.
     """
 
-    lows_m: wp.array(dtype=wp.vec3)
-    highs_m: wp.array(dtype=wp.vec3)
-    listed: wp.array(dtype=int, ndim=2)
-    enters_m: wp.array(dtype=float, ndim=2)
+    lows_m: wp.array[wp.vec3]
+    highs_m: wp.array[wp.vec3]
+    listed: wp.array2d[int]
+    enters_m: wp.array2d[float]
 
 
 @wp.struct

@@ -92,7 +92,7 @@ def schlick_weight(c: float):
 
 @wp.func
 def make_bsdf(
-    table: wp.array(dtype=wp.vec2, ndim=2),
+    table: wp.array2d[wp.vec2],
     v: wp.vec3,
     albedo: wp.vec3,
     roughness: float,

@@ -51,8 +51,8 @@ class SkyTable:
     """
 
     part: float
-    rows: wp.array(dtype=float)
-    columns: wp.array(dtype=float, ndim=2)
+    rows: wp.array[float]
+    columns: wp.array2d[float]
 
 
 @wp.struct
@@ -268,7 +268,7 @@ def intersect_lamp(lamp: LightRecord, p: wp.vec3, d: wp.vec3):
 
 
 @wp.func
-def find_interval(shares: wp.array(dtype=float), last: int, u: float):
+def find_interval(shares: wp.array[float], last: int, u: float):
     """The largest k < last with ``shares[k] <= u``; binary search."""
     low = int(0)
     high = last

@@ -689,11 +689,7 @@ def trace_path(
 
 @wp.kernel
 def trace_paths(
-    view: View,
-    world: World,
-    table: SkyTable,
-    budget: Budget,
-    light: wp.array(dtype=wp.vec3),
+    view: View, world: World, table: SkyTable, budget: Budget, light: wp.array[wp.vec3]
 ):
     """Add the light of some samples to every pixel."""
     i = wp.tid()
@@ -713,7 +709,7 @@ def trace_paths(
 
 
 @wp.kernel
-def scale_light(factor: float, light: wp.array(dtype=wp.vec3)):
+def scale_light(factor: float, light: wp.array[wp.vec3]):
     """Multiply all light by a factor."""
     i = wp.tid()
     light[i] = light[i] * factor

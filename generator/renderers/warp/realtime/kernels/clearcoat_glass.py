@@ -105,10 +105,10 @@ class Probe:
         lit: Scratch: visible fraction of each lamp at the end of a pixel's ray [lamp, pixel].
     """
 
-    parts: wp.array(dtype=wp.vec2)
-    disc: wp.array(dtype=wp.vec2)
+    parts: wp.array[wp.vec2]
+    disc: wp.array[wp.vec2]
     radius_m: float
-    lit: wp.array(dtype=float, ndim=2)
+    lit: wp.array2d[float]
 
 
 @wp.struct
@@ -150,9 +150,7 @@ def texels_per_m2(world: World, surface: int, hit: wp.vec2i):
 
 
 @wp.func
-def texture_mix(
-    texels: wp.array(dtype=wp.uint32), first: int, width: int, height: int, uv: wp.vec2
-):
+def texture_mix(texels: wp.array[wp.uint32], first: int, width: int, height: int, uv: wp.vec2):
     """Four channels of one mip level at a point, [0, 1]."""
     return mix_texels(texels, taps_at(first, width, height, uv[0], uv[1])) * (1.0 / FULL)
 
@@ -469,7 +467,7 @@ def add_clearcoat(
     n: wp.vec3,
     p: wp.vec3,
     v: wp.vec3,
-    lit: wp.array(dtype=float, ndim=2),
+    lit: wp.array2d[float],
     open_sky: float,
     k: int,
 ):
@@ -502,7 +500,7 @@ def layers_at(
     n: wp.vec3,
     p: wp.vec3,
     v: wp.vec3,
-    lit: wp.array(dtype=float, ndim=2),
+    lit: wp.array2d[float],
     open_sky: float,
     k: int,
 ):
@@ -652,7 +650,7 @@ def layered_radiance(
     i: int,
     x_px: float,
     y_px: float,
-    lit: wp.array(dtype=float, ndim=2),
+    lit: wp.array2d[float],
     open_sky: float,
     exposed: float,
     probe: Probe,
@@ -687,12 +685,12 @@ def shade_layers(
     view: View,
     world: World,
     images: GBufferRecord,
-    pixels: wp.array(dtype=int),
-    lit: wp.array(dtype=float, ndim=2),
-    open_sky: wp.array(dtype=float, ndim=2),
-    exposed: wp.array(dtype=float),
+    pixels: wp.array[int],
+    lit: wp.array2d[float],
+    open_sky: wp.array2d[float],
+    exposed: wp.array[float],
     probe: Probe,
-    radiance: wp.array(dtype=wp.vec3),
+    radiance: wp.array[wp.vec3],
 ):
     """Shade the listed pixels that show layered surfaces, each by itself."""
     k = wp.tid()
@@ -719,10 +717,10 @@ def find_contrasts(
     view: View,
     world: World,
     images: GBufferRecord,
-    pixels: wp.array(dtype=int),
-    radiance: wp.array(dtype=wp.vec3),
-    count: wp.array(dtype=int),
-    places: wp.array(dtype=int),
+    pixels: wp.array[int],
+    radiance: wp.array[wp.vec3],
+    count: wp.array[int],
+    places: wp.array[int],
 ):
     """List the layered pixels among listed ones that show edges by reflection or refraction.
 
@@ -753,15 +751,15 @@ def shade_contrasts(
     view: View,
     world: World,
     images: GBufferRecord,
-    places: wp.array(dtype=int),
-    pixels: wp.array(dtype=int),
-    lit: wp.array(dtype=float, ndim=2),
-    open_sky: wp.array(dtype=float, ndim=2),
-    exposed: wp.array(dtype=float),
+    places: wp.array[int],
+    pixels: wp.array[int],
+    lit: wp.array2d[float],
+    open_sky: wp.array2d[float],
+    exposed: wp.array[float],
     probe: Probe,
-    offsets: wp.array(dtype=wp.vec2),
-    listed: wp.array(dtype=int),
-    mixed: wp.array(dtype=wp.vec3),
+    offsets: wp.array[wp.vec2],
+    listed: wp.array[int],
+    mixed: wp.array[wp.vec3],
 ):
     """Radiance of pixels with contrasts: the mean over several points of each.
 

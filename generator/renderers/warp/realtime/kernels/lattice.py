@@ -45,13 +45,13 @@ class Lattice:
     stride: int
     width: int
     height: int
-    body: wp.array(dtype=int)
-    surface: wp.array(dtype=int)
-    pixel: wp.array(dtype=int)
-    skip: wp.array(dtype=int)
-    p_m: wp.array(dtype=wp.vec3)
-    normal: wp.array(dtype=wp.vec3)
-    origin_m: wp.array(dtype=wp.vec3)
+    body: wp.array[int]
+    surface: wp.array[int]
+    pixel: wp.array[int]
+    skip: wp.array[int]
+    p_m: wp.array[wp.vec3]
+    normal: wp.array[wp.vec3]
+    origin_m: wp.array[wp.vec3]
 
 
 @wp.func
@@ -88,10 +88,10 @@ def ray_origin(world: World, hit: wp.vec2i, weight: wp.vec2, p_world: wp.vec3, d
 def sample_lattice(
     view: View,
     world: World,
-    hits: wp.array(dtype=wp.vec2i),
-    z_m: wp.array(dtype=float),
-    weights: wp.array(dtype=wp.vec2),
-    normals: wp.array(dtype=wp.vec3),
+    hits: wp.array[wp.vec2i],
+    z_m: wp.array[float],
+    weights: wp.array[wp.vec2],
+    normals: wp.array[wp.vec3],
     lattice: Lattice,
 ):
     """Compute the lattice's points from the G-buffer."""

@@ -177,7 +177,7 @@ def bump_factors(tilt: Tilt, roughness: float, m: wp.vec3):
 
 
 @wp.func
-def quad_tilt(lattice: Lattice, lights: wp.array(dtype=LatticeLight), q: int, quad: Quad):
+def quad_tilt(lattice: Lattice, lights: wp.array[LatticeLight], q: int, quad: Quad):
     """The tilt of a whole cell, from the mean of its corners."""
     a = lights[q]
     b = lights[q + 1]
@@ -195,8 +195,8 @@ def gathered_radiance(
     world: World,
     images: GBufferRecord,
     lattice: Lattice,
-    lights: wp.array(dtype=LatticeLight),
-    coats: wp.array(dtype=wp.vec4),
+    lights: wp.array[LatticeLight],
+    coats: wp.array[wp.vec4],
     cell: Cell,
     i: int,
     d: wp.vec3,
@@ -302,13 +302,13 @@ def light_patch(
     world: World,
     images: GBufferRecord,
     lattice: Lattice,
-    lights: wp.array(dtype=LatticeLight),
-    coats: wp.array(dtype=wp.vec4),
+    lights: wp.array[LatticeLight],
+    coats: wp.array[wp.vec4],
     quad: Quad,
     patch: Patch,
     column: int,
     row: int,
-    radiance: wp.array(dtype=wp.vec3),
+    radiance: wp.array[wp.vec3],
 ):
     """Shade a smooth cell all of whose pixels show one face."""
     q = row * lattice.width + column
@@ -376,12 +376,12 @@ def gather_light(
     world: World,
     images: GBufferRecord,
     lattice: Lattice,
-    lights: wp.array(dtype=LatticeLight),
-    coats: wp.array(dtype=wp.vec4),
+    lights: wp.array[LatticeLight],
+    coats: wp.array[wp.vec4],
     run: int,
-    count: wp.array(dtype=int),
-    pixels: wp.array(dtype=int),
-    radiance: wp.array(dtype=wp.vec3),
+    count: wp.array[int],
+    pixels: wp.array[int],
+    radiance: wp.array[wp.vec3],
 ):
     """Shade every pixel from lattice points, or list it for individual shading.
 

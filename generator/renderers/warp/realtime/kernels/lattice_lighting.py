@@ -61,10 +61,10 @@ GATHERED_ROUGHNESS = wp.constant(0.25)
 class GBufferRecord:
     """G-buffer at every pixel centre, flat; fields as in gbuffer.GBuffer."""
 
-    hits: wp.array(dtype=wp.vec2i)
-    z_m: wp.array(dtype=float)
-    weights: wp.array(dtype=wp.vec2)
-    normals: wp.array(dtype=wp.vec3)
+    hits: wp.array[wp.vec2i]
+    z_m: wp.array[float]
+    weights: wp.array[wp.vec2]
+    normals: wp.array[wp.vec3]
 
 
 @wp.struct
@@ -117,7 +117,7 @@ def sum_lamp_light(
     n: wp.vec3,
     p_world: wp.vec3,
     v: wp.vec3,
-    lit: wp.array(dtype=float, ndim=2),
+    lit: wp.array2d[float],
     k: int,
 ):
     """Light of all lamps at a point; arguments as for light_at."""
@@ -164,7 +164,7 @@ def light_at(
     material: SurfaceMaterial,
     p_world: wp.vec3,
     v: wp.vec3,
-    lit: wp.array(dtype=float, ndim=2),
+    lit: wp.array2d[float],
     open_sky: float,
     k: int,
 ):
@@ -201,10 +201,10 @@ def light_lattice(
     world: World,
     images: GBufferRecord,
     lattice: Lattice,
-    lit: wp.array(dtype=float, ndim=2),
-    open_sky: wp.array(dtype=float, ndim=2),
-    lights: wp.array(dtype=LatticeLight),
-    coats: wp.array(dtype=wp.vec4),
+    lit: wp.array2d[float],
+    open_sky: wp.array2d[float],
+    lights: wp.array[LatticeLight],
+    coats: wp.array[wp.vec4],
 ):
     """Light at the lattice's points on surfaces that are interpolated; bumps are left out.
 
@@ -245,11 +245,11 @@ def shade_points(
     view: View,
     world: World,
     images: GBufferRecord,
-    pixels: wp.array(dtype=int),
-    lit: wp.array(dtype=float, ndim=2),
-    open_sky: wp.array(dtype=float, ndim=2),
-    exposed: wp.array(dtype=float),
-    radiance: wp.array(dtype=wp.vec3),
+    pixels: wp.array[int],
+    lit: wp.array2d[float],
+    open_sky: wp.array2d[float],
+    exposed: wp.array[float],
+    radiance: wp.array[wp.vec3],
 ):
     """Shade listed pixels individually, except layered surfaces."""
     k = wp.tid()
@@ -294,15 +294,15 @@ def find_pixel_visibility(
     world: World,
     images: GBufferRecord,
     lattice: Lattice,
-    lattice_lit: wp.array(dtype=float, ndim=2),
-    lattice_sky: wp.array(dtype=float, ndim=2),
-    parts: wp.array(dtype=wp.vec2),
-    disc: wp.array(dtype=wp.vec2),
+    lattice_lit: wp.array2d[float],
+    lattice_sky: wp.array2d[float],
+    parts: wp.array[wp.vec2],
+    disc: wp.array[wp.vec2],
     radius_m: float,
-    pixels: wp.array(dtype=int),
-    lit: wp.array(dtype=float, ndim=2),
-    open_sky: wp.array(dtype=float, ndim=2),
-    exposed: wp.array(dtype=float),
+    pixels: wp.array[int],
+    lit: wp.array2d[float],
+    open_sky: wp.array2d[float],
+    exposed: wp.array[float],
 ):
     """Visibility of lamps and environment at listed pixels, from lattice points or by rays.
 
@@ -382,9 +382,7 @@ def sky_exposure_at(world: World, origin: wp.vec3, n: wp.vec3):
 
 
 @wp.func
-def body_sky_visibility(
-    lattice: Lattice, lattice_sky: wp.array(dtype=float, ndim=2), q: int, body: int
-):
+def body_sky_visibility(lattice: Lattice, lattice_sky: wp.array2d[float], q: int, body: int):
     """Sum and number of the sky's visible fractions at a cell's corners on one body.
 
     Thin parts such as leaves and spokes are as open to the sky as their neighbours, whatever their
@@ -425,7 +423,7 @@ def is_usable_point(
 
 @wp.func
 def visible_lamp_fraction(
-    world: World, lamp: LightRecord, origin: wp.vec3, n: wp.vec3, parts: wp.array(dtype=wp.vec2)
+    world: World, lamp: LightRecord, origin: wp.vec3, n: wp.vec3, parts: wp.array[wp.vec2]
 ):
     """Visible fraction of a lamp from a point, by up to all ``parts``; one ray for small lamps."""
     beam = beam_from(lamp, origin)
@@ -445,7 +443,7 @@ def visible_lamp_fraction(
 
 @wp.func
 def visible_sky_fraction(
-    world: World, origin: wp.vec3, n: wp.vec3, disc: wp.array(dtype=wp.vec2), radius_m: float
+    world: World, origin: wp.vec3, n: wp.vec3, disc: wp.array[wp.vec2], radius_m: float
 ):
     """Visible fraction of the hemisphere within a radius, weighted by the cosine."""
     if radius_m == 0.0:

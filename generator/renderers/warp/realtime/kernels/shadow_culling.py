@@ -194,7 +194,7 @@ def may_shade_from(world: World, b: int, tile: Tile, lamp: LightRecord):
 
 
 @wp.func
-def append_occluder(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: int):
+def append_occluder(lists: wp.array3d[int], tile: int, j: int, b: int):
     """Append a body to a list, or mark the list as overflowing."""
     n = lists[tile, j, 0]
     if n >= 0 and n < LIST_LENGTH:
@@ -205,9 +205,7 @@ def append_occluder(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: in
 
 
 @wp.func
-def is_lamp_relevant(
-    lattice: Lattice, shares: wp.array(dtype=float, ndim=2), j: int, column: int, row: int
-):
+def is_lamp_relevant(lattice: Lattice, shares: wp.array2d[float], j: int, column: int, row: int):
     """Whether lamp j is more than faint at any point of a tile."""
     found = bool(False)
     for y in range(row * TILE, wp.min((row + 1) * TILE, lattice.height)):
@@ -224,8 +222,8 @@ def list_occluders(
     lattice: Lattice,
     tile_columns: int,
     ambient_radius_m: float,
-    shares: wp.array(dtype=float, ndim=2),
-    lists: wp.array(dtype=int, ndim=3),
+    shares: wp.array2d[float],
+    lists: wp.array3d[int],
 ):
     """Bodies that may shade each tile from each lamp; the last list is for ambient occlusion.
 

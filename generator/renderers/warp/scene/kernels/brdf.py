@@ -40,7 +40,7 @@ class Brdf:
 
 
 @wp.func
-def directional_albedo(table: wp.array(dtype=wp.vec2, ndim=2), roughness: float, n_v: float):
+def directional_albedo(table: wp.array2d[wp.vec2], roughness: float, n_v: float):
     """Factors on F0 and on F90 of the GGX lobe's directional albedo.
 
     Args:
@@ -61,7 +61,7 @@ def directional_albedo(table: wp.array(dtype=wp.vec2, ndim=2), roughness: float,
 
 @wp.func
 def make_brdf(
-    table: wp.array(dtype=wp.vec2, ndim=2),
+    table: wp.array2d[wp.vec2],
     albedo: wp.vec3,
     roughness: float,
     metallic: float,

@@ -93,7 +93,7 @@ def closest_cutout_hit(world: World, o: wp.vec3, d: wp.vec3, through: int, befor
 
 
 @wp.kernel
-def trace_pixels(view: View, world: World, t_min: float, hits: wp.array(dtype=wp.vec2i)):
+def trace_pixels(view: View, world: World, t_min: float, hits: wp.array[wp.vec2i]):
     """Nearest (body, face) through every pixel centre."""
     i = wp.tid()
     x = float(i % view.width) + 0.5
@@ -202,7 +202,7 @@ def is_cut_by_cutouts(world: World, path: Path, through: int):
 
 @wp.func
 def is_occluded_by_listed(
-    world: World, lists: wp.array(dtype=int, ndim=3), tile: int, j: int, skip: int, path: Path
+    world: World, lists: wp.array3d[int], tile: int, j: int, skip: int, path: Path
 ):
     """Whether any body but ``skip`` blocks the path from a point of a tile to lamp j."""
     hit = bool(False)
@@ -226,9 +226,7 @@ def free_path(world: World, path: Path):
 
 
 @wp.func
-def free_path_of_listed(
-    world: World, lists: wp.array(dtype=int, ndim=3), tile: int, skip: int, path: Path
-):
+def free_path_of_listed(world: World, lists: wp.array3d[int], tile: int, skip: int, path: Path):
     """Unobstructed part of a path from a point of a tile, ignoring the body ``skip``."""
     # The last list is that of ambient occlusion.
     j = world.lamps.shape[0]

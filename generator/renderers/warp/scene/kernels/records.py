@@ -43,7 +43,7 @@ class View:
     inverse_fy: float
     lens: int
     coefficients: Coefficients
-    directions: wp.array(dtype=wp.vec4)
+    directions: wp.array[wp.vec4]
     R_world_camera: wp.mat33
     eye_m: wp.vec3
     pixel_rad: float
@@ -62,14 +62,14 @@ class Geometry:
     """
 
     mesh: wp.uint64
-    tree: wp.array(dtype=wp.float32)
-    vertices_m: wp.array(dtype=wp.vec3)
-    normals: wp.array(dtype=wp.vec3)
-    uvs: wp.array(dtype=wp.vec2)
-    faces: wp.array(dtype=wp.int32)
-    face_slots: wp.array(dtype=wp.int32)
-    box_lows_m: wp.array(dtype=wp.vec3)
-    box_highs_m: wp.array(dtype=wp.vec3)
+    tree: wp.array[wp.float32]
+    vertices_m: wp.array[wp.vec3]
+    normals: wp.array[wp.vec3]
+    uvs: wp.array[wp.vec2]
+    faces: wp.array[wp.int32]
+    face_slots: wp.array[wp.int32]
+    box_lows_m: wp.array[wp.vec3]
+    box_highs_m: wp.array[wp.vec3]
     low_m: wp.vec3
     high_m: wp.vec3
     convex: int
@@ -155,12 +155,12 @@ class TextureRecord:
         offsets: First texel of each level.
     """
 
-    texels: wp.array(dtype=wp.uint32)
-    bumps: wp.array(dtype=wp.uint32)
-    shares: wp.array(dtype=wp.uint32)
-    glow: wp.array(dtype=wp.uint32)
-    cover: wp.array(dtype=wp.uint8)
-    offsets: wp.array(dtype=wp.int32)
+    texels: wp.array[wp.uint32]
+    bumps: wp.array[wp.uint32]
+    shares: wp.array[wp.uint32]
+    glow: wp.array[wp.uint32]
+    cover: wp.array[wp.uint8]
+    offsets: wp.array[wp.int32]
     width: int
     height: int
     levels: int
@@ -217,10 +217,10 @@ class EnvironmentRecord:
         visible: Whether pixels without a body show the image.
     """
 
-    irradiance: wp.array(dtype=wp.vec3)
-    glossy: wp.array(dtype=wp.vec3, ndim=3)
-    image: wp.array(dtype=wp.vec3, ndim=2)
-    rest: wp.array(dtype=wp.vec3, ndim=2)
+    irradiance: wp.array[wp.vec3]
+    glossy: wp.array3d[wp.vec3]
+    image: wp.array2d[wp.vec3]
+    rest: wp.array2d[wp.vec3]
     luminance: float
     cos_yaw: float
     sin_yaw: float
@@ -246,7 +246,7 @@ class GroundRecord:
     snow_cover: float
     snow_level: float
     seed: int
-    exposed: wp.array(dtype=float)
+    exposed: wp.array[float]
 
 
 @wp.func
@@ -383,16 +383,16 @@ class World:
         lobes: Directional albedo of specular lobes, see brdf.directional_albedo.
     """
 
-    tree: wp.array(dtype=wp.float32)
+    tree: wp.array[wp.float32]
     hierarchy: wp.uint64
-    cutouts: wp.array(dtype=wp.int32)
+    cutouts: wp.array[wp.int32]
     cutout_hierarchy: wp.uint64
-    geometries: wp.array(dtype=Geometry)
-    bodies: wp.array(dtype=BodyRecord)
-    surfaces: wp.array(dtype=MaterialRecord)
-    textures: wp.array(dtype=TextureRecord)
-    lamps: wp.array(dtype=LightRecord)
-    lobes: wp.array(dtype=wp.vec2, ndim=2)
+    geometries: wp.array[Geometry]
+    bodies: wp.array[BodyRecord]
+    surfaces: wp.array[MaterialRecord]
+    textures: wp.array[TextureRecord]
+    lamps: wp.array[LightRecord]
+    lobes: wp.array2d[wp.vec2]
     sky: EnvironmentRecord
     ground: GroundRecord
 

@@ -105,7 +105,7 @@ def taps_at(first: int, width: int, height: int, u: float, v: float):
 
 
 @wp.func
-def mix_texels(texels: wp.array(dtype=wp.uint32), t: Taps):
+def mix_texels(texels: wp.array[wp.uint32], t: Taps):
     """Weighted sum of four texels of four bytes each."""
     a = texels[t.a]
     b = texels[t.b]

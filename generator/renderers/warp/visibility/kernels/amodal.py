@@ -37,10 +37,10 @@ class Canvas:
 def draw_silhouettes(
     view: View,
     world: World,
-    p_camera: wp.array(dtype=wp.vec3),
-    xy: wp.array(dtype=wp.vec2i),
-    canvases: wp.array(dtype=Canvas),
-    mask: wp.array(dtype=wp.uint8),
+    p_camera: wp.array[wp.vec3],
+    xy: wp.array[wp.vec2i],
+    canvases: wp.array[Canvas],
+    mask: wp.array[wp.uint8],
 ):
     """Write 1 at every pixel centre that a body covers; one body per thread.
 

@@ -37,9 +37,7 @@ class AmodalWindow:
 
 
 @wp.func
-def canvas_direction(
-    view: View, nodes: wp.array(dtype=wp.vec4, ndim=2), stride: int, x: int, y: int
-):
+def canvas_direction(view: View, nodes: wp.array2d[wp.vec4], stride: int, x: int, y: int):
     """Unit direction through a pixel's centre inside or outside the image; 0 if not shown.
 
     Args:
@@ -71,11 +69,11 @@ def canvas_direction(
 def trace_silhouettes(
     view: View,
     world: World,
-    nodes: wp.array(dtype=wp.vec4, ndim=2),
+    nodes: wp.array2d[wp.vec4],
     stride: int,
     t_min: float,
-    windows: wp.array(dtype=AmodalWindow),
-    mask: wp.array(dtype=wp.uint8),
+    windows: wp.array[AmodalWindow],
+    mask: wp.array[wp.uint8],
 ):
     """Write 1 at every pixel whose ray meets a body; one row of one window per thread."""
     k, row = wp.tid()

@@ -65,7 +65,7 @@ def cover(
     view: View,
     world: World,
     images: GBufferRecord,
-    offsets: wp.array(dtype=wp.vec2),
+    offsets: wp.array[wp.vec2],
     x: int,
     y: int,
     source: int,
@@ -142,11 +142,11 @@ def antialias(
     view: View,
     world: World,
     images: GBufferRecord,
-    radiance: wp.array(dtype=wp.vec3),
-    pixels: wp.array(dtype=int),
-    offsets: wp.array(dtype=wp.vec2),
+    radiance: wp.array[wp.vec3],
+    pixels: wp.array[int],
+    offsets: wp.array[wp.vec2],
     t_min: float,
-    mixed: wp.array(dtype=wp.vec3),
+    mixed: wp.array[wp.vec3],
 ):
     """Radiance of listed pixels: the mean over their samples, in the order of the list.
 

@@ -44,9 +44,7 @@ def is_edge_between(images: GBufferRecord, i: int, j: int):
 
 
 @wp.kernel
-def find_edges(
-    view: View, images: GBufferRecord, count: wp.array(dtype=int), pixels: wp.array(dtype=int)
-):
+def find_edges(view: View, images: GBufferRecord, count: wp.array[int], pixels: wp.array[int]):
     """List the pixels that an edge may cross.
 
     Args:
@@ -96,9 +94,7 @@ def most_similar_normal(
 
 
 @wp.kernel
-def write_mixed(
-    pixels: wp.array(dtype=int), mixed: wp.array(dtype=wp.vec3), radiance: wp.array(dtype=wp.vec3)
-):
+def write_mixed(pixels: wp.array[int], mixed: wp.array[wp.vec3], radiance: wp.array[wp.vec3]):
     """Write the mixed radiance of listed pixels into the image."""
     row = wp.tid()
     radiance[pixels[row]] = mixed[row]

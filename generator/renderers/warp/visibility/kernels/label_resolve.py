@@ -92,10 +92,10 @@ def resolve(
     view: View,
     world: World,
     run: int,
-    hits: wp.array(dtype=wp.vec2i),
-    z_m: wp.array(dtype=float),
-    weights: wp.array(dtype=wp.vec2),
-    normals: wp.array(dtype=wp.vec3),
+    hits: wp.array[wp.vec2i],
+    z_m: wp.array[float],
+    weights: wp.array[wp.vec2],
+    normals: wp.array[wp.vec3],
 ):
     """Depth (inf for nothing), barycentric weights and smooth world normal of every pixel.
 
@@ -145,18 +145,14 @@ def resolve(
 
 
 @wp.kernel
-def label_ids(
-    hits: wp.array(dtype=wp.vec2i),
-    ids: wp.array(dtype=wp.uint16),
-    labels: wp.array(dtype=wp.uint16),
-):
+def label_ids(hits: wp.array[wp.vec2i], ids: wp.array[wp.uint16], labels: wp.array[wp.uint16]):
     """Id of the body at every pixel; ``ids[0]`` is the background's, ``ids[1 + b]`` that of b."""
     i = wp.tid()
     labels[i] = ids[hits[i][0] + 1]
 
 
 @wp.kernel
-def label_ranges(view: View, z_m: wp.array(dtype=float), ranges_m: wp.array(dtype=float)):
+def label_ranges(view: View, z_m: wp.array[float], ranges_m: wp.array[float]):
     """Distance along the ray [m]."""
     i = wp.tid()
     x = float(i % view.width) + 0.5
@@ -165,7 +161,7 @@ def label_ranges(view: View, z_m: wp.array(dtype=float), ranges_m: wp.array(dtyp
 
 
 @wp.kernel
-def label_z_depths(view: View, ranges_m: wp.array(dtype=float), z_m: wp.array(dtype=float)):
+def label_z_depths(view: View, ranges_m: wp.array[float], z_m: wp.array[float]):
     """Distance along the optical axis [m]; inf behind the camera's plane."""
     i = wp.tid()
     z = ranges_m[i] * view.directions[i][2]
@@ -176,9 +172,7 @@ def label_z_depths(view: View, ranges_m: wp.array(dtype=float), z_m: wp.array(dt
 
 
 @wp.kernel
-def label_normals(
-    view: View, normals: wp.array(dtype=wp.vec3), normals_camera: wp.array(dtype=wp.vec3)
-):
+def label_normals(view: View, normals: wp.array[wp.vec3], normals_camera: wp.array[wp.vec3]):
     """Normals in the camera frame."""
     i = wp.tid()
     normals_camera[i] = wp.transpose(view.R_world_camera) @ normals[i]
@@ -196,10 +190,10 @@ class BoxFrame:
 @wp.kernel
 def label_object_coordinates(
     world: World,
-    hits: wp.array(dtype=wp.vec2i),
-    weights: wp.array(dtype=wp.vec2),
-    frames: wp.array(dtype=BoxFrame),
-    coordinates: wp.array(dtype=wp.vec3),
+    hits: wp.array[wp.vec2i],
+    weights: wp.array[wp.vec2],
+    frames: wp.array[BoxFrame],
+    coordinates: wp.array[wp.vec3],
 ):
     """Position within the instance's box, [0, 1] per axis; 0 for the background."""
     i = wp.tid()
