@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.annotations.bev_raster import Float32, Grid, heights_m
-from gen_data.generator.annotations.ground_geometry import carriageway
+from gen_data.generator.annotations.bev_raster import Float32, Grid, carriageway, heights_m
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.boxes import tight_box
 from gen_data.generator.core.capture import Channel, SensorReading

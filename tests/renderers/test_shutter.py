@@ -228,10 +228,10 @@ def test_bands_of_a_still_world_make_the_whole_image(renderer: WarpRenderer, len
     rows = make_bands(near.state, list(range(0, LENS.height_px, 5)))
 
     def light(see):  # noqa: ANN001, ANN202
-        return integrate_light(see, context)
+        return integrate_light(see)
 
-    one, images = render_bands(whole_bands, LABELS, context, near, light)
-    other, banded = render_bands(rows, LABELS, context, near, light)
+    one, images = render_bands(whole_bands, LABELS, near, light)
+    other, banded = render_bands(rows, LABELS, near, light)
     for channel in LABELS:
         assert np.array_equal(images[channel], banded[channel]), channel
     assert np.array_equal(one.hits, other.hits)

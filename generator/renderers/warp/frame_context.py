@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import warp as wp
 
 from gen_data.generator.core.scene import Camera, Scene
 from gen_data.generator.core.scene_time import scene_at
@@ -70,6 +73,33 @@ class CameraView:
     world: PackedWorld
     view: records.View
     gbuffer: GBuffer
+    context: RenderContext
+
+    @property
+    def cache(self) -> DeviceCache:
+        """Assets and scratch memory."""
+        return self.context.cache
+
+    @property
+    def settings(self) -> RenderSettings:
+        """Settings of the renderer."""
+        return self.context.settings
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels."""
+        return int(self.view.width * self.view.height)
+
+    @property
+    def inputs(self) -> list[Any]:
+        """View, World and GBufferRecord, the first inputs of most kernels."""
+        return [self.view, self.world.record, self.gbuffer.record]
+
+    def launch(
+        self, kernel: wp.Kernel, dim: Any, inputs: Sequence[Any], outputs: Sequence[Any] = ()
+    ) -> None:
+        """Run a kernel on the renderer's device."""
+        wp.launch(kernel, dim, [*inputs], [*outputs], device=self.cache.device)
 
 
 def is_moving(state: CameraState, open_s: float) -> bool:
@@ -98,9 +128,8 @@ def render_view(
     view = pack_view(state.camera, context.cache)
     if rows is not None:
         view = crop_rows(view, *rows)
-    return CameraView(
-        state, world, view, find_visible(world, view, context.cache, context.settings.visibility)
-    )
+    gbuffer = find_visible(world, view, context.cache, context.settings.visibility)
+    return CameraView(state, world, view, gbuffer, context)
 
 
 def pack_state(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from gen_data.generator.config.distributions import (
     Scalar,
     UnitInterval,
 )
+from gen_data.generator.config.yaml_tree import load_yaml
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.interfaces import Renderer
@@ -32,14 +34,15 @@ from gen_data.generator.sensors.camera.exposure import (
     meter_ev100,
     saturation_cd_m2,
 )
-from gen_data.generator.sensors.camera.flare import add_flare
 from gen_data.generator.sensors.camera.glare import add_glare
 from gen_data.generator.sensors.camera.image_sensor import ImageSensor, expose, filter_at, mosaic
 from gen_data.generator.sensors.camera.lens_drops import lens_drops, refract_in_drops
-from gen_data.generator.sensors.camera.presets import camera_preset
+from gen_data.generator.sensors.camera.optics import add_flare
 from gen_data.generator.sensors.camera.tone import Tone, display_values, to_bytes, tone_to_bytes
+from gen_data.generator.sensors.device_presets import check_preset, preset_path
 
 NONE = Constant(0.0)
+PRESETS = "gen_data.generator.sensors.camera.presets"
 Row = tuple[float, float, float]
 
 
@@ -116,7 +119,7 @@ class ImagePipeline(Strict):
         if not isinstance(given, Mapping):
             return given
         preset = given.get("preset", "ideal")
-        below = camera_preset(preset) if isinstance(preset, str) else {}
+        below = _preset(preset) if isinstance(preset, str) else {}
         return _lists_to_tuples(_merge_presets(below, given))
 
     @model_validator(mode="after")
@@ -380,6 +383,14 @@ def _centre_m(depth_m: NDArray[np.floating]) -> float:
     middle = depth_m[height // 3 : height - height // 3, width // 3 : width - width // 3]
     there = middle[np.isfinite(middle)]
     return float(np.median(there)) if len(there) else 1000.0
+
+
+@cache
+def _preset(name: str) -> dict[str, Any]:
+    """The values of a preset, as plain data; ValueError if there is no such preset."""
+    plain = load_yaml(preset_path(PRESETS, check_preset(PRESETS, name))).plain()
+    assert isinstance(plain, dict)
+    return plain
 
 
 def _merge_presets(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:

@@ -120,20 +120,17 @@ def apply_chromatic_aberration(image: Float32, corner_px: float) -> Float32:
     share = corner_px / (0.5 * math.hypot(width, height))
     out = image.copy()
     for channel, scale in ((0, 1.0 + share), (2, 1.0 - share)):
-        shift = np.array(
-            [
-                [scale, 0.0, (1.0 - scale) * 0.5 * (width - 1)],
-                [0.0, scale, (1.0 - scale) * 0.5 * (height - 1)],
-            ]
-        )
+        shift = _scale_about_middle(scale, width, height)
         out[..., channel] = cv2.warpAffine(
-            image[..., channel],
-            shift,
-            (width, height),
-            flags=cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
+            image[..., channel], shift, (width, height), borderMode=cv2.BORDER_REPLICATE
         )
     return np.asarray(out, np.float32)
+
+
+def _scale_about_middle(scale: float, width: int, height: int) -> Array:
+    """Affine map of pixel indices, [2, 3]."""
+    x, y = ((1.0 - scale) * 0.5 * (size - 1) for size in (width, height))
+    return np.array([[scale, 0.0, x], [0.0, scale, y]])
 
 
 def _disc(radius_px: float) -> Float32:
@@ -142,3 +139,44 @@ def _disc(radius_px: float) -> Float32:
     y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1].astype(np.float32)
     disc = np.clip(radius_px + 0.5 - np.hypot(x, y), 0.0, 1.0)
     return np.asarray(disc / disc.sum(), np.float32)
+
+
+_GHOSTS = (
+    (-0.35, 0.02, (0.5, 1.0, 0.6)),
+    (-0.8, 0.05, (1.0, 0.5, 0.5)),
+    (0.5, 0.03, (0.5, 0.6, 1.0)),
+)
+"""Ghosts: position of the spot scaled about the image's centre, radius over width, tint."""
+
+
+def add_flare(image: Float32, share: float, white: float) -> Float32:
+    """Add ghosts of light far beyond white, on a line through the centre of the image.
+
+    Args:
+        image: Linear, float32 [h, w, 3].
+        share: Share of the light beyond white that returns as ghosts.
+        white: The value that saturates the sensor.
+    """
+    beyond = np.maximum(image - 4.0 * white, 0.0)
+    if not beyond.any():
+        return image
+    height, width = image.shape[:2]
+    out = image.copy()
+    for place, radius, tint in _GHOSTS:
+        shift = _scale_about_middle(place, width, height)
+        # Shrinking averages the light of the pixels that it merges.
+        ghost = cv2.warpAffine(beyond, shift, (width, height), flags=cv2.INTER_AREA)
+        ghost = _gaussian(ghost, radius * width)
+        out += share * place * place * ghost * np.asarray(tint, np.float32)
+    return np.asarray(out, np.float32)
+
+
+def _gaussian(image: Float32, sigma_px: float) -> Float32:
+    """Blur an image by a wide Gaussian at reduced resolution, which suffices for smooth images."""
+    halvings = max(0, int(math.log2(max(sigma_px, 1.0) / 2.0)))
+    small = image
+    for _ in range(halvings):
+        small = cv2.resize(small, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    small = cv2.GaussianBlur(small, (0, 0), sigma_px / 2**halvings, borderType=cv2.BORDER_REPLICATE)
+    size = (image.shape[1], image.shape[0])
+    return np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_LINEAR), np.float32)

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.errors import ConfigError, SampleError, did_you_mean
-from gen_data.generator.core.interfaces import Renderer, SensorInfo
+from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.scene import Camera, Region, Scene
 from gen_data.generator.core.scene_time import RIG_AXES
@@ -19,9 +19,9 @@ from gen_data.generator.core.se3 import SE3, look_at
 from gen_data.generator.core.shutter import INSTANT, Shutter
 from gen_data.generator.core.stereo import baseline_m, disparity_px, is_seen_by_both
 from gen_data.generator.core.streams import Rng
+from gen_data.generator.sensors.camera.exposure import ExposureTime, RollingShutter, make_shutter
 from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 from gen_data.generator.sensors.camera.lens_models import CalibratedLens, LensConfig, Pinhole
-from gen_data.generator.sensors.camera.shutter import ExposureTime, RollingShutter, make_shutter
 from gen_data.generator.sensors.mounting import Mounted, check_rig
 
 Image = Literal[
@@ -133,7 +133,8 @@ class RgbCamera(Mounted):
 
     def describe(self) -> SensorInfo:
         """Describe a camera with the channels that it writes."""
-        return self._camera_info(self.name, self.media, self.intrinsics().lens.model)
+        lens = self.intrinsics().lens.model
+        return self._info(self.name, Modality.CAMERA, channels=self.media, lens=lens)
 
     def mount(self, scene: Scene) -> Scene:
         """Add this camera, on its rig or looking at the scene's focus, unless it exists."""

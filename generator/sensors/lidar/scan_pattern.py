@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from gen_data.generator.config.base_model import Strict
+from gen_data.generator.sensors.device_presets import load_preset
 
+PRESETS = "gen_data.generator.sensors.lidar.presets"
 Hertz = Annotated[float, Field(gt=0, le=10_000)]
 
 
@@ -100,6 +102,12 @@ class LidarModel(Strict):
         """Elevation of every laser, the highest first, [rings]; empty for a rosette scanner."""
         blocks = [np.linspace(b.first, b.last, b.count) for b in self.elevations_deg]
         return np.asarray(np.radians(np.concatenate([np.zeros(0), *blocks])), np.float64)
+
+
+def lidar_model(name: str) -> LidarModel:
+    """The preset of that name; ConfigError if there is none."""
+    model: LidarModel = load_preset(PRESETS, name, LidarModel)
+    return model
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -1,19 +1,5 @@
 """GNSS receiver: geodetic position, velocity and their accuracy.
 
-Example, for a scene with a rig ``ego``::
-
-    sensors:
-      - type: gnss
-        name: gps
-        rig: ego
-        model: ZED-F9P
-        rate_hz: 10
-
-``sample.measurements["gps"]`` then holds the fixes since the last step, with the fields ``time_s``,
-``latitude_deg``, ``longitude_deg``, ``altitude_m``, ``velocity_east_m_s`` ...,
-``horizontal_sigma_m``, ``vertical_sigma_m``, ``satellites`` and ``quality`` (as in NMEA GGA).
-Positions and velocities are NaN without a fix.
-
 Errors are white noise and a first-order Gauss-Markov process (Brown and Hwang, "Introduction to
 Random Signals and Applied Kalman Filtering"), scaled by the dilution of precision of the visible
 satellites (Langley, "Dilution of Precision", GPS World 1999).
@@ -39,8 +25,13 @@ from gen_data.generator.core.scene_time import scene_at
 from gen_data.generator.core.se3 import SE3, Array
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.device_presets import check_preset, load_preset
-from gen_data.generator.sensors.mount_kinematics import MountMotion, mount_motion, remove_carrier
-from gen_data.generator.sensors.mounting import Instrument, reading_times
+from gen_data.generator.sensors.mounting import (
+    Instrument,
+    MountMotion,
+    mount_motion,
+    reading_times,
+    remove_carrier,
+)
 
 PRESETS = "gen_data.generator.sensors.navigation.gnss_presets"
 OCCLUSION_RANGE_M = 1000.0
@@ -104,11 +95,6 @@ class Gnss(Instrument):
     satellites: int = Field(12, ge=4, le=60)
     mask_deg: float = Field(10.0, ge=0, le=60)
     noise: float = Field(1.0, ge=0)
-
-    @property
-    def device_model(self) -> str:
-        """Name of the preset."""
-        return self.model
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng

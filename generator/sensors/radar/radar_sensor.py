@@ -29,8 +29,12 @@ from gen_data.generator.core.scene import Instance, Lidar, Scene
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.device_presets import check_preset, load_preset
-from gen_data.generator.sensors.mount_kinematics import mount_motion, remove_carrier, velocity_at
-from gen_data.generator.sensors.mounting import Instrument
+from gen_data.generator.sensors.mounting import (
+    Instrument,
+    mount_motion,
+    remove_carrier,
+    velocity_at,
+)
 from gen_data.generator.sensors.radar.cross_section import (
     TARGETS,
     area_factor,
@@ -90,11 +94,6 @@ class Radar(Instrument):
     model: Annotated[str, AfterValidator(lambda name: check_preset(PRESETS, name))] = "ARS408-21"
     false_alarms: float = Field(1.0, ge=0, le=1000)
     noise: float = Field(1.0, ge=0)
-
-    @property
-    def device_model(self) -> str:
-        """Name of the preset."""
-        return self.model
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng

@@ -24,9 +24,7 @@ from gen_data.generator.core.scene import Camera, Weather
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Rng, Streams
 from gen_data.generator.renderers.warp.atmosphere.kernels import precipitation
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.scene.kernels import records
-from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
+from gen_data.generator.renderers.warp.frame_context import CameraView
 
 _NEAREST_M = 0.35
 # Aperture of the lens: near particles are defocused by that much.
@@ -99,16 +97,15 @@ def usual_exposure_s(ev100: float) -> float:
     return float(min(max(_F_NUMBER**2 / 2.0**ev100, _EXPOSURE_S[0]), _EXPOSURE_S[1]))
 
 
-def draw_precipitation(
-    world: PackedWorld,
-    camera: Camera,
-    view: records.View,
-    z_m: wp.array,
-    radiance: wp.array,
-    cache: DeviceCache,
-) -> bool:
-    """Draw falling particles over the image, in place; returns whether there are any."""
-    weather = world.weather
+def draw_precipitation(frame: CameraView, z_m: wp.array, radiance: wp.array) -> bool:
+    """Draw falling particles over the image, in place; returns whether there are any.
+
+    Args:
+        frame: The image.
+        z_m: Its depths, as of GBuffer.
+        radiance: Linear RGB [cd/m^2], flat.
+    """
+    weather, camera = frame.world.weather, frame.state.camera
     if weather.rain_mm_h <= 0.0 and weather.snow_mm_h <= 0.0:
         return False
     exposure_s = camera.shutter.exposure_s
@@ -126,14 +123,14 @@ def draw_precipitation(
     if not len(values):
         return False
     values = values[np.argsort(-values["z_m"], kind="stable")]
-    first, listed = _streaks_by_row(values, view.height)
-    streaks = wp.array(values, dtype=precipitation.Streak, device=cache.device)
-    wp.launch(
-        precipitation.light_streaks, len(values), [view, world.record, streaks], device=cache.device
-    )
-    lists = [wp.array(a, dtype=wp.int32, device=cache.device) for a in (first, listed)]
-    inputs = [view.width, z_m, streaks, *lists]
-    wp.launch(precipitation.draw_streaks, view.height, inputs, [radiance], device=cache.device)
+    first, listed = _streaks_by_row(values, frame.view.height)
+    device = frame.cache.device
+    streaks = wp.array(values, dtype=precipitation.Streak, device=device)
+    inputs = [frame.view, frame.world.record, streaks]
+    frame.launch(precipitation.light_streaks, len(values), inputs)
+    lists = [wp.array(a, dtype=wp.int32, device=device) for a in (first, listed)]
+    inputs = [frame.view.width, z_m, streaks, *lists]
+    frame.launch(precipitation.draw_streaks, frame.view.height, inputs, [radiance])
     return True
 
 

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import warp as wp
 
 from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.realtime.kernels import lattice as lattice_kernels
+from gen_data.generator.renderers.warp.frame_context import CameraView
 from gen_data.generator.renderers.warp.realtime.kernels import shadow_culling, soft_shadows
-from gen_data.generator.renderers.warp.scene.kernels import records
-from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
-from gen_data.generator.renderers.warp.settings import RenderSettings
-from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer
+from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice, sample_lattice
 
 _STRIDE_PX = 3
 _TILE = int(shadow_culling.TILE)
@@ -37,58 +34,37 @@ class LightVisibility:
     open_sky: wp.array
 
 
-def make_lattice(
-    world: PackedWorld, view: records.View, gbuffer: GBuffer, cache: DeviceCache
-) -> lattice_kernels.Lattice:
+def make_lattice(frame: CameraView) -> Lattice:
     """Sample the lattice of a view."""
-    lattice = lattice_kernels.Lattice()
+    lattice = Lattice()
     lattice.stride = _STRIDE_PX
-    lattice.width = (view.width - 1) // _STRIDE_PX + 2
-    lattice.height = (view.height - 1) // _STRIDE_PX + 2
+    lattice.width = (frame.view.width - 1) // _STRIDE_PX + 2
+    lattice.height = (frame.view.height - 1) // _STRIDE_PX + 2
     n = lattice.width * lattice.height
-    lattice.body = cache.scratch("lattice body", n, wp.int32)
-    lattice.surface = cache.scratch("lattice surface", n, wp.int32)
-    lattice.pixel = cache.scratch("lattice pixel", n, wp.int32)
-    lattice.skip = cache.scratch("lattice skip", n, wp.int32)
-    lattice.p_m = cache.scratch("lattice p", n, wp.vec3)
-    lattice.normal = cache.scratch("lattice normal", n, wp.vec3)
-    lattice.origin_m = cache.scratch("lattice origin", n, wp.vec3)
-    inputs = [
-        view,
-        world.record,
-        gbuffer.hits,
-        gbuffer.z_m,
-        gbuffer.weights,
-        gbuffer.normals,
-        lattice,
-    ]
-    wp.launch(lattice_kernels.sample_lattice, n, inputs, device=cache.device)
+    for name in ("body", "surface", "pixel", "skip"):
+        setattr(lattice, name, frame.cache.scratch(f"lattice {name}", n, wp.int32))
+    for name in ("p_m", "normal", "origin_m"):
+        setattr(lattice, name, frame.cache.scratch(f"lattice {name}", n, wp.vec3))
+    frame.launch(sample_lattice, n, [*frame.inputs, lattice])
     return lattice
 
 
-def find_light_visibility(
-    world: PackedWorld,
-    view: records.View,
-    lattice: lattice_kernels.Lattice,
-    cache: DeviceCache,
-    settings: RenderSettings,
-) -> LightVisibility:
+def find_light_visibility(frame: CameraView, lattice: Lattice) -> LightVisibility:
     """Compute shadows and ambient occlusion of all points."""
-    lamps = world.record.lamps.shape[0]
+    world, cache = frame.world.record, frame.cache
+    lamps = world.lamps.shape[0]
     columns = -(-lattice.width // _TILE)
     tiles = columns * -(-lattice.height // _TILE)
     lists = cache.scratch("occluders", (tiles, lamps + 1, 1 + _LIST_LENGTH), wp.int32)
-    radius_m = settings.ambient_occlusion_radius_m
+    radius_m = frame.settings.ambient_occlusion_radius_m
     points = lattice.width * lattice.height
     shares = cache.scratch("shares", (max(lamps, 1), points), float)
-    wp.launch(
-        soft_shadows.weigh_lamps, points, [world.record, lattice], [shares], device=cache.device
-    )
-    inputs = [world.record, lattice, columns, radius_m, shares, lists]
-    wp.launch(shadow_culling.list_occluders, tiles, inputs, device=cache.device)
+    frame.launch(soft_shadows.weigh_lamps, points, [world, lattice], [shares])
+    inputs = [world, lattice, columns, radius_m, shares, lists]
+    frame.launch(shadow_culling.list_occluders, tiles, inputs)
+    inputs = [world, lattice, columns, lists]
     return LightVisibility(
-        _lamp_visibility(world, view, lattice, lists, shares, settings, cache),
-        _sky_visibility(world, view, lattice, lists, columns, radius_m, cache),
+        _lamp_visibility(frame, lattice, inputs, shares), _sky_visibility(frame, lattice, inputs)
     )
 
 
@@ -118,74 +94,45 @@ def cosine_hemisphere(n: int) -> Array:
 
 
 def _lamp_visibility(
-    world: PackedWorld,
-    view: records.View,
-    lattice: lattice_kernels.Lattice,
-    lists: wp.array,
-    shares: wp.array,
-    settings: RenderSettings,
-    cache: DeviceCache,
+    frame: CameraView, lattice: Lattice, inputs: list[Any], shares: wp.array
 ) -> wp.array:
-    device = cache.device
-    n, lamps = lattice.width * lattice.height, world.record.lamps.shape[0]
-    probed = cache.scratch("probed", (max(lamps, 1), n), float)
-    lit = cache.scratch("lit", (max(lamps, 1), n), float)
+    cache, lamps = frame.cache, frame.world.record.lamps.shape[0]
+    n = lattice.width * lattice.height
+    probed, lit = (cache.scratch(name, (max(lamps, 1), n), float) for name in ("probed", "lit"))
     if lamps == 0:
         return lit
-    disc = cache.constant(wp.vec2, lamp_samples, 48, settings.shadows)
-    columns = -(-lattice.width // _TILE)
-    inputs = [world.record, lattice, columns, lists, disc, shares]
+    disc = cache.constant(wp.vec2, lamp_samples, 48, frame.settings.shadows)
+    inputs = [*inputs, disc, shares]
     for parity in (0, 1):
-        wp.launch(soft_shadows.probe_lamps, n, [*inputs, parity], [probed], device=device)
-    classes = _classify(lattice, probed, lamps, cache)
-    wp.launch(soft_shadows.refine_lamps, n, [*inputs, classes, probed], [lit], device=device)
-    _smooth(view, lattice, lit, probed, cache)
+        frame.launch(soft_shadows.probe_lamps, n, [*inputs, parity], [probed])
+    classes = _classify(frame, lattice, probed)
+    frame.launch(soft_shadows.refine_lamps, n, [*inputs, classes, probed], [lit])
+    _smooth(frame, lattice, lit, probed)
     return probed
 
 
-def _sky_visibility(
-    world: PackedWorld,
-    view: records.View,
-    lattice: lattice_kernels.Lattice,
-    lists: wp.array,
-    columns: int,
-    radius_m: float,
-    cache: DeviceCache,
-) -> wp.array:
+def _sky_visibility(frame: CameraView, lattice: Lattice, inputs: list[Any]) -> wp.array:
+    cache, radius_m = frame.cache, frame.settings.ambient_occlusion_radius_m
     n = lattice.width * lattice.height
-    probed = cache.scratch("probed sky", (1, n), float)
-    open_sky = cache.scratch("open sky", (1, n), float)
+    probed, open_sky = (cache.scratch(name, (1, n), float) for name in ("probed sky", "open sky"))
     if radius_m == 0.0:
         open_sky.fill_(1.0)
         return open_sky
     hemisphere = cache.constant(wp.vec3, cosine_hemisphere, 16)
-    inputs = [world.record, lattice, columns, lists, hemisphere, radius_m]
-    wp.launch(soft_shadows.probe_ambient, n, inputs, [probed], device=cache.device)
-    _smooth(view, lattice, probed, open_sky, cache)
+    frame.launch(soft_shadows.probe_ambient, n, [*inputs, hemisphere, radius_m], [probed])
+    _smooth(frame, lattice, probed, open_sky)
     return open_sky
 
 
-def _smooth(
-    view: records.View,
-    lattice: lattice_kernels.Lattice,
-    values: wp.array,
-    smoothed: wp.array,
-    cache: DeviceCache,
-) -> None:
-    rows, n = values.shape
-    classes = _classify(lattice, values, rows, cache)
-    sums = cache.scratch("row sums", (rows, n), wp.vec2)
-    inputs = [view, lattice, classes, values]
-    wp.launch(soft_shadows.sum_rows, n, inputs, [sums], device=cache.device)
-    wp.launch(soft_shadows.smooth_lattice, n, [*inputs, sums], [smoothed], device=cache.device)
+def _smooth(frame: CameraView, lattice: Lattice, values: wp.array, smoothed: wp.array) -> None:
+    sums = frame.cache.scratch("row sums", values.shape, wp.vec2)
+    inputs = [frame.view, lattice, _classify(frame, lattice, values), values]
+    frame.launch(soft_shadows.sum_rows, values.shape[1], inputs, [sums])
+    frame.launch(soft_shadows.smooth_lattice, values.shape[1], [*inputs, sums], [smoothed])
 
 
-def _classify(
-    lattice: lattice_kernels.Lattice, values: wp.array, rows: int, cache: DeviceCache
-) -> wp.array:
-    shape = (-(-lattice.height // 4), -(-lattice.width // 4), rows)
-    classes = cache.scratch("classes", shape, wp.int32)
-    wp.launch(
-        soft_shadows.classify_blocks, shape, [lattice, values], [classes], device=cache.device
-    )
+def _classify(frame: CameraView, lattice: Lattice, values: wp.array) -> wp.array:
+    shape = (-(-lattice.height // 4), -(-lattice.width // 4), values.shape[0])
+    classes = frame.cache.scratch("classes", shape, wp.int32)
+    frame.launch(soft_shadows.classify_blocks, shape, [lattice, values], [classes])
     return classes

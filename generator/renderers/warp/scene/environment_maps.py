@@ -12,8 +12,11 @@ import warp as wp
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.scene.envmap_peaks import SkyLamp, remove_peaks
-from gen_data.generator.renderers.warp.scene.equirectangular import texel_directions
+from gen_data.generator.renderers.warp.scene.envmap_peaks import (
+    SkyLamp,
+    remove_peaks,
+    texel_directions,
+)
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
     prefilter,
     weigh_texels,

@@ -10,7 +10,7 @@ import warp as wp
 from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.scene import Environment, Light, Scene
 from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.frame_context import CameraView
 from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import count_free_paths
 from gen_data.generator.renderers.warp.scene.envmap_peaks import SkyLamp
 from gen_data.generator.renderers.warp.scene.kernels import records
@@ -26,24 +26,25 @@ _SHARE = 0.1
 _FAR_M = 1e3
 
 
-def extract_sky_lights(world: PackedWorld, scene: Scene, cache: DeviceCache) -> PackedWorld:
+def extract_sky_lights(frame: CameraView) -> PackedWorld:
     """The world with lamps for the brightest parts of its panorama.
 
     Unchanged if the scene has a sun, which its panorama then lacks; if walls block the panorama,
     whose light is then the room's; or if other lamps outshine it.
     """
+    world, scene, cache = frame.world, frame.state.scene, frame.cache
     environment = scene.environment
     if environment.luminance_cd_m2 <= 0.0 or any(light.kind == "sun" for light in scene.lights):
         return world
     points = _viewpoints(scene)
-    if not _is_open(world, points, _directions_around(), cache):
+    if not _is_open(frame, points, _directions_around()):
         return world
     split = cache.split_environment(environment.image)
     if not split.lamps or not _is_significant(split.lamps[0], scene):
         return world
     suns = [_sun(lamp, environment) for lamp in split.lamps]
     towards = np.array([np.negative(sun.direction) for sun in suns])
-    if not _is_open(world, points, towards, cache):
+    if not _is_open(frame, points, towards):
         return world
     lit = copy_world(world)
     lit.record.sky = sky_record(environment, split)
@@ -98,14 +99,10 @@ def _directions_around() -> Array:
     return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), up], axis=-1)
 
 
-def _is_open(world: PackedWorld, points: Array, towards: Array, cache: DeviceCache) -> bool:
+def _is_open(frame: CameraView, points: Array, towards: Array) -> bool:
     """Whether any of the directions is unobstructed at any of the points."""
-    device = cache.device
+    device = frame.cache.device
     free = wp.zeros(1, dtype=wp.int32, device=device)
-    inputs = [
-        world.record,
-        wp.array(points, dtype=wp.vec3, device=device),
-        wp.array(towards * _FAR_M, dtype=wp.vec3, device=device),
-    ]
-    wp.launch(count_free_paths, len(points), inputs, [free], device=device)
+    ends = (wp.array(a, dtype=wp.vec3, device=device) for a in (points, towards * _FAR_M))
+    frame.launch(count_free_paths, len(points), [frame.world.record, *ends], [free])
     return int(free.numpy()[0]) > 0

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.scene import LIGHT_KINDS, PANEL_KINDS
 from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.frame_context import CameraView
 from gen_data.generator.renderers.warp.scene.kernels import analytic_lights, records
-from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
 from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer
 
 _STRIDE_PX = 11
@@ -24,25 +23,22 @@ _DIM_LUX = 0.05
 _TURNED_AWAY = 0.1
 
 
-def keep_main_lamps(
-    world: PackedWorld, view: records.View, gbuffer: GBuffer, cache: DeviceCache, lamps_max: int
-) -> None:
+def keep_main_lamps(frame: CameraView) -> None:
     """Restrict the world to the lamps that contribute most to the visible surfaces, in place."""
-    chosen = main_lamp_numbers(world, view, gbuffer, lamps_max)
+    chosen = main_lamp_numbers(frame)
     if chosen is not None:
-        lamps = world.record.lamps.numpy()[chosen]
-        world.record.lamps = wp.array(lamps, dtype=records.LightRecord, device=cache.device)
+        lamps = frame.world.record.lamps.numpy()[chosen]
+        frame.world.record.lamps = wp.array(
+            lamps, dtype=records.LightRecord, device=frame.cache.device
+        )
 
 
-def main_lamp_numbers(
-    world: PackedWorld, view: records.View, gbuffer: GBuffer, lamps_max: int
-) -> NDArray[np.int64] | None:
+def main_lamp_numbers(frame: CameraView) -> NDArray[np.int64] | None:
     """Numbers of the lamps that ``keep_main_lamps`` keeps, ascending; None = all."""
-    lamps = world.record.lamps.numpy()
+    lamps, lamps_max = frame.world.record.lamps.numpy(), frame.settings.max_lamps
     if len(lamps) <= lamps_max:
         return None
-    points, normals = _sparse_points(view, gbuffer)
-    return main_lamps(lamps, points, normals, lamps_max)
+    return main_lamps(lamps, *_sparse_points(frame.view, frame.gbuffer), lamps_max)
 
 
 def main_lamps(

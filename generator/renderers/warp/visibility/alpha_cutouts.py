@@ -12,7 +12,10 @@ from gen_data.generator.core.boxes import BoxPx
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
-from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M
+from gen_data.generator.renderers.warp.visibility.kernels import rasterizer
+
+CORNERS = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
+"""For each corner of a box, whether it is at the high end of each axis, [8, 3]."""
 
 
 def has_cutouts(body_records: NDArray[np.void]) -> NDArray[np.bool_]:
@@ -28,7 +31,7 @@ def trace_over(
     from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
 
     bodies = _upload_bodies(world, view, seen, hits.device)
-    inputs = [view, world.record, bodies, Z_NEAR_M]
+    inputs = [view, world.record, bodies, rasterizer.Z_NEAR_M]
     wp.launch(
         alpha_cutouts.trace_centres, view.height, inputs, [nearness, hits], device=hits.device
     )
@@ -49,51 +52,51 @@ def trace_over_samples(
     device = hits.device
     bodies = _upload_bodies(world, view, seen, device)
     offsets = wp.array(parts, dtype=wp.vec2, device=device)
-    inputs = [view, world.record, bodies, Z_NEAR_M, pixels, offsets]
+    inputs = [view, world.record, bodies, rasterizer.Z_NEAR_M, pixels, offsets]
     wp.launch(alpha_cutouts.trace_samples, len(pixels), inputs, [nearness, hits], device=device)
 
 
 def trace_outlines(
-    world: PackedWorld, view: records.View, canvases: NDArray[np.void], mask: wp.array
+    world: PackedWorld, view: records.View, outlines: NDArray[np.void], mask: wp.array
 ) -> None:
-    """Draw silhouettes of bodies with cut-outs into the mask pixels of their Canvas records."""
+    """Draw silhouettes of bodies with cut-outs into the mask pixels of their Outline records."""
     from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
 
-    outlines = np.zeros(len(canvases), dtype=alpha_cutouts.Outline.numpy_dtype())
-    for outline, canvas in zip(outlines, canvases, strict=True):
-        whole = canvas["window"]
-        around = BoxPx(
-            int(whole["x0"]),
-            int(whole["y0"]),
-            int(whole["x0"] + whole["width"]),
-            int(whole["y0"] + whole["height"]),
-        )
-        box = _intersect(project_window(world.body_records[canvas["body"]], view), around)
-        outline["body"] = canvas["body"]
-        outline["window"] = _window_fields(box)
-        offset = (box.y_min - around.y_min) * around.width_px + box.x_min - around.x_min
-        outline["first_pixel"] = canvas["first_pixel"] + offset
-        outline["stride"] = around.width_px
+    for outline in outlines:
+        x0, y0, width, height = outline["window"].tolist()
+        around = BoxPx(x0, y0, x0 + width, y0 + height)
+        box = project_window(world.body_records, outline["body"], view).intersection(around)
+        outline["first_pixel"] += (box.y_min - y0) * outline["stride"] + box.x_min - x0
+        outline["window"] = (box.x_min, box.y_min, box.width_px, box.height_px)
     shape = (len(outlines), int(outlines["window"]["height"].max(initial=0)))
-    listed = wp.array(outlines, dtype=alpha_cutouts.Outline, device=mask.device)
-    inputs = [view, world.record, listed, Z_NEAR_M]
+    listed = wp.array(outlines, dtype=rasterizer.Outline, device=mask.device)
+    inputs = [view, world.record, listed, rasterizer.Z_NEAR_M]
     wp.launch(alpha_cutouts.trace_outlines, shape, inputs, [mask], device=mask.device)
 
 
-def project_window(body_records: np.void, view: records.View) -> BoxPx:
-    """Pixels that a body may cover before a pinhole; may lie outside the image."""
-    ends = np.stack([body_records["low_m"], body_records["high_m"]]).astype(np.float64)
-    picks = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
-    corners = ends[picks, np.arange(3)] - np.array(view.eye_m, dtype=np.float64)
+def canvas_box(view: records.View) -> BoxPx:
+    """The canvas of three by three images, in image coordinates."""
+    return BoxPx(-view.width, -view.height, 2 * view.width, 2 * view.height)
+
+
+def box_corners(body_records: NDArray[np.void], view: records.View) -> Array:
+    """Corners of the boxes of bodies [n] in the camera frame, [n, 3, 8]."""
+    ends = np.stack([body_records["low_m"], body_records["high_m"]], axis=1).astype(np.float64)
+    corners = ends[:, CORNERS, np.arange(3)] - np.array(view.eye_m, dtype=np.float64)
     R_world_camera = np.array(view.R_world_camera, dtype=np.float64).reshape(3, 3)
-    x, y, z = np.einsum("ki,ij->jk", corners, R_world_camera, optimize=False)
-    everywhere = BoxPx(-view.width, -view.height, 2 * view.width, 2 * view.height)
-    if z.min() < Z_NEAR_M:
-        return everywhere
+    return np.asarray(np.einsum("nki,ij->njk", corners, R_world_camera, optimize=False))
+
+
+def project_window(body_records: NDArray[np.void], body: int, view: records.View) -> BoxPx:
+    """Pixels that a body may cover before a pinhole; may lie outside the image."""
+    ((x, y, z),) = box_corners(body_records[[body]], view)
+    if z.min() < rasterizer.Z_NEAR_M:
+        return canvas_box(view)
     x_px, y_px = view.fx * x / z + view.cx, view.fy * y / z + view.cy
     low = np.floor([x_px.min(), y_px.min()]) - 1.0
     high = np.ceil([x_px.max(), y_px.max()]) + 1.0
-    return _intersect(BoxPx(int(low[0]), int(low[1]), int(high[0]), int(high[1])), everywhere)
+    box = BoxPx(int(low[0]), int(low[1]), int(high[0]), int(high[1]))
+    return box.intersection(canvas_box(view))
 
 
 def _upload_bodies(
@@ -101,21 +104,10 @@ def _upload_bodies(
 ) -> wp.array:
     from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
 
-    values = np.zeros(len(seen), dtype=alpha_cutouts.CutoutBody.numpy_dtype())
-    for value, number in zip(values, seen.tolist(), strict=True):
-        value["body"] = number
-        value["window"] = _window_fields(project_window(world.body_records[number], view))
+    boxes = [project_window(world.body_records, number, view) for number in seen.tolist()]
+    rows = [
+        (number, (box.x_min, box.y_min, box.width_px, box.height_px))
+        for number, box in zip(seen.tolist(), boxes, strict=True)
+    ]
+    values = np.array(rows, dtype=alpha_cutouts.CutoutBody.numpy_dtype())
     return wp.array(values, dtype=alpha_cutouts.CutoutBody, device=device)
-
-
-def _window_fields(box: BoxPx) -> tuple[int, int, int, int]:
-    return (box.x_min, box.y_min, box.width_px, box.height_px)
-
-
-def _intersect(box: BoxPx, bounds: BoxPx) -> BoxPx:
-    """Intersection of two boxes; empty, at the second's corner, if they are disjoint."""
-    x_min, y_min = max(box.x_min, bounds.x_min), max(box.y_min, bounds.y_min)
-    x_max, y_max = min(box.x_max, bounds.x_max), min(box.y_max, bounds.y_max)
-    if x_min >= x_max or y_min >= y_max:
-        return BoxPx(bounds.x_min, bounds.y_min, bounds.x_min, bounds.y_min)
-    return BoxPx(x_min, y_min, x_max, y_max)

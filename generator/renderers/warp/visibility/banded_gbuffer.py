@@ -15,7 +15,6 @@ from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.renderers.warp.frame_context import (
     CameraState,
     CameraView,
-    RenderContext,
     RowBand,
     render_view,
 )
@@ -69,7 +68,6 @@ def copy_gbuffer(rendered: CameraView) -> BandedGBuffer:
 def render_bands(
     bands: Sequence[RowBand],
     channels: frozenset[Channel],
-    context: RenderContext,
     reference: CameraView,
     light: RadianceFunction | None = None,
 ) -> tuple[BandedGBuffer, dict[Channel, NDArray[Any]]]:
@@ -78,7 +76,6 @@ def render_bands(
     Args:
         bands: Bands in order of rows, covering the image.
         channels: Labels.
-        context: Assets and settings.
         reference: The world at a nearby instant.
         light: Computes the channel RADIANCE; None = not requested.
     """
@@ -91,13 +88,13 @@ def render_bands(
         rows = slice(band.first, band.end)
         first, end = (band.first, band.end) if light is None else add_margin(band, lens.height_px)
         # Neighbouring bands share the most packed data.
-        rendered = reference = render_view(band.state, context, (first, end), reference)
+        rendered = reference = render_view(band.state, reference.context, (first, end), reference)
         own = slice(band.first - first, band.end - first)
         gbuffer, rows_px = rendered.gbuffer, (end - first, lens.width_px)
         hits[rows] = gbuffer.hits.numpy().reshape(*rows_px, 2)[own]
         weights[rows] = gbuffer.weights.numpy().reshape(*rows_px, 2)[own]
         z_m[rows] = gbuffer.z_m.numpy().reshape(rows_px)[own]
-        drawn = label_images(band.state.scene, rendered.world, rendered.view, gbuffer, channels)
+        drawn = label_images(rendered, channels)
         if light is not None:
             drawn[Channel.RADIANCE] = light(rendered)
         for channel, image in drawn.items():

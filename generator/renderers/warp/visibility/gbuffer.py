@@ -12,7 +12,11 @@ from numpy.typing import NDArray
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.scene.kernels import ray_queries, records
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
-from gen_data.generator.renderers.warp.visibility.alpha_cutouts import has_cutouts, trace_over
+from gen_data.generator.renderers.warp.visibility.alpha_cutouts import (
+    box_corners,
+    has_cutouts,
+    trace_over,
+)
 from gen_data.generator.renderers.warp.visibility.kernels import label_resolve, rasterizer
 
 Method = Literal["auto", "raster", "rays"]
@@ -56,6 +60,14 @@ class GBuffer:
     normals: wp.array
     projected: Projected | None
 
+    @property
+    def record(self) -> records.GBufferRecord:
+        """The images as kernels read and write them."""
+        images = records.GBufferRecord()
+        images.hits, images.z_m = self.hits, self.z_m
+        images.weights, images.normals = self.weights, self.normals
+        return images
+
 
 def find_visible(
     world: PackedWorld, view: records.View, cache: DeviceCache, method: Method
@@ -80,15 +92,8 @@ def find_visible(
         wp.launch(ray_queries.trace_pixels, n, inputs, [gbuffer.hits], device=cache.device)
     # One thread per row on the CPU, where threads run one after the other anyway.
     run = view.width if cache.device.is_cpu else 1
-    outputs = [gbuffer.z_m, gbuffer.weights, gbuffer.normals]
-    inputs = [view, world.record, run, gbuffer.hits]
-    wp.launch(
-        label_resolve.resolve,
-        (view.height, view.width // run),
-        inputs,
-        outputs,
-        device=cache.device,
-    )
+    inputs, shape = [view, world.record, run, gbuffer.record], (view.height, view.width // run)
+    wp.launch(label_resolve.resolve, shape, inputs, device=cache.device)
     return gbuffer
 
 
@@ -122,11 +127,7 @@ def bodies_within(
         view: The camera.
         margin: How far the frustum extends beyond each side of the image, in images.
     """
-    ends = np.stack([body_records["low_m"], body_records["high_m"]], axis=1).astype(np.float64)
-    picks = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
-    corners = ends[:, picks, np.arange(3)] - np.array(view.eye_m, dtype=np.float64)
-    R_world_camera = np.array(view.R_world_camera, dtype=np.float64).reshape(3, 3)
-    x, y, z = np.moveaxis(np.einsum("nki,ij->nkj", corners, R_world_camera, optimize=False), -1, 0)
+    x, y, z = np.moveaxis(box_corners(body_records, view), 1, 0)
     # One more pixel absorbs all rounding.
     beyond_x, beyond_y = margin * view.width + 1.0, margin * view.height + 1.0
     outside = [

@@ -17,7 +17,6 @@ from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.renderers.warp.frame_context import (
     CameraState,
     CameraView,
-    RenderContext,
     RowBand,
     render_view,
 )
@@ -48,7 +47,6 @@ def flow_images(
     reference: CameraView,
     gbuffer: BandedGBuffer,
     channels: frozenset[Channel],
-    context: RenderContext,
 ) -> dict[Channel, NDArray[Any]]:
     """All requested flow channels, as documented at Channel.
 
@@ -56,7 +54,6 @@ def flow_images(
         reference: The world at the image's instant.
         gbuffer: G-buffer of the image, each row at its own instant.
         channels: Requested channels of any kind.
-        context: Assets and settings.
     """
     images: dict[Channel, NDArray[Any]] = {}
     if not channels & FLOW:
@@ -67,13 +64,13 @@ def flow_images(
     points = gather_points(gbuffer, carriers)
     if channels & FORWARD:
         images |= _flow_channels(
-            points, gbuffer, middle.later(step_s), channels & FORWARD, reference, context
+            points, gbuffer, middle.later(step_s), channels & FORWARD, reference
         )
     if channels & BACKWARD and middle.scene.time_s < step_s - 1e-9:
         images |= _undefined_flow(points.carriers.shape, channels)
     elif channels & BACKWARD:
         images |= _flow_channels(
-            points, gbuffer, middle.later(-step_s), channels & BACKWARD, reference, context
+            points, gbuffer, middle.later(-step_s), channels & BACKWARD, reference
         )
     return images
 
@@ -84,16 +81,15 @@ def _flow_channels(
     then: CameraState,
     channels: frozenset[Channel],
     reference: CameraView,
-    context: RenderContext,
 ) -> dict[Channel, NDArray[Any]]:
     """Channels of one direction."""
     images: dict[Channel, NDArray[Any]] = {}
     carriers = find_carriers(then.scene)
     bands: Sequence[RowBand] = (full_band(then),)
     if then.camera.shutter.rolls:
-        reference = render_view(then, context, None, reference)
+        reference = render_view(then, reference.context, None, reference)
         bands = split_bands(reference)
-    points = deform_points(points, gbuffer, then.scene, context.cache.assets)
+    points = deform_points(points, gbuffer, then.scene, reference.cache.assets)
     found = reproject(points, bands, carriers)
     for channel in sorted(channels, key=lambda c: c.value):
         if channel in (Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD):
@@ -104,7 +100,7 @@ def _flow_channels(
             seen = frozenset({Channel.RANGE, Channel.NORMALS})
             # Bands four times as high allow one pixel of motion: as accurate as the occlusion test.
             starts = [band.first for band in bands[::4]]
-            _, other = render_bands(make_bands(then, starts), seen, context, reference)
+            _, other = render_bands(make_bands(then, starts), seen, reference)
             images[channel] = find_occluded(points, found, other, gbuffer.intrinsics)
     return images
 

@@ -21,9 +21,8 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     cell_corner,
     ray_origin,
 )
-from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import GBufferRecord
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
-from gen_data.generator.renderers.warp.scene.kernels.dielectrics import WATER_F0, fresnel_schlick
+from gen_data.generator.renderers.warp.scene.kernels.brdf import WATER_F0, fresnel_schlick
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
     sky_irradiance,
     sky_rest,
@@ -34,11 +33,12 @@ from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
 )
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     HOLES,
+    GBufferRecord,
     View,
     World,
     fast_normalize,
     flat_normal,
-    pixel_direction,
+    pixel_ray,
     surface_index,
 )
 from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import make_sampler, texel_at
@@ -363,10 +363,7 @@ def mirror_in_puddles(
         return
     around = around_pixel(view, world, images, lattice, water, films, i)
     wet = around.water
-    way = view.R_world_camera @ pixel_direction(
-        view, float(i % view.width) + 0.5, float(i / view.width) + 0.5
-    )
-    way = way * images.z_m[i]
+    way = pixel_ray(view, i) * images.z_m[i]
     p = view.eye_m + way
     if around.found > 0.0:
         wet = wet * (1.0 / around.found)

@@ -18,21 +18,21 @@ from gen_data.generator.renderers.warp.lidar.kernels.ray_packets import (
     extend_bundle,
     is_box_entered,
     list_bodies,
-    reciprocals,
 )
 from gen_data.generator.renderers.warp.scene.kernels.alpha_test import closest_solid_hit
-from gen_data.generator.renderers.warp.scene.kernels.dielectrics import WATER_F0, fresnel_schlick
-from gen_data.generator.renderers.warp.scene.kernels.ray_offsets import (
+from gen_data.generator.renderers.warp.scene.kernels.brdf import WATER_F0, fresnel_schlick
+from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
     LASER_OFFSET_M,
     SHELTER_OFFSET_M,
+    precipitation_exposure,
 )
-from gen_data.generator.renderers.warp.scene.kernels.ray_queries import precipitation_exposure
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     HOLES,
     World,
     face_vertices,
     fast_normalize,
     normal_at,
+    reciprocals,
     surface_index,
 )
 

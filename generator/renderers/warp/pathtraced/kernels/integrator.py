@@ -57,11 +57,11 @@ from gen_data.generator.renderers.warp.realtime.kernels.clearcoat_glass import m
 from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import make_frame
 from gen_data.generator.renderers.warp.scene.kernels.alpha_test import OUT_OF_LINE
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import is_panel
-from gen_data.generator.renderers.warp.scene.kernels.brdf import directional_albedo
-from gen_data.generator.renderers.warp.scene.kernels.colorimetry import luminance
-from gen_data.generator.renderers.warp.scene.kernels.dielectrics import (
+from gen_data.generator.renderers.warp.scene.kernels.brdf import (
     WATER_F0,
+    directional_albedo,
     fresnel_dielectric,
+    luminance,
     pane_reflectance,
     pane_transmittance,
 )
@@ -69,11 +69,11 @@ from gen_data.generator.renderers.warp.scene.kernels.material_eval import (
     SurfaceMaterial,
     evaluate_material,
 )
-from gen_data.generator.renderers.warp.scene.kernels.ray_offsets import offset_origin
 from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
     RayHit,
     closest_hit,
     is_intersected,
+    offset_origin,
     path_along,
     precipitation_exposure,
 )

@@ -22,7 +22,6 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     step_at,
 )
 from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import (
-    GBufferRecord,
     LatticeLight,
     is_gatherable,
 )
@@ -30,6 +29,7 @@ from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import surf
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_image
 from gen_data.generator.renderers.warp.scene.kernels.material_eval import evaluate_material
 from gen_data.generator.renderers.warp.scene.kernels.records import (
+    GBufferRecord,
     View,
     World,
     fast_normalize,
@@ -37,10 +37,11 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     pixel_width,
     surface_index,
 )
-from gen_data.generator.renderers.warp.scene.kernels.texture_patches import Patch, patch_at
 from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import (
+    Patch,
     Sampler,
     make_sampler,
+    patch_at,
     texel_at,
 )
 

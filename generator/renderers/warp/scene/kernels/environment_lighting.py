@@ -60,6 +60,14 @@ def sample_panorama(image: wp.array2d[wp.vec3], direction: wp.vec3):
     x = (0.5 - wp.atan2(d[1], d[0]) * (0.5 / wp.pi)) * float(width) - 0.5
     # Clamped: rounding may leave a unit vector's z at 1 + 1e-7, whose arc cosine is NaN.
     y = wp.acos(wp.clamp(d[2], -1.0, 1.0)) / wp.pi * float(height) - 0.5
+    return blend_texels(image, x, y)
+
+
+@wp.func
+def blend_texels(image: wp.array2d[wp.vec3], x: float, y: float):
+    """An equirectangular image at a position in texels from the centre of the first, bilinear."""
+    height = image.shape[0]
+    width = image.shape[1]
     x0 = floor_int(x)
     y0 = floor_int(y)
     fx = x - float(x0)

@@ -228,6 +228,16 @@ class EnvironmentRecord:
 
 
 @wp.struct
+class GBufferRecord:
+    """G-buffer at every pixel centre, flat; fields as in gbuffer.GBuffer."""
+
+    hits: wp.array[wp.vec2i]
+    z_m: wp.array[float]
+    weights: wp.array[wp.vec2]
+    normals: wp.array[wp.vec3]
+
+
+@wp.struct
 class GroundRecord:
     """Wetness and snow on surfaces.
 
@@ -260,6 +270,14 @@ def pixel_direction(view: View, x_px: float, y_px: float):
     if view.lens != PINHOLE:
         d = distorted_direction(view, x_px, y_px)
     return d
+
+
+@wp.func
+def pixel_ray(view: View, i: int):
+    """Direction in the world through the centre of pixel i, as long as by ``pixel_direction``."""
+    x = float(i % view.width) + 0.5
+    y = float(i / view.width) + 0.5
+    return view.R_world_camera @ pixel_direction(view, x, y)
 
 
 @wp.func
@@ -343,6 +361,31 @@ def componentwise_min(a: wp.vec3, b: wp.vec3):
 def componentwise_max(a: wp.vec3, b: wp.vec3):
     """Componentwise maximum."""
     return wp.vec3(max_of_two(a[0], b[0]), max_of_two(a[1], b[1]), max_of_two(a[2], b[2]))
+
+
+@wp.func
+def reciprocals(way: wp.vec3):
+    """Componentwise reciprocals; zeros become tiny numbers, whose sign does not matter."""
+    # 0 / 0 would be NaN for a ray in a box's face; a large number is as good as infinity.
+    x = wp.where(wp.abs(way[0]) < 1.0e-20, 1.0e-20, way[0])
+    y = wp.where(wp.abs(way[1]) < 1.0e-20, 1.0e-20, way[1])
+    z = wp.where(wp.abs(way[2]) < 1.0e-20, 1.0e-20, way[2])
+    return wp.vec3(1.0 / x, 1.0 / y, 1.0 / z)
+
+
+@wp.func
+def slab_interval(low: wp.vec3, high: wp.vec3, inverse: wp.vec3):
+    """Parameters at which a ray enters and leaves a box; it misses if it would leave first.
+
+    Args:
+        low, high: Corners relative to the ray's origin.
+        inverse: ``reciprocals`` of its direction.
+    """
+    a = wp.cw_mul(low, inverse)
+    c = wp.cw_mul(high, inverse)
+    enter = max_of_two(min_of_two(a[0], c[0]), min_of_two(a[1], c[1]))
+    leave = min_of_two(max_of_two(a[0], c[0]), max_of_two(a[1], c[1]))
+    return max_of_two(enter, min_of_two(a[2], c[2])), min_of_two(leave, max_of_two(a[2], c[2]))
 
 
 @wp.func

@@ -16,7 +16,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     to_mesh_point,
     to_mesh_vector,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Window
+from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Outline, Window
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -117,22 +117,6 @@ def trace_samples(
                 if near > nearness[row, s]:
                     nearness[row, s] = near
                     hits[row, s] = wp.vec2i(b, face)
-
-
-@wp.struct
-class Outline:
-    """Where the silhouette of a body is written.
-
-    Attributes:
-        window: The pixels that the body may cover; may lie outside the image.
-        first_pixel: Index in the buffer of the window's first pixel.
-        stride: Pixels between rows of the buffer.
-    """
-
-    body: int
-    window: Window
-    first_pixel: int
-    stride: int
 
 
 @wp.kernel

@@ -14,26 +14,9 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     to_mesh_point,
     to_mesh_vector,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Window
+from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Outline
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
-
-
-@wp.struct
-class AmodalWindow:
-    """The part of the canvas in which one body may be visible.
-
-    Attributes:
-        body: Number of the body.
-        window: The pixels, in image coordinates.
-        first_pixel: Index of its first pixel in the buffer.
-        stride: Pixels between rows of the buffer.
-    """
-
-    body: int
-    window: Window
-    first_pixel: int
-    stride: int
 
 
 @wp.func
@@ -72,7 +55,7 @@ def trace_silhouettes(
     nodes: wp.array2d[wp.vec4],
     stride: int,
     t_min: float,
-    windows: wp.array[AmodalWindow],
+    windows: wp.array[Outline],
     mask: wp.array[wp.uint8],
 ):
     """Write 1 at every pixel whose ray meets a body; one row of one window per thread."""

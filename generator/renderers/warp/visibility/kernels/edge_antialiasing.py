@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import GBufferRecord
 from gen_data.generator.renderers.warp.scene.kernels.alpha_test import closest_solid_hit, is_hole
 from gen_data.generator.renderers.warp.scene.kernels.ray_queries import FARTHEST
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     HOLES,
+    GBufferRecord,
     View,
     World,
     flat_normal,

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import GBufferRecord
-from gen_data.generator.renderers.warp.scene.kernels.records import View
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    GBufferRecord,
+    View,
+)
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 

@@ -6,6 +6,7 @@ import warp as wp
 
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     PINHOLE,
+    GBufferRecord,
     View,
     World,
     face_vertices,
@@ -92,10 +93,7 @@ def resolve(
     view: View,
     world: World,
     run: int,
-    hits: wp.array[wp.vec2i],
-    z_m: wp.array[float],
-    weights: wp.array[wp.vec2],
-    normals: wp.array[wp.vec3],
+    images: GBufferRecord,
 ):
     """Depth (inf for nothing), barycentric weights and smooth world normal of every pixel.
 
@@ -103,17 +101,18 @@ def resolve(
 
     Args:
         run: Pixels in a row per thread: neighbours on one triangle share its preparation.
-        z_m: Parameters of the pixels' rays: z-depths for a pinhole, else ranges.
+        images: With ``hits`` filled in. ``z_m`` are parameters of the pixels' rays: z-depths for a
+            pinhole, else ranges.
     """
     y, segment = wp.tid()
     x = segment * run
     end = wp.min(x + run, view.width)
     row = y * view.width
     while x < end:
-        hit = hits[row + x]
+        hit = images.hits[row + x]
         if hit[0] < 0:
-            z_m[row + x] = wp.inf
-            normals[row + x] = wp.vec3(0.0)
+            images.z_m[row + x] = wp.inf
+            images.normals[row + x] = wp.vec3(0.0)
             x += 1
         else:
             facet = make_facet(world, hit)
@@ -135,13 +134,13 @@ def resolve(
                         z = distance_to(world, hit, wp.vec2(u, v))
                 n = facet.n + facet.n_u * u + facet.n_v * v
                 side = wp.where(det < 0.0, -1.0, 1.0)
-                z_m[row + x] = z
-                weights[row + x] = wp.vec2(u + 1.0 - side, v)
-                normals[row + x] = face_viewer(n * side, view.R_world_camera @ d)
+                images.z_m[row + x] = z
+                images.weights[row + x] = wp.vec2(u + 1.0 - side, v)
+                images.normals[row + x] = face_viewer(n * side, view.R_world_camera @ d)
                 x += 1
                 same = False
                 if x < end:
-                    same = hits[row + x][0] == hit[0] and hits[row + x][1] == hit[1]
+                    same = images.hits[row + x][0] == hit[0] and images.hits[row + x][1] == hit[1]
 
 
 @wp.kernel

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import GBufferRecord
 from gen_data.generator.renderers.warp.scene.kernels.records import (
+    GBufferRecord,
     View,
     World,
-    face_vertices,
+    flat_normal,
     min_of_two,
-    vertex_at,
 )
 from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import (
     most_similar_normal,
@@ -298,14 +297,8 @@ def color_source(view: View, world: World, images: GBufferRecord, x: int, y: int
                 if source < 0:
                     source = j
     if not same_face and others > 1:
-        b = hit[0]
-        corner = face_vertices(world, world.bodies[b].geometry, hit[1])
-        p = vertex_at(world, world.bodies[b].geometry, corner[0])
-        e1 = vertex_at(world, world.bodies[b].geometry, corner[1]) - p
-        e2 = vertex_at(world, world.bodies[b].geometry, corner[2]) - p
-        n = world.bodies[b].R_world_mesh @ wp.normalize(wp.cross(e1, e2))
         # Several faces of the body are near, none of them the sample's: choose by orientation.
-        source = most_similar_normal(view, images, x, y, source, n)
+        source = most_similar_normal(view, images, x, y, source, flat_normal(world, hit))
     return source
 
 

@@ -37,6 +37,22 @@ class Window:
 
 
 @wp.struct
+class Outline:
+    """Where the silhouette of a body is written.
+
+    Attributes:
+        window: The pixels that the body may cover; may lie outside the image.
+        first_pixel: Index in the buffer of the window's first pixel.
+        stride: Pixels between rows of the buffer.
+    """
+
+    body: int
+    window: Window
+    first_pixel: int
+    stride: int
+
+
+@wp.struct
 class Edge:
     """Edge function: value at a first pixel, and steps per pixel; inside is >= 0."""
 
