@@ -44,14 +44,9 @@ class Grid:
 
 
 def heights_m(grid: Grid, triangles_m: Array) -> Float32:
-    """Height above the grid's origin of the highest triangle at every cell; -inf = none.
+    """Height of the highest of triangles [n, 3, 3] (world) at every cell above the grid's origin.
 
-    Args:
-        grid: The grid.
-        triangles_m: Corners in the world, [n, 3, 3].
-
-    Returns:
-        float32 [count, count].
+    float32 [count, count]; -inf = none.
     """
     high = np.full((grid.count, grid.count), -np.inf, np.float32)
     corners = _near(grid, triangles_m)

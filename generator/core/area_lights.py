@@ -39,12 +39,8 @@ def fixture_asset(light: Light) -> str:
 def add_fixture(scene: Scene, light: Light, materials: Sequence[Material]) -> tuple[Scene, Light]:
     """Add the fixture of a panel to a scene; return the scene and the panel attached to it.
 
-    The fixture is background: it has no instance and does not collide.
-
-    Args:
-        scene: Without the fixture.
-        light: Of kind rectangle or disk.
-        materials: Of ``fixture_asset(light)``; slots with the role ``lamp`` become emissive.
+    The fixture is background: it has no instance and does not collide. ``materials`` are those of
+    ``fixture_asset(light)``; slots with the role ``lamp`` become emissive.
     """
     z = -np.asarray(light.direction, dtype=np.float64)
     x = np.asarray(light.side if light.kind == "rectangle" else level_side(light.direction))

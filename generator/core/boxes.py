@@ -104,16 +104,10 @@ _SLACK_M = 1e-12
 
 
 def rectangles_overlap(a: Array, half_a_m: Array, b: Array, half_b_m: Array) -> NDArray[np.bool_]:
-    """Whether rectangles have inner points in common, pair by pair.
+    """Whether rectangles have inner points in common, pair by pair; arrays are broadcast.
 
-    Args:
-        a: Centre [m] and direction of the first half extent: x, y, cosine, sine; shape [..., 4].
-        half_a_m: Half extents, shape [..., 2].
-        b: The other rectangles, as ``a``.
-        half_b_m: As ``half_a_m``.
-
-    Returns:
-        Shape [...], after broadcasting.
+    ``a`` and ``b`` are their centres [m] and the directions of their first half extents: x, y,
+    cosine, sine; shape [..., 4]. Half extents have the shape [..., 2].
     """
     dx, dy = b[..., 0] - a[..., 0], b[..., 1] - a[..., 1]
     cos_a, sin_a, cos_b, sin_b = a[..., 2], a[..., 3], b[..., 2], b[..., 3]

@@ -15,10 +15,6 @@ def flux_to_intensity_cd(light: Light, flux_lm: float) -> float:
     into its cone: uniformly up to ``even`` of its half angle, then fading to 0 by a smooth step
     that is symmetric in the cosine, so that half of the solid angle in between counts.
 
-    Args:
-        light: Of any kind but sun.
-        flux_lm: Total luminous flux.
-
     Raises:
         ValueError: a sun has no flux.
     """
@@ -35,13 +31,9 @@ def flux_to_intensity_cd(light: Light, flux_lm: float) -> float:
 
 
 def illuminance_to_intensity_cd(light: Light, lux: float, distance_m: float) -> float:
-    """Luminous intensity [cd] that causes an illuminance on the light's axis.
+    """Luminous intensity [cd] that causes an illuminance at a distance on the light's axis.
 
-    Args:
-        light: Of any kind but sun.
-        lux: Illuminance of a surface that faces the light's centre.
-        distance_m: From the centre; panels face the surface.
-
+    The surface faces the light's centre, from which the distance counts; panels face the surface.
     Sources: the inverse square law; for panels, Howell, "A catalog of radiation heat transfer
     configuration factors", 1982 (a disk and a rectangle before a parallel element).
     """

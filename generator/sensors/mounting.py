@@ -121,10 +121,7 @@ def check_rig(scene: Scene, sensor: str, rig: str) -> str:
 def add_lidar(scene: Scene, sensor: Mounted, lidar: Lidar) -> Scene:
     """Add a scanner on its sensor's rig, or at its camera if the sensor has no rig.
 
-    Args:
-        scene: With all sensors that are listed before this one.
-        sensor: The sensor's mounting.
-        lidar: Names the camera to mount it at if there is no rig.
+    The scene has all sensors that are listed before this one.
 
     Raises:
         ConfigError: the scene has no such rig or camera.
@@ -152,14 +149,9 @@ def find_camera(scene: Scene, sensor: str, camera: str) -> Camera:
 
 
 def check_not_buried(scene: Scene, name: str, assets: AssetIndex) -> None:
-    """Refuse a sensor on a rig inside the body that carries the rig, which would occlude it.
+    """Refuse a mounted sensor on a rig inside the body that carries it, which would occlude it.
 
     Inside means in the body's bounding box, more than ``BURIED_M`` from its faces.
-
-    Args:
-        scene: With the sensor mounted.
-        name: Of the sensor.
-        assets: Source of the body's bounds.
 
     Raises:
         ConfigError: the sensor is inside.

@@ -116,13 +116,9 @@ def render_view(
     rows: tuple[int, int] | None = None,
     reference: CameraView | None = None,
 ) -> CameraView:
-    """Find the surfaces at all pixel centres, or at those of some rows.
+    """Find the surfaces at all pixel centres, or at those of some rows (the end is exclusive).
 
-    Args:
-        state: World and camera.
-        context: Assets and settings.
-        rows: First row and end row (exclusive); None = all.
-        reference: The same world at another instant, whose assets need not be packed again.
+    ``reference`` is the same world at another instant, whose assets need not be packed again.
     """
     world = pack_state(state, context, reference)
     view = pack_view(state.camera, context.cache)

@@ -117,13 +117,10 @@ def _render_images(
 def split_slices(
     middle: CameraState, samples: int, blurred: NDArray[np.bool_] | None = None
 ) -> list[Slice]:
-    """Time slices that together cover every row's exposure once.
+    """Time slices that together cover every row's exposure once, some per exposure.
 
-    Args:
-        middle: State at the middle of the image's exposure.
-        samples: Slices per exposure.
-        blurred: Rows with motion blur; the others are rendered in the slice nearest to their own
-            instant. None = all.
+    ``middle`` is the state at the middle of the image's exposure. Rows that are not ``blurred`` are
+    rendered in the slice nearest to their own instant; None = all are.
     """
     shutter, height = middle.camera.shutter, middle.camera.intrinsics.height_px
     step_s = shutter.exposure_s / samples

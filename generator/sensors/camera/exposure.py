@@ -69,10 +69,8 @@ def saturation_cd_m2(ev100: float) -> float:
 def meter_ev100(radiance: Float32) -> float:
     """The exposure value that puts the centre-weighted log-average luminance at middle grey.
 
-    Source: Reinhard et al., "Photographic tone reproduction for digital images", 2002.
-
-    Args:
-        radiance: Linear RGB [cd/m^2], shape [h, w, 3].
+    Source: Reinhard et al., "Photographic tone reproduction for digital images", 2002. Radiance is
+    linear RGB [cd/m^2], shape [h, w, 3].
     """
     sparse = radiance[::_METERED_EVERY, ::_METERED_EVERY].astype(np.float64)
     levels = luminance(sparse)

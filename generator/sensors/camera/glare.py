@@ -42,13 +42,8 @@ def bilinear(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], Float32]:
     """Indices and weights of bilinear interpolation in a coarser image, along one axis.
 
-    Args:
-        size: Number of pixels.
-        factor: Pixels per coarse pixel.
-        coarse: Number of coarse pixels.
-
-    Returns:
-        Index of the coarse pixel before, of the one after, and weight of the latter; [size] each.
+    For ``size`` pixels, ``factor`` per pixel of the ``coarse`` ones: index of the coarse pixel
+    before, of the one after, and weight of the latter; [size] each.
     """
     place = np.clip((np.arange(size) + 0.5) / factor - 0.5, 0.0, coarse - 1.0)
     first = np.minimum(place.astype(np.int64), max(coarse - 2, 0))
@@ -64,14 +59,10 @@ _ROWS_AT_ONCE = 32
 
 
 def add_glare(image: Float32, share: float) -> Float32:
-    """Scatter a share of an image's light; the total is preserved.
+    """Scatter a share of a linear image's light, float32 [h, w, 3]; the total is preserved.
 
-    Source of the sum of blurs: Spencer et al., "Physically-based glare effects for digital images",
-    SIGGRAPH 1995.
-
-    Args:
-        image: Linear, float32 [h, w, 3].
-        share: Of the light; 0.02 suits a clean lens, 0.1 a dirty one.
+    A share of 0.02 suits a clean lens, 0.1 a dirty one. Source of the sum of blurs: Spencer et al.,
+    "Physically-based glare effects for digital images", SIGGRAPH 1995.
     """
     height, width = image.shape[:2]
     coarse = scatter(image) * np.float32(share / len(_LEVELS))

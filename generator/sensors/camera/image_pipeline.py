@@ -221,13 +221,7 @@ def develop(
 ) -> Photograph:
     """Develop a photograph: meter the exposure, then apply all of ``STAGES`` in order.
 
-    Args:
-        radiance: Linear Rec. 709 colours [cd/m^2], float32 [h, w, 3].
-        depth_m: As in ``Shot``; needed only by a pipeline with a focus.
-        camera: Lens, and exposure value if that is fixed.
-        weather: Source of drops on the lens.
-        pipeline: The camera's configuration.
-        rng: Draws parameters and noise.
+    Arguments are as in ``Shot``; the depth is needed only by a pipeline with a focus.
     """
     ev100 = meter_ev100(radiance) if camera.ev100 is None else camera.ev100
     wanted = ev100 - pipeline.exposure_compensation_ev.draw(rng)

@@ -20,13 +20,9 @@ _DEPTH = 65_535.0
 
 
 def demosaic(raw: Float32, pattern: Pattern, method: Demosaic, white: float) -> Float32:
-    """Interpolate three colours at every pixel, float32 [h, w, 3].
+    """Interpolate three colours at every pixel of linear values [h, w]: float32 [h, w, 3].
 
-    Args:
-        raw: Linear values [h, w].
-        pattern: Colour filter array.
-        method: Of interpolation.
-        white: Larger values are clipped.
+    Values above ``white`` are clipped.
     """
     if pattern == "mono":
         return np.asarray(np.repeat(raw[..., None], 3, axis=-1), np.float32)
@@ -39,11 +35,8 @@ def demosaic(raw: Float32, pattern: Pattern, method: Demosaic, white: float) -> 
 def grey_world_gains(image: Float32) -> Float32:
     """Factors on red, green and blue that make the mean of an image grey, float32 [3].
 
-    Clipped pixels are left out; 1 if hardly any other is left. Source: Buchsbaum, "A spatial
+    Clipped pixels, at 1, are left out; 1 if hardly any other is left. Source: Buchsbaum, "A spatial
     processor model for object colour perception", 1980.
-
-    Args:
-        image: Linear; 1 saturates.
     """
     seen = image.reshape(-1, 3)[::7]
     seen = seen[(seen.max(axis=1) < 0.95) & (seen.min(axis=1) > 0.0)]
@@ -54,12 +47,10 @@ def grey_world_gains(image: Float32) -> Float32:
 
 
 def white_balance_gains(image: Float32, share: float, warmth_ev: float) -> Float32:
-    """Factors on red, green and blue relative to green, float32 [3].
+    """Factors on red, green and blue relative to green, float32 [3]; 1 saturates the image.
 
-    Args:
-        image: Linear; 1 saturates.
-        share: Share of the illuminant's colour to correct, by the grey-world assumption.
-        warmth_ev: Error: red over blue, in stops.
+    ``share`` of the illuminant's colour is corrected by the grey-world assumption; the error
+    ``warmth_ev`` is red over blue, in stops.
     """
     gains = np.ones(3, np.float32)
     if share > 0.0:
@@ -82,12 +73,7 @@ def sharpen(display: Float32, amount: float, radius_px: float) -> Float32:
 
 
 def compress_jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
-    """Encode and decode an image as JPEG, uint8 [h, w, 3].
-
-    Args:
-        image: sRGB, uint8 [h, w, 3].
-        quality: Quality of libjpeg, 1 to 100.
-    """
+    """Encode and decode an sRGB image as JPEG, uint8 [h, w, 3]; libjpeg's quality, 1 to 100."""
     ok, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
     assert ok, "the JPEG encoder takes any RGB image"
     decoded = cv2.imdecode(data, cv2.IMREAD_COLOR)

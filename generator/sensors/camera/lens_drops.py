@@ -39,12 +39,7 @@ def lens_drops(weather: Weather, camera: Camera) -> Array:
 
 
 def refract_in_drops(image: Float32, drops: Array) -> Float32:
-    """Draw drops over an image in order, float32 [h, w, 3].
-
-    Args:
-        image: Linear, without drops.
-        drops: As returned by ``lens_drops``.
-    """
+    """Draw drops over a linear image in order, float32 [h, w, 3]; drops as of ``lens_drops``."""
     height, width = image.shape[:2]
     small = blur(halve(image, _HALVINGS))
     out: Float32 = image.copy()

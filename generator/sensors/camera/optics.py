@@ -56,10 +56,8 @@ def defocus(image: Float32, radius_px: Float32) -> Float32:
 def apply_vignetting(image: Float32, corner_loss: float) -> Float32:
     """Darken an image towards its corners by mechanical vignetting.
 
-    Args:
-        image: Linear image.
-        corner_loss: Share of light lost at the corners; the loss grows with the square of the
-            distance (Goldman, "Vignette and exposure calibration and compensation", 2010).
+    The loss grows with the square of the distance (Goldman, "Vignette and exposure calibration and
+    compensation", 2010) to a share of ``corner_loss`` at the corners.
     """
     height, width = image.shape[:2]
     x = np.arange(width, dtype=np.float32) + np.float32(0.5 - 0.5 * width)
@@ -152,10 +150,7 @@ _GHOSTS = (
 def add_flare(image: Float32, share: float, white: float) -> Float32:
     """Add ghosts of light far beyond white, on a line through the centre of the image.
 
-    Args:
-        image: Linear, float32 [h, w, 3].
-        share: Share of the light beyond white that returns as ghosts.
-        white: The value that saturates the sensor.
+    ``share`` of the light beyond ``white``, which saturates the sensor, returns as ghosts.
     """
     beyond = np.maximum(image - 4.0 * white, 0.0)
     if not beyond.any():

@@ -68,10 +68,7 @@ def log(value: NDArray[Real], white: float) -> NDArray[Real]:
 def display_values(value: NDArray[Real], tone: Tone, white: float = 1.0) -> NDArray[Real]:
     """Display values [0, 1] of linear ones, of the same shape and type.
 
-    Args:
-        value: Linear; 1 saturates for all curves but ``log``.
-        tone: Curve.
-        white: The value that ``log`` maps to 1.
+    1 saturates for all curves but ``log``, which maps ``white`` to 1.
     """
     value = np.maximum(value, 0.0)
     if tone == "filmic":
@@ -92,16 +89,10 @@ def to_bytes(display: NDArray[np.floating]) -> NDArray[np.uint8]:
 def tone_to_bytes(
     image: Float32, scale: float, tone: Tone, white: float = 1.0
 ) -> NDArray[np.uint8]:
-    """Bytes of linear values, uint8 of the same shape, by a lookup table.
+    """Bytes of linear values times ``scale``, uint8 of the same shape [h, w, 3], by a lookup table.
 
     Equals ``to_bytes(display_values(...))`` of values rounded to ten bits of mantissa: an error of
     at most a tenth of a byte before rounding.
-
-    Args:
-        image: float32 [h, w, 3].
-        scale: Factor on the image, after which 1 saturates.
-        tone: Curve.
-        white: As in ``display_values``.
     """
     table, factor = _byte_table(tone, white), np.float32(scale)
     out = np.zeros(image.shape, np.uint8)

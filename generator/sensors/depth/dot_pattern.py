@@ -28,9 +28,7 @@ class Dots(Strict):
     def at(self, x: Float32, y: Float32) -> Float32:
         """Intensity of the pattern over its mean, float32 of the shape of ``x``.
 
-        Args:
-            x: Tangents of directions from the projector, to the right.
-            y: Tangents downwards.
+        ``x`` and ``y`` are tangents of directions from the projector, to the right and downwards.
         """
         pitch, sigma = 1e-3 * self.pitch_mrad, 1e-3 * self.dot_mrad
         u, v = x / np.float32(pitch), y / np.float32(pitch)

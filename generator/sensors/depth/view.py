@@ -66,11 +66,9 @@ class View:
         return replace(self.camera, T_world_camera=pose)
 
     def trace(self, right_m: float = 0.0, subrays: int = 1) -> Hits:
-        """Trace the rays through all pixels.
+        """Trace the rays through all pixels, one each or 7 spread over a pixel's footprint.
 
-        Args:
-            right_m: Position of eye and light source, to the right of the camera.
-            subrays: 1, or 7 spread over a pixel's footprint.
+        Eye and light source are ``right_m`` to the right of the camera.
         """
         lens = self.camera.intrinsics
         shape = (lens.height_px, lens.width_px)

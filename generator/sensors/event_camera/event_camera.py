@@ -89,11 +89,9 @@ class Events:
 def stable_order(
     numbers: NDArray[np.int64], before: NDArray[np.intp] | None = None
 ) -> NDArray[np.intp]:
-    """Indices that sort integers stably: a radix sort by 16 bits, linear in their count.
+    """Indices that sort integers [n] stably: a radix sort by 16 bits, linear in their count.
 
-    Args:
-        numbers: Of any sign, [n].
-        before: An order to refine, which ties keep; None = the given order.
+    Ties keep the order ``before``; None = the given order.
     """
     order = np.arange(len(numbers)) if before is None else before
     if len(numbers) == 0:
@@ -114,11 +112,8 @@ def log_response(luminance: Array) -> Array:
 def signal_events(levels: list[Array], times_s: Array) -> Events:
     """Events between frames: one per crossed level, at its linearly interpolated time.
 
-    They are grouped by frame and not sorted by time.
-
-    Args:
-        levels: ``Pixels.levels`` of at least two frames.
-        times_s: Instants of the frames.
+    They are grouped by frame and not sorted by time. ``levels`` are ``Pixels.levels`` of at least
+    two frames, ``times_s`` their instants.
     """
     flat = [level.ravel() for level in levels]
     # The last level reported is the nearest one behind, seen in the direction of the first change.

@@ -175,10 +175,7 @@ def lane_border_pieces(scene: Scene) -> Array:
 def is_crossed(pieces: Array, T_world_box: SE3, half_m: tuple[float, float, float]) -> Array:
     """Whether a line lies under the left and the right half of a footprint, bool [2].
 
-    Args:
-        pieces: As returned by ``lane_border_pieces``.
-        T_world_box: Pose of the box.
-        half_m: Half extents of the box.
+    ``pieces`` are as returned by ``lane_border_pieces``; the box has half extents ``half_m``.
     """
     forward = T_world_box.rotation()[:2, 0]
     forward = forward / np.sqrt(forward @ forward)

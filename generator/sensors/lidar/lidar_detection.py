@@ -194,12 +194,8 @@ def _relevant_hits(pulses: Pulses, detours: SecondaryHits, model: LidarModel) ->
 def _merge_peaks(fields: Mapping[str, NDArray[Any]], rays: int, model: LidarModel) -> Pulses:
     """Merge hits of a beam's rays that are closer than a pulse into peaks, [pulses, hits].
 
-    A peak has the range and the labels of its brightest hit.
-
-    Args:
-        fields: Of hits, [pulses, hits].
-        rays: Rays per beam, each with an equal share of its light.
-        model: Of the scanner.
+    A peak has the range and the labels of its brightest hit; each ray has an equal share of the
+    beam's light. ``fields`` are of hits, [pulses, hits].
     """
     order = np.argsort(fields["range_m"], axis=1, kind="stable")
     sorted_ = {name: np.take_along_axis(fields[name], order, axis=1) for name in FIELDS}

@@ -43,12 +43,9 @@ class SweepPulses:
 
 
 def fire_pulses(scene: Scene, lidar: Lidar, sweep: Sweep) -> SweepPulses:
-    """The pulses of a sweep from a scanner that may move.
+    """The pulses of a sweep from a scanner that may move; the scene is at the sweep's middle.
 
-    Args:
-        scene: At the instant of the sweep's middle.
-        lidar: One of its scanners.
-        sweep: Its pulses; directions are in the lidar frame of each pulse's own instant.
+    Directions in ``sweep`` are in the lidar frame of each pulse's own instant.
     """
     if not scene.tracks:
         return SweepPulses(sweep.directions)

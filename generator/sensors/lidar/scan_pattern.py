@@ -132,12 +132,7 @@ TILE = (32, 4)
 
 
 def make_sweep(model: LidarModel, start_s: float) -> Sweep:
-    """One sweep of a scanner.
-
-    Args:
-        model: Data sheet.
-        start_s: Start of the sweep; affects only rosettes, which never repeat.
-    """
+    """One sweep of a scanner; ``start_s`` affects only rosettes, which never repeat."""
     return _rotation(model) if model.prisms is None else _rosette(model, model.prisms, start_s)
 
 

@@ -61,11 +61,9 @@ def silhouette_m2(instance: Instance, towards_radar: Array) -> float:
 
 
 def area_factor(category: str, surface: NDArray[np.uint8]) -> Array:
-    """RCS per perpendicular area, for rays that hit one category, [n].
+    """RCS per perpendicular area, for rays that hit one category (empty = unlabelled), [n].
 
-    Args:
-        category: Of the object; empty = unlabelled.
-        surface: Numbers in ``SURFACES``, uint8 [n].
+    ``surface`` are numbers in ``SURFACES``, uint8 [n].
     """
     if category in METAL:
         return np.full(len(surface), 10.0 ** (0.1 * METAL_DB))

@@ -107,12 +107,7 @@ def make_cells(lit: Echo, look: Look) -> Cells:
 
 
 def find_peaks(cells: Cells, power: Array) -> NDArray[np.int64]:
-    """Index of the peak that each cell belongs to, from 0, [n].
-
-    Args:
-        cells: The cells.
-        power: Of each cell, [n].
-    """
+    """Index of the peak that each cell belongs to, from 0, [n]; ``power`` is of each cell, [n]."""
     count = len(power)
     if count == 0:
         return np.zeros(0, np.int64)

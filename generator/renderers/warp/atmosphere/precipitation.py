@@ -77,10 +77,8 @@ def snow(rate_mm_h: float) -> Kind:
 def light_level_ev100(radiance: wp.array, fixed_ev100: float | None) -> float:
     """Exposure value that a camera is set to, or that suits the light it receives.
 
-    Args:
-        radiance: Linear RGB [cd/m^2], flat.
-        fixed_ev100: Setting of the camera; None = automatic, approximated from the median
-            luminance: only the length of streaks depends on it.
+    Without a setting it is approximated from the median luminance of the radiance [cd/m^2], flat
+    linear RGB: only the length of streaks depends on it.
     """
     if fixed_ev100 is not None:
         return fixed_ev100
@@ -98,12 +96,9 @@ def usual_exposure_s(ev100: float) -> float:
 
 
 def draw_precipitation(frame: CameraView, z_m: wp.array, radiance: wp.array) -> bool:
-    """Draw falling particles over the image, in place; returns whether there are any.
+    """Draw falling particles over the radiance [cd/m^2], in place; returns whether there are any.
 
-    Args:
-        frame: The image.
-        z_m: Its depths, as of GBuffer.
-        radiance: Linear RGB [cd/m^2], flat.
+    ``z_m`` are the image's depths, as of GBuffer.
     """
     weather, camera = frame.world.weather, frame.state.camera
     if weather.rain_mm_h <= 0.0 and weather.snow_mm_h <= 0.0:

@@ -38,9 +38,7 @@ def expose_ground(frame: CameraView, lattice: Lattice) -> None:
 def ground_record(weather: Weather, exposed: wp.array | None = None) -> records.GroundRecord:
     """The GroundRecord of a scene's weather.
 
-    Args:
-        weather: Weather of the scene.
-        exposed: Exposure of each lattice point to precipitation, if there is a lattice.
+    ``exposed`` is the exposure of each lattice point to precipitation, if there is a lattice.
     """
     ground = records.GroundRecord()
     ground.covered = int(weather.wetness + weather.puddles + weather.snow_cover > 0.0)

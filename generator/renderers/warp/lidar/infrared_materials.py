@@ -53,12 +53,7 @@ def _pack_infrared(materials: Sequence[Material], cache: DeviceCache) -> NDArray
 
 
 def infrared_fields(material: Material, color: Array) -> tuple[float, ...]:
-    """The fields of one material's Infrared record.
-
-    Args:
-        material: The material.
-        color: Its mean linear RGB, texture included.
-    """
+    """The Infrared record of a material, given its mean linear RGB, texture included."""
     red = float(0.7 * color[0] + 0.2 * color[1] + 0.1 * color[2])
     diffuse = DIFFUSE.get(material.role, red)
     if material.role in TEXTILES:

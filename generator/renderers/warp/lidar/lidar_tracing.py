@@ -83,13 +83,8 @@ def trace_secondary(
 ) -> SecondaryHits | None:
     """Secondary hits of all rays; None without any.
 
-    Args:
-        inputs: Inputs of the kernel that found the first hits.
-        first: The first hits.
-        order: Order of the beams.
-        infrared: Infrared records of the materials.
-        labels: Label tables of the scene.
-        cache: Cache of the renderer.
+    ``inputs`` are those of the kernel that found the first hits, ``order`` the order of the beams,
+    ``infrared`` the Infrared records of the materials.
     """
     material = first.hits[:, 1]
     clear = np.append(infrared["clear"] > 0.0, False)[material]

@@ -24,15 +24,10 @@ def require_denoiser() -> None:
 
 
 def denoise(light: Float32, albedo: Float32, normal: Float32) -> Float32:
-    """Denoise an image.
+    """Denoise an image, linear RGB [h, w, 3], by albedo [0, 1] and normals [-1, 1] of its surfaces.
 
     Single-threaded like the whole renderer: processes use the cores. The bytes are reproducible on
     processors of one kind; others round differently.
-
-    Args:
-        light: Linear RGB, [h, w, 3].
-        albedo: Albedo of the visible surfaces, [0, 1], same shape.
-        normal: Their normals, [-1, 1], same shape.
 
     Raises:
         ConfigError: the denoiser reports an error.

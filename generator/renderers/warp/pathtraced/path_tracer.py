@@ -82,13 +82,8 @@ class PathTracer:
     ) -> wp.array:
         """Mean radiance of each pixel's square [cd/m^2], linear RGB, flat; scratch memory.
 
-        Args:
-            scene: The scene of ``world``.
-            camera: Its name keys the noise.
-            world: Modified in place: receives all lights and the path tracer's tables.
-            view: View of the camera.
-            seed: Seed of the noise.
-            lights: Techniques: 1 light sampling, 2 BSDF sampling, 3 both.
+        The world receives all lights and the path tracer's tables, in place. The camera's name and
+        the seed key the noise. ``lights``: 1 light sampling, 2 BSDF sampling, 3 both.
         """
         sky = self._sky_light(scene.environment.image, whole=lights == 1)
         record = world.record
@@ -160,11 +155,9 @@ _HEIGHT_MAX = 512
 def sky_shares(image: Float32, *, whole: bool) -> tuple[float, Float32, Float32]:
     """Cumulative distribution of light over an equirectangular image, for bilinear lookup.
 
-    Args:
-        image: Radiance, [h, 2h, 3].
-        whole: Whether to sample all light, or only the excess over the mean: BSDF sampling finds
-            the rest as well. Source: Karlik et al., "MIS compensation", SIGGRAPH Asia 2019, section
-            5.
+    The image is [h, 2h, 3]. If not ``whole``, only the excess over the mean is sampled: BSDF
+    sampling finds the rest as well. Source: Karlik et al., "MIS compensation", SIGGRAPH Asia 2019,
+    section 5.
 
     Returns:
         Share of the light that is sampled; its cumulative distribution over rows, [rows + 1]; and

@@ -77,11 +77,8 @@ def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
 def remove_fringe(albedo: UInt8, alpha: UInt8) -> UInt8:
     """Fill the colours of holes from their surroundings, so that coarser levels have no fringes.
 
-    Source: Gortler et al., "The lumigraph", SIGGRAPH 1996 (pull and push).
-
-    Args:
-        albedo: [height, width, 3].
-        alpha: Coverage, [height, width]; holes are below 128.
+    Source: Gortler et al., "The lumigraph", SIGGRAPH 1996 (pull and push). ``albedo`` is [h, w, 3],
+    ``alpha`` the coverage [h, w]; holes are below 128.
     """
     solid = (alpha >= 128).astype(np.float32)[..., None]
     levels = _mip_levels(np.concatenate([albedo * solid, solid], axis=2))

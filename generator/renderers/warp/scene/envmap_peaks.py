@@ -77,10 +77,7 @@ class SkyLamp:
 def remove_peaks(image: Float32) -> tuple[Float32, tuple[SkyLamp, ...]]:
     """The panorama without its brightest parts, and those parts, the strongest first.
 
-    The panorama itself if there are none.
-
-    Args:
-        image: Equirectangular luminance of mean 1, shape [h, 2h, 3].
+    The panorama itself if there are none. It is equirectangular, of mean luminance 1, [h, 2h, 3].
     """
     if float(_search_luminance(image).max()) <= _LEVELS[-1]:
         return image, ()
@@ -122,12 +119,9 @@ def _search_luminance(image: Array | Float32) -> Array:
 def _find_parts(
     small: Array, level: float, shape: tuple[int, ...]
 ) -> Iterator[tuple[NDArray[np.bool_], float]]:
-    """Connected parts above a threshold: their masks, and the luminance around them.
+    """Connected parts above a level in units of the mean: masks of a shape, luminance around them.
 
-    Args:
-        small: Result of ``_search_luminance``.
-        level: Threshold in units of the mean.
-        shape: Shape of the masks.
+    ``small`` is a result of ``_search_luminance``.
     """
     bright = small > level
     if not bright.any():

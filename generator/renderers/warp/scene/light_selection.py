@@ -44,13 +44,9 @@ def main_lamp_numbers(frame: CameraView) -> NDArray[np.int64] | None:
 def main_lamps(
     lamps: NDArray[np.void], points_m: Array, normals: Array, lamps_max: int
 ) -> NDArray[np.int64]:
-    """Numbers of the selected lamps, ascending: suns first, then by share of light.
+    """Numbers of the selected lamp records, ascending: suns first, then by share of light.
 
-    Args:
-        lamps: Lamp records.
-        points_m: Visible points, world frame, [n, 3].
-        normals: Unit normals at these points, [n, 3].
-        lamps_max: Maximum number of lamps.
+    Visible points and their unit normals are in the world frame, [n, 3].
     """
     lux = np.stack([_illuminance(lamp, points_m, normals) for lamp in lamps])
     shares = (lux / (_DIM_LUX + lux.sum(axis=0))).sum(axis=1)

@@ -65,9 +65,7 @@ def surface_records(
 ) -> NDArray[np.void]:
     """Material records of all bodies, body after body; at least one.
 
-    Args:
-        per_body: Materials of the bodies.
-        textures: All textures that the bodies name, in the order of the device's textures.
+    ``textures`` are all that the bodies name, in the order of the device's textures.
     """
     values = stack_records([entry.surfaces for entry in per_body], records.MaterialRecord)
     place = {texture_id: k for k, texture_id in enumerate(textures)}
@@ -101,12 +99,7 @@ def cutout_slots(
 
 
 def cutout_bodies(slots: NDArray[np.int32], counts: NDArray[np.int64]) -> NDArray[np.int32]:
-    """Per body: the union of its slots' flags.
-
-    Args:
-        slots: Flags of all bodies' materials, body after body.
-        counts: Number of materials of each body.
-    """
+    """Per body: the union of its slots' flags; ``counts`` are the bodies' numbers of materials."""
     if not slots.any():
         return np.zeros(len(counts), np.int32)
     of_slots = np.repeat(np.arange(len(counts)), counts)

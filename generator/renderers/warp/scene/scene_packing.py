@@ -120,11 +120,7 @@ def repack_moved(
 ) -> PackedWorld:
     """Pack another instant of a packed scene: the same assets and materials at other poses.
 
-    Args:
-        world: Result of ``pack_world``.
-        scene: Poses of bodies and lights may differ from those that were packed.
-        camera: Its pose may differ.
-        cache: Assets.
+    Poses of bodies, lights and camera may differ from those of ``world``.
     """
     _, *assets = world.keep
     meshes = assets[0]

@@ -124,10 +124,7 @@ def _outline_records(
 ) -> tuple[NDArray[np.void], int]:
     """One record per body whose box is not empty, and the size of all instances' masks.
 
-    Args:
-        scene: The scene.
-        boxes: Box of each instance's mask, by instance id; masks are stored one after another.
-        of_bodies: Box of each body, in that of its instance, by number.
+    Masks fill the boxes of the instances, one after another; each body's box is in its instance's.
     """
     first_pixels, size = {}, 0
     for instance_id, box in boxes.items():
@@ -195,8 +192,7 @@ def _trace_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.uint8]
 def bounding_cone(ends_m: Array) -> tuple[Array, float]:
     """Axis and half angle of a cone from the origin around a box; pi if it contains the origin.
 
-    Args:
-        ends_m: Low and high corner, [2, 3].
+    ``ends_m`` are its low and high corner, [2, 3].
     """
     centre = ends_m.mean(axis=0)
     distance_m = math.sqrt(float((centre * centre).sum()))

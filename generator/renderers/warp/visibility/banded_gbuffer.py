@@ -71,13 +71,10 @@ def render_bands(
     reference: CameraView,
     light: RadianceFunction | None = None,
 ) -> tuple[BandedGBuffer, dict[Channel, NDArray[Any]]]:
-    """Render G-buffer and images, each band at its own instant.
+    """Render G-buffer and label images of bands that cover the image, each at its own instant.
 
-    Args:
-        bands: Bands in order of rows, covering the image.
-        channels: Labels.
-        reference: The world at a nearby instant.
-        light: Computes the channel RADIANCE; None = not requested.
+    ``reference`` is the world at a nearby instant; ``light`` computes the channel RADIANCE, None =
+    not requested.
     """
     lens = reference.state.camera.intrinsics
     shape = (lens.height_px, lens.width_px)

@@ -122,10 +122,7 @@ def bodies_within(
 ) -> NDArray[np.int32]:
     """Numbers, ascending, of the bodies whose boxes reach into an image's frustum.
 
-    Args:
-        body_records: Body records.
-        view: The camera.
-        margin: How far the frustum extends beyond each side of the image, in images.
+    The frustum extends beyond each side of the image by ``margin`` images.
     """
     x, y, z = np.moveaxis(box_corners(body_records, view), 1, 0)
     # One more pixel absorbs all rounding.

@@ -47,11 +47,7 @@ class ShutterSampling:
 
 
 def plan_sampling(rendered: CameraView) -> ShutterSampling:
-    """Plan the sampling of an image over the time its shutter is open.
-
-    Args:
-        rendered: The image at the middle of that time.
-    """
+    """Plan the sampling of an image, given at the middle of the time its shutter is open."""
     middle, gbuffer = rendered.state, copy_gbuffer(rendered)
     shutter = middle.camera.shutter
     ends = [_global_shutter_band(middle.later(side * shutter.open_s)) for side in (-0.5, 0.5)]
@@ -74,9 +70,7 @@ def split_bands(
 ) -> tuple[RowBand, ...]:
     """Bands of rows, each at its instant, within which nothing moves farther than ``BAND_PX``.
 
-    Args:
-        rendered: The image at the middle of its exposure.
-        sampling: Sampling of the image; None = determine it.
+    ``rendered`` is the image at the middle of its exposure; without ``sampling``, plan it.
     """
     middle = rendered.state
     shutter = middle.camera.shutter
@@ -98,11 +92,7 @@ def make_bands(middle: CameraState, starts: Sequence[int]) -> tuple[RowBand, ...
 
 
 def band_starts(motion_px: Array) -> list[int]:
-    """First rows of bands, each as high as the motion in it allows.
-
-    Args:
-        motion_px: Motion from one row to the next, shape [height].
-    """
+    """First rows of bands, each as high as the motion from row to row [height] allows."""
     travelled = np.concatenate([[0.0], np.cumsum(motion_px)])[:-1]
     begins: NDArray[np.bool_] = np.diff(np.floor(travelled / BAND_PX), prepend=-1.0) > 0.0
     return [int(row) for row in np.flatnonzero(begins)]
@@ -111,10 +101,7 @@ def band_starts(motion_px: Array) -> list[int]:
 def _dilate_rows(speeds: Array, travels_px: Array, height: int) -> Array:
     """Highest speed of anything that may reach each row while the shutter is open, [height].
 
-    Args:
-        speeds: Speeds in every few rows.
-        travels_px: Vertical motion of the same points in that time.
-        height: Height of the image.
+    Given speeds in every few rows, and the vertical motion of the same points in that time.
     """
     highest = np.zeros(height)
     reaches = np.ceil(0.5 * np.minimum(travels_px, 2.0 * height)).astype(int) + 2 * _STRIDE_PX

@@ -50,10 +50,7 @@ def flow_images(
 ) -> dict[Channel, NDArray[Any]]:
     """All requested flow channels, as documented at Channel.
 
-    Args:
-        reference: The world at the image's instant.
-        gbuffer: G-buffer of the image, each row at its own instant.
-        channels: Requested channels of any kind.
+    ``reference`` is the world at the image's instant; each row of the G-buffer is at its own.
     """
     images: dict[Channel, NDArray[Any]] = {}
     if not channels & FLOW:
@@ -127,13 +124,8 @@ def find_occluded(
     """Occlusion of points in another image, uint8 [h, w]: 1 if hidden or outside it.
 
     A point is visible if any of the four pixels around it shows no nearer surface; surfaces are
-    extrapolated from pixel centres along their tangent planes.
-
-    Args:
-        points: Points of this image.
-        found: Their positions at the other instant.
-        then: Range and normals of the image at the other instant.
-        camera: Intrinsics of that image.
+    extrapolated from pixel centres along their tangent planes. ``found`` are the points, ``then``
+    range and normals of the image at the other instant.
     """
     range_m, normals = then[Channel.RANGE], then[Channel.NORMALS]
     u, v = found.image_px[..., 0], found.image_px[..., 1]
