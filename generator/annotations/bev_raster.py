@@ -1,4 +1,4 @@
-"""Rasterisation of triangles on a horizontal grid: covered cells, and heights.
+"""Geometry on the ground as triangles in the world, and their rasterisation on a horizontal grid.
 
 A cell is covered if its centre is, as for label pixels of images.
 """

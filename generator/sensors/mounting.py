@@ -1,4 +1,4 @@
-"""Mounting of sensors on rigs and cameras, and their rates."""
+"""Mounting of sensors on rigs and cameras, their rates, and their motion with their carrier."""
 
 from __future__ import annotations
 

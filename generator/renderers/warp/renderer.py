@@ -8,10 +8,9 @@ from gen_data.generator.core.capture import Channel, LidarHits, LidarRays, Senso
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetLibrary
 from gen_data.generator.core.scene import Camera, Lidar, Scene
-from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.device import compile_kernels, open_device
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.frame_context import CameraState, CameraView, RenderContext
-from gen_data.generator.renderers.warp.kernel_compilation import compile_kernels
 from gen_data.generator.renderers.warp.lidar.lidar_tracing import trace_scan
 from gen_data.generator.renderers.warp.realtime.realtime_shading import (
     add_precipitation,

@@ -42,12 +42,12 @@ from gen_data.generator.renderers.warp.visibility.banded_gbuffer import (
     add_margin,
     render_bands,
 )
-from gen_data.generator.renderers.warp.visibility.motion_bounds import (
+from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow_images
+from gen_data.generator.renderers.warp.visibility.reprojection import (
     ShutterSampling,
     plan_sampling,
     split_bands,
 )
-from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow_images
 
 
 @dataclass(frozen=True, eq=False, slots=True)

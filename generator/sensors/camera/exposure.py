@@ -1,4 +1,4 @@
-"""Exposure: metering, and the exposure time and gain that achieve an exposure value."""
+"""Exposure: metering, exposure time and gain that achieve an exposure value, rolling shutter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Veiling glare: the lens scatters a share of all light around its source."""
+"""Veiling glare: the lens scatters a share of all light around its source.
+
+Image pyramids use only sums and products, which all processors round alike, so that results do not
+depend on the machine.
+"""
 
 from __future__ import annotations
 

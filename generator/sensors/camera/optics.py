@@ -1,4 +1,7 @@
-"""Lens effects on linear images, float32 [h, w, 3] of any unit."""
+"""Lens effects on linear images, float32 [h, w, 3] of any unit.
+
+Flare consists of ghosts by reflections between the surfaces of a lens.
+"""
 
 from __future__ import annotations
 

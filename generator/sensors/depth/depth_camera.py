@@ -1,4 +1,4 @@
-"""Depth camera: measured depth and infrared images, beside the true ones."""
+"""Depth camera: its data sheet; measured depth and infrared images, beside the true ones."""
 
 from __future__ import annotations
 

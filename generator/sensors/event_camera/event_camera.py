@@ -1,4 +1,14 @@
-"""Event camera: time, pixel and polarity of changes of brightness."""
+"""Event camera: time, pixel and polarity of changes of brightness.
+
+A pixel triggers an event whenever the logarithm of its intensity has changed by a threshold since
+its last event (Lichtsteiner, Posch and Delbruck 2008). Events are interpolated between frames as in
+Rebecq et al., "ESIM", CoRL 2018; the spread of thresholds and the noise are those of Hu, Liu and
+Delbruck, "v2e", CVPRW 2021.
+
+The trigger levels of each pixel lie on a grid that is fixed for a sequence, so that the events
+between two instants do not depend on earlier events: none is lost or repeated at the border of two
+steps as long as the change continues in one direction.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Queries of moving oriented boxes: contact, gap ahead, distance."""
+"""Queries of moving oriented boxes: contact, gap ahead, distance; lane borders and lights."""
 
 from __future__ import annotations
 

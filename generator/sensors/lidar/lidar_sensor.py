@@ -35,11 +35,12 @@ from gen_data.generator.sensors.lidar.lidar_detection import (
     report_intensity,
     select_returns,
 )
-from gen_data.generator.sensors.lidar.motion_distortion import SweepPulses, fire_pulses
 from gen_data.generator.sensors.lidar.scan_pattern import (
     PRESETS,
     LidarModel,
     Sweep,
+    SweepPulses,
+    fire_pulses,
     lidar_model,
     make_sweep,
 )

@@ -1,4 +1,8 @@
-"""Ray tracing of laser scans, through the same world, meshes and materials as cameras."""
+"""Ray tracing of laser scans, through the same world, meshes and materials as cameras.
+
+Secondary hits are those behind glass and by reflection in mirrors. Few rays hit a pane, a mirror or
+a puddle; only these are traced further, after all first hits.
+"""
 
 from __future__ import annotations
 

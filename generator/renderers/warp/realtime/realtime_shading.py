@@ -24,14 +24,16 @@ from gen_data.generator.renderers.warp.realtime.light_visibility import (
     pixel_samples,
     sunflower,
 )
-from gen_data.generator.renderers.warp.scene.envmap_lights import extract_sky_lights
 from gen_data.generator.renderers.warp.scene.kernels import records
-from gen_data.generator.renderers.warp.scene.light_selection import keep_main_lamps
-from gen_data.generator.renderers.warp.visibility.alpha_cutouts import (
+from gen_data.generator.renderers.warp.scene.light_selection import (
+    extract_sky_lights,
+    keep_main_lamps,
+)
+from gen_data.generator.renderers.warp.visibility.gbuffer import (
+    Projected,
     has_cutouts,
     trace_over_samples,
 )
-from gen_data.generator.renderers.warp.visibility.gbuffer import Projected
 from gen_data.generator.renderers.warp.visibility.kernels import (
     distortion,
     edge_antialiasing,

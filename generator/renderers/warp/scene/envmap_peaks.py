@@ -1,4 +1,4 @@
-"""Extraction of a panorama's brightest parts as lamps at infinity.
+"""Extraction of a panorama's brightest parts as lamps at infinity; geometry of panoramas.
 
 Environment light casts no shadows here, but a sun, a window or a softbox in a panorama should. Each
 such part becomes a disk in the sky with the part's vector irradiance, so that a surface with the

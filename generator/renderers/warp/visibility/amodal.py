@@ -28,21 +28,19 @@ from gen_data.generator.renderers.warp.frame_context import (
 )
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld, pack_view
-from gen_data.generator.renderers.warp.visibility.alpha_cutouts import (
-    CORNERS,
-    canvas_box,
-    has_cutouts,
-    trace_outlines,
-)
 from gen_data.generator.renderers.warp.visibility.distortion_lut import NODE_STRIDE_PX
 from gen_data.generator.renderers.warp.visibility.gbuffer import (
+    CORNERS,
     Projected,
+    canvas_box,
+    has_cutouts,
     project_vertices,
+    trace_outlines,
 )
 from gen_data.generator.renderers.warp.visibility.kernels.amodal import draw_silhouettes
 from gen_data.generator.renderers.warp.visibility.kernels.amodal_lens import trace_silhouettes
 from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M, Outline
-from gen_data.generator.renderers.warp.visibility.motion_bounds import make_bands
+from gen_data.generator.renderers.warp.visibility.reprojection import make_bands
 
 _NOTHING = np.zeros((0, 0), np.bool_)
 _UNSNAPPED = -(2**31)

@@ -25,14 +25,15 @@ from gen_data.generator.renderers.warp.visibility.banded_gbuffer import (
     full_band,
     render_bands,
 )
-from gen_data.generator.renderers.warp.visibility.motion_bounds import make_bands, split_bands
 from gen_data.generator.renderers.warp.visibility.reprojection import (
     ReprojectedPoints,
     ScenePoints,
     deform_points,
     find_carriers,
     gather_points,
+    make_bands,
     reproject,
+    split_bands,
 )
 
 FORWARD = frozenset({Channel.FLOW_FORWARD, Channel.FLOW_OCCLUDED_FORWARD, Channel.SCENE_FLOW})

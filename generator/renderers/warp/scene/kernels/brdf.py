@@ -1,11 +1,16 @@
-"""Metallic-roughness BRDF: GGX over Lambert, energy-conserving.
+"""Reflection and refraction of surfaces, and the luminance of colours.
+
+The BRDF is metallic-roughness: GGX over Lambert, energy-conserving. Dielectric interfaces and thin
+panes reflect and refract by Fresnel's equations.
 
 Sources: Walter et al., "Microfacet models for refraction through rough surfaces", EGSR 2007 (GGX);
 Hammon, "PBR diffuse lighting for GGX+Smith microsurfaces", GDC 2017 (height-correlated Smith
 without square roots); Burley, "Physically based shading at Disney", 2012 (parameters); Karis, "Real
 shading in Unreal Engine 4", 2013 (directional albedo from a table); Turquin, "Practical multiple
 scattering compensation for microfacet models", 2019; Lagarde and de Rousiers, "Moving Frostbite to
-PBR", 2014 (F90).
+PBR", 2014 (F90); Born and Wolf, "Principles of Optics", 1.5.2 (Fresnel's formulae); Snell's law as
+in Pharr, Jakob and Humphreys, "Physically Based Rendering", 4th ed., 9.3. Weights of luminance are
+those of ``gen_data.generator.core.colorimetry``.
 """
 
 from __future__ import annotations

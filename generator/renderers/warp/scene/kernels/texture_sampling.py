@@ -1,4 +1,7 @@
-"""Texture sampling: bilinear taps of mip levels chosen by a pixel's footprint."""
+"""Texture sampling: bilinear taps of mip levels chosen by a pixel's footprint.
+
+Patches are flat faces whose texture coordinates are linear in space, for fast lookups.
+"""
 
 from __future__ import annotations
 
