@@ -77,7 +77,7 @@ def _silhouette_faults(
         yield "its silhouette is not stored tight"
     if truth.box is None:
         return
-    if outer is None or not _contains(outer, truth.box):
+    if outer is None or truth.box.intersection(outer) != truth.box:
         yield f"its visible box {truth.box} leaves the box {outer} of its silhouette"
     elif (visible > silhouette_crop(silhouette, truth.box)).any():
         yield "pixels are visible that are not in its silhouette"
@@ -120,15 +120,6 @@ def _keypoint_faults(reading: SensorReading, truth: ObjectTruth) -> Iterator[str
 
 def _is_tight(mask: NDArray[np.bool_]) -> bool:
     return bool(mask[0].any() and mask[-1].any() and mask[:, 0].any() and mask[:, -1].any())
-
-
-def _contains(outer: BoxPx, inner: BoxPx) -> bool:
-    return (
-        outer.x_min <= inner.x_min
-        and outer.y_min <= inner.y_min
-        and outer.x_max >= inner.x_max
-        and outer.y_max >= inner.y_max
-    )
 
 
 def _is_rigid(pose: SE3) -> bool:

@@ -73,4 +73,4 @@ def _crop_mask(mask: NDArray[np.bool_]) -> MaskPx:
     box = tight_box(mask)
     if box is None:
         return MaskPx(0, 0, np.zeros((0, 0), dtype=bool))
-    return MaskPx(box.x_min, box.y_min, mask[box.y_min : box.y_max, box.x_min : box.x_max].copy())
+    return MaskPx(box.x_min, box.y_min, mask[box.window()].copy())

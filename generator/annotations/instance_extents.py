@@ -59,7 +59,7 @@ def find_extents(ids: NDArray[np.uint16]) -> dict[int, Extent]:
 
 def crop(image: NDArray[np.generic], box: BoxPx) -> NDArray[np.generic]:
     """The part of an image that a box inside it covers, as a view."""
-    return image[box.y_min : box.y_max, box.x_min : box.x_max]
+    return image[box.window()]
 
 
 def visible_mask(reading: SensorReading, truth: ObjectTruth) -> NDArray[np.bool_]:
@@ -97,5 +97,4 @@ def silhouette_box(silhouette: Silhouette) -> BoxPx | None:
 
 def silhouette_crop(silhouette: Silhouette, box: BoxPx) -> NDArray[np.bool_]:
     """The silhouette's pixels inside a box that lies within the silhouette's own, as a view."""
-    x, y = silhouette.x_px, silhouette.y_px
-    return silhouette.mask[box.y_min - y : box.y_max - y, box.x_min - x : box.x_max - x]
+    return silhouette.mask[box.window(silhouette.x_px, silhouette.y_px)]

@@ -48,10 +48,8 @@ class Mounted(Strict):
     @property
     def T_rig_sensor(self) -> SE3:  # noqa: N802
         """Pose on the rig; both frames are X forward, Y left, Z up."""
-        half_pitch, half_roll = (
-            -0.5 * math.radians(self.pitch_deg),
-            0.5 * math.radians(self.roll_deg),
-        )
+        half_pitch = -0.5 * math.radians(self.pitch_deg)
+        half_roll = 0.5 * math.radians(self.roll_deg)
         pitch = SE3((0.0, 0.0, 0.0), (math.cos(half_pitch), 0.0, math.sin(half_pitch), 0.0))
         roll = SE3((0.0, 0.0, 0.0), (math.cos(half_roll), math.sin(half_roll), 0.0, 0.0))
         yaw = SE3.about_z(math.radians(self.yaw_deg), self.offset_m)

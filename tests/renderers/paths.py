@@ -6,8 +6,8 @@ import numpy as np
 
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.scene import Camera, Scene
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.pathtraced.path_tracer import PathTracer
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from gen_data.generator.renderers.warp.scene.scene_packing import pack_view, pack_world

@@ -9,8 +9,8 @@ from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.scene import Body, Environment, Instance, Scene
 from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from gen_data.generator.renderers.warp.scene.bvh import face_boxes
 from gen_data.generator.renderers.warp.scene.device_meshes import boxes_around

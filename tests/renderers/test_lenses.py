@@ -16,8 +16,8 @@ from gen_data.generator.core.lens import Lens
 from gen_data.generator.core.scene import Body, Camera, Instance, Light, Scene, Weather
 from gen_data.generator.core.se3 import SE3, look_at
 from gen_data.generator.renderers.warp.atmosphere.precipitation import make_streaks, rain
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from gen_data.generator.renderers.warp.scene.kernels.records import View
 from gen_data.generator.renderers.warp.scene.scene_packing import pack_view

@@ -22,8 +22,8 @@ from gen_data.generator.renderers.warp.atmosphere.precipitation import (
     snow,
     usual_exposure_s,
 )
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from gen_data.generator.renderers.warp.scene.light_selection import main_lamps
 from gen_data.generator.renderers.warp.scene.scene_packing import pack_world

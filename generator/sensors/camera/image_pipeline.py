@@ -36,9 +36,9 @@ from gen_data.generator.sensors.camera.exposure import (
 )
 from gen_data.generator.sensors.camera.glare import add_glare
 from gen_data.generator.sensors.camera.image_sensor import ImageSensor, expose, filter_at, mosaic
+from gen_data.generator.sensors.camera.isp import Tone, display_values, to_bytes, tone_to_bytes
 from gen_data.generator.sensors.camera.lens_drops import lens_drops, refract_in_drops
 from gen_data.generator.sensors.camera.optics import add_flare
-from gen_data.generator.sensors.camera.tone import Tone, display_values, to_bytes, tone_to_bytes
 from gen_data.generator.sensors.device_presets import check_preset, preset_path
 
 NONE = Constant(0.0)
@@ -83,7 +83,7 @@ class ImagePipeline(Strict):
         warmth_ev: Error of the white balance: red over blue, in stops.
         demosaic: Method of demosaicing.
         saturation: Factor on saturation.
-        tone: Tone curve, see ``generator/sensors/camera/tone.py``; ``log`` is for sensors with
+        tone: Tone curve, see ``generator/sensors/camera/isp.py``; ``log`` is for sensors with
             several exposures.
         sharpening: Amount of unsharp masking.
         sharpening_px: Radius of unsharp masking.
@@ -263,18 +263,6 @@ def _flare(light: Light, shot: Shot) -> Light:
     return replace(light, values=add_flare(light.values, share, light.white))
 
 
-def _glare(light: Light, shot: Shot) -> Light:
-    share = shot.pipeline.glare.draw(shot.rng)
-    return replace(light, values=add_glare(light.values, share)) if share > 0.0 else light
-
-
-def _chromatic_aberration(light: Light, shot: Shot) -> Light:
-    corner_px = shot.pipeline.chromatic_aberration_px.draw(shot.rng)
-    if corner_px == 0.0:
-        return light
-    return replace(light, values=optics.apply_chromatic_aberration(light.values, corner_px))
-
-
 def _vignetting(light: Light, shot: Shot) -> Light:
     loss = shot.pipeline.vignetting.draw(shot.rng)
     values = optics.apply_vignetting(light.values, loss) if loss > 0.0 else light.values
@@ -323,27 +311,29 @@ def _white_balance(light: Light, shot: Shot) -> Light:
     return Light(image * gains @ srgb_from_camera.T, 1.0)
 
 
-def _saturation(light: Light, shot: Shot) -> Light:
-    factor = shot.pipeline.saturation.draw(shot.rng)
-    return (
-        light
-        if factor == 1.0
-        else replace(light, values=isp.scale_saturation(light.values, factor))
-    )
-
-
 Stage = Callable[[Light, Shot], Light]
+
+
+def _effect(field: str, neutral: float, apply: Callable[[Float32, float], Float32]) -> Stage:
+    """A stage that applies a strength, drawn from a field of the pipeline, unless it is neutral."""
+
+    def stage(light: Light, shot: Shot) -> Light:
+        drawn = getattr(shot.pipeline, field).draw(shot.rng)
+        return light if drawn == neutral else replace(light, values=apply(light.values, drawn))
+
+    return stage
+
 
 STAGES: tuple[Stage, ...] = (
     _lens_drops,
     _defocus,
     _flare,
-    _glare,
-    _chromatic_aberration,
+    _effect("glare", 0.0, add_glare),
+    _effect("chromatic_aberration_px", 0.0, optics.apply_chromatic_aberration),
     _vignetting,
     _image_circle,
     _image_sensor,
-    _saturation,
+    _effect("saturation", 1.0, isp.scale_saturation),
 )
 """From radiance to linear sRGB, in the order of a real camera; tone and JPEG follow."""
 

@@ -35,19 +35,17 @@ from gen_data.generator.sensors.mounting import (
     remove_carrier,
     velocity_at,
 )
-from gen_data.generator.sensors.radar.cross_section import (
-    TARGETS,
-    area_factor,
-    cross_section_m2,
-    silhouette_m2,
-)
 from gen_data.generator.sensors.radar.radar_detection import (
+    TARGETS,
     Echo,
     Look,
+    area_factor,
+    cross_section_m2,
     find_peaks,
     interpolate_curve,
     make_cells,
     merge_echoes,
+    silhouette_m2,
 )
 
 PRESETS = "gen_data.generator.sensors.radar.presets"

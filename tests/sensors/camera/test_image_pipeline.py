@@ -24,7 +24,7 @@ from gen_data.generator.sensors.camera.image_pipeline import (
     capture_photograph,
     develop,
 )
-from gen_data.generator.sensors.camera.tone import display_values, to_bytes
+from gen_data.generator.sensors.camera.isp import display_values, to_bytes
 from gen_data.generator.sensors.device_presets import preset_names
 
 LENS = Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)

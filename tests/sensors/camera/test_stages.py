@@ -21,7 +21,7 @@ from gen_data.generator.sensors.camera import isp, optics
 from gen_data.generator.sensors.camera.exposure import ExposureControl, exposure_settings
 from gen_data.generator.sensors.camera.image_pipeline import PRESETS, ImagePipeline, develop
 from gen_data.generator.sensors.camera.image_sensor import ImageSensor, Pattern, expose, mosaic
-from gen_data.generator.sensors.camera.tone import to_bytes
+from gen_data.generator.sensors.camera.isp import to_bytes
 from gen_data.generator.sensors.device_presets import preset_names
 
 FAR = np.full((48, 64), np.inf)

@@ -6,7 +6,7 @@ Bodies with cut-outs are ray-traced into the z-buffer of rasterised images.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import warp as wp
@@ -30,35 +30,34 @@ def has_cutouts(body_records: NDArray[np.void]) -> NDArray[np.bool_]:
 
 
 def trace_over(
-    world: PackedWorld, view: records.View, seen: NDArray[np.int32], nearness: wp.array, hits: Any
-) -> None:
-    """Add listed bodies to a z-buffer of pixel centres, in place."""
-    from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
-
-    bodies = _upload_bodies(world, view, seen, hits.device)
-    inputs = [view, world.record, bodies, rasterizer.Z_NEAR_M]
-    wp.launch(
-        alpha_cutouts.trace_centres, view.height, inputs, [nearness, hits], device=hits.device
-    )
-
-
-def trace_over_samples(
     world: PackedWorld,
     view: records.View,
     seen: NDArray[np.int32],
-    pixels: wp.array,
-    parts: Array,
     nearness: wp.array,
     hits: wp.array,
+    samples: tuple[wp.array, Array] | None = None,
 ) -> None:
-    """Add listed bodies to a z-buffer of listed pixels' samples, in place."""
+    """Add listed bodies to a z-buffer of pixel centres, or of samples, in place.
+
+    ``samples`` are listed pixels and the positions of samples in each.
+    """
     from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
 
     device = hits.device
-    bodies = _upload_bodies(world, view, seen, device)
-    offsets = wp.array(parts, dtype=wp.vec2, device=device)
-    inputs = [view, world.record, bodies, rasterizer.Z_NEAR_M, pixels, offsets]
-    wp.launch(alpha_cutouts.trace_samples, len(pixels), inputs, [nearness, hits], device=device)
+    boxes = [project_window(world.body_records, number, view) for number in seen.tolist()]
+    rows = [
+        (number, (box.x_min, box.y_min, box.width_px, box.height_px))
+        for number, box in zip(seen.tolist(), boxes, strict=True)
+    ]
+    values = np.array(rows, dtype=alpha_cutouts.CutoutBody.numpy_dtype())
+    bodies = wp.array(values, dtype=alpha_cutouts.CutoutBody, device=device)
+    inputs = [view, world.record, bodies, rasterizer.Z_NEAR_M]
+    kernel, count = alpha_cutouts.trace_centres, view.height
+    if samples is not None:
+        pixels, parts = samples
+        inputs += [pixels, wp.array(parts, dtype=wp.vec2, device=device)]
+        kernel, count = alpha_cutouts.trace_samples, len(pixels)
+    wp.launch(kernel, count, inputs, [nearness, hits], device=device)
 
 
 def trace_outlines(
@@ -102,20 +101,6 @@ def project_window(body_records: NDArray[np.void], body: int, view: records.View
     high = np.ceil([x_px.max(), y_px.max()]) + 1.0
     box = BoxPx(int(low[0]), int(low[1]), int(high[0]), int(high[1]))
     return box.intersection(canvas_box(view))
-
-
-def _upload_bodies(
-    world: PackedWorld, view: records.View, seen: NDArray[np.int32], device: wp.Device
-) -> wp.array:
-    from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
-
-    boxes = [project_window(world.body_records, number, view) for number in seen.tolist()]
-    rows = [
-        (number, (box.x_min, box.y_min, box.width_px, box.height_px))
-        for number, box in zip(seen.tolist(), boxes, strict=True)
-    ]
-    values = np.array(rows, dtype=alpha_cutouts.CutoutBody.numpy_dtype())
-    return wp.array(values, dtype=alpha_cutouts.CutoutBody, device=device)
 
 
 Method = Literal["auto", "raster", "rays"]
