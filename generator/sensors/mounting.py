@@ -180,16 +180,10 @@ def find_mounting(scene: Scene, name: str) -> tuple[str, SE3]:
     Raises:
         KeyError: the scene has no sensor of that name.
     """
-    for camera in scene.cameras:
-        if camera.name == name:
-            return camera.rig, camera.T_rig_camera @ RIG_AXES
-    for lidar in scene.lidars:
-        if lidar.name == name:
-            return lidar.rig, lidar.T_rig_lidar
-    for device in scene.devices:
-        if device.name == name:
-            return device.rig, device.T_rig_device
-    raise KeyError(name)
+    known = {device.name: (device.rig, device.T_rig_device) for device in scene.devices}
+    known |= {lidar.name: (lidar.rig, lidar.T_rig_lidar) for lidar in scene.lidars}
+    known |= {c.name: (c.rig, c.T_rig_camera @ RIG_AXES) for c in scene.cameras}
+    return known[name]
 
 
 def stride(sensor: str, rate_hz: float | None, step_s: float) -> int:

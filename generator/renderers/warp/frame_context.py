@@ -18,6 +18,7 @@ from gen_data.generator.renderers.warp.scene.scene_packing import (
     pack_world,
     repack_moved,
 )
+from gen_data.generator.renderers.warp.scene.struct_dtypes import copy_struct
 from gen_data.generator.renderers.warp.settings import RenderSettings
 from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer, find_visible
 
@@ -147,9 +148,7 @@ def _has_same_assets(one: Scene, other: Scene) -> bool:
 
 def crop_rows(view: records.View, first: int, end: int) -> records.View:
     """The view of a band of an image's rows."""
-    part = records.View()
-    for name in records.View.vars:
-        setattr(part, name, getattr(view, name))
+    part = copy_struct(view, records.View)
     part.height = end - first
     part.cy = view.cy - first
     if view.lens != records.PINHOLE:

@@ -13,7 +13,7 @@ from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.se3 import Array
-from gen_data.generator.core.shutter import INSTANT, Shutter
+from gen_data.generator.core.shutter import Shutter
 
 _MIDDLE_GREY = 0.18
 # From 1/30 s at f/1.4 and ISO 3200 to sunlit snow. Automatic exposure stops there, so that night
@@ -137,8 +137,6 @@ class RollingShutter(Strict):
 
 def make_shutter(exposure: ExposureTime | None, rolling: RollingShutter | None) -> Shutter:
     """The shutter of a camera with these settings."""
-    if exposure is None and rolling is None:
-        return INSTANT
     readout_s = 0.0 if rolling is None else rolling.readout_s
     if rolling is not None and rolling.direction == "up":
         readout_s = -readout_s

@@ -11,22 +11,31 @@ from pydantic import Field
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import COEFFICIENTS, PINHOLE, Lens
+from gen_data.generator.core.lens import COEFFICIENTS, Lens, LensModel
 
 FieldDeg = Annotated[float, Field(gt=0, le=360)]
 
 
-class Pinhole(Strict):
+class _LensModel(Strict):
+    """Base of the models of ``gen_data.generator.core.lens``; fields are their coefficients."""
+
+    model: LensModel
+
+    def lens(self) -> Lens:
+        """The lens as renderers use it."""
+        values = tuple(float(getattr(self, name)) for name in COEFFICIENTS[self.model])
+        field_deg = getattr(self, "field_deg", None)
+        half_rad = math.pi if field_deg is None else math.radians(0.5 * field_deg)
+        return Lens(self.model, values, half_rad)
+
+
+class Pinhole(_LensModel):
     """A pinhole: no distortion."""
 
     model: Literal["pinhole"] = "pinhole"
 
-    def lens(self) -> Lens:
-        """The lens as renderers use it."""
-        return PINHOLE
 
-
-class BrownConrady(Strict):
+class BrownConrady(_LensModel):
     """A lens with OpenCV's rational distortion model, with its names and signs.
 
     Attributes:
@@ -48,12 +57,8 @@ class BrownConrady(Strict):
     k6: float = 0.0
     field_deg: FieldDeg | None = None
 
-    def lens(self) -> Lens:
-        """The lens as renderers use it."""
-        return _polynomial(self)
 
-
-class KannalaBrandt(Strict):
+class KannalaBrandt(_LensModel):
     """A fisheye with OpenCV's model and names; all coefficients 0 is an equidistant lens.
 
     Attributes:
@@ -69,19 +74,11 @@ class KannalaBrandt(Strict):
     k4: float = 0.0
     field_deg: FieldDeg | None = None
 
-    def lens(self) -> Lens:
-        """The lens as renderers use it."""
-        return _polynomial(self)
 
-
-class Equirectangular(Strict):
+class Equirectangular(_LensModel):
     """A panorama: columns are longitudes, rows latitudes; hfov_deg 360 and 2:1 is a full sphere."""
 
     model: Literal["equirectangular"]
-
-    def lens(self) -> Lens:
-        """The lens as renderers use it."""
-        return Lens("equirectangular")
 
 
 class CalibratedLens(Strict):
@@ -133,9 +130,3 @@ class Calibration:
 
 CALIBRATIONS = load_table(__package__, "calibrations", Calibration)
 """Calibrations by their name in configurations."""
-
-
-def _polynomial(config: BrownConrady | KannalaBrandt) -> Lens:
-    values = tuple(float(getattr(config, name)) for name in COEFFICIENTS[config.model])
-    half_rad = math.pi if config.field_deg is None else math.radians(0.5 * config.field_deg)
-    return Lens(config.model, values, half_rad)

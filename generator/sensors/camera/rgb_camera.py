@@ -25,22 +25,11 @@ from gen_data.generator.sensors.camera.lens_models import CalibratedLens, LensCo
 from gen_data.generator.sensors.mounting import Mounted, check_rig
 
 Image = Literal[
-    Channel.RGB,
-    Channel.Z_DEPTH,
-    Channel.RANGE,
-    Channel.NORMALS,
-    Channel.INSTANCE,
-    Channel.PART,
-    Channel.CATEGORY,
-    Channel.OBJECT_COORDINATES,
-    Channel.DISPARITY,
-    Channel.DISPARITY_VISIBLE,
-    Channel.FLOW_FORWARD,
-    Channel.FLOW_BACKWARD,
-    Channel.FLOW_OCCLUDED_FORWARD,
-    Channel.FLOW_OCCLUDED_BACKWARD,
-    Channel.SCENE_FLOW,
-]
+    Channel.RGB, Channel.Z_DEPTH, Channel.RANGE, Channel.NORMALS, Channel.INSTANCE, Channel.PART,
+    Channel.CATEGORY, Channel.OBJECT_COORDINATES, Channel.DISPARITY, Channel.DISPARITY_VISIBLE,
+    Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD, Channel.FLOW_OCCLUDED_FORWARD,
+    Channel.FLOW_OCCLUDED_BACKWARD, Channel.SCENE_FLOW,
+]  # fmt: skip
 """Channels that can be written as images; see ``gen_data.generator.core.capture.Channel``."""
 
 PAIRED = frozenset({Channel.DISPARITY, Channel.DISPARITY_VISIBLE})
@@ -152,17 +141,11 @@ class RgbCamera(Mounted):
             SampleError: it forms no rectified pair with ``stereo_with``.
         """
         requested = channels | set(self.media)
-        if self.stereo_with and PAIRED & requested:
-            mono = (requested - PAIRED) | {Channel.Z_DEPTH}
-            reading = self._capture(scene, renderer, mono, rng)
-            return self._add_disparity(scene, renderer, reading)
-        return self._capture(scene, renderer, requested, rng)
-
-    def _capture(
-        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
-    ) -> SensorReading:
+        paired = bool(self.stereo_with and PAIRED & requested)
+        seen = (requested - PAIRED) | {Channel.Z_DEPTH} if paired else requested
         camera = scene.camera(self.name)
-        return capture_photograph(scene, renderer, camera, channels, self.image_pipeline, rng)
+        reading = capture_photograph(scene, renderer, camera, seen, self.image_pipeline, rng)
+        return self._add_disparity(scene, renderer, reading) if paired else reading
 
     def _add_disparity(
         self, scene: Scene, renderer: Renderer, reading: SensorReading

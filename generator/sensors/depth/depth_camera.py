@@ -74,17 +74,9 @@ IDEAL = ImagePipeline()
 OWN = frozenset({Channel.MEASURED_DEPTH, Channel.INFRARED})
 
 DepthImage = Literal[
-    Channel.MEASURED_DEPTH,
-    Channel.INFRARED,
-    Channel.RGB,
-    Channel.Z_DEPTH,
-    Channel.RANGE,
-    Channel.NORMALS,
-    Channel.INSTANCE,
-    Channel.PART,
-    Channel.CATEGORY,
-    Channel.OBJECT_COORDINATES,
-]
+    Channel.MEASURED_DEPTH, Channel.INFRARED, Channel.RGB, Channel.Z_DEPTH, Channel.RANGE,
+    Channel.NORMALS, Channel.INSTANCE, Channel.PART, Channel.CATEGORY, Channel.OBJECT_COORDINATES,
+]  # fmt: skip
 """Channels that can be written as images; all but the first two are ground truth."""
 
 

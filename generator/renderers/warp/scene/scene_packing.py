@@ -34,6 +34,7 @@ from gen_data.generator.renderers.warp.scene.material_packing import (
     surface_records,
 )
 from gen_data.generator.renderers.warp.scene.struct_dtypes import (
+    copy_struct,
     stack_records,
     struct_dtype,
     to_device,
@@ -126,7 +127,7 @@ def repack_moved(
     meshes = assets[0]
     assert isinstance(meshes, list)
     body_meshes = [meshes[k] for k in world.body_records["geometry"]]
-    record = _copy_record(world.record)
+    record = copy_struct(world.record, records.World)
     placement = _place_bodies(record, world.body_records.copy(), scene.bodies, body_meshes, cache)
     record.lamps = to_device(lamp_records(scene.lights), records.LightRecord, cache.device)
     packed = _PackedScene(record, tuple(assets), placement, world.layered)
@@ -135,14 +136,7 @@ def repack_moved(
 
 def copy_world(world: PackedWorld) -> PackedWorld:
     """Copy of the world whose lamps, ground and sky can be changed independently."""
-    return replace(world, record=_copy_record(world.record))
-
-
-def _copy_record(record: records.World) -> records.World:
-    copy = records.World()
-    for name in records.World.vars:
-        setattr(copy, name, getattr(record, name))
-    return copy
+    return replace(world, record=copy_struct(world.record, records.World))
 
 
 def _pack_for_camera(
@@ -154,7 +148,7 @@ def _pack_for_camera(
     if len(body_records):
         _fill_camera_poses(body_records, placement, camera)
     # A record of its own: weather and lamps are set for one view.
-    record = _copy_record(packed.record)
+    record = copy_struct(packed.record, records.World)
     record.bodies = to_device(body_records, records.BodyRecord, cache.device)
     return PackedWorld(
         record,
