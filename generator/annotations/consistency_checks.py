@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.annotations.instance_extents import (
+    instance_error,
     silhouette_box,
     silhouette_crop,
     visible_mask,
 )
 from gen_data.generator.core.boxes import BoxPx
 from gen_data.generator.core.capture import SensorReading
-from gen_data.generator.core.errors import SampleError
 from gen_data.generator.core.sample import MaskPx, ObjectTruth
 from gen_data.generator.core.se3 import SE3
 
@@ -30,10 +30,7 @@ def check_truth(reading: SensorReading, truth: ObjectTruth) -> None:
         SampleError: they contradict each other; names sensor, instance and contradiction.
     """
     for fault in _faults(reading, truth):
-        instance = truth.instance
-        raise SampleError(
-            f"sensor '{reading.sensor}', instance {instance.instance_id} '{instance.name}': {fault}"
-        )
+        raise instance_error(reading, truth.instance, fault)
 
 
 def _faults(reading: SensorReading, truth: ObjectTruth) -> Iterator[str]:

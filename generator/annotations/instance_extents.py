@@ -57,6 +57,13 @@ def find_extents(ids: NDArray[np.uint16]) -> dict[int, Extent]:
     }
 
 
+def instance_error(reading: SensorReading, instance: Instance, fault: str) -> SampleError:
+    """An error that names sensor and instance."""
+    return SampleError(
+        f"sensor '{reading.sensor}', instance {instance.instance_id} '{instance.name}': {fault}"
+    )
+
+
 def crop(image: NDArray[np.generic], box: BoxPx) -> NDArray[np.generic]:
     """The part of an image that a box inside it covers, as a view."""
     return image[box.window()]
@@ -79,9 +86,10 @@ def find_silhouette(reading: SensorReading, instance: Instance) -> Silhouette:
     """
     silhouette = reading.silhouettes.get(instance.instance_id)
     if silhouette is None:
-        raise SampleError(
-            f"sensor '{reading.sensor}', instance {instance.instance_id} '{instance.name}': the "
-            "renderer returned no silhouette of it although the amodal channel was requested"
+        raise instance_error(
+            reading,
+            instance,
+            "the renderer returned no silhouette of it although the amodal channel was requested",
         )
     return silhouette
 

@@ -19,8 +19,7 @@ from gen_data.generator.core.shutter import INSTANT, Shutter
 from gen_data.generator.renderers.warp.frame_context import CameraState, render_view
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from gen_data.generator.renderers.warp.shutter_integration import integrate_light, split_slices
-from gen_data.generator.renderers.warp.visibility.banded_gbuffer import render_bands
-from gen_data.generator.renderers.warp.visibility.reprojection import make_bands
+from gen_data.generator.renderers.warp.visibility.reprojection import make_bands, render_bands
 from tests.renderers.moving import FACING, LENS, MESHES, even_track, world
 
 LABELS = frozenset(

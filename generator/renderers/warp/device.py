@@ -20,9 +20,8 @@ from pathlib import Path
 
 import warp as wp
 
-from gen_data.generator.core.child_processes import end_with_parent
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.silence_stdio import silence_stdio
+from gen_data.generator.core.processes import end_with_parent, silence_stdio
 
 # Not -march=native: fused multiply-adds would change bytes between machines. The inlining threshold
 # saves a quarter of all ray time.

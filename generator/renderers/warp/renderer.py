@@ -22,10 +22,10 @@ from gen_data.generator.renderers.warp.scene.scene_packing import pack_view, pac
 from gen_data.generator.renderers.warp.settings import RenderSettings
 from gen_data.generator.renderers.warp.shutter_integration import expose_shutter
 from gen_data.generator.renderers.warp.visibility.amodal import render_silhouettes
-from gen_data.generator.renderers.warp.visibility.banded_gbuffer import copy_gbuffer
 from gen_data.generator.renderers.warp.visibility.gbuffer import find_visible
 from gen_data.generator.renderers.warp.visibility.label_images import label_images
 from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow_images
+from gen_data.generator.renderers.warp.visibility.reprojection import copy_gbuffer
 
 
 class WarpRenderer:

@@ -37,15 +37,13 @@ from gen_data.generator.renderers.warp.realtime.realtime_shading import (
 from gen_data.generator.renderers.warp.scene.light_selection import main_lamp_numbers
 from gen_data.generator.renderers.warp.scene.scene_packing import copy_world, repack_moved
 from gen_data.generator.renderers.warp.visibility.amodal import rolling_silhouettes
-from gen_data.generator.renderers.warp.visibility.banded_gbuffer import (
-    BandedGBuffer,
-    add_margin,
-    render_bands,
-)
 from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow_images
 from gen_data.generator.renderers.warp.visibility.reprojection import (
+    BandedGBuffer,
     ShutterSampling,
+    add_margin,
     plan_sampling,
+    render_bands,
     split_bands,
 )
 

@@ -90,9 +90,7 @@ class Events:
     def concatenate(parts: list[Events]) -> Events:
         """All events in the given order."""
         return Events(
-            np.concatenate([part.time_s for part in parts]),
-            np.concatenate([part.pixel for part in parts]),
-            np.concatenate([part.polarity for part in parts]),
+            *(np.concatenate([getattr(part, name) for part in parts]) for name in Events.__slots__)
         )
 
 

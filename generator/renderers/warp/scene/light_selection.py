@@ -17,7 +17,7 @@ from gen_data.generator.core.scene import LIGHT_KINDS, PANEL_KINDS, Environment,
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.frame_context import CameraView
 from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import count_free_paths
-from gen_data.generator.renderers.warp.scene.envmap_peaks import SkyLamp
+from gen_data.generator.renderers.warp.scene.environment_maps import SkyLamp
 from gen_data.generator.renderers.warp.scene.kernels import analytic_lights, records
 from gen_data.generator.renderers.warp.scene.scene_packing import (
     PackedWorld,

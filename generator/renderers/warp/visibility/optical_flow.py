@@ -20,18 +20,16 @@ from gen_data.generator.renderers.warp.frame_context import (
     RowBand,
     render_view,
 )
-from gen_data.generator.renderers.warp.visibility.banded_gbuffer import (
-    BandedGBuffer,
-    full_band,
-    render_bands,
-)
 from gen_data.generator.renderers.warp.visibility.reprojection import (
+    BandedGBuffer,
     ReprojectedPoints,
     ScenePoints,
     deform_points,
     find_carriers,
+    full_band,
     gather_points,
     make_bands,
+    render_bands,
     reproject,
     split_bands,
 )
