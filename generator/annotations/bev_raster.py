@@ -70,16 +70,14 @@ def covered_cells(grid: Grid, triangles_m: Array) -> NDArray[np.bool_]:
     steps = np.zeros((grid.count, grid.count + 1), np.int32)
     np.add.at(steps, (row, first), 1)
     np.add.at(steps, (row, last), -1)
-    mask: NDArray[np.bool_] = np.cumsum(steps, axis=1)[:, :-1] > 0
-    return mask
+    return np.asarray(np.cumsum(steps, axis=1)[:, :-1] > 0)
 
 
 def _near(grid: Grid, triangles_m: Array) -> Array:
     """The triangles that may overlap the grid, as (row, column, height) [n, 3, 3]."""
     corners = grid.cells(triangles_m)
     low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
-    near: Array = corners[((high > 0.0) & (low < grid.count)).all(axis=1)]
-    return near
+    return np.asarray(corners[((high > 0.0) & (low < grid.count)).all(axis=1)])
 
 
 def _spans(

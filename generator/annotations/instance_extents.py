@@ -74,8 +74,7 @@ def visible_mask(reading: SensorReading, truth: ObjectTruth) -> NDArray[np.bool_
     if truth.box is None:
         return np.zeros((0, 0), dtype=bool)
     ids = crop(reading.channels[Channel.INSTANCE], truth.box)
-    mask: NDArray[np.bool_] = ids == truth.instance.instance_id
-    return mask
+    return np.asarray(ids == truth.instance.instance_id)
 
 
 def find_silhouette(reading: SensorReading, instance: Instance) -> Silhouette:

@@ -119,5 +119,4 @@ def is_seen(reading: SensorReading, p_camera: Array, uv: Array) -> NDArray[np.bo
     away_m = np.sqrt((p_camera * p_camera).sum(axis=1))
     first_hit = p_camera * (np.minimum(range_m, away_m) / away_m)[:, None]
     above_m = reading.camera.T_world_camera.rotate(first_hit - p_camera)[:, 2]
-    seen: NDArray[np.bool_] = above_m < OCCLUDER_MIN_M
-    return seen
+    return np.asarray(above_m < OCCLUDER_MIN_M)

@@ -188,8 +188,7 @@ def _first_fold(lens: Lens, end_rad: float) -> float | None:
         arguments = np.tan(angles) if lens.model == "brown_conrady" else angles
         with np.errstate(all="ignore"):
             _, slope, divisor = _radial(lens, arguments)
-        rising: NDArray[np.bool_] = (slope > 0.0) & (divisor > 0.0)
-        return rising
+        return np.asarray((slope > 0.0) & (divisor > 0.0))
 
     angles = np.linspace(0.0, end_rad, 4 * _SAMPLES)
     falls = np.flatnonzero(~rises(angles))

@@ -52,8 +52,7 @@ def world_points(
         return camera.T_world_camera.apply(p_camera_m)
     delays_s = camera.shutter.row_delays_s(camera.intrinsics.height_px)
     R, t = _camera_poses(scene, camera, delays_s)
-    placed: Array = np.einsum("nij,nj->ni", R[rows], p_camera_m, optimize=False) + t[rows]
-    return placed
+    return np.asarray(np.einsum("nij,nj->ni", R[rows], p_camera_m, optimize=False) + t[rows])
 
 
 def _find_carrier(scene: Scene, instance: Instance) -> str:

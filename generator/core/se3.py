@@ -69,8 +69,7 @@ class SE3:
 
     def apply(self, points_m: Array) -> Array:
         """Points mapped to the outer frame [m], shape [..., 3]."""
-        moved: Array = self.rotate(points_m) + np.asarray(self.translation_m)
-        return moved
+        return np.asarray(self.rotate(points_m) + self.translation_m)
 
     def rotate(self, vectors: Array) -> Array:
         """Directions mapped to the outer frame, shape [..., 3]."""
@@ -125,8 +124,7 @@ def quaternions_to_rotations(quaternions_wxyz: Array) -> Array:
 def unit_quaternions_to_rotations(quaternions_wxyz: Array) -> Array:
     """Rotation matrices [n, 3, 3] of unit quaternions [n, 4], as ``SE3.rotation``."""
     rows = np.array(_rotation_rows(*quaternions_wxyz.T))
-    rotations: Array = np.ascontiguousarray(rows.transpose(2, 0, 1))
-    return rotations
+    return np.ascontiguousarray(rows.transpose(2, 0, 1))
 
 
 def _rotation_rows(w: Any, x: Any, y: Any, z: Any) -> list[list[Any]]:

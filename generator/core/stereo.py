@@ -44,8 +44,7 @@ def disparity_px(z_depth_m: Float32, focal_baseline: float) -> Float32:
     ``focal_baseline`` is the focal length [px] times the baseline [m]; negative = the other camera
     is to the left.
     """
-    disparity: Float32 = np.divide(focal_baseline, z_depth_m, dtype=np.float32)
-    return disparity
+    return np.asarray(np.divide(focal_baseline, z_depth_m, dtype=np.float32))
 
 
 def is_seen_by_both(

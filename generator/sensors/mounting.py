@@ -318,8 +318,7 @@ def mount_motion(scene: Scene, device: str) -> MountMotion:
 def velocity_at(twist: Twist, lever_m: Array) -> Array:
     """Velocity [m/s] of points at ``lever_m`` from the origin of a moving frame, [..., 3]."""
     omega = np.asarray(twist.angular_velocity_rad_s)
-    velocity: Array = np.asarray(twist.velocity_m_s) + np.cross(omega, lever_m)
-    return velocity
+    return np.asarray(np.asarray(twist.velocity_m_s) + np.cross(omega, lever_m))
 
 
 def rotation_vector(turn: SE3) -> Array:

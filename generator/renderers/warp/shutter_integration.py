@@ -163,8 +163,7 @@ def integrate_light(rendered: CameraView) -> Float32:
     rendered = replace(rendered, world=copy_world(rendered.world))
     radiance = shade_pixels(rendered)
     smooth_edges(rendered, radiance)
-    image: Float32 = radiance.numpy().reshape(rendered.view.height, rendered.view.width, 3)
-    return image
+    return np.asarray(radiance.numpy().reshape(rendered.view.height, rendered.view.width, 3))
 
 
 def _keep_main_lamps(reference: CameraView) -> CameraView:

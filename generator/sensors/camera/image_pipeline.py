@@ -34,11 +34,10 @@ from gen_data.generator.sensors.camera.exposure import (
     meter_ev100,
     saturation_cd_m2,
 )
-from gen_data.generator.sensors.camera.glare import add_glare
 from gen_data.generator.sensors.camera.image_sensor import ImageSensor, expose, filter_at, mosaic
 from gen_data.generator.sensors.camera.isp import Tone, display_values, to_bytes, tone_to_bytes
 from gen_data.generator.sensors.camera.lens_drops import lens_drops, refract_in_drops
-from gen_data.generator.sensors.camera.optics import add_flare
+from gen_data.generator.sensors.camera.optics import add_flare, add_glare
 from gen_data.generator.sensors.device_presets import check_preset, preset_path
 
 NONE = Constant(0.0)

@@ -82,8 +82,7 @@ def white_balance_gains(image: Float32, share: float, warmth_ev: float) -> Float
 def scale_saturation(image: Float32, factor: float) -> Float32:
     """Scale the difference of colours from grey of the same luminance."""
     grey = luminance(image)[..., None]
-    colors: Float32 = grey + np.float32(factor) * (image - grey)
-    return colors
+    return np.asarray(grey + np.float32(factor) * (image - grey))
 
 
 def sharpen(display: Float32, amount: float, radius_px: float) -> Float32:
@@ -122,8 +121,7 @@ def filmic(value: NDArray[Real]) -> NDArray[Real]:
     toe_weight = 1.0 - t * t * (3.0 - 2.0 * t)
     lower = toe * toe_weight + value * (1.0 - toe_weight)
     curve: NDArray[Real] = np.where(value < shoulder_start, lower, shoulder)
-    clipped: NDArray[Real] = np.clip(curve, 0.0, 1.0)
-    return clipped
+    return np.asarray(np.clip(curve, 0.0, 1.0))
 
 
 def knee(value: NDArray[Real]) -> NDArray[Real]:
@@ -134,8 +132,7 @@ def knee(value: NDArray[Real]) -> NDArray[Real]:
 
 def log(value: NDArray[Real], white: float) -> NDArray[Real]:
     """``ln(1 + mu x) / ln(1 + mu)`` of ``x = value / white`` with ``mu = 8 white``."""
-    curve: NDArray[Real] = np.log1p(_LOG_SLOPE * value) / math.log1p(_LOG_SLOPE * white)
-    return curve
+    return np.asarray(np.log1p(_LOG_SLOPE * value) / math.log1p(_LOG_SLOPE * white))
 
 
 def display_values(value: NDArray[Real], tone: Tone, white: float = 1.0) -> NDArray[Real]:

@@ -11,7 +11,7 @@ from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.scene import Camera, Weather
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Streams
-from gen_data.generator.sensors.camera.glare import blur, halve
+from gen_data.generator.sensors.camera.optics import blur, halve
 
 _RADII = (0.004, 0.022)
 """Smallest and largest radius of drops over the image's width."""

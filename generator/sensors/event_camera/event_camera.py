@@ -60,8 +60,7 @@ class Pixels:
 
     def levels(self, logarithm: Array) -> Array:
         """Log intensity in units of the threshold; whole numbers are the trigger levels."""
-        levels: Array = logarithm / self.threshold + self.phase
-        return levels
+        return np.asarray(logarithm / self.threshold + self.phase)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -113,8 +112,7 @@ def stable_order(
 
 def log_response(luminance: Array) -> Array:
     """Logarithm of luminance [cd/m^2] plus dark current."""
-    logarithm: Array = np.log(np.maximum(luminance, 0.0) + DARK_CD_M2)
-    return logarithm
+    return np.asarray(np.log(np.maximum(luminance, 0.0) + DARK_CD_M2))
 
 
 def signal_events(levels: list[Array], times_s: Array) -> Events:

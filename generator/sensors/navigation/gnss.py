@@ -184,8 +184,7 @@ def _is_visible(
     antenna = Lidar("antenna", "", T_world_lidar=SE3(motion.pose(time_s).translation_m))
     around = remove_carrier(scene_at(scene, float(time_s)), rig)
     rays = LidarRays(sky.astype(np.float32), 0.0, 1, OCCLUSION_RANGE_M)
-    visible: NDArray[np.bool_] = ~np.isfinite(renderer.scan(around, antenna, rays).range_m[:, 0])
-    return visible
+    return np.asarray(~np.isfinite(renderer.scan(around, antenna, rays).range_m[:, 0]))
 
 
 def _compute_fixes(sky: Array, visible: NDArray[np.bool_]) -> Fixes:
@@ -213,8 +212,7 @@ def _dilution(sky: Array) -> Array:
     if abs(float(np.linalg.det(normal))) < 1e-9:
         return np.full(2, np.inf)
     q = np.diag(np.linalg.inv(normal))
-    dilution: Array = np.sqrt(np.array([q[0] + q[1], q[2]]))
-    return dilution
+    return np.asarray(np.sqrt(np.array([q[0] + q[1], q[2]])))
 
 
 def _draw_slow_errors(times_s: Array, rate_hz: float, correlation_s: float, shared: Rng) -> Array:
@@ -231,5 +229,4 @@ def _draw_slow_errors(times_s: Array, rate_hz: float, correlation_s: float, shar
     for k, step in enumerate(fresh):
         value = kept * value + step
         values[k] = value
-    slow: Array = values[np.rint(times_s * rate_hz).astype(int)]
-    return slow
+    return np.asarray(values[np.rint(times_s * rate_hz).astype(int)])

@@ -110,8 +110,7 @@ def _draw_errors(model: ImuModel, times_s: Array, rate_hz: float, rng: Rng) -> A
     rows = np.rint(times_s * rate_hz).astype(int)
     walk = _per_axis(model, "bias_random_walk") / math.sqrt(rate_hz) * walks[rows]
     white = _per_axis(model, "noise") * math.sqrt(rate_hz) * rng.standard_normal((len(times_s), 6))
-    errors: Array = bias + walk + white
-    return errors
+    return np.asarray(bias + walk + white)
 
 
 def _per_axis(model: ImuModel, field: str) -> Array:

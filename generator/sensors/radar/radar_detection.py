@@ -142,11 +142,9 @@ def merge_echoes(echo: Echo, group: NDArray[np.int64], power: Array) -> Echo:
     total = np.bincount(group, power, count)
 
     def mean(values: Array) -> Array:
-        middle: Array = np.bincount(group, power * values, count) / total
-        return middle
+        return np.asarray(np.bincount(group, power * values, count) / total)
 
-    order = np.lexsort((-power, group))
-    strongest = order[np.searchsorted(group[order], np.arange(count))]
+    strongest = strongest_members(group, power)
     return Echo(
         mean(echo.range_m),
         mean(echo.azimuth_rad),
@@ -157,6 +155,13 @@ def merge_echoes(echo: Echo, group: NDArray[np.int64], power: Array) -> Echo:
         echo.instance_id[strongest],
         echo.origin[strongest],
     )
+
+
+def strongest_members(group: NDArray[np.int64], power: Array) -> NDArray[np.intp]:
+    """Index of the strongest member of every group."""
+    order = np.lexsort((-power, group))
+    count = int(group.max()) + 1 if len(group) else 0
+    return np.asarray(order[np.searchsorted(group[order], np.arange(count))])
 
 
 def interpolate_curve(curve: Curve, azimuth_rad: Array) -> Array:
@@ -226,5 +231,4 @@ def area_factor(category: str, surface: NDArray[np.uint8]) -> Array:
     if category in METAL:
         return np.full(len(surface), 10.0 ** (0.1 * METAL_DB))
     table = np.array([GAMMA_DB[name] for name in SURFACES])
-    factor: Array = 10.0 ** (0.1 * table[surface])
-    return factor
+    return np.asarray(10.0 ** (0.1 * table[surface]))

@@ -246,8 +246,7 @@ def _px_per_rad(k: Intrinsics, places_px: Array) -> Array:
     area = np.cross(across, down)
     usual = 1.0 / k.fx_px
     angles = np.nan_to_num(np.sqrt(np.sqrt((area * area).sum(axis=1))), nan=usual)
-    scale: Array = 1.0 / np.maximum(angles, 0.05 * usual)
-    return scale
+    return np.asarray(1.0 / np.maximum(angles, 0.05 * usual))
 
 
 def poisson(expected: float, rng: Rng) -> int:

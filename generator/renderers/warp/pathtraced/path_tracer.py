@@ -78,8 +78,7 @@ def denoise(light: Float32, albedo: Float32, normal: Float32) -> Float32:
         fault = device.get_error()
     if fault is not None:
         raise ConfigError(f"render.denoise: Open Image Denoise reports: {fault}")
-    clean: Float32 = result * np.float32(1.0 / scale)
-    return clean
+    return np.asarray(result * np.float32(1.0 / scale))
 
 
 # Launches are short, so that a device that also drives a screen stays responsive.
@@ -239,8 +238,7 @@ def _mean_of_texels(values: Array) -> Array:
     beside = np.roll(values, 1, axis=1) + np.roll(values, -1, axis=1)
     values = 0.75 * values + 0.125 * beside
     padded = np.pad(values, ((1, 1), (0, 0)), "edge")
-    mean: Array = 0.75 * values + 0.125 * (padded[:-2] + padded[2:])
-    return mean
+    return np.asarray(0.75 * values + 0.125 * (padded[:-2] + padded[2:]))
 
 
 def _cumulate(light: Array) -> NDArray[np.float32]:

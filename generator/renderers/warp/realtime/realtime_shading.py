@@ -100,8 +100,7 @@ def add_precipitation(frame: CameraView, z_m: wp.array, radiance: wp.array) -> N
 
 def radiance_image(radiance: wp.array, view: records.View) -> Float32:
     """Radiance [cd/m^2], linear RGB, float32 [h, w, 3]; a copy of the flat array."""
-    image: Float32 = radiance.numpy().reshape(view.height, view.width, 3).copy()
-    return image
+    return np.asarray(radiance.numpy().reshape(view.height, view.width, 3).copy())
 
 
 def darken_outside(view: records.View, radiance: wp.array) -> None:

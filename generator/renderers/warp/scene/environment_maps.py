@@ -167,8 +167,7 @@ def _excess(image: Array, part: NDArray[np.bool_], floor: float) -> Array:
     bright = luminance(image.astype(np.float64))
     brighter = part & (bright > floor)
     share = np.where(brighter, 1.0 - floor / np.where(brighter, bright, 1.0), 0.0)
-    excess: Array = image * share[..., None]
-    return excess
+    return np.asarray(image * share[..., None])
 
 
 def _fit_lamp(excess: Array, sphere: _Sphere) -> SkyLamp:
@@ -193,8 +192,7 @@ def _fit_lamp(excess: Array, sphere: _Sphere) -> SkyLamp:
 
 def _cosine(towards: Vec3 | Array, sphere: _Sphere) -> Array:
     x, y, z = (sphere.directions[..., k] * float(towards[k]) for k in range(3))
-    cosine: Array = x + y + z
-    return cosine
+    return np.asarray(x + y + z)
 
 
 def _strength(lamp: SkyLamp) -> float:
@@ -250,8 +248,7 @@ def _dim(image: Float32, light: Float32, rest: Float32) -> Float32:
     left = luminance(rest) / np.where(before > 0.0, before, 1.0)
     size = (image.shape[1], image.shape[0])
     part = cv2.resize(left.astype(np.float32), size, interpolation=cv2.INTER_NEAREST)
-    dimmed: Float32 = image * part[..., None]
-    return dimmed
+    return np.asarray(image * part[..., None])
 
 
 def _upload(
@@ -287,8 +284,7 @@ def irradiance_coefficients(image: Float32) -> Array:
     norm = np.array([0.282095, *[0.488603] * 3, 1.092548, 1.092548, 0.315392, 1.092548, 0.546274])
     transfer = np.array([1.0, *[2.0 / 3.0] * 3, *[0.25] * 5])
     moments = np.einsum("khw,hw,hwc->kc", basis, solid, image.astype(np.float64), optimize=False)
-    coefficients: Array = moments * (norm * norm * transfer)[:, None]
-    return coefficients
+    return np.asarray(moments * (norm * norm * transfer)[:, None])
 
 
 def add_border(maps: Float32) -> Float32:
@@ -331,5 +327,4 @@ def _shrink(image: Float32, height: int) -> Float32:
     if image.shape[0] <= height:
         return image
     size = (2 * height, height)
-    shrunk: Float32 = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    return shrunk
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))

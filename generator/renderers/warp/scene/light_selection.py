@@ -104,13 +104,11 @@ def dipped_share(lamp: NDArray[np.void], d: Sequence[Array]) -> Array:
     s = (side - analytic_lights.HOT_SIDE) / analytic_lights.SIDE_WIDTH
     v = np.maximum(below, 0.0) / analytic_lights.DOWN_WIDTH
     lit = t * t * (3.0 - 2.0 * t) / ((1.0 + s * s) * (1.0 + v * v))
-    share: Array = np.maximum(lit, analytic_lights.STRAY)
-    return share
+    return np.asarray(np.maximum(lit, analytic_lights.STRAY))
 
 
 def _dot(a: Sequence[Array], b: Sequence[Array] | Sequence[float]) -> Array:
-    product: Array = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    return product
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 def _sparse_points(view: records.View, gbuffer: GBuffer) -> tuple[Array, Array]:

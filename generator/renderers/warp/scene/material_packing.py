@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gen_data.generator.core.asset_types import SURFACES, Material
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.scene.device_textures import DeviceTexture
+from gen_data.generator.renderers.warp.scene.device_assets import DeviceTexture
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.struct_dtypes import stack_records, struct_dtype
 
@@ -94,8 +94,7 @@ def cutout_slots(
     holes = np.array([*(texture.has_cutouts for texture in textures.values()), False])
     clear = (surfaces["transmission"] > 0.5) | (surfaces["opacity"] < 0.5)
     flags = holes[surfaces["texture"]] * int(records.HOLES) + clear * int(records.CLEAR)
-    slots: NDArray[np.int32] = flags.astype(np.int32)
-    return slots
+    return np.asarray(flags.astype(np.int32))
 
 
 def cutout_bodies(slots: NDArray[np.int32], counts: NDArray[np.int64]) -> NDArray[np.int32]:

@@ -24,7 +24,7 @@ from gen_data.generator.core.scene import (
 from gen_data.generator.core.se3 import Array, unit_quaternions_to_rotations
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.scene.bvh import body_tree
-from gen_data.generator.renderers.warp.scene.device_meshes import DeviceMesh
+from gen_data.generator.renderers.warp.scene.device_assets import DeviceMesh
 from gen_data.generator.renderers.warp.scene.environment_maps import DeviceEnvironment
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.material_packing import (

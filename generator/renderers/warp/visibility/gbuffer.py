@@ -25,8 +25,7 @@ CORNERS = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
 
 def has_cutouts(body_records: NDArray[np.void]) -> NDArray[np.bool_]:
     """Whether rays may pass holes in each body, bool [n]."""
-    holes: NDArray[np.bool_] = (body_records["cutouts"] & int(records.HOLES)) != 0
-    return holes
+    return np.asarray((body_records["cutouts"] & int(records.HOLES)) != 0)
 
 
 def trace_over(

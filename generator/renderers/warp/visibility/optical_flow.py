@@ -104,14 +104,12 @@ def _flow_channels(
 def _flow(found: ReprojectedPoints) -> Float32:
     height, width = found.image_px.shape[:2]
     centres = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1)
-    flow: Float32 = (found.image_px - centres).astype(np.float32)
-    return flow
+    return np.asarray((found.image_px - centres).astype(np.float32))
 
 
 def _scene_flow(points: ScenePoints, found: ReprojectedPoints) -> Float32:
     there = (points.places[..., 3] > 0.0)[..., None]
-    flow: Float32 = np.where(there, found.p_camera - points.p_camera, np.nan).astype(np.float32)
-    return flow
+    return np.asarray(np.where(there, found.p_camera - points.p_camera, np.nan).astype(np.float32))
 
 
 def find_occluded(
@@ -161,5 +159,4 @@ def _undefined_flow(
 
 
 def _dot(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
-    product: NDArray[Any] = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
-    return product
+    return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2])

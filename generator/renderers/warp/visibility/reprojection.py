@@ -228,8 +228,7 @@ def _seen_points(gbuffer: BandedGBuffer, stride: int) -> Array:
     camera, z_m = gbuffer.intrinsics, gbuffer.z_m[::stride, ::stride].astype(np.float64)
     depth_m = np.where(gbuffer.hits[::stride, ::stride, 0] >= 0, z_m, 1.0)
     if not camera.straight:
-        scaled: Array = camera.pixel_rays()[::stride, ::stride] * depth_m[..., None]
-        return scaled
+        return np.asarray(camera.pixel_rays()[::stride, ::stride] * depth_m[..., None])
     u = np.arange(0, camera.width_px, stride) + 0.5
     v = np.arange(0, camera.height_px, stride) + 0.5
     x = (u[None, :] - camera.cx_px) / camera.fx_px * depth_m
@@ -254,8 +253,7 @@ def _interpolate(corners: Array, weights: Float32) -> Array:
     u = np.where(weights[:, 0] > 1.5, weights[:, 0] - 2.0, weights[:, 0]).astype(np.float64)
     v = weights[:, 1].astype(np.float64)
     shares = np.stack([1.0 - u - v, u, v], axis=-1)
-    sums: Array = np.einsum("nk,nki->ni", shares, corners, optimize=False)
-    return sums
+    return np.asarray(np.einsum("nk,nki->ni", shares, corners, optimize=False))
 
 
 BAND_PX = 0.25
