@@ -260,7 +260,7 @@ BAND_PX = 0.25
 """Largest motion of visible points within a band of rows."""
 BLUR_PX = 0.3
 """Largest motion within a slice of an exposure, if the camera's number of samples allows."""
-_STRIDE_PX = 4
+_SPARSE_PX = 4
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -284,8 +284,8 @@ def plan_sampling(rendered: CameraView) -> ShutterSampling:
     shutter = middle.camera.shutter
     ends = [_global_shutter_band(middle.later(side * shutter.open_s)) for side in (-0.5, 0.5)]
     carriers = find_carriers(middle.scene)
-    points = gather_points(gbuffer, carriers, _STRIDE_PX)
-    before, after = (reproject(points, [end], carriers, _STRIDE_PX).image_px for end in ends)
+    points = gather_points(gbuffer, carriers, _SPARSE_PX)
+    before, after = (reproject(points, [end], carriers, _SPARSE_PX).image_px for end in ends)
     way = after - before
     length = np.where(np.isfinite(way).all(axis=-1), np.sqrt((way * way).sum(axis=-1)), 0.0)
     vertical = np.where(length > 0.0, np.abs(way[..., 1]), 0.0)
@@ -336,9 +336,9 @@ def _dilate_rows(speeds: Array, travels_px: Array, height: int) -> Array:
     Given speeds in every few rows, and the vertical motion of the same points in that time.
     """
     highest = np.zeros(height)
-    reaches = np.ceil(0.5 * np.minimum(travels_px, 2.0 * height)).astype(int) + 2 * _STRIDE_PX
+    reaches = np.ceil(0.5 * np.minimum(travels_px, 2.0 * height)).astype(int) + 2 * _SPARSE_PX
     for k, (speed, reach) in enumerate(zip(speeds, reaches, strict=True)):
-        rows = slice(max(k * _STRIDE_PX - reach, 0), (k + 1) * _STRIDE_PX + reach)
+        rows = slice(max(k * _SPARSE_PX - reach, 0), (k + 1) * _SPARSE_PX + reach)
         highest[rows] = np.maximum(highest[rows], speed)
     return highest
 
