@@ -24,8 +24,7 @@ from gen_data.generator.core.scene import Body, Rig, Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.streams import Streams
 from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
-from gen_data.generator.sensors.lidar.presets import lidar_model
-from gen_data.generator.sensors.lidar.scan_pattern import make_sweep
+from gen_data.generator.sensors.lidar.scan_pattern import lidar_model, make_sweep
 
 
 def best_s(work: Callable[[], object], repeats: int) -> float:

@@ -19,10 +19,14 @@ from gen_data.generator.config.distributions import (
     Uniform,
     UniformInteger,
 )
-from gen_data.generator.core.area_lights import add_fixture, fixture_asset, remove_lights
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.photometry import scale_to_flux
+from gen_data.generator.core.photometry import (
+    add_fixture,
+    fixture_asset,
+    remove_lights,
+    scale_to_flux,
+)
 from gen_data.generator.core.scene import PANEL_KINDS, Light, LightKind, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng

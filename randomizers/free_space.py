@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from gen_data.generator.core.boxes import rectangles_overlap
 from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.obb import rectangles_overlap
 from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.se3 import SE3, Array, Vec3
 

@@ -21,15 +21,16 @@ from gen_data.generator.config.distributions import (
     UniformInteger,
     UnitInterval,
 )
-from gen_data.generator.core.area_lights import (
+from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.photometry import (
     add_fixture,
     fixture_asset,
+    flux_to_intensity_cd,
+    illuminance_to_intensity_cd,
     level_side,
     remove_lights,
 )
-from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
-from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.photometry import flux_to_intensity_cd, illuminance_to_intensity_cd
 from gen_data.generator.core.scene import LIGHT_KINDS, PANEL_KINDS, Light, LightKind, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng

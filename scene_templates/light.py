@@ -8,9 +8,8 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from gen_data.generator.core.area_lights import add_fixture, fixture_asset, level_side
 from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.photometry import scale_to_flux
+from gen_data.generator.core.photometry import add_fixture, fixture_asset, level_side, scale_to_flux
 from gen_data.generator.core.scene import PANEL_KINDS, LampKind, Light, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.scene_templates.element import Element

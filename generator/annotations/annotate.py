@@ -63,10 +63,7 @@ def annotate_ego(
 ) -> EgoTruth | None:
     """Annotate one sample as a whole; None without an annotator of samples.
 
-    Args:
-        scenes: As in ``FrameAnnotator``.
-        annotators: All of the data set.
-        assets: Geometry.
+    ``scenes`` are as in ``FrameAnnotator``.
     """
     of_frames = [a for a in annotators if isinstance(a, FrameAnnotator)]
     if not of_frames:

@@ -10,9 +10,15 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.annotations.bev_raster import Grid, covered_cells
+from gen_data.generator.annotations.bev_raster import (
+    Grid,
+    carriageways,
+    covered_cells,
+    footprints,
+    ribbon,
+    strips,
+)
 from gen_data.generator.annotations.boxes3d import oriented_box
-from gen_data.generator.annotations.ground_geometry import carriageways, footprints, ribbon, strips
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError

@@ -1,15 +1,20 @@
-"""Rasterisation of triangles on a horizontal grid: covered cells, and heights.
+"""Geometry on the ground as triangles in the world, and their rasterisation on a horizontal grid.
 
 A cell is covered if its centre is, as for label pixels of images.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.lane_geometry import border_line
+from gen_data.generator.core.scene import Body, Lane, Scene
 from gen_data.generator.core.se3 import SE3, Array
 
 Float32 = NDArray[np.float32]
@@ -39,14 +44,9 @@ class Grid:
 
 
 def heights_m(grid: Grid, triangles_m: Array) -> Float32:
-    """Height above the grid's origin of the highest triangle at every cell; -inf = none.
+    """Height of the highest of triangles [n, 3, 3] (world) at every cell above the grid's origin.
 
-    Args:
-        grid: The grid.
-        triangles_m: Corners in the world, [n, 3, 3].
-
-    Returns:
-        float32 [count, count].
+    float32 [count, count]; -inf = none.
     """
     high = np.full((grid.count, grid.count), -np.inf, np.float32)
     corners = _near(grid, triangles_m)
@@ -70,16 +70,14 @@ def covered_cells(grid: Grid, triangles_m: Array) -> NDArray[np.bool_]:
     steps = np.zeros((grid.count, grid.count + 1), np.int32)
     np.add.at(steps, (row, first), 1)
     np.add.at(steps, (row, last), -1)
-    mask: NDArray[np.bool_] = np.cumsum(steps, axis=1)[:, :-1] > 0
-    return mask
+    return np.asarray(np.cumsum(steps, axis=1)[:, :-1] > 0)
 
 
 def _near(grid: Grid, triangles_m: Array) -> Array:
     """The triangles that may overlap the grid, as (row, column, height) [n, 3, 3]."""
     corners = grid.cells(triangles_m)
     low, high = corners[..., :2].min(axis=1), corners[..., :2].max(axis=1)
-    near: Array = corners[((high > 0.0) & (low < grid.count)).all(axis=1)]
-    return near
+    return np.asarray(corners[((high > 0.0) & (low < grid.count)).all(axis=1)])
 
 
 def _spans(
@@ -117,3 +115,80 @@ def _slopes(corners: Array) -> Array:
     along_rows = (u[:, 2] * v[:, 1] - v[:, 2] * u[:, 1]) * inverse
     along_columns = (v[:, 2] * u[:, 0] - u[:, 2] * v[:, 0]) * inverse
     return np.stack([along_rows, along_columns], axis=1)
+
+
+CARRIAGEWAY = frozenset({"asphalt", "marking"})
+"""Roles of materials of drivable surfaces."""
+LOW_M = 2.0
+"""Geometry higher than this above the ground, as crowns of trees, does not occupy it."""
+DIRECTIONS = 48
+"""Directions that sample the outline of a footprint."""
+NOTHING: Array = np.zeros((0, 3, 3))
+
+
+def carriageways(scene: Scene, assets: AssetLibrary) -> Array:
+    """Triangles [n, 3, 3] of all drivable surfaces."""
+    parts = [
+        carriageway(body, assets)
+        for body in scene.bodies
+        if body.instance_id == 0 and body.motion == "static"
+    ]
+    return np.concatenate([NOTHING, *parts])
+
+
+@lru_cache(maxsize=32)
+def carriageway(body: Body, assets: AssetLibrary) -> Array:
+    """Upward triangles [n, 3, 3] of a body's carriageway; [0, 3, 3] for most bodies."""
+    materials = body.materials or assets.materials(body.asset)
+    slots = [k for k, material in enumerate(materials) if material.role in CARRIAGEWAY]
+    if not slots:
+        return NOTHING
+    mesh = assets.mesh(body.asset)
+    faces = mesh.faces[np.isin(mesh.face_slots, slots)]
+    vertices = body.T_world_body.apply(mesh.vertices_m.astype(np.float64) * body.scale)
+    triangles: Array = vertices[faces]
+    u, v = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    up = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] > 0.0
+    return triangles[up]
+
+
+def strips(lanes: Iterable[Lane]) -> Array:
+    """Triangles [n, 3, 3] of the areas of lanes."""
+    parts = []
+    for lane in lanes:
+        left, right = (np.asarray(border_line(lane, side)) for side in ("left", "right"))
+        parts.append(ribbon(left, right))
+    return np.concatenate([NOTHING, *parts])
+
+
+def ribbon(left: Array, right: Array) -> Array:
+    """Triangles [2 (n - 1), 3, 3] between two lines of n points."""
+    one = np.stack([left[:-1], right[:-1], right[1:]], axis=1)
+    other = np.stack([left[:-1], right[1:], left[1:]], axis=1)
+    return np.concatenate([one, other])
+
+
+def footprints(bodies: Iterable[Body], assets: AssetLibrary) -> Array:
+    """Triangles [n, 3, 3] of the ground occupied by bodies: convex outlines of their lowest 2 m."""
+    parts = []
+    for body in bodies:
+        outline = body.T_world_body.apply(low_outline(body.asset, body.scale, assets))
+        if len(outline) >= 3:
+            first = np.broadcast_to(outline[0], outline[2:].shape)
+            parts.append(np.stack([first, outline[1:-1], outline[2:]], axis=1))
+    return np.concatenate([NOTHING, *parts])
+
+
+@lru_cache(maxsize=4096)
+def low_outline(asset: str, scale: float, assets: AssetLibrary) -> Array:
+    """The convex outline [n, 3], counter-clockwise, of the lowest 2 m of an asset, at its foot."""
+    vertices = assets.mesh(asset).vertices_m.astype(np.float64) * scale
+    foot_m = vertices[:, 2].min()
+    low = vertices[vertices[:, 2] < foot_m + LOW_M]
+    angles = 2.0 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    towards = np.stack([np.cos(angles), np.sin(angles)])
+    # einsum keeps one order of summation, on which ties between vertices depend.
+    along = np.einsum("ij,jk->ik", low[:, :2], towards, optimize=False)
+    corners = along.argmax(axis=0)
+    outline = low[corners[np.diff(corners, append=corners[0] - 1) != 0]]
+    return np.column_stack([outline[:, :2], np.full(len(outline), foot_m)])

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.annotations.instance_extents import (
+    instance_error,
     silhouette_box,
     silhouette_crop,
     visible_mask,
 )
 from gen_data.generator.core.boxes import BoxPx
 from gen_data.generator.core.capture import SensorReading
-from gen_data.generator.core.errors import SampleError
 from gen_data.generator.core.sample import MaskPx, ObjectTruth
 from gen_data.generator.core.se3 import SE3
 
@@ -30,10 +30,7 @@ def check_truth(reading: SensorReading, truth: ObjectTruth) -> None:
         SampleError: they contradict each other; names sensor, instance and contradiction.
     """
     for fault in _faults(reading, truth):
-        instance = truth.instance
-        raise SampleError(
-            f"sensor '{reading.sensor}', instance {instance.instance_id} '{instance.name}': {fault}"
-        )
+        raise instance_error(reading, truth.instance, fault)
 
 
 def _faults(reading: SensorReading, truth: ObjectTruth) -> Iterator[str]:
@@ -77,7 +74,7 @@ def _silhouette_faults(
         yield "its silhouette is not stored tight"
     if truth.box is None:
         return
-    if outer is None or not _contains(outer, truth.box):
+    if outer is None or truth.box.intersection(outer) != truth.box:
         yield f"its visible box {truth.box} leaves the box {outer} of its silhouette"
     elif (visible > silhouette_crop(silhouette, truth.box)).any():
         yield "pixels are visible that are not in its silhouette"
@@ -120,15 +117,6 @@ def _keypoint_faults(reading: SensorReading, truth: ObjectTruth) -> Iterator[str
 
 def _is_tight(mask: NDArray[np.bool_]) -> bool:
     return bool(mask[0].any() and mask[-1].any() and mask[:, 0].any() and mask[:, -1].any())
-
-
-def _contains(outer: BoxPx, inner: BoxPx) -> bool:
-    return (
-        outer.x_min <= inner.x_min
-        and outer.y_min <= inner.y_min
-        and outer.x_max >= inner.x_max
-        and outer.y_max >= inner.y_max
-    )
 
 
 def _is_rigid(pose: SE3) -> bool:

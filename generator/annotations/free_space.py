@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.annotations.bev_raster import Float32, Grid, heights_m
-from gen_data.generator.annotations.ground_geometry import carriageway
+from gen_data.generator.annotations.bev_raster import Float32, Grid, carriageway, heights_m
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.boxes import tight_box
 from gen_data.generator.core.capture import Channel, SensorReading
@@ -74,4 +73,4 @@ def _crop_mask(mask: NDArray[np.bool_]) -> MaskPx:
     box = tight_box(mask)
     if box is None:
         return MaskPx(0, 0, np.zeros((0, 0), dtype=bool))
-    return MaskPx(box.x_min, box.y_min, mask[box.y_min : box.y_max, box.x_min : box.x_max].copy())
+    return MaskPx(box.x_min, box.y_min, mask[box.window()].copy())

@@ -57,9 +57,16 @@ def find_extents(ids: NDArray[np.uint16]) -> dict[int, Extent]:
     }
 
 
+def instance_error(reading: SensorReading, instance: Instance, fault: str) -> SampleError:
+    """An error that names sensor and instance."""
+    return SampleError(
+        f"sensor '{reading.sensor}', instance {instance.instance_id} '{instance.name}': {fault}"
+    )
+
+
 def crop(image: NDArray[np.generic], box: BoxPx) -> NDArray[np.generic]:
     """The part of an image that a box inside it covers, as a view."""
-    return image[box.y_min : box.y_max, box.x_min : box.x_max]
+    return image[box.window()]
 
 
 def visible_mask(reading: SensorReading, truth: ObjectTruth) -> NDArray[np.bool_]:
@@ -67,8 +74,7 @@ def visible_mask(reading: SensorReading, truth: ObjectTruth) -> NDArray[np.bool_
     if truth.box is None:
         return np.zeros((0, 0), dtype=bool)
     ids = crop(reading.channels[Channel.INSTANCE], truth.box)
-    mask: NDArray[np.bool_] = ids == truth.instance.instance_id
-    return mask
+    return np.asarray(ids == truth.instance.instance_id)
 
 
 def find_silhouette(reading: SensorReading, instance: Instance) -> Silhouette:
@@ -79,9 +85,10 @@ def find_silhouette(reading: SensorReading, instance: Instance) -> Silhouette:
     """
     silhouette = reading.silhouettes.get(instance.instance_id)
     if silhouette is None:
-        raise SampleError(
-            f"sensor '{reading.sensor}', instance {instance.instance_id} '{instance.name}': the "
-            "renderer returned no silhouette of it although the amodal channel was requested"
+        raise instance_error(
+            reading,
+            instance,
+            "the renderer returned no silhouette of it although the amodal channel was requested",
         )
     return silhouette
 
@@ -97,5 +104,4 @@ def silhouette_box(silhouette: Silhouette) -> BoxPx | None:
 
 def silhouette_crop(silhouette: Silhouette, box: BoxPx) -> NDArray[np.bool_]:
     """The silhouette's pixels inside a box that lies within the silhouette's own, as a view."""
-    x, y = silhouette.x_px, silhouette.y_px
-    return silhouette.mask[box.y_min - y : box.y_max - y, box.x_min - x : box.x_max - x]
+    return silhouette.mask[box.window(silhouette.x_px, silhouette.y_px)]

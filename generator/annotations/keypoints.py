@@ -66,14 +66,9 @@ def _locate(
     p_camera: Array,
     seen: Sequence[Array],
 ) -> KeypointTruth:
-    """One keypoint.
+    """One keypoint, at ``p_camera`` at the image's instant.
 
-    Args:
-        reading: The image.
-        instance_id: Instance of the point.
-        point: Which.
-        p_camera: Where it is at the image's instant.
-        seen: Where it is when its row is exposed: camera frame, and image.
+    ``seen`` is where it is when its row is exposed: camera frame, and image.
     """
     camera = reading.camera.intrinsics
     x, y, z = (float(v) for v in p_camera)
@@ -93,17 +88,11 @@ def is_visible(
     pixel: tuple[int, int],
     radius_m: float,
 ) -> bool:
-    """Whether a point of an instance is visible at its pixel.
+    """Whether a point of an instance, in the camera frame [m], is visible at its pixel.
 
-    If the pixel shows another object behind the point, its ray just misses the silhouette: then one
-    of the eight neighbours must show the instance.
-
-    Args:
-        reading: With ids, range and normals.
-        instance_id: Of the instance that the point belongs to.
-        p_camera: The point [m], camera frame.
-        pixel: Column and row of its image.
-        radius_m: How deep it may lie below the surface.
+    It may lie ``radius_m`` below the surface. If the pixel (column, row) shows another object
+    behind the point, its ray just misses the silhouette: then one of the eight neighbours must
+    show the instance.
     """
     column, row = pixel
     left, top = max(column - 1, 0), max(row - 1, 0)

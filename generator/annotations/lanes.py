@@ -110,17 +110,13 @@ def thin_line(uv: Array, step_px: float) -> NDArray[np.intp]:
 
 
 def is_seen(reading: SensorReading, p_camera: Array, uv: Array) -> NDArray[np.bool_]:
-    """Whether points on the ground are visible, bool [n]: not occluded by objects on it.
+    """Whether points on the ground, [n, 3] in the camera frame, are visible, bool [n].
 
-    Args:
-        reading: With ranges.
-        p_camera: Points, camera frame, [n, 3].
-        uv: Their image coordinates, [n, 2].
+    They are unless objects on the ground occlude them. ``uv`` are their image coordinates, [n, 2].
     """
     columns, rows = (uv[:, k].astype(np.intp) for k in (0, 1))
     range_m = reading.channels[Channel.RANGE][rows, columns].astype(np.float64)
     away_m = np.sqrt((p_camera * p_camera).sum(axis=1))
     first_hit = p_camera * (np.minimum(range_m, away_m) / away_m)[:, None]
     above_m = reading.camera.T_world_camera.rotate(first_hit - p_camera)[:, 2]
-    seen: NDArray[np.bool_] = above_m < OCCLUDER_MIN_M
-    return seen
+    return np.asarray(above_m < OCCLUDER_MIN_M)

@@ -7,10 +7,9 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from gen_data.generator.annotations.instance_extents import crop, visible_mask
+from gen_data.generator.annotations.instance_extents import crop, instance_error, visible_mask
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.errors import SampleError
 from gen_data.generator.core.sample import ObjectTruth
 from gen_data.generator.core.scene import Scene
 
@@ -38,9 +37,8 @@ class PartMasks(Strict):
             shown = crop(reading.channels[Channel.PART], truth.box)[visible_mask(reading, truth)]
             counts = np.bincount(shown, minlength=len(counts))
         if len(counts) > len(instance.parts) + 1:
-            raise SampleError(
-                f"sensor '{reading.sensor}', instance {instance.instance_id} '{instance.name}': "
-                f"the part image shows part {len(counts) - 1}; it has {len(instance.parts)} parts"
-            )
+            shown_part, known = len(counts) - 1, len(instance.parts)
+            fault = f"the part image shows part {shown_part}; it has {known} parts"
+            raise instance_error(reading, instance, fault)
         names = instance.parts
         return replace(truth, part_px={name: int(counts[k]) for k, name in enumerate(names, 1)})

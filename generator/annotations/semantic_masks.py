@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal
 
-from gen_data.generator.annotations.instance_extents import crop, visible_mask
+from gen_data.generator.annotations.instance_extents import crop, instance_error, visible_mask
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.errors import SampleError
 from gen_data.generator.core.sample import ObjectTruth
 from gen_data.generator.core.scene import Scene
 
@@ -28,9 +27,8 @@ class SemanticMasks(Strict):
             instance = truth.instance
             shown = crop(reading.channels[Channel.CATEGORY], truth.box)
             if (shown[visible_mask(reading, truth)] != instance.category_id).any():
-                raise SampleError(
-                    f"sensor '{reading.sensor}', instance {instance.instance_id} "
-                    f"'{instance.name}': the category image shows another category than "
-                    f"{instance.category_id} '{instance.category}' on its pixels"
-                )
+                raise instance_error(
+                    reading, instance, "the category image shows another category than"
+                    f" {instance.category_id} '{instance.category}' on its pixels",
+                )  # fmt: skip
         return truth

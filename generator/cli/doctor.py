@@ -23,7 +23,7 @@ import click
 
 from gen_data.generator import __version__
 from gen_data.generator.core.errors import GenDataError, SampleError
-from gen_data.generator.core.silence_stdio import silence_stdio
+from gen_data.generator.core.processes import silence_stdio
 
 REINSTALL = "reinstall it: pip install --force-reinstall --no-deps {}"
 

@@ -64,7 +64,7 @@ def _shipped_texts() -> dict[str, dict[str, str]]:
 def formats() -> None:
     """List the output formats."""
     from gen_data.exporters import TABLE
-    from gen_data.generator.config.describe import docstring_summary
+    from gen_data.generator.config.schema import docstring_summary
 
     width = max(map(len, TABLE))
     for name in TABLE:

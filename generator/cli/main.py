@@ -17,8 +17,8 @@ import click
 
 from gen_data.generator import __version__
 from gen_data.generator.cli.options import ConfigurationOptions, configuration_options
-from gen_data.generator.core.child_processes import SINGLE_THREADED
 from gen_data.generator.core.errors import ConfigError, ConfigWarning, GenDataError, Interrupted
+from gen_data.generator.core.processes import SINGLE_THREADED
 
 
 class LazyCommands(click.Group):

@@ -73,7 +73,7 @@ def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
         ready_exporters,
     )
     from gen_data.generator.assets.library import open_library
-    from gen_data.generator.config.describe import docstring_summary
+    from gen_data.generator.config.schema import docstring_summary
     from gen_data.generator.pipeline.splits import split_of
 
     general = config.general

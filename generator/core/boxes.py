@@ -1,4 +1,9 @@
-"""Boxes in images and in space."""
+"""Boxes in images and in space; whether oriented boxes overlap, on the ground and in space.
+
+Convex bodies are disjoint if and only if some axis separates them: their projections onto it are
+disjoint. For boxes it is enough to try the normals of their faces and, in space, the nine
+directions across an edge of each (Gottschalk, Lin and Manocha, "OBBTree", SIGGRAPH 1996).
+"""
 
 from __future__ import annotations
 
@@ -35,13 +40,32 @@ class BoxPx:
 
     def clipped(self, width_px: int, height_px: int) -> BoxPx | None:
         """The part inside an image, or None where nothing is left."""
-        box = BoxPx(
-            max(self.x_min, 0),
-            max(self.y_min, 0),
-            min(self.x_max, width_px),
-            min(self.y_max, height_px),
-        )
-        return box if box.width_px > 0 and box.height_px > 0 else None
+        box = self.intersection(BoxPx(0, 0, width_px, height_px))
+        return None if box.is_empty else box
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether it contains no pixel."""
+        return self.x_min >= self.x_max or self.y_min >= self.y_max
+
+    def intersection(self, other: BoxPx) -> BoxPx:
+        """The common part; empty, at the other's first corner, if there is none."""
+        x_min, y_min = max(self.x_min, other.x_min), max(self.y_min, other.y_min)
+        x_max, y_max = min(self.x_max, other.x_max), min(self.y_max, other.y_max)
+        if x_min >= x_max or y_min >= y_max:
+            return BoxPx(other.x_min, other.y_min, other.x_min, other.y_min)
+        return BoxPx(x_min, y_min, x_max, y_max)
+
+    def union(self, other: BoxPx) -> BoxPx:
+        """Smallest box around both, either of which may be empty."""
+        if self.is_empty or other.is_empty:
+            return other if self.is_empty else self
+        x_min, y_min = min(self.x_min, other.x_min), min(self.y_min, other.y_min)
+        return BoxPx(x_min, y_min, max(self.x_max, other.x_max), max(self.y_max, other.y_max))
+
+    def window(self, x0: int = 0, y0: int = 0) -> tuple[slice, slice]:
+        """Rows and columns of the box in an image whose first pixel is at ``x0``, ``y0``."""
+        return slice(self.y_min - y0, self.y_max - y0), slice(self.x_min - x0, self.x_max - x0)
 
 
 def tight_box(mask: NDArray[np.bool_], x0: int = 0, y0: int = 0) -> BoxPx | None:
@@ -74,3 +98,42 @@ class OrientedBox:
     def seen_from(self, T_other_frame: SE3) -> OrientedBox:
         """The same box, expressed in another frame."""
         return OrientedBox(T_other_frame @ self.T_frame_box, self.size_m)
+
+
+_SLACK_M = 1e-12
+
+
+def rectangles_overlap(a: Array, half_a_m: Array, b: Array, half_b_m: Array) -> NDArray[np.bool_]:
+    """Whether rectangles have inner points in common, pair by pair; arrays are broadcast.
+
+    ``a`` and ``b`` are their centres [m] and the directions of their first half extents: x, y,
+    cosine, sine; shape [..., 4]. Half extents have the shape [..., 2].
+    """
+    dx, dy = b[..., 0] - a[..., 0], b[..., 1] - a[..., 1]
+    cos_a, sin_a, cos_b, sin_b = a[..., 2], a[..., 3], b[..., 2], b[..., 3]
+    ax, ay, bx, by = half_a_m[..., 0], half_a_m[..., 1], half_b_m[..., 0], half_b_m[..., 1]
+    # Of the angle between both: how much of one's extents counts along the other's axes.
+    c = np.abs(cos_a * cos_b + sin_a * sin_b)
+    s = np.abs(cos_a * sin_b - sin_a * cos_b)
+    overlap: NDArray[np.bool_] = (
+        (np.abs(dx * cos_a + dy * sin_a) < ax + bx * c + by * s)
+        & (np.abs(dy * cos_a - dx * sin_a) < ay + bx * s + by * c)
+        & (np.abs(dx * cos_b + dy * sin_b) < bx + ax * c + ay * s)
+        & (np.abs(dy * cos_b - dx * sin_b) < by + ax * s + ay * c)
+    )
+    return overlap
+
+
+def boxes_touch(T_world_a: SE3, half_a_m: Vec3, T_world_b: SE3, half_b_m: Vec3) -> bool:
+    """Whether two boxes, given by their centres and half extents, have a point in common."""
+    between = np.asarray(T_world_b.translation_m) - np.asarray(T_world_a.translation_m)
+    half_a, half_b = np.array(half_a_m), np.array(half_b_m)
+    reach_m = float(np.sqrt(np.sum(half_a * half_a))) + float(np.sqrt(np.sum(half_b * half_b)))
+    if float(between @ between) > reach_m * reach_m:
+        return False
+    edges_a, edges_b = T_world_a.rotation().T, T_world_b.rotation().T
+    across = np.cross(edges_a[:, None], edges_b[None]).reshape(9, 3)
+    axes = np.concatenate([edges_a, edges_b, across])
+    span_m = np.abs(axes @ edges_a.T) @ half_a + np.abs(axes @ edges_b.T) @ half_b
+    # Parallel edges give an axis of length 0, along which nothing may count as separated.
+    return bool(np.all(np.abs(axes @ between) <= span_m + _SLACK_M))

@@ -38,14 +38,7 @@ _KNEE_LINEAR, _KNEE_ENCODED = 0.0031308, 0.04045
 
 
 def luminance(rgb: NDArray[Real]) -> NDArray[Real]:
-    """Luminance of linear RGB, in the unit of ``rgb``.
-
-    Args:
-        rgb: Shape [..., 3], float32 or float64.
-
-    Returns:
-        Shape [...], of the type of ``rgb``.
-    """
+    """Luminance [...] of linear RGB [..., 3], of its type (float32 or float64) and in its unit."""
     # Channel by channel: three times as fast as a reduction over a short last axis, and, unlike a
     # matrix product, added up in the same order on every processor.
     total: NDArray[Real] = rgb[..., 0] * _RED + rgb[..., 1] * _GREEN + rgb[..., 2] * _BLUE

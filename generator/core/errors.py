@@ -1,19 +1,4 @@
-"""Every error a user can meet, each with the exit code of the process.
-
-GenDataError                        1  should not be raised itself
-+-- ConfigError                     2  configuration or usage
-|   +-- UnknownNameError            2  a name that the data set does not have; also a KeyError
-|   +-- SampleIndexError            2  an index beyond the data set; also an IndexError
-+-- AssetError                      3  a mesh, texture or robot cannot be used
-|   +-- UnknownAsset                3  an id names none
-+-- StorageError                    4  disk full, no permission, foreign folder; resumable
-+-- DeterminismError                5  the same shard came out with other bytes
-+-- SampleError                     6  a sample cannot be made
-|   +-- SceneRejected               6  no valid layout in a bounded number of attempts
-|   +-- WorkerLost                  6  a worker process died again and again on one shard
-+-- VerificationError               7  a data set is not what its manifest says
-+-- Interrupted                   130  Ctrl-C
-"""
+"""Every error a user can meet, each with the exit code of the process."""
 
 from __future__ import annotations
 

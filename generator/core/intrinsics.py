@@ -92,13 +92,9 @@ class Intrinsics:
         return _pixel_rays(self)
 
     def unproject(self, z_depth_m: NDArray[np.floating]) -> Array:
-        """Points in the camera frame [m], shape [height, width, 3], of a z-depth image.
+        """Points of a z-depth image in the camera frame [m], [height, width, 3]; NaN without depth.
 
-        Args:
-            z_depth_m: Distance along the optical axis [m], shape [height, width]; inf = nothing.
-
-        Returns:
-            Points; NaN for pixels without depth.
+        ``z_depth_m`` is the distance along the optical axis, [height, width]; inf = nothing.
         """
         z = np.where(np.isfinite(z_depth_m), z_depth_m, np.nan).astype(np.float64)
         if not self.straight:

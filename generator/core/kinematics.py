@@ -18,13 +18,7 @@ POSITION_DECIMALS = 6
 
 
 def link_poses(robot: RobotModel, T_world_base: SE3, positions: Sequence[float]) -> dict[str, SE3]:
-    """``T_world_link`` of every link.
-
-    Args:
-        robot: The kinematic tree.
-        T_world_base: Pose of the root link.
-        positions: One per movable joint, in the model's order [rad or m].
-    """
+    """``T_world_link`` of every link; one position [rad or m] per movable joint, in their order."""
     if len(positions) != len(robot.movable):
         raise ValueError(f"{len(robot.movable)} joint positions needed, got {len(positions)}")
     poses = {robot.links[0]: T_world_base}
@@ -51,10 +45,7 @@ def make_link_bodies(
 ) -> tuple[Body, ...]:
     """The bodies of a robot's visible links at ``articulation.joint_positions``.
 
-    Args:
-        articulation: Pose of the robot's base and joint positions.
-        robot: Its model.
-        parts: ``Instance.parts`` of the robot; a link that is not listed has part id 0.
+    ``parts`` are ``Instance.parts`` of the robot; a link that is not listed has part id 0.
     """
     poses = link_poses(robot, articulation.T_world_base, articulation.joint_positions)
     part_ids = {link: k for k, link in enumerate(parts, 1)}
@@ -84,11 +75,7 @@ def is_arm_joint(joint: Joint, robot: RobotModel) -> bool:
 
 
 def leader_of(joint: Joint, joints: Sequence[Joint]) -> tuple[Joint, float, float]:
-    """The joint that determines a joint's position, through any number of ``mimic`` steps.
-
-    Args:
-        joint: Any joint.
-        joints: All joints of its robot.
+    """The joint, of all ``joints`` of its robot, that determines a joint's position by ``mimic``.
 
     Returns:
         Leader, multiplier and offset: ``position = multiplier * leader's position + offset``
@@ -118,15 +105,10 @@ def leader_of(joint: Joint, joints: Sequence[Joint]) -> tuple[Joint, float, floa
 
 
 def position_limits(joint: Joint, robot: RobotModel) -> tuple[float, float]:
-    """Positions of a joint that keep it and all joints that mimic it within their limits.
+    """Lowest and highest position [rad or m] that keep a joint and its followers within limits.
 
-    Args:
-        joint: A joint without ``mimic``.
-        robot: Its robot.
-
-    Returns:
-        Lowest and highest position [rad or m]; lowest > highest if no position satisfies all. A
-        continuous joint that no other mimics has -pi and pi.
+    Followers mimic it; the joint itself must not mimic another. Lowest > highest if no position
+    satisfies all. A continuous joint that no other mimics has -pi and pi.
     """
     low, high = (-math.pi, math.pi) if joint.kind == "continuous" else (joint.lower, joint.upper)
     for other in robot.movable:
@@ -141,9 +123,7 @@ def position_limits(joint: Joint, robot: RobotModel) -> tuple[float, float]:
 def positions_of(joints: Sequence[Joint], given: Mapping[str, float]) -> tuple[float, ...]:
     """Positions of all movable joints in order, including those that mimic others.
 
-    Args:
-        joints: All joints of a robot.
-        given: Position of every movable joint without ``mimic``, by name [rad or m].
+    ``given`` has the position [rad or m] of every movable joint without ``mimic``, by name.
     """
     positions = []
     for joint in (j for j in joints if j.movable):
@@ -159,12 +139,7 @@ def finger_position(joint: Joint, gripper: Gripper, opening: float) -> float:
 
 
 def gripper_opening(robot: RobotModel, positions: Sequence[float]) -> float:
-    """Opening of the gripper in [0, 1]; 0 without one.
-
-    Args:
-        robot: Its model.
-        positions: One per movable joint, in the model's order [rad or m].
-    """
+    """Opening of the gripper in [0, 1]; 0 without one. Positions as for ``link_poses``."""
     for joint, position in zip(robot.movable, positions, strict=True):
         if (
             robot.gripper
@@ -181,10 +156,8 @@ def all_positions(
 ) -> tuple[float, ...]:
     """Positions of all movable joints.
 
-    Args:
-        robot: Its model.
-        arm_positions: One per arm joint, in order [rad or m].
-        opening: Of the gripper, in [0, 1].
+    ``arm_positions`` are those of the arm joints, in order [rad or m]; ``opening`` of the gripper
+    is in [0, 1].
     """
     remaining = iter(arm_positions)
     given: dict[str, float] = {}

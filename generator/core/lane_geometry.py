@@ -44,9 +44,7 @@ class LaneLine:
     def pose(self, at_m: float, left_m: float = 0.0) -> SE3:
         """``T_world_place``: on the ground, X in the direction of travel, Z up.
 
-        Args:
-            at_m: Arc length, clamped to the lane.
-            left_m: How far to the left of the centre line.
+        It is ``left_m`` to the left of the centre line at an arc length, clamped to the lane.
         """
         points = self.lane.center_m
         k = min(max(bisect_right(self.at_m, at_m) - 1, 0), len(points) - 2)
@@ -67,14 +65,8 @@ def pose_on_lane(
 ) -> SE3:
     """``T_world_body`` of something whose lowest point stands on a place of a lane.
 
-    Its middle is at the place; on a ``frontage``, its front is.
-
-    Args:
-        T_world_place: As ``LaneLine.pose`` gives it.
-        lane: Where the place is.
-        facing: Where fronts point there.
-        bounds_m: Its smallest and largest coordinates, scale included.
-        turn_rad: How far it is turned from where it should face.
+    Its middle is at the place, as ``LaneLine.pose`` gives it; on a ``frontage``, its front is. Its
+    fronts point to ``facing`` there, turned by ``turn_rad``; its bounds include the scale.
     """
     (x0, y0, z0), (x1, y1, _) = bounds_m
     if facing == "left":

@@ -114,8 +114,7 @@ class Lens:
     def project(self, directions: Array) -> Array:
         """Project directions to the plane, [..., 2]; NaN for directions without an image.
 
-        Args:
-            directions: Camera frame, of any length but 0, [..., 3].
+        Directions are in the camera frame, of any length but 0, [..., 3].
         """
         x, y, z = np.moveaxis(np.asarray(directions, dtype=np.float64), -1, 0)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -132,10 +131,7 @@ class Lens:
     def unproject(self, points: Array) -> Array:
         """Unit directions of points, camera frame, [..., 3]; NaN for points outside the field.
 
-        The inverse of ``project``, to about 1e-13.
-
-        Args:
-            points: On the plane, [..., 2].
+        The inverse of ``project``, to about 1e-13, for points on the plane [..., 2].
         """
         points = np.asarray(points, dtype=np.float64)
         flat = points.reshape(-1, 2)
@@ -192,8 +188,7 @@ def _first_fold(lens: Lens, end_rad: float) -> float | None:
         arguments = np.tan(angles) if lens.model == "brown_conrady" else angles
         with np.errstate(all="ignore"):
             _, slope, divisor = _radial(lens, arguments)
-        rising: NDArray[np.bool_] = (slope > 0.0) & (divisor > 0.0)
-        return rising
+        return np.asarray((slope > 0.0) & (divisor > 0.0))
 
     angles = np.linspace(0.0, end_rad, 4 * _SAMPLES)
     falls = np.flatnonzero(~rises(angles))
@@ -325,13 +320,8 @@ def _undistort(lens: Lens, points: Array) -> Array:
 def _refine_inverse(lens: Lens, plane: Array, target: Array) -> Array:
     """Invert the distortion by Newton's method; steps that increase the error are halved.
 
-    Args:
-        lens: With tangential terms.
-        plane: Start values, [n, 2].
-        target: Distorted points, [n, 2].
-
-    Returns:
-        Undistorted points, [n, 2]; NaN where the iteration fails.
+    From start values ``plane`` to the undistorted points of ``target``, [n, 2] each; NaN where the
+    iteration fails. The lens has tangential terms.
     """
     miss, step = _newton_step(lens, plane, target)
     pace = np.ones(len(plane))

@@ -137,12 +137,9 @@ def columns_dtype(columns: Sequence[Column]) -> np.dtype[np.void]:
 
 
 def table_rows(kind: str, count: int, /, **columns: ArrayLike) -> NDArray[np.void]:
-    """Rows of a table; columns that are not given are 0.
+    """Rows of a table of a kind of device.
 
-    Args:
-        kind: Of the device.
-        count: Number of rows.
-        columns: Values by name: one per row, or one for all.
+    Columns hold one value per row, or one for all; those that are not given are 0.
     """
     rows: NDArray[Any] = np.zeros(count, table_dtype(kind))
     for name, values in columns.items():

@@ -31,15 +31,7 @@ class Member:
 def add_members(
     scene: Scene, group: ObjectGroup, members: Sequence[Member], assets: AssetIndex, first: int = 0
 ) -> Scene:
-    """The scene with a body ``group/k`` and an instance for every member.
-
-    Args:
-        scene: Where they are added.
-        group: The group they belong to.
-        members: In order.
-        assets: The library, which knows their categories.
-        first: Number ``k`` of the first one.
-    """
+    """The scene with a body ``group/k`` and an instance for every member; k is from ``first``."""
     ids = free_instance_ids(scene, len(members))
     bodies = []
     instances = []
@@ -60,11 +52,7 @@ def add_members(
         instances.append(
             Instance(instance_id, body.name, category, 0, member.asset, annotated=group.annotated)
         )
-    return replace(
-        scene,
-        bodies=(*scene.bodies, *bodies),
-        instances=(*scene.instances, *instances),
-    )
+    return replace(scene, bodies=(*scene.bodies, *bodies), instances=(*scene.instances, *instances))
 
 
 def remove_members(scene: Scene, group: str) -> Scene:

@@ -101,13 +101,9 @@ def loaded(path: str, what: str) -> Any:
         raise ConfigError(f"{what}: {path} cannot be imported: {error}") from error
 
 
+@cache
 def third_party(kind: str) -> Mapping[str, EntryPoint]:
     """Entry points of the group ``gen_data.<kind>``, by name."""
-    return _third_party(kind)
-
-
-@cache
-def _third_party(kind: str) -> dict[str, EntryPoint]:
     # Reading the metadata of every installed package takes milliseconds; it cannot change.
     return {e.name: e for e in entry_points(group=f"gen_data.{kind}")}
 

@@ -16,13 +16,9 @@ by the speed of the image over that of the readout, a factor of ten or more, eac
 def project_rolling_shutter(
     scene: Scene, camera: Camera, points_m: Array, instance: Instance | None = None
 ) -> tuple[Array, Array]:
-    """Project points at the instants of the rows that show them.
+    """Project points [n, 3] at the instants of the rows that show them.
 
-    Args:
-        scene: At the image's instant.
-        camera: A camera of the scene, or one equal to it.
-        points_m: In the instance's frame, or in the world, [n, 3].
-        instance: The instance that carries the points; None = they are fixed in the world.
+    They are in the frame of the instance that carries them, or fixed in the world without one.
 
     Returns:
         Points in the camera frame of their instant [m], [n, 3], and their image coordinates [px],
@@ -50,18 +46,13 @@ def world_points(
 ) -> Array:
     """World coordinates [m] of points that are visible in some rows, [n, 3].
 
-    Args:
-        scene: At the image's instant.
-        camera: Of the scene, or its equal.
-        p_camera_m: In the camera frame of each row's instant, shape [n, 3].
-        rows: Numbers of the rows, shape [n].
+    ``p_camera_m`` [n, 3] is in the camera frame of each row's instant, the scene at the image's.
     """
     if not camera.shutter.rolls:
         return camera.T_world_camera.apply(p_camera_m)
     delays_s = camera.shutter.row_delays_s(camera.intrinsics.height_px)
     R, t = _camera_poses(scene, camera, delays_s)
-    placed: Array = np.einsum("nij,nj->ni", R[rows], p_camera_m, optimize=False) + t[rows]
-    return placed
+    return np.asarray(np.einsum("nij,nj->ni", R[rows], p_camera_m, optimize=False) + t[rows])
 
 
 def _find_carrier(scene: Scene, instance: Instance) -> str:
@@ -85,12 +76,8 @@ def _poses(
 ) -> tuple[Array, Array]:
     """World rotations [n, 3, 3] and origins [n, 3] of a frame on a body, at several instants.
 
-    Args:
-        scene: At the instant that delays refer to.
-        body: Name of the body that carries the frame.
-        at_rest: Pose of the frame if the body does not move.
-        T_body_frame: Pose of the frame on the body.
-        delays_s: Instants relative to the scene's, [n].
+    The instants are relative to the scene's, [n]; ``at_rest`` is the pose of the frame if the body
+    does not move.
     """
     track = scene.track(body) if body else None
     n = len(delays_s)

@@ -26,15 +26,11 @@ def format_position(element: Element) -> str:
 def parse_xml(data: bytes, place: str, root_tag: str, kind: str, max_elements: int) -> Element:
     """Parse a document and return its root element.
 
-    Args:
-        data: Content of the file.
-        place: Name of the file in error messages.
-        root_tag: Required tag of the root.
-        kind: Name of this kind of file in error messages.
-        max_elements: Documents with more elements are refused.
+    ``place`` and ``kind`` name the file and its kind in error messages.
 
     Raises:
-        AssetError: it is malformed, too large or deep, or declares a document type.
+        AssetError: it is malformed, has another root, more elements than ``max_elements`` or too
+            many levels, or declares a document type.
     """
     builder = TreeBuilder(element_factory=PlacedElement)
     parser = expat.ParserCreate()

@@ -57,19 +57,20 @@ def scene_at(scene: Scene, time_s: float) -> Scene:
         for old, new in zip(scene.bodies, bodies, strict=True)
         if old.name in tracks
     }
-    return place_sensors(
-        replace(
-            scene,
-            time_s=time_s,
-            bodies=bodies,
-            articulations=tuple(_moved_joints(a, time_s) for a in scene.articulations),
-            instances=_moved_instances(scene, bodies, changes, time_s),
-            lights=tuple(
-                _moved_light(light, moved[light.body]) if light.body in moved else light
-                for light in scene.lights
-            ),
-        )
+    articulations = tuple(_moved_joints(a, time_s) for a in scene.articulations)
+    lights = tuple(
+        _moved_light(light, moved[light.body]) if light.body in moved else light
+        for light in scene.lights
     )
+    scene = replace(
+        scene,
+        time_s=time_s,
+        bodies=bodies,
+        articulations=articulations,
+        lights=lights,
+        instances=_moved_instances(scene, bodies, changes, time_s),
+    )
+    return place_sensors(scene)
 
 
 def place_sensors(scene: Scene) -> Scene:
@@ -222,16 +223,15 @@ def _placed_camera(scene: Scene, camera: Camera) -> Camera:
 
 
 def _placed_lidar(scene: Scene, lidar: Lidar) -> Lidar:
-    if lidar.rig:
-        T_world_rig = scene.rig_pose(lidar.rig)
-    else:
-        T_world_rig = scene.camera(lidar.camera).T_world_camera @ RIG_AXES
+    T_world_rig = _rig_pose(scene, lidar.rig, lidar.camera)
     return replace(lidar, T_world_lidar=(T_world_rig @ lidar.T_rig_lidar).rounded())
 
 
 def _placed_device(scene: Scene, device: Device) -> Device:
-    if device.rig:
-        T_world_rig = scene.rig_pose(device.rig)
-    else:
-        T_world_rig = scene.camera(device.camera).T_world_camera @ RIG_AXES
+    T_world_rig = _rig_pose(scene, device.rig, device.camera)
     return replace(device, T_world_device=(T_world_rig @ device.T_rig_device).rounded())
+
+
+def _rig_pose(scene: Scene, rig: str, camera: str) -> SE3:
+    """``T_world_rig`` of a rig; of that at a camera if there is none."""
+    return scene.rig_pose(rig) if rig else scene.camera(camera).T_world_camera @ RIG_AXES

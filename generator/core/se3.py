@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,14 +44,7 @@ class SE3:
 
     def rotation(self) -> Array:
         """Rotation matrix, shape [3, 3]."""
-        w, x, y, z = self.quaternion_wxyz
-        return np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-            ]
-        )
+        return np.array(_rotation_rows(*self.quaternion_wxyz))
 
     def matrix(self) -> Array:
         """Homogeneous matrix, shape [4, 4]."""
@@ -75,8 +69,7 @@ class SE3:
 
     def apply(self, points_m: Array) -> Array:
         """Points mapped to the outer frame [m], shape [..., 3]."""
-        moved: Array = self.rotate(points_m) + np.asarray(self.translation_m)
-        return moved
+        return np.asarray(self.rotate(points_m) + self.translation_m)
 
     def rotate(self, vectors: Array) -> Array:
         """Directions mapped to the outer frame, shape [..., 3]."""
@@ -130,14 +123,16 @@ def quaternions_to_rotations(quaternions_wxyz: Array) -> Array:
 
 def unit_quaternions_to_rotations(quaternions_wxyz: Array) -> Array:
     """Rotation matrices [n, 3, 3] of unit quaternions [n, 4], as ``SE3.rotation``."""
-    w, x, y, z = quaternions_wxyz.T
-    rows = [
+    rows = np.array(_rotation_rows(*quaternions_wxyz.T))
+    return np.ascontiguousarray(rows.transpose(2, 0, 1))
+
+
+def _rotation_rows(w: Any, x: Any, y: Any, z: Any) -> list[list[Any]]:
+    return [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
-    rotations: Array = np.ascontiguousarray(np.array(rows).transpose(2, 0, 1))
-    return rotations
 
 
 def rotation_to_quaternion(rotation: Array) -> Quaternion:

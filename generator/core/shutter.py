@@ -44,8 +44,7 @@ class Shutter:
 
     def row_delays_s(self, height_px: int) -> Array:
         """Delays of the centres of all rows [s], [height]."""
-        delays: Array = self.delay_s(np.arange(height_px) + 0.5, height_px)
-        return delays
+        return np.asarray(self.delay_s(np.arange(height_px) + 0.5, height_px))
 
 
 INSTANT = Shutter()

@@ -39,15 +39,12 @@ def baseline_m(left: Camera, right: Camera) -> float:
 
 
 def disparity_px(z_depth_m: Float32, focal_baseline: float) -> Float32:
-    """``focal * baseline / z`` [px]; 0 where there is nothing.
+    """``focal * baseline / z`` [px]; 0 where the depth is inf.
 
-    Args:
-        z_depth_m: inf where there is nothing.
-        focal_baseline: Focal length [px] times baseline [m]; negative = the other camera is to
-            the left.
+    ``focal_baseline`` is the focal length [px] times the baseline [m]; negative = the other camera
+    is to the left.
     """
-    disparity: Float32 = np.divide(focal_baseline, z_depth_m, dtype=np.float32)
-    return disparity
+    return np.asarray(np.divide(focal_baseline, z_depth_m, dtype=np.float32))
 
 
 def is_seen_by_both(
@@ -56,12 +53,10 @@ def is_seen_by_both(
     """Whether the other camera sees what this one does, bool [h, w].
 
     It does if the point is in its image and nothing there is nearer by more than a pixel, in at
-    least one of the two columns between which the point lies.
+    least one of the two columns between which the point lies. Disparities of both images have the
+    same sign; 0 = nothing.
 
-    Args:
-        here_px: Disparities of this image, float32 [h, w]; 0 = nothing.
-        there_px: Those of the other one, with the same sign.
-        beyond: Whether the other one, such as a projector, sees points beside its image.
+    ``beyond``: the other one, such as a projector, also sees points beside its image.
     """
     height, width = here_px.shape
     at_px = np.arange(width, dtype=np.float32) - here_px

@@ -13,8 +13,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from gen_data.generator.core.processes import silence_stdio
 from gen_data.generator.core.se3 import SE3, Array, Vec3
-from gen_data.generator.core.silence_stdio import silence_stdio
 from gen_data.generator.physics.collision_shapes import CollisionShape, scale_step
 
 with silence_stdio():  # it prints its build time

@@ -202,13 +202,12 @@ class Pipeline:
             seen = {name: timeline.at(r.time_s) for name, r in capture.readings.items()}
             described = self.config.frame_truth
             frame = described({"": scene, **swept}) if described is not None else None
-        view_number = view.scene_index * self.info.views_per_scene + view.view_index
         return Sample(
-            index=view_number * self.info.steps_per_scene + step_index,
-            scene_index=view.scene_index,
-            view_index=view.view_index,
+            index=view.number * self.info.steps_per_scene + step_index,
+            scene_index=streams.scene,
+            view_index=streams.view,
             step_index=step_index,
-            split=self.split(view.scene_index),
+            split=self.split(streams.scene),
             scene=scene,
             capture=capture,
             truth=_count_lidar_points(truth, capture.clouds),

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-from gen_data.generator.core.child_processes import end_with_parent
 from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.processes import end_with_parent
 
 LOOPBACK = "127.0.0.1"
 GRPC_PORT = 9876

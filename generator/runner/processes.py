@@ -22,8 +22,8 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
 
-from gen_data.generator.core.child_processes import SINGLE_THREADED
 from gen_data.generator.core.errors import GenDataError
+from gen_data.generator.core.processes import SINGLE_THREADED
 from gen_data.generator.runner.shard import Job
 from gen_data.generator.runner.supervisor import Supervisor
 from gen_data.generator.runner.termination_signals import Interruption

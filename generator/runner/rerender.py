@@ -98,7 +98,7 @@ class RerenderedScenes:
             index=first.scene_index * self.info.views_per_scene + first.view_index,
         )
         scene = self._redraw(scene, randomizers, {Stage.BUILD: streams, Stage.VIEW: view_streams})
-        view = DrawnView(first.scene_index, first.view_index, place_sensors(scene), view_streams)
+        view = DrawnView(view_streams.index, place_sensors(scene), view_streams)
         return replace(
             self.pipeline.read_sensors(view, sensors, step_index),
             split=first.split,

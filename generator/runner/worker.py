@@ -22,8 +22,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gen_data.generator.core.child_processes import end_with_parent
 from gen_data.generator.core.errors import GenDataError
+from gen_data.generator.core.processes import end_with_parent
 from gen_data.generator.runner.error_context import unexpected_error
 from gen_data.generator.runner.worker_events import Failed, Ready, SampleDone, ShardDone
 

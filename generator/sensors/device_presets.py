@@ -34,12 +34,10 @@ def load_preset(package: str, name: str, kind: type[M]) -> M:
     Raises:
         ConfigError: there is no such file, or it is invalid.
     """
-    known = preset_names(package)
-    if name not in known:
-        raise ConfigError(
-            f"{package} has no preset '{name}'; expected one of {', '.join(known)}"
-            f"{did_you_mean(name, known)}"
-        )
+    try:
+        check_preset(package, name)
+    except ValueError as error:
+        raise ConfigError(f"{package} has no preset '{name}'; {error}") from None
     problems = Problems()
     preset = validate(load_yaml(preset_path(package, name)), kind, problems)
     problems.raise_if_any()

@@ -1,20 +1,19 @@
-"""Mounting of sensors on rigs and cameras, and their rates."""
+"""Mounting of sensors on rigs and cameras, their rates, and their motion with their carrier."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from gen_data.generator.config.base_model import Strict
-from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex, Modality, SensorInfo
-from gen_data.generator.core.lens import LensModel
 from gen_data.generator.core.measurement_dtypes import TABLE_COLUMNS, TIME_DECIMALS
+from gen_data.generator.core.motion import STILL, Trajectory, Twist
 from gen_data.generator.core.scene import Camera, Device, Lidar, Scene
 from gen_data.generator.core.scene_time import RIG_AXES
 from gen_data.generator.core.se3 import SE3, Array
@@ -49,38 +48,22 @@ class Mounted(Strict):
     @property
     def T_rig_sensor(self) -> SE3:  # noqa: N802
         """Pose on the rig; both frames are X forward, Y left, Z up."""
-        half_pitch, half_roll = (
-            -0.5 * math.radians(self.pitch_deg),
-            0.5 * math.radians(self.roll_deg),
-        )
+        half_pitch = -0.5 * math.radians(self.pitch_deg)
+        half_roll = 0.5 * math.radians(self.roll_deg)
         pitch = SE3((0.0, 0.0, 0.0), (math.cos(half_pitch), 0.0, math.sin(half_pitch), 0.0))
         roll = SE3((0.0, 0.0, 0.0), (math.cos(half_roll), math.sin(half_roll), 0.0, 0.0))
         yaw = SE3.about_z(math.radians(self.yaw_deg), self.offset_m)
         return (yaw @ pitch @ roll).rounded()
 
-    def _camera_info(self, name: str, channels: tuple[Channel, ...], lens: LensModel) -> SensorInfo:
-        """Description of a camera that writes these channels."""
-        return SensorInfo(
-            name,
-            Modality.CAMERA,
-            channels=channels,
-            lens=lens,
-            rate_hz=self.rate_hz,
-            time_offset_s=self.time_offset_s,
-            needs_clear_view=not self.inside,
-        )
+    def _info(self, name: str, modality: Modality, kind: str = "", **more: Any) -> SensorInfo:
+        """Description with the rate of its readings; ``more`` are further fields.
 
-    def _device_info(self, name: str, kind: str, needs_clear_view: bool = False) -> SensorInfo:
-        """Description of a device of one of the kinds in ``TABLE_COLUMNS``."""
-        return SensorInfo(
-            name,
-            Modality.DEVICE,
-            kind,
-            columns=TABLE_COLUMNS[kind],
-            rate_hz=self.rate_hz,
-            time_offset_s=self.time_offset_s,
-            needs_clear_view=needs_clear_view,
-        )
+        Its carrier may occlude it, unless it may be inside; devices have the columns of their kind.
+        """
+        given = {"columns": TABLE_COLUMNS[kind]} if kind else {}
+        times = {"rate_hz": self.rate_hz, "time_offset_s": self.time_offset_s}
+        fields = {"needs_clear_view": not self.inside, **times, **given, **more}
+        return SensorInfo(name, modality, kind, **fields)
 
 
 class Instrument(Mounted):
@@ -99,12 +82,12 @@ class Instrument(Mounted):
 
     @property
     def device_model(self) -> str:
-        """Name of the device's model in labels; empty = none."""
-        return ""
+        """Name of the device's model in labels, its field ``model``; empty = none."""
+        return str(getattr(self, "model", ""))
 
     def describe(self) -> SensorInfo:
         """Describe a device with the columns of its kind."""
-        return self._device_info(self.name, self.kind)
+        return self._info(self.name, Modality.DEVICE, self.kind, needs_clear_view=False)
 
     def mount(self, scene: Scene) -> Scene:
         """Add this device to its rig.
@@ -136,10 +119,7 @@ def check_rig(scene: Scene, sensor: str, rig: str) -> str:
 def add_lidar(scene: Scene, sensor: Mounted, lidar: Lidar) -> Scene:
     """Add a scanner on its sensor's rig, or at its camera if the sensor has no rig.
 
-    Args:
-        scene: With all sensors that are listed before this one.
-        sensor: The sensor's mounting.
-        lidar: Names the camera to mount it at if there is no rig.
+    The scene has all sensors that are listed before this one.
 
     Raises:
         ConfigError: the scene has no such rig or camera.
@@ -167,14 +147,9 @@ def find_camera(scene: Scene, sensor: str, camera: str) -> Camera:
 
 
 def check_not_buried(scene: Scene, name: str, assets: AssetIndex) -> None:
-    """Refuse a sensor on a rig inside the body that carries the rig, which would occlude it.
+    """Refuse a mounted sensor on a rig inside the body that carries it, which would occlude it.
 
     Inside means in the body's bounding box, more than ``BURIED_M`` from its faces.
-
-    Args:
-        scene: With the sensor mounted.
-        name: Of the sensor.
-        assets: Source of the body's bounds.
 
     Raises:
         ConfigError: the sensor is inside.
@@ -205,16 +180,10 @@ def find_mounting(scene: Scene, name: str) -> tuple[str, SE3]:
     Raises:
         KeyError: the scene has no sensor of that name.
     """
-    for camera in scene.cameras:
-        if camera.name == name:
-            return camera.rig, camera.T_rig_camera @ RIG_AXES
-    for lidar in scene.lidars:
-        if lidar.name == name:
-            return lidar.rig, lidar.T_rig_lidar
-    for device in scene.devices:
-        if device.name == name:
-            return device.rig, device.T_rig_device
-    raise KeyError(name)
+    known = {device.name: (device.rig, device.T_rig_device) for device in scene.devices}
+    known |= {lidar.name: (lidar.rig, lidar.T_rig_lidar) for lidar in scene.lidars}
+    known |= {c.name: (c.rig, c.T_rig_camera @ RIG_AXES) for c in scene.cameras}
+    return known[name]
 
 
 def stride(sensor: str, rate_hz: float | None, step_s: float) -> int:
@@ -274,3 +243,101 @@ def window_s(scene: Scene, rate_hz: float | None) -> tuple[float, float]:
     """Start and end [s] of the interval that a reading covers: a step, or a longer period."""
     period_s = max(scene.step_s, 1.0 / rate_hz if rate_hz else 0.0)
     return max(round(scene.time_s - period_s, TIME_DECIMALS), 0.0), scene.time_s
+
+
+@dataclass(frozen=True, slots=True)
+class MountMotion:
+    """Motion of a device on a body.
+
+    Attributes:
+        track: Trajectory of the body; None = it does not move.
+        T_world_body: Pose of the body at the scene's instant.
+        T_body_device: Pose of the device on the body.
+    """
+
+    track: Trajectory | None
+    T_world_body: SE3
+    T_body_device: SE3
+
+    def pose(self, time_s: float) -> SE3:
+        """``T_world_device`` at an instant."""
+        carrier = self.T_world_body if self.track is None else self.track.pose(time_s)
+        return carrier @ self.T_body_device
+
+    def velocity_m_s(self, time_s: float) -> Array:
+        """Velocity of the device's origin at an instant, world axes, [3]."""
+        twist = self.twist(time_s)
+        if self.track is None:
+            return np.zeros(3)
+        lever_m = self.track.pose(time_s).rotate(np.asarray(self.T_body_device.translation_m))
+        return np.asarray(velocity_at(twist, lever_m))
+
+    def twist(self, time_s: float) -> Twist:
+        """Twist of the body at an instant."""
+        return STILL if self.track is None else self.track.twist(time_s)
+
+    def inertial_motion(self, time_s: float) -> tuple[SE3, Array, Array]:
+        """Pose, acceleration and angular velocity of the device at an instant.
+
+        Acceleration and angular velocity are central differences over one step of the trajectory,
+        which is the bandwidth of an interpolated trajectory. Within two steps of its ends, where
+        neighbours are missing, they keep the values of two steps from the end, device axes.
+
+        Returns:
+            ``T_world_device``; acceleration [m/s^2] and angular velocity [rad/s] in the device's
+            axes, [3] each; 0 outside the trajectory.
+        """
+        track = self.track
+        pose = self.pose(time_s)
+        if track is None or not track.start_s <= time_s <= track.end_s:
+            return pose, np.zeros(3), np.zeros(3)
+        half_s = 0.5 * (track.end_s - track.start_s)
+        h, margin_s = min(track.step_s, half_s), min(2.0 * track.step_s, half_s)
+        middle_s = min(max(time_s, track.start_s + margin_s), track.end_s - margin_s)
+        before, here, after = (self.pose(middle_s + k * h) for k in (-1, 0, 1))
+        a, b, c = (np.asarray(place.translation_m) for place in (before, here, after))
+        axes = here.inverse()
+        acceleration = axes.rotate((a - 2.0 * b + c) / (h * h))
+        return (
+            pose,
+            acceleration,
+            axes.rotate(rotation_vector(after @ before.inverse())) / (2.0 * h),
+        )
+
+
+def mount_motion(scene: Scene, device: str) -> MountMotion:
+    """Motion of the device of that name; KeyError if the scene has none."""
+    mounted = scene.device(device)
+    rig = scene.rig(mounted.rig)
+    body = scene.body(rig.body)
+    return MountMotion(
+        scene.track(rig.body), body.T_world_body, rig.T_body_rig @ mounted.T_rig_device
+    )
+
+
+def velocity_at(twist: Twist, lever_m: Array) -> Array:
+    """Velocity [m/s] of points at ``lever_m`` from the origin of a moving frame, [..., 3]."""
+    omega = np.asarray(twist.angular_velocity_rad_s)
+    return np.asarray(np.asarray(twist.velocity_m_s) + np.cross(omega, lever_m))
+
+
+def rotation_vector(turn: SE3) -> Array:
+    """Axis times angle [rad] of a rotation, [3]."""
+    w, x, y, z = turn.quaternion_wxyz
+    sign = 1.0 if w >= 0.0 else -1.0
+    axis = sign * np.array([x, y, z])
+    sine = float(np.sqrt(axis @ axis))
+    angle = 2.0 * float(np.arctan2(sine, sign * w))
+    return axis * (angle / sine if sine > 1e-12 else 2.0)
+
+
+def remove_carrier(scene: Scene, rig: str) -> Scene:
+    """The scene without the body that carries a rig, so that it does not occlude devices."""
+    carrier = scene.body(scene.rig(rig).body)
+    own = carrier.instance_id
+    bodies = tuple(
+        body
+        for body in scene.bodies
+        if body.name != carrier.name and not (own and body.instance_id == own)
+    )
+    return replace(scene, bodies=bodies)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gen_data.generator.core.obb import rectangles_overlap
+from gen_data.generator.core.boxes import rectangles_overlap
 from gen_data.generator.core.se3 import Array
 
 

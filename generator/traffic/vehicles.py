@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.core.obb import rectangles_overlap
+from gen_data.generator.core.boxes import rectangles_overlap
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.traffic.conflict_zones import (
     Overlap,

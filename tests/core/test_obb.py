@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from gen_data.generator.core.obb import boxes_touch, rectangles_overlap
+from gen_data.generator.core.boxes import boxes_touch, rectangles_overlap
 from gen_data.generator.core.se3 import SE3, Array, Vec3
 
 PLACES = st.tuples(*[st.floats(-2.0, 2.0)] * 3)

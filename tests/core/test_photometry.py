@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from scipy.integrate import dblquad, quad
 
-from gen_data.generator.core.area_lights import add_fixture, level_side, remove_lights
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.photometry import (
+    add_fixture,
     flux_to_intensity_cd,
     illuminance_to_intensity_cd,
+    level_side,
     luminance_cd_m2,
+    remove_lights,
     scale_to_flux,
 )
 from gen_data.generator.core.scene import Body, Light, Scene

@@ -15,7 +15,7 @@ from gen_data.generator.core.lens import Lens
 from gen_data.generator.core.scene import Body, Camera, Environment, Instance, Lidar, Light, Scene
 from gen_data.generator.core.se3 import SE3, look_at
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.scene.device_textures import remove_fringe
+from gen_data.generator.renderers.warp.scene.device_assets import remove_fringe
 from gen_data.generator.renderers.warp.settings import RenderSettings
 from tests.renderers.embree import cast, open3d_or_skip
 from tests.renderers.fake_library import DARK, FakeLibrary, camera_at, plane_mesh

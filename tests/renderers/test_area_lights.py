@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 import warp as wp
 
-from gen_data.generator.core.area_lights import add_fixture, fixture_asset
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.photometry import luminance_cd_m2
+from gen_data.generator.core.photometry import add_fixture, fixture_asset, luminance_cd_m2
 from gen_data.generator.core.scene import Body, Camera, Light, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.renderers.warp.device import open_device

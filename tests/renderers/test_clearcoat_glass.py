@@ -15,7 +15,7 @@ from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scen
 from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.renderers.warp.device import open_device
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.scene.kernels.dielectrics import (
+from gen_data.generator.renderers.warp.scene.kernels.brdf import (
     fresnel_dielectric,
     pane_reflectance,
     pane_transmittance,

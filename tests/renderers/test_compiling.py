@@ -37,7 +37,7 @@ def test_what_is_compiled_side_by_side_is_all_that_a_photograph_takes(tmp_path: 
         sys.executable,
         "-c",
         "from gen_data.generator.renderers.warp.device import open_device\n"
-        "from gen_data.generator.renderers.warp.kernel_compilation import compile_kernels\n"
+        "from gen_data.generator.renderers.warp.device import compile_kernels\n"
         "compile_kernels(open_device('cpu').alias)",
     ]
     environment = {**os.environ, "WARP_CACHE_PATH": str(tmp_path)}

@@ -13,7 +13,7 @@ from gen_data.generator.renderers.warp.device import open_device
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from gen_data.generator.renderers.warp.scene.bvh import face_boxes
-from gen_data.generator.renderers.warp.scene.device_meshes import boxes_around
+from gen_data.generator.renderers.warp.scene.device_assets import boxes_around
 from gen_data.generator.renderers.warp.scene.scene_packing import pack_view, pack_world
 from gen_data.generator.renderers.warp.settings import RenderSettings
 from gen_data.generator.renderers.warp.visibility.gbuffer import bodies_within, project_vertices

@@ -15,10 +15,11 @@ from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.renderers.warp.device import open_device
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from gen_data.generator.renderers.warp.scene.environment_maps import (
+    SkyLamp,
+    remove_peaks,
     upload_environment,
     upload_split,
 )
-from gen_data.generator.renderers.warp.scene.envmap_peaks import SkyLamp, remove_peaks
 from gen_data.generator.renderers.warp.settings import RenderSettings
 from tests.renderers.embree import open3d_or_skip
 from tests.renderers.fake_library import (

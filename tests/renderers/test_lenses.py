@@ -21,7 +21,7 @@ from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from gen_data.generator.renderers.warp.scene.kernels.records import View
 from gen_data.generator.renderers.warp.scene.scene_packing import pack_view
-from gen_data.generator.renderers.warp.visibility.amodal_lens import bounding_cone
+from gen_data.generator.renderers.warp.visibility.amodal import bounding_cone
 from gen_data.generator.renderers.warp.visibility.kernels.distortion import project_to_pixel
 from tests.renderers.embree import near_edges, open3d_or_skip
 from tests.renderers.fake_library import DARK, FakeLibrary, box_mesh, room_mesh, sphere_mesh

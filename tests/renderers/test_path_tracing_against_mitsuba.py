@@ -21,7 +21,7 @@ from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scen
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.renderers.warp.scene.environment_maps import texel_directions
 from gen_data.generator.sensors.camera.exposure import meter_ev100, saturation_cd_m2
-from gen_data.generator.sensors.camera.tone import display_values
+from gen_data.generator.sensors.camera.isp import display_values
 from tests.renderers.fake_library import (
     DARK,
     FakeLibrary,

@@ -11,7 +11,7 @@ from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
 from gen_data.generator.core.se3 import SE3
-from gen_data.generator.renderers.warp.realtime.light_visibility import pixel_samples
+from gen_data.generator.renderers.warp.realtime.realtime_shading import pixel_samples
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from gen_data.generator.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import (

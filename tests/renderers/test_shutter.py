@@ -19,8 +19,7 @@ from gen_data.generator.core.shutter import INSTANT, Shutter
 from gen_data.generator.renderers.warp.frame_context import CameraState, render_view
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from gen_data.generator.renderers.warp.shutter_integration import integrate_light, split_slices
-from gen_data.generator.renderers.warp.visibility.banded_gbuffer import render_bands
-from gen_data.generator.renderers.warp.visibility.motion_bounds import make_bands
+from gen_data.generator.renderers.warp.visibility.reprojection import make_bands, render_bands
 from tests.renderers.moving import FACING, LENS, MESHES, even_track, world
 
 LABELS = frozenset(
@@ -228,10 +227,10 @@ def test_bands_of_a_still_world_make_the_whole_image(renderer: WarpRenderer, len
     rows = make_bands(near.state, list(range(0, LENS.height_px, 5)))
 
     def light(see):  # noqa: ANN001, ANN202
-        return integrate_light(see, context)
+        return integrate_light(see)
 
-    one, images = render_bands(whole_bands, LABELS, context, near, light)
-    other, banded = render_bands(rows, LABELS, context, near, light)
+    one, images = render_bands(whole_bands, LABELS, near, light)
+    other, banded = render_bands(rows, LABELS, near, light)
     for channel in LABELS:
         assert np.array_equal(images[channel], banded[channel]), channel
     assert np.array_equal(one.hits, other.hits)

@@ -18,7 +18,7 @@ from gen_data.generator.core.scene import Body, Camera, Light, Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.renderers import TABLE
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
-from gen_data.generator.renderers.warp.scene.device_meshes import is_convex_solid
+from gen_data.generator.renderers.warp.scene.device_assets import is_convex_solid
 from gen_data.generator.renderers.warp.settings import RenderSettings
 from tests.renderers.fake_library import (
     FakeLibrary,

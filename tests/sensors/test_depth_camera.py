@@ -20,8 +20,7 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.streams import Streams
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
 from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
-from gen_data.generator.sensors.depth.depth_camera import DepthCamera
-from gen_data.generator.sensors.depth.depth_model import DepthModel
+from gen_data.generator.sensors.depth.depth_camera import DepthCamera, DepthModel
 from gen_data.generator.sensors.depth.structured_light import axial_noise_m, lateral_noise_px
 from gen_data.generator.sensors.depth.time_of_flight import unwrap_phases
 from gen_data.generator.sensors.device_presets import preset_names

@@ -17,9 +17,9 @@ from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.scene import Camera, Scene, Weather
 from gen_data.generator.core.scene_time import place_sensors, scene_at
 from gen_data.generator.core.se3 import SE3
-from gen_data.generator.sensors.event_camera.event_camera import EventCamera
-from gen_data.generator.sensors.event_camera.event_pixels import (
+from gen_data.generator.sensors.event_camera.event_camera import (
     DARK_CD_M2,
+    EventCamera,
     Events,
     apply_refractory_period,
     log_response,

@@ -7,8 +7,13 @@ import pytest
 from pydantic import ValidationError
 
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.sensors.lidar.presets import lidar_model, model_names
-from gen_data.generator.sensors.lidar.scan_pattern import LidarModel, make_sweep
+from gen_data.generator.sensors.device_presets import preset_names
+from gen_data.generator.sensors.lidar.scan_pattern import (
+    PRESETS,
+    LidarModel,
+    lidar_model,
+    make_sweep,
+)
 
 
 def angles_deg(name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -51,7 +56,7 @@ def test_rings_and_pulses_are_those_of_the_data_sheet(
     assert len(ring) == pytest.approx(pulses, abs=rings)
 
 
-@pytest.mark.parametrize("name", model_names())
+@pytest.mark.parametrize("name", preset_names(PRESETS))
 def test_every_direction_is_a_unit_vector_and_time_rises_within_a_sweep(name: str) -> None:
     """From 0 to one rotation."""
     model = lidar_model(name)

@@ -28,7 +28,7 @@ from gen_data.generator.sensors.lidar.lidar_detection import (
     select_returns,
 )
 from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
-from gen_data.generator.sensors.lidar.presets import lidar_model
+from gen_data.generator.sensors.lidar.scan_pattern import lidar_model
 
 MODEL = lidar_model("VLP-16")
 

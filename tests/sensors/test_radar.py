@@ -13,7 +13,7 @@ from gen_data.generator.core.asset_types import SURFACES
 from gen_data.generator.core.scene import Body, Instance, Scene, Weather
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.sensors.device_presets import load_preset, preset_names
-from gen_data.generator.sensors.radar.cross_section import (
+from gen_data.generator.sensors.radar.radar_detection import (
     TARGETS,
     area_factor,
     cross_section_m2,

@@ -1,13 +1,27 @@
-"""Warp devices, with reproducible code generation."""
+"""Warp devices, with reproducible code generation and parallel compilation of kernels on first use.
+
+Warp compiles a module when it is first used, one at a time and on one core: the dozen modules that
+every image needs would delay the first sample. Here separate processes compile them side by side
+into Warp's cache. Failures are harmless: a module that is missing from the cache is compiled on
+first use.
+"""
 
 from __future__ import annotations
 
+import fcntl
+import hashlib
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
 from functools import cache
+from importlib import import_module
+from pathlib import Path
 
 import warp as wp
 
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.silence_stdio import silence_stdio
+from gen_data.generator.core.processes import end_with_parent, silence_stdio
 
 # Not -march=native: fused multiply-adds would change bytes between machines. The inlining threshold
 # saves a quarter of all ray time.
@@ -42,3 +56,67 @@ def _start() -> None:
     wp.config.cpu_compiler_flags = _COMPILER_FLAGS
     with silence_stdio():  # Warp warns about a missing CUDA driver
         wp.init()
+
+
+EVERY_FRAME = (
+    "realtime.kernels.lattice_lighting",
+    "realtime.kernels.soft_shadows",
+    "visibility.kernels.rasterizer",
+    "realtime.kernels.lattice_interpolation",
+    "visibility.kernels.amodal",
+    "visibility.kernels.msaa",
+    "realtime.kernels.shadow_culling",
+    "visibility.kernels.label_resolve",
+    "visibility.kernels.edge_detection",
+    "realtime.kernels.lattice",
+    "scene.kernels.environment_lighting",
+    "scene.kernels.bvh_build",
+)
+"""Kernel modules, below this package, that every image needs; their order balances the load."""
+
+
+@cache
+def compile_kernels(device: str) -> None:
+    """Fill Warp's cache for a device with the kernels of ``EVERY_FRAME``, if they are missing.
+
+    Of several processes that find the cache empty, one compiles and the others wait.
+    """
+    cores = len(os.sched_getaffinity(0))
+    stamp = Path(wp.config.kernel_cache_dir) / f"gen-data-{_digest()}-{device[:4]}"
+    if stamp.exists() or cores == 1:
+        return
+    with stamp.with_suffix(".lock").open("a") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not stamp.exists() and _compile_in_parallel(device, cores):
+            stamp.touch()
+
+
+def load_kernels(device_name: str, names: Sequence[str]) -> None:
+    """Load kernel modules in this process, which compiles those missing from the cache."""
+    device = open_device(device_name)
+    for name in names:
+        module = f"{__package__}.{name}"
+        import_module(module)
+        wp.load_module(module, device=device)
+
+
+def _compile_in_parallel(device: str, cores: int) -> bool:
+    """Distribute the modules over one process per core; returns whether all succeeded."""
+    shares = [EVERY_FRAME[k::cores] for k in range(min(cores, len(EVERY_FRAME)))]
+    here = [sys.executable, "-m", __name__, str(os.getpid()), device]
+    running = [subprocess.Popen([*here, *share], stdout=subprocess.DEVNULL) for share in shares]
+    codes = [process.wait() for process in running]
+    return not any(codes)
+
+
+def _digest() -> str:
+    """Digest of the kernels' sources and of the compiler's settings."""
+    digest = hashlib.sha256(f"{wp.config.version} {wp.config.cpu_compiler_flags}".encode())
+    for source in sorted(Path(__file__).parent.glob("*/kernels/*.py")):
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+if __name__ == "__main__":
+    end_with_parent(int(sys.argv[1]))
+    load_kernels(sys.argv[2], sys.argv[3:])

@@ -15,8 +15,12 @@ from gen_data.generator.core.bounded_cache import ByteCache, ObjectCache
 from gen_data.generator.core.interfaces import AssetLibrary
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.renderers.warp.scene.brdf_albedo_lut import lobe_albedo
-from gen_data.generator.renderers.warp.scene.device_meshes import DeviceMesh, upload_mesh
-from gen_data.generator.renderers.warp.scene.device_textures import DeviceTexture, upload_texture
+from gen_data.generator.renderers.warp.scene.device_assets import (
+    DeviceMesh,
+    DeviceTexture,
+    upload_mesh,
+    upload_texture,
+)
 from gen_data.generator.renderers.warp.scene.environment_maps import (
     DeviceEnvironment,
     upload_environment,

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import warp as wp
 
 from gen_data.generator.core.scene import Camera, Scene
 from gen_data.generator.core.scene_time import scene_at
@@ -15,6 +18,7 @@ from gen_data.generator.renderers.warp.scene.scene_packing import (
     pack_world,
     repack_moved,
 )
+from gen_data.generator.renderers.warp.scene.struct_dtypes import copy_struct
 from gen_data.generator.renderers.warp.settings import RenderSettings
 from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer, find_visible
 
@@ -70,6 +74,33 @@ class CameraView:
     world: PackedWorld
     view: records.View
     gbuffer: GBuffer
+    context: RenderContext
+
+    @property
+    def cache(self) -> DeviceCache:
+        """Assets and scratch memory."""
+        return self.context.cache
+
+    @property
+    def settings(self) -> RenderSettings:
+        """Settings of the renderer."""
+        return self.context.settings
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels."""
+        return int(self.view.width * self.view.height)
+
+    @property
+    def inputs(self) -> list[Any]:
+        """View, World and GBufferRecord, the first inputs of most kernels."""
+        return [self.view, self.world.record, self.gbuffer.record]
+
+    def launch(
+        self, kernel: wp.Kernel, dim: Any, inputs: Sequence[Any], outputs: Sequence[Any] = ()
+    ) -> None:
+        """Run a kernel on the renderer's device."""
+        wp.launch(kernel, dim, [*inputs], [*outputs], device=self.cache.device)
 
 
 def is_moving(state: CameraState, open_s: float) -> bool:
@@ -86,21 +117,16 @@ def render_view(
     rows: tuple[int, int] | None = None,
     reference: CameraView | None = None,
 ) -> CameraView:
-    """Find the surfaces at all pixel centres, or at those of some rows.
+    """Find the surfaces at all pixel centres, or at those of some rows (the end is exclusive).
 
-    Args:
-        state: World and camera.
-        context: Assets and settings.
-        rows: First row and end row (exclusive); None = all.
-        reference: The same world at another instant, whose assets need not be packed again.
+    ``reference`` is the same world at another instant, whose assets need not be packed again.
     """
     world = pack_state(state, context, reference)
     view = pack_view(state.camera, context.cache)
     if rows is not None:
         view = crop_rows(view, *rows)
-    return CameraView(
-        state, world, view, find_visible(world, view, context.cache, context.settings.visibility)
-    )
+    gbuffer = find_visible(world, view, context.cache, context.settings.visibility)
+    return CameraView(state, world, view, gbuffer, context)
 
 
 def pack_state(
@@ -122,9 +148,7 @@ def _has_same_assets(one: Scene, other: Scene) -> bool:
 
 def crop_rows(view: records.View, first: int, end: int) -> records.View:
     """The view of a band of an image's rows."""
-    part = records.View()
-    for name in records.View.vars:
-        setattr(part, name, getattr(view, name))
+    part = copy_struct(view, records.View)
     part.height = end - first
     part.cy = view.cy - first
     if view.lens != records.PINHOLE:

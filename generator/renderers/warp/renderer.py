@@ -8,24 +8,24 @@ from gen_data.generator.core.capture import Channel, LidarHits, LidarRays, Senso
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetLibrary
 from gen_data.generator.core.scene import Camera, Lidar, Scene
-from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.device import compile_kernels, open_device
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.frame_context import CameraState, CameraView, RenderContext
-from gen_data.generator.renderers.warp.kernel_compilation import compile_kernels
 from gen_data.generator.renderers.warp.lidar.lidar_tracing import trace_scan
 from gen_data.generator.renderers.warp.realtime.realtime_shading import (
     add_precipitation,
     radiance_image,
+    shade_pixels,
+    smooth_edges,
 )
 from gen_data.generator.renderers.warp.scene.scene_packing import pack_view, pack_world
 from gen_data.generator.renderers.warp.settings import RenderSettings
-from gen_data.generator.renderers.warp.shading_dispatch import shade_pixels, smooth_edges
 from gen_data.generator.renderers.warp.shutter_integration import expose_shutter
 from gen_data.generator.renderers.warp.visibility.amodal import render_silhouettes
-from gen_data.generator.renderers.warp.visibility.banded_gbuffer import copy_gbuffer
 from gen_data.generator.renderers.warp.visibility.gbuffer import find_visible
 from gen_data.generator.renderers.warp.visibility.label_images import label_images
 from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow_images
+from gen_data.generator.renderers.warp.visibility.reprojection import copy_gbuffer
 
 
 class WarpRenderer:
@@ -75,21 +75,21 @@ class WarpRenderer:
         world = pack_world(scene, camera, self._cache)
         view = pack_view(camera, self._cache)
         gbuffer = find_visible(world, view, self._cache, self._settings.visibility)
+        frame = CameraView(CameraState(scene, camera), world, view, gbuffer, self._context)
         if Channel.AMODAL in channels:
             channels = channels | {Channel.INSTANCE}
-        images = label_images(scene, world, view, gbuffer, channels)
+        images = label_images(frame, channels)
         if Channel.RADIANCE in channels:
-            radiance = shade_pixels(scene, camera, world, view, gbuffer, self._context)
-            smooth_edges(world, view, gbuffer, radiance, self._context)
-            add_precipitation(world, camera, view, gbuffer.z_m, radiance, self._cache)
+            radiance = shade_pixels(frame)
+            smooth_edges(frame, radiance)
+            add_precipitation(frame, gbuffer.z_m, radiance)
             images[Channel.RADIANCE] = radiance_image(radiance, view)
         outlines = {}
         if Channel.AMODAL in channels:
-            ids = images[Channel.INSTANCE]
-            outlines = render_silhouettes(scene, camera, world, view, self._cache, gbuffer, ids)
+            outlines = render_silhouettes(frame, images[Channel.INSTANCE])
         if channels & FLOW:
-            reference = CameraView(CameraState.of(scene, camera), world, view, gbuffer)
-            images |= flow_images(reference, copy_gbuffer(reference), channels, self._context)
+            reference = replace(frame, state=CameraState.of(scene, camera))
+            images |= flow_images(reference, copy_gbuffer(reference), channels)
         return SensorReading(camera.name, camera, images, outlines, scene.time_s)
 
     def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:

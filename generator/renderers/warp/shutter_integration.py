@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -32,23 +31,21 @@ from gen_data.generator.renderers.warp.frame_context import (
 from gen_data.generator.renderers.warp.realtime.realtime_shading import (
     add_precipitation,
     radiance_image,
+    shade_pixels,
+    smooth_edges,
 )
 from gen_data.generator.renderers.warp.scene.light_selection import main_lamp_numbers
 from gen_data.generator.renderers.warp.scene.scene_packing import copy_world, repack_moved
-from gen_data.generator.renderers.warp.shading_dispatch import shade_pixels, smooth_edges
-from gen_data.generator.renderers.warp.visibility.amodal_rolling import rolling_silhouettes
-from gen_data.generator.renderers.warp.visibility.banded_gbuffer import (
+from gen_data.generator.renderers.warp.visibility.amodal import rolling_silhouettes
+from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow_images
+from gen_data.generator.renderers.warp.visibility.reprojection import (
     BandedGBuffer,
-    RadianceFunction,
-    add_margin,
-    render_bands,
-)
-from gen_data.generator.renderers.warp.visibility.motion_bounds import (
     ShutterSampling,
+    add_margin,
     plan_sampling,
+    render_bands,
     split_bands,
 )
-from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow_images
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -79,15 +76,15 @@ def expose_shutter(
     bands = split_bands(reference, sampling)
     if len(bands) == 1 and sampling.samples == 1:
         return None
-    reference = _keep_main_lamps(reference, context)
+    reference = _keep_main_lamps(reference)
     drawn = channels - FLOW - {Channel.AMODAL}
     if Channel.AMODAL in channels:
         drawn = drawn | {Channel.INSTANCE}
-    gbuffer, images = _render_images(reference, bands, drawn, sampling, context)
+    gbuffer, images = _render_images(reference, bands, drawn, sampling)
     outlines: dict[int, Silhouette] = {}
     if Channel.AMODAL in channels:
-        outlines = rolling_silhouettes(bands, images[Channel.INSTANCE], context, reference)
-    images |= flow_images(reference, gbuffer, channels, context)
+        outlines = rolling_silhouettes(bands, images[Channel.INSTANCE], reference)
+    images |= flow_images(reference, gbuffer, channels)
     return SensorReading(camera.name, camera, images, outlines, scene.time_s)
 
 
@@ -96,42 +93,32 @@ def _render_images(
     bands: Sequence[RowBand],
     channels: frozenset[Channel],
     sampling: ShutterSampling,
-    context: RenderContext,
 ) -> tuple[BandedGBuffer, dict[Channel, NDArray[Any]]]:
     """G-buffer, label images and, if requested, radiance."""
     labels = channels - {Channel.RADIANCE}
     if Channel.RADIANCE not in channels:
-        return render_bands(bands, labels, context, reference)
-    light = partial(integrate_light, context=context)
+        return render_bands(bands, labels, reference)
     if sampling.samples > 1:
-        gbuffer, images = render_bands(bands, labels, context, reference)
-        mean = _average_slices(
-            split_slices(reference.state, sampling.samples, sampling.blurred),
-            light,
-            reference,
-            context,
-        )
+        gbuffer, images = render_bands(bands, labels, reference)
+        slices = split_slices(reference.state, sampling.samples, sampling.blurred)
+        mean = _average_slices(slices, reference)
     else:
-        gbuffer, images = render_bands(bands, labels, context, reference, light)
+        gbuffer, images = render_bands(bands, labels, reference, integrate_light)
         mean = images[Channel.RADIANCE]
-    radiance = _to_device(mean, wp.vec3, context)
-    depths = _to_device(gbuffer.z_m, float, context)
-    add_precipitation(
-        reference.world, reference.state.camera, reference.view, depths, radiance, context.cache
-    )
+    device = reference.cache.device
+    radiance = wp.array(mean.reshape(-1, 3), dtype=wp.vec3, device=device)
+    depths = wp.array(gbuffer.z_m.reshape(-1), dtype=float, device=device)
+    add_precipitation(reference, depths, radiance)
     return gbuffer, images | {Channel.RADIANCE: radiance_image(radiance, reference.view)}
 
 
 def split_slices(
     middle: CameraState, samples: int, blurred: NDArray[np.bool_] | None = None
 ) -> list[Slice]:
-    """Time slices that together cover every row's exposure once.
+    """Time slices that together cover every row's exposure once, some per exposure.
 
-    Args:
-        middle: State at the middle of the image's exposure.
-        samples: Slices per exposure.
-        blurred: Rows with motion blur; the others are rendered in the slice nearest to their own
-            instant. None = all.
+    ``middle`` is the state at the middle of the image's exposure. Rows that are not ``blurred`` are
+    rendered in the slice nearest to their own instant; None = all are.
     """
     shutter, height = middle.camera.shutter, middle.camera.intrinsics.height_px
     step_s = shutter.exposure_s / samples
@@ -157,46 +144,34 @@ def split_slices(
     return slices
 
 
-def _average_slices(
-    slices: Sequence[Slice], light: RadianceFunction, reference: CameraView, context: RenderContext
-) -> Float32:
+def _average_slices(slices: Sequence[Slice], reference: CameraView) -> Float32:
     """Mean radiance over slices [cd/m^2], float32 [h, w, 3]."""
     lens = reference.state.camera.intrinsics
     mean = np.zeros((lens.height_px, lens.width_px, 3), np.float32)
     for part in slices:
         band = part.band
         first, end = add_margin(band, lens.height_px)
-        rendered = reference = render_view(band.state, context, (first, end), reference)
-        own = light(rendered)[band.first - first : band.end - first]
+        rendered = reference = render_view(band.state, reference.context, (first, end), reference)
+        own = integrate_light(rendered)[band.first - first : band.end - first]
         mean[band.first : band.end] += part.weights[:, None, None] * own
     return mean
 
 
-def integrate_light(rendered: CameraView, context: RenderContext) -> Float32:
+def integrate_light(rendered: CameraView) -> Float32:
     """Radiance of every pixel, anti-aliased; valid until the next call."""
     # Shading changes the world's record, from which other instants start.
     rendered = replace(rendered, world=copy_world(rendered.world))
-    scene, camera = rendered.state.scene, rendered.state.camera
-    radiance = shade_pixels(scene, camera, rendered.world, rendered.view, rendered.gbuffer, context)
-    smooth_edges(rendered.world, rendered.view, rendered.gbuffer, radiance, context)
-    image: Float32 = radiance.numpy().reshape(rendered.view.height, rendered.view.width, 3)
-    return image
+    radiance = shade_pixels(rendered)
+    smooth_edges(rendered, radiance)
+    return np.asarray(radiance.numpy().reshape(rendered.view.height, rendered.view.width, 3))
 
 
-def _keep_main_lamps(reference: CameraView, context: RenderContext) -> CameraView:
+def _keep_main_lamps(reference: CameraView) -> CameraView:
     """The view with only the lamps that matter at the middle of the exposure."""
-    chosen = main_lamp_numbers(
-        reference.world, reference.view, reference.gbuffer, context.settings.max_lamps
-    )
+    chosen = main_lamp_numbers(reference)
     if chosen is None:
         return reference
     scene, camera = reference.state.scene, reference.state.camera
     scene = replace(scene, lights=tuple(scene.lights[k] for k in chosen))
-    world = repack_moved(reference.world, scene, camera, context.cache)
+    world = repack_moved(reference.world, scene, camera, reference.cache)
     return replace(reference, state=CameraState(scene, camera), world=world)
-
-
-def _to_device(image: Float32, dtype: Any, context: RenderContext) -> wp.array:
-    """An image as a flat array on the device."""
-    flat = image.reshape(-1, *image.shape[2:])
-    return wp.array(flat, dtype=dtype, device=context.cache.device)

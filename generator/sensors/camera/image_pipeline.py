@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Annotated, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from gen_data.generator.config.distributions import (
     Scalar,
     UnitInterval,
 )
+from gen_data.generator.config.yaml_tree import load_yaml
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.interfaces import Renderer
@@ -32,14 +34,14 @@ from gen_data.generator.sensors.camera.exposure import (
     meter_ev100,
     saturation_cd_m2,
 )
-from gen_data.generator.sensors.camera.flare import add_flare
-from gen_data.generator.sensors.camera.glare import add_glare
 from gen_data.generator.sensors.camera.image_sensor import ImageSensor, expose, filter_at, mosaic
+from gen_data.generator.sensors.camera.isp import Tone, display_values, to_bytes, tone_to_bytes
 from gen_data.generator.sensors.camera.lens_drops import lens_drops, refract_in_drops
-from gen_data.generator.sensors.camera.presets import camera_preset
-from gen_data.generator.sensors.camera.tone import Tone, display_values, to_bytes, tone_to_bytes
+from gen_data.generator.sensors.camera.optics import add_flare, add_glare
+from gen_data.generator.sensors.device_presets import check_preset, preset_path
 
 NONE = Constant(0.0)
+PRESETS = "gen_data.generator.sensors.camera.presets"
 Row = tuple[float, float, float]
 
 
@@ -80,7 +82,7 @@ class ImagePipeline(Strict):
         warmth_ev: Error of the white balance: red over blue, in stops.
         demosaic: Method of demosaicing.
         saturation: Factor on saturation.
-        tone: Tone curve, see ``generator/sensors/camera/tone.py``; ``log`` is for sensors with
+        tone: Tone curve, see ``generator/sensors/camera/isp.py``; ``log`` is for sensors with
             several exposures.
         sharpening: Amount of unsharp masking.
         sharpening_px: Radius of unsharp masking.
@@ -116,7 +118,7 @@ class ImagePipeline(Strict):
         if not isinstance(given, Mapping):
             return given
         preset = given.get("preset", "ideal")
-        below = camera_preset(preset) if isinstance(preset, str) else {}
+        below = _preset(preset) if isinstance(preset, str) else {}
         return _lists_to_tuples(_merge_presets(below, given))
 
     @model_validator(mode="after")
@@ -218,13 +220,7 @@ def develop(
 ) -> Photograph:
     """Develop a photograph: meter the exposure, then apply all of ``STAGES`` in order.
 
-    Args:
-        radiance: Linear Rec. 709 colours [cd/m^2], float32 [h, w, 3].
-        depth_m: As in ``Shot``; needed only by a pipeline with a focus.
-        camera: Lens, and exposure value if that is fixed.
-        weather: Source of drops on the lens.
-        pipeline: The camera's configuration.
-        rng: Draws parameters and noise.
+    Arguments are as in ``Shot``; the depth is needed only by a pipeline with a focus.
     """
     ev100 = meter_ev100(radiance) if camera.ev100 is None else camera.ev100
     wanted = ev100 - pipeline.exposure_compensation_ev.draw(rng)
@@ -264,18 +260,6 @@ def _flare(light: Light, shot: Shot) -> Light:
     if share <= 0.0:
         return light
     return replace(light, values=add_flare(light.values, share, light.white))
-
-
-def _glare(light: Light, shot: Shot) -> Light:
-    share = shot.pipeline.glare.draw(shot.rng)
-    return replace(light, values=add_glare(light.values, share)) if share > 0.0 else light
-
-
-def _chromatic_aberration(light: Light, shot: Shot) -> Light:
-    corner_px = shot.pipeline.chromatic_aberration_px.draw(shot.rng)
-    if corner_px == 0.0:
-        return light
-    return replace(light, values=optics.apply_chromatic_aberration(light.values, corner_px))
 
 
 def _vignetting(light: Light, shot: Shot) -> Light:
@@ -326,27 +310,29 @@ def _white_balance(light: Light, shot: Shot) -> Light:
     return Light(image * gains @ srgb_from_camera.T, 1.0)
 
 
-def _saturation(light: Light, shot: Shot) -> Light:
-    factor = shot.pipeline.saturation.draw(shot.rng)
-    return (
-        light
-        if factor == 1.0
-        else replace(light, values=isp.scale_saturation(light.values, factor))
-    )
-
-
 Stage = Callable[[Light, Shot], Light]
+
+
+def _effect(field: str, neutral: float, apply: Callable[[Float32, float], Float32]) -> Stage:
+    """A stage that applies a strength, drawn from a field of the pipeline, unless it is neutral."""
+
+    def stage(light: Light, shot: Shot) -> Light:
+        drawn = getattr(shot.pipeline, field).draw(shot.rng)
+        return light if drawn == neutral else replace(light, values=apply(light.values, drawn))
+
+    return stage
+
 
 STAGES: tuple[Stage, ...] = (
     _lens_drops,
     _defocus,
     _flare,
-    _glare,
-    _chromatic_aberration,
+    _effect("glare", 0.0, add_glare),
+    _effect("chromatic_aberration_px", 0.0, optics.apply_chromatic_aberration),
     _vignetting,
     _image_circle,
     _image_sensor,
-    _saturation,
+    _effect("saturation", 1.0, isp.scale_saturation),
 )
 """From radiance to linear sRGB, in the order of a real camera; tone and JPEG follow."""
 
@@ -380,6 +366,14 @@ def _centre_m(depth_m: NDArray[np.floating]) -> float:
     middle = depth_m[height // 3 : height - height // 3, width // 3 : width - width // 3]
     there = middle[np.isfinite(middle)]
     return float(np.median(there)) if len(there) else 1000.0
+
+
+@cache
+def _preset(name: str) -> dict[str, Any]:
+    """The values of a preset, as plain data; ValueError if there is no such preset."""
+    plain = load_yaml(preset_path(PRESETS, check_preset(PRESETS, name))).plain()
+    assert isinstance(plain, dict)
+    return plain
 
 
 def _merge_presets(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:

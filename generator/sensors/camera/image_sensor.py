@@ -58,11 +58,9 @@ class ImageSensor(Strict):
 
 
 def mosaic(image: Float32, pattern: Pattern) -> Float32:
-    """Light on pixels behind their colour filters, float32 [h, w].
+    """Light on pixels behind their colour filters, float32 [h, w]; ``mono`` takes luminance.
 
-    Args:
-        image: Linear response of the three filters, float32 [h, w, 3].
-        pattern: Colour filter array; ``mono`` takes luminance.
+    ``image`` is the linear response of the three filters, float32 [h, w, 3].
     """
     if pattern == "mono":
         return np.asarray(luminance(image), np.float32)
@@ -82,7 +80,7 @@ def filter_at(pattern: Pattern, height: int, width: int) -> NDArray[np.intp]:
 
 
 def expose(light: Float32, gain: float, time_s: float, sensor: ImageSensor, rng: Rng) -> Float32:
-    """Digital values of an exposure, float32 [h, w]; 1 = saturated.
+    """Digital values of an exposure, float32 [h, w], from 0; above 1 only with several exposures.
 
     Args:
         light: Light on pixels; 1 saturates them at this gain; any range.
@@ -90,9 +88,6 @@ def expose(light: Float32, gain: float, time_s: float, sensor: ImageSensor, rng:
         time_s: Exposure time.
         sensor: Data sheet.
         rng: Draws the noise.
-
-    Returns:
-        Linear values from 0; above 1 only with several exposures.
     """
     merged = _expose_once(light, gain, time_s, sensor, rng)
     reach = 1.0

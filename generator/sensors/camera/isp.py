@@ -1,15 +1,35 @@
-"""Image signal processor: demosaicing, white balance, saturation, sharpening and JPEG."""
+"""Image signal processor: demosaicing, white balance, saturation, sharpening, tone curve and JPEG.
+
+Tone curves give display values from linear ones, of which 1 saturates:
+
+=========  ==============================================================================
+filmic     slight toe, straight mid-tones, exponential shoulder to 1: Uchimura, "HDR
+           theory and practice", CEDEC 2017
+knee       straight to a half, above it an exponential shoulder to 1: the knee by which
+           cameras compress highlights
+log        logarithm of the whole range of a sensor of several exposures: the mu-law of
+           Kalantari and Ramamoorthi, "Deep high dynamic range imaging of dynamic scenes",
+           2017
+srgb       clipped at 1
+linear     clipped at 1 and written without sRGB's transfer function
+=========  ==============================================================================
+
+All but ``linear`` are followed by the transfer function of sRGB (IEC 61966-2-1).
+"""
 
 from __future__ import annotations
 
-from typing import Literal
+import math
+from functools import lru_cache
+from typing import Any, Literal, TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.colorimetry import luminance
+from gen_data.generator.core.colorimetry import luminance, srgb_encode
+from gen_data.generator.core.se3 import Array
 from gen_data.generator.sensors.camera.image_sensor import Pattern
 
 Demosaic = Literal["bilinear", "edge_aware"]
@@ -20,13 +40,9 @@ _DEPTH = 65_535.0
 
 
 def demosaic(raw: Float32, pattern: Pattern, method: Demosaic, white: float) -> Float32:
-    """Interpolate three colours at every pixel, float32 [h, w, 3].
+    """Interpolate three colours at every pixel of linear values [h, w]: float32 [h, w, 3].
 
-    Args:
-        raw: Linear values [h, w].
-        pattern: Colour filter array.
-        method: Of interpolation.
-        white: Larger values are clipped.
+    Values above ``white`` are clipped.
     """
     if pattern == "mono":
         return np.asarray(np.repeat(raw[..., None], 3, axis=-1), np.float32)
@@ -39,11 +55,8 @@ def demosaic(raw: Float32, pattern: Pattern, method: Demosaic, white: float) -> 
 def grey_world_gains(image: Float32) -> Float32:
     """Factors on red, green and blue that make the mean of an image grey, float32 [3].
 
-    Clipped pixels are left out; 1 if hardly any other is left. Source: Buchsbaum, "A spatial
+    Clipped pixels, at 1, are left out; 1 if hardly any other is left. Source: Buchsbaum, "A spatial
     processor model for object colour perception", 1980.
-
-    Args:
-        image: Linear; 1 saturates.
     """
     seen = image.reshape(-1, 3)[::7]
     seen = seen[(seen.max(axis=1) < 0.95) & (seen.min(axis=1) > 0.0)]
@@ -54,12 +67,10 @@ def grey_world_gains(image: Float32) -> Float32:
 
 
 def white_balance_gains(image: Float32, share: float, warmth_ev: float) -> Float32:
-    """Factors on red, green and blue relative to green, float32 [3].
+    """Factors on red, green and blue relative to green, float32 [3]; 1 saturates the image.
 
-    Args:
-        image: Linear; 1 saturates.
-        share: Share of the illuminant's colour to correct, by the grey-world assumption.
-        warmth_ev: Error: red over blue, in stops.
+    ``share`` of the illuminant's colour is corrected by the grey-world assumption; the error
+    ``warmth_ev`` is red over blue, in stops.
     """
     gains = np.ones(3, np.float32)
     if share > 0.0:
@@ -71,8 +82,7 @@ def white_balance_gains(image: Float32, share: float, warmth_ev: float) -> Float
 def scale_saturation(image: Float32, factor: float) -> Float32:
     """Scale the difference of colours from grey of the same luminance."""
     grey = luminance(image)[..., None]
-    colors: Float32 = grey + np.float32(factor) * (image - grey)
-    return colors
+    return np.asarray(grey + np.float32(factor) * (image - grey))
 
 
 def sharpen(display: Float32, amount: float, radius_px: float) -> Float32:
@@ -82,14 +92,93 @@ def sharpen(display: Float32, amount: float, radius_px: float) -> Float32:
 
 
 def compress_jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
-    """Encode and decode an image as JPEG, uint8 [h, w, 3].
-
-    Args:
-        image: sRGB, uint8 [h, w, 3].
-        quality: Quality of libjpeg, 1 to 100.
-    """
+    """Encode and decode an sRGB image as JPEG, uint8 [h, w, 3]; libjpeg's quality, 1 to 100."""
     ok, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
     assert ok, "the JPEG encoder takes any RGB image"
     decoded = cv2.imdecode(data, cv2.IMREAD_COLOR)
     assert decoded is not None, "encoded bytes can be decoded"
     return np.ascontiguousarray(decoded[..., ::-1], np.uint8)
+
+
+Tone = Literal["filmic", "knee", "log", "srgb", "linear"]
+Real = TypeVar("Real", bound=np.floating[Any])
+
+_LOG_SLOPE = 8.0
+"""Slope of ``log`` at black, before it is scaled to reach 1 at white."""
+_MANTISSA_BITS = 10
+_DROPPED_BITS = 23 - _MANTISSA_BITS
+_ROWS_AT_ONCE = 32
+
+
+def filmic(value: NDArray[Real]) -> NDArray[Real]:
+    """Uchimura's curve with contrast 1, linear from 0.22 of length 0.4, black tightness 1.33."""
+    m, length, black = 0.22, 0.4, 1.33
+    shoulder_start = m + (1.0 - m) * length
+    falloff = 1.0 / (1.0 - shoulder_start)
+    toe = m * (value / m) ** black
+    shoulder = 1.0 - (1.0 - shoulder_start) * np.exp(-falloff * (value - shoulder_start))
+    t = np.clip(value / m, 0.0, 1.0)
+    toe_weight = 1.0 - t * t * (3.0 - 2.0 * t)
+    lower = toe * toe_weight + value * (1.0 - toe_weight)
+    curve: NDArray[Real] = np.where(value < shoulder_start, lower, shoulder)
+    return np.asarray(np.clip(curve, 0.0, 1.0))
+
+
+def knee(value: NDArray[Real]) -> NDArray[Real]:
+    """Straight to 0.5, then ``1 - 0.5 exp(-2 (value - 0.5))``, which has the same slope there."""
+    over = np.maximum(value - 0.5, 0.0)
+    return np.where(value < 0.5, value, 1.0 - 0.5 * np.exp(-2.0 * over))
+
+
+def log(value: NDArray[Real], white: float) -> NDArray[Real]:
+    """``ln(1 + mu x) / ln(1 + mu)`` of ``x = value / white`` with ``mu = 8 white``."""
+    return np.asarray(np.log1p(_LOG_SLOPE * value) / math.log1p(_LOG_SLOPE * white))
+
+
+def display_values(value: NDArray[Real], tone: Tone, white: float = 1.0) -> NDArray[Real]:
+    """Display values [0, 1] of linear ones, of the same shape and type.
+
+    1 saturates for all curves but ``log``, which maps ``white`` to 1.
+    """
+    value = np.maximum(value, 0.0)
+    if tone == "filmic":
+        value = filmic(value)
+    elif tone == "knee":
+        value = knee(value)
+    elif tone == "log":
+        value = log(value, white)
+    value = np.clip(value, 0.0, 1.0)
+    return value if tone == "linear" else srgb_encode(value)
+
+
+def to_bytes(display: NDArray[np.floating]) -> NDArray[np.uint8]:
+    """Quantise display values [0, 1] to bytes."""
+    return np.asarray(np.floor(np.clip(display, 0.0, 1.0) * 255.0 + 0.5), np.uint8)
+
+
+def tone_to_bytes(
+    image: Float32, scale: float, tone: Tone, white: float = 1.0
+) -> NDArray[np.uint8]:
+    """Bytes of linear values times ``scale``, uint8 of the same shape [h, w, 3], by a lookup table.
+
+    Equals ``to_bytes(display_values(...))`` of values rounded to ten bits of mantissa: an error of
+    at most a tenth of a byte before rounding.
+    """
+    table, factor = _byte_table(tone, white), np.float32(scale)
+    out = np.zeros(image.shape, np.uint8)
+    # In bands that fit into the processor's cache.
+    for top in range(0, len(image), _ROWS_AT_ONCE):
+        rows = slice(top, top + _ROWS_AT_ONCE)
+        # Sign, exponent and leading bits of the mantissa are the index: negative values clip to 0.
+        index = (image[rows] * factor).view(np.int32) >> _DROPPED_BITS
+        np.take(table, index, out=out[rows], mode="clip")
+    return out
+
+
+@lru_cache(maxsize=8)
+def _byte_table(tone: Tone, white: float) -> NDArray[np.uint8]:
+    """Bytes of all positive float32, indexed by their leading bits."""
+    infinity = int(np.float32(np.inf).view(np.int32)) >> _DROPPED_BITS
+    middle = (np.arange(infinity, dtype=np.int32) << _DROPPED_BITS) + (1 << (_DROPPED_BITS - 1))
+    values: Array = middle.view(np.float32).astype(np.float64)
+    return np.append(to_bytes(display_values(values, tone, white)), np.uint8(255))

@@ -11,7 +11,7 @@ from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.scene import Camera, Weather
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Streams
-from gen_data.generator.sensors.camera.pyramid import blur, halve
+from gen_data.generator.sensors.camera.optics import blur, halve
 
 _RADII = (0.004, 0.022)
 """Smallest and largest radius of drops over the image's width."""
@@ -39,12 +39,7 @@ def lens_drops(weather: Weather, camera: Camera) -> Array:
 
 
 def refract_in_drops(image: Float32, drops: Array) -> Float32:
-    """Draw drops over an image in order, float32 [h, w, 3].
-
-    Args:
-        image: Linear, without drops.
-        drops: As returned by ``lens_drops``.
-    """
+    """Draw drops over a linear image in order, float32 [h, w, 3]; drops as of ``lens_drops``."""
     height, width = image.shape[:2]
     small = blur(halve(image, _HALVINGS))
     out: Float32 = image.copy()

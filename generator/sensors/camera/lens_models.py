@@ -8,24 +8,34 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.lens import COEFFICIENTS, PINHOLE, Lens
+from gen_data.generator.core.lens import COEFFICIENTS, Lens, LensModel
 
 FieldDeg = Annotated[float, Field(gt=0, le=360)]
 
 
-class Pinhole(Strict):
+class _LensModel(Strict):
+    """Base of the models of ``gen_data.generator.core.lens``; fields are their coefficients."""
+
+    model: LensModel
+
+    def lens(self) -> Lens:
+        """The lens as renderers use it."""
+        values = tuple(float(getattr(self, name)) for name in COEFFICIENTS[self.model])
+        field_deg = getattr(self, "field_deg", None)
+        half_rad = math.pi if field_deg is None else math.radians(0.5 * field_deg)
+        return Lens(self.model, values, half_rad)
+
+
+class Pinhole(_LensModel):
     """A pinhole: no distortion."""
 
     model: Literal["pinhole"] = "pinhole"
 
-    def lens(self) -> Lens:
-        """The lens as renderers use it."""
-        return PINHOLE
 
-
-class BrownConrady(Strict):
+class BrownConrady(_LensModel):
     """A lens with OpenCV's rational distortion model, with its names and signs.
 
     Attributes:
@@ -47,12 +57,8 @@ class BrownConrady(Strict):
     k6: float = 0.0
     field_deg: FieldDeg | None = None
 
-    def lens(self) -> Lens:
-        """The lens as renderers use it."""
-        return _polynomial(self)
 
-
-class KannalaBrandt(Strict):
+class KannalaBrandt(_LensModel):
     """A fisheye with OpenCV's model and names; all coefficients 0 is an equidistant lens.
 
     Attributes:
@@ -68,19 +74,11 @@ class KannalaBrandt(Strict):
     k4: float = 0.0
     field_deg: FieldDeg | None = None
 
-    def lens(self) -> Lens:
-        """The lens as renderers use it."""
-        return _polynomial(self)
 
-
-class Equirectangular(Strict):
+class Equirectangular(_LensModel):
     """A panorama: columns are longitudes, rows latitudes; hfov_deg 360 and 2:1 is a full sphere."""
 
     model: Literal["equirectangular"]
-
-    def lens(self) -> Lens:
-        """The lens as renderers use it."""
-        return Lens("equirectangular")
 
 
 class CalibratedLens(Strict):
@@ -120,11 +118,7 @@ LensConfig = Annotated[
 
 @dataclass(frozen=True, slots=True)
 class Calibration:
-    """Published intrinsics, with pixel centres at integers.
-
-    Attributes:
-        source: Publication or file.
-    """
+    """Published intrinsics, with pixel centres at integers."""
 
     size_px: tuple[int, int]
     fx_px: float
@@ -132,59 +126,7 @@ class Calibration:
     cx_px: float
     cy_px: float
     lens: Lens
-    source: str
 
 
-CALIBRATIONS: dict[str, Calibration] = {
-    "kitti_raw_02": Calibration(
-        (1392, 512),
-        959.7910,
-        956.9251,
-        696.0217,
-        224.1806,
-        Lens(
-            "brown_conrady",
-            (-3.691481e-01, 1.968681e-01, 1.353473e-03, 5.677587e-04, -6.770705e-02, 0.0, 0.0, 0.0),
-        ),
-        "KITTI raw data, 2011_09_26/calib_cam_to_cam.txt, lines S_02, K_02, D_02 (Geiger et al., "
-        "'Vision meets robotics', IJRR 2013)",
-    ),
-    "euroc_cam0": Calibration(
-        (752, 480),
-        458.654,
-        457.296,
-        367.215,
-        248.375,
-        Lens(
-            "brown_conrady",
-            (-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05, 0.0, 0.0, 0.0, 0.0),
-        ),
-        "EuRoC MAV data set, mav0/cam0/sensor.yaml (Burri et al., IJRR 2016)",
-    ),
-    "tum_vi_cam0": Calibration(
-        (512, 512),
-        190.97847715128717,
-        190.9733070521226,
-        254.93170605935475,
-        256.8974428996504,
-        Lens(
-            "kannala_brandt",
-            (
-                0.0034823894022493434,
-                0.0007150348452162257,
-                -0.0020532361418706202,
-                0.00020293673591811182,
-            ),
-            math.radians(97.5),
-        ),
-        "TUM VI benchmark, camera 0 at 512 x 512 (Schubert et al., IROS 2018); the lens shows 195 "
-        "degrees",
-    ),
-}
+CALIBRATIONS = load_table(__package__, "calibrations", Calibration)
 """Calibrations by their name in configurations."""
-
-
-def _polynomial(config: BrownConrady | KannalaBrandt) -> Lens:
-    values = tuple(float(getattr(config, name)) for name in COEFFICIENTS[config.model])
-    half_rad = math.pi if config.field_deg is None else math.radians(0.5 * config.field_deg)
-    return Lens(config.model, values, half_rad)

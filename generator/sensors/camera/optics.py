@@ -1,4 +1,9 @@
-"""Lens effects on linear images, float32 [h, w, 3] of any unit."""
+"""Lens effects on linear images, float32 [h, w, 3] of any unit.
+
+Flare consists of ghosts by reflections between the surfaces of a lens; by veiling glare, the lens
+scatters a share of all light around its source. Image pyramids use only sums and products, which
+all processors round alike, so that results do not depend on the machine.
+"""
 
 from __future__ import annotations
 
@@ -56,10 +61,8 @@ def defocus(image: Float32, radius_px: Float32) -> Float32:
 def apply_vignetting(image: Float32, corner_loss: float) -> Float32:
     """Darken an image towards its corners by mechanical vignetting.
 
-    Args:
-        image: Linear image.
-        corner_loss: Share of light lost at the corners; the loss grows with the square of the
-            distance (Goldman, "Vignette and exposure calibration and compensation", 2010).
+    The loss grows with the square of the distance (Goldman, "Vignette and exposure calibration and
+    compensation", 2010) to a share of ``corner_loss`` at the corners.
     """
     height, width = image.shape[:2]
     x = np.arange(width, dtype=np.float32) + np.float32(0.5 - 0.5 * width)
@@ -110,8 +113,7 @@ def _fisheye_gain(cosine: Array, coefficients: Sequence[float]) -> Array:
         slope = slope + (2 * k + 1) * coefficient * power
         power = power * square
     # sin(theta) / (r r') with r = theta * ratio; numpy's sinc(x) is sin(pi x) / (pi x).
-    gain: Array = np.sinc(theta / np.pi) / (ratio * slope)
-    return gain
+    return np.asarray(np.sinc(theta / np.pi) / (ratio * slope))
 
 
 def apply_chromatic_aberration(image: Float32, corner_px: float) -> Float32:
@@ -120,20 +122,17 @@ def apply_chromatic_aberration(image: Float32, corner_px: float) -> Float32:
     share = corner_px / (0.5 * math.hypot(width, height))
     out = image.copy()
     for channel, scale in ((0, 1.0 + share), (2, 1.0 - share)):
-        shift = np.array(
-            [
-                [scale, 0.0, (1.0 - scale) * 0.5 * (width - 1)],
-                [0.0, scale, (1.0 - scale) * 0.5 * (height - 1)],
-            ]
-        )
+        shift = _scale_about_middle(scale, width, height)
         out[..., channel] = cv2.warpAffine(
-            image[..., channel],
-            shift,
-            (width, height),
-            flags=cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
+            image[..., channel], shift, (width, height), borderMode=cv2.BORDER_REPLICATE
         )
     return np.asarray(out, np.float32)
+
+
+def _scale_about_middle(scale: float, width: int, height: int) -> Array:
+    """Affine map of pixel indices, [2, 3]."""
+    x, y = ((1.0 - scale) * 0.5 * (size - 1) for size in (width, height))
+    return np.array([[scale, 0.0, x], [0.0, scale, y]])
 
 
 def _disc(radius_px: float) -> Float32:
@@ -142,3 +141,136 @@ def _disc(radius_px: float) -> Float32:
     y, x = np.mgrid[-reach : reach + 1, -reach : reach + 1].astype(np.float32)
     disc = np.clip(radius_px + 0.5 - np.hypot(x, y), 0.0, 1.0)
     return np.asarray(disc / disc.sum(), np.float32)
+
+
+_GHOSTS = (
+    (-0.35, 0.02, (0.5, 1.0, 0.6)),
+    (-0.8, 0.05, (1.0, 0.5, 0.5)),
+    (0.5, 0.03, (0.5, 0.6, 1.0)),
+)
+"""Ghosts: position of the spot scaled about the image's centre, radius over width, tint."""
+
+
+def add_flare(image: Float32, share: float, white: float) -> Float32:
+    """Add ghosts of light far beyond white, on a line through the centre of the image.
+
+    ``share`` of the light beyond ``white``, which saturates the sensor, returns as ghosts.
+    """
+    beyond = np.maximum(image - 4.0 * white, 0.0)
+    if not beyond.any():
+        return image
+    height, width = image.shape[:2]
+    out = image.copy()
+    for place, radius, tint in _GHOSTS:
+        shift = _scale_about_middle(place, width, height)
+        # Shrinking averages the light of the pixels that it merges.
+        ghost = cv2.warpAffine(beyond, shift, (width, height), flags=cv2.INTER_AREA)
+        ghost = _gaussian(ghost, radius * width)
+        out += share * place * place * ghost * np.asarray(tint, np.float32)
+    return np.asarray(out, np.float32)
+
+
+def _gaussian(image: Float32, sigma_px: float) -> Float32:
+    """Blur an image by a wide Gaussian at reduced resolution, which suffices for smooth images."""
+    halvings = max(0, int(math.log2(max(sigma_px, 1.0) / 2.0)))
+    small = image
+    for _ in range(halvings):
+        small = cv2.resize(small, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    small = cv2.GaussianBlur(small, (0, 0), sigma_px / 2**halvings, borderType=cv2.BORDER_REPLICATE)
+    size = (image.shape[1], image.shape[0])
+    return np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_LINEAR), np.float32)
+
+
+def halve(image: Float32, times: int) -> Float32:
+    """Average squares of ``2 ** times`` pixels; edges are replicated."""
+    for _ in range(times):
+        image = np.pad(image, ((0, image.shape[0] % 2), (0, image.shape[1] % 2), (0, 0)), "edge")
+        rows = image[0::2] + image[1::2]
+        image = np.float32(0.25) * (rows[:, 0::2] + rows[:, 1::2])
+    return image
+
+
+def blur(image: Float32) -> Float32:
+    """Convolve with [1 2 1] / 4 in both directions; edges are replicated."""
+    for axis in (0, 1):
+        n = image.shape[axis]
+        at = np.arange(n)
+        before = image.take(np.maximum(at - 1, 0), axis)
+        after = image.take(np.minimum(at + 1, n - 1), axis)
+        image = np.float32(0.5) * image + np.float32(0.25) * (before + after)
+    return image
+
+
+def enlarge(image: Float32, height: int, width: int, factor: int) -> Float32:
+    """Enlarge an image bilinearly, aligned by pixel centres, to [height, width, 3]."""
+    for axis, size in ((0, height), (1, width)):
+        first, after, part = bilinear(size, factor, image.shape[axis])
+        part = part[:, None, None] if axis == 0 else part[None, :, None]
+        image = image.take(first, axis) * (1 - part) + image.take(after, axis) * part
+    return image
+
+
+def bilinear(
+    size: int, factor: int, coarse: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64], Float32]:
+    """Indices and weights of bilinear interpolation in a coarser image, along one axis.
+
+    For ``size`` pixels, ``factor`` per pixel of the ``coarse`` ones: index of the coarse pixel
+    before, of the one after, and weight of the latter; [size] each.
+    """
+    place = np.clip((np.arange(size) + 0.5) / factor - 0.5, 0.0, coarse - 1.0)
+    first = np.minimum(place.astype(np.int64), max(coarse - 2, 0))
+    after = np.minimum(first + 1, coarse - 1)
+    return first, after, (place - first).astype(np.float32)
+
+
+# Scales of the blurs, in halvings of the image: a narrow core and a wide skirt approximate the
+# point spread of eyes and cameras, which falls with the square of the angle.
+_LEVELS = (2, 4, 6)
+FACTOR = 2 ** _LEVELS[0]
+_ROWS_AT_ONCE = 32
+
+
+def add_glare(image: Float32, share: float) -> Float32:
+    """Scatter a share of a linear image's light, float32 [h, w, 3]; the total is preserved.
+
+    A share of 0.02 suits a clean lens, 0.1 a dirty one. Source of the sum of blurs: Spencer et al.,
+    "Physically-based glare effects for digital images", SIGGRAPH 1995.
+    """
+    height, width = image.shape[:2]
+    coarse = scatter(image) * np.float32(share / len(_LEVELS))
+    veil = _widen(coarse, width)
+    first, after, part = bilinear(height, FACTOR, len(veil))
+    out: Float32 = image * np.float32(1.0 - share)
+    # In bands that fit into the processor's cache.
+    for top in range(0, height, _ROWS_AT_ONCE):
+        rows = slice(top, top + _ROWS_AT_ONCE)
+        weight = part[rows, None, None]
+        band = veil[first[rows]]
+        band *= 1 - weight
+        out[rows] += band
+        band = veil[after[rows]]
+        band *= weight
+        out[rows] += band
+    return out
+
+
+def scatter(image: Float32) -> Float32:
+    """Sum of blurs of an image, each of its brightness, at ``1 / FACTOR`` of its resolution."""
+    blurs = []
+    for level, before in zip(_LEVELS, (0, *_LEVELS), strict=False):
+        image = halve(image, level - before)
+        blurs.append(blur(blur(image)))
+    # From coarse to fine: only the running sum is enlarged.
+    total = blurs[-1]
+    for k in range(len(_LEVELS) - 2, -1, -1):
+        height, width = blurs[k].shape[:2]
+        total = blurs[k] + enlarge(total, height, width, 2 ** (_LEVELS[k + 1] - _LEVELS[k]))
+    return total
+
+
+def _widen(image: Float32, width: int) -> Float32:
+    """Enlarge the columns of an image by ``FACTOR`` to ``width``."""
+    first, after, part = bilinear(width, FACTOR, image.shape[1])
+    weight = part[None, :, None]
+    return image.take(first, 1) * (1 - weight) + image.take(after, 1) * weight

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.errors import ConfigError, SampleError, did_you_mean
-from gen_data.generator.core.interfaces import Renderer, SensorInfo
+from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.scene import Camera, Region, Scene
 from gen_data.generator.core.scene_time import RIG_AXES
@@ -19,28 +19,17 @@ from gen_data.generator.core.se3 import SE3, look_at
 from gen_data.generator.core.shutter import INSTANT, Shutter
 from gen_data.generator.core.stereo import baseline_m, disparity_px, is_seen_by_both
 from gen_data.generator.core.streams import Rng
+from gen_data.generator.sensors.camera.exposure import ExposureTime, RollingShutter, make_shutter
 from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 from gen_data.generator.sensors.camera.lens_models import CalibratedLens, LensConfig, Pinhole
-from gen_data.generator.sensors.camera.shutter import ExposureTime, RollingShutter, make_shutter
 from gen_data.generator.sensors.mounting import Mounted, check_rig
 
 Image = Literal[
-    Channel.RGB,
-    Channel.Z_DEPTH,
-    Channel.RANGE,
-    Channel.NORMALS,
-    Channel.INSTANCE,
-    Channel.PART,
-    Channel.CATEGORY,
-    Channel.OBJECT_COORDINATES,
-    Channel.DISPARITY,
-    Channel.DISPARITY_VISIBLE,
-    Channel.FLOW_FORWARD,
-    Channel.FLOW_BACKWARD,
-    Channel.FLOW_OCCLUDED_FORWARD,
-    Channel.FLOW_OCCLUDED_BACKWARD,
-    Channel.SCENE_FLOW,
-]
+    Channel.RGB, Channel.Z_DEPTH, Channel.RANGE, Channel.NORMALS, Channel.INSTANCE, Channel.PART,
+    Channel.CATEGORY, Channel.OBJECT_COORDINATES, Channel.DISPARITY, Channel.DISPARITY_VISIBLE,
+    Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD, Channel.FLOW_OCCLUDED_FORWARD,
+    Channel.FLOW_OCCLUDED_BACKWARD, Channel.SCENE_FLOW,
+]  # fmt: skip
 """Channels that can be written as images; see ``gen_data.generator.core.capture.Channel``."""
 
 PAIRED = frozenset({Channel.DISPARITY, Channel.DISPARITY_VISIBLE})
@@ -133,7 +122,8 @@ class RgbCamera(Mounted):
 
     def describe(self) -> SensorInfo:
         """Describe a camera with the channels that it writes."""
-        return self._camera_info(self.name, self.media, self.intrinsics().lens.model)
+        lens = self.intrinsics().lens.model
+        return self._info(self.name, Modality.CAMERA, channels=self.media, lens=lens)
 
     def mount(self, scene: Scene) -> Scene:
         """Add this camera, on its rig or looking at the scene's focus, unless it exists."""
@@ -151,17 +141,11 @@ class RgbCamera(Mounted):
             SampleError: it forms no rectified pair with ``stereo_with``.
         """
         requested = channels | set(self.media)
-        if self.stereo_with and PAIRED & requested:
-            mono = (requested - PAIRED) | {Channel.Z_DEPTH}
-            reading = self._capture(scene, renderer, mono, rng)
-            return self._add_disparity(scene, renderer, reading)
-        return self._capture(scene, renderer, requested, rng)
-
-    def _capture(
-        self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
-    ) -> SensorReading:
+        paired = bool(self.stereo_with and PAIRED & requested)
+        seen = (requested - PAIRED) | {Channel.Z_DEPTH} if paired else requested
         camera = scene.camera(self.name)
-        return capture_photograph(scene, renderer, camera, channels, self.image_pipeline, rng)
+        reading = capture_photograph(scene, renderer, camera, seen, self.image_pipeline, rng)
+        return self._add_disparity(scene, renderer, reading) if paired else reading
 
     def _add_disparity(
         self, scene: Scene, renderer: Renderer, reading: SensorReading

@@ -21,7 +21,7 @@ from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.stereo import disparity_px, is_seen_by_both
 from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.depth.dot_pattern import Dots
+from gen_data.generator.sensors.depth.structured_light import Dots
 from gen_data.generator.sensors.depth.view import Measured, View
 
 UInt8 = NDArray[np.uint8]

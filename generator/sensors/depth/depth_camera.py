@@ -1,44 +1,82 @@
-"""Depth camera: measured depth and infrared images, beside the true ones."""
+"""Depth camera: its data sheet; measured depth and infrared images, beside the true ones."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
+from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.errors import SampleError
-from gen_data.generator.core.interfaces import Renderer, SensorInfo
+from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 from gen_data.generator.sensors.camera.rgb_camera import add_camera
-from gen_data.generator.sensors.depth.depth_model import DepthModel, SidePx
-from gen_data.generator.sensors.depth.view import View
+from gen_data.generator.sensors.depth.active_stereo import ActiveStereo
+from gen_data.generator.sensors.depth.structured_light import StructuredLight
+from gen_data.generator.sensors.depth.time_of_flight import TimeOfFlight
+from gen_data.generator.sensors.depth.view import Measured, View
 from gen_data.generator.sensors.device_presets import check_preset, load_preset
 from gen_data.generator.sensors.mounting import Mounted
+
+SidePx = Annotated[int, Field(ge=8, le=4096)]
+
+
+class Ideal(Strict):
+    """Depth without errors."""
+
+    kind: Literal["ideal"] = "ideal"
+
+    def measure(self, view: View, rng: Rng) -> Measured:
+        """Measure true depth; white surfaces have an infrared value of 1000 at 1 m."""
+        del rng
+        hits = view.trace()
+        signal = 1000.0 * hits.reflectance[..., 0] / np.square(hits.range_m[..., 0])
+        infrared = np.rint(np.clip(signal, 0, 65_535)).astype(np.uint16)
+        return Measured(view.z_depth_m(0.0), infrared)
+
+
+class DepthModel(Strict):
+    """Data sheet of a depth camera.
+
+    Attributes:
+        size_px: Width and height of its images.
+        hfov_deg: Horizontal field of view.
+        range_m: Smallest and largest reported depth.
+        principle: Principle of measurement: ``ideal``, ``structured_light``, ``active_stereo`` or
+            ``time_of_flight``.
+    """
+
+    size_px: tuple[SidePx, SidePx] = (640, 480)
+    hfov_deg: float = Field(60.0, ge=1, le=150)
+    range_m: tuple[float, float] = (0.2, 10.0)
+    principle: Annotated[
+        Ideal | StructuredLight | ActiveStereo | TimeOfFlight, Field(discriminator="kind")
+    ] = Ideal()
+
+    @model_validator(mode="after")
+    def _range_rises(self) -> DepthModel:
+        low, high = self.range_m
+        if not 0.0 <= low < high:
+            raise ValueError(f"range_m must rise from 0 or more, got [{low:g}, {high:g}]")
+        return self
+
 
 MODELS = "gen_data.generator.sensors.depth"
 IDEAL = ImagePipeline()
 OWN = frozenset({Channel.MEASURED_DEPTH, Channel.INFRARED})
 
 DepthImage = Literal[
-    Channel.MEASURED_DEPTH,
-    Channel.INFRARED,
-    Channel.RGB,
-    Channel.Z_DEPTH,
-    Channel.RANGE,
-    Channel.NORMALS,
-    Channel.INSTANCE,
-    Channel.PART,
-    Channel.CATEGORY,
-    Channel.OBJECT_COORDINATES,
-]
+    Channel.MEASURED_DEPTH, Channel.INFRARED, Channel.RGB, Channel.Z_DEPTH, Channel.RANGE,
+    Channel.NORMALS, Channel.INSTANCE, Channel.PART, Channel.CATEGORY, Channel.OBJECT_COORDINATES,
+]  # fmt: skip
 """Channels that can be written as images; all but the first two are ground truth."""
 
 
@@ -89,7 +127,8 @@ class DepthCamera(Mounted):
 
     def describe(self) -> SensorInfo:
         """Describe a camera with the channels that it writes."""
-        return self._camera_info(self.name, self.media, self.intrinsics().lens.model)
+        lens = self.intrinsics().lens.model
+        return self._info(self.name, Modality.CAMERA, channels=self.media, lens=lens)
 
     def mount(self, scene: Scene) -> Scene:
         """Add this camera, on its rig or looking at the scene's focus, unless it exists.

@@ -125,9 +125,7 @@ class TimeOfFlight(Strict):
 def unwrap_phases(phases: Float32, modulation_mhz: tuple[int, ...]) -> tuple[Float32, Float32]:
     """Distances [m] on which phases agree best, and their root mean square disagreement [rad].
 
-    Args:
-        phases: In [0, 2 pi), one image per frequency, [n, h, w].
-        modulation_mhz: The frequencies, the highest last.
+    Phases are in [0, 2 pi), one image per frequency, [n, h, w]; the highest frequency is the last.
     """
     finest_m = LIGHT_M_S / (2e6 * modulation_mhz[-1])
     wraps = modulation_mhz[-1] // math.gcd(*modulation_mhz)

@@ -66,11 +66,9 @@ class View:
         return replace(self.camera, T_world_camera=pose)
 
     def trace(self, right_m: float = 0.0, subrays: int = 1) -> Hits:
-        """Trace the rays through all pixels.
+        """Trace the rays through all pixels, one each or 7 spread over a pixel's footprint.
 
-        Args:
-            right_m: Position of eye and light source, to the right of the camera.
-            subrays: 1, or 7 spread over a pixel's footprint.
+        Eye and light source are ``right_m`` to the right of the camera.
         """
         lens = self.camera.intrinsics
         shape = (lens.height_px, lens.width_px)
@@ -85,13 +83,15 @@ class View:
 
     def z_depth_m(self, right_m: float) -> Float32:
         """Depth image from beside the camera, float32 [h, w]; inf = nothing."""
-        seen = self.renderer.render(self.scene, self.beside(right_m), frozenset({Channel.Z_DEPTH}))
-        return np.asarray(seen.channels[Channel.Z_DEPTH], np.float32)
+        return self._render(right_m, Channel.Z_DEPTH)
 
     def luminance_cd_m2(self, right_m: float) -> Float32:
         """Luminance of the scene in ambient light, float32 [h, w]."""
-        seen = self.renderer.render(self.scene, self.beside(right_m), frozenset({Channel.RADIANCE}))
-        return luminance(np.asarray(seen.channels[Channel.RADIANCE], np.float32))
+        return luminance(self._render(right_m, Channel.RADIANCE))
+
+    def _render(self, right_m: float, channel: Channel) -> Float32:
+        seen = self.renderer.render(self.scene, self.beside(right_m), frozenset({channel}))
+        return np.asarray(seen.channels[channel], np.float32)
 
 
 def smooth_noise(rng: Rng, shape: tuple[int, int], sigma_px: float) -> Float32:

@@ -25,18 +25,16 @@ from gen_data.generator.core.measurement_dtypes import (
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.events.lane_queries import (
-    governing_light,
-    is_crossed,
-    lane_border_pieces,
-)
 from gen_data.generator.sensors.events.obb_queries import (
     OrientedObstacle,
     distance_m,
     find_obstacles,
     gap_ahead_m,
+    governing_light,
     is_below,
+    is_crossed,
     is_touching,
+    lane_border_pieces,
 )
 from gen_data.generator.sensors.mounting import Instrument, window_s
 

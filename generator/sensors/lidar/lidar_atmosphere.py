@@ -86,12 +86,8 @@ def optical_depth(
 ) -> Float32:
     """One-way optical depth along beams, float32 [n, candidates]; light falls by its double.
 
-    Args:
-        weather: Of the scene.
-        model: Of the scanner.
-        height_m: Height of the scanner above the world's origin, where fog has its full density.
-        up: z of the beams' directions in the world [n, 1].
-        range_m: [n, candidates]; finite.
+    Fog has its full density at the world's origin, ``height_m`` below the scanner. ``up`` is z of
+    the beams' directions in the world [n, 1]; ranges [n, candidates] are finite.
     """
     uniform = rain_extinction_per_m(weather.rain_mm_h)
     uniform += snow_extinction_per_m(weather.snow_mm_h, model.wavelength_nm)

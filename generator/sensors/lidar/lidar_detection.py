@@ -82,8 +82,7 @@ def received_light(reflectance: Float32, range_m: Float32, model: LidarModel) ->
     """Light received from a reflectance at a range through clear air; 0 without reflectance."""
     reach = np.float32(model.seen.range_m)
     near = reach / np.maximum(range_m, np.float32(1e-3))
-    light: Float32 = reflectance * (near * near) * np.float32(1.0 / model.seen.reflectance)
-    return light
+    return np.asarray(reflectance * (near * near) * np.float32(1.0 / model.seen.reflectance))
 
 
 def join_pulses(pulses: Pulses, more: Pulses) -> Pulses:
@@ -101,8 +100,7 @@ def is_detected(pulses: Pulses, rng: Rng) -> NDArray[np.bool_]:
     draw = rng.random(pulses.light.shape, dtype=np.float32)
     # The bound avoids overflow of the power; there p is 1 to float precision.
     odds = np.minimum(pulses.light, np.float32(100.0)) ** np.float32(STEEPNESS)
-    detected: NDArray[np.bool_] = draw * (1.0 + odds) < odds
-    return detected
+    return np.asarray(draw * (1.0 + odds) < odds)
 
 
 def select_returns(
@@ -169,9 +167,8 @@ def _add_secondary_hits(
     slot = rays * (1 + again) + ray % rays
     wide = {}
     for name in FIELDS:
-        nothing = np.inf if name == "range_m" else 0
-        further = np.full((len(rows), DETOURS_MAX * rays), nothing, fields[name].dtype)
-        wide[name] = np.concatenate([fields[name][rows], further], axis=1)
+        first = fields[name][rows]
+        wide[name] = np.concatenate([first, _empty_field(name, first, DETOURS_MAX * rays)], axis=1)
         wide[name][place, slot] = getattr(detours, name)[order]
     peaks = _merge_peaks(wide, rays, model)
     best = np.argsort(-peaks.light, axis=1, kind="stable")[:, : pulses.light.shape[1]]
@@ -194,12 +191,8 @@ def _relevant_hits(pulses: Pulses, detours: SecondaryHits, model: LidarModel) ->
 def _merge_peaks(fields: Mapping[str, NDArray[Any]], rays: int, model: LidarModel) -> Pulses:
     """Merge hits of a beam's rays that are closer than a pulse into peaks, [pulses, hits].
 
-    A peak has the range and the labels of its brightest hit.
-
-    Args:
-        fields: Of hits, [pulses, hits].
-        rays: Rays per beam, each with an equal share of its light.
-        model: Of the scanner.
+    A peak has the range and the labels of its brightest hit; each ray has an equal share of the
+    beam's light. ``fields`` are of hits, [pulses, hits].
     """
     order = np.argsort(fields["range_m"], axis=1, kind="stable")
     sorted_ = {name: np.take_along_axis(fields[name], order, axis=1) for name in FIELDS}

@@ -14,6 +14,7 @@ from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
 from gen_data.generator.core.scene import Lidar, Scene, Weather
 from gen_data.generator.core.streams import Rng
+from gen_data.generator.sensors.device_presets import preset_names
 from gen_data.generator.sensors.lidar.lidar_atmosphere import (
     add_atmosphere,
     attenuate,
@@ -21,6 +22,7 @@ from gen_data.generator.sensors.lidar.lidar_atmosphere import (
     rain_noise_m,
 )
 from gen_data.generator.sensors.lidar.lidar_detection import (
+    FIELDS,
     LABELS,
     Float32,
     Kept,
@@ -33,9 +35,15 @@ from gen_data.generator.sensors.lidar.lidar_detection import (
     report_intensity,
     select_returns,
 )
-from gen_data.generator.sensors.lidar.motion_distortion import SweepPulses, fire_pulses
-from gen_data.generator.sensors.lidar.presets import lidar_model, model_names
-from gen_data.generator.sensors.lidar.scan_pattern import LidarModel, Sweep, make_sweep
+from gen_data.generator.sensors.lidar.scan_pattern import (
+    PRESETS,
+    LidarModel,
+    Sweep,
+    SweepPulses,
+    fire_pulses,
+    lidar_model,
+    make_sweep,
+)
 from gen_data.generator.sensors.mounting import Mounted, add_lidar
 
 SUBRAYS = 7
@@ -93,10 +101,11 @@ class LidarSensor(Mounted):
     @field_validator("model")
     @classmethod
     def _is_known(cls, model: str | LidarModel) -> str | LidarModel:
-        if isinstance(model, str) and model not in model_names():
+        known = preset_names(PRESETS)
+        if isinstance(model, str) and model not in known:
             raise ValueError(
-                f"expected one of {', '.join(model_names())}, or the name of a .yaml file"
-                f"{did_you_mean(model, model_names())}"
+                f"expected one of {', '.join(known)}, or the name of a .yaml file"
+                f"{did_you_mean(model, known)}"
             )
         return model
 
@@ -110,13 +119,7 @@ class LidarSensor(Mounted):
 
     def describe(self) -> SensorInfo:
         """Describe a laser scanner."""
-        return SensorInfo(
-            self.name,
-            Modality.LIDAR,
-            rate_hz=self.rate_hz,
-            time_offset_s=self.time_offset_s,
-            needs_clear_view=not self.inside,
-        )
+        return self._info(self.name, Modality.LIDAR)
 
     def mount(self, scene: Scene) -> Scene:
         """Add this scanner to its rig, or to its camera.
@@ -178,14 +181,7 @@ class Returns:
     def select(cls, pulses: Pulses, rows: NDArray[np.intp], picks: NDArray[np.intp]) -> Returns:
         """Select candidate ``picks[k]`` of pulse ``rows[k]``."""
         which = rows * pulses.light.shape[1] + picks
-        return cls(
-            rows,
-            pulses.range_m.ravel().take(which),
-            pulses.reflectance.ravel().take(which),
-            pulses.instance_id.ravel().take(which),
-            pulses.category_id.ravel().take(which),
-            pulses.surface.ravel().take(which),
-        )
+        return cls(rows, *(getattr(pulses, name).ravel().take(which) for name in FIELDS))
 
 
 def _apply_weather(

@@ -1,19 +1,5 @@
 """GNSS receiver: geodetic position, velocity and their accuracy.
 
-Example, for a scene with a rig ``ego``::
-
-    sensors:
-      - type: gnss
-        name: gps
-        rig: ego
-        model: ZED-F9P
-        rate_hz: 10
-
-``sample.measurements["gps"]`` then holds the fixes since the last step, with the fields ``time_s``,
-``latitude_deg``, ``longitude_deg``, ``altitude_m``, ``velocity_east_m_s`` ...,
-``horizontal_sigma_m``, ``vertical_sigma_m``, ``satellites`` and ``quality`` (as in NMEA GGA).
-Positions and velocities are NaN without a fix.
-
 Errors are white noise and a first-order Gauss-Markov process (Brown and Hwang, "Introduction to
 Random Signals and Applied Kalman Filtering"), scaled by the dilution of precision of the visible
 satellites (Langley, "Dilution of Precision", GPS World 1999).
@@ -39,8 +25,13 @@ from gen_data.generator.core.scene_time import scene_at
 from gen_data.generator.core.se3 import SE3, Array
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.device_presets import check_preset, load_preset
-from gen_data.generator.sensors.mount_kinematics import MountMotion, mount_motion, remove_carrier
-from gen_data.generator.sensors.mounting import Instrument, reading_times
+from gen_data.generator.sensors.mounting import (
+    Instrument,
+    MountMotion,
+    mount_motion,
+    reading_times,
+    remove_carrier,
+)
 
 PRESETS = "gen_data.generator.sensors.navigation.gnss_presets"
 OCCLUSION_RANGE_M = 1000.0
@@ -104,11 +95,6 @@ class Gnss(Instrument):
     satellites: int = Field(12, ge=4, le=60)
     mask_deg: float = Field(10.0, ge=0, le=60)
     noise: float = Field(1.0, ge=0)
-
-    @property
-    def device_model(self) -> str:
-        """Name of the preset."""
-        return self.model
 
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
@@ -198,8 +184,7 @@ def _is_visible(
     antenna = Lidar("antenna", "", T_world_lidar=SE3(motion.pose(time_s).translation_m))
     around = remove_carrier(scene_at(scene, float(time_s)), rig)
     rays = LidarRays(sky.astype(np.float32), 0.0, 1, OCCLUSION_RANGE_M)
-    visible: NDArray[np.bool_] = ~np.isfinite(renderer.scan(around, antenna, rays).range_m[:, 0])
-    return visible
+    return np.asarray(~np.isfinite(renderer.scan(around, antenna, rays).range_m[:, 0]))
 
 
 def _compute_fixes(sky: Array, visible: NDArray[np.bool_]) -> Fixes:
@@ -227,8 +212,7 @@ def _dilution(sky: Array) -> Array:
     if abs(float(np.linalg.det(normal))) < 1e-9:
         return np.full(2, np.inf)
     q = np.diag(np.linalg.inv(normal))
-    dilution: Array = np.sqrt(np.array([q[0] + q[1], q[2]]))
-    return dilution
+    return np.asarray(np.sqrt(np.array([q[0] + q[1], q[2]])))
 
 
 def _draw_slow_errors(times_s: Array, rate_hz: float, correlation_s: float, shared: Rng) -> Array:
@@ -245,5 +229,4 @@ def _draw_slow_errors(times_s: Array, rate_hz: float, correlation_s: float, shar
     for k, step in enumerate(fresh):
         value = kept * value + step
         values[k] = value
-    slow: Array = values[np.rint(times_s * rate_hz).astype(int)]
-    return slow
+    return np.asarray(values[np.rint(times_s * rate_hz).astype(int)])

@@ -1,18 +1,5 @@
 """Inertial measurement unit (IMU): accelerometer and gyroscope.
 
-Example, for a scene with a rig ``ego``::
-
-    sensors:
-      - type: imu
-        name: imu
-        rig: ego
-        model: ADIS16448
-        rate_hz: 100
-
-``sample.measurements["imu"]`` then holds the readings since the last step, with the fields
-``time_s``, ``force_x_m_s2`` ... ``force_z_m_s2`` (specific force) and ``rate_x_rad_s`` ...
-``rate_z_rad_s`` (angular rate), axes X forward, Y left, Z up. At rest ``force_z_m_s2`` is 9.8.
-
 The errors of each axis are a turn-on bias, a random walk of the bias, and white noise, the terms
 of data sheets and calibrations (IEEE Std 952; Woodman, "An introduction to inertial navigation",
 2007). White noise of density ``n`` sampled at rate ``f`` has standard deviation ``n sqrt(f)``; a
@@ -35,8 +22,7 @@ from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.device_presets import check_preset, load_preset
-from gen_data.generator.sensors.mount_kinematics import mount_motion
-from gen_data.generator.sensors.mounting import Instrument, reading_times
+from gen_data.generator.sensors.mounting import Instrument, mount_motion, reading_times
 
 PRESETS = "gen_data.generator.sensors.navigation.imu_presets"
 GRAVITY_M_S2 = 9.80665
@@ -82,11 +68,6 @@ class Imu(Instrument):
     rate_hz: float | None = Field(100.0, gt=0, le=10_000)
     noise: float = Field(1.0, ge=0)
 
-    @property
-    def device_model(self) -> str:
-        """Name of the preset."""
-        return self.model
-
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Measurements:
@@ -129,8 +110,7 @@ def _draw_errors(model: ImuModel, times_s: Array, rate_hz: float, rng: Rng) -> A
     rows = np.rint(times_s * rate_hz).astype(int)
     walk = _per_axis(model, "bias_random_walk") / math.sqrt(rate_hz) * walks[rows]
     white = _per_axis(model, "noise") * math.sqrt(rate_hz) * rng.standard_normal((len(times_s), 6))
-    errors: Array = bias + walk + white
-    return errors
+    return np.asarray(bias + walk + white)
 
 
 def _per_axis(model: ImuModel, field: str) -> Array:

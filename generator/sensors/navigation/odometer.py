@@ -1,17 +1,5 @@
 """Wheel odometer: distance, speed, yaw rate, steering angle and wheel speeds.
 
-Example, for a scene with a rig ``ego`` at the middle of the rear axle::
-
-    sensors:
-      - type: odometer
-        name: wheels
-        rig: ego
-        rate_hz: 50
-
-``sample.measurements["wheels"]`` then holds the readings since the last step, with the fields
-``time_s``, ``distance_m``, ``speed_m_s``, ``yaw_rate_rad_s``, ``steering_rad`` and the rim speeds
-``wheel_rear_left_m_s`` ... ``wheel_front_right_m_s``.
-
 Wheels roll without slip, with Ackermann geometry at the front; the steering angle is that of the
 bicycle model, ``atan(wheelbase * yaw rate / speed)``.
 """
@@ -29,8 +17,7 @@ from gen_data.generator.core.measurement_dtypes import table_rows
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Rng
-from gen_data.generator.sensors.mount_kinematics import MountMotion, mount_motion
-from gen_data.generator.sensors.mounting import Instrument, reading_times
+from gen_data.generator.sensors.mounting import Instrument, MountMotion, mount_motion, reading_times
 
 WALKING_M_S = 0.5
 """Below this speed the steering angle is not observable and reported as 0."""

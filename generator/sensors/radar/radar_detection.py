@@ -5,6 +5,9 @@ than a cell, and detectors report local maxima only (Richards, "Fundamentals of 
 Processing", 2nd ed., 2014, chapter 6). Every cell is therefore assigned to its strongest neighbour,
 that one to its own, and so on; all cells that end at the same peak form one detection with the sum
 of their power, at its centroid.
+
+Radar cross sections (RCS) at 77 GHz are those of road users by category, and of all else by area.
+Sources and values are in ``targets.yaml`` and ``surfaces.yaml``.
 """
 
 from __future__ import annotations
@@ -18,7 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.asset_types import SURFACES
+from gen_data.generator.core.scene import Instance
 from gen_data.generator.core.se3 import Array
 
 Curve = tuple[tuple[float, float], ...]
@@ -107,12 +113,7 @@ def make_cells(lit: Echo, look: Look) -> Cells:
 
 
 def find_peaks(cells: Cells, power: Array) -> NDArray[np.int64]:
-    """Index of the peak that each cell belongs to, from 0, [n].
-
-    Args:
-        cells: The cells.
-        power: Of each cell, [n].
-    """
+    """Index of the peak that each cell belongs to, from 0, [n]; ``power`` is of each cell, [n]."""
     count = len(power)
     if count == 0:
         return np.zeros(0, np.int64)
@@ -141,11 +142,9 @@ def merge_echoes(echo: Echo, group: NDArray[np.int64], power: Array) -> Echo:
     total = np.bincount(group, power, count)
 
     def mean(values: Array) -> Array:
-        middle: Array = np.bincount(group, power * values, count) / total
-        return middle
+        return np.asarray(np.bincount(group, power * values, count) / total)
 
-    order = np.lexsort((-power, group))
-    strongest = order[np.searchsorted(group[order], np.arange(count))]
+    strongest = strongest_members(group, power)
     return Echo(
         mean(echo.range_m),
         mean(echo.azimuth_rad),
@@ -156,6 +155,13 @@ def merge_echoes(echo: Echo, group: NDArray[np.int64], power: Array) -> Echo:
         echo.instance_id[strongest],
         echo.origin[strongest],
     )
+
+
+def strongest_members(group: NDArray[np.int64], power: Array) -> NDArray[np.intp]:
+    """Index of the strongest member of every group."""
+    order = np.lexsort((-power, group))
+    count = int(group.max()) + 1 if len(group) else 0
+    return np.asarray(order[np.searchsorted(group[order], np.arange(count))])
 
 
 def interpolate_curve(curve: Curve, azimuth_rad: Array) -> Array:
@@ -171,3 +177,58 @@ def _azimuth_bins(size_deg: Curve, azimuth_rad: Array) -> Array:
     sums = np.concatenate([[0.0], np.cumsum(0.5 * (per_deg[1:] + per_deg[:-1]) * 0.1)])
     bins = np.interp(np.abs(np.degrees(azimuth_rad)), azimuth_deg, sums)
     return np.asarray(np.copysign(bins, azimuth_rad))
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Radar cross section of a category of road users.
+
+    Attributes:
+        mean_dbsm: RCS, averaged over all aspect angles.
+        swing_db: Excess square on to a side, and deficit across a corner.
+        fill: Share of the box's silhouette that the object fills.
+    """
+
+    mean_dbsm: float
+    swing_db: float
+    fill: float
+
+
+TARGETS = load_table(__package__, "targets", Target)
+"""By category."""
+METAL = frozenset(
+    {"barrier", "bollard", "fence", "street_light", "traffic_light", "traffic_sign", "pole"}
+)
+"""Categories made of sheet metal and posts."""
+
+GAMMA_DB = load_table(__package__, "surfaces", float)
+"""RCS per area that faces the radar, by surface."""
+
+METAL_DB = 0.0
+
+
+def cross_section_m2(target: Target, instance: Instance, towards_radar: Array) -> float:
+    """Mean RCS [m^2] of a road user seen from a direction (unit, world)."""
+    x, y, _ = instance.T_world_instance.inverse().rotate(towards_radar)
+    level2 = float(x * x + y * y)
+    # The cosine of four times the azimuth, without the angle.
+    fourfold = 1.0 - 8.0 * float(x * x * y * y) / (level2 * level2) if level2 > 1e-12 else 0.0
+    return float(10.0 ** (0.1 * (target.mean_dbsm + target.swing_db * fourfold)))
+
+
+def silhouette_m2(instance: Instance, towards_radar: Array) -> float:
+    """Area [m^2] of a box's silhouette seen from a direction (unit, world)."""
+    a, b, c = np.subtract(instance.box_max_m, instance.box_min_m)
+    x, y, z = np.abs(instance.T_world_instance.inverse().rotate(towards_radar))
+    return float(x * b * c + y * a * c + z * a * b)
+
+
+def area_factor(category: str, surface: NDArray[np.uint8]) -> Array:
+    """RCS per perpendicular area, for rays that hit one category (empty = unlabelled), [n].
+
+    ``surface`` are numbers in ``SURFACES``, uint8 [n].
+    """
+    if category in METAL:
+        return np.full(len(surface), 10.0 ** (0.1 * METAL_DB))
+    table = np.array([GAMMA_DB[name] for name in SURFACES])
+    return np.asarray(10.0 ** (0.1 * table[surface]))

@@ -29,21 +29,24 @@ from gen_data.generator.core.scene import Instance, Lidar, Scene
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.device_presets import check_preset, load_preset
-from gen_data.generator.sensors.mount_kinematics import mount_motion, remove_carrier, velocity_at
-from gen_data.generator.sensors.mounting import Instrument
-from gen_data.generator.sensors.radar.cross_section import (
-    TARGETS,
-    area_factor,
-    cross_section_m2,
-    silhouette_m2,
+from gen_data.generator.sensors.mounting import (
+    Instrument,
+    mount_motion,
+    remove_carrier,
+    velocity_at,
 )
 from gen_data.generator.sensors.radar.radar_detection import (
+    TARGETS,
     Echo,
     Look,
+    area_factor,
+    cross_section_m2,
     find_peaks,
     interpolate_curve,
     make_cells,
     merge_echoes,
+    silhouette_m2,
+    strongest_members,
 )
 
 PRESETS = "gen_data.generator.sensors.radar.presets"
@@ -91,11 +94,6 @@ class Radar(Instrument):
     false_alarms: float = Field(1.0, ge=0, le=1000)
     noise: float = Field(1.0, ge=0)
 
-    @property
-    def device_model(self) -> str:
-        """Name of the preset."""
-        return self.model
-
     def capture(
         self, scene: Scene, renderer: Renderer, channels: frozenset[Channel], rng: Rng
     ) -> Measurements:
@@ -132,7 +130,7 @@ class Radar(Instrument):
             return peaks.take(strong & (peaks.snr >= HALF_SNR))
         # Signal and noise of a single cell together are one exponential with mean 1 + SNR: the
         # noise, added once per peak, is the draw of its strongest cell.
-        received = peaks.snr + draws[_strongest(peak, signal)]
+        received = peaks.snr + draws[strongest_members(peak, signal)]
         found = replace(peaks, snr=received - 1.0).take(strong & (received > THRESHOLD))
         found = found.append([_draw_false_alarms(look, model, self.false_alarms, rng)])
         measured = _add_noise(found, look, self.noise, rng)
@@ -237,14 +235,6 @@ def _instance_rcs_m2(
     return areas_m2 / whole_m2 * cross_section_m2(target, instance, axis)
 
 
-def _strongest(group: NDArray[np.int64], power: Array) -> NDArray[np.intp]:
-    """Index of the strongest member of every group."""
-    order = np.lexsort((-power, group))
-    count = int(group.max()) + 1 if len(group) else 0
-    firsts: NDArray[np.intp] = order[np.searchsorted(group[order], np.arange(count))]
-    return firsts
-
-
 def _gain(look: Look, model: RadarModel, rain_mm_h: float, echo: Echo) -> Array:
     """Signal-to-noise ratio per square metre of RCS, [n]."""
     reach_m = interpolate_curve(look.reach_m, echo.azimuth_rad)
@@ -252,8 +242,7 @@ def _gain(look: Look, model: RadarModel, rain_mm_h: float, echo: Echo) -> Array:
     k, alpha = model.rain
     loss_db = 2.0 * echo.range_m / 1000.0 * (k * rain_mm_h**alpha if rain_mm_h > 0.0 else 0.0)
     nearer: Array = reach_m / np.maximum(echo.range_m, 0.1)
-    gain: Array = HALF_SNR / reference_m2 * nearer**4 * 10.0 ** (-0.1 * loss_db)
-    return gain
+    return np.asarray(HALF_SNR / reference_m2 * nearer**4 * 10.0 ** (-0.1 * loss_db))
 
 
 def _draw_false_alarms(look: Look, model: RadarModel, mean: float, rng: Rng) -> Echo:

@@ -18,13 +18,14 @@ from gen_data.generator.core.scene import Camera, Scene, Weather
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.streams import Rng, Streams
 from gen_data.generator.sensors.camera.image_pipeline import (
+    PRESETS,
     STAGES,
     ImagePipeline,
     capture_photograph,
     develop,
 )
-from gen_data.generator.sensors.camera.presets import camera_names
-from gen_data.generator.sensors.camera.tone import display_values, to_bytes
+from gen_data.generator.sensors.camera.isp import display_values, to_bytes
+from gen_data.generator.sensors.device_presets import preset_names
 
 LENS = Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)
 CAMERA = Camera("eye", SE3(), LENS, ev100=8.0)
@@ -90,7 +91,7 @@ def test_every_stage_of_a_camera_with_all_errors_changes_its_picture() -> None:
 
 def test_ideal_is_a_preset_and_the_default() -> None:
     """It exposes, and applies Uchimura's curve: nothing else happens to the radiance."""
-    assert "ideal" in camera_names()
+    assert "ideal" in preset_names(PRESETS)
     assert ImagePipeline() == ImagePipeline(preset="ideal")
 
     photo = develop(speckled(), None, CAMERA, Weather(), ImagePipeline(), rng())

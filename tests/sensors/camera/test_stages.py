@@ -19,10 +19,10 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.streams import Rng, Streams
 from gen_data.generator.sensors.camera import isp, optics
 from gen_data.generator.sensors.camera.exposure import ExposureControl, exposure_settings
-from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, develop
+from gen_data.generator.sensors.camera.image_pipeline import PRESETS, ImagePipeline, develop
 from gen_data.generator.sensors.camera.image_sensor import ImageSensor, Pattern, expose, mosaic
-from gen_data.generator.sensors.camera.presets import camera_names
-from gen_data.generator.sensors.camera.tone import to_bytes
+from gen_data.generator.sensors.camera.isp import to_bytes
+from gen_data.generator.sensors.device_presets import preset_names
 
 FAR = np.full((48, 64), np.inf)
 EYE = Camera("eye", SE3(), Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0), ev100=8.0)
@@ -298,7 +298,7 @@ def test_compression_leaves_its_traces_and_little_else() -> None:
     assert np.abs(rough).mean() > 1.5 * np.abs(fine).mean() > 0.0
 
 
-@pytest.mark.parametrize("name", sorted(set(camera_names()) - {"ideal"}))
+@pytest.mark.parametrize("name", sorted(set(preset_names(PRESETS)) - {"ideal"}))
 def test_every_preset_takes_the_same_picture_twice(name: str) -> None:
     """Same stream, same bytes; a picture of a mid-grey scene is neither black nor white."""
     radiance, depth_m = flat(40.0, 45.0, 50.0), np.full((48, 64), 2.0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gen_data.generator.core.streams import Streams
-from gen_data.generator.sensors.camera.tone import (
+from gen_data.generator.sensors.camera.isp import (
     Tone,
     display_values,
     filmic,

@@ -21,12 +21,10 @@ from numpy.typing import NDArray
 from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.scene import Camera, Weather
-from gen_data.generator.core.se3 import Array
+from gen_data.generator.core.se3 import SE3, Array
 from gen_data.generator.core.streams import Rng, Streams
 from gen_data.generator.renderers.warp.atmosphere.kernels import precipitation
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.scene.kernels import records
-from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
+from gen_data.generator.renderers.warp.frame_context import CameraView
 
 _NEAREST_M = 0.35
 # Aperture of the lens: near particles are defocused by that much.
@@ -79,10 +77,8 @@ def snow(rate_mm_h: float) -> Kind:
 def light_level_ev100(radiance: wp.array, fixed_ev100: float | None) -> float:
     """Exposure value that a camera is set to, or that suits the light it receives.
 
-    Args:
-        radiance: Linear RGB [cd/m^2], flat.
-        fixed_ev100: Setting of the camera; None = automatic, approximated from the median
-            luminance: only the length of streaks depends on it.
+    Without a setting it is approximated from the median luminance of the radiance [cd/m^2], flat
+    linear RGB: only the length of streaks depends on it.
     """
     if fixed_ev100 is not None:
         return fixed_ev100
@@ -99,16 +95,12 @@ def usual_exposure_s(ev100: float) -> float:
     return float(min(max(_F_NUMBER**2 / 2.0**ev100, _EXPOSURE_S[0]), _EXPOSURE_S[1]))
 
 
-def draw_precipitation(
-    world: PackedWorld,
-    camera: Camera,
-    view: records.View,
-    z_m: wp.array,
-    radiance: wp.array,
-    cache: DeviceCache,
-) -> bool:
-    """Draw falling particles over the image, in place; returns whether there are any."""
-    weather = world.weather
+def draw_precipitation(frame: CameraView, z_m: wp.array, radiance: wp.array) -> bool:
+    """Draw falling particles over the radiance [cd/m^2], in place; returns whether there are any.
+
+    ``z_m`` are the image's depths, as of GBuffer.
+    """
+    weather, camera = frame.world.weather, frame.state.camera
     if weather.rain_mm_h <= 0.0 and weather.snow_mm_h <= 0.0:
         return False
     exposure_s = camera.shutter.exposure_s
@@ -126,14 +118,14 @@ def draw_precipitation(
     if not len(values):
         return False
     values = values[np.argsort(-values["z_m"], kind="stable")]
-    first, listed = _streaks_by_row(values, view.height)
-    streaks = wp.array(values, dtype=precipitation.Streak, device=cache.device)
-    wp.launch(
-        precipitation.light_streaks, len(values), [view, world.record, streaks], device=cache.device
-    )
-    lists = [wp.array(a, dtype=wp.int32, device=cache.device) for a in (first, listed)]
-    inputs = [view.width, z_m, streaks, *lists]
-    wp.launch(precipitation.draw_streaks, view.height, inputs, [radiance], device=cache.device)
+    first, listed = _streaks_by_row(values, frame.view.height)
+    device = frame.cache.device
+    streaks = wp.array(values, dtype=precipitation.Streak, device=device)
+    inputs = [frame.view, frame.world.record, streaks]
+    frame.launch(precipitation.light_streaks, len(values), inputs)
+    lists = [wp.array(a, dtype=wp.int32, device=device) for a in (first, listed)]
+    inputs = [frame.view.width, z_m, streaks, *lists]
+    frame.launch(precipitation.draw_streaks, frame.view.height, inputs, [radiance])
     return True
 
 
@@ -153,17 +145,13 @@ def make_streaks(
     x = (u[1] * k.width_px - k.cx_px) / k.fx_px * z
     y = (u[2] * k.height_px - k.cy_px) / k.fy_px * z
     p = np.stack([x, y, z], axis=-1)
-    values = np.zeros(len(z), dtype=precipitation.Streak.numpy_dtype())
-    for end, side in (("start_px", -0.5), ("end_px", 0.5)):
+    ends = []
+    for side in (-0.5, 0.5):
         q = p + side * way
         depth = np.maximum(q[:, 2], 0.5 * _NEAREST_M)
-        values[end][:, 0] = q[:, 0] / depth * k.fx_px + k.cx_px
-        values[end][:, 1] = q[:, 1] / depth * k.fy_px + k.cy_px
-    values["z_m"] = z
-    R_world_camera = T.rotation()
-    values["p_m"] = np.einsum("ij,nj->ni", R_world_camera, p, optimize=False) + T.translation_m
-    _fill_shape(values, diameter_m, z, k.fx_px)
-    return values
+        u_px = q[:, 0] / depth * k.fx_px + k.cx_px
+        ends.append(np.stack([u_px, q[:, 1] / depth * k.fy_px + k.cy_px], axis=1))
+    return _streak_records(T, np.stack(ends, axis=1), p, z, diameter_m, k.fx_px)
 
 
 def _draw_particles(
@@ -189,10 +177,20 @@ def _draw_particles(
     return u, distance_m, diameter_m, way
 
 
-def _fill_shape(
-    values: NDArray[np.void], diameter_m: Array, depth_m: Array, px_per_rad: Array | float
-) -> None:
-    """Fill in width and opacity of streaks, in place."""
+def _streak_records(
+    T_world_camera: SE3,
+    ends_px: Array,
+    p_camera: Array,
+    depth_m: Array,
+    diameter_m: Array,
+    px_per_rad: Array | float,
+) -> NDArray[np.void]:
+    """Streak records of particles with the given ends [n, 2, 2], places [n, 3] and depths [n]."""
+    values = np.zeros(len(depth_m), dtype=precipitation.Streak.numpy_dtype())
+    values["start_px"], values["end_px"] = ends_px[:, 0], ends_px[:, 1]
+    values["z_m"] = depth_m
+    there = np.einsum("ij,nj->ni", T_world_camera.rotation(), p_camera, optimize=False)
+    values["p_m"] = there + T_world_camera.translation_m
     length = np.sqrt(((values["end_px"] - values["start_px"]) ** 2).sum(axis=1))
     sharp = px_per_rad * diameter_m / depth_m
     wide = np.maximum(sharp + px_per_rad * _APERTURE_M / depth_m, 1.0)
@@ -200,6 +198,7 @@ def _fill_shape(
     area = 0.25 * math.pi * sharp**2 / (wide * length + 0.25 * math.pi * wide**2)
     values["opacity"] = np.minimum(area, 1.0)
     values["radius_px"] = 0.5 * wide
+    return values
 
 
 def trace_through_lens(
@@ -226,13 +225,8 @@ def trace_through_lens(
     # Ends half an image apart lie on both sides of a seam.
     whole = np.abs(ends[:, 1] - ends[:, 0]).max(axis=1) < 0.5 * k.width_px
     kept = np.flatnonzero(inside & whole)[:_COUNT_MAX]
-    values = np.zeros(len(kept), dtype=precipitation.Streak.numpy_dtype())
-    values["start_px"], values["end_px"] = ends[kept, 0], ends[kept, 1]
-    values["z_m"] = range_m[kept]
-    there = np.einsum("ij,nj->ni", T.rotation(), p[kept], optimize=False)
-    values["p_m"] = there + T.translation_m
-    _fill_shape(values, diameter_m[kept], range_m[kept], _px_per_rad(k, middle[kept]))
-    return values
+    px_per_rad = _px_per_rad(k, middle[kept])
+    return _streak_records(T, ends[kept], p[kept], range_m[kept], diameter_m[kept], px_per_rad)
 
 
 def _rim_cosine(k: Intrinsics) -> float:
@@ -252,8 +246,7 @@ def _px_per_rad(k: Intrinsics, places_px: Array) -> Array:
     area = np.cross(across, down)
     usual = 1.0 / k.fx_px
     angles = np.nan_to_num(np.sqrt(np.sqrt((area * area).sum(axis=1))), nan=usual)
-    scale: Array = 1.0 / np.maximum(angles, 0.05 * usual)
-    return scale
+    return np.asarray(1.0 / np.maximum(angles, 0.05 * usual))
 
 
 def poisson(expected: float, rng: Rng) -> int:

@@ -1,29 +1,254 @@
-"""Ray tracing of laser scans, through the same world, meshes and materials as cameras."""
+"""Ray tracing of laser scans, through the same world, meshes and materials as cameras.
+
+Secondary hits are those behind glass and by reflection in mirrors. Few rays hit a pane, a mirror or
+a puddle; only these are traced further, after all first hits. Bodies may move during a scan, whose
+pulses are emitted one after another.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
-from gen_data.generator.core.capture import LidarHits, LidarRays
+from gen_data.generator.core.asset_types import SURFACES
+from gen_data.generator.core.capture import LidarHits, LidarRays, SecondaryHits
 from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.scene import Camera, Lidar, Scene
+from gen_data.generator.core.motion import interpolate_poses
+from gen_data.generator.core.scene import Body, Camera, Lidar, Scene
+from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.atmosphere.weather import ground_record
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.lidar.infrared_materials import infrared_surfaces
 from gen_data.generator.renderers.warp.lidar.kernels import lidar_rays as kernels
 from gen_data.generator.renderers.warp.lidar.kernels.ray_packets import LISTED_MAX, Boxes
-from gen_data.generator.renderers.warp.lidar.lidar_secondary_rays import (
-    FirstHits,
-    HitLabels,
-    trace_secondary,
-)
-from gen_data.generator.renderers.warp.lidar.moving_bodies import pack_moving_bodies
-from gen_data.generator.renderers.warp.scene.material_packing import body_materials
+from gen_data.generator.renderers.warp.scene.material_packing import BodyMaterials, body_materials
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld, pack_world
 from gen_data.generator.renderers.warp.scene.struct_dtypes import to_device
+from gen_data.generator.renderers.warp.visibility.label_images import category_ids
+
+KEYS = 9
+"""Poses over a sweep, interpolated linearly: within 0.2 mm at 10 m/s^2 and 0.1 s."""
+
+SLACK_M = 2e-3
+"""Margin by which a body may leave its boxes between keys."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Mover:
+    """A moving body: its number, rotation matrices [KEYS, 3, 3] and positions [KEYS, 3]."""
+
+    number: int
+    body: Body
+    R_world_mesh: Array
+    t_world_mesh: Array
+
+
+def pack_moving_bodies(
+    scene: Scene, lidar: Lidar, beams: LidarRays, world: PackedWorld, cache: DeviceCache
+) -> tuple[PackedWorld, kernels.BodyMotion]:
+    """The world with boxes around the bodies' whole motion, and that motion."""
+    device = cache.device
+    motion = kernels.BodyMotion()
+    motion.keys = 0
+    movers = _find_movers(scene, beams.time_s)
+    if beams.time_s is None or not (movers or beams.origins_m is not None):
+        return world, motion
+    rows = np.full(max(len(scene.bodies), 1), -1, np.int32)
+    rows[[mover.number for mover in movers]] = np.arange(len(movers))
+    start_s, end_s = float(beams.time_s.min()), float(beams.time_s.max())
+    phases = (beams.time_s - start_s) * np.float32((KEYS - 1) / max(end_s - start_s, 1e-9))
+    origins_m = beams.origins_m
+    if origins_m is None:
+        origins_m = np.zeros((len(beams.time_s), 3), np.float32)
+    B_mesh_lidar, eye_mesh = _lidar_in_mesh_frames(lidar, movers)
+    motion.keys = KEYS
+    motion.rows = wp.array(rows, dtype=int, device=device)
+    motion.B_mesh_lidar = wp.array(B_mesh_lidar, dtype=wp.mat33, device=device)
+    motion.eye_mesh = wp.array(eye_mesh, dtype=wp.vec3, device=device)
+    motion.phases = wp.array(phases, dtype=float, device=device, copy=False)
+    motion.origins_m = wp.array(origins_m, dtype=wp.vec3, device=device, copy=False)
+    return _enclose(world, movers, cache), motion
+
+
+def _find_movers(scene: Scene, time_s: NDArray[np.float32] | None) -> list[Mover]:
+    """Bodies whose pose changes during the scan."""
+    if time_s is None or not scene.tracks:
+        return []
+    keys_s = scene.time_s + np.linspace(float(time_s.min()), float(time_s.max()), KEYS)
+    numbers = {body.name: k for k, body in enumerate(scene.bodies)}
+    tracks = [
+        track
+        for track in scene.tracks
+        if track.end_s > keys_s[0] and track.start_s < keys_s[-1] and track.body in numbers
+    ]
+    R, t = interpolate_poses(tracks, keys_s)
+    moves = (t != t[:, :1]).any(axis=(1, 2)) | (R[:, :1] != R).any(axis=(1, 2, 3))
+    moving = sorted((numbers[tracks[k].body], int(k)) for k in np.flatnonzero(moves))
+    return [Mover(number, scene.bodies[number], R[k], t[k]) for number, k in moving]
+
+
+def _lidar_in_mesh_frames(
+    lidar: Lidar, movers: list[Mover]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Directions and origin of the lidar frame in each mover's mesh frame, at each key."""
+    if not movers:
+        return np.zeros((1, KEYS, 3, 3), np.float32), np.zeros((1, KEYS, 3), np.float32)
+    R_world_lidar = lidar.T_world_lidar.rotation()
+    R = np.stack([mover.R_world_mesh for mover in movers])
+    t = np.stack([mover.t_world_mesh for mover in movers])
+    scale = np.array([mover.body.scale for mover in movers])[:, None, None]
+    away = np.asarray(lidar.T_world_lidar.translation_m) - t
+    B = np.einsum("nkji,jl->nkil", R, R_world_lidar, optimize=False) / scale[..., None]
+    eye = np.einsum("nkji,nkj->nki", R, away, optimize=False) / scale
+    return B.astype(np.float32), eye.astype(np.float32)
+
+
+def _enclose(world: PackedWorld, movers: list[Mover], cache: DeviceCache) -> PackedWorld:
+    """The world with boxes that contain the movers at all keys."""
+    if not movers:
+        return world
+    low_m, high_m = world.body_records["low_m"].copy(), world.body_records["high_m"].copy()
+    numbers = [mover.number for mover in movers]
+    meshes = [cache.mesh(mover.body.asset) for mover in movers]
+    scale = np.array([mover.body.scale for mover in movers])[:, None]
+    low, high = (
+        np.stack(corner) for corner in zip(*((m.low_m, m.high_m) for m in meshes), strict=True)
+    )
+    R = np.stack([mover.R_world_mesh for mover in movers])
+    t = np.stack([mover.t_world_mesh for mover in movers])
+    centre = t + np.einsum("nkij,nj->nki", R, 0.5 * (low + high) * scale, optimize=False)
+    half = 0.5 * (high - low) * scale
+    reach = np.einsum("nkij,nj->nki", np.abs(R), half, optimize=False) + SLACK_M
+    low_m[numbers] = (centre - reach).min(axis=1)
+    high_m[numbers] = (centre + reach).max(axis=1)
+    lows_m, highs_m = (
+        wp.array(corner, dtype=wp.vec3, device=cache.device) for corner in (low_m, high_m)
+    )
+    return replace(world, lows_m=lows_m, highs_m=highs_m)
+
+
+PUDDLE_MIN = 0.05
+"""Smallest share of standing water that reflects."""
+
+Labels = tuple[NDArray[np.uint16], NDArray[np.uint16], NDArray[np.uint8]]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class HitLabels:
+    """Lookup tables from body and material to labels; the first entry is the background's."""
+
+    instances: NDArray[np.uint16]
+    categories: NDArray[np.uint16]
+    surfaces: NDArray[np.uint8]
+
+    @classmethod
+    def of(cls, scene: Scene, per_body: Sequence[BodyMaterials]) -> HitLabels:
+        """Tables of a scene with the given materials of its bodies."""
+        instances = [0, *(body.instance_id for body in scene.bodies)]
+        nothing = np.zeros(1, np.uint8)
+        return cls(
+            np.array(instances, np.uint16),
+            np.array([0, *category_ids(scene)], np.uint16),
+            np.concatenate([nothing, *(entry.roles for entry in per_body)]),
+        )
+
+    def at(self, hits: NDArray[np.int32]) -> Labels:
+        """Instance, category and surface of (body, material) pairs [n, 2]."""
+        bodies, materials = hits[:, 0] + 1, hits[:, 1] + 1
+        return self.instances[bodies], self.categories[bodies], self.surfaces[materials]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FirstHits:
+    """First hits of all rays: ranges and (body, material) on the device, hits also on the host.
+
+    Attributes:
+        normals: Normals at mirrors, on the device, lidar frame.
+        puddles: Share of standing water at each ray's end; None if everything is dry.
+    """
+
+    ranges_m: wp.array
+    on_device: wp.array
+    normals: wp.array
+    hits: NDArray[np.int32]
+    puddles: NDArray[np.float32] | None
+
+
+def trace_secondary(
+    inputs: Sequence[Any],
+    first: FirstHits,
+    order: NDArray[np.int32] | None,
+    infrared: NDArray[np.void],
+    labels: HitLabels,
+    cache: DeviceCache,
+) -> SecondaryHits | None:
+    """Secondary hits of all rays; None without any.
+
+    ``inputs`` are those of the kernel that found the first hits, ``order`` the order of the beams,
+    ``infrared`` the Infrared records of the materials.
+    """
+    material = first.hits[:, 1]
+    clear = np.append(infrared["clear"] > 0.0, False)[material]
+    mirror = np.append(infrared["mirror"] > 0.0, False)[material]
+    if first.puddles is not None:
+        mirror = mirror | (first.puddles > PUDDLE_MIN)
+    found = []
+    panes, mirrors = (_select_rays(which, order) for which in (clear, mirror))
+    if len(panes):
+        given = [wp.array(panes, dtype=int, device=cache.device), first.ranges_m]
+        found.append(_launch(kernels.trace_behind_panes, [*inputs, *given], panes, labels, cache))
+    if len(mirrors):
+        water = np.zeros(len(mirrors), np.float32)
+        if first.puddles is not None:
+            water = np.where(first.puddles[mirrors] > PUDDLE_MIN, first.puddles[mirrors], 0.0)
+        given = [
+            wp.array(mirrors, dtype=int, device=cache.device),
+            first.ranges_m,
+            first.on_device,
+            first.normals,
+            wp.array(water, dtype=float, device=cache.device),
+        ]
+        seen = _launch(kernels.trace_mirrors, [*inputs, *given], mirrors, labels, cache)
+        seen[3][:], seen[4][:], seen[5][:] = 0, 0, SURFACES.index("mirrored")
+        found.append(seen)
+    if not found:
+        return None
+    return SecondaryHits(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+
+
+def _select_rays(which: NDArray[np.bool_], order: NDArray[np.int32] | None) -> NDArray[np.int32]:
+    """Numbers of the marked rays, with neighbouring beams adjacent."""
+    if order is None or not which.any():
+        return np.flatnonzero(which).astype(np.int32)
+    subrays = len(which) // len(order)
+    rays = order if subrays == 1 else (subrays * order[:, None] + np.arange(subrays)).ravel()
+    return rays[which[rays]].astype(np.int32, copy=False)
+
+
+def _launch(
+    kernel: wp.Kernel,
+    inputs: Sequence[Any],
+    selected: NDArray[np.int32],
+    labels: HitLabels,
+    cache: DeviceCache,
+) -> list[NDArray[Any]]:
+    """Fields of SecondaryHits for the selected rays that hit something."""
+    count = len(selected)
+    ranges_m, reflectances = (wp.zeros(count, dtype=float, device=cache.device) for _ in range(2))
+    hits_ = wp.zeros(count, dtype=wp.vec2i, device=cache.device)
+    outputs = [ranges_m, reflectances, hits_]
+    wp.launch(kernel, inputs[0].threads, list(inputs), outputs, device=cache.device)
+    hits = hits_.numpy()
+    there = hits[:, 0] >= 0
+    seen = (ranges_m.numpy()[there], reflectances.numpy()[there])
+    return [selected[there].astype(np.int64), *seen, *labels.at(hits[there])]
+
 
 RING_SHARE = math.sqrt(1.0 / 2.0)
 """Radius of the ring of rays, relative to the beam's: half the light is outside it."""

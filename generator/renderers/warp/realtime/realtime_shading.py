@@ -1,38 +1,40 @@
-"""Radiance of the realtime tier: lighting, weather, anti-aliasing."""
+"""Shading: dispatch to the tier; lighting, weather and anti-aliasing of the realtime one.
+
+Shadows and ambient occlusion are the visibility of each lamp and of the sky from lattice points.
+"""
 
 from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
 from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.scene import Camera
+from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.atmosphere.precipitation import draw_precipitation
 from gen_data.generator.renderers.warp.atmosphere.weather import expose_ground, fill_air
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.realtime.clearcoat_glass import ListedPixels, shade_layers
+from gen_data.generator.renderers.warp.frame_context import CameraView
 from gen_data.generator.renderers.warp.realtime.kernels import (
     lattice_interpolation,
     lattice_lighting,
+    shadow_culling,
+    soft_shadows,
 )
-from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice
-from gen_data.generator.renderers.warp.realtime.light_visibility import (
-    find_light_visibility,
-    lamp_samples,
-    make_lattice,
-    pixel_samples,
-    sunflower,
-)
+from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice, sample_lattice
 from gen_data.generator.renderers.warp.scene.kernels import records
-from gen_data.generator.renderers.warp.scene.light_selection import keep_main_lamps
-from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
-from gen_data.generator.renderers.warp.settings import RenderSettings
-from gen_data.generator.renderers.warp.visibility.alpha_cutouts import (
-    has_cutouts,
-    trace_over_samples,
+from gen_data.generator.renderers.warp.scene.light_selection import (
+    extract_sky_lights,
+    keep_main_lamps,
 )
-from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer, Projected
+from gen_data.generator.renderers.warp.visibility.gbuffer import (
+    Projected,
+    has_cutouts,
+    trace_over,
+)
 from gen_data.generator.renderers.warp.visibility.kernels import (
     distortion,
     edge_antialiasing,
@@ -43,69 +45,62 @@ from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import 
     find_edges,
     write_mixed,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M
+
+_PARTS = 2
+"""Samples per pixel on edges in reflections or behind glass."""
 
 
-def surface_light(
-    world: PackedWorld,
-    view: records.View,
-    gbuffer: GBuffer,
-    cache: DeviceCache,
-    settings: RenderSettings,
-) -> wp.array:
-    """Radiance at pixel centres through the air [cd/m^2], linear RGB, flat; scratch memory."""
-    images = gbuffer_record(gbuffer)
-    keep_main_lamps(world, view, gbuffer, cache, settings.max_lamps)
-    lattice = make_lattice(world, view, gbuffer, cache)
-    radiance = _shade(world, view, images, lattice, cache, settings)
-    fill_air(world, view, images, lattice, radiance, cache)
-    darken_outside(view, radiance)
+def shade_pixels(frame: CameraView) -> wp.array:
+    """Radiance of all pixels through the air [cd/m^2], linear RGB, flat; scratch memory.
+
+    The realtime tier shades pixel centres, which ``smooth_edges`` anti-aliases.
+    """
+    if frame.context.paths is not None:
+        return frame.context.paths.light(frame)
+    if frame.settings.environment_shadow == "auto":
+        frame = replace(frame, world=extract_sky_lights(frame))
+    keep_main_lamps(frame)
+    lattice = make_lattice(frame)
+    radiance = _shade(frame, lattice)
+    fill_air(frame, lattice, radiance)
+    darken_outside(frame.view, radiance)
     return radiance
 
 
-def add_precipitation(
-    world: PackedWorld, camera: Camera, view: records.View, z_m: wp.array, radiance: wp.array,
-    cache: DeviceCache,
-) -> None:  # fmt: skip
+def smooth_edges(frame: CameraView, radiance: wp.array) -> None:
+    """Anti-alias radiance that is not averaged over pixels yet, in place.
+
+    Pixels on edges become the mean of their samples' radiance.
+    """
+    samples = frame.settings.antialias
+    if frame.context.paths is not None or samples == 1:
+        return
+    cache, projected = frame.cache, frame.gbuffer.projected
+    count = wp.zeros(1, dtype=wp.int32, device=cache.device)
+    pixels = cache.scratch("listed pixels", frame.pixels, wp.int32)
+    inputs = [frame.view, frame.gbuffer.record]
+    frame.launch(find_edges, frame.view.height, inputs, [count, pixels])
+    edges = pixels[: int(count.numpy()[0])]
+    mixed = wp.zeros(max(len(edges), 1), dtype=wp.vec3, device=cache.device)
+    inputs = [*frame.inputs, radiance, edges]
+    if projected is not None:
+        inputs.append(_draw_samples(frame, projected, edges, samples))
+        frame.launch(mixing.mix_samples, len(edges), inputs, [mixed])
+    else:
+        inputs += [cache.constant(wp.vec2, pixel_samples, samples), rasterizer.Z_NEAR_M]
+        frame.launch(edge_antialiasing.antialias, len(edges), inputs, [mixed])
+    frame.launch(write_mixed, len(edges), [edges, mixed], [radiance])
+
+
+def add_precipitation(frame: CameraView, z_m: wp.array, radiance: wp.array) -> None:
     """Draw falling rain and snow in front of the surfaces, in place; depths as of GBuffer."""
-    if draw_precipitation(world, camera, view, z_m, radiance, cache):
-        darken_outside(view, radiance)
+    if draw_precipitation(frame, z_m, radiance):
+        darken_outside(frame.view, radiance)
 
 
 def radiance_image(radiance: wp.array, view: records.View) -> Float32:
     """Radiance [cd/m^2], linear RGB, float32 [h, w, 3]; a copy of the flat array."""
-    image: Float32 = radiance.numpy().reshape(view.height, view.width, 3).copy()
-    return image
-
-
-def mix_edges(
-    world: PackedWorld,
-    view: records.View,
-    gbuffer: GBuffer,
-    radiance: wp.array,
-    cache: DeviceCache,
-    settings: RenderSettings,
-) -> None:
-    """Anti-alias in place: pixels on edges become the mean of their samples' radiance."""
-    samples = settings.antialias
-    if samples == 1:
-        return
-    device, images = cache.device, gbuffer_record(gbuffer)
-    count = wp.zeros(1, dtype=wp.int32, device=device)
-    pixels = cache.scratch("listed pixels", view.width * view.height, wp.int32)
-    wp.launch(find_edges, view.height, [view, images], [count, pixels], device=device)
-    edges = pixels[: int(count.numpy()[0])]
-    mixed = wp.zeros(max(len(edges), 1), dtype=wp.vec3, device=device)
-    frame = [view, world.record, images, radiance, edges]
-    if gbuffer.projected is not None:
-        drawn = _draw_samples(world, view, gbuffer, gbuffer.projected, edges, samples, cache)
-        inputs = [*frame, drawn]
-        wp.launch(mixing.mix_samples, len(edges), inputs, [mixed], device=device)
-    else:
-        parts = cache.constant(wp.vec2, pixel_samples, samples)
-        inputs = [*frame, parts, Z_NEAR_M]
-        wp.launch(edge_antialiasing.antialias, len(edges), inputs, [mixed], device=device)
-    wp.launch(write_mixed, len(edges), [edges, mixed], [radiance], device=device)
+    return np.asarray(radiance.numpy().reshape(view.height, view.width, 3).copy())
 
 
 def darken_outside(view: records.View, radiance: wp.array) -> None:
@@ -116,36 +111,28 @@ def darken_outside(view: records.View, radiance: wp.array) -> None:
 
 
 def _draw_samples(
-    world: PackedWorld,
-    view: records.View,
-    gbuffer: GBuffer,
-    projected: Projected,
-    pixels: wp.array,
-    samples: int,
-    cache: DeviceCache,
+    frame: CameraView, projected: Projected, pixels: wp.array, samples: int
 ) -> wp.array:
     """Visible (body, face) at samples of listed pixels, [pixels, samples]; (-1, -1) for none."""
-    device = cache.device
-    numbers = cache.scratch("numbers", view.width * view.height, wp.int32)
-    floors = cache.scratch("floors", view.width * view.height, float)
+    cache, view, world = frame.cache, frame.view, frame.world
+    numbers = cache.scratch("numbers", frame.pixels, wp.int32)
+    floors = cache.scratch("floors", frame.pixels, float)
     floors.fill_(mixing.UNLISTED)
-    inputs = [view, gbuffer_record(gbuffer), pixels]
-    wp.launch(mixing.number_pixels, len(pixels), inputs, [numbers, floors], device=device)
+    inputs = [view, frame.gbuffer.record, pixels]
+    frame.launch(mixing.number_pixels, len(pixels), inputs, [numbers, floors])
     shape = (max(len(pixels), 1), samples)
-    nearness = wp.zeros(shape, dtype=float, device=device)
-    hits = wp.full(shape, wp.vec2i(-1, -1), dtype=wp.vec2i, device=device)
-    offsets = cache.constant(wp.vec2i, _offsets, samples)
+    nearness = wp.zeros(shape, dtype=float, device=cache.device)
+    hits = wp.full(shape, wp.vec2i(-1, -1), dtype=wp.vec2i, device=cache.device)
     window = rasterizer.Window()
     window.width, window.height = view.width, view.height
     cutouts = has_cutouts(world.body_records)[projected.in_view]
-    bodies = wp.array(projected.in_view[~cutouts], dtype=wp.int32, device=device)
+    bodies = wp.array(projected.in_view[~cutouts], dtype=wp.int32, device=cache.device)
     inputs = [view, window, world.record, bodies, projected.p_camera, projected.xy]
-    inputs += [numbers, floors, offsets]
-    wp.launch(mixing.draw_samples, len(bodies), inputs, [nearness, hits], device=device)
+    inputs += [numbers, floors, cache.constant(wp.vec2i, _offsets, samples)]
+    frame.launch(mixing.draw_samples, len(bodies), inputs, [nearness, hits])
     if cutouts.any():
-        listed = projected.in_view[cutouts]
-        parts = pixel_samples(samples)
-        trace_over_samples(world, view, listed, pixels, parts, nearness, hits)
+        traced = (pixels, pixel_samples(samples))
+        trace_over(world, view, projected.in_view[cutouts], nearness, hits, traced)
     return hits
 
 
@@ -154,64 +141,195 @@ def _offsets(samples: int) -> NDArray[np.int32]:
     return (pixel_samples(samples) * 256.0 - 128.0).astype(np.int32)
 
 
-def gbuffer_record(gbuffer: GBuffer) -> lattice_lighting.GBufferRecord:
-    """The G-buffer as kernels read it."""
-    images = lattice_lighting.GBufferRecord()
-    images.hits, images.z_m = gbuffer.hits, gbuffer.z_m
-    images.weights, images.normals = gbuffer.weights, gbuffer.normals
-    return images
-
-
-def _shade(
-    world: PackedWorld,
-    view: records.View,
-    images: lattice_lighting.GBufferRecord,
-    lattice: Lattice,
-    cache: DeviceCache,
-    settings: RenderSettings,
-) -> wp.array:
+def _shade(frame: CameraView, lattice: Lattice) -> wp.array:
     """Radiance at all pixel centres [cd/m^2], linear RGB, flat."""
-    device, n = cache.device, view.width * view.height
-    expose_ground(world, lattice, cache)
-    radiance = cache.scratch("radiance", n, wp.vec3)
-    around = find_light_visibility(world, view, lattice, cache, settings)
+    cache, settings = frame.cache, frame.settings
+    expose_ground(frame, lattice)
+    radiance = cache.scratch("radiance", frame.pixels, wp.vec3)
+    around = find_light_visibility(frame, lattice)
     corners = lattice.width * lattice.height
     lights = cache.scratch("lights", corners, lattice_lighting.LatticeLight)
     coats = cache.scratch("coats", corners, wp.vec4)
-    frame = [view, world.record, images]
-    inputs = [*frame, lattice, around.lit, around.open_sky]
-    wp.launch(lattice_lighting.light_lattice, corners, inputs, [lights, coats], device=device)
-    count = wp.zeros(1, dtype=wp.int32, device=device)
-    pixels = cache.scratch("listed pixels", n, wp.int32)
+    seen = [*frame.inputs, lattice, around.lit, around.open_sky]
+    frame.launch(lattice_lighting.light_lattice, corners, seen, [lights, coats])
+    count = wp.zeros(1, dtype=wp.int32, device=cache.device)
+    listed = lattice_lighting.ListedPixels()
+    listed.pixels = cache.scratch("listed pixels", frame.pixels, wp.int32)
     # One thread per row on the CPU, where threads run one after the other anyway.
     cells = lattice.width - 1
-    run = cells if device.is_cpu else 1
-    inputs = [*frame, lattice, lights, coats, run]
-    shape = (lattice.height - 1, cells // run)
-    wp.launch(
-        lattice_interpolation.gather_light, shape, inputs, [count, pixels, radiance], device=device
-    )
-    listed = int(count.numpy()[0])
+    run = cells if cache.device.is_cpu else 1
+    inputs, shape = [*frame.inputs, lattice, lights, coats, run], (lattice.height - 1, cells // run)
+    outputs = [count, listed.pixels, radiance]
+    frame.launch(lattice_interpolation.gather_light, shape, inputs, outputs)
+    number = int(count.numpy()[0])
     # Sizes are powers of two, so that few are kept, plus a little: rows of lamps a power of two
     # apart would collide in the processor's cache.
-    room = (1 << listed.bit_length()) + 48
-    lit = cache.scratch("listed lit", (around.lit.shape[0], room), float)
-    open_sky = cache.scratch("listed sky", (1, room), float)
-    exposed = cache.scratch("listed exposed", room, float)
-    parts = cache.constant(wp.vec2, lamp_samples, 4, settings.shadows)
-    disc = cache.constant(wp.vec2, sunflower, 4)
-    radius_m = settings.ambient_occlusion_radius_m
-    inputs = [*frame, lattice, around.lit, around.open_sky, parts, disc, radius_m, pixels]
-    wp.launch(
-        lattice_lighting.find_pixel_visibility,
-        listed,
-        inputs,
-        [lit, open_sky, exposed],
-        device=device,
-    )
-    inputs = [*frame, pixels, lit, open_sky, exposed]
-    wp.launch(lattice_lighting.shade_points, listed, inputs, [radiance], device=device)
-    if world.layered:
-        points = ListedPixels(listed, pixels, lit, open_sky, exposed)
-        shade_layers(world, view, images, points, radiance, cache, settings)
+    room = (1 << number.bit_length()) + 48
+    listed.lit = cache.scratch("listed lit", (around.lit.shape[0], room), float)
+    listed.open_sky = cache.scratch("listed sky", (1, room), float)
+    listed.exposed = cache.scratch("listed exposed", room, float)
+    probe = lattice_lighting.Probe()
+    probe.parts = cache.constant(wp.vec2, lamp_samples, 4, settings.shadows)
+    probe.disc = cache.constant(wp.vec2, sunflower, 4)
+    probe.radius_m = settings.ambient_occlusion_radius_m
+    frame.launch(lattice_lighting.find_pixel_visibility, number, [*seen, probe, listed])
+    frame.launch(lattice_lighting.shade_points, number, [*frame.inputs, listed], [radiance])
+    if frame.world.layered:
+        probe.lit = cache.scratch("lit where rays end", listed.lit.shape, float)
+        _shade_layers(frame, number, listed, probe, radiance)
     return radiance
+
+
+def _shade_layers(
+    frame: CameraView,
+    number: int,
+    listed: lattice_lighting.ListedPixels,
+    probe: lattice_lighting.Probe,
+    radiance: wp.array,
+) -> None:
+    """Shade those of ``number`` listed pixels that show layered surfaces, in place.
+
+    Pixels with edges in reflections or behind glass take several samples.
+    """
+    # A module of its own: scenes without such surfaces neither compile nor load it.
+    from gen_data.generator.renderers.warp.realtime.kernels import clearcoat_glass
+
+    cache = frame.cache
+    frame.launch(clearcoat_glass.shade_layers, number, [*frame.inputs, listed, probe], [radiance])
+    if frame.settings.antialias == 1:
+        return
+    count = wp.zeros(1, dtype=wp.int32, device=cache.device)
+    places = cache.scratch("contrasts", frame.pixels, wp.int32)
+    inputs = [*frame.inputs, listed, radiance]
+    frame.launch(clearcoat_glass.find_contrasts, number, inputs, [count, places])
+    found = int(count.numpy()[0])
+    pixels = cache.scratch("contrast pixels", frame.pixels, wp.int32)
+    mixed = cache.scratch("contrast colours", frame.pixels, wp.vec3)
+    offsets = cache.constant(wp.vec2, pixel_samples, _PARTS)
+    inputs = [*frame.inputs, places, listed, probe, offsets]
+    frame.launch(clearcoat_glass.shade_contrasts, found, inputs, [pixels, mixed])
+    frame.launch(write_mixed, found, [pixels, mixed], [radiance])
+
+
+_STRIDE_PX = 3
+_TILE = int(shadow_culling.TILE)
+_LIST_LENGTH = int(shadow_culling.LIST_LENGTH)
+# Column of the sample in each row of a pixel, far from those of neighbouring rows (n-rooks).
+_ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LightVisibility:
+    """Visibility of lights from the lattice's points.
+
+    Attributes:
+        lit: Visible fraction of each lamp, [lamps, points]; UNSEEN where it has no effect.
+        open_sky: Visible fraction of the hemisphere, [1, points].
+    """
+
+    lit: wp.array
+    open_sky: wp.array
+
+
+def make_lattice(frame: CameraView) -> Lattice:
+    """Sample the lattice of a view."""
+    lattice = Lattice()
+    lattice.stride = _STRIDE_PX
+    lattice.width = (frame.view.width - 1) // _STRIDE_PX + 2
+    lattice.height = (frame.view.height - 1) // _STRIDE_PX + 2
+    n = lattice.width * lattice.height
+    for name in ("body", "surface", "pixel", "skip"):
+        setattr(lattice, name, frame.cache.scratch(f"lattice {name}", n, wp.int32))
+    for name in ("p_m", "normal", "origin_m"):
+        setattr(lattice, name, frame.cache.scratch(f"lattice {name}", n, wp.vec3))
+    frame.launch(sample_lattice, n, [*frame.inputs, lattice])
+    return lattice
+
+
+def find_light_visibility(frame: CameraView, lattice: Lattice) -> LightVisibility:
+    """Compute shadows and ambient occlusion of all points."""
+    world, cache = frame.world.record, frame.cache
+    lamps = world.lamps.shape[0]
+    columns = -(-lattice.width // _TILE)
+    tiles = columns * -(-lattice.height // _TILE)
+    lists = cache.scratch("occluders", (tiles, lamps + 1, 1 + _LIST_LENGTH), wp.int32)
+    radius_m = frame.settings.ambient_occlusion_radius_m
+    points = lattice.width * lattice.height
+    shares = cache.scratch("shares", (max(lamps, 1), points), float)
+    frame.launch(soft_shadows.weigh_lamps, points, [world, lattice], [shares])
+    inputs = [world, lattice, columns, radius_m, shares, lists]
+    frame.launch(shadow_culling.list_occluders, tiles, inputs)
+    inputs = [world, lattice, columns, lists]
+    return LightVisibility(
+        _lamp_visibility(frame, lattice, inputs, shares), _sky_visibility(frame, lattice, inputs)
+    )
+
+
+def sunflower(n: int) -> Array:
+    """Points evenly distributed over the unit disk, [n, 2] (Vogel, Math. Biosciences 44, 1979)."""
+    k = np.arange(n)
+    radius, angle = np.sqrt((k + 0.5) / n), k * math.pi * (3.0 - math.sqrt(5.0))
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+
+
+def lamp_samples(n: int, shadows: str) -> Array:
+    """Points of a lamp's disk at which shadow rays aim, [n, 2]; its centre for hard shadows."""
+    return sunflower(n) * (1.0 if shadows == "soft" else 0.0)
+
+
+def pixel_samples(n: int) -> Array:
+    """Sample positions in a pixel, [0, 1), [n, 2]: no two in one row or column (n-rooks)."""
+    columns = _ROOKS[n]
+    return (np.stack([columns, np.arange(n)], axis=-1) + 0.5) / n
+
+
+def cosine_hemisphere(n: int) -> Array:
+    """Unit directions about +Z distributed by the cosine (Malley), [n, 3]."""
+    disc = sunflower(n)
+    up = np.sqrt(1.0 - (disc * disc).sum(axis=1))
+    return np.concatenate([disc, up[:, None]], axis=1)
+
+
+def _lamp_visibility(
+    frame: CameraView, lattice: Lattice, inputs: list[Any], shares: wp.array
+) -> wp.array:
+    cache, lamps = frame.cache, frame.world.record.lamps.shape[0]
+    n = lattice.width * lattice.height
+    probed, lit = (cache.scratch(name, (max(lamps, 1), n), float) for name in ("probed", "lit"))
+    if lamps == 0:
+        return lit
+    disc = cache.constant(wp.vec2, lamp_samples, 48, frame.settings.shadows)
+    inputs = [*inputs, disc, shares]
+    for parity in (0, 1):
+        frame.launch(soft_shadows.probe_lamps, n, [*inputs, parity], [probed])
+    classes = _classify(frame, lattice, probed)
+    frame.launch(soft_shadows.refine_lamps, n, [*inputs, classes, probed], [lit])
+    _smooth(frame, lattice, lit, probed)
+    return probed
+
+
+def _sky_visibility(frame: CameraView, lattice: Lattice, inputs: list[Any]) -> wp.array:
+    cache, radius_m = frame.cache, frame.settings.ambient_occlusion_radius_m
+    n = lattice.width * lattice.height
+    probed, open_sky = (cache.scratch(name, (1, n), float) for name in ("probed sky", "open sky"))
+    if radius_m == 0.0:
+        open_sky.fill_(1.0)
+        return open_sky
+    hemisphere = cache.constant(wp.vec3, cosine_hemisphere, 16)
+    frame.launch(soft_shadows.probe_ambient, n, [*inputs, hemisphere, radius_m], [probed])
+    _smooth(frame, lattice, probed, open_sky)
+    return open_sky
+
+
+def _smooth(frame: CameraView, lattice: Lattice, values: wp.array, smoothed: wp.array) -> None:
+    sums = frame.cache.scratch("row sums", values.shape, wp.vec2)
+    inputs = [frame.view, lattice, _classify(frame, lattice, values), values]
+    frame.launch(soft_shadows.sum_rows, values.shape[1], inputs, [sums])
+    frame.launch(soft_shadows.smooth_lattice, values.shape[1], [*inputs, sums], [smoothed])
+
+
+def _classify(frame: CameraView, lattice: Lattice, values: wp.array) -> wp.array:
+    shape = (-(-lattice.height // 4), -(-lattice.width // 4), values.shape[0])
+    classes = frame.cache.scratch("classes", shape, wp.int32)
+    frame.launch(soft_shadows.classify_blocks, shape, [lattice, values], [classes])
+    return classes

@@ -38,8 +38,7 @@ def lobe_albedo() -> Float32:
     weight = np.where(reflected, 2.0 * n_l * v_h / np.where(reflected, masking * n_h, 1.0), 0.0)
     fresnel = np.clip(1.0 - v_h, 0.0, 1.0) ** 5
     factors = np.stack([(weight * (1.0 - fresnel)), (weight * fresnel)], axis=-1).mean(axis=2)
-    table: Float32 = factors.astype(np.float32)
-    return table
+    return np.asarray(factors.astype(np.float32))
 
 
 @cache

@@ -1,4 +1,7 @@
-"""Selection of the lights that matter in a view: each costs the same, however dim."""
+"""Selection of the lights that matter in a view: each costs the same, however dim.
+
+The brightest parts of a panorama become lamps where their shadows would be visible.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +13,18 @@ import warp as wp
 from numpy.typing import NDArray
 
 from gen_data.generator.core.colorimetry import luminance
-from gen_data.generator.core.scene import LIGHT_KINDS, PANEL_KINDS
+from gen_data.generator.core.scene import LIGHT_KINDS, PANEL_KINDS, Environment, Light, Scene
 from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.renderers.warp.frame_context import CameraView
+from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import count_free_paths
+from gen_data.generator.renderers.warp.scene.environment_maps import SkyLamp
 from gen_data.generator.renderers.warp.scene.kernels import analytic_lights, records
-from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
+from gen_data.generator.renderers.warp.scene.scene_packing import (
+    PackedWorld,
+    copy_world,
+    lamp_records,
+    sky_record,
+)
 from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer
 
 _STRIDE_PX = 11
@@ -24,37 +34,30 @@ _DIM_LUX = 0.05
 _TURNED_AWAY = 0.1
 
 
-def keep_main_lamps(
-    world: PackedWorld, view: records.View, gbuffer: GBuffer, cache: DeviceCache, lamps_max: int
-) -> None:
+def keep_main_lamps(frame: CameraView) -> None:
     """Restrict the world to the lamps that contribute most to the visible surfaces, in place."""
-    chosen = main_lamp_numbers(world, view, gbuffer, lamps_max)
+    chosen = main_lamp_numbers(frame)
     if chosen is not None:
-        lamps = world.record.lamps.numpy()[chosen]
-        world.record.lamps = wp.array(lamps, dtype=records.LightRecord, device=cache.device)
+        lamps = frame.world.record.lamps.numpy()[chosen]
+        frame.world.record.lamps = wp.array(
+            lamps, dtype=records.LightRecord, device=frame.cache.device
+        )
 
 
-def main_lamp_numbers(
-    world: PackedWorld, view: records.View, gbuffer: GBuffer, lamps_max: int
-) -> NDArray[np.int64] | None:
+def main_lamp_numbers(frame: CameraView) -> NDArray[np.int64] | None:
     """Numbers of the lamps that ``keep_main_lamps`` keeps, ascending; None = all."""
-    lamps = world.record.lamps.numpy()
+    lamps, lamps_max = frame.world.record.lamps.numpy(), frame.settings.max_lamps
     if len(lamps) <= lamps_max:
         return None
-    points, normals = _sparse_points(view, gbuffer)
-    return main_lamps(lamps, points, normals, lamps_max)
+    return main_lamps(lamps, *_sparse_points(frame.view, frame.gbuffer), lamps_max)
 
 
 def main_lamps(
     lamps: NDArray[np.void], points_m: Array, normals: Array, lamps_max: int
 ) -> NDArray[np.int64]:
-    """Numbers of the selected lamps, ascending: suns first, then by share of light.
+    """Numbers of the selected lamp records, ascending: suns first, then by share of light.
 
-    Args:
-        lamps: Lamp records.
-        points_m: Visible points, world frame, [n, 3].
-        normals: Unit normals at these points, [n, 3].
-        lamps_max: Maximum number of lamps.
+    Visible points and their unit normals are in the world frame, [n, 3].
     """
     lux = np.stack([_illuminance(lamp, points_m, normals) for lamp in lamps])
     shares = (lux / (_DIM_LUX + lux.sum(axis=0))).sum(axis=1)
@@ -101,13 +104,11 @@ def dipped_share(lamp: NDArray[np.void], d: Sequence[Array]) -> Array:
     s = (side - analytic_lights.HOT_SIDE) / analytic_lights.SIDE_WIDTH
     v = np.maximum(below, 0.0) / analytic_lights.DOWN_WIDTH
     lit = t * t * (3.0 - 2.0 * t) / ((1.0 + s * s) * (1.0 + v * v))
-    share: Array = np.maximum(lit, analytic_lights.STRAY)
-    return share
+    return np.asarray(np.maximum(lit, analytic_lights.STRAY))
 
 
 def _dot(a: Sequence[Array], b: Sequence[Array] | Sequence[float]) -> Array:
-    product: Array = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-    return product
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 def _sparse_points(view: records.View, gbuffer: GBuffer) -> tuple[Array, Array]:
@@ -132,3 +133,90 @@ def _directions(view: records.View, rows: NDArray[np.int64], columns: NDArray[np
     x = (columns + 0.5 - view.cx) * view.inverse_fx
     y = (rows + 0.5 - view.cy) * view.inverse_fy
     return np.stack([x, y, np.ones_like(x)], axis=-1)
+
+
+# Parts with a smaller share of the light at the focus cast no visible shadows.
+_SHARE = 0.1
+_FAR_M = 1e3
+
+
+def extract_sky_lights(frame: CameraView) -> PackedWorld:
+    """The world with lamps for the brightest parts of its panorama.
+
+    Unchanged if the scene has a sun, which its panorama then lacks; if walls block the panorama,
+    whose light is then the room's; or if other lamps outshine it.
+    """
+    world, scene, cache = frame.world, frame.state.scene, frame.cache
+    environment = scene.environment
+    if environment.luminance_cd_m2 <= 0.0 or any(light.kind == "sun" for light in scene.lights):
+        return world
+    points = _viewpoints(scene)
+    if not _is_open(frame, points, _directions_around()):
+        return world
+    split = cache.split_environment(environment.image)
+    if not split.lamps or not _is_significant(split.lamps[0], scene):
+        return world
+    suns = [_sun(lamp, environment) for lamp in split.lamps]
+    towards = np.array([np.negative(sun.direction) for sun in suns])
+    if not _is_open(frame, points, towards):
+        return world
+    lit = copy_world(world)
+    lit.record.sky = sky_record(environment, split)
+    added = lamp_records(suns)
+    # Reflected rays hit them in the panorama itself.
+    added["shown"] = 1
+    lamps = np.concatenate([world.record.lamps.numpy(), added])
+    lit.record.lamps = wp.array(lamps, dtype=records.LightRecord, device=cache.device)
+    return lit
+
+
+def _sun(lamp: SkyLamp, environment: Environment) -> Light:
+    """The lamp as a light in the world."""
+    x, y, z = lamp.towards
+    c, s = math.cos(environment.yaw_rad), math.sin(environment.yaw_rad)
+    power = np.asarray(lamp.power)
+    relative = float(luminance(power))
+    red, green, blue = (float(v) for v in power / relative)
+    return Light(
+        "",
+        "sun",
+        direction=(s * y - c * x, -s * x - c * y, -z),
+        color=(red, green, blue),
+        illuminance_lux=relative * environment.luminance_cd_m2,
+        angular_radius_rad=lamp.angular_radius_rad,
+    )
+
+
+def _is_significant(lamp: SkyLamp, scene: Scene) -> bool:
+    """Whether a part of the panorama contributes noticeably to the light at the focus."""
+    lux = float(luminance(np.asarray(lamp.power))) * scene.environment.luminance_cd_m2
+    others = sum(
+        light.intensity_cd / max(math.dist(light.position_m, scene.focus.center_m) ** 2, 1e-4)
+        for light in scene.lights
+    )
+    return lux > _SHARE * (lux / lamp.share + others)
+
+
+def _viewpoints(scene: Scene) -> Array:
+    """Points above the focus and at the cameras, [n, 3]."""
+    center, half = np.asarray(scene.focus.center_m), 0.5 * np.asarray(scene.focus.size_m)
+    corners = [center + half * (x, y, 1.0) for x in (-1, 0, 1) for y in (-1, 0, 1)]
+    eyes = [np.asarray(camera.T_world_camera.translation_m) for camera in scene.cameras]
+    return np.array([*corners, *eyes])
+
+
+def _directions_around() -> Array:
+    """Twelve directions above the horizon, evenly distributed (Fibonacci spiral), [12, 3]."""
+    k = np.arange(12)
+    up = (k + 0.5) / 12.0
+    level, azimuth = np.sqrt(1.0 - up * up), k * math.pi * (3.0 - math.sqrt(5.0))
+    return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), up], axis=-1)
+
+
+def _is_open(frame: CameraView, points: Array, towards: Array) -> bool:
+    """Whether any of the directions is unobstructed at any of the points."""
+    device = frame.cache.device
+    free = wp.zeros(1, dtype=wp.int32, device=device)
+    ends = (wp.array(a, dtype=wp.vec3, device=device) for a in (points, towards * _FAR_M))
+    frame.launch(count_free_paths, len(points), [frame.world.record, *ends], [free])
+    return int(free.numpy()[0]) > 0

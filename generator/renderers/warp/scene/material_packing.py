@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gen_data.generator.core.asset_types import SURFACES, Material
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.scene.device_textures import DeviceTexture
+from gen_data.generator.renderers.warp.scene.device_assets import DeviceTexture
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.struct_dtypes import stack_records, struct_dtype
 
@@ -65,9 +65,7 @@ def surface_records(
 ) -> NDArray[np.void]:
     """Material records of all bodies, body after body; at least one.
 
-    Args:
-        per_body: Materials of the bodies.
-        textures: All textures that the bodies name, in the order of the device's textures.
+    ``textures`` are all that the bodies name, in the order of the device's textures.
     """
     values = stack_records([entry.surfaces for entry in per_body], records.MaterialRecord)
     place = {texture_id: k for k, texture_id in enumerate(textures)}
@@ -96,17 +94,11 @@ def cutout_slots(
     holes = np.array([*(texture.has_cutouts for texture in textures.values()), False])
     clear = (surfaces["transmission"] > 0.5) | (surfaces["opacity"] < 0.5)
     flags = holes[surfaces["texture"]] * int(records.HOLES) + clear * int(records.CLEAR)
-    slots: NDArray[np.int32] = flags.astype(np.int32)
-    return slots
+    return np.asarray(flags.astype(np.int32))
 
 
 def cutout_bodies(slots: NDArray[np.int32], counts: NDArray[np.int64]) -> NDArray[np.int32]:
-    """Per body: the union of its slots' flags.
-
-    Args:
-        slots: Flags of all bodies' materials, body after body.
-        counts: Number of materials of each body.
-    """
+    """Per body: the union of its slots' flags; ``counts`` are the bodies' numbers of materials."""
     if not slots.any():
         return np.zeros(len(counts), np.int32)
     of_slots = np.repeat(np.arange(len(counts)), counts)

@@ -24,7 +24,7 @@ from gen_data.generator.core.scene import (
 from gen_data.generator.core.se3 import Array, unit_quaternions_to_rotations
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.scene.bvh import body_tree
-from gen_data.generator.renderers.warp.scene.device_meshes import DeviceMesh
+from gen_data.generator.renderers.warp.scene.device_assets import DeviceMesh
 from gen_data.generator.renderers.warp.scene.environment_maps import DeviceEnvironment
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.material_packing import (
@@ -34,6 +34,7 @@ from gen_data.generator.renderers.warp.scene.material_packing import (
     surface_records,
 )
 from gen_data.generator.renderers.warp.scene.struct_dtypes import (
+    copy_struct,
     stack_records,
     struct_dtype,
     to_device,
@@ -120,17 +121,13 @@ def repack_moved(
 ) -> PackedWorld:
     """Pack another instant of a packed scene: the same assets and materials at other poses.
 
-    Args:
-        world: Result of ``pack_world``.
-        scene: Poses of bodies and lights may differ from those that were packed.
-        camera: Its pose may differ.
-        cache: Assets.
+    Poses of bodies, lights and camera may differ from those of ``world``.
     """
     _, *assets = world.keep
     meshes = assets[0]
     assert isinstance(meshes, list)
     body_meshes = [meshes[k] for k in world.body_records["geometry"]]
-    record = _copy_record(world.record)
+    record = copy_struct(world.record, records.World)
     placement = _place_bodies(record, world.body_records.copy(), scene.bodies, body_meshes, cache)
     record.lamps = to_device(lamp_records(scene.lights), records.LightRecord, cache.device)
     packed = _PackedScene(record, tuple(assets), placement, world.layered)
@@ -139,14 +136,7 @@ def repack_moved(
 
 def copy_world(world: PackedWorld) -> PackedWorld:
     """Copy of the world whose lamps, ground and sky can be changed independently."""
-    return replace(world, record=_copy_record(world.record))
-
-
-def _copy_record(record: records.World) -> records.World:
-    copy = records.World()
-    for name in records.World.vars:
-        setattr(copy, name, getattr(record, name))
-    return copy
+    return replace(world, record=copy_struct(world.record, records.World))
 
 
 def _pack_for_camera(
@@ -158,7 +148,7 @@ def _pack_for_camera(
     if len(body_records):
         _fill_camera_poses(body_records, placement, camera)
     # A record of its own: weather and lamps are set for one view.
-    record = _copy_record(packed.record)
+    record = copy_struct(packed.record, records.World)
     record.bodies = to_device(body_records, records.BodyRecord, cache.device)
     return PackedWorld(
         record,

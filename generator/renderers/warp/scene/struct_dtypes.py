@@ -38,3 +38,11 @@ def to_device(records: NDArray[np.void], struct: Any, device: wp.Device) -> wp.a
     shape = records.shape
     here = wp.array(ptr=records.ctypes.data, dtype=struct, shape=shape, device="cpu")
     return wp.clone(here, device=device)
+
+
+def copy_struct(instance: Any, struct: Any) -> Any:
+    """A shallow copy of an instance of a Warp struct."""
+    copy = struct()
+    for name in struct.vars:
+        setattr(copy, name, getattr(instance, name))
+    return copy

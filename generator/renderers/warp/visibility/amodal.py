@@ -1,55 +1,62 @@
-"""Amodal silhouettes: each instance alone, on a canvas three images wide and high."""
+"""Amodal silhouettes: each instance alone, on a canvas three images wide and high.
+
+Silhouettes of a pinhole are rasterised, those of other lenses found by rays. There the canvas
+extends the lens model: its pixels outside the image look where a larger sensor behind the same lens
+would, and nowhere beyond the lens's field.
+"""
 
 from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.boxes import BoxPx, tight_box
 from gen_data.generator.core.capture import Silhouette
-from gen_data.generator.core.scene import Camera, Scene
-from gen_data.generator.renderers.warp.device_cache import DeviceCache
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.renderers.warp.frame_context import (
+    CameraView,
+    RowBand,
+    pack_state,
+)
 from gen_data.generator.renderers.warp.scene.kernels import records
-from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
-from gen_data.generator.renderers.warp.visibility.alpha_cutouts import has_cutouts, trace_outlines
-from gen_data.generator.renderers.warp.visibility.amodal_lens import (
-    mask_offsets,
-    trace_masks,
-    union_box,
-)
+from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld, pack_view
+from gen_data.generator.renderers.warp.visibility.distortion_lut import NODE_STRIDE_PX
 from gen_data.generator.renderers.warp.visibility.gbuffer import (
-    GBuffer,
+    CORNERS,
     Projected,
+    canvas_box,
+    has_cutouts,
     project_vertices,
+    trace_outlines,
 )
-from gen_data.generator.renderers.warp.visibility.kernels import rasterizer
-from gen_data.generator.renderers.warp.visibility.kernels.amodal import Canvas, draw_silhouettes
+from gen_data.generator.renderers.warp.visibility.kernels.amodal import draw_silhouettes
+from gen_data.generator.renderers.warp.visibility.kernels.amodal_lens import trace_silhouettes
+from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M, Outline
+from gen_data.generator.renderers.warp.visibility.reprojection import make_bands
 
 _NOTHING = np.zeros((0, 0), np.bool_)
 _UNSNAPPED = -(2**31)
+_BANDS = 12
+EMPTY = BoxPx(0, 0, 0, 0)
 
 
-def render_silhouettes(
-    scene: Scene,
-    camera: Camera,
-    world: PackedWorld,
-    view: records.View,
-    cache: DeviceCache,
-    gbuffer: GBuffer,
-    seen_ids: NDArray[np.uint16],
-) -> dict[int, Silhouette]:
+def render_silhouettes(frame: CameraView, seen_ids: NDArray[np.uint16]) -> dict[int, Silhouette]:
     """The silhouette of every annotated instance, by instance id.
 
     Coverage is the rasteriser's for a pinhole, else that of rays. It is united with ``seen_ids``,
     the image of visible instance ids: where rays decide visibility, they may differ from the
     rasteriser by a pixel at an edge.
     """
-    if view.lens == records.PINHOLE:
-        projected = gbuffer.projected or project_vertices(world, view, cache)
-        boxes, drawn = _rasterize_masks(scene, world, view, projected, cache)
-    else:
-        boxes, drawn = trace_masks(scene, world, view, camera, cache)
+    pinhole = frame.view.lens == records.PINHOLE
+    boxes, drawn = _rasterize_masks(frame) if pinhole else _trace_masks(frame)
     found: dict[int, Silhouette] = {}
     first = 0
     for instance_id, box in boxes.items():
@@ -61,35 +68,35 @@ def render_silhouettes(
     return found
 
 
-def _rasterize_masks(
-    scene: Scene, world: PackedWorld, view: records.View, projected: Projected, cache: DeviceCache
-) -> tuple[dict[int, BoxPx], NDArray[np.uint8]]:
+def _rasterize_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.uint8]]:
     """A bounding box of each annotated instance's silhouette, and the masks of all boxes."""
-    p_camera, xy = projected.p_camera, projected.xy
+    scene, world, view, cache = frame.state.scene, frame.world, frame.view, frame.cache
+    projected = frame.gbuffer.projected or project_vertices(world, view, cache)
     boxes = _boxes_px(scene, world, view, projected)
-    canvases, size = _canvases(scene, boxes, projected.reached)
+    whole = {
+        number: boxes.get(scene.bodies[number].instance_id, EMPTY)
+        for number in projected.reached.tolist()
+    }
+    outlines, size = _outline_records(scene, boxes, whole)
     mask = wp.zeros(size, dtype=wp.uint8, device=cache.device)
-    cutouts = has_cutouts(world.body_records)[canvases["body"]]
+    cutouts = has_cutouts(world.body_records)[outlines["body"]]
     if not cutouts.all():
-        drawn_into = wp.array(canvases[~cutouts], dtype=Canvas, device=cache.device)
-        inputs = [view, world.record, p_camera, xy, drawn_into]
-        wp.launch(draw_silhouettes, len(drawn_into), inputs, [mask], device=cache.device)
+        drawn_into = wp.array(outlines[~cutouts], dtype=Outline, device=cache.device)
+        inputs = [view, world.record, projected.p_camera, projected.xy, drawn_into]
+        frame.launch(draw_silhouettes, len(drawn_into), inputs, [mask])
     if cutouts.any():
-        trace_outlines(world, view, canvases[cutouts], mask)
+        trace_outlines(world, view, outlines[cutouts], mask)
     drawn: NDArray[np.uint8] = mask.numpy()
     return boxes, drawn
 
 
 def _boxes_px(
-    scene: Scene,
-    world: PackedWorld,
-    view: records.View,
-    projected: Projected,
+    scene: Scene, world: PackedWorld, view: records.View, projected: Projected
 ) -> dict[int, BoxPx]:
     """Pixels of the canvas that each annotated instance's vertices span; may be empty."""
-    canvas = BoxPx(-view.width, -view.height, 2 * view.width, 2 * view.height)
+    canvas = canvas_box(view)
     annotated = sorted(i.instance_id for i in scene.instances if i.annotated)
-    boxes = dict.fromkeys(annotated, BoxPx(0, 0, 0, 0))
+    boxes = dict.fromkeys(annotated, EMPTY)
     # All bodies at once: hundreds of small queries take longer than drawing them.
     first = world.body_records["first_vertex"]
     solid = np.flatnonzero(np.diff([*first, world.vertex_count]))
@@ -97,42 +104,40 @@ def _boxes_px(
     nearest = np.maximum.reduceat(p_camera[:, 2], first[solid])
     lows = np.minimum.reduceat(xy, first[solid], axis=0)
     highs = np.maximum.reduceat(xy, first[solid], axis=0)
-    drawn = np.isin(solid, projected.reached) & (nearest >= rasterizer.Z_NEAR_M)
+    drawn = np.isin(solid, projected.reached) & (nearest >= Z_NEAR_M)
     for k in np.flatnonzero(drawn).tolist():
         instance_id = scene.bodies[solid[k]].instance_id
         if instance_id in boxes:
+            reached = BoxPx(*(lows[k] >> 8).tolist(), *((highs[k] >> 8) + 1).tolist())
             # A triangle clipped at the camera's plane may reach anywhere.
             cut = lows[k, 0] == _UNSNAPPED
-            reached = canvas if cut else _clip_to_canvas(canvas, lows[k] >> 8, (highs[k] >> 8) + 1)
-            boxes[instance_id] = union_box(boxes[instance_id], reached)
+            boxes[instance_id] = boxes[instance_id].union(
+                canvas if cut else reached.intersection(canvas)
+            )
     return boxes
 
 
-def _clip_to_canvas(canvas: BoxPx, low: NDArray[np.int32], high: NDArray[np.int32]) -> BoxPx:
-    x_min, y_min = max(int(low[0]), canvas.x_min), max(int(low[1]), canvas.y_min)
-    x_max, y_max = min(int(high[0]), canvas.x_max), min(int(high[1]), canvas.y_max)
-    return BoxPx(x_min, y_min, max(x_max, x_min), max(y_max, y_min))
-
-
-def _canvases(
-    scene: Scene, boxes: dict[int, BoxPx], reached: NDArray[np.int32]
+def _outline_records(
+    scene: Scene, boxes: dict[int, BoxPx], of_bodies: dict[int, BoxPx]
 ) -> tuple[NDArray[np.void], int]:
-    """One record per projected body of an instance with a box, and the size of all masks."""
-    first_pixels, size = mask_offsets(boxes)
-    drawn = [
-        (number, scene.bodies[number].instance_id)
-        for number in reached.tolist()
-        if scene.bodies[number].instance_id in boxes
-        and boxes[scene.bodies[number].instance_id].width_px
-    ]
-    values = np.zeros(len(drawn), dtype=Canvas.numpy_dtype())
-    for value, (number, instance_id) in zip(values, drawn, strict=True):
-        box = boxes[instance_id]
-        value["body"] = number
-        value["first_pixel"] = first_pixels[instance_id]
-        value["window"]["x0"], value["window"]["y0"] = box.x_min, box.y_min
-        value["window"]["width"], value["window"]["height"] = box.width_px, box.height_px
-    return values, size
+    """One record per body whose box is not empty, and the size of all instances' masks.
+
+    Masks fill the boxes of the instances, one after another; each body's box is in its instance's.
+    """
+    first_pixels, size = {}, 0
+    for instance_id, box in boxes.items():
+        first_pixels[instance_id] = size
+        size += box.width_px * box.height_px
+    rows = []
+    for number, box in of_bodies.items():
+        if box.is_empty:
+            continue
+        instance_id = scene.bodies[number].instance_id
+        whole = boxes[instance_id]
+        offset = (box.y_min - whole.y_min) * whole.width_px + box.x_min - whole.x_min
+        window = (box.x_min, box.y_min, box.width_px, box.height_px)
+        rows.append((number, window, first_pixels[instance_id] + offset, whole.width_px))
+    return np.array(rows, dtype=Outline.numpy_dtype()), size
 
 
 def _unite(
@@ -140,17 +145,133 @@ def _unite(
 ) -> None:
     """Add an instance's visible pixels to its silhouette, in place."""
     inside = box.clipped(seen_ids.shape[1], seen_ids.shape[0])
-    if inside is None:
-        return
-    rows = slice(inside.y_min - box.y_min, inside.y_max - box.y_min)
-    columns = slice(inside.x_min - box.x_min, inside.x_max - box.x_min)
-    window = seen_ids[inside.y_min : inside.y_max, inside.x_min : inside.x_max]
-    pixels[rows, columns] |= window == instance_id
+    if inside is not None:
+        pixels[inside.window(box.x_min, box.y_min)] |= seen_ids[inside.window()] == instance_id
 
 
 def _crop(instance_id: int, pixels: NDArray[np.bool_], box: BoxPx) -> Silhouette:
     tight = tight_box(pixels)
     if tight is None:
         return Silhouette(instance_id, 0, 0, _NOTHING)
-    mask = pixels[tight.y_min : tight.y_max, tight.x_min : tight.x_max]
-    return Silhouette(instance_id, box.x_min + tight.x_min, box.y_min + tight.y_min, mask)
+    x_px, y_px = box.x_min + tight.x_min, box.y_min + tight.y_min
+    return Silhouette(instance_id, x_px, y_px, pixels[tight.window()])
+
+
+def _trace_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.uint8]]:
+    """A bounding box of each annotated instance's silhouette, and the masks of all boxes."""
+    scene, camera, cache = frame.state.scene, frame.state.camera, frame.cache
+    world, view = frame.world, frame.view
+    optics = cache.optics(camera.intrinsics)
+    annotated = sorted(i.instance_id for i in scene.instances if i.annotated)
+    boxes = dict.fromkeys(annotated, EMPTY)
+    of_bodies: dict[int, BoxPx] = {}
+    R_camera_world = camera.T_world_camera.rotation().T
+    step_rad = _widest_step(optics.nodes)
+    for number, body in enumerate(scene.bodies):
+        if body.instance_id in boxes:
+            ends_m = np.stack([world.body_records[end][number] for end in ("low_m", "high_m")])
+            axis, half_rad = bounding_cone(ends_m - np.array(camera.T_world_camera.translation_m))
+            cosines = optics.nodes @ (R_camera_world @ axis).astype(np.float32)
+            # Every visible pixel has a node within the diagonal of a cell.
+            near = cosines >= math.cos(min(half_rad + 1.5 * step_rad, math.pi))
+            of_bodies[number] = _box_around(near, view).intersection(canvas_box(view))
+            boxes[body.instance_id] = boxes[body.instance_id].union(of_bodies[number])
+    windows, size = _outline_records(scene, boxes, of_bodies)
+    mask = wp.zeros(size, dtype=wp.uint8, device=cache.device)
+    if len(windows):
+        shape = (len(windows), int(windows["window"]["height"].max()))
+        records_ = wp.array(windows, dtype=Outline, device=cache.device)
+        inputs = [view, world.record, optics.nodes_on_device, NODE_STRIDE_PX, Z_NEAR_M, records_]
+        frame.launch(trace_silhouettes, shape, inputs, [mask])
+    pixels: NDArray[np.uint8] = mask.numpy()
+    return boxes, pixels
+
+
+def bounding_cone(ends_m: Array) -> tuple[Array, float]:
+    """Axis and half angle of a cone from the origin around a box; pi if it contains the origin.
+
+    ``ends_m`` are its low and high corner, [2, 3].
+    """
+    centre = ends_m.mean(axis=0)
+    distance_m = math.sqrt(float((centre * centre).sum()))
+    radius_m = 0.5 * math.sqrt(float(((ends_m[1] - ends_m[0]) ** 2).sum()))
+    if distance_m <= radius_m:
+        return np.array([0.0, 0.0, 1.0]), math.pi
+    axis = centre / distance_m
+    corners = ends_m[CORNERS, [0, 1, 2]]
+    cosines = corners @ axis / np.sqrt((corners * corners).sum(axis=1))
+    least = float(cosines.min())
+    # Cones below 90 degrees are convex: one that contains all corners contains the box.
+    narrow_rad = math.acos(min(least, 1.0)) if least > 0.0 else math.pi
+    return axis, min(narrow_rad, math.asin(radius_m / distance_m))
+
+
+def _box_around(marked: NDArray[np.bool_], view: records.View) -> BoxPx:
+    """Bounding box of marked nodes [rows, columns] and two more cells, in the image."""
+    nodes = tight_box(marked)
+    if nodes is None:
+        return EMPTY
+    x0, y0, stride = -view.width, -view.height, NODE_STRIDE_PX
+    x_min, y_min = x0 + (nodes.x_min - 2) * stride, y0 + (nodes.y_min - 2) * stride
+    return BoxPx(
+        x_min, y_min, x0 + (nodes.x_max + 1) * stride + 1, y0 + (nodes.y_max + 1) * stride + 1
+    )
+
+
+def _widest_step(nodes: Float32) -> float:
+    """Largest angle between neighbouring visible nodes [rad]."""
+    widest = 0.0
+    for a, b in ((nodes[1:], nodes[:-1]), (nodes[:, 1:], nodes[:, :-1])):
+        chords = ((a - b) ** 2).sum(axis=-1)
+        widest = max(widest, float(np.max(chords, initial=0.0, where=np.isfinite(chords))))
+    return 2.0 * math.asin(min(0.5 * math.sqrt(widest), 1.0))
+
+
+def rolling_silhouettes(
+    bands: Sequence[RowBand], ids: NDArray[np.uint16], reference: CameraView
+) -> dict[int, Silhouette]:
+    """Silhouettes with each row at its own instant, approximated by a dozen bands.
+
+    The canvas above the image is as at the first row, below it as at the last row. Visible pixels
+    are always included.
+    """
+    if len(bands) > _BANDS:
+        starts = [band.first for band in bands][:: -(-len(bands) // _BANDS)]
+        bands = make_bands(reference.state, starts)
+    pieces: dict[int, list[Silhouette]] = {}
+    height = reference.state.camera.intrinsics.height_px
+    none, unseen = np.zeros_like(ids), replace(reference.gbuffer, projected=None)
+    for band in bands:
+        world = pack_state(band.state, reference.context, reference)
+        view = pack_view(band.state.camera, reference.cache)
+        reference = CameraView(band.state, world, view, unseen, reference.context)
+        drawn = render_silhouettes(reference, none)
+        top = band.first if band.first > 0 else -height
+        end = band.end if band.end < height else 2 * height
+        for instance_id, outline in drawn.items():
+            pieces.setdefault(instance_id, []).append(_crop_rows(outline, top, end))
+    return {
+        k: _merge(k, [*parts, Silhouette(k, 0, 0, ids == k)]) for k, parts in sorted(pieces.items())
+    }
+
+
+def _crop_rows(outline: Silhouette, top: int, end: int) -> Silhouette:
+    """Rows ``top`` to ``end`` (exclusive) of a silhouette."""
+    first = max(top - outline.y_px, 0)
+    mask = outline.mask[first : max(end - outline.y_px, first)]
+    return replace(outline, y_px=outline.y_px + first, mask=mask)
+
+
+def _merge(instance_id: int, parts: Sequence[Silhouette]) -> Silhouette:
+    """One silhouette from several bands of rows."""
+    filled = [part for part in parts if part.mask.any()]
+    if not filled:
+        return Silhouette(instance_id, 0, 0, _NOTHING)
+    boxes = [
+        BoxPx(p.x_px, p.y_px, p.x_px + p.mask.shape[1], p.y_px + p.mask.shape[0]) for p in filled
+    ]
+    whole = reduce(BoxPx.union, boxes)
+    mask = np.zeros((whole.height_px, whole.width_px), np.bool_)
+    for part, box in zip(filled, boxes, strict=True):
+        mask[box.window(whole.x_min, whole.y_min)] |= part.mask
+    return _crop(instance_id, mask, whole)

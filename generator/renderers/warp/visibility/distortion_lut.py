@@ -66,8 +66,7 @@ def canvas_nodes(intrinsics: Intrinsics) -> Float32:
         np.arange(-(-3 * size // NODE_STRIDE_PX) + 1) * NODE_STRIDE_PX - size + 0.5
         for size in (width, height)
     )
-    nodes: Float32 = intrinsics.rays(np.stack(np.meshgrid(u, v), axis=-1)).astype(np.float32)
-    return nodes
+    return np.asarray(intrinsics.rays(np.stack(np.meshgrid(u, v), axis=-1)).astype(np.float32))
 
 
 def _pixel_angles(rays: Array, intrinsics: Intrinsics) -> Array:
@@ -77,13 +76,11 @@ def _pixel_angles(rays: Array, intrinsics: Intrinsics) -> Array:
     angles = np.sqrt(np.sqrt((area * area).sum(axis=-1)))
     usual = 1.0 / intrinsics.fx_px
     # Pixels of an equirectangular image shrink to nothing at the poles, but their contents do not.
-    filled: Array = np.maximum(np.nan_to_num(angles, nan=usual), 0.05 * usual)
-    return filled
+    return np.asarray(np.maximum(np.nan_to_num(angles, nan=usual), 0.05 * usual))
 
 
 def _slopes(rays: Array, axis: int) -> Array:
     """Change per pixel along an axis; NaN beside pixels that are not shown."""
     if rays.shape[axis] == 1:
         return np.full_like(rays, np.nan)
-    slopes: Array = np.gradient(rays, axis=axis)
-    return slopes
+    return np.asarray(np.gradient(rays, axis=axis))

@@ -1,4 +1,7 @@
-"""G-buffer: the visible surface at every pixel centre."""
+"""G-buffer: the visible surface at every pixel centre.
+
+Bodies with cut-outs are ray-traced into the z-buffer of rasterised images.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +12,95 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from gen_data.generator.core.boxes import BoxPx
+from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.scene.kernels import ray_queries, records
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
-from gen_data.generator.renderers.warp.visibility.alpha_cutouts import has_cutouts, trace_over
 from gen_data.generator.renderers.warp.visibility.kernels import label_resolve, rasterizer
+
+CORNERS = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
+"""For each corner of a box, whether it is at the high end of each axis, [8, 3]."""
+
+
+def has_cutouts(body_records: NDArray[np.void]) -> NDArray[np.bool_]:
+    """Whether rays may pass holes in each body, bool [n]."""
+    return np.asarray((body_records["cutouts"] & int(records.HOLES)) != 0)
+
+
+def trace_over(
+    world: PackedWorld,
+    view: records.View,
+    seen: NDArray[np.int32],
+    nearness: wp.array,
+    hits: wp.array,
+    samples: tuple[wp.array, Array] | None = None,
+) -> None:
+    """Add listed bodies to a z-buffer of pixel centres, or of samples, in place.
+
+    ``samples`` are listed pixels and the positions of samples in each.
+    """
+    from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
+
+    device = hits.device
+    boxes = [project_window(world.body_records, number, view) for number in seen.tolist()]
+    rows = [
+        (number, (box.x_min, box.y_min, box.width_px, box.height_px))
+        for number, box in zip(seen.tolist(), boxes, strict=True)
+    ]
+    values = np.array(rows, dtype=alpha_cutouts.CutoutBody.numpy_dtype())
+    bodies = wp.array(values, dtype=alpha_cutouts.CutoutBody, device=device)
+    inputs = [view, world.record, bodies, rasterizer.Z_NEAR_M]
+    kernel, count = alpha_cutouts.trace_centres, view.height
+    if samples is not None:
+        pixels, parts = samples
+        inputs += [pixels, wp.array(parts, dtype=wp.vec2, device=device)]
+        kernel, count = alpha_cutouts.trace_samples, len(pixels)
+    wp.launch(kernel, count, inputs, [nearness, hits], device=device)
+
+
+def trace_outlines(
+    world: PackedWorld, view: records.View, outlines: NDArray[np.void], mask: wp.array
+) -> None:
+    """Draw silhouettes of bodies with cut-outs into the mask pixels of their Outline records."""
+    from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
+
+    for outline in outlines:
+        x0, y0, width, height = outline["window"].tolist()
+        around = BoxPx(x0, y0, x0 + width, y0 + height)
+        box = project_window(world.body_records, outline["body"], view).intersection(around)
+        outline["first_pixel"] += (box.y_min - y0) * outline["stride"] + box.x_min - x0
+        outline["window"] = (box.x_min, box.y_min, box.width_px, box.height_px)
+    shape = (len(outlines), int(outlines["window"]["height"].max(initial=0)))
+    listed = wp.array(outlines, dtype=rasterizer.Outline, device=mask.device)
+    inputs = [view, world.record, listed, rasterizer.Z_NEAR_M]
+    wp.launch(alpha_cutouts.trace_outlines, shape, inputs, [mask], device=mask.device)
+
+
+def canvas_box(view: records.View) -> BoxPx:
+    """The canvas of three by three images, in image coordinates."""
+    return BoxPx(-view.width, -view.height, 2 * view.width, 2 * view.height)
+
+
+def box_corners(body_records: NDArray[np.void], view: records.View) -> Array:
+    """Corners of the boxes of bodies [n] in the camera frame, [n, 3, 8]."""
+    ends = np.stack([body_records["low_m"], body_records["high_m"]], axis=1).astype(np.float64)
+    corners = ends[:, CORNERS, np.arange(3)] - np.array(view.eye_m, dtype=np.float64)
+    R_world_camera = np.array(view.R_world_camera, dtype=np.float64).reshape(3, 3)
+    return np.asarray(np.einsum("nki,ij->njk", corners, R_world_camera, optimize=False))
+
+
+def project_window(body_records: NDArray[np.void], body: int, view: records.View) -> BoxPx:
+    """Pixels that a body may cover before a pinhole; may lie outside the image."""
+    ((x, y, z),) = box_corners(body_records[[body]], view)
+    if z.min() < rasterizer.Z_NEAR_M:
+        return canvas_box(view)
+    x_px, y_px = view.fx * x / z + view.cx, view.fy * y / z + view.cy
+    low = np.floor([x_px.min(), y_px.min()]) - 1.0
+    high = np.ceil([x_px.max(), y_px.max()]) + 1.0
+    box = BoxPx(int(low[0]), int(low[1]), int(high[0]), int(high[1]))
+    return box.intersection(canvas_box(view))
+
 
 Method = Literal["auto", "raster", "rays"]
 """How visibility is determined, as in RenderSettings."""
@@ -56,12 +143,17 @@ class GBuffer:
     normals: wp.array
     projected: Projected | None
 
+    @property
+    def record(self) -> records.GBufferRecord:
+        """The images as kernels read and write them."""
+        images = records.GBufferRecord()
+        images.hits, images.z_m = self.hits, self.z_m
+        images.weights, images.normals = self.weights, self.normals
+        return images
+
 
 def find_visible(
-    world: PackedWorld,
-    view: records.View,
-    cache: DeviceCache,
-    method: Method,
+    world: PackedWorld, view: records.View, cache: DeviceCache, method: Method
 ) -> GBuffer:
     """Find the surfaces at all pixel centres of a view."""
     n = view.width * view.height
@@ -83,15 +175,8 @@ def find_visible(
         wp.launch(ray_queries.trace_pixels, n, inputs, [gbuffer.hits], device=cache.device)
     # One thread per row on the CPU, where threads run one after the other anyway.
     run = view.width if cache.device.is_cpu else 1
-    outputs = [gbuffer.z_m, gbuffer.weights, gbuffer.normals]
-    inputs = [view, world.record, run, gbuffer.hits]
-    wp.launch(
-        label_resolve.resolve,
-        (view.height, view.width // run),
-        inputs,
-        outputs,
-        device=cache.device,
-    )
+    inputs, shape = [view, world.record, run, gbuffer.record], (view.height, view.width // run)
+    wp.launch(label_resolve.resolve, shape, inputs, device=cache.device)
     return gbuffer
 
 
@@ -120,16 +205,9 @@ def bodies_within(
 ) -> NDArray[np.int32]:
     """Numbers, ascending, of the bodies whose boxes reach into an image's frustum.
 
-    Args:
-        body_records: Body records.
-        view: The camera.
-        margin: How far the frustum extends beyond each side of the image, in images.
+    The frustum extends beyond each side of the image by ``margin`` images.
     """
-    ends = np.stack([body_records["low_m"], body_records["high_m"]], axis=1).astype(np.float64)
-    picks = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
-    corners = ends[:, picks, np.arange(3)] - np.array(view.eye_m, dtype=np.float64)
-    R_world_camera = np.array(view.R_world_camera, dtype=np.float64).reshape(3, 3)
-    x, y, z = np.moveaxis(np.einsum("nki,ij->nkj", corners, R_world_camera, optimize=False), -1, 0)
+    x, y, z = np.moveaxis(box_corners(body_records, view), 1, 0)
     # One more pixel absorbs all rounding.
     beyond_x, beyond_y = margin * view.width + 1.0, margin * view.height + 1.0
     outside = [
@@ -144,11 +222,7 @@ def bodies_within(
 
 
 def _rasterise(
-    world: PackedWorld,
-    view: records.View,
-    cache: DeviceCache,
-    projected: Projected,
-    hits: wp.array,
+    world: PackedWorld, view: records.View, cache: DeviceCache, projected: Projected, hits: wp.array
 ) -> None:
     nearness = cache.scratch("nearness", view.width * view.height, float)
     nearness.zero_()

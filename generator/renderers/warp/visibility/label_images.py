@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,21 +10,14 @@ from numpy.typing import NDArray
 
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.scene import Scene
+from gen_data.generator.renderers.warp.frame_context import CameraView
 from gen_data.generator.renderers.warp.scene.kernels import records
-from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
-from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer
 from gen_data.generator.renderers.warp.visibility.kernels import label_resolve
 
 
-def label_images(
-    scene: Scene,
-    world: PackedWorld,
-    view: records.View,
-    gbuffer: GBuffer,
-    channels: frozenset[Channel],
-) -> dict[Channel, NDArray[Any]]:
+def label_images(frame: CameraView, channels: frozenset[Channel]) -> dict[Channel, NDArray[Any]]:
     """All requested label channels, as documented at Channel."""
-    shape = (view.height, view.width)
+    scene, view, gbuffer = frame.state.scene, frame.view, frame.gbuffer
     images: dict[Channel, NDArray[Any]] = {}
     ids = {
         Channel.INSTANCE: [body.instance_id for body in scene.bodies],
@@ -33,26 +25,35 @@ def label_images(
         Channel.CATEGORY: category_ids(scene),
     }
     for channel in sorted(channels & ids.keys(), key=lambda c: c.value):
-        images[channel] = _ids(gbuffer, ids[channel]).reshape(shape)
-    if Channel.Z_DEPTH in channels:
-        images[Channel.Z_DEPTH] = _z_depths(view, gbuffer).reshape(shape)
+        listed = np.array([0, *ids[channel]], dtype=np.uint16)
+        table = wp.array(listed, dtype=wp.uint16, device=frame.cache.device)
+        inputs = [gbuffer.hits, table]
+        images[channel] = _launch(frame, label_resolve.label_ids, inputs, wp.uint16)
+    if Channel.Z_DEPTH in channels and view.lens == records.PINHOLE:
+        images[Channel.Z_DEPTH] = gbuffer.z_m.numpy().reshape(view.height, view.width).copy()
+    elif Channel.Z_DEPTH in channels:
+        inputs = [view, gbuffer.z_m]
+        images[Channel.Z_DEPTH] = _launch(frame, label_resolve.label_z_depths, inputs, float)
     if Channel.RANGE in channels:
         inputs = [view, gbuffer.z_m]
-        images[Channel.RANGE] = _launch(label_resolve.label_ranges, inputs, float, gbuffer).reshape(
-            shape
-        )
+        images[Channel.RANGE] = _launch(frame, label_resolve.label_ranges, inputs, float)
     if Channel.NORMALS in channels:
         inputs = [view, gbuffer.normals]
-        normals = _launch(label_resolve.label_normals, inputs, wp.vec3, gbuffer)
-        images[Channel.NORMALS] = normals.reshape(*shape, 3)
+        images[Channel.NORMALS] = _launch(frame, label_resolve.label_normals, inputs, wp.vec3)
     if Channel.OBJECT_COORDINATES in channels:
-        frames = wp.array(
-            box_frames(scene), dtype=label_resolve.BoxFrame, device=gbuffer.hits.device
-        )
-        inputs = [world.record, gbuffer.hits, gbuffer.weights, frames]
-        coordinates = _launch(label_resolve.label_object_coordinates, inputs, wp.vec3, gbuffer)
-        images[Channel.OBJECT_COORDINATES] = coordinates.reshape(*shape, 3)
+        frames, kernel = box_frames(scene), label_resolve.label_object_coordinates
+        boxes = wp.array(frames, dtype=label_resolve.BoxFrame, device=frame.cache.device)
+        inputs = [frame.world.record, gbuffer.hits, gbuffer.weights, boxes]
+        images[Channel.OBJECT_COORDINATES] = _launch(frame, kernel, inputs, wp.vec3)
     return images
+
+
+def _launch(frame: CameraView, kernel: wp.Kernel, inputs: list[Any], dtype: Any) -> NDArray[Any]:
+    """The image that a kernel computes, [h, w] or [h, w, 3]."""
+    image = wp.zeros(frame.pixels, dtype=dtype, device=frame.cache.device)
+    frame.launch(kernel, frame.pixels, inputs, [image])
+    values: NDArray[Any] = image.numpy()
+    return values.reshape(frame.view.height, frame.view.width, *values.shape[1:])
 
 
 def category_ids(scene: Scene) -> list[int]:
@@ -77,24 +78,3 @@ def box_frames(scene: Scene) -> NDArray[np.void]:
         frame["t_box_mesh"] = (np.asarray(T_instance_body.translation_m) - low) / size
         frame["labelled"] = 1
     return frames
-
-
-def _z_depths(view: records.View, gbuffer: GBuffer) -> NDArray[np.float32]:
-    if view.lens == records.PINHOLE:
-        z_m: NDArray[np.float32] = gbuffer.z_m.numpy().copy()
-        return z_m
-    return _launch(label_resolve.label_z_depths, [view, gbuffer.z_m], float, gbuffer)
-
-
-def _ids(gbuffer: GBuffer, of_bodies: Sequence[int]) -> NDArray[np.uint16]:
-    ids = np.array([0, *of_bodies], dtype=np.uint16)
-    table = wp.array(ids, dtype=wp.uint16, device=gbuffer.hits.device)
-    return _launch(label_resolve.label_ids, [gbuffer.hits, table], wp.uint16, gbuffer)
-
-
-def _launch(kernel: wp.Kernel, inputs: list[Any], dtype: Any, gbuffer: GBuffer) -> NDArray[Any]:
-    pixels = len(gbuffer.hits)
-    image = wp.zeros(pixels, dtype=dtype, device=gbuffer.hits.device)
-    wp.launch(kernel, pixels, inputs, [image], device=gbuffer.hits.device)
-    values: NDArray[Any] = image.numpy()
-    return values

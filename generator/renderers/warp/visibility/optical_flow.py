@@ -17,23 +17,21 @@ from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.renderers.warp.frame_context import (
     CameraState,
     CameraView,
-    RenderContext,
     RowBand,
     render_view,
 )
-from gen_data.generator.renderers.warp.visibility.banded_gbuffer import (
-    BandedGBuffer,
-    full_band,
-    render_bands,
-)
-from gen_data.generator.renderers.warp.visibility.motion_bounds import make_bands, split_bands
 from gen_data.generator.renderers.warp.visibility.reprojection import (
+    BandedGBuffer,
     ReprojectedPoints,
     ScenePoints,
     deform_points,
     find_carriers,
+    full_band,
     gather_points,
+    make_bands,
+    render_bands,
     reproject,
+    split_bands,
 )
 
 FORWARD = frozenset({Channel.FLOW_FORWARD, Channel.FLOW_OCCLUDED_FORWARD, Channel.SCENE_FLOW})
@@ -48,15 +46,10 @@ def flow_images(
     reference: CameraView,
     gbuffer: BandedGBuffer,
     channels: frozenset[Channel],
-    context: RenderContext,
 ) -> dict[Channel, NDArray[Any]]:
     """All requested flow channels, as documented at Channel.
 
-    Args:
-        reference: The world at the image's instant.
-        gbuffer: G-buffer of the image, each row at its own instant.
-        channels: Requested channels of any kind.
-        context: Assets and settings.
+    ``reference`` is the world at the image's instant; each row of the G-buffer is at its own.
     """
     images: dict[Channel, NDArray[Any]] = {}
     if not channels & FLOW:
@@ -67,13 +60,13 @@ def flow_images(
     points = gather_points(gbuffer, carriers)
     if channels & FORWARD:
         images |= _flow_channels(
-            points, gbuffer, middle.later(step_s), channels & FORWARD, reference, context
+            points, gbuffer, middle.later(step_s), channels & FORWARD, reference
         )
     if channels & BACKWARD and middle.scene.time_s < step_s - 1e-9:
         images |= _undefined_flow(points.carriers.shape, channels)
     elif channels & BACKWARD:
         images |= _flow_channels(
-            points, gbuffer, middle.later(-step_s), channels & BACKWARD, reference, context
+            points, gbuffer, middle.later(-step_s), channels & BACKWARD, reference
         )
     return images
 
@@ -84,16 +77,15 @@ def _flow_channels(
     then: CameraState,
     channels: frozenset[Channel],
     reference: CameraView,
-    context: RenderContext,
 ) -> dict[Channel, NDArray[Any]]:
     """Channels of one direction."""
     images: dict[Channel, NDArray[Any]] = {}
     carriers = find_carriers(then.scene)
     bands: Sequence[RowBand] = (full_band(then),)
     if then.camera.shutter.rolls:
-        reference = render_view(then, context, None, reference)
+        reference = render_view(then, reference.context, None, reference)
         bands = split_bands(reference)
-    points = deform_points(points, gbuffer, then.scene, context.cache.assets)
+    points = deform_points(points, gbuffer, then.scene, reference.cache.assets)
     found = reproject(points, bands, carriers)
     for channel in sorted(channels, key=lambda c: c.value):
         if channel in (Channel.FLOW_FORWARD, Channel.FLOW_BACKWARD):
@@ -104,7 +96,7 @@ def _flow_channels(
             seen = frozenset({Channel.RANGE, Channel.NORMALS})
             # Bands four times as high allow one pixel of motion: as accurate as the occlusion test.
             starts = [band.first for band in bands[::4]]
-            _, other = render_bands(make_bands(then, starts), seen, context, reference)
+            _, other = render_bands(make_bands(then, starts), seen, reference)
             images[channel] = find_occluded(points, found, other, gbuffer.intrinsics)
     return images
 
@@ -112,14 +104,12 @@ def _flow_channels(
 def _flow(found: ReprojectedPoints) -> Float32:
     height, width = found.image_px.shape[:2]
     centres = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1)
-    flow: Float32 = (found.image_px - centres).astype(np.float32)
-    return flow
+    return np.asarray((found.image_px - centres).astype(np.float32))
 
 
 def _scene_flow(points: ScenePoints, found: ReprojectedPoints) -> Float32:
     there = (points.places[..., 3] > 0.0)[..., None]
-    flow: Float32 = np.where(there, found.p_camera - points.p_camera, np.nan).astype(np.float32)
-    return flow
+    return np.asarray(np.where(there, found.p_camera - points.p_camera, np.nan).astype(np.float32))
 
 
 def find_occluded(
@@ -131,13 +121,8 @@ def find_occluded(
     """Occlusion of points in another image, uint8 [h, w]: 1 if hidden or outside it.
 
     A point is visible if any of the four pixels around it shows no nearer surface; surfaces are
-    extrapolated from pixel centres along their tangent planes.
-
-    Args:
-        points: Points of this image.
-        found: Their positions at the other instant.
-        then: Range and normals of the image at the other instant.
-        camera: Intrinsics of that image.
+    extrapolated from pixel centres along their tangent planes. ``found`` are the points, ``then``
+    range and normals of the image at the other instant.
     """
     range_m, normals = then[Channel.RANGE], then[Channel.NORMALS]
     u, v = found.image_px[..., 0], found.image_px[..., 1]
@@ -174,5 +159,4 @@ def _undefined_flow(
 
 
 def _dot(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
-    product: NDArray[Any] = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2]
-    return product
+    return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2])

@@ -1,22 +1,121 @@
-"""Reprojection of visible points to other instants.
+"""G-buffers assembled from bands of rows, and reprojection of their points to other instants.
 
-Every point is expressed in the frame of its carrier, a body or the world: no search is needed.
+Every point is expressed in the frame of its carrier, a body or the world: no search is needed. The
+motion of points determines the number of instants that an image requires.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.asset_types import Float32, Int32
+from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import Array
-from gen_data.generator.renderers.warp.frame_context import RowBand
-from gen_data.generator.renderers.warp.visibility.banded_gbuffer import BandedGBuffer
+from gen_data.generator.core.shutter import INSTANT
+from gen_data.generator.renderers.warp.frame_context import (
+    CameraState,
+    CameraView,
+    RowBand,
+    is_moving,
+    render_view,
+)
+from gen_data.generator.renderers.warp.visibility.label_images import label_images
+
+RadianceFunction = Callable[[CameraView], Float32]
+"""Radiance of every pixel of a view [cd/m^2], float32 [h, w, 3]."""
+
+# Spacing of the lattice of realtime shading; period of its sampling pattern; and half width of its
+# smoothing.
+_STRIDE_PX, _PATTERN_PX, _MARGIN_PX = 3, 12, 6
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class BandedGBuffer:
+    """G-buffer of an image whose rows may differ in time.
+
+    Attributes:
+        bands: Bands in order of rows, covering the image.
+        hits, z_m, weights: As of GBuffer, shapes [h, w, 2], [h, w], [h, w, 2].
+    """
+
+    bands: Sequence[RowBand]
+    hits: Int32
+    z_m: Float32
+    weights: Float32
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """Intrinsics of the camera; the bands hold its poses."""
+        return self.bands[0].state.camera.intrinsics
+
+
+def full_band(state: CameraState) -> RowBand:
+    """All rows at one instant."""
+    return RowBand(0, state.camera.intrinsics.height_px, state)
+
+
+def copy_gbuffer(rendered: CameraView) -> BandedGBuffer:
+    """Copy of the G-buffer of an image of one instant."""
+    lens = rendered.state.camera.intrinsics
+    shape = (lens.height_px, lens.width_px)
+    return BandedGBuffer(
+        (full_band(rendered.state),),
+        rendered.gbuffer.hits.numpy().reshape(*shape, 2).copy(),
+        rendered.gbuffer.z_m.numpy().reshape(shape).copy(),
+        rendered.gbuffer.weights.numpy().reshape(*shape, 2).copy(),
+    )
+
+
+def render_bands(
+    bands: Sequence[RowBand],
+    channels: frozenset[Channel],
+    reference: CameraView,
+    light: RadianceFunction | None = None,
+) -> tuple[BandedGBuffer, dict[Channel, NDArray[Any]]]:
+    """Render G-buffer and label images of bands that cover the image, each at its own instant.
+
+    ``reference`` is the world at a nearby instant; ``light`` computes the channel RADIANCE, None =
+    not requested.
+    """
+    lens = reference.state.camera.intrinsics
+    shape = (lens.height_px, lens.width_px)
+    hits, weights = np.zeros((*shape, 2), np.int32), np.zeros((*shape, 2), np.float32)
+    z_m = np.zeros(shape, np.float32)
+    parts: dict[Channel, list[NDArray[Any]]] = {}
+    for band in bands:
+        rows = slice(band.first, band.end)
+        first, end = (band.first, band.end) if light is None else add_margin(band, lens.height_px)
+        # Neighbouring bands share the most packed data.
+        rendered = reference = render_view(band.state, reference.context, (first, end), reference)
+        own = slice(band.first - first, band.end - first)
+        gbuffer, rows_px = rendered.gbuffer, (end - first, lens.width_px)
+        hits[rows] = gbuffer.hits.numpy().reshape(*rows_px, 2)[own]
+        weights[rows] = gbuffer.weights.numpy().reshape(*rows_px, 2)[own]
+        z_m[rows] = gbuffer.z_m.numpy().reshape(rows_px)[own]
+        drawn = label_images(rendered, channels)
+        if light is not None:
+            drawn[Channel.RADIANCE] = light(rendered)
+        for channel, image in drawn.items():
+            parts.setdefault(channel, []).append(image[own].copy())
+    images = {channel: np.concatenate(pieces) for channel, pieces in parts.items()}
+    return BandedGBuffer(tuple(bands), hits, z_m, weights), images
+
+
+def add_margin(band: RowBand, height_px: int) -> tuple[int, int]:
+    """Rows to render so that light in a band equals that of the whole image."""
+    first = max(band.first - _MARGIN_PX, 0) // _PATTERN_PX * _PATTERN_PX
+    end = -(-(band.end + _MARGIN_PX) // _STRIDE_PX) * _STRIDE_PX + 1
+    return first, min(end, height_px)
+
 
 _ROWS_AT_ONCE = 32
 _ITERATIONS = 4
@@ -129,8 +228,7 @@ def _seen_points(gbuffer: BandedGBuffer, stride: int) -> Array:
     camera, z_m = gbuffer.intrinsics, gbuffer.z_m[::stride, ::stride].astype(np.float64)
     depth_m = np.where(gbuffer.hits[::stride, ::stride, 0] >= 0, z_m, 1.0)
     if not camera.straight:
-        scaled: Array = camera.pixel_rays()[::stride, ::stride] * depth_m[..., None]
-        return scaled
+        return np.asarray(camera.pixel_rays()[::stride, ::stride] * depth_m[..., None])
     u = np.arange(0, camera.width_px, stride) + 0.5
     v = np.arange(0, camera.height_px, stride) + 0.5
     x = (u[None, :] - camera.cx_px) / camera.fx_px * depth_m
@@ -155,5 +253,97 @@ def _interpolate(corners: Array, weights: Float32) -> Array:
     u = np.where(weights[:, 0] > 1.5, weights[:, 0] - 2.0, weights[:, 0]).astype(np.float64)
     v = weights[:, 1].astype(np.float64)
     shares = np.stack([1.0 - u - v, u, v], axis=-1)
-    sums: Array = np.einsum("nk,nki->ni", shares, corners, optimize=False)
-    return sums
+    return np.asarray(np.einsum("nk,nki->ni", shares, corners, optimize=False))
+
+
+BAND_PX = 0.25
+"""Largest motion of visible points within a band of rows."""
+BLUR_PX = 0.3
+"""Largest motion within a slice of an exposure, if the camera's number of samples allows."""
+_SPARSE_PX = 4
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ShutterSampling:
+    """Sampling in time that an image requires.
+
+    Attributes:
+        speeds_px_s: Speed of the fastest point in or near each row, shape [height].
+        samples: Slices per exposure.
+        blurred: Rows with visible motion during their exposure, shape [height].
+    """
+
+    speeds_px_s: Array
+    samples: int
+    blurred: NDArray[np.bool_]
+
+
+def plan_sampling(rendered: CameraView) -> ShutterSampling:
+    """Plan the sampling of an image, given at the middle of the time its shutter is open."""
+    middle, gbuffer = rendered.state, copy_gbuffer(rendered)
+    shutter = middle.camera.shutter
+    ends = [_global_shutter_band(middle.later(side * shutter.open_s)) for side in (-0.5, 0.5)]
+    carriers = find_carriers(middle.scene)
+    points = gather_points(gbuffer, carriers, _SPARSE_PX)
+    before, after = (reproject(points, [end], carriers, _SPARSE_PX).image_px for end in ends)
+    way = after - before
+    length = np.where(np.isfinite(way).all(axis=-1), np.sqrt((way * way).sum(axis=-1)), 0.0)
+    vertical = np.where(length > 0.0, np.abs(way[..., 1]), 0.0)
+    speeds = _dilate_rows(
+        length.max(axis=1) / shutter.open_s, vertical.max(axis=1), len(gbuffer.z_m)
+    )
+    wanted = math.ceil(float(speeds.max()) * shutter.exposure_s / BLUR_PX)
+    blurred = speeds * shutter.exposure_s > BLUR_PX
+    return ShutterSampling(speeds, min(max(wanted, 1), shutter.samples), blurred)
+
+
+def split_bands(
+    rendered: CameraView, sampling: ShutterSampling | None = None
+) -> tuple[RowBand, ...]:
+    """Bands of rows, each at its instant, within which nothing moves farther than ``BAND_PX``.
+
+    ``rendered`` is the image at the middle of its exposure; without ``sampling``, plan it.
+    """
+    middle = rendered.state
+    shutter = middle.camera.shutter
+    if not shutter.rolls or not is_moving(middle, shutter.open_s):
+        return (full_band(middle),)
+    sampling = sampling or plan_sampling(rendered)
+    per_row_s = abs(shutter.readout_s) / len(sampling.speeds_px_s)
+    return make_bands(middle, band_starts(sampling.speeds_px_s * per_row_s))
+
+
+def make_bands(middle: CameraState, starts: Sequence[int]) -> tuple[RowBand, ...]:
+    """Bands that begin at the given rows, each at the instant of its middle."""
+    height = middle.camera.intrinsics.height_px
+    delay_s = middle.camera.shutter.delay_s
+    return tuple(
+        RowBand(first, end, middle.later(delay_s(0.5 * (first + end), height)))
+        for first, end in zip(starts, [*starts[1:], height], strict=True)
+    )
+
+
+def band_starts(motion_px: Array) -> list[int]:
+    """First rows of bands, each as high as the motion from row to row [height] allows."""
+    travelled = np.concatenate([[0.0], np.cumsum(motion_px)])[:-1]
+    begins: NDArray[np.bool_] = np.diff(np.floor(travelled / BAND_PX), prepend=-1.0) > 0.0
+    return [int(row) for row in np.flatnonzero(begins)]
+
+
+def _dilate_rows(speeds: Array, travels_px: Array, height: int) -> Array:
+    """Highest speed of anything that may reach each row while the shutter is open, [height].
+
+    Given speeds in every few rows, and the vertical motion of the same points in that time.
+    """
+    highest = np.zeros(height)
+    reaches = np.ceil(0.5 * np.minimum(travels_px, 2.0 * height)).astype(int) + 2 * _SPARSE_PX
+    for k, (speed, reach) in enumerate(zip(speeds, reaches, strict=True)):
+        rows = slice(max(k * _SPARSE_PX - reach, 0), (k + 1) * _SPARSE_PX + reach)
+        highest[rows] = np.maximum(highest[rows], speed)
+    return highest
+
+
+def _global_shutter_band(state: CameraState) -> RowBand:
+    """The whole image with all rows exposed at one instant."""
+    camera = replace(state.camera, shutter=INSTANT)
+    return full_band(replace(state, camera=camera))

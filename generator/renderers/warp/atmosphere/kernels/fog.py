@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import GBufferRecord
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
 from gen_data.generator.renderers.warp.scene.kernels.records import (
+    GBufferRecord,
     LightRecord,
     View,
     World,
-    pixel_direction,
+    pixel_ray,
 )
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -105,9 +105,7 @@ def seen_distance(images: GBufferRecord, i: int, length: float):
 @wp.func
 def glow_along(view: View, world: World, images: GBufferRecord, fog: Fog, i: int):
     """In-scattered light of all lamps along the ray of pixel i [cd/m^2]."""
-    x = float(i % view.width) + 0.5
-    y = float(i / view.width) + 0.5
-    d = view.R_world_camera @ pixel_direction(view, x, y)
+    d = pixel_ray(view, i)
     length = wp.length(d)
     reach_m = wp.min(seen_distance(images, i, length), GLOW_REACH_M)
     glow = wp.vec3(0.0)
@@ -119,12 +117,7 @@ def glow_along(view: View, world: World, images: GBufferRecord, fog: Fog, i: int
 
 @wp.kernel
 def glow_at_points(
-    view: View,
-    world: World,
-    images: GBufferRecord,
-    fog: Fog,
-    columns: int,
-    glow: wp.array(dtype=wp.vec3),
+    view: View, world: World, images: GBufferRecord, fog: Fog, columns: int, glow: wp.array[wp.vec3]
 ):
     """The glow of lamps at the points of a sparse grid."""
     k = wp.tid()
@@ -140,7 +133,7 @@ def glow_between(
     images: GBufferRecord,
     fog: Fog,
     columns: int,
-    glow: wp.array(dtype=wp.vec3),
+    glow: wp.array[wp.vec3],
     i: int,
 ):
     """The glow at pixel i, interpolated from the grid; computed directly where depths differ."""
@@ -175,8 +168,8 @@ def fill_with_fog(
     images: GBufferRecord,
     fog: Fog,
     columns: int,
-    glow: wp.array(dtype=wp.vec3),
-    radiance: wp.array(dtype=wp.vec3),
+    glow: wp.array[wp.vec3],
+    radiance: wp.array[wp.vec3],
 ):
     """Attenuate every pixel by fog and add the fog's in-scattered light.
 
@@ -185,9 +178,7 @@ def fill_with_fog(
         glow: Glow at those points.
     """
     i = wp.tid()
-    x = float(i % view.width) + 0.5
-    y = float(i / view.width) + 0.5
-    d = view.R_world_camera @ pixel_direction(view, x, y)
+    d = pixel_ray(view, i)
     length = wp.length(d)
     distance_m = seen_distance(images, i, length)
     d = d * (1.0 / length)

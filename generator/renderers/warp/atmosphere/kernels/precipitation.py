@@ -40,7 +40,7 @@ class Streak:
 
 
 @wp.kernel
-def light_streaks(view: View, world: World, streaks: wp.array(dtype=Streak)):
+def light_streaks(view: View, world: World, streaks: wp.array[Streak]):
     """Radiance of particles towards the camera: ambient light, and that of lamps."""
     k = wp.tid()
     p = streaks[k].p_m
@@ -58,11 +58,11 @@ def light_streaks(view: View, world: World, streaks: wp.array(dtype=Streak)):
 @wp.kernel
 def draw_streaks(
     width: int,
-    z_m: wp.array(dtype=float),
-    streaks: wp.array(dtype=Streak),
-    first: wp.array(dtype=int),
-    listed: wp.array(dtype=int),
-    radiance: wp.array(dtype=wp.vec3),
+    z_m: wp.array[float],
+    streaks: wp.array[Streak],
+    first: wp.array[int],
+    listed: wp.array[int],
+    radiance: wp.array[wp.vec3],
 ):
     """Blend particles over each row of the image where no surface is nearer.
 

@@ -21,9 +21,8 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     cell_corner,
     ray_origin,
 )
-from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import GBufferRecord
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
-from gen_data.generator.renderers.warp.scene.kernels.dielectrics import WATER_F0, fresnel_schlick
+from gen_data.generator.renderers.warp.scene.kernels.brdf import WATER_F0, fresnel_schlick
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
     sky_irradiance,
     sky_rest,
@@ -34,11 +33,12 @@ from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
 )
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     HOLES,
+    GBufferRecord,
     View,
     World,
     fast_normalize,
     flat_normal,
-    pixel_direction,
+    pixel_ray,
     surface_index,
 )
 from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import make_sampler, texel_at
@@ -62,7 +62,7 @@ FILM_REACH = wp.constant(8)
 
 
 @wp.kernel
-def probe_exposure(world: World, lattice: Lattice, exposed: wp.array(dtype=float)):
+def probe_exposure(world: World, lattice: Lattice, exposed: wp.array[float]):
     """Exposure of each lattice point to precipitation, by one ray each."""
     k = wp.tid()
     exposed[k] = 1.0
@@ -71,9 +71,7 @@ def probe_exposure(world: World, lattice: Lattice, exposed: wp.array(dtype=float
 
 
 @wp.kernel
-def average_exposure(
-    lattice: Lattice, probed: wp.array(dtype=float), exposed: wp.array(dtype=float)
-):
+def average_exposure(lattice: Lattice, probed: wp.array[float], exposed: wp.array[float]):
     """Mean of probe_exposure over nearby points on the same material."""
     k = wp.tid()
     column = k % lattice.width
@@ -138,7 +136,7 @@ def reflected_surface(
     view: View,
     world: World,
     images: GBufferRecord,
-    radiance: wp.array(dtype=wp.vec3),
+    radiance: wp.array[wp.vec3],
     origin: wp.vec3,
     d: wp.vec3,
     t: float,
@@ -173,7 +171,7 @@ def reflected_radiance(
     view: View,
     world: World,
     images: GBufferRecord,
-    radiance: wp.array(dtype=wp.vec3),
+    radiance: wp.array[wp.vec3],
     origin: wp.vec3,
     d: wp.vec3,
     width: float,
@@ -191,7 +189,7 @@ def facet_reflection(
     view: View,
     world: World,
     images: GBufferRecord,
-    radiance: wp.array(dtype=wp.vec3),
+    radiance: wp.array[wp.vec3],
     p: wp.vec3,
     origin: wp.vec3,
     m: wp.vec3,
@@ -215,9 +213,9 @@ def mirror_in_films(
     world: World,
     images: GBufferRecord,
     lattice: Lattice,
-    radiance: wp.array(dtype=wp.vec3),
-    water: wp.array(dtype=wp.vec2),
-    films: wp.array(dtype=wp.vec4),
+    radiance: wp.array[wp.vec3],
+    water: wp.array[wp.vec2],
+    films: wp.array[wp.vec4],
 ):
     """Water at the lattice's points, and one reflected ray of the film there.
 
@@ -260,10 +258,10 @@ def mirror_in_films(
 def blur_films(
     images: GBufferRecord,
     lattice: Lattice,
-    water: wp.array(dtype=wp.vec2),
-    films: wp.array(dtype=wp.vec4),
+    water: wp.array[wp.vec2],
+    films: wp.array[wp.vec4],
     step: int,
-    spread: wp.array(dtype=wp.vec4),
+    spread: wp.array[wp.vec4],
 ):
     """Average over points of similar depth along a row (``step`` 1) or column (``step`` width)."""
     k = wp.tid()
@@ -310,8 +308,8 @@ def around_pixel(
     world: World,
     images: GBufferRecord,
     lattice: Lattice,
-    water: wp.array(dtype=wp.vec2),
-    films: wp.array(dtype=wp.vec4),
+    water: wp.array[wp.vec2],
+    films: wp.array[wp.vec4],
     i: int,
 ):
     """Water around pixel i."""
@@ -343,11 +341,11 @@ def mirror_in_puddles(
     world: World,
     images: GBufferRecord,
     lattice: Lattice,
-    radiance: wp.array(dtype=wp.vec3),
+    radiance: wp.array[wp.vec3],
     ripples: float,
-    water: wp.array(dtype=wp.vec2),
-    films: wp.array(dtype=wp.vec4),
-    laid: wp.array(dtype=wp.vec4),
+    water: wp.array[wp.vec2],
+    films: wp.array[wp.vec4],
+    laid: wp.array[wp.vec4],
 ):
     """Reflections of water at each pixel: traced in puddles, elsewhere from films around.
 
@@ -365,10 +363,7 @@ def mirror_in_puddles(
         return
     around = around_pixel(view, world, images, lattice, water, films, i)
     wet = around.water
-    way = view.R_world_camera @ pixel_direction(
-        view, float(i % view.width) + 0.5, float(i / view.width) + 0.5
-    )
-    way = way * images.z_m[i]
+    way = pixel_ray(view, i) * images.z_m[i]
     p = view.eye_m + way
     if around.found > 0.0:
         wet = wet * (1.0 / around.found)
@@ -390,7 +385,7 @@ def mirror_in_puddles(
 
 
 @wp.kernel
-def lay_water(laid: wp.array(dtype=wp.vec4), radiance: wp.array(dtype=wp.vec3)):
+def lay_water(laid: wp.array[wp.vec4], radiance: wp.array[wp.vec3]):
     """Blend reflections of water over the image."""
     i = wp.tid()
     c = laid[i]

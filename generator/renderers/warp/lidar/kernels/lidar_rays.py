@@ -18,21 +18,21 @@ from gen_data.generator.renderers.warp.lidar.kernels.ray_packets import (
     extend_bundle,
     is_box_entered,
     list_bodies,
-    reciprocals,
 )
 from gen_data.generator.renderers.warp.scene.kernels.alpha_test import closest_solid_hit
-from gen_data.generator.renderers.warp.scene.kernels.dielectrics import WATER_F0, fresnel_schlick
-from gen_data.generator.renderers.warp.scene.kernels.ray_offsets import (
+from gen_data.generator.renderers.warp.scene.kernels.brdf import WATER_F0, fresnel_schlick
+from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
     LASER_OFFSET_M,
     SHELTER_OFFSET_M,
+    precipitation_exposure,
 )
-from gen_data.generator.renderers.warp.scene.kernels.ray_queries import precipitation_exposure
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     HOLES,
     World,
     face_vertices,
     fast_normalize,
     normal_at,
+    reciprocals,
     surface_index,
 )
 
@@ -112,11 +112,11 @@ class BodyMotion:
     """
 
     keys: int
-    rows: wp.array(dtype=int)
-    B_mesh_lidar: wp.array(dtype=wp.mat33, ndim=2)
-    eye_mesh: wp.array(dtype=wp.vec3, ndim=2)
-    phases: wp.array(dtype=float)
-    origins_m: wp.array(dtype=wp.vec3)
+    rows: wp.array[int]
+    B_mesh_lidar: wp.array2d[wp.mat33]
+    eye_mesh: wp.array2d[wp.vec3]
+    phases: wp.array[float]
+    origins_m: wp.array[wp.vec3]
 
 
 @wp.struct
@@ -240,7 +240,7 @@ def hit_normal(scan: Scan, world: World, motion: BodyMotion, ray: Ray, hit: Near
 
 
 @wp.func
-def make_ray(scan: Scan, motion: BodyMotion, axes: wp.array(dtype=wp.vec3), i: int):
+def make_ray(scan: Scan, motion: BodyMotion, axes: wp.array[wp.vec3], i: int):
     """Ray i of all, in the lidar frame."""
     beam = i / scan.subrays
     ray = Ray()
@@ -345,7 +345,7 @@ def apply_weather(world: World, light: Infrared, coat: Coat, surface: int, cosin
 
 
 @wp.func
-def ray_index(scan: Scan, order: wp.array(dtype=int), j: int):
+def ray_index(scan: Scan, order: wp.array[int], j: int):
     """Index of the ray at a position in the order of beams; an empty order is the identity."""
     i = int(j)
     if order.shape[0] > 0:
@@ -354,7 +354,7 @@ def ray_index(scan: Scan, order: wp.array(dtype=int), j: int):
 
 
 @wp.func
-def add_ray(bundle: Bundle, scan: Scan, motion: BodyMotion, axes: wp.array(dtype=wp.vec3), i: int):
+def add_ray(bundle: Bundle, scan: Scan, motion: BodyMotion, axes: wp.array[wp.vec3], i: int):
     """The bundle extended by ray i of all."""
     ray = make_ray(scan, motion, axes, i)
     return extend_bundle(bundle, world_origin(scan, ray, True), scan.R_world_lidar @ ray.direction)
@@ -366,15 +366,15 @@ def scan_beams(
     world: World,
     motion: BodyMotion,
     boxes: Boxes,
-    lights: wp.array(dtype=Infrared),
-    axes: wp.array(dtype=wp.vec3),
-    order: wp.array(dtype=int),
-    ranges_m: wp.array(dtype=float),
-    reflectances: wp.array(dtype=float),
-    cosines: wp.array(dtype=float),
-    hits: wp.array(dtype=wp.vec2i),
-    normals: wp.array(dtype=wp.vec3),
-    puddles: wp.array(dtype=float),
+    lights: wp.array[Infrared],
+    axes: wp.array[wp.vec3],
+    order: wp.array[int],
+    ranges_m: wp.array[float],
+    reflectances: wp.array[float],
+    cosines: wp.array[float],
+    hits: wp.array[wp.vec2i],
+    normals: wp.array[wp.vec3],
+    puddles: wp.array[float],
 ):
     """First hit of every ray; ray k of beam i is at ``i * subrays + k``.
 
@@ -430,13 +430,13 @@ def trace_behind_panes(
     world: World,
     motion: BodyMotion,
     boxes: Boxes,
-    lights: wp.array(dtype=Infrared),
-    axes: wp.array(dtype=wp.vec3),
-    selected: wp.array(dtype=int),
-    first_m: wp.array(dtype=float),
-    ranges_m: wp.array(dtype=float),
-    reflectances: wp.array(dtype=float),
-    hits: wp.array(dtype=wp.vec2i),
+    lights: wp.array[Infrared],
+    axes: wp.array[wp.vec3],
+    selected: wp.array[int],
+    first_m: wp.array[float],
+    ranges_m: wp.array[float],
+    reflectances: wp.array[float],
+    hits: wp.array[wp.vec2i],
 ):
     """Last surfaces on selected rays that have hit a pane, behind it and any further pane."""
     t = wp.tid()
@@ -495,16 +495,16 @@ def trace_mirrors(
     world: World,
     motion: BodyMotion,
     boxes: Boxes,
-    lights: wp.array(dtype=Infrared),
-    axes: wp.array(dtype=wp.vec3),
-    selected: wp.array(dtype=int),
-    first_m: wp.array(dtype=float),
-    first_hits: wp.array(dtype=wp.vec2i),
-    normals: wp.array(dtype=wp.vec3),
-    waters: wp.array(dtype=float),
-    ranges_m: wp.array(dtype=float),
-    reflectances: wp.array(dtype=float),
-    hits: wp.array(dtype=wp.vec2i),
+    lights: wp.array[Infrared],
+    axes: wp.array[wp.vec3],
+    selected: wp.array[int],
+    first_m: wp.array[float],
+    first_hits: wp.array[wp.vec2i],
+    normals: wp.array[wp.vec3],
+    waters: wp.array[float],
+    ranges_m: wp.array[float],
+    reflectances: wp.array[float],
+    hits: wp.array[wp.vec2i],
 ):
     """Surfaces that selected rays hit after one reflection at a mirror.
 

@@ -14,6 +14,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     componentwise_min,
     max_of_two,
     min_of_two,
+    slab_interval,
 )
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -36,10 +37,10 @@ class Boxes:
         enters_m: Smallest distance at which a ray of the run may enter the body's box, ascending.
     """
 
-    lows_m: wp.array(dtype=wp.vec3)
-    highs_m: wp.array(dtype=wp.vec3)
-    listed: wp.array(dtype=int, ndim=2)
-    enters_m: wp.array(dtype=float, ndim=2)
+    lows_m: wp.array[wp.vec3]
+    highs_m: wp.array[wp.vec3]
+    listed: wp.array2d[int]
+    enters_m: wp.array2d[float]
 
 
 @wp.struct
@@ -157,24 +158,8 @@ def list_bodies(boxes: Boxes, row: int, bundle: Bundle, reach_m: float):
 
 
 @wp.func
-def reciprocals(way: wp.vec3):
-    """Componentwise reciprocals; zeros become tiny numbers."""
-    # 0 / 0 would be NaN for a ray in a box's face; a large number is as good as infinity.
-    x = wp.where(wp.abs(way[0]) < 1.0e-20, 1.0e-20, way[0])
-    y = wp.where(wp.abs(way[1]) < 1.0e-20, 1.0e-20, way[1])
-    z = wp.where(wp.abs(way[2]) < 1.0e-20, 1.0e-20, way[2])
-    return wp.vec3(1.0 / x, 1.0 / y, 1.0 / z)
-
-
-@wp.func
 def is_box_entered(boxes: Boxes, b: int, origin_m: wp.vec3, inverse: wp.vec3, reach_m: float):
     """Whether a ray may enter a body's box within its reach."""
-    a = wp.cw_mul(boxes.lows_m[b] - origin_m, inverse)
-    c = wp.cw_mul(boxes.highs_m[b] - origin_m, inverse)
-    enter = max_of_two(
-        max_of_two(min_of_two(a[0], c[0]), min_of_two(a[1], c[1])), min_of_two(a[2], c[2])
-    )
-    leave = min_of_two(
-        min_of_two(max_of_two(a[0], c[0]), max_of_two(a[1], c[1])), max_of_two(a[2], c[2])
-    )
+    low_m = boxes.lows_m[b] - origin_m
+    enter, leave = slab_interval(low_m, boxes.highs_m[b] - origin_m, inverse)
     return leave >= 0.0 and leave >= enter and enter < reach_m

@@ -14,9 +14,12 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.brdf import directional_albedo
-from gen_data.generator.renderers.warp.scene.kernels.colorimetry import luminance
-from gen_data.generator.renderers.warp.scene.kernels.dielectrics import fresnel_dielectric, refract
+from gen_data.generator.renderers.warp.scene.kernels.brdf import (
+    directional_albedo,
+    fresnel_dielectric,
+    luminance,
+    refract,
+)
 from gen_data.generator.renderers.warp.scene.kernels.records import fast_normalize
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -92,7 +95,7 @@ def schlick_weight(c: float):
 
 @wp.func
 def make_bsdf(
-    table: wp.array(dtype=wp.vec2, ndim=2),
+    table: wp.array2d[wp.vec2],
     v: wp.vec3,
     albedo: wp.vec3,
     roughness: float,

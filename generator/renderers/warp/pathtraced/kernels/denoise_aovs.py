@@ -23,11 +23,7 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 @wp.kernel
 def trace_guides(
-    view: View,
-    world: World,
-    samples: int,
-    albedo: wp.array(dtype=wp.vec3),
-    normal: wp.array(dtype=wp.vec3),
+    view: View, world: World, samples: int, albedo: wp.array[wp.vec3], normal: wp.array[wp.vec3]
 ):
     """Mean albedo and normal over each pixel's square; white and no normal for the background."""
     i = wp.tid()

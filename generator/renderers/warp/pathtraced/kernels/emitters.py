@@ -18,13 +18,15 @@ from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     SUN,
     is_panel,
 )
-from gen_data.generator.renderers.warp.scene.kernels.colorimetry import luminance
-from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_irradiance
+from gen_data.generator.renderers.warp.scene.kernels.brdf import luminance
+from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
+    blend_texels,
+    sky_irradiance,
+)
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     EnvironmentRecord,
     LightRecord,
     World,
-    floor_int,
     max_of_two,
 )
 
@@ -51,8 +53,8 @@ class SkyTable:
     """
 
     part: float
-    rows: wp.array(dtype=float)
-    columns: wp.array(dtype=float, ndim=2)
+    rows: wp.array[float]
+    columns: wp.array2d[float]
 
 
 @wp.struct
@@ -268,7 +270,7 @@ def intersect_lamp(lamp: LightRecord, p: wp.vec3, d: wp.vec3):
 
 
 @wp.func
-def find_interval(shares: wp.array(dtype=float), last: int, u: float):
+def find_interval(shares: wp.array[float], last: int, u: float):
     """The largest k < last with ``shares[k] <= u``; binary search."""
     low = int(0)
     high = last
@@ -293,22 +295,10 @@ def sky_place(sky: EnvironmentRecord, d: wp.vec3):
 
 @wp.func
 def sky_light(sky: EnvironmentRecord, place: wp.vec3):
-    """The image at a position, bilinear, as environment_lighting.sample_panorama."""
-    height = sky.image.shape[0]
-    width = sky.image.shape[1]
-    x = place[0] * float(width) - 0.5
-    y = place[1] * float(height) - 0.5
-    x0 = floor_int(x)
-    y0 = floor_int(y)
-    fx = x - float(x0)
-    fy = y - float(y0)
-    xa = wp.where(x0 < 0, width - 1, wp.min(x0, width - 1))
-    xb = wp.where(x0 + 1 >= width, 0, x0 + 1)
-    ya = wp.clamp(y0, 0, height - 1)
-    yb = wp.clamp(y0 + 1, 0, height - 1)
-    top = sky.image[ya, xa] * (1.0 - fx) + sky.image[ya, xb] * fx
-    bottom = sky.image[yb, xa] * (1.0 - fx) + sky.image[yb, xb] * fx
-    return (top * (1.0 - fy) + bottom * fy) * sky.luminance
+    """Radiance of the image at a position, bilinear."""
+    x = place[0] * float(sky.image.shape[1]) - 0.5
+    y = place[1] * float(sky.image.shape[0]) - 0.5
+    return blend_texels(sky.image, x, y) * sky.luminance
 
 
 @wp.func

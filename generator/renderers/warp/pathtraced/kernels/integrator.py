@@ -57,11 +57,11 @@ from gen_data.generator.renderers.warp.realtime.kernels.clearcoat_glass import m
 from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import make_frame
 from gen_data.generator.renderers.warp.scene.kernels.alpha_test import OUT_OF_LINE
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import is_panel
-from gen_data.generator.renderers.warp.scene.kernels.brdf import directional_albedo
-from gen_data.generator.renderers.warp.scene.kernels.colorimetry import luminance
-from gen_data.generator.renderers.warp.scene.kernels.dielectrics import (
+from gen_data.generator.renderers.warp.scene.kernels.brdf import (
     WATER_F0,
+    directional_albedo,
     fresnel_dielectric,
+    luminance,
     pane_reflectance,
     pane_transmittance,
 )
@@ -69,11 +69,11 @@ from gen_data.generator.renderers.warp.scene.kernels.material_eval import (
     SurfaceMaterial,
     evaluate_material,
 )
-from gen_data.generator.renderers.warp.scene.kernels.ray_offsets import offset_origin
 from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
     RayHit,
     closest_hit,
     is_intersected,
+    offset_origin,
     path_along,
     precipitation_exposure,
 )
@@ -689,11 +689,7 @@ def trace_path(
 
 @wp.kernel
 def trace_paths(
-    view: View,
-    world: World,
-    table: SkyTable,
-    budget: Budget,
-    light: wp.array(dtype=wp.vec3),
+    view: View, world: World, table: SkyTable, budget: Budget, light: wp.array[wp.vec3]
 ):
     """Add the light of some samples to every pixel."""
     i = wp.tid()
@@ -713,7 +709,7 @@ def trace_paths(
 
 
 @wp.kernel
-def scale_light(factor: float, light: wp.array(dtype=wp.vec3)):
+def scale_light(factor: float, light: wp.array[wp.vec3]):
     """Multiply all light by a factor."""
     i = wp.tid()
     light[i] = light[i] * factor

@@ -27,7 +27,8 @@ from gen_data.generator.renderers.warp.atmosphere.kernels.ground_weathering impo
 )
 from gen_data.generator.renderers.warp.realtime.kernels.lattice import ray_origin
 from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import (
-    GBufferRecord,
+    ListedPixels,
+    Probe,
     light_at,
     sky_exposure_at,
     specular_occlusion,
@@ -36,9 +37,9 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import 
     visible_sky_fraction,
 )
 from gen_data.generator.renderers.warp.scene.kernels.alpha_test import OUT_OF_LINE, uv_at
-from gen_data.generator.renderers.warp.scene.kernels.brdf import make_brdf
-from gen_data.generator.renderers.warp.scene.kernels.dielectrics import (
+from gen_data.generator.renderers.warp.scene.kernels.brdf import (
     fresnel_dielectric,
+    make_brdf,
     pane_reflectance,
     pane_transmittance,
     refract,
@@ -53,11 +54,15 @@ from gen_data.generator.renderers.warp.scene.kernels.material_eval import (
     SurfaceMaterial,
     evaluate_material,
 )
-from gen_data.generator.renderers.warp.scene.kernels.ray_offsets import passed_origin
-from gen_data.generator.renderers.warp.scene.kernels.ray_queries import FARTHEST, closest_hit
+from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
+    FARTHEST,
+    closest_hit,
+    passed_origin,
+)
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     HOLES,
     MIRROR_ROUGHNESS,
+    GBufferRecord,
     View,
     World,
     face_vertices,
@@ -92,23 +97,6 @@ MOSTLY_CLEAR = wp.constant(0.9)
 CONTRAST = wp.constant(0.15)
 # Limit on the clear surfaces along one ray.
 SURFACES_MAX = wp.constant(8)
-
-
-@wp.struct
-class Probe:
-    """Samples that light the ends of rays.
-
-    Attributes:
-        parts: Points of the unit disk at which shadow rays aim.
-        disc: Points of the unit disk, lifted to the hemisphere for ambient occlusion.
-        radius_m: Radius of ambient occlusion.
-        lit: Scratch: visible fraction of each lamp at the end of a pixel's ray [lamp, pixel].
-    """
-
-    parts: wp.array(dtype=wp.vec2)
-    disc: wp.array(dtype=wp.vec2)
-    radius_m: float
-    lit: wp.array(dtype=float, ndim=2)
 
 
 @wp.struct
@@ -150,9 +138,7 @@ def texels_per_m2(world: World, surface: int, hit: wp.vec2i):
 
 
 @wp.func
-def texture_mix(
-    texels: wp.array(dtype=wp.uint32), first: int, width: int, height: int, uv: wp.vec2
-):
+def texture_mix(texels: wp.array[wp.uint32], first: int, width: int, height: int, uv: wp.vec2):
     """Four channels of one mip level at a point, [0, 1]."""
     return mix_texels(texels, taps_at(first, width, height, uv[0], uv[1])) * (1.0 / FULL)
 
@@ -469,7 +455,7 @@ def add_clearcoat(
     n: wp.vec3,
     p: wp.vec3,
     v: wp.vec3,
-    lit: wp.array(dtype=float, ndim=2),
+    lit: wp.array2d[float],
     open_sky: float,
     k: int,
 ):
@@ -502,7 +488,7 @@ def layers_at(
     n: wp.vec3,
     p: wp.vec3,
     v: wp.vec3,
-    lit: wp.array(dtype=float, ndim=2),
+    lit: wp.array2d[float],
     open_sky: float,
     k: int,
 ):
@@ -649,16 +635,14 @@ def layered_radiance(
     view: View,
     world: World,
     images: GBufferRecord,
-    i: int,
     x_px: float,
     y_px: float,
-    lit: wp.array(dtype=float, ndim=2),
-    open_sky: float,
-    exposed: float,
+    listed: ListedPixels,
     probe: Probe,
     k: int,
 ):
-    """Radiance of the layered surface of pixel i, at a point of the image within that pixel."""
+    """Radiance of the layered surface of the k-th pixel, at a point of the image within it."""
+    i = listed.pixels[k]
     hit = images.hits[i]
     surface = surface_index(world, hit)
     point = point_at(view, world, hit, x_px, y_px)
@@ -669,11 +653,11 @@ def layered_radiance(
     material, maps = evaluate_with_maps(world, surface, hit, point.weight, n, width_m, v)
     bare = float(1.0)
     if world.ground.covered != 0:
-        coat = coat_at(world, surface, p, n, exposed, footprint(view, p, n, 1.0))
+        coat = coat_at(world, surface, p, n, listed.exposed[k], footprint(view, p, n, 1.0))
         material = apply_coat(world, surface, material, coat, n)
         bare = 1.0 - wp.min(coat.snow, 1.0)
-    sky = open_sky * maps.occlusion
-    layers = layers_at(world, surface, material, maps, bare, n, p, v, lit, sky, k)
+    sky = listed.open_sky[0, k] * maps.occlusion
+    layers = layers_at(world, surface, material, maps, bare, n, p, v, listed.lit, sky, k)
     c = layers.own
     for part in range(4):
         ray = make_layer_ray(view, world, layers, part, hit, point.weight, n, p, point.way, width_m)
@@ -687,23 +671,18 @@ def shade_layers(
     view: View,
     world: World,
     images: GBufferRecord,
-    pixels: wp.array(dtype=int),
-    lit: wp.array(dtype=float, ndim=2),
-    open_sky: wp.array(dtype=float, ndim=2),
-    exposed: wp.array(dtype=float),
+    listed: ListedPixels,
     probe: Probe,
-    radiance: wp.array(dtype=wp.vec3),
+    radiance: wp.array[wp.vec3],
 ):
     """Shade the listed pixels that show layered surfaces, each by itself."""
     k = wp.tid()
-    i = pixels[k]
+    i = listed.pixels[k]
     # lattice_lighting.shade_points has shaded all others.
     if world.surfaces[surface_index(world, images.hits[i])].layered != 0:
         x = float(i % view.width) + 0.5
         y = float(i / view.width) + 0.5
-        radiance[i] = layered_radiance(
-            view, world, images, i, x, y, lit, open_sky[0, k], exposed[k], probe, k
-        )
+        radiance[i] = layered_radiance(view, world, images, x, y, listed, probe, k)
 
 
 @wp.func
@@ -719,10 +698,10 @@ def find_contrasts(
     view: View,
     world: World,
     images: GBufferRecord,
-    pixels: wp.array(dtype=int),
-    radiance: wp.array(dtype=wp.vec3),
-    count: wp.array(dtype=int),
-    places: wp.array(dtype=int),
+    listed: ListedPixels,
+    radiance: wp.array[wp.vec3],
+    count: wp.array[int],
+    places: wp.array[int],
 ):
     """List the layered pixels among listed ones that show edges by reflection or refraction.
 
@@ -731,7 +710,7 @@ def find_contrasts(
         places: The new list, in any order.
     """
     k = wp.tid()
-    i = pixels[k]
+    i = listed.pixels[k]
     if world.surfaces[surface_index(world, images.hits[i])].layered == 0:
         return
     x = i % view.width
@@ -753,42 +732,29 @@ def shade_contrasts(
     view: View,
     world: World,
     images: GBufferRecord,
-    places: wp.array(dtype=int),
-    pixels: wp.array(dtype=int),
-    lit: wp.array(dtype=float, ndim=2),
-    open_sky: wp.array(dtype=float, ndim=2),
-    exposed: wp.array(dtype=float),
+    places: wp.array[int],
+    listed: ListedPixels,
     probe: Probe,
-    offsets: wp.array(dtype=wp.vec2),
-    listed: wp.array(dtype=int),
-    mixed: wp.array(dtype=wp.vec3),
+    offsets: wp.array[wp.vec2],
+    pixels: wp.array[int],
+    mixed: wp.array[wp.vec3],
 ):
     """Radiance of pixels with contrasts: the mean over several points of each.
 
     Args:
         offsets: Positions within a pixel, [0, 1).
-        listed: The pixels.
+        pixels: The pixels.
         mixed: In their order.
     """
     place = wp.tid()
     k = places[place]
-    i = pixels[k]
+    i = listed.pixels[k]
     x = float(i % view.width)
     y = float(i / view.width)
     total = wp.vec3(0.0)
     for s in range(offsets.shape[0]):
         total += layered_radiance(
-            view,
-            world,
-            images,
-            i,
-            x + offsets[s][0],
-            y + offsets[s][1],
-            lit,
-            open_sky[0, k],
-            exposed[k],
-            probe,
-            k,
+            view, world, images, x + offsets[s][0], y + offsets[s][1], listed, probe, k
         )
-    listed[place] = i
+    pixels[place] = i
     mixed[place] = total / float(offsets.shape[0])

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.ray_offsets import (
+from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
     OFFSET_M,
     OFFSET_PER_DISTANCE,
 )
 from gen_data.generator.renderers.warp.scene.kernels.records import (
+    GBufferRecord,
     View,
     World,
     face_vertices,
@@ -20,7 +21,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     first_weight,
     is_back_face,
     normal_at,
-    pixel_direction,
+    pixel_ray,
     surface_index,
     vertex_at,
 )
@@ -45,13 +46,13 @@ class Lattice:
     stride: int
     width: int
     height: int
-    body: wp.array(dtype=int)
-    surface: wp.array(dtype=int)
-    pixel: wp.array(dtype=int)
-    skip: wp.array(dtype=int)
-    p_m: wp.array(dtype=wp.vec3)
-    normal: wp.array(dtype=wp.vec3)
-    origin_m: wp.array(dtype=wp.vec3)
+    body: wp.array[int]
+    surface: wp.array[int]
+    pixel: wp.array[int]
+    skip: wp.array[int]
+    p_m: wp.array[wp.vec3]
+    normal: wp.array[wp.vec3]
+    origin_m: wp.array[wp.vec3]
 
 
 @wp.func
@@ -88,10 +89,7 @@ def ray_origin(world: World, hit: wp.vec2i, weight: wp.vec2, p_world: wp.vec3, d
 def sample_lattice(
     view: View,
     world: World,
-    hits: wp.array(dtype=wp.vec2i),
-    z_m: wp.array(dtype=float),
-    weights: wp.array(dtype=wp.vec2),
-    normals: wp.array(dtype=wp.vec3),
+    images: GBufferRecord,
     lattice: Lattice,
 ):
     """Compute the lattice's points from the G-buffer."""
@@ -99,23 +97,22 @@ def sample_lattice(
     x = wp.min(lattice.stride * (i % lattice.width), view.width - 1)
     y = wp.min(lattice.stride * (i / lattice.width), view.height - 1)
     pixel = y * view.width + x
-    hit = hits[pixel]
+    hit = images.hits[pixel]
     lattice.body[i] = hit[0]
     lattice.pixel[i] = pixel
     lattice.surface[i] = -1
     if hit[0] < 0:
         return
     lattice.surface[i] = surface_index(world, hit)
-    d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
-    offset = d * z_m[pixel]
+    offset = pixel_ray(view, pixel) * images.z_m[pixel]
     p = view.eye_m + offset
     lattice.p_m[i] = p
-    lattice.normal[i] = normals[pixel]
-    lattice.origin_m[i] = ray_origin(world, hit, weights[pixel], p, offset)
+    lattice.normal[i] = images.normals[pixel]
+    lattice.origin_m[i] = ray_origin(world, hit, images.weights[pixel], p, offset)
     convex = world.geometries[world.bodies[hit[0]].geometry].convex
     # Only its own back could occlude a point on the front of a convex solid, and that is behind the
     # horizon.
-    lattice.skip[i] = wp.where(convex != 0 and weights[pixel][0] < 1.5, hit[0], -1)
+    lattice.skip[i] = wp.where(convex != 0 and images.weights[pixel][0] < 1.5, hit[0], -1)
 
 
 @wp.func

@@ -22,7 +22,6 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     step_at,
 )
 from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import (
-    GBufferRecord,
     LatticeLight,
     is_gatherable,
 )
@@ -30,6 +29,7 @@ from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import surf
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_image
 from gen_data.generator.renderers.warp.scene.kernels.material_eval import evaluate_material
 from gen_data.generator.renderers.warp.scene.kernels.records import (
+    GBufferRecord,
     View,
     World,
     fast_normalize,
@@ -37,10 +37,11 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     pixel_width,
     surface_index,
 )
-from gen_data.generator.renderers.warp.scene.kernels.texture_patches import Patch, patch_at
 from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import (
+    Patch,
     Sampler,
     make_sampler,
+    patch_at,
     texel_at,
 )
 
@@ -177,7 +178,7 @@ def bump_factors(tilt: Tilt, roughness: float, m: wp.vec3):
 
 
 @wp.func
-def quad_tilt(lattice: Lattice, lights: wp.array(dtype=LatticeLight), q: int, quad: Quad):
+def quad_tilt(lattice: Lattice, lights: wp.array[LatticeLight], q: int, quad: Quad):
     """The tilt of a whole cell, from the mean of its corners."""
     a = lights[q]
     b = lights[q + 1]
@@ -195,8 +196,8 @@ def gathered_radiance(
     world: World,
     images: GBufferRecord,
     lattice: Lattice,
-    lights: wp.array(dtype=LatticeLight),
-    coats: wp.array(dtype=wp.vec4),
+    lights: wp.array[LatticeLight],
+    coats: wp.array[wp.vec4],
     cell: Cell,
     i: int,
     d: wp.vec3,
@@ -302,13 +303,13 @@ def light_patch(
     world: World,
     images: GBufferRecord,
     lattice: Lattice,
-    lights: wp.array(dtype=LatticeLight),
-    coats: wp.array(dtype=wp.vec4),
+    lights: wp.array[LatticeLight],
+    coats: wp.array[wp.vec4],
     quad: Quad,
     patch: Patch,
     column: int,
     row: int,
-    radiance: wp.array(dtype=wp.vec3),
+    radiance: wp.array[wp.vec3],
 ):
     """Shade a smooth cell all of whose pixels show one face."""
     q = row * lattice.width + column
@@ -376,12 +377,12 @@ def gather_light(
     world: World,
     images: GBufferRecord,
     lattice: Lattice,
-    lights: wp.array(dtype=LatticeLight),
-    coats: wp.array(dtype=wp.vec4),
+    lights: wp.array[LatticeLight],
+    coats: wp.array[wp.vec4],
     run: int,
-    count: wp.array(dtype=int),
-    pixels: wp.array(dtype=int),
-    radiance: wp.array(dtype=wp.vec3),
+    count: wp.array[int],
+    pixels: wp.array[int],
+    radiance: wp.array[wp.vec3],
 ):
     """Shade every pixel from lattice points, or list it for individual shading.
 

@@ -39,11 +39,12 @@ from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
     precipitation_exposure,
 )
 from gen_data.generator.renderers.warp.scene.kernels.records import (
+    GBufferRecord,
     LightRecord,
     View,
     World,
     fast_normalize,
-    pixel_direction,
+    pixel_ray,
     pixel_width,
     surface_index,
 )
@@ -58,13 +59,37 @@ GATHERED_ROUGHNESS = wp.constant(0.25)
 
 
 @wp.struct
-class GBufferRecord:
-    """G-buffer at every pixel centre, flat; fields as in gbuffer.GBuffer."""
+class ListedPixels:
+    """Pixels that are shaded individually.
 
-    hits: wp.array(dtype=wp.vec2i)
-    z_m: wp.array(dtype=float)
-    weights: wp.array(dtype=wp.vec2)
-    normals: wp.array(dtype=wp.vec3)
+    Attributes:
+        pixels: Indices of the pixels.
+        lit: Visible fraction of each lamp [lamp, position in the list].
+        open_sky: Visible fraction of the hemisphere, [1, position].
+        exposed: Exposure to precipitation.
+    """
+
+    pixels: wp.array[int]
+    lit: wp.array2d[float]
+    open_sky: wp.array2d[float]
+    exposed: wp.array[float]
+
+
+@wp.struct
+class Probe:
+    """Samples that find the visibility of lights.
+
+    Attributes:
+        parts: Points of the unit disk at which shadow rays aim.
+        disc: Points of the unit disk, lifted to the hemisphere for ambient occlusion.
+        radius_m: Radius of ambient occlusion.
+        lit: Scratch: visible fraction of each lamp at the end of a pixel's ray [lamp, pixel].
+    """
+
+    parts: wp.array[wp.vec2]
+    disc: wp.array[wp.vec2]
+    radius_m: float
+    lit: wp.array2d[float]
 
 
 @wp.struct
@@ -117,7 +142,7 @@ def sum_lamp_light(
     n: wp.vec3,
     p_world: wp.vec3,
     v: wp.vec3,
-    lit: wp.array(dtype=float, ndim=2),
+    lit: wp.array2d[float],
     k: int,
 ):
     """Light of all lamps at a point; arguments as for light_at."""
@@ -164,7 +189,7 @@ def light_at(
     material: SurfaceMaterial,
     p_world: wp.vec3,
     v: wp.vec3,
-    lit: wp.array(dtype=float, ndim=2),
+    lit: wp.array2d[float],
     open_sky: float,
     k: int,
 ):
@@ -201,10 +226,10 @@ def light_lattice(
     world: World,
     images: GBufferRecord,
     lattice: Lattice,
-    lit: wp.array(dtype=float, ndim=2),
-    open_sky: wp.array(dtype=float, ndim=2),
-    lights: wp.array(dtype=LatticeLight),
-    coats: wp.array(dtype=wp.vec4),
+    lit: wp.array2d[float],
+    open_sky: wp.array2d[float],
+    lights: wp.array[LatticeLight],
+    coats: wp.array[wp.vec4],
 ):
     """Light at the lattice's points on surfaces that are interpolated; bumps are left out.
 
@@ -245,22 +270,17 @@ def shade_points(
     view: View,
     world: World,
     images: GBufferRecord,
-    pixels: wp.array(dtype=int),
-    lit: wp.array(dtype=float, ndim=2),
-    open_sky: wp.array(dtype=float, ndim=2),
-    exposed: wp.array(dtype=float),
-    radiance: wp.array(dtype=wp.vec3),
+    listed: ListedPixels,
+    radiance: wp.array[wp.vec3],
 ):
     """Shade listed pixels individually, except layered surfaces."""
     k = wp.tid()
-    i = pixels[k]
+    i = listed.pixels[k]
     hit = images.hits[i]
     surface = surface_index(world, hit)
     if world.surfaces[surface].layered != 0:
         return
-    x = float(i % view.width) + 0.5
-    y = float(i / view.width) + 0.5
-    d = view.R_world_camera @ pixel_direction(view, x, y)
+    d = pixel_ray(view, i)
     v = fast_normalize(-d)
     z = images.z_m[i]
     width_m = pixel_width(view, i, z)
@@ -270,9 +290,9 @@ def shade_points(
     p = view.eye_m + d * z
     if world.ground.covered != 0:
         n = images.normals[i]
-        coat = coat_at(world, surface, p, n, exposed[k], footprint(view, p, n, 1.0))
+        coat = coat_at(world, surface, p, n, listed.exposed[k], footprint(view, p, n, 1.0))
         material = apply_coat(world, surface, material, coat, n)
-    light = light_at(world, surface, material, p, v, lit, open_sky[0, k], k)
+    light = light_at(world, surface, material, p, v, listed.lit, listed.open_sky[0, k], k)
     radiance[i] = wp.cw_mul(light.diffuse, material.albedo) + light.rest
 
 
@@ -294,32 +314,21 @@ def find_pixel_visibility(
     world: World,
     images: GBufferRecord,
     lattice: Lattice,
-    lattice_lit: wp.array(dtype=float, ndim=2),
-    lattice_sky: wp.array(dtype=float, ndim=2),
-    parts: wp.array(dtype=wp.vec2),
-    disc: wp.array(dtype=wp.vec2),
-    radius_m: float,
-    pixels: wp.array(dtype=int),
-    lit: wp.array(dtype=float, ndim=2),
-    open_sky: wp.array(dtype=float, ndim=2),
-    exposed: wp.array(dtype=float),
+    lattice_lit: wp.array2d[float],
+    lattice_sky: wp.array2d[float],
+    probe: Probe,
+    listed: ListedPixels,
 ):
-    """Visibility of lamps and environment at listed pixels, from lattice points or by rays.
-
-    Args:
-        parts: Points of the unit disk at which shadow rays aim.
-        disc: Points of the unit disk, lifted to the hemisphere for ambient occlusion.
-        radius_m: Radius of ambient occlusion.
-    """
+    """Visibility of lamps and environment at listed pixels, from lattice points or by rays."""
     k = wp.tid()
-    i = pixels[k]
+    i = listed.pixels[k]
     x = i % view.width
     y = i / view.width
-    d = view.R_world_camera @ pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+    d = pixel_ray(view, i)
     p = view.eye_m + d * images.z_m[i]
     cell = cell_at(view, lattice, x, y)
     for j in range(world.lamps.shape[0]):
-        lit[j, k] = 0.0
+        listed.lit[j, k] = 0.0
     # Visibility varies less than appearance: the points need not share the pixel's material.
     column = x / lattice.stride
     row = y / lattice.stride
@@ -343,23 +352,23 @@ def find_pixel_visibility(
                         rained_on += lattice_exposure(world, q) * w
                         for j in range(world.lamps.shape[0]):
                             # UNSEEN is negative and counts as dark.
-                            lit[j, k] = lit[j, k] + wp.max(lattice_lit[j, q], 0.0) * w
+                            listed.lit[j, k] = listed.lit[j, k] + wp.max(lattice_lit[j, q], 0.0) * w
     if found > 0.0:
-        open_sky[0, k] = sky / found
-        exposed[k] = rained_on / found
+        listed.open_sky[0, k] = sky / found
+        listed.exposed[k] = rained_on / found
         for j in range(world.lamps.shape[0]):
-            lit[j, k] = lit[j, k] / found
+            listed.lit[j, k] = listed.lit[j, k] / found
     else:
         n = images.normals[i]
         origin = ray_origin(world, images.hits[i], images.weights[i], p, d * images.z_m[i])
         for j in range(world.lamps.shape[0]):
-            lit[j, k] = visible_lamp_fraction(world, world.lamps[j], origin, n, parts)
+            listed.lit[j, k] = visible_lamp_fraction(world, world.lamps[j], origin, n, probe.parts)
         sky, found = body_sky_visibility(lattice, lattice_sky, cell.first, images.hits[i][0])
         if found == 0.0:
-            sky = visible_sky_fraction(world, origin, n, disc, radius_m)
+            sky = visible_sky_fraction(world, origin, n, probe.disc, probe.radius_m)
             found = 1.0
-        open_sky[0, k] = sky / found
-        exposed[k] = sky_exposure_at(world, origin, n)
+        listed.open_sky[0, k] = sky / found
+        listed.exposed[k] = sky_exposure_at(world, origin, n)
 
 
 @wp.func
@@ -382,9 +391,7 @@ def sky_exposure_at(world: World, origin: wp.vec3, n: wp.vec3):
 
 
 @wp.func
-def body_sky_visibility(
-    lattice: Lattice, lattice_sky: wp.array(dtype=float, ndim=2), q: int, body: int
-):
+def body_sky_visibility(lattice: Lattice, lattice_sky: wp.array2d[float], q: int, body: int):
     """Sum and number of the sky's visible fractions at a cell's corners on one body.
 
     Thin parts such as leaves and spokes are as open to the sky as their neighbours, whatever their
@@ -425,7 +432,7 @@ def is_usable_point(
 
 @wp.func
 def visible_lamp_fraction(
-    world: World, lamp: LightRecord, origin: wp.vec3, n: wp.vec3, parts: wp.array(dtype=wp.vec2)
+    world: World, lamp: LightRecord, origin: wp.vec3, n: wp.vec3, parts: wp.array[wp.vec2]
 ):
     """Visible fraction of a lamp from a point, by up to all ``parts``; one ray for small lamps."""
     beam = beam_from(lamp, origin)
@@ -445,7 +452,7 @@ def visible_lamp_fraction(
 
 @wp.func
 def visible_sky_fraction(
-    world: World, origin: wp.vec3, n: wp.vec3, disc: wp.array(dtype=wp.vec2), radius_m: float
+    world: World, origin: wp.vec3, n: wp.vec3, disc: wp.array[wp.vec2], radius_m: float
 ):
     """Visible fraction of the hemisphere within a radius, weighted by the cosine."""
     if radius_m == 0.0:

@@ -9,12 +9,13 @@ import warp as wp
 
 from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, SUN_DISTANCE_M
-from gen_data.generator.renderers.warp.scene.kernels.ray_queries import path_along
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     LightRecord,
     World,
     max_of_two,
     min_of_two,
+    reciprocals,
+    slab_interval,
     to_mesh_point,
     to_mesh_vector,
 )
@@ -102,7 +103,7 @@ def make_shaft(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
     shaft = Shaft()
     shaft.start = to_mesh_point(world, b, tile.centre_m)
     shaft.way = to_mesh_vector(world, b, way)
-    shaft.inverse = path_along(shaft.start, shaft.way).inverse
+    shaft.inverse = reciprocals(shaft.way)
     shaft.radius = tile.radius_m * shrink
     shaft.end_radius = radius_m * shrink
     shaft.flat = tile.flat
@@ -117,14 +118,8 @@ def make_shaft(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
 def overlap(shaft: Shaft, low: wp.vec3, high: wp.vec3, grown: float):
     """Interval of a shaft's axis inside an enlarged box; empty if its start exceeds its end."""
     margin = wp.vec3(grown, grown, grown)
-    a = wp.cw_mul(low - shaft.start - margin, shaft.inverse)
-    c = wp.cw_mul(high - shaft.start + margin, shaft.inverse)
-    t0 = max_of_two(
-        max_of_two(min_of_two(a[0], c[0]), min_of_two(a[1], c[1])), min_of_two(a[2], c[2])
-    )
-    t1 = min_of_two(
-        min_of_two(max_of_two(a[0], c[0]), max_of_two(a[1], c[1])), max_of_two(a[2], c[2])
-    )
+    first = low - shaft.start - margin
+    t0, t1 = slab_interval(first, high - shaft.start + margin, shaft.inverse)
     return max_of_two(t0, 0.0), min_of_two(t1, 1.0)
 
 
@@ -194,7 +189,7 @@ def may_shade_from(world: World, b: int, tile: Tile, lamp: LightRecord):
 
 
 @wp.func
-def append_occluder(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: int):
+def append_occluder(lists: wp.array3d[int], tile: int, j: int, b: int):
     """Append a body to a list, or mark the list as overflowing."""
     n = lists[tile, j, 0]
     if n >= 0 and n < LIST_LENGTH:
@@ -205,9 +200,7 @@ def append_occluder(lists: wp.array(dtype=int, ndim=3), tile: int, j: int, b: in
 
 
 @wp.func
-def is_lamp_relevant(
-    lattice: Lattice, shares: wp.array(dtype=float, ndim=2), j: int, column: int, row: int
-):
+def is_lamp_relevant(lattice: Lattice, shares: wp.array2d[float], j: int, column: int, row: int):
     """Whether lamp j is more than faint at any point of a tile."""
     found = bool(False)
     for y in range(row * TILE, wp.min((row + 1) * TILE, lattice.height)):
@@ -224,8 +217,8 @@ def list_occluders(
     lattice: Lattice,
     tile_columns: int,
     ambient_radius_m: float,
-    shares: wp.array(dtype=float, ndim=2),
-    lists: wp.array(dtype=int, ndim=3),
+    shares: wp.array2d[float],
+    lists: wp.array3d[int],
 ):
     """Bodies that may shade each tile from each lamp; the last list is for ambient occlusion.
 

@@ -119,7 +119,7 @@ def tile_index(lattice: Lattice, i: int, tile_columns: int):
 
 
 @wp.func
-def agreed_value(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: int, y: int):
+def agreed_value(lattice: Lattice, values: wp.array2d[float], j: int, x: int, y: int):
     """Common value of a point's four neighbours; UNSEEN if they differ.
 
     All four must exist and share its material.
@@ -137,7 +137,7 @@ def agreed_value(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int
 
 
 @wp.kernel
-def weigh_lamps(world: World, lattice: Lattice, shares: wp.array(dtype=float, ndim=2)):
+def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float]):
     """Share of each lamp in each point's unshadowed light [lamp, point]; UNSEEN behind surfaces."""
     i = wp.tid()
     if lattice.body[i] < 0:
@@ -160,9 +160,7 @@ def weigh_lamps(world: World, lattice: Lattice, shares: wp.array(dtype=float, nd
 
 
 @wp.func
-def mean_of_neighbours(
-    lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, x: int, y: int
-):
+def mean_of_neighbours(lattice: Lattice, values: wp.array2d[float], j: int, x: int, y: int):
     """Mean of the known values beside, above and below a point on its material; else UNSEEN."""
     i = y * lattice.width + x
     total = float(0.0)
@@ -181,11 +179,11 @@ def probe_lamps(
     world: World,
     lattice: Lattice,
     tile_columns: int,
-    lists: wp.array(dtype=int, ndim=3),
-    disc: wp.array(dtype=wp.vec2),
-    shares: wp.array(dtype=float, ndim=2),
+    lists: wp.array3d[int],
+    disc: wp.array[wp.vec2],
+    shares: wp.array2d[float],
     parity: int,
-    lit: wp.array(dtype=float, ndim=2),
+    lit: wp.array2d[float],
 ):
     """One shadow ray per point and lamp: 1, 0, or UNSEEN for lamps without effect.
 
@@ -216,13 +214,7 @@ def probe_lamps(
 
 @wp.func
 def probe_lamp(
-    world: World,
-    lattice: Lattice,
-    lists: wp.array(dtype=int, ndim=3),
-    tile: int,
-    i: int,
-    j: int,
-    part: wp.vec2,
+    world: World, lattice: Lattice, lists: wp.array3d[int], tile: int, i: int, j: int, part: wp.vec2
 ):
     """Visibility of a part of lamp j from point i, 1 or 0, by one ray."""
     value = float(1.0)
@@ -235,9 +227,7 @@ def probe_lamp(
 
 
 @wp.kernel
-def classify_blocks(
-    lattice: Lattice, values: wp.array(dtype=float, ndim=2), classes: wp.array(dtype=int, ndim=3)
-):
+def classify_blocks(lattice: Lattice, values: wp.array2d[float], classes: wp.array3d[int]):
     """Values in each aligned 4 x 4 block, as bits: 1 zeros, 2 ones, 4 others."""
     row, column, j = wp.tid()
     found = int(0)
@@ -258,7 +248,7 @@ def classify_blocks(
 
 
 @wp.func
-def classes_around(classes: wp.array(dtype=int, ndim=3), x: int, y: int, j: int):
+def classes_around(classes: wp.array3d[int], x: int, y: int, j: int):
     """Union of the classes of the blocks that a point's window touches."""
     last_row = classes.shape[0] - 1
     last_column = classes.shape[1] - 1
@@ -270,7 +260,7 @@ def classes_around(classes: wp.array(dtype=int, ndim=3), x: int, y: int, j: int)
 
 
 @wp.func
-def window_bits(lattice: Lattice, values: wp.array(dtype=float, ndim=2), j: int, i: int):
+def window_bits(lattice: Lattice, values: wp.array2d[float], j: int, i: int):
     """Values of the points of the same material in the window around a point, as bits."""
     x = i % lattice.width
     y = i / lattice.width
@@ -292,12 +282,12 @@ def refine_lamps(
     world: World,
     lattice: Lattice,
     tile_columns: int,
-    lists: wp.array(dtype=int, ndim=3),
-    disc: wp.array(dtype=wp.vec2),
-    shares: wp.array(dtype=float, ndim=2),
-    classes: wp.array(dtype=int, ndim=3),
-    probed: wp.array(dtype=float, ndim=2),
-    lit: wp.array(dtype=float, ndim=2),
+    lists: wp.array3d[int],
+    disc: wp.array[wp.vec2],
+    shares: wp.array2d[float],
+    classes: wp.array3d[int],
+    probed: wp.array2d[float],
+    lit: wp.array2d[float],
 ):
     """Trace two more rays where a lamp is visible from part of the neighbourhood only.
 
@@ -357,9 +347,9 @@ def is_same_surface(lattice: Lattice, i: int, k: int, tolerance_m: float):
 def sum_rows(
     view: View,
     lattice: Lattice,
-    classes: wp.array(dtype=int, ndim=3),
-    values: wp.array(dtype=float, ndim=2),
-    sums: wp.array(dtype=wp.vec2, ndim=2),
+    classes: wp.array3d[int],
+    values: wp.array2d[float],
+    sums: wp.array2d[wp.vec2],
 ):
     """Sum and number of the values beside each point on its own surface.
 
@@ -386,12 +376,7 @@ def sum_rows(
 
 @wp.func
 def column_sum(
-    lattice: Lattice,
-    sums: wp.array(dtype=wp.vec2, ndim=2),
-    j: int,
-    i: int,
-    half: int,
-    tolerance_m: float,
+    lattice: Lattice, sums: wp.array2d[wp.vec2], j: int, i: int, half: int, tolerance_m: float
 ):
     """Row sums added over the points above and below a point on its own surface."""
     y = i / lattice.width
@@ -409,10 +394,10 @@ def column_sum(
 def smooth_lattice(
     view: View,
     lattice: Lattice,
-    classes: wp.array(dtype=int, ndim=3),
-    values: wp.array(dtype=float, ndim=2),
-    sums: wp.array(dtype=wp.vec2, ndim=2),
-    smoothed: wp.array(dtype=float, ndim=2),
+    classes: wp.array3d[int],
+    values: wp.array2d[float],
+    sums: wp.array2d[wp.vec2],
+    smoothed: wp.array2d[float],
 ):
     """Average differing values over neighbours on one surface."""
     i = wp.tid()
@@ -442,10 +427,10 @@ def probe_ambient(
     world: World,
     lattice: Lattice,
     tile_columns: int,
-    lists: wp.array(dtype=int, ndim=3),
-    hemisphere: wp.array(dtype=wp.vec3),
+    lists: wp.array3d[int],
+    hemisphere: wp.array[wp.vec3],
     radius_m: float,
-    open_sky: wp.array(dtype=float, ndim=2),
+    open_sky: wp.array2d[float],
 ):
     """Ambient occlusion by one short ray per point: 1 if free, less the nearer the obstacle.
 
@@ -472,10 +457,7 @@ def probe_ambient(
 
 @wp.kernel
 def count_free_paths(
-    world: World,
-    points: wp.array(dtype=wp.vec3),
-    ways: wp.array(dtype=wp.vec3),
-    free: wp.array(dtype=int),
+    world: World, points: wp.array[wp.vec3], ways: wp.array[wp.vec3], free: wp.array[int]
 ):
     """Count the unobstructed paths over all points and directions."""
     i = wp.tid()

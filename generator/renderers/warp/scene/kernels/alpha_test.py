@@ -174,11 +174,7 @@ def first_opaque_hit(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: float,
         going = False
         met = to_strike(
             first_in_mesh(
-                world.geometries[g].tree,
-                world.geometries[g].mesh,
-                o + d * begin,
-                d,
-                reach - begin,
+                world.geometries[g].tree, world.geometries[g].mesh, o + d * begin, d, reach - begin
             )
         )
         if met.face >= 0:

@@ -40,13 +40,13 @@ class Boxes:
         costs: SAH cost to the right of each split plane [BINS].
     """
 
-    lows: wp.array(dtype=wp.vec3)
-    highs: wp.array(dtype=wp.vec3)
-    order: wp.array(dtype=wp.int32)
-    bin_lows: wp.array(dtype=wp.vec3)
-    bin_highs: wp.array(dtype=wp.vec3)
-    bin_counts: wp.array(dtype=wp.int32)
-    costs: wp.array(dtype=wp.float32)
+    lows: wp.array[wp.vec3]
+    highs: wp.array[wp.vec3]
+    order: wp.array[wp.int32]
+    bin_lows: wp.array[wp.vec3]
+    bin_highs: wp.array[wp.vec3]
+    bin_counts: wp.array[wp.int32]
+    costs: wp.array[wp.float32]
 
 
 @wp.func
@@ -227,11 +227,11 @@ def split_node(boxes: Boxes, begin: int, end: int, leaf: int, depth: int):
 def grow_tree(
     boxes: Boxes,
     leaf: int,
-    todo: wp.array(dtype=wp.vec4i),
-    nodes: wp.array(dtype=float, ndim=3),
-    codes: wp.array(dtype=int, ndim=2),
-    leaves: wp.array(dtype=wp.vec2i),
-    counts: wp.array(dtype=int),
+    todo: wp.array[wp.vec4i],
+    nodes: wp.array3d[float],
+    codes: wp.array2d[int],
+    leaves: wp.array[wp.vec2i],
+    counts: wp.array[int],
 ):
     """Build one tree; launched with a single thread.
 

@@ -257,7 +257,7 @@ def _snippet(cpu: str, cuda: str, *, first: bool) -> str:
 
 @wp.func_native(_snippet(_IN_MESH, _IN_MESH_ON_CUDA, first=True))
 def first_in_mesh(
-    tree: wp.array(dtype=wp.float32), mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
+    tree: wp.array[wp.float32], mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
 ) -> wp.spatial_vectord:
     """The first face along a ray in the mesh frame, before a parameter."""
     ...
@@ -265,7 +265,7 @@ def first_in_mesh(
 
 @wp.func_native(_snippet(_IN_MESH, _IN_MESH_ON_CUDA, first=False))
 def any_in_mesh(
-    tree: wp.array(dtype=wp.float32), mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
+    tree: wp.array[wp.float32], mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
 ) -> bool:
     """Whether a ray in the mesh frame meets a face before a parameter."""
     ...
@@ -273,10 +273,10 @@ def any_in_mesh(
 
 @wp.func_native(_snippet(_IN_SCENE, _IN_SCENE_ON_CUDA, first=True))
 def first_in_scene(
-    tree: wp.array(dtype=wp.float32),
+    tree: wp.array[wp.float32],
     hierarchy: wp.uint64,
-    bodies: wp.array(dtype=BodyRecord),
-    geometries: wp.array(dtype=Geometry),
+    bodies: wp.array[BodyRecord],
+    geometries: wp.array[Geometry],
     o: wp.vec3,
     d: wp.vec3,
     reach: float,
@@ -288,10 +288,10 @@ def first_in_scene(
 
 @wp.func_native(_snippet(_IN_SCENE, _IN_SCENE_ON_CUDA, first=False))
 def any_in_scene(
-    tree: wp.array(dtype=wp.float32),
+    tree: wp.array[wp.float32],
     hierarchy: wp.uint64,
-    bodies: wp.array(dtype=BodyRecord),
-    geometries: wp.array(dtype=Geometry),
+    bodies: wp.array[BodyRecord],
+    geometries: wp.array[Geometry],
     o: wp.vec3,
     d: wp.vec3,
     reach: float,

@@ -51,7 +51,7 @@ def sky_rest(sky: EnvironmentRecord, d_world: wp.vec3):
 
 
 @wp.func
-def sample_panorama(image: wp.array(dtype=wp.vec3, ndim=2), direction: wp.vec3):
+def sample_panorama(image: wp.array2d[wp.vec3], direction: wp.vec3):
     """An equirectangular image in one direction of its own frame, bilinear; any length."""
     d = fast_normalize(direction)
     height = image.shape[0]
@@ -60,6 +60,14 @@ def sample_panorama(image: wp.array(dtype=wp.vec3, ndim=2), direction: wp.vec3):
     x = (0.5 - wp.atan2(d[1], d[0]) * (0.5 / wp.pi)) * float(width) - 0.5
     # Clamped: rounding may leave a unit vector's z at 1 + 1e-7, whose arc cosine is NaN.
     y = wp.acos(wp.clamp(d[2], -1.0, 1.0)) / wp.pi * float(height) - 0.5
+    return blend_texels(image, x, y)
+
+
+@wp.func
+def blend_texels(image: wp.array2d[wp.vec3], x: float, y: float):
+    """An equirectangular image at a position in texels from the centre of the first, bilinear."""
+    height = image.shape[0]
+    width = image.shape[1]
     x0 = floor_int(x)
     y0 = floor_int(y)
     fx = x - float(x0)
@@ -139,11 +147,11 @@ def octahedral_direction(x: float, y: float):
 
 @wp.kernel
 def weigh_texels(
-    directions: wp.array(dtype=wp.vec3),
-    solid_angles: wp.array(dtype=float),
+    directions: wp.array[wp.vec3],
+    solid_angles: wp.array[float],
     alpha: float,
     size: int,
-    shares: wp.array(dtype=float, ndim=2),
+    shares: wp.array2d[float],
 ):
     """Weights of an environment's texels in the GGX lobe around each direction of a map.
 
@@ -175,11 +183,7 @@ def weigh_texels(
 
 
 @wp.kernel
-def prefilter(
-    shares: wp.array(dtype=float, ndim=2),
-    radiance: wp.array(dtype=wp.vec3),
-    smoothed: wp.array(dtype=wp.vec3),
-):
+def prefilter(shares: wp.array2d[float], radiance: wp.array[wp.vec3], smoothed: wp.array[wp.vec3]):
     """Average an environment over the lobe around each direction of an octahedral map.
 
     Four texels of the map per thread: independent sums hide the latency of additions.

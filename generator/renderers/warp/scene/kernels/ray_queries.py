@@ -1,4 +1,12 @@
-"""Ray queries through the two-level hierarchy: bodies above, each mesh's triangles below."""
+"""Ray queries through the two-level hierarchy: bodies above, each mesh's triangles below.
+
+Offsets of ray origins avoid self-intersection. A point on a surface is known to half a unit in the
+last place of its largest coordinate, a relative error of 6e-8 in single precision, and the distance
+of a hit no better. Rays therefore start beside the surface: by a constant, for points near the
+world's origin, and by a share of the coordinates. Too large an offset loses contact shadows and
+thin panes. Source: Waechter and Binder, "A fast and robust method for avoiding self-intersection",
+Ray Tracing Gems, 2019, here in its plain form.
+"""
 
 from __future__ import annotations
 
@@ -22,12 +30,44 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     is_in_view,
     max_of_two,
     min_of_two,
-    pixel_direction,
+    pixel_ray,
+    reciprocals,
+    slab_interval,
     to_mesh_point,
     to_mesh_vector,
 )
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+# Smallest offset of light rays: a fiftieth of a millimetre, below the rounding of meshes.
+OFFSET_M = wp.constant(2.0e-5)
+# Sixteen times the relative error: the accumulated error of a transform and a cross product.
+OFFSET_SHARE = wp.constant(1.0e-6)
+# Offsets along a ray are larger: at oblique incidence only a part of them leaves the surface.
+PASSED_M = wp.constant(3.0e-5)
+PASSED_SHARE = wp.constant(2.0e-6)
+# Half a millimetre per metre from the eye: less than half a pixel, and from a few metres on more
+# than the height at which markings and covers float over a road, beneath whose rims a camera looks.
+OFFSET_PER_DISTANCE = wp.constant(5.0e-4)
+# Laser ranges are measured over hundreds of metres in the scanner's frame; surfaces within two
+# millimetres behind a pane or in front of a mirror merge with it.
+LASER_OFFSET_M = wp.constant(2.0e-3)
+# Obstacles closer than this shelter nothing: grass, kerbs, floating markings.
+SHELTER_OFFSET_M = wp.constant(0.02)
+
+
+@wp.func
+def offset_origin(p: wp.vec3, n: wp.vec3):
+    """Origin of a ray off a surface, on the side of the normal."""
+    size = wp.abs(p[0]) + wp.abs(p[1]) + wp.abs(p[2])
+    return p + n * (OFFSET_M + OFFSET_SHARE * size)
+
+
+@wp.func
+def passed_origin(p: wp.vec3, d: wp.vec3, eye_m: wp.vec3):
+    """Origin of a ray that continues behind a surface."""
+    return p + d * (PASSED_M + PASSED_SHARE * (wp.length(p - eye_m) + wp.length(p)))
+
 
 FARTHEST = wp.constant(1.0e6)
 # Only obstacles lower than this above a surface shelter it from rain and snow.
@@ -93,12 +133,10 @@ def closest_cutout_hit(world: World, o: wp.vec3, d: wp.vec3, through: int, befor
 
 
 @wp.kernel
-def trace_pixels(view: View, world: World, t_min: float, hits: wp.array(dtype=wp.vec2i)):
+def trace_pixels(view: View, world: World, t_min: float, hits: wp.array[wp.vec2i]):
     """Nearest (body, face) through every pixel centre."""
     i = wp.tid()
-    x = float(i % view.width) + 0.5
-    y = float(i / view.width) + 0.5
-    d = view.R_world_camera @ pixel_direction(view, x, y)
+    d = pixel_ray(view, i)
     hit = wp.vec2i(-1, -1)
     if is_in_view(view, i):
         hit = closest_hit(world, view.eye_m + d * t_min, d, FARTHEST, HOLES).at
@@ -120,26 +158,15 @@ def path_along(origin: wp.vec3, way: wp.vec3):
     path = Path()
     path.origin = origin
     path.way = way
-    # A tiny number instead of zero: its reciprocal is large but finite, and its sign does not
-    # matter.
-    x = wp.where(wp.abs(way[0]) < 1.0e-20, 1.0e-20, way[0])
-    y = wp.where(wp.abs(way[1]) < 1.0e-20, 1.0e-20, way[1])
-    z = wp.where(wp.abs(way[2]) < 1.0e-20, 1.0e-20, way[2])
-    path.inverse = wp.vec3(1.0 / x, 1.0 / y, 1.0 / z)
+    path.inverse = reciprocals(way)
     return path
 
 
 @wp.func
 def enters_box(world: World, b: int, path: Path):
     """Whether a path may enter a body's box; a cheap test before any query of its mesh."""
-    a = wp.cw_mul(world.bodies[b].low_m - path.origin, path.inverse)
-    c = wp.cw_mul(world.bodies[b].high_m - path.origin, path.inverse)
-    enters = max_of_two(
-        max_of_two(min_of_two(a[0], c[0]), min_of_two(a[1], c[1])), min_of_two(a[2], c[2])
-    )
-    leaves = min_of_two(
-        min_of_two(max_of_two(a[0], c[0]), max_of_two(a[1], c[1])), max_of_two(a[2], c[2])
-    )
+    low = world.bodies[b].low_m - path.origin
+    enters, leaves = slab_interval(low, world.bodies[b].high_m - path.origin, path.inverse)
     # The slab test: the path is inside all three pairs of planes at once.
     return max_of_two(enters, 0.0) <= min_of_two(leaves, 1.0)
 
@@ -202,7 +229,7 @@ def is_cut_by_cutouts(world: World, path: Path, through: int):
 
 @wp.func
 def is_occluded_by_listed(
-    world: World, lists: wp.array(dtype=int, ndim=3), tile: int, j: int, skip: int, path: Path
+    world: World, lists: wp.array3d[int], tile: int, j: int, skip: int, path: Path
 ):
     """Whether any body but ``skip`` blocks the path from a point of a tile to lamp j."""
     hit = bool(False)
@@ -226,9 +253,7 @@ def free_path(world: World, path: Path):
 
 
 @wp.func
-def free_path_of_listed(
-    world: World, lists: wp.array(dtype=int, ndim=3), tile: int, skip: int, path: Path
-):
+def free_path_of_listed(world: World, lists: wp.array3d[int], tile: int, skip: int, path: Path):
     """Unobstructed part of a path from a point of a tile, ignoring the body ``skip``."""
     # The last list is that of ambient occlusion.
     j = world.lamps.shape[0]

@@ -43,7 +43,7 @@ class View:
     inverse_fy: float
     lens: int
     coefficients: Coefficients
-    directions: wp.array(dtype=wp.vec4)
+    directions: wp.array[wp.vec4]
     R_world_camera: wp.mat33
     eye_m: wp.vec3
     pixel_rad: float
@@ -62,14 +62,14 @@ class Geometry:
     """
 
     mesh: wp.uint64
-    tree: wp.array(dtype=wp.float32)
-    vertices_m: wp.array(dtype=wp.vec3)
-    normals: wp.array(dtype=wp.vec3)
-    uvs: wp.array(dtype=wp.vec2)
-    faces: wp.array(dtype=wp.int32)
-    face_slots: wp.array(dtype=wp.int32)
-    box_lows_m: wp.array(dtype=wp.vec3)
-    box_highs_m: wp.array(dtype=wp.vec3)
+    tree: wp.array[wp.float32]
+    vertices_m: wp.array[wp.vec3]
+    normals: wp.array[wp.vec3]
+    uvs: wp.array[wp.vec2]
+    faces: wp.array[wp.int32]
+    face_slots: wp.array[wp.int32]
+    box_lows_m: wp.array[wp.vec3]
+    box_highs_m: wp.array[wp.vec3]
     low_m: wp.vec3
     high_m: wp.vec3
     convex: int
@@ -155,12 +155,12 @@ class TextureRecord:
         offsets: First texel of each level.
     """
 
-    texels: wp.array(dtype=wp.uint32)
-    bumps: wp.array(dtype=wp.uint32)
-    shares: wp.array(dtype=wp.uint32)
-    glow: wp.array(dtype=wp.uint32)
-    cover: wp.array(dtype=wp.uint8)
-    offsets: wp.array(dtype=wp.int32)
+    texels: wp.array[wp.uint32]
+    bumps: wp.array[wp.uint32]
+    shares: wp.array[wp.uint32]
+    glow: wp.array[wp.uint32]
+    cover: wp.array[wp.uint8]
+    offsets: wp.array[wp.int32]
     width: int
     height: int
     levels: int
@@ -217,14 +217,24 @@ class EnvironmentRecord:
         visible: Whether pixels without a body show the image.
     """
 
-    irradiance: wp.array(dtype=wp.vec3)
-    glossy: wp.array(dtype=wp.vec3, ndim=3)
-    image: wp.array(dtype=wp.vec3, ndim=2)
-    rest: wp.array(dtype=wp.vec3, ndim=2)
+    irradiance: wp.array[wp.vec3]
+    glossy: wp.array3d[wp.vec3]
+    image: wp.array2d[wp.vec3]
+    rest: wp.array2d[wp.vec3]
     luminance: float
     cos_yaw: float
     sin_yaw: float
     visible: int
+
+
+@wp.struct
+class GBufferRecord:
+    """G-buffer at every pixel centre, flat; fields as in gbuffer.GBuffer."""
+
+    hits: wp.array[wp.vec2i]
+    z_m: wp.array[float]
+    weights: wp.array[wp.vec2]
+    normals: wp.array[wp.vec3]
 
 
 @wp.struct
@@ -246,7 +256,7 @@ class GroundRecord:
     snow_cover: float
     snow_level: float
     seed: int
-    exposed: wp.array(dtype=float)
+    exposed: wp.array[float]
 
 
 @wp.func
@@ -260,6 +270,14 @@ def pixel_direction(view: View, x_px: float, y_px: float):
     if view.lens != PINHOLE:
         d = distorted_direction(view, x_px, y_px)
     return d
+
+
+@wp.func
+def pixel_ray(view: View, i: int):
+    """Direction in the world through the centre of pixel i, as long as by ``pixel_direction``."""
+    x = float(i % view.width) + 0.5
+    y = float(i / view.width) + 0.5
+    return view.R_world_camera @ pixel_direction(view, x, y)
 
 
 @wp.func
@@ -346,6 +364,31 @@ def componentwise_max(a: wp.vec3, b: wp.vec3):
 
 
 @wp.func
+def reciprocals(way: wp.vec3):
+    """Componentwise reciprocals; zeros become tiny numbers, whose sign does not matter."""
+    # 0 / 0 would be NaN for a ray in a box's face; a large number is as good as infinity.
+    x = wp.where(wp.abs(way[0]) < 1.0e-20, 1.0e-20, way[0])
+    y = wp.where(wp.abs(way[1]) < 1.0e-20, 1.0e-20, way[1])
+    z = wp.where(wp.abs(way[2]) < 1.0e-20, 1.0e-20, way[2])
+    return wp.vec3(1.0 / x, 1.0 / y, 1.0 / z)
+
+
+@wp.func
+def slab_interval(low: wp.vec3, high: wp.vec3, inverse: wp.vec3):
+    """Parameters at which a ray enters and leaves a box; it misses if it would leave first.
+
+    Args:
+        low, high: Corners relative to the ray's origin.
+        inverse: ``reciprocals`` of its direction.
+    """
+    a = wp.cw_mul(low, inverse)
+    c = wp.cw_mul(high, inverse)
+    enter = max_of_two(min_of_two(a[0], c[0]), min_of_two(a[1], c[1]))
+    leave = min_of_two(max_of_two(a[0], c[0]), max_of_two(a[1], c[1]))
+    return max_of_two(enter, min_of_two(a[2], c[2])), min_of_two(leave, max_of_two(a[2], c[2]))
+
+
+@wp.func
 def first_weight(weight: wp.vec2):
     """Barycentric weight of a face's second corner, from a stored weight.
 
@@ -383,16 +426,16 @@ class World:
         lobes: Directional albedo of specular lobes, see brdf.directional_albedo.
     """
 
-    tree: wp.array(dtype=wp.float32)
+    tree: wp.array[wp.float32]
     hierarchy: wp.uint64
-    cutouts: wp.array(dtype=wp.int32)
+    cutouts: wp.array[wp.int32]
     cutout_hierarchy: wp.uint64
-    geometries: wp.array(dtype=Geometry)
-    bodies: wp.array(dtype=BodyRecord)
-    surfaces: wp.array(dtype=MaterialRecord)
-    textures: wp.array(dtype=TextureRecord)
-    lamps: wp.array(dtype=LightRecord)
-    lobes: wp.array(dtype=wp.vec2, ndim=2)
+    geometries: wp.array[Geometry]
+    bodies: wp.array[BodyRecord]
+    surfaces: wp.array[MaterialRecord]
+    textures: wp.array[TextureRecord]
+    lamps: wp.array[LightRecord]
+    lobes: wp.array2d[wp.vec2]
     sky: EnvironmentRecord
     ground: GroundRecord
 

@@ -16,7 +16,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     to_mesh_point,
     to_mesh_vector,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Window
+from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Outline, Window
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -67,10 +67,10 @@ def trace_nearness(
 def trace_centres(
     view: View,
     world: World,
-    bodies: wp.array(dtype=CutoutBody),
+    bodies: wp.array[CutoutBody],
     z_near_m: float,
-    nearness: wp.array(dtype=float),
-    hits: wp.array(dtype=wp.vec2i),
+    nearness: wp.array[float],
+    hits: wp.array[wp.vec2i],
 ):
     """Z-buffer over pixel centres, as rasterizer.draw_bodies; one image row per thread."""
     y = wp.tid()
@@ -92,12 +92,12 @@ def trace_centres(
 def trace_samples(
     view: View,
     world: World,
-    bodies: wp.array(dtype=CutoutBody),
+    bodies: wp.array[CutoutBody],
     z_near_m: float,
-    pixels: wp.array(dtype=int),
-    offsets: wp.array(dtype=wp.vec2),
-    nearness: wp.array(dtype=float, ndim=2),
-    hits: wp.array(dtype=wp.vec2i, ndim=2),
+    pixels: wp.array[int],
+    offsets: wp.array[wp.vec2],
+    nearness: wp.array2d[float],
+    hits: wp.array2d[wp.vec2i],
 ):
     """Z-buffer over samples of listed pixels, as msaa.draw_samples.
 
@@ -119,29 +119,9 @@ def trace_samples(
                     hits[row, s] = wp.vec2i(b, face)
 
 
-@wp.struct
-class Outline:
-    """Where the silhouette of a body is written.
-
-    Attributes:
-        window: The pixels that the body may cover; may lie outside the image.
-        first_pixel: Index in the buffer of the window's first pixel.
-        stride: Pixels between rows of the buffer.
-    """
-
-    body: int
-    window: Window
-    first_pixel: int
-    stride: int
-
-
 @wp.kernel
 def trace_outlines(
-    view: View,
-    world: World,
-    outlines: wp.array(dtype=Outline),
-    z_near_m: float,
-    mask: wp.array(dtype=wp.uint8),
+    view: View, world: World, outlines: wp.array[Outline], z_near_m: float, mask: wp.array[wp.uint8]
 ):
     """Write 1 at every pixel centre that a body covers, for a pinhole; one row per thread."""
     k, row = wp.tid()

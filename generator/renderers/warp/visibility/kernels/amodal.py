@@ -7,7 +7,7 @@ import warp as wp
 from gen_data.generator.renderers.warp.scene.kernels.records import View, World
 from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
     UNSNAPPED,
-    Window,
+    Outline,
     clip,
     draw_coverage,
     fan_edges,
@@ -18,50 +18,34 @@ from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 
-@wp.struct
-class Canvas:
-    """The part of the mask buffer into which an instance is drawn.
-
-    Attributes:
-        body: Number of one of its bodies.
-        window: The pixels it covers, in image coordinates.
-        first_pixel: Index of its mask's first pixel in the buffer.
-    """
-
-    body: int
-    window: Window
-    first_pixel: int
-
-
 @wp.kernel
 def draw_silhouettes(
     view: View,
     world: World,
-    p_camera: wp.array(dtype=wp.vec3),
-    xy: wp.array(dtype=wp.vec2i),
-    canvases: wp.array(dtype=Canvas),
-    mask: wp.array(dtype=wp.uint8),
+    p_camera: wp.array[wp.vec3],
+    xy: wp.array[wp.vec2i],
+    outlines: wp.array[Outline],
+    mask: wp.array[wp.uint8],
 ):
     """Write 1 at every pixel centre that a body covers; one body per thread.
 
     All threads write the same value, so bodies of one instance may be drawn concurrently.
     """
-    canvas = canvases[wp.tid()]
-    geometry = world.geometries[world.bodies[canvas.body].geometry]
-    first = world.bodies[canvas.body].first_vertex
-    stride = canvas.window.width
+    outline = outlines[wp.tid()]
+    geometry = world.geometries[world.bodies[outline.body].geometry]
+    first = world.bodies[outline.body].first_vertex
     for f in range(geometry.face_slots.shape[0]):
         i = first + geometry.faces[3 * f]
         j = first + geometry.faces[3 * f + 1]
         k = first + geometry.faces[3 * f + 2]
         if xy[i][0] != UNSNAPPED and xy[j][0] != UNSNAPPED and xy[k][0] != UNSNAPPED:
-            e = make_edges(xy[i], xy[j], xy[k], canvas.window)
+            e = make_edges(xy[i], xy[j], xy[k], outline.window)
             if e.covers != 0:
-                draw_coverage(e, canvas.first_pixel, stride, mask)
+                draw_coverage(e, outline.first_pixel, outline.stride, mask)
         elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
             # A vertex lies outside the snapping range: clip first, then draw the polygon as a fan.
             polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
             for t in range(1, corners - 1):
-                e = fan_edges(view, polygon, t, canvas.window)
+                e = fan_edges(view, polygon, t, outline.window)
                 if e.covers != 0:
-                    draw_coverage(e, canvas.first_pixel, stride, mask)
+                    draw_coverage(e, outline.first_pixel, outline.stride, mask)

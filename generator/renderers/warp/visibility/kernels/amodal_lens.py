@@ -14,32 +14,13 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     to_mesh_point,
     to_mesh_vector,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Window
+from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Outline
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 
-@wp.struct
-class AmodalWindow:
-    """The part of the canvas in which one body may be visible.
-
-    Attributes:
-        body: Number of the body.
-        window: The pixels, in image coordinates.
-        first_pixel: Index of its first pixel in the buffer.
-        stride: Pixels between rows of the buffer.
-    """
-
-    body: int
-    window: Window
-    first_pixel: int
-    stride: int
-
-
 @wp.func
-def canvas_direction(
-    view: View, nodes: wp.array(dtype=wp.vec4, ndim=2), stride: int, x: int, y: int
-):
+def canvas_direction(view: View, nodes: wp.array2d[wp.vec4], stride: int, x: int, y: int):
     """Unit direction through a pixel's centre inside or outside the image; 0 if not shown.
 
     Args:
@@ -71,11 +52,11 @@ def canvas_direction(
 def trace_silhouettes(
     view: View,
     world: World,
-    nodes: wp.array(dtype=wp.vec4, ndim=2),
+    nodes: wp.array2d[wp.vec4],
     stride: int,
     t_min: float,
-    windows: wp.array(dtype=AmodalWindow),
-    mask: wp.array(dtype=wp.uint8),
+    windows: wp.array[Outline],
+    mask: wp.array[wp.uint8],
 ):
     """Write 1 at every pixel whose ray meets a body; one row of one window per thread."""
     k, row = wp.tid()

@@ -76,7 +76,7 @@ def project_to_pixel(view: View, q: wp.vec3):
 
 
 @wp.kernel
-def darken_outside(view: View, radiance: wp.array(dtype=wp.vec3)):
+def darken_outside(view: View, radiance: wp.array[wp.vec3]):
     """Set radiance to zero where the lens shows nothing."""
     i = wp.tid()
     if view.directions[i][3] == 0.0:

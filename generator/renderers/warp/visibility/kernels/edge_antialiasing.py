@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import GBufferRecord
 from gen_data.generator.renderers.warp.scene.kernels.alpha_test import closest_solid_hit, is_hole
 from gen_data.generator.renderers.warp.scene.kernels.ray_queries import FARTHEST
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     HOLES,
+    GBufferRecord,
     View,
     World,
     flat_normal,
@@ -65,7 +65,7 @@ def cover(
     view: View,
     world: World,
     images: GBufferRecord,
-    offsets: wp.array(dtype=wp.vec2),
+    offsets: wp.array[wp.vec2],
     x: int,
     y: int,
     source: int,
@@ -142,11 +142,11 @@ def antialias(
     view: View,
     world: World,
     images: GBufferRecord,
-    radiance: wp.array(dtype=wp.vec3),
-    pixels: wp.array(dtype=int),
-    offsets: wp.array(dtype=wp.vec2),
+    radiance: wp.array[wp.vec3],
+    pixels: wp.array[int],
+    offsets: wp.array[wp.vec2],
     t_min: float,
-    mixed: wp.array(dtype=wp.vec3),
+    mixed: wp.array[wp.vec3],
 ):
     """Radiance of listed pixels: the mean over their samples, in the order of the list.
 

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import GBufferRecord
-from gen_data.generator.renderers.warp.scene.kernels.records import View
+from gen_data.generator.renderers.warp.scene.kernels.records import (
+    GBufferRecord,
+    View,
+)
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -44,9 +46,7 @@ def is_edge_between(images: GBufferRecord, i: int, j: int):
 
 
 @wp.kernel
-def find_edges(
-    view: View, images: GBufferRecord, count: wp.array(dtype=int), pixels: wp.array(dtype=int)
-):
+def find_edges(view: View, images: GBufferRecord, count: wp.array[int], pixels: wp.array[int]):
     """List the pixels that an edge may cross.
 
     Args:
@@ -96,9 +96,7 @@ def most_similar_normal(
 
 
 @wp.kernel
-def write_mixed(
-    pixels: wp.array(dtype=int), mixed: wp.array(dtype=wp.vec3), radiance: wp.array(dtype=wp.vec3)
-):
+def write_mixed(pixels: wp.array[int], mixed: wp.array[wp.vec3], radiance: wp.array[wp.vec3]):
     """Write the mixed radiance of listed pixels into the image."""
     row = wp.tid()
     radiance[pixels[row]] = mixed[row]

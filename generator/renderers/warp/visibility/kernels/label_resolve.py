@@ -6,6 +6,7 @@ import warp as wp
 
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     PINHOLE,
+    GBufferRecord,
     View,
     World,
     face_vertices,
@@ -92,10 +93,7 @@ def resolve(
     view: View,
     world: World,
     run: int,
-    hits: wp.array(dtype=wp.vec2i),
-    z_m: wp.array(dtype=float),
-    weights: wp.array(dtype=wp.vec2),
-    normals: wp.array(dtype=wp.vec3),
+    images: GBufferRecord,
 ):
     """Depth (inf for nothing), barycentric weights and smooth world normal of every pixel.
 
@@ -103,17 +101,18 @@ def resolve(
 
     Args:
         run: Pixels in a row per thread: neighbours on one triangle share its preparation.
-        z_m: Parameters of the pixels' rays: z-depths for a pinhole, else ranges.
+        images: With ``hits`` filled in. ``z_m`` are parameters of the pixels' rays: z-depths for a
+            pinhole, else ranges.
     """
     y, segment = wp.tid()
     x = segment * run
     end = wp.min(x + run, view.width)
     row = y * view.width
     while x < end:
-        hit = hits[row + x]
+        hit = images.hits[row + x]
         if hit[0] < 0:
-            z_m[row + x] = wp.inf
-            normals[row + x] = wp.vec3(0.0)
+            images.z_m[row + x] = wp.inf
+            images.normals[row + x] = wp.vec3(0.0)
             x += 1
         else:
             facet = make_facet(world, hit)
@@ -135,28 +134,24 @@ def resolve(
                         z = distance_to(world, hit, wp.vec2(u, v))
                 n = facet.n + facet.n_u * u + facet.n_v * v
                 side = wp.where(det < 0.0, -1.0, 1.0)
-                z_m[row + x] = z
-                weights[row + x] = wp.vec2(u + 1.0 - side, v)
-                normals[row + x] = face_viewer(n * side, view.R_world_camera @ d)
+                images.z_m[row + x] = z
+                images.weights[row + x] = wp.vec2(u + 1.0 - side, v)
+                images.normals[row + x] = face_viewer(n * side, view.R_world_camera @ d)
                 x += 1
                 same = False
                 if x < end:
-                    same = hits[row + x][0] == hit[0] and hits[row + x][1] == hit[1]
+                    same = images.hits[row + x][0] == hit[0] and images.hits[row + x][1] == hit[1]
 
 
 @wp.kernel
-def label_ids(
-    hits: wp.array(dtype=wp.vec2i),
-    ids: wp.array(dtype=wp.uint16),
-    labels: wp.array(dtype=wp.uint16),
-):
+def label_ids(hits: wp.array[wp.vec2i], ids: wp.array[wp.uint16], labels: wp.array[wp.uint16]):
     """Id of the body at every pixel; ``ids[0]`` is the background's, ``ids[1 + b]`` that of b."""
     i = wp.tid()
     labels[i] = ids[hits[i][0] + 1]
 
 
 @wp.kernel
-def label_ranges(view: View, z_m: wp.array(dtype=float), ranges_m: wp.array(dtype=float)):
+def label_ranges(view: View, z_m: wp.array[float], ranges_m: wp.array[float]):
     """Distance along the ray [m]."""
     i = wp.tid()
     x = float(i % view.width) + 0.5
@@ -165,7 +160,7 @@ def label_ranges(view: View, z_m: wp.array(dtype=float), ranges_m: wp.array(dtyp
 
 
 @wp.kernel
-def label_z_depths(view: View, ranges_m: wp.array(dtype=float), z_m: wp.array(dtype=float)):
+def label_z_depths(view: View, ranges_m: wp.array[float], z_m: wp.array[float]):
     """Distance along the optical axis [m]; inf behind the camera's plane."""
     i = wp.tid()
     z = ranges_m[i] * view.directions[i][2]
@@ -176,9 +171,7 @@ def label_z_depths(view: View, ranges_m: wp.array(dtype=float), z_m: wp.array(dt
 
 
 @wp.kernel
-def label_normals(
-    view: View, normals: wp.array(dtype=wp.vec3), normals_camera: wp.array(dtype=wp.vec3)
-):
+def label_normals(view: View, normals: wp.array[wp.vec3], normals_camera: wp.array[wp.vec3]):
     """Normals in the camera frame."""
     i = wp.tid()
     normals_camera[i] = wp.transpose(view.R_world_camera) @ normals[i]
@@ -196,10 +189,10 @@ class BoxFrame:
 @wp.kernel
 def label_object_coordinates(
     world: World,
-    hits: wp.array(dtype=wp.vec2i),
-    weights: wp.array(dtype=wp.vec2),
-    frames: wp.array(dtype=BoxFrame),
-    coordinates: wp.array(dtype=wp.vec3),
+    hits: wp.array[wp.vec2i],
+    weights: wp.array[wp.vec2],
+    frames: wp.array[BoxFrame],
+    coordinates: wp.array[wp.vec3],
 ):
     """Position within the instance's box, [0, 1] per axis; 0 for the background."""
     i = wp.tid()

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import GBufferRecord
 from gen_data.generator.renderers.warp.scene.kernels.records import (
+    GBufferRecord,
     View,
     World,
-    face_vertices,
+    flat_normal,
     min_of_two,
-    vertex_at,
 )
 from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import (
     most_similar_normal,
@@ -44,9 +43,9 @@ UNLISTED = wp.constant(1.0e30)
 def number_pixels(
     view: View,
     images: GBufferRecord,
-    pixels: wp.array(dtype=int),
-    numbers: wp.array(dtype=int),
-    floors: wp.array(dtype=float),
+    pixels: wp.array[int],
+    numbers: wp.array[int],
+    floors: wp.array[float],
 ):
     """Position in the list of every listed pixel, and the least nearness that matters there.
 
@@ -133,18 +132,18 @@ def covers(ea: Side, eb: Side, ec: Side, a: wp.int64, b: wp.int64, c: wp.int64, 
 
 @wp.func
 def draw_triangle_samples(
-    numbers: wp.array(dtype=int),
-    floors: wp.array(dtype=float),
+    numbers: wp.array[int],
+    floors: wp.array[float],
     window: Window,
-    offsets: wp.array(dtype=wp.vec2i),
+    offsets: wp.array[wp.vec2i],
     p: wp.vec2i,
     q: wp.vec2i,
     r: wp.vec2i,
     plane: DepthPlane,
     body: int,
     face: int,
-    nearness: wp.array(dtype=float, ndim=2),
-    hits: wp.array(dtype=wp.vec2i, ndim=2),
+    nearness: wp.array2d[float],
+    hits: wp.array2d[wp.vec2i],
 ):
     """Write (body, face) into the samples of numbered pixels where a triangle is nearest."""
     area = wp.int64(q[0] - p[0]) * wp.int64(r[1] - p[1])
@@ -205,9 +204,7 @@ def draw_triangle_samples(
 
 
 @wp.func
-def floor_below(
-    floors: wp.array(dtype=float), window: Window, p: wp.vec2i, q: wp.vec2i, r: wp.vec2i
-):
+def floor_below(floors: wp.array[float], window: Window, p: wp.vec2i, q: wp.vec2i, r: wp.vec2i):
     """Lowest floor within a triangle's box; 0 if the box is too large to scan."""
     x_first = wp.max(wp.min(p[0], wp.min(q[0], r[0])) >> 8, 0)
     x_last = wp.min(wp.max(p[0], wp.max(q[0], r[0])) >> 8, window.width - 1)
@@ -230,14 +227,14 @@ def draw_samples(
     view: View,
     window: Window,
     world: World,
-    bodies: wp.array(dtype=int),
-    p_camera: wp.array(dtype=wp.vec3),
-    xy: wp.array(dtype=wp.vec2i),
-    numbers: wp.array(dtype=int),
-    floors: wp.array(dtype=float),
-    offsets: wp.array(dtype=wp.vec2i),
-    nearness: wp.array(dtype=float, ndim=2),
-    hits: wp.array(dtype=wp.vec2i, ndim=2),
+    bodies: wp.array[int],
+    p_camera: wp.array[wp.vec3],
+    xy: wp.array[wp.vec2i],
+    numbers: wp.array[int],
+    floors: wp.array[float],
+    offsets: wp.array[wp.vec2i],
+    nearness: wp.array2d[float],
+    hits: wp.array2d[wp.vec2i],
 ):
     """Z-buffer of listed bodies over samples of numbered pixels, as draw_bodies over centres.
 
@@ -300,14 +297,8 @@ def color_source(view: View, world: World, images: GBufferRecord, x: int, y: int
                 if source < 0:
                     source = j
     if not same_face and others > 1:
-        b = hit[0]
-        corner = face_vertices(world, world.bodies[b].geometry, hit[1])
-        p = vertex_at(world, world.bodies[b].geometry, corner[0])
-        e1 = vertex_at(world, world.bodies[b].geometry, corner[1]) - p
-        e2 = vertex_at(world, world.bodies[b].geometry, corner[2]) - p
-        n = world.bodies[b].R_world_mesh @ wp.normalize(wp.cross(e1, e2))
         # Several faces of the body are near, none of them the sample's: choose by orientation.
-        source = most_similar_normal(view, images, x, y, source, n)
+        source = most_similar_normal(view, images, x, y, source, flat_normal(world, hit))
     return source
 
 
@@ -316,10 +307,10 @@ def mix_samples(
     view: View,
     world: World,
     images: GBufferRecord,
-    radiance: wp.array(dtype=wp.vec3),
-    pixels: wp.array(dtype=int),
-    hits: wp.array(dtype=wp.vec2i, ndim=2),
-    mixed: wp.array(dtype=wp.vec3),
+    radiance: wp.array[wp.vec3],
+    pixels: wp.array[int],
+    hits: wp.array2d[wp.vec2i],
+    mixed: wp.array[wp.vec3],
 ):
     """Radiance of listed pixels: the mean over their samples, in the order of the list."""
     row = wp.tid()

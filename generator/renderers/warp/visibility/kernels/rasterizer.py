@@ -37,6 +37,22 @@ class Window:
 
 
 @wp.struct
+class Outline:
+    """Where the silhouette of a body is written.
+
+    Attributes:
+        window: The pixels that the body may cover; may lie outside the image.
+        first_pixel: Index in the buffer of the window's first pixel.
+        stride: Pixels between rows of the buffer.
+    """
+
+    body: int
+    window: Window
+    first_pixel: int
+    stride: int
+
+
+@wp.struct
 class Edge:
     """Edge function: value at a first pixel, and steps per pixel; inside is >= 0."""
 
@@ -98,9 +114,9 @@ def guard_distance(view: View, p: wp.vec3, plane: int):
 def project_vertices(
     view: View,
     world: World,
-    bodies: wp.array(dtype=int),
-    p_camera: wp.array(dtype=wp.vec3),
-    xy: wp.array(dtype=wp.vec2i),
+    bodies: wp.array[int],
+    p_camera: wp.array[wp.vec3],
+    xy: wp.array[wp.vec2i],
 ):
     """Vertices in the camera frame and on the snapped image plane, one listed body per thread."""
     b = bodies[wp.tid()]
@@ -235,8 +251,8 @@ def draw_nearest(
     body: int,
     face: int,
     stride: int,
-    nearness: wp.array(dtype=float),
-    hits: wp.array(dtype=wp.vec2i),
+    nearness: wp.array[float],
+    hits: wp.array[wp.vec2i],
 ):
     """Write (body, face) where the triangle is nearer than the buffer."""
     a = e.a.value
@@ -275,7 +291,7 @@ def draw_nearest(
 
 
 @wp.func
-def draw_coverage(e: Edges, first_pixel: int, stride: int, mask: wp.array(dtype=wp.uint8)):
+def draw_coverage(e: Edges, first_pixel: int, stride: int, mask: wp.array[wp.uint8]):
     """Write 1 where the triangle covers a pixel centre."""
     a = e.a.value
     b = e.b.value
@@ -367,11 +383,11 @@ def draw_bodies(
     view: View,
     window: Window,
     world: World,
-    bodies: wp.array(dtype=int),
-    p_camera: wp.array(dtype=wp.vec3),
-    xy: wp.array(dtype=wp.vec2i),
-    nearness: wp.array(dtype=float),
-    hits: wp.array(dtype=wp.vec2i),
+    bodies: wp.array[int],
+    p_camera: wp.array[wp.vec3],
+    xy: wp.array[wp.vec2i],
+    nearness: wp.array[float],
+    hits: wp.array[wp.vec2i],
 ):
     """Z-buffer of listed bodies: the nearest (body, face) at every pixel centre.
 

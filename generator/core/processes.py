@@ -1,4 +1,4 @@
-"""Settings of processes: one thread for sums, and no child that outlives its parent."""
+"""Settings of processes: one thread for sums, no child outlives its parent, no stray output."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import ctypes
 import os
 import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 SINGLE_THREADED = (
     "OMP_NUM_THREADS",
@@ -32,3 +34,25 @@ def end_with_parent(parent_pid: int) -> None:
     if os.getppid() != parent_pid:
         # The parent ended before the call above.
         os._exit(1)
+
+
+@contextmanager
+def silence_stdio() -> Iterator[None]:
+    """Discard the output of native code on standard output and standard error.
+
+    Some libraries print a banner on import, or warn about missing hardware, bypassing Python's
+    streams. Exceptions are not affected.
+    """
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = [(fd, os.dup(fd)) for fd in (1, 2)]
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        for fd, _ in kept:
+            os.dup2(nowhere, fd)
+        yield
+    finally:
+        for fd, copy in kept:
+            os.dup2(copy, fd)
+            os.close(copy)
+        os.close(nowhere)
