@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import colorsys
+from typing import Annotated
 
 import numpy as np
 
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.colorimetry import REC709_FROM_XYZ, luminance, srgb_decode
 from gen_data.generator.core.se3 import Vec3
+
+Temperature = Annotated[dist.Scalar, dist.Bounds(1667, 25_000)]
+"""Colour temperature [K] within the range of ``temperature_to_chromaticity``."""
 
 
 def hsv_to_linear(hue: float, saturation: float, value: float) -> Vec3:

@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.config.distributions import LogUniform, NonNegative, Scalar, Uniform
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Environment, Scene
@@ -28,8 +28,8 @@ class EnvironmentLight(RandomizerBase):
 
     type: Literal["environment"] = "environment"
     images: tuple[str, ...] = ()
-    luminance_cd_m2: NonNegative = LogUniform(10.0, 80.0)
-    yaw_deg: Scalar = Uniform(0.0, 360.0)
+    luminance_cd_m2: dist.NonNegative = dist.LogUniform(10.0, 80.0)
+    yaw_deg: dist.Scalar = dist.Uniform(0.0, 360.0)
     visible: bool = Field(True)
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from gen_data.generator.config.distributions import So3
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.errors import LayoutRejected, Rejection
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, ObjectGroup, Scene, SupportSurface
@@ -134,7 +134,7 @@ def _drop(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: bool)
     if z + half_height_m > clearance_m:
         raise LayoutRejected(_no_place(group))
     floor.taken.append((x, y, radius_m, z + half_height_m))
-    turn = _yaw(rng) if upright else SE3(quaternion_wxyz=So3().draw(rng))
+    turn = _yaw(rng) if upright else SE3(quaternion_wxyz=dist.So3().draw(rng))
     return floor.surface.T_world_surface @ SE3((x, y, z)) @ turn
 
 

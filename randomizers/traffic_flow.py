@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.config.distributions import Normal, Positive, Uniform
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.motion import StateChange, Trajectory
@@ -106,15 +106,15 @@ class TrafficFlow(RandomizerBase):
     duration_s: float = Field(10.0, gt=0, le=600)
     routes: dict[str, tuple[Stop, ...]] = Field({})
     signals: bool = True
-    green_s: Positive = Uniform(12.0, 25.0)
-    all_red_s: Positive = Uniform(1.5, 3.0)
-    lens_cd_m2: Positive = Uniform(5000.0, 10_000.0)
-    speed_factor: Positive = Normal(1.0, 0.1, clip=(0.75, 1.2))
-    headway_s: Positive = Normal(1.3, 0.25, clip=(0.8, 2.2))
-    walking_m_s: Positive = Normal(1.35, 0.2, clip=(0.8, 1.9))
+    green_s: dist.Positive = dist.Uniform(12.0, 25.0)
+    all_red_s: dist.Positive = dist.Uniform(1.5, 3.0)
+    lens_cd_m2: dist.Positive = dist.Uniform(5000.0, 10_000.0)
+    speed_factor: dist.Positive = dist.Normal(1.0, 0.1, clip=(0.75, 1.2))
+    headway_s: dist.Positive = dist.Normal(1.3, 0.25, clip=(0.8, 2.2))
+    walking_m_s: dist.Positive = dist.Normal(1.35, 0.2, clip=(0.8, 1.9))
     crossing: float = Field(0.4, ge=0, le=1)
-    brakelight_cd_m2: Positive = Uniform(6000.0, 15_000.0)
-    indicator_cd_m2: Positive = Uniform(15_000.0, 40_000.0)
+    brakelight_cd_m2: dist.Positive = dist.Uniform(6000.0, 15_000.0)
+    indicator_cd_m2: dist.Positive = dist.Uniform(15_000.0, 40_000.0)
 
     @property
     def motion_duration_s(self) -> float:

@@ -7,16 +7,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.vehicles.plates import SEEDS, reseed_plate
-from gen_data.generator.config.distributions import (
-    Chance,
-    Constant,
-    Flag,
-    LogUniform,
-    Probability,
-    Uniform,
-    UnitInterval,
-)
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Scene
@@ -36,31 +29,16 @@ _SOILED = ("paint", "glass", "rim", "tyre", "trim", "chrome", "plate", "headligh
 
 @dataclass(frozen=True, slots=True)
 class Paint:
-    """A family of paints: ranges of hue, saturation and value (HSV in sRGB)."""
+    """A family of paints: ranges of hue, saturation and value (HSV in sRGB); its frequency."""
 
     hue: tuple[float, float]
     saturation: tuple[float, float]
     value: tuple[float, float]
+    weight: float
 
 
-PAINTS: dict[str, Paint] = {
-    "white": Paint((0.1, 0.16), (0.0, 0.04), (0.86, 0.93)),
-    "black": Paint((0.0, 1.0), (0.0, 0.15), (0.05, 0.13)),
-    "grey": Paint((0.55, 0.65), (0.0, 0.1), (0.24, 0.45)),
-    "silver": Paint((0.5, 0.65), (0.0, 0.06), (0.62, 0.75)),
-    "blue": Paint((0.57, 0.65), (0.6, 0.95), (0.2, 0.6)),
-    "red": Paint((0.96, 1.01), (0.75, 0.95), (0.35, 0.75)),
-    "green": Paint((0.3, 0.45), (0.35, 0.8), (0.15, 0.45)),
-    "brown": Paint((0.04, 0.1), (0.3, 0.6), (0.2, 0.45)),
-    "yellow": Paint((0.12, 0.15), (0.75, 0.95), (0.75, 0.9)),
-    "orange": Paint((0.04, 0.08), (0.8, 0.95), (0.75, 0.9)),
-}
-
-ON_ROADS = {
-    "white": 30.0, "black": 21.0, "grey": 21.0, "silver": 10.0, "blue": 9.0,
-    "red": 5.0, "green": 1.5, "brown": 1.2, "yellow": 0.7, "orange": 0.6,
-}  # fmt: skip
-"""The project's own weights, in the order of paint makers' annual reports."""
+PAINTS = load_table("gen_data.randomizers", "vehicle_paint", Paint)
+ON_ROADS = {name: paint.weight for name, paint in PAINTS.items()}
 
 
 class VehiclePaint(SurfaceRandomizer):
@@ -80,12 +58,12 @@ class VehiclePaint(SurfaceRandomizer):
 
     type: Literal["vehicle_paint"] = "vehicle_paint"
     weights: dict[str, Annotated[float, Field(ge=0)]] = Field(ON_ROADS)
-    probability: Chance = Probability(0.85)
-    roughness: UnitInterval = LogUniform(0.1, 0.3)
-    metallic: Flag = Probability(0.6)
-    dirt: UnitInterval = Uniform(0.0, 0.25)
+    probability: dist.Chance = dist.Probability(0.85)
+    roughness: dist.UnitInterval = dist.LogUniform(0.1, 0.3)
+    metallic: dist.Flag = dist.Probability(0.6)
+    dirt: dist.UnitInterval = dist.Uniform(0.0, 0.25)
     plates: bool = Field(True)
-    coat: UnitInterval = Constant(0.0)
+    coat: dist.UnitInterval = dist.Constant(0.0)
 
     def model_post_init(self, context: object) -> None:
         """Reject unknown colours, and weights that are all 0."""

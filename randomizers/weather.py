@@ -7,15 +7,7 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator
 
-from gen_data.generator.config.distributions import (
-    Choice,
-    Malformed,
-    Name,
-    NonNegative,
-    Scalar,
-    Uniform,
-    UnitInterval,
-)
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.config.distributions.fields import custom_error
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
@@ -63,19 +55,19 @@ class Weather(RandomizerBase):
     """
 
     type: Literal["weather"] = "weather"
-    preset: Name = Choice(("ClearNoon", "CloudyNoon", "ClearSunset", "WetNoon"))
+    preset: dist.Name = dist.Choice(("ClearNoon", "CloudyNoon", "ClearSunset", "WetNoon"))
     sun_altitude_deg: Altitude | None = Field(None)
-    sun_azimuth_deg: Scalar = Uniform(0.0, 360.0)
-    cloudiness: UnitInterval | None = Field(None)
+    sun_azimuth_deg: dist.Scalar = dist.Uniform(0.0, 360.0)
+    cloudiness: dist.UnitInterval | None = Field(None)
     turbidity: Turbidity | None = Field(None)
-    fog_extinction_per_m: NonNegative | None = Field(None)
-    fog_height_m: NonNegative | None = Field(None)
-    rain_mm_h: NonNegative | None = Field(None)
-    snow_mm_h: NonNegative | None = Field(None)
-    wetness: UnitInterval | None = Field(None)
-    puddles: UnitInterval | None = Field(None)
-    snow_cover: UnitInterval | None = Field(None)
-    lens_drops: UnitInterval | None = Field(None)
+    fog_extinction_per_m: dist.NonNegative | None = Field(None)
+    fog_height_m: dist.NonNegative | None = Field(None)
+    rain_mm_h: dist.NonNegative | None = Field(None)
+    snow_mm_h: dist.NonNegative | None = Field(None)
+    wetness: dist.UnitInterval | None = Field(None)
+    puddles: dist.UnitInterval | None = Field(None)
+    snow_cover: dist.UnitInterval | None = Field(None)
+    lens_drops: dist.UnitInterval | None = Field(None)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with drawn weather, sun and sky."""
@@ -91,7 +83,7 @@ class Weather(RandomizerBase):
         )
         values: dict[str, Any] = {"seed": int(rng.integers(_PATTERNS))}
         for name in _FIELDS:
-            given: Scalar | None = getattr(self, name)
+            given: dist.Scalar | None = getattr(self, name)
             if given is not None:
                 values[name] = round(given.draw(rng), 6)
         weather = replace(condition.weather, **values)
@@ -100,12 +92,12 @@ class Weather(RandomizerBase):
 
     @field_validator("preset")
     @classmethod
-    def _check_preset(cls, preset: Name) -> Name:
+    def _check_preset(cls, preset: dist.Name) -> dist.Name:
         """Reject unknown presets."""
         for name in preset.outcomes():
             if name not in PRESETS:
                 raise custom_error(
-                    Malformed(
+                    dist.Malformed(
                         f"there is no weather '{name}'; expected a condition and a time such as "
                         f"ClearNoon{did_you_mean(name, PRESETS)}"
                     )
@@ -113,5 +105,5 @@ class Weather(RandomizerBase):
         return preset
 
 
-def _draw(given: Scalar | None, default: Range, rng: Rng) -> float:
-    return (given or Uniform(*default)).draw(rng)
+def _draw(given: dist.Scalar | None, default: Range, rng: Rng) -> float:
+    return (given or dist.Uniform(*default)).draw(rng)
