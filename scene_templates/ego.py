@@ -53,13 +53,8 @@ class Ego(Element):
         T_body_rig = find_axles(assets, asset, 1.0).T_body_rear
         place = line.pose(0.5 * line.length_m)
         instance_id = next_instance_id(scene)
-        body = Body(
-            self.name,
-            asset,
-            (place @ T_body_rig.inverse()).rounded(),
-            instance_id=instance_id,
-            collides=False,
-        )
+        pose = (place @ T_body_rig.inverse()).rounded()
+        body = Body(self.name, asset, pose, instance_id=instance_id, collides=False)
         instance = Instance(instance_id, self.name, CATEGORY, 0, asset, annotated=False)
         return replace(
             scene,

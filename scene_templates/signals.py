@@ -54,14 +54,8 @@ class Signals(Element):
             line = LaneLine(lane)
             right_m = 0.5 * lane.width_m + self.beside_m + SIGNAL_M
             stand = line.pose(line.length_m, -right_m) @ SE3.about_z(math.pi)
-            scene = add_static(
-                scene,
-                assets,
-                name=f"{self.name}/{number}",
-                asset=asset,
-                T_world_body=stand_upright(assets, asset, stand),
-                annotated=self.annotate,
-            )
+            name, pose = f"{self.name}/{number}", stand_upright(assets, asset, stand)
+            scene = add_static(scene, assets, name, asset, pose, annotated=self.annotate)
         return scene
 
 
