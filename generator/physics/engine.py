@@ -121,11 +121,7 @@ class BulletEngine:
         return arms
 
     def _add_arm_tracks(
-        self,
-        scene: Scene,
-        fixed: list[str],
-        fallen: list[str],
-        arms: list[tuple[Arm, ArmState]],
+        self, scene: Scene, fixed: list[str], fallen: list[str], arms: list[tuple[Arm, ArmState]]
     ) -> Scene | Rejection:
         """The scene with trajectories of arms with tasks, and of the bodies they carry.
 
@@ -151,7 +147,7 @@ class BulletEngine:
                 return plan
             resting = planner.resting
             parts = [link for link in arm.robot.links if link in arm.robot.visuals]
-            recording.add(arm, plan.legs, parts)
+            recording.add(arm, plan, parts)
         return replace(
             scene,
             tracks=(*scene.tracks, *recording.tracks()),

@@ -42,15 +42,10 @@ def is_supported(surfaces: Iterable[SupportSurface], low_m: Array, high_m: Array
 
 def is_within(surfaces: Iterable[SupportSurface], low_m: Array, high_m: Array) -> bool:
     """Whether the whole footprint of a body with these bounds is above one surface."""
-    corners = [(x, y) for x in (low_m[0], high_m[0]) for y in (low_m[1], high_m[1])]
-    bottom = float(low_m[2])
-    return any(
-        all(
-            _holds(s, np.array([x, y, bottom]), np.array([x, y, bottom]), slack_m=0.0)
-            for x, y in corners
-        )
-        for s in surfaces
-    )
+    corners = [
+        np.array([x, y, low_m[2]]) for x in (low_m[0], high_m[0]) for y in (low_m[1], high_m[1])
+    ]
+    return any(all(_holds(s, at, at, slack_m=0.0) for at in corners) for s in surfaces)
 
 
 def guard_walls(surface: SupportSurface) -> list[tuple[CollisionShape, SE3]]:

@@ -61,13 +61,16 @@ class Settling:
                 self._restart(body, pull=1.0 - 0.5**attempt)
             self._lower(loose, fixed, arms)
             if not self._rest_guarded():
-                return self._still_moving()
+                return Rejection(
+                    f"still moving after {self._config.settle_time_s_max} s",
+                    f"a larger physics.settle_time_s_max, or {self._fewer()}",
+                )
             loose = [body for body in self._falling if not self._is_supported(body)]
             if not loose:
                 break
             if any(self._homes[body.name] is None for body in loose):
                 return self._fell_off()
-        return self._fell_off() if loose else self._find_rejection()
+        return self._fell_off() if loose else self._check_overlaps()
 
     def _restart(self, body: Body, pull: float) -> None:
         """Put a body at its initial pose, moved by a share towards the middle of its surface."""
@@ -178,25 +181,16 @@ class Settling:
         surfaces = self._surfaces[body.name]
         return not surfaces or is_supported(surfaces, *self._world.bounds_m(body.name))
 
-    def _find_rejection(self) -> Rejection | None:
+    def _check_overlaps(self) -> Rejection | None:
         deepest = min((gap_m for _, _, gap_m in self._world.contacts()), default=0.0)
-        return self._overlapping() if deepest < -self._config.penetration_m_max else None
+        if deepest >= -self._config.penetration_m_max:
+            return None
+        remedy = f"{self._fewer()}, a larger surface, or a larger physics.penetration_m_max"
+        return Rejection("objects interpenetrate", remedy)
 
     def _fell_off(self) -> Rejection:
         guard = "" if self._config.guard_walls else ", or physics.guard_walls: true"
         return Rejection("object fell off", f"{self._fewer()}, or a larger surface{guard}")
-
-    def _still_moving(self) -> Rejection:
-        return Rejection(
-            f"still moving after {self._config.settle_time_s_max} s",
-            f"a larger physics.settle_time_s_max, or {self._fewer()}",
-        )
-
-    def _overlapping(self) -> Rejection:
-        return Rejection(
-            "objects interpenetrate",
-            f"{self._fewer()}, a larger surface, or a larger physics.penetration_m_max",
-        )
 
     def _fewer(self) -> str:
         groups = ", ".join(sorted({f"'{body.group}'" for body in self._falling if body.group}))

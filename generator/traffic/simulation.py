@@ -49,11 +49,6 @@ class SimulatedMotion:
     walked_m: Array
     pace_m_s: Array
 
-    @property
-    def knots(self) -> int:
-        """Number of knots."""
-        return len(self.feet_m)
-
 
 def simulate(
     fleet: Vehicles | None,
@@ -109,11 +104,8 @@ def _collect_motion(
     if fleet is None:
         none = np.zeros((len(people), 0))
         station = speed = acceleration = none
-        axle, ahead, rise = (
-            np.zeros((*none[kept].shape, 3)),
-            np.zeros((*none[kept].shape, 2)),
-            none[kept],
-        )
+        knots, rise = len(none[kept]), none[kept]
+        axle, ahead = np.zeros((knots, 0, 3)), np.zeros((knots, 0, 2))
     else:
         station, speed, acceleration = (np.stack(column) for column in zip(*cars, strict=True))
         axle, ahead, rise = _vehicle_poses(fleet, station[kept])

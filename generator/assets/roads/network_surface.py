@@ -10,8 +10,9 @@ from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import Array, Patch, make_solid_in_place
 from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, surface
 from gen_data.generator.assets.roads.road_materials import street_materials
+from gen_data.generator.roads.lane_graph import stations
 from gen_data.generator.roads.opendrive import Network, Road, Section
-from gen_data.generator.roads.opendrive_lanes import heights_m, origin_m, stations
+from gen_data.generator.roads.opendrive_lanes import heights_m, origin_m
 
 _STEP_M = 2.5
 _DASH_M, _GAP_M = 3.0, 6.0
