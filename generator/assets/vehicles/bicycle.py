@@ -19,14 +19,13 @@ from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles import rider as people
 from gen_data.generator.assets.vehicles.body_shell import drop_uvs
 from gen_data.generator.assets.vehicles.rider import Seat, blob, limb
+from gen_data.generator.assets.vehicles.vehicle_materials import COLORS, materials
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
-from gen_data.generator.assets.vehicles.vehicle_materials import materials
 from gen_data.generator.core.asset_types import Keypoint, Material
 from gen_data.generator.core.se3 import Vec3
 
 STYLES = ("city", "mountain", "road")
 
-_PAINTS = ("#151618", "#e6e6e2", "#1f4f91", "#a3201c", "#2f5a42", "#6d7276", "#c97a1e", "#2aa3a0")
 _CRANK_M = 0.17
 
 
@@ -62,7 +61,7 @@ def bicycle(seed: int) -> Solid:
     rng = variant_rng("bicycle", seed)
     frame = _FRAMES[in_turn(STYLES, seed)]
     parts = _machine(in_turn(STYLES, seed), frame, rng.between(0.0, 2.0 * math.pi), rng)
-    paint = hex_to_linear(rng.choose(_PAINTS))
+    paint = hex_to_linear(rng.choose(COLORS["bicycles"]))
     return _solid(parts, frame, materials(rng, paint), 1.0)
 
 
@@ -77,7 +76,7 @@ def cyclist(seed: int) -> Solid:
     frame, turn = _FRAMES[in_turn(STYLES, seed)], rng.between(0.0, 2.0 * math.pi)
     parts = _machine(in_turn(STYLES, seed), frame, turn, rng)
     parts += people.rider(_seat(frame, turn), rng)
-    paint = hex_to_linear(rng.choose(_PAINTS))
+    paint = hex_to_linear(rng.choose(COLORS["bicycles"]))
     finish = materials(rng, paint, clothes=people.draw_clothes(rng))
     return _solid(parts, frame, finish, 1.7)
 

@@ -21,14 +21,10 @@ from gen_data.generator.assets.vehicles.body_shell import (
     stack,
     take_triangles,
 )
-from gen_data.generator.assets.vehicles.vehicle_materials import SIDES, materials
+from gen_data.generator.assets.vehicles.vehicle_materials import COLORS, SIDES, materials
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.assets.vehicles.wheels import Axles
 
-_LIVERIES = (
-    ("#e9e8e3", "#2458a6"), ("#f2c318", "#33383c"), ("#c3221f", "#e9e8e3"), ("#2f7d4a", "#e9e8e3"),
-    ("#1f4f91", "#e9e8e3"), ("#e9e8e3", "#c3221f"),
-)  # fmt: skip
 _FLOOR_M = 0.26
 _HALF_M = 1.275
 
@@ -38,7 +34,7 @@ def bus(seed: int) -> Solid:
     rng = variant_rng("bus", seed)
     x, top = 0.5 * rng.between(11.2, 12.2), rng.between(2.95, 3.08)
     axles = Axles(x - 2.72, -x + 3.35, 1.08, 0.48, 0.29, 0.56, 0)
-    livery = rng.choose(_LIVERIES)
+    livery = rng.choose(COLORS["liveries"]).split()
     body = _body(x, top, axles, striped=rng.chance(0.6))
     body = _doors(body, (x - 0.55, x - 6.0, *((x - 9.6,) if rng.chance(0.5) else ())), top)
     parts = [body, *(drop_uvs(p) for p in [*axles.wheels(0.0), *_fittings(x, top)])]

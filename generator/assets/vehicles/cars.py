@@ -15,13 +15,11 @@ from gen_data.generator.assets.vehicles.bodywork import (
     collision,
     keypoints,
 )
-from gen_data.generator.assets.vehicles.vehicle_materials import draw_paint, materials
+from gen_data.generator.assets.vehicles.vehicle_materials import COLORS, draw_paint, materials
 from gen_data.generator.core.se3 import Vec3
 
 CARS = ("hatchback", "sedan", "estate", "suv", "coupe")
 VANS = ("panel_van", "minibus", "high_roof")
-
-_FLEET = ("#f0c419", "#7a4a24", "#1e5aa8", "#c8281e")
 
 
 def car(seed: int, steer_deg: float) -> Solid:
@@ -36,7 +34,7 @@ def van(seed: int, steer_deg: float) -> Solid:
     rng = variant_rng("van", seed)
     design = _vary_van(DESIGNS[in_turn(VANS, seed)], rng)
     draw = float(rng.random())
-    white, fleet = hex_to_linear("#e6e7e6"), hex_to_linear(rng.choose(_FLEET))
+    white, fleet = hex_to_linear("#e6e7e6"), hex_to_linear(rng.choose(COLORS["fleets"]))
     paint = white if draw < 0.55 else (fleet if draw < 0.75 else draw_paint(rng))
     return _solid(design, steer_deg, paint, rng)
 

@@ -18,15 +18,13 @@ from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles import rider as people
 from gen_data.generator.assets.vehicles.body_shell import drop_uvs
 from gen_data.generator.assets.vehicles.rider import Seat, blob, limb
+from gen_data.generator.assets.vehicles.vehicle_materials import COLORS, materials
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
-from gen_data.generator.assets.vehicles.vehicle_materials import materials
 from gen_data.generator.assets.vehicles.wheels import wheel
 from gen_data.generator.core.asset_types import Keypoint
 from gen_data.generator.core.se3 import Vec3
 
 STYLES = ("naked", "sport", "scooter")
-
-_PAINTS = ("#121314", "#b01d1a", "#1f4f91", "#e6e6e2", "#2f6b3d", "#c97a1e", "#6d7276", "#7fb8b0")
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ def motorcycle(seed: int) -> Solid:
     ridden = _is_ridden(seed)
     if ridden:
         parts += people.rider(_seat(build), rng)
-    paint = hex_to_linear(rng.choose(_PAINTS))
+    paint = hex_to_linear(rng.choose(COLORS["motorcycles"]))
     finish = materials(rng, paint, clothes=people.draw_clothes(rng), plate_rows=2)
     reach = build.axle + build.wheel_m
     hull = [

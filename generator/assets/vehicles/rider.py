@@ -15,13 +15,10 @@ from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Array, Patch
 from gen_data.generator.assets.procedural.surface_shapes import ball, circle, spline, sweep
 from gen_data.generator.assets.procedural.variant_rng import VariantRng
+from gen_data.generator.assets.vehicles.vehicle_materials import COLORS
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.core.se3 import Vec3
 
-_SKINS = ("#f0cdb0", "#e0b08c", "#c68e64", "#8d5a3a", "#5a3825")
-_TOPS = ("#1f3a5f", "#b3231d", "#20242a", "#e8e6e0", "#d9d12a", "#2f6b4a", "#6b6f76", "#d96a1f")
-_BOTTOMS = ("#1c1e22", "#2b3a55", "#4b4a45", "#1c1e22", "#7a6a52")
-_HELMETS = ("#e8e8e6", "#1a1b1d", "#b3231d", "#1f4f91", "#d9d12a")
 _STATURE_M = 1.74
 _THIGH_M, _SHIN_M = 0.245 * _STATURE_M, 0.246 * _STATURE_M
 _UPPER_ARM_M, _FOREARM_M = 0.186 * _STATURE_M, 0.17 * _STATURE_M
@@ -48,8 +45,8 @@ class Seat:
 
 def draw_clothes(rng: VariantRng) -> tuple[Vec3, ...]:
     """Colours of skin, top, bottom, shoes and helmet, linear RGB."""
-    codes = (_SKINS, _TOPS, _BOTTOMS, ("#18181a", "#e2e2de", "#4a3627"), _HELMETS)
-    return tuple(hex_to_linear(rng.choose(options)) for options in codes)
+    kinds = ("skins", "tops", "bottoms", "shoes", "helmets")
+    return tuple(hex_to_linear(rng.choose(COLORS[kind])) for kind in kinds)
 
 
 def rider(seat: Seat, rng: VariantRng) -> list[Patch]:

@@ -21,12 +21,10 @@ from gen_data.generator.assets.vehicles.body_shell import (
     plan,
     stack,
 )
-from gen_data.generator.assets.vehicles.vehicle_materials import SIDES, materials
+from gen_data.generator.assets.vehicles.vehicle_materials import COLORS, SIDES, materials
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.assets.vehicles.wheels import Axles
 
-_CABS = ("#e6e6e3", "#e6e6e3", "#1d4f96", "#b3231d", "#2d6b45", "#d9a514", "#3d4247")
-_BOXES = ("#e4e4e0", "#e4e4e0", "#dcdcd6", "#c9ccce", "#2a5c9c", "#b52b22", "#e0b022")
 _FLOOR_M = 0.42
 _HALF_M = 1.16
 
@@ -43,7 +41,7 @@ def truck(seed: int) -> Solid:
     if rng.chance(0.6):
         fitted.append(_spoiler(x, cab, roof, top))
     parts += [drop_uvs(p) for p in fitted]
-    cab_paint, box_paint = (hex_to_linear(rng.choose(codes)) for codes in (_CABS, _BOXES))
+    cab_paint, box_paint = (hex_to_linear(rng.choose(COLORS[k])) for k in ("cabs", "boxes"))
     hull = [
         hulls.box((x - cab, -_HALF_M, _FLOOR_M), (x, _HALF_M, roof)),
         hulls.box((-x, -1.25, 0.95), (x - cab - 0.12, 1.25, top)),

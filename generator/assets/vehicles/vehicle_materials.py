@@ -6,6 +6,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.assets.vehicles import plates
@@ -37,22 +38,17 @@ class VehicleSlot(IntEnum):
     HELMET = 18
 
 
+COLORS = load_table(__package__, "colors", tuple[str, ...])
 SIDES = ((VehicleSlot.INDICATOR_LEFT, VehicleSlot.INDICATOR_RIGHT),)
 """Slots that a mirror image exchanges."""
-
-# Weights after the ranking of Axalta's and BASF's yearly colour reports for Europe.
-_PAINTS = (
-    (0.2, "#e9eaea"), (0.05, "#d8d4c8"), (0.2, "#0d0e10"), (0.14, "#4a4d50"), (0.09, "#2b2e31"),
-    (0.11, "#a5a9ac"), (0.06, "#1d3a6e"), (0.04, "#12233f"), (0.05, "#8f1418"), (0.02, "#b8471b"),
-    (0.02, "#2c4a36"), (0.02, "#5a4634"),
-)  # fmt: skip
 
 
 def draw_paint(rng: VariantRng) -> Vec3:
     """Colour of a private car, linear RGB."""
-    shares = np.cumsum([weight for weight, _ in _PAINTS])
+    weights, codes = zip(*(row.split() for row in COLORS["cars"]), strict=True)
+    shares = np.cumsum([float(weight) for weight in weights])
     index = int(np.searchsorted(shares, float(rng.random()), side="right"))
-    return hex_to_linear(_PAINTS[min(index, len(_PAINTS) - 1)][1])
+    return hex_to_linear(codes[min(index, len(codes) - 1)])
 
 
 def materials(
