@@ -16,13 +16,16 @@ from gen_data.generator.core.motion import StateChange, Trajectory
 from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Rng
-from gen_data.generator.traffic.body_trajectories import make_upright_trajectories
 from gen_data.generator.traffic.lane_routes import LaneGraph, draw_route, lanes_through_point
-from gen_data.generator.traffic.obb_overlap import first_overlap
 from gen_data.generator.traffic.pedestrian_paths import WalkNetwork, draw_path, make_walk_network
 from gen_data.generator.traffic.pedestrians import Pedestrian
 from gen_data.generator.traffic.signal_cycles import Approach, Cycle
-from gen_data.generator.traffic.simulation import SimulatedMotion, simulate
+from gen_data.generator.traffic.simulation import (
+    SimulatedMotion,
+    first_overlap,
+    make_upright_trajectories,
+    simulate,
+)
 from gen_data.generator.traffic.vehicles import LOOKAHEAD_M, Vehicle, Vehicles, make_vehicles
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.ego_on_lane import Stop

@@ -1,34 +1,74 @@
-"""Weather, with the matching sun and sky."""
+"""Weather, with the matching sun and sky.
+
+A preset is a condition and a time of day in one name, as in ``HardRainSunset``.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from pydantic import Field, field_validator
 
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.config.distributions.fields import custom_error
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.scene import Weather as SceneWeather
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.daylight import Daylight, draw_cloud_seed, set_daylight
 from gen_data.randomizers.time_of_day import Altitude, Turbidity
-from gen_data.randomizers.weather_presets import PRESETS, Range
 
-_FIELDS = (
-    "fog_extinction_per_m",
-    "fog_height_m",
-    "rain_mm_h",
-    "snow_mm_h",
-    "wetness",
-    "puddles",
-    "snow_cover",
-    "lens_drops",
-)
+_FIELDS = ("fog_extinction_per_m", "fog_height_m", "rain_mm_h", "snow_mm_h", "wetness", "puddles",
+           "snow_cover", "lens_drops")  # fmt: skip
 _PATTERNS = 2**31
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """State of the sky, the air and the ground.
+
+    Attributes:
+        cloudiness, turbidity: Ranges of uniform draws.
+        weather: Typical values; the seed is drawn.
+    """
+
+    cloudiness: Range
+    turbidity: Range = (2.0, 3.5)
+    weather: SceneWeather = field(default_factory=SceneWeather)
+
+
+CONDITIONS = load_table("gen_data.randomizers", "weather_conditions", Condition)
+"""Conditions by the first part of a preset's name."""
+
+ALTITUDES_DEG: dict[str, Range] = {
+    "Noon": (32.0, 62.0),
+    "Morning": (8.0, 22.0),
+    "Sunset": (0.8, 6.0),
+    "Dusk": (-7.0, -3.0),
+    "Night": (-50.0, -16.0),
+}
+"""Range of the sun's altitude, by the last part of a preset's name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """A condition at a time of day."""
+
+    condition: Condition
+    sun_altitude_deg: Range
+
+
+PRESETS: dict[str, Preset] = {
+    f"{name}{time}": Preset(condition, altitude_deg)
+    for name, condition in {**CONDITIONS, "MidRainy": CONDITIONS["MidRain"]}.items()
+    for time, altitude_deg in ALTITUDES_DEG.items()
+}
 
 
 class Weather(RandomizerBase):

@@ -15,7 +15,7 @@ from gen_data.generator.physics.manipulation.continuous_collision import ITSELF,
 from gen_data.generator.physics.manipulation.grasping import Grasp, Hand
 from gen_data.generator.physics.manipulation.joint_trajectories import Held, Leg, time_leg
 from gen_data.generator.physics.manipulation.motion_planner import MotionPlanner, Positions
-from gen_data.generator.physics.placement_surfaces import home_surface, is_within
+from gen_data.generator.physics.settling import home_surface, is_within
 
 CANNOT_REACH = "its pose or joint positions are out of reach"
 NOTHING_TO_GRASP = "no listed object lies free and fits between the fingers"
