@@ -91,11 +91,7 @@ class ArmMotion(RandomizerBase):
     speed: Speed = dist.Uniform(0.4, 0.7)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with a sequence of goals for every arm.
-
-        Raises:
-            ConfigError: a task, group or surface is unknown, or the number of joints is wrong.
-        """
+        """Return the scene with a sequence of goals for every arm."""
         return replace(
             scene,
             articulations=tuple(

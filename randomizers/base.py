@@ -55,7 +55,12 @@ class RandomizerBase(Strict):
 
     @abstractmethod
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return a new scene; the one passed in is unchanged."""
+        """Return a new scene; the one passed in is unchanged.
+
+        Raises:
+            ConfigError: a field names something unknown, or the scene lacks what it needs.
+            LayoutRejected: no free or possible place was found; another draw may succeed.
+        """
 
 
 class SurfaceRandomizer(RandomizerBase):

@@ -55,12 +55,7 @@ class CameraIntrinsics(RandomizerBase):
     lens: Coefficients = Coefficients()
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with drawn lenses; lens models and image sizes stay.
-
-        Raises:
-            ConfigError: the camera is unknown, or its lens model lacks a drawn coefficient.
-            LayoutRejected: the drawn distortion folds over inside the image.
-        """
+        """Return the scene with drawn lenses; lens models and image sizes stay."""
         del assets
         known = [camera.name for camera in scene.cameras]
         if self.camera:

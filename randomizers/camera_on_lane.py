@@ -61,12 +61,7 @@ class CameraOnLane(RandomizerBase):
     beam_cd: dist.NonNegative = dist.Constant(0.0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with all cameras without a rig at one pose.
-
-        Raises:
-            ConfigError: the scene has no lane of these kinds and roads.
-            LayoutRejected: no free place was found.
-        """
+        """Return the scene with all cameras without a rig at one pose."""
         lines = [LaneLine(lane) for lane in scene.lanes if lane.kind in self.lanes]
         lines = [
             line

@@ -44,12 +44,7 @@ class CameraPose(RandomizerBase):
     clearance_m: float = Field(0.1, ge=0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with its cameras moved, all outside of bodies and inside the room.
-
-        Raises:
-            ConfigError: the camera is unknown or on a rig.
-            LayoutRejected: no free place was found.
-        """
+        """Return the scene with its cameras moved, all outside of bodies and inside the room."""
         known = [camera.name for camera in scene.cameras if not camera.rig]
         if self.camera and self.camera not in known:
             raise ConfigError(

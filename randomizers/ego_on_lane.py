@@ -47,12 +47,7 @@ class EgoOnLane(RandomizerBase):
     min_clearance_m: float = Field(0.5, ge=0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with the ego vehicle moved.
-
-        Raises:
-            ConfigError: the vehicle or a lane is unknown, or the route is not connected.
-            LayoutRejected: no free place was found.
-        """
+        """Return the scene with the ego vehicle moved."""
         body = find_ego(scene, self.ego, f"randomizers.{self.name}.ego")
         lines = self._select_lanes(scene)
         axles = find_axles(assets, body.asset, body.scale)

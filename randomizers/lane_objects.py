@@ -72,12 +72,7 @@ class LaneObjects(GroupRandomizer):
     uniform_area: bool = False
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with the group's members replaced.
-
-        Raises:
-            ConfigError: objects and gaps are so short that a lane has too many places.
-            LayoutRejected: there are too few free places.
-        """
+        """Return the scene with the group's members replaced."""
         group, weights = self.find_group(scene, assets)
         scene = remove_members(scene, group.name)
         lines = self._select_lanes(scene, group)

@@ -81,12 +81,7 @@ class Lighting(RandomizerBase):
         return self
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with its lights replaced; the total is split unevenly between them.
-
-        Raises:
-            ConfigError: the kind is unknown, or a sun was given a flux.
-            LayoutRejected: no free place was found for a light.
-        """
+        """Return the scene with its lights replaced; the total is split unevenly between them."""
         count = self.count.draw(rng)
         shares = [0.3 + float(rng.uniform()) for _ in range(count)]
         strength = self.illuminance_lux if self.luminous_flux_lm is None else self.luminous_flux_lm

@@ -36,11 +36,7 @@ class RigCalibration(RandomizerBase):
     turn_deg: dist.Scalar = dist.Normal(0.0, 0.2, clip=(-1.0, 1.0))
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with perturbed sensor poses.
-
-        Raises:
-            ConfigError: the rig is unknown or carries no sensor.
-        """
+        """Return the scene with perturbed sensor poses."""
         del assets
         sensors: tuple[Camera | Lidar | Device, ...]
         sensors = (*scene.cameras, *scene.lidars, *scene.devices)

@@ -125,12 +125,7 @@ class TrafficFlow(RandomizerBase):
         return self.duration_s
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene at time 0, with trajectories and state changes.
-
-        Raises:
-            ConfigError: a route names an unknown vehicle or lane, or leaves the lanes.
-            LayoutRejected: the simulated bodies would collide.
-        """
+        """Return the scene at time 0, with trajectories and state changes."""
         streets = Streets.of(scene)
         signals = self._draw_signal_cycles(scene, assets, rng) if self.signals else []
         approaches = find_approaches(streets.driving, streets.crosswalks, signals)

@@ -36,11 +36,7 @@ class Ego(Element):
     lane: str = ""
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """Add the vehicle and its rig.
-
-        Raises:
-            ConfigError: no asset has the tags, or the lane is unknown.
-        """
+        """Add the vehicle and its rig."""
         asset = self.asset or self._find_asset(assets)
         lanes = [lane for lane in scene.lanes if lane.name == self.lane or not self.lane]
         lanes = [lane for lane in lanes if lane.kind == "driving" and not lane.junction]

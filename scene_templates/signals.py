@@ -37,11 +37,7 @@ class Signals(Element):
     annotate: bool = False
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """Add one light per incoming road.
-
-        Raises:
-            ConfigError: no road leads to such a junction.
-        """
+        """Add one light per incoming road."""
         crossing = {lane.name for lane in scene.lanes if lane.road == self.junction}
         coming = [lane for lane in scene.lanes if _is_entry(lane, crossing, self.junction)]
         if not coming:
