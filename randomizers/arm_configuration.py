@@ -47,13 +47,9 @@ class ArmConfiguration(RandomizerBase):
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with a goal for every arm."""
-        return replace(
-            scene,
-            articulations=tuple(
-                replace(arm, goal=self._draw_goal(arm, scene, assets, rng))
-                for arm in scene.articulations
-            ),
-        )
+        arms = scene.articulations
+        arms = tuple(replace(a, goal=self._draw_goal(a, scene, assets, rng)) for a in arms)
+        return replace(scene, articulations=arms)
 
     def _draw_goal(self, arm: Articulation, scene: Scene, assets: AssetIndex, rng: Rng) -> ArmGoal:
         mode = self.mode.draw(rng)

@@ -92,23 +92,18 @@ class ArmMotion(RandomizerBase):
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with a sequence of goals for every arm."""
-        return replace(
-            scene,
-            articulations=tuple(
-                replace(arm, task=self._draw_goals(arm, scene, assets, rng))
-                for arm in scene.articulations
-            ),
-        )
+        arms = scene.articulations
+        arms = tuple(replace(a, task=self._draw_goals(a, scene, assets, rng)) for a in arms)
+        return replace(scene, articulations=arms)
 
     def _draw_goals(
         self, arm: Articulation, scene: Scene, assets: AssetIndex, rng: Rng
     ) -> tuple[ArmGoal, ...]:
         speed = round(self.speed.draw(rng), 4)
         if self.way:
+            where = f"randomizers.{self.name}.way"
             goals = [
-                self._goal_at_stop(
-                    stop, f"randomizers.{self.name}.way[{k}]", arm, scene, assets, rng
-                )
+                self._goal_at_stop(stop, f"{where}[{k}]", arm, scene, assets, rng)
                 for k, stop in enumerate(self.way)
             ]
         elif self._draw_task(rng) == "reach" or assets.robot(arm.asset).gripper is None:
@@ -147,12 +142,7 @@ class ArmMotion(RandomizerBase):
         return goals
 
     def _draw_graspable(
-        self,
-        arm: Articulation,
-        groups: tuple[str, ...],
-        scene: Scene,
-        assets: AssetIndex,
-        rng: Rng,
+        self, arm: Articulation, groups: tuple[str, ...], scene: Scene, assets: AssetIndex, rng: Rng
     ) -> tuple[str, ...]:
         """Draw an order of the objects with a side that fits between the fingers."""
         gripper = assets.robot(arm.asset).gripper
@@ -187,23 +177,15 @@ class ArmMotion(RandomizerBase):
         )
 
     def _goal_at_stop(
-        self,
-        stop: Stop,
-        field: str,
-        arm: Articulation,
-        scene: Scene,
-        assets: AssetIndex,
-        rng: Rng,
+        self, stop: Stop, field: str, arm: Articulation, scene: Scene, assets: AssetIndex, rng: Rng
     ) -> ArmGoal:
         if stop.grasp:
-            return ArmGoal(
-                "grasp", objects=self._draw_graspable(arm, stop.grasp, scene, assets, rng)
-            )
+            names = self._draw_graspable(arm, stop.grasp, scene, assets, rng)
+            return ArmGoal("grasp", objects=names)
         yaw_rad = math.radians(stop.yaw_deg)
         if stop.place_m:
-            return ArmGoal(
-                "place", pose_candidates=(_pose_on_surface(stop, yaw_rad, scene, field),)
-            )
+            pose = _pose_on_surface(stop, yaw_rad, scene, field)
+            return ArmGoal("place", pose_candidates=(pose,))
         if stop.reach_m:
             tilt_rad, towards_rad = math.radians(stop.tilt_deg), math.radians(stop.towards_deg)
             pose = hand_pose(stop.reach_m, yaw_rad, tilt_rad, towards_rad)

@@ -79,11 +79,8 @@ class CameraIntrinsics(RandomizerBase):
                 drawn = Intrinsics.from_hfov(before.width_px, before.height_px, hfov_rad, lens)
         except ValueError as error:
             raise self._rejection() from error
-        drawn = replace(
-            drawn,
-            cx_px=round(drawn.cx_px + offset_x, 4),
-            cy_px=round(drawn.cy_px + offset_y, 4),
-        )
+        cx_px, cy_px = round(drawn.cx_px + offset_x, 4), round(drawn.cy_px + offset_y, 4)
+        drawn = replace(drawn, cx_px=cx_px, cy_px=cy_px)
         if drawn.folds_over():
             raise self._rejection()
         return replace(camera, intrinsics=drawn)

@@ -18,11 +18,7 @@ Temperature = Annotated[dist.Scalar, dist.Bounds(1667, 25_000)]
 def hsv_to_linear(hue: float, saturation: float, value: float) -> Vec3:
     """Convert hue, saturation and value in sRGB, each in [0, 1], to linear RGB."""
     red, green, blue = colorsys.hsv_to_rgb(hue % 1.0, saturation, value)
-    return (
-        round(srgb_decode(red), 6),
-        round(srgb_decode(green), 6),
-        round(srgb_decode(blue), 6),
-    )
+    return (round(srgb_decode(red), 6), round(srgb_decode(green), 6), round(srgb_decode(blue), 6))
 
 
 def temperature_to_chromaticity(kelvin: float) -> tuple[float, float]:

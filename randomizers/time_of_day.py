@@ -6,12 +6,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from gen_data.generator.assets.skies.sky import SkyModel
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.daylight import Daylight, draw_cloud_seed, set_daylight, shared_number
+from gen_data.randomizers.daylight import draw_cloud_seed, set_daylight, shared_number
 
 Altitude = Annotated[dist.Scalar, dist.Bounds(-90, 90)]
 Turbidity = Annotated[dist.Scalar, dist.Bounds(1.8, 8.0)]
@@ -63,8 +64,5 @@ class TimeOfDay(RandomizerBase):
             cloudiness = given
         else:
             cloudiness = dist.Uniform(0.0, 0.6).draw(rng)
-        snow = scene.weather.snow_cover > 0.0
-        light = Daylight(
-            altitude_deg, azimuth_deg, cloudiness, turbidity, seed, snow=snow, model=self.sky
-        )
-        return set_daylight(scene, light)
+        sky = SkyModel(seed, altitude_deg, turbidity, cloudiness, model=self.sky)
+        return set_daylight(scene, sky, azimuth_deg)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -85,8 +85,8 @@ class VehiclePaint(SurfaceRandomizer):
             painted = [_change_plates(body, int(rng.integers(SEEDS))) for body in painted]
         return scene.with_bodies(*painted)
 
-    def _draw_paint(self, rng: Rng) -> Material:
-        """Draw the material of a paint: colour, gloss and coat."""
+    def _draw_paint(self, rng: Rng) -> dict[str, Any]:
+        """Draw the fields of a paint's material: colour, gloss and coat."""
         names = sorted(self.weights)
         ends = [sum(self.weights[n] for n in names[: k + 1]) for k in range(len(names))]
         draw = float(rng.uniform()) * ends[-1]
@@ -97,34 +97,24 @@ class VehiclePaint(SurfaceRandomizer):
             for low, high in (paint.hue, paint.saturation, paint.value)
         )
         flakes = self.metallic.draw(rng) and name != "white"
-        material = Material(
-            base_color=hsv_to_linear(hue, saturation, value),
-            roughness=round(self.roughness.draw(rng), 4),
-            metallic=0.25 if flakes else 0.0,
-            specular=0.6,
-        )
-        coat = round(self.coat.draw(rng), 4)
-        if not coat:
-            return material
-        worn = round(_WORN * material.roughness, 4)
-        return replace(material, roughness=_PIGMENT, coat=coat, coat_roughness=worn)
+        roughness, coat = round(self.roughness.draw(rng), 4), round(self.coat.draw(rng), 4)
+        return {
+            "base_color": hsv_to_linear(hue, saturation, value),
+            "roughness": _PIGMENT if coat else roughness,
+            "metallic": 0.25 if flakes else 0.0,
+            "specular": 0.6,
+            "coat": coat,
+            "coat_roughness": round(_WORN * roughness, 4) if coat else Material().coat_roughness,
+            "texture": "",
+        }
 
 
-def _finish(body: Body, assets: AssetIndex, paint: Material | None, dirt: float) -> Body:
+def _finish(body: Body, assets: AssetIndex, paint: dict[str, Any] | None, dirt: float) -> Body:
     """Return the body with dust on it, and painted unless the paint is None."""
 
     def finish(material: Material) -> Material:
         if paint is not None and material.role == PAINT and not material.printed:
-            material = replace(
-                material,
-                base_color=paint.base_color,
-                roughness=paint.roughness,
-                metallic=paint.metallic,
-                specular=paint.specular,
-                coat=paint.coat,
-                coat_roughness=paint.coat_roughness,
-                texture="",
-            )
+            material = replace(material, **paint)
         return _soil(material, dirt) if material.role in _SOILED else material
 
     slots = body_materials(body, assets)

@@ -11,6 +11,7 @@ from typing import Any, Literal
 from pydantic import Field, field_validator
 
 from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.assets.skies.sky import SkyModel
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.config.distributions.fields import custom_error
 from gen_data.generator.core.errors import did_you_mean
@@ -19,7 +20,7 @@ from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.scene import Weather as SceneWeather
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.daylight import Daylight, draw_cloud_seed, set_daylight
+from gen_data.randomizers.daylight import draw_cloud_seed, set_daylight
 from gen_data.randomizers.time_of_day import Altitude, Turbidity
 
 _FIELDS = ("fog_extinction_per_m", "fog_height_m", "rain_mm_h", "snow_mm_h", "wetness", "puddles",
@@ -114,21 +115,18 @@ class Weather(RandomizerBase):
         del assets
         preset = PRESETS[self.preset.draw(rng)]
         condition = preset.condition
-        light = Daylight(
-            _draw(self.sun_altitude_deg, preset.sun_altitude_deg, rng),
-            self.sun_azimuth_deg.draw(rng),
-            _draw(self.cloudiness, condition.cloudiness, rng),
-            _draw(self.turbidity, condition.turbidity, rng),
-            draw_cloud_seed(rng),
-        )
+        altitude_deg = _draw(self.sun_altitude_deg, preset.sun_altitude_deg, rng)
+        azimuth_deg = self.sun_azimuth_deg.draw(rng)
+        cloudiness = _draw(self.cloudiness, condition.cloudiness, rng)
+        turbidity = _draw(self.turbidity, condition.turbidity, rng)
+        sky = SkyModel(draw_cloud_seed(rng), altitude_deg, turbidity, cloudiness)
         values: dict[str, Any] = {"seed": int(rng.integers(_PATTERNS))}
         for name in _FIELDS:
             given: dist.Scalar | None = getattr(self, name)
             if given is not None:
                 values[name] = round(given.draw(rng), 6)
         weather = replace(condition.weather, **values)
-        light = replace(light, snow=weather.snow_cover > 0.0)
-        return set_daylight(replace(scene, weather=weather), light)
+        return set_daylight(replace(scene, weather=weather), sky, azimuth_deg)
 
     @field_validator("preset")
     @classmethod
