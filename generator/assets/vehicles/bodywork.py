@@ -9,8 +9,10 @@ import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import Point2, block, rounded_box
+from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles import body_shell
 from gen_data.generator.assets.vehicles.body_shell import (
     BODY_ROWS,
@@ -24,7 +26,7 @@ from gen_data.generator.assets.vehicles.body_shell import (
 from gen_data.generator.assets.vehicles.vehicle_materials import SIDES
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.assets.vehicles.wheels import Axles
-from gen_data.generator.core.asset_types import Keypoint
+from gen_data.generator.core.asset_types import Keypoint, Material
 
 
 @dataclass(frozen=True)
@@ -122,6 +124,11 @@ class Design:
 DESIGNS = load_table(__package__, "designs", Design)
 
 
+def make_vehicle(design: Design, steer_deg: float, finish: tuple[Material, ...]) -> Solid:
+    """The vehicle of a design with steered front wheels."""
+    return make_solid([bodywork(design, steer_deg)], finish, _collision(design), _keypoints(design))
+
+
 def bodywork(design: Design, steer_deg: float) -> Patch:
     """The whole vehicle, both sides."""
     ring = body_shell.plan(*design.body_ends, sides=20)
@@ -135,7 +142,7 @@ def bodywork(design: Design, steer_deg: float) -> Patch:
     )
 
 
-def collision(design: Design) -> list[Array]:
+def _collision(design: Design) -> list[Array]:
     """Body and glass house as boxes."""
     x, y, axles = 0.5 * design.length_m, design.half_m, design.axles
     house = 0.5 * (1.0 + design.roof_share) * 0.92 * y
@@ -151,7 +158,7 @@ def collision(design: Design) -> list[Array]:
     ]  # fmt: skip
 
 
-def keypoints(design: Design) -> tuple[Keypoint, ...]:
+def _keypoints(design: Design) -> tuple[Keypoint, ...]:
     """Hubs and lamps."""
     x, y = 0.5 * design.length_m, design.half_m
     head, tail = design.lamp_m

@@ -7,16 +7,8 @@ from dataclasses import replace
 from gen_data.generator.assets.procedural.family import Facts, Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
-from gen_data.generator.assets.scenery.basic_shapes import make_solid
-from gen_data.generator.assets.vehicles.bodywork import (
-    DESIGNS,
-    Design,
-    bodywork,
-    collision,
-    keypoints,
-)
+from gen_data.generator.assets.vehicles.bodywork import DESIGNS, Design, make_vehicle
 from gen_data.generator.assets.vehicles.vehicle_materials import COLORS, draw_paint, materials
-from gen_data.generator.core.se3 import Vec3
 
 CARS = ("hatchback", "sedan", "estate", "suv", "coupe")
 VANS = ("panel_van", "minibus", "high_roof")
@@ -26,7 +18,7 @@ def car(seed: int, steer_deg: float) -> Solid:
     """A car. Slots and keypoints are those of all vehicles; positive steering turns to the left."""
     rng = variant_rng("car", seed)
     design = _vary_car(DESIGNS[in_turn(CARS, seed)], rng)
-    return _solid(design, steer_deg, draw_paint(rng), rng)
+    return make_vehicle(design, steer_deg, materials(rng, draw_paint(rng)))
 
 
 def van(seed: int, steer_deg: float) -> Solid:
@@ -36,7 +28,7 @@ def van(seed: int, steer_deg: float) -> Solid:
     draw = float(rng.random())
     white, fleet = hex_to_linear("#e6e7e6"), hex_to_linear(rng.choose(COLORS["fleets"]))
     paint = white if draw < 0.55 else (fleet if draw < 0.75 else draw_paint(rng))
-    return _solid(design, steer_deg, paint, rng)
+    return make_vehicle(design, steer_deg, materials(rng, paint))
 
 
 def car_facts(seed: int, **_: object) -> Facts:
@@ -47,11 +39,6 @@ def car_facts(seed: int, **_: object) -> Facts:
 def van_facts(seed: int, **_: object) -> Facts:
     """Its kind."""
     return Facts(in_turn(VANS, seed))
-
-
-def _solid(design: Design, steer_deg: float, paint: Vec3, rng: VariantRng) -> Solid:
-    finish = materials(rng, paint)
-    return make_solid([bodywork(design, steer_deg)], finish, collision(design), keypoints(design))
 
 
 def _vary_car(design: Design, rng: VariantRng) -> Design:
