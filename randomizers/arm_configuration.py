@@ -99,15 +99,9 @@ def hand_pose(
         tilt_rad: Tilt of the hand from the vertical.
         towards_rad: Direction of the horizontal axis of the tilt.
     """
-    half = 0.5 * tilt_rad
-    lean = SE3(
-        quaternion_wxyz=(
-            math.cos(half),
-            math.sin(half) * math.cos(towards_rad),
-            math.sin(half) * math.sin(towards_rad),
-            0.0,
-        )
-    )
+    cosine, sine = math.cos(0.5 * tilt_rad), math.sin(0.5 * tilt_rad)
+    axis = (sine * math.cos(towards_rad), sine * math.sin(towards_rad), 0.0)
+    lean = SE3(quaternion_wxyz=(cosine, *axis))
     return (SE3(position_m) @ lean @ SE3.about_z(yaw_rad) @ FLIP).rounded()
 
 

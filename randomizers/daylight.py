@@ -80,16 +80,10 @@ def _sun(model: SkyModel, yaw_rad: float) -> tuple[Light, ...]:
         round(-level * math.sin(yaw_rad), 6),
         round(-math.sin(altitude), 6),
     )
-    return (
-        Light(
-            SUN,
-            "sun",
-            direction=direction,
-            color=sun_color(altitude, model.turbidity),
-            illuminance_lux=_significant(lux),
-            angular_radius_rad=round(sun_radius_rad(model.cloudiness), 6),
-        ),
-    )
+    color, lux = sun_color(altitude, model.turbidity), _significant(lux)
+    light = Light(SUN, "sun", direction=direction, color=color, illuminance_lux=lux)
+    radius_rad = round(sun_radius_rad(model.cloudiness), 6)
+    return (replace(light, angular_radius_rad=radius_rad),)
 
 
 def _significant(value: float) -> float:

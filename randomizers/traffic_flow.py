@@ -244,15 +244,8 @@ class TrafficFlow(RandomizerBase):
                 graph = walks.crosswalks
             axis = graph.lines[member.place.lane].pose(member.place.at_m).rotation()[:2, 0]
             forward = bool(ahead[0] * axis[0] + ahead[1] * axis[1] >= 0.0)
-            path = draw_path(
-                walks,
-                member.place.lane,
-                member.place.at_m,
-                forward,
-                speed_m_s * self.duration_s + 2.0,
-                self.crossing,
-                rng,
-            )
+            place, length_m = member.place, speed_m_s * self.duration_s + 2.0
+            path = draw_path(walks, place.lane, place.at_m, forward, length_m, self.crossing, rng)
             left_m = member.place.left_m if forward else -member.place.left_m
             pedestrians.append(
                 Pedestrian(member.body.name, (x, y), ahead, speed_m_s, path, left_m)

@@ -14,7 +14,7 @@ from gen_data.generator.assets.procedural.surface_shapes import block
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, Deck, surface
 from gen_data.generator.assets.roads.markings import ZEBRA_BAR_M, bay_lines, paint_stripe, stripes
-from gen_data.generator.assets.roads.road_materials import street_materials
+from gen_data.generator.assets.roads.road_materials import SLOT_OF, street_materials
 from gen_data.generator.roads.cross_section import (
     APRON_DROPS,
     APRON_FALL_M,
@@ -64,17 +64,12 @@ def road(  # noqa: PLR0913 - a family's parameters are its function's
     profile = RoadShape(**shape)
     deck = make_deck(profile, seed, wear, paving, ground)
     rng = variant_rng("road", seed)
-    patches = [
-        *_carriageway(deck, profile),
-        *(p for side in (1, -1) for p in _beside(deck, profile, side, apron_m)),
-        *(
-            patch
-            for stripe in stripes(profile, markings, edge_lines, dash_m, line_m)
-            for patch in paint_stripe(deck, stripe, profile.length_m)
-        ),
-        *_wear(deck, profile, wear, rng),
-        *_covers(deck, profile, rng),
-    ]
+    patches = list(_carriageway(deck, profile))
+    for side in (1, -1):
+        patches += _beside(deck, profile, side, apron_m)
+    for stripe in stripes(profile, markings, edge_lines, dash_m, line_m):
+        patches += paint_stripe(deck, stripe, profile.length_m)
+    patches += [*_wear(deck, profile, wear, rng), *_covers(deck, profile, rng)]
     for side in (1, -1):
         for strip in strips(profile, side):
             if strip.kind == "parking":
@@ -109,24 +104,13 @@ def _columns(profile: RoadShape) -> Iterator[float]:
                 yield side * (strip.inner_m + _BATTER_M)
 
 
-_SLOT_OF = {
-    "median": "verge",
-    "driving": "asphalt",
-    "bicycle": "asphalt_new",
-    "shoulder": "asphalt",
-    "parking": "asphalt_new",
-    "verge": "verge",
-    "sidewalk": "pavement",
-}
-
-
 def _carriageway(deck: Deck, profile: RoadShape) -> Iterator[Patch]:
     for side in (1, -1):
         for strip in strips(profile, side):
             if strip.kind != "kerb":
                 t0, t1 = sorted((side * strip.inner_m, side * strip.outer_m))
                 t = deck.t_m[(deck.t_m >= t0 - 1e-6) & (deck.t_m <= t1 + 1e-6)]
-                yield deck.ribbon((0.0, profile.length_m), tuple(t), _SLOT_OF[strip.kind])
+                yield deck.ribbon((0.0, profile.length_m), tuple(t), SLOT_OF[strip.kind])
 
 
 def _beside(deck: Deck, profile: RoadShape, side: int, apron_m: float) -> Iterator[Patch]:

@@ -6,22 +6,12 @@ cities", LBNL-43442, 2000 (new asphalt 0.04-0.05, aged 0.1-0.15, concrete 0.25-0
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
 
-SCALES_M: Mapping[str, float] = {
-    "asphalt": 6.0,
-    "asphalt_new": 5.0,
-    "marking": 2.0,
-    "kerb": 2.0,
-    "pavement": 3.0,
-    "verge": 5.0,
-    "ground": 7.0,
-}
-"""Length of one repeat of a slot's texture; other slots give their own coordinates."""
-
+SCALES_M = load_table(__package__, "texture_scales", float)
+SLOT_OF = load_table(__package__, "slots", str)
 GROUNDS = ("grass", "paving", "cobbles", "gravel", "earth", "asphalt")
 """Covers of the land, each a family of textures."""
 
