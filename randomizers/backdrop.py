@@ -52,11 +52,6 @@ class Backdrop(RandomizerBase):
         floors, walls = self._find_options(assets)
         return find_texture_files(assets, (*floors, *walls))
 
-    def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raise ConfigError if a name matches no texture."""
-        del scene
-        self._find_options(assets)
-
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with new materials on every background body."""
         floors, walls = self._find_options(assets)

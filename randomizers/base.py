@@ -38,7 +38,11 @@ class RandomizerBase(Strict):
         return None
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
-        """Ids of the assets that only this randomizer can add to a scene; part of the plan."""
+        """Ids of the assets that only this randomizer can add to a scene; part of the plan.
+
+        Raises:
+            ConfigError: a field names an asset that is unknown.
+        """
         del assets
         return ()
 
@@ -49,9 +53,13 @@ class RandomizerBase(Strict):
     def check(self, scene: Scene, assets: AssetIndex) -> None:
         """Check the names in its fields against a nominal scene and the library, before a run.
 
+        By default the names of assets are checked.
+
         Raises:
             ConfigError: a name is unknown; the text begins with ``randomizers.<name>.<field>: ``.
         """
+        del scene
+        self.possible_assets(assets)
 
     @abstractmethod
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:

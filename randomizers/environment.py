@@ -34,24 +34,6 @@ class EnvironmentLight(RandomizerBase):
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
         """Ids of the environment maps to draw from."""
-        return self._find_options(assets)
-
-    def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raise ConfigError if no environment has one of the names."""
-        del scene
-        self._find_options(assets)
-
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with a drawn environment map."""
-        environment = Environment(
-            image=choose(self._find_options(assets), rng),
-            luminance_cd_m2=round(self.luminance_cd_m2.draw(rng), 4),
-            yaw_rad=round(math.radians(self.yaw_deg.draw(rng)), 6),
-            visible=self.visible,
-        )
-        return replace(scene, environment=environment)
-
-    def _find_options(self, assets: AssetIndex) -> tuple[str, ...]:
         every = assets.find((), kind="environment")
         fitting = tuple(
             a.asset_id
@@ -66,3 +48,13 @@ class EnvironmentLight(RandomizerBase):
                 f"expected one of {', '.join(known)}{did_you_mean(self.images[0], known)}"
             )
         return fitting
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """Return the scene with a drawn environment map."""
+        environment = Environment(
+            image=choose(self.possible_assets(assets), rng),
+            luminance_cd_m2=round(self.luminance_cd_m2.draw(rng), 4),
+            yaw_rad=round(math.radians(self.yaw_deg.draw(rng)), 6),
+            visible=self.visible,
+        )
+        return replace(scene, environment=environment)

@@ -38,11 +38,6 @@ class Textures(SurfaceRandomizer):
         """Ids of the texture files to draw from."""
         return find_texture_files(assets, self._find_options(assets))
 
-    def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raise ConfigError if a name matches no texture."""
-        del scene
-        self._find_options(assets)
-
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with one texture per target."""
         options = self._find_options(assets)
