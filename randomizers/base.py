@@ -88,8 +88,8 @@ class SurfaceRandomizer(RandomizerBase):
         """
         groups = {group.name for group in scene.groups}
         owners = {body.name.partition("/")[0] for body in scene.bodies}
+        known = sorted(groups | owners)
         for target in self.targets:
-            known = sorted(groups | owners)
             check_known(target, known, f"randomizers.{self.name}.targets: there is no")
         wanted = set(self.targets) or groups
         for body in scene.bodies:
@@ -150,8 +150,9 @@ def find_textures(assets: AssetIndex, names: tuple[str, ...], field: str) -> tup
     """
     textures = assets.find((), kind="texture")
     by_word = _BY_WORD.get(textures, lambda: _by_word(textures))
+    known = sorted(by_word)
     for name in names:
-        check_known(name, sorted(by_word), f"{field}: there is no texture")
+        check_known(name, known, f"{field}: there is no texture")
     return tuple(sorted({texture for name in names for texture in by_word[name]}))
 
 
@@ -186,13 +187,13 @@ def set_emission(body: Body, assets: AssetIndex, emission_cd_m2: Mapping[str, Ve
 
 def add_attributes(scene: Scene, attributes: Mapping[int, Iterable[tuple[str, str]]]) -> Scene:
     """Return the scene with attributes added to those of some instances, by instance id."""
-    instances = tuple(
-        replace(i, attributes=tuple(sorted((dict(i.attributes) | dict(attributes[k])).items())))
-        if (k := i.instance_id) in attributes
-        else i
-        for i in scene.instances
-    )
-    return replace(scene, instances=instances)
+    instances = []
+    for instance in scene.instances:
+        if instance.instance_id in attributes:
+            merged = dict(instance.attributes) | dict(attributes[instance.instance_id])
+            instance = replace(instance, attributes=tuple(sorted(merged.items())))  # noqa: PLW2901
+        instances.append(instance)
+    return replace(scene, instances=tuple(instances))
 
 
 def scale_emission(color: Vec3, luminance_cd_m2: float) -> Vec3:
