@@ -8,14 +8,13 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.config.distributions import Choice, Name, NonNegative, Uniform, UnitInterval
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.asset_types import Joint, RobotModel
-from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import ArmGoal, Articulation, Body, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.base import RandomizerBase, check_known
 from gen_data.randomizers.placement import half_extents_m
 
 MODES = ("joints", "reach", "hold")
@@ -40,29 +39,21 @@ class ArmConfiguration(RandomizerBase):
 
     type: Literal["arm_configuration"] = "arm_configuration"
     stage: Literal["scene"] = "scene"
-    mode: Name = Choice({"joints": 1.0, "reach": 2.0, "hold": 1.0})
+    mode: dist.Name = dist.Choice({"joints": 1.0, "reach": 2.0, "hold": 1.0})
     candidates: int = Field(24, ge=1, le=256)
     range_share: float = Field(0.9, gt=0, le=1)
-    tilt_deg: NonNegative = Uniform(0.0, 35.0)
-    opening: UnitInterval = Uniform(0.0, 1.0)
+    tilt_deg: dist.NonNegative = dist.Uniform(0.0, 35.0)
+    opening: dist.UnitInterval = dist.Uniform(0.0, 1.0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with a goal for every arm."""
-        return replace(
-            scene,
-            articulations=tuple(
-                replace(arm, goal=self._draw_goal(arm, scene, assets, rng))
-                for arm in scene.articulations
-            ),
-        )
+        arms = scene.articulations
+        arms = tuple(replace(a, goal=self._draw_goal(a, scene, assets, rng)) for a in arms)
+        return replace(scene, articulations=arms)
 
     def _draw_goal(self, arm: Articulation, scene: Scene, assets: AssetIndex, rng: Rng) -> ArmGoal:
         mode = self.mode.draw(rng)
-        if mode not in MODES:
-            raise ConfigError(
-                f"randomizers.{self.name}.mode: unknown mode '{mode}'; expected one of "
-                f"{', '.join(MODES)}{did_you_mean(mode, MODES)}"
-            )
+        check_known(mode, MODES, f"randomizers.{self.name}.mode: unknown mode")
         robot = assets.robot(arm.asset)
         opening = round(self.opening.draw(rng), 4)
         held = _draw_graspable(scene, robot, assets, rng) if mode == "hold" else ""
@@ -87,7 +78,7 @@ class ArmConfiguration(RandomizerBase):
         return round(middle + half * float(rng.uniform(-1.0, 1.0)), 6)
 
 
-def draw_hand_pose(arm: Articulation, tilt_deg: NonNegative, rng: Rng) -> SE3:
+def draw_hand_pose(arm: Articulation, tilt_deg: dist.NonNegative, rng: Rng) -> SE3:
     """Draw ``T_world_grasp`` in an arm's workspace, pointing down with a tilt in any direction."""
     low, high = arm.workspace_m
     x, y, z = (float(rng.uniform(a, b)) for a, b in zip(low, high, strict=True))
@@ -108,15 +99,9 @@ def hand_pose(
         tilt_rad: Tilt of the hand from the vertical.
         towards_rad: Direction of the horizontal axis of the tilt.
     """
-    half = 0.5 * tilt_rad
-    lean = SE3(
-        quaternion_wxyz=(
-            math.cos(half),
-            math.sin(half) * math.cos(towards_rad),
-            math.sin(half) * math.sin(towards_rad),
-            0.0,
-        )
-    )
+    cosine, sine = math.cos(0.5 * tilt_rad), math.sin(0.5 * tilt_rad)
+    axis = (sine * math.cos(towards_rad), sine * math.sin(towards_rad), 0.0)
+    lean = SE3(quaternion_wxyz=(cosine, *axis))
     return (SE3(position_m) @ lean @ SE3.about_z(yaw_rad) @ FLIP).rounded()
 
 
@@ -137,5 +122,4 @@ def _draw_graspable(scene: Scene, robot: RobotModel, assets: AssetIndex, rng: Rn
 
 def _width_m(body: Body, assets: AssetIndex) -> float:
     """Smaller horizontal extent of an upright object."""
-    half = half_extents_m(*assets.bounds_m(body.asset), body.scale)
-    return 2.0 * min(half[0], half[1])
+    return 2.0 * min(half_extents_m(*assets.bounds_m(body.asset), body.scale)[:2])

@@ -8,16 +8,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.distributions import (
-    Bounds,
-    Choice,
-    Name,
-    NonNegative,
-    Scalar,
-    Uniform,
-)
-from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import ArmGoal, Articulation, Body, Scene, SupportSurface
 from gen_data.generator.core.se3 import SE3
@@ -28,7 +21,7 @@ from gen_data.randomizers.arm_configuration import (
     draw_hand_pose,
     hand_pose,
 )
-from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.base import RandomizerBase, check_known
 from gen_data.randomizers.placement import half_extents_m
 
 TASKS = ("pick_and_place", "reach")
@@ -37,7 +30,7 @@ EDGE_M = 0.08
 CANDIDATES_MAX = 12
 """Largest number of objects to try in turn."""
 
-Speed = Annotated[Scalar, Bounds(0.01, 1.0)]
+Speed = Annotated[dist.Scalar, dist.Bounds(0.01, 1.0)]
 
 
 class Stop(Strict):
@@ -89,37 +82,28 @@ class ArmMotion(RandomizerBase):
 
     type: Literal["arm_motion"] = "arm_motion"
     stage: Literal["scene"] = "scene"
-    task: Name = Choice({"pick_and_place": 1.0})
+    task: dist.Name = dist.Choice({"pick_and_place": 1.0})
     way: tuple[Stop, ...] = ()
     objects: tuple[str, ...] = ()
     count: int = Field(1, ge=1, le=20)
     candidates: int = Field(16, ge=1, le=256)
-    tilt_deg: NonNegative = Uniform(0.0, 25.0)
-    speed: Speed = Uniform(0.4, 0.7)
+    tilt_deg: dist.NonNegative = dist.Uniform(0.0, 25.0)
+    speed: Speed = dist.Uniform(0.4, 0.7)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with a sequence of goals for every arm.
-
-        Raises:
-            ConfigError: a task, group or surface is unknown, or the number of joints is wrong.
-        """
-        return replace(
-            scene,
-            articulations=tuple(
-                replace(arm, task=self._draw_goals(arm, scene, assets, rng))
-                for arm in scene.articulations
-            ),
-        )
+        """Return the scene with a sequence of goals for every arm."""
+        arms = scene.articulations
+        arms = tuple(replace(a, task=self._draw_goals(a, scene, assets, rng)) for a in arms)
+        return replace(scene, articulations=arms)
 
     def _draw_goals(
         self, arm: Articulation, scene: Scene, assets: AssetIndex, rng: Rng
     ) -> tuple[ArmGoal, ...]:
         speed = round(self.speed.draw(rng), 4)
         if self.way:
+            where = f"randomizers.{self.name}.way"
             goals = [
-                self._goal_at_stop(
-                    stop, f"randomizers.{self.name}.way[{k}]", arm, scene, assets, rng
-                )
+                self._goal_at_stop(stop, f"{where}[{k}]", arm, scene, assets, rng)
                 for k, stop in enumerate(self.way)
             ]
         elif self._draw_task(rng) == "reach" or assets.robot(arm.asset).gripper is None:
@@ -130,11 +114,7 @@ class ArmMotion(RandomizerBase):
 
     def _draw_task(self, rng: Rng) -> str:
         task = self.task.draw(rng)
-        if task not in TASKS:
-            raise ConfigError(
-                f"randomizers.{self.name}.task: unknown task '{task}'; expected one of "
-                f"{', '.join(TASKS)}{did_you_mean(task, TASKS)}"
-            )
+        check_known(task, TASKS, f"randomizers.{self.name}.task: unknown task")
         return task
 
     def _draw_reach_goal(self, arm: Articulation, assets: AssetIndex, rng: Rng) -> ArmGoal:
@@ -162,22 +142,13 @@ class ArmMotion(RandomizerBase):
         return goals
 
     def _draw_graspable(
-        self,
-        arm: Articulation,
-        groups: tuple[str, ...],
-        scene: Scene,
-        assets: AssetIndex,
-        rng: Rng,
+        self, arm: Articulation, groups: tuple[str, ...], scene: Scene, assets: AssetIndex, rng: Rng
     ) -> tuple[str, ...]:
         """Draw an order of the objects with a side that fits between the fingers."""
         gripper = assets.robot(arm.asset).gripper
         known = [group.name for group in scene.groups]
         for name in groups:
-            if name not in known:
-                raise ConfigError(
-                    f"randomizers.{self.name}: there is no object group '{name}'; expected one of "
-                    f"{', '.join(known)}{did_you_mean(name, known)}"
-                )
+            check_known(name, known, f"randomizers.{self.name}: there is no object group")
         limit_m = GRASP_MARGIN * gripper.stroke_m if gripper else 0.0
         wanted = groups or tuple(known)
         held = arm.goal.grasped_object if arm.goal else ""
@@ -206,23 +177,15 @@ class ArmMotion(RandomizerBase):
         )
 
     def _goal_at_stop(
-        self,
-        stop: Stop,
-        field: str,
-        arm: Articulation,
-        scene: Scene,
-        assets: AssetIndex,
-        rng: Rng,
+        self, stop: Stop, field: str, arm: Articulation, scene: Scene, assets: AssetIndex, rng: Rng
     ) -> ArmGoal:
         if stop.grasp:
-            return ArmGoal(
-                "grasp", objects=self._draw_graspable(arm, stop.grasp, scene, assets, rng)
-            )
+            names = self._draw_graspable(arm, stop.grasp, scene, assets, rng)
+            return ArmGoal("grasp", objects=names)
         yaw_rad = math.radians(stop.yaw_deg)
         if stop.place_m:
-            return ArmGoal(
-                "place", pose_candidates=(_pose_on_surface(stop, yaw_rad, scene, field),)
-            )
+            pose = _pose_on_surface(stop, yaw_rad, scene, field)
+            return ArmGoal("place", pose_candidates=(pose,))
         if stop.reach_m:
             tilt_rad, towards_rad = math.radians(stop.tilt_deg), math.radians(stop.towards_deg)
             pose = hand_pose(stop.reach_m, yaw_rad, tilt_rad, towards_rad)

@@ -8,13 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from gen_data.generator.assets.procedural.furniture import SLOTS
-from gen_data.generator.config.distributions import (
-    Flag,
-    Positive,
-    Probability,
-    Uniform,
-    UnitInterval,
-)
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Scene
@@ -45,23 +39,18 @@ class Backdrop(RandomizerBase):
 
     type: Literal["backdrop"] = "backdrop"
     floor: tuple[str, ...] = Field(("floor",), min_length=1)
-    floor_scale_m: Positive = Uniform(0.8, 2.0)
+    floor_scale_m: dist.Positive = dist.Uniform(0.8, 2.0)
     walls: tuple[str, ...] = Field(("wall",), min_length=1)
-    wall_scale_m: Positive = Uniform(0.8, 2.0)
-    painted: Flag = Probability(0.6)
-    hue: UnitInterval = Uniform(0.0, 1.0)
-    saturation: UnitInterval = Uniform(0.0, 0.35)
-    value: UnitInterval = Uniform(0.55, 0.95)
+    wall_scale_m: dist.Positive = dist.Uniform(0.8, 2.0)
+    painted: dist.Flag = dist.Probability(0.6)
+    hue: dist.UnitInterval = dist.Uniform(0.0, 1.0)
+    saturation: dist.UnitInterval = dist.Uniform(0.0, 0.35)
+    value: dist.UnitInterval = dist.Uniform(0.55, 0.95)
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
         """Ids of the texture files to draw from."""
         floors, walls = self._find_options(assets)
         return find_texture_files(assets, (*floors, *walls))
-
-    def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raise ConfigError if a name matches no texture."""
-        del scene
-        self._find_options(assets)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with new materials on every background body."""

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.asset_types import Asset, Material
 from gen_data.generator.core.bounded_cache import ObjectCache
-from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.se3 import Vec3
@@ -38,20 +38,37 @@ class RandomizerBase(Strict):
         return None
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
-        """Ids of the assets that only this randomizer can add to a scene; part of the plan."""
+        """Ids of the assets that only this randomizer can add to a scene; part of the plan.
+
+        Raises:
+            ConfigError: a field names an asset that is unknown.
+        """
         del assets
         return ()
+
+    def reject(self, reason: str, remedy: str) -> LayoutRejected:
+        """Rejection of a drawn layout; the text of the remedy ends with the randomizer's name."""
+        return LayoutRejected(Rejection(reason, f"{remedy} (randomizers.{self.name})"))
 
     def check(self, scene: Scene, assets: AssetIndex) -> None:
         """Check the names in its fields against a nominal scene and the library, before a run.
 
+        By default the names of assets are checked.
+
         Raises:
             ConfigError: a name is unknown; the text begins with ``randomizers.<name>.<field>: ``.
         """
+        del scene
+        self.possible_assets(assets)
 
     @abstractmethod
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return a new scene; the one passed in is unchanged."""
+        """Return a new scene; the one passed in is unchanged.
+
+        Raises:
+            ConfigError: a field names something unknown, or the scene lacks what it needs.
+            LayoutRejected: no free or possible place was found; another draw may succeed.
+        """
 
 
 class SurfaceRandomizer(RandomizerBase):
@@ -71,17 +88,43 @@ class SurfaceRandomizer(RandomizerBase):
         """
         groups = {group.name for group in scene.groups}
         owners = {body.name.partition("/")[0] for body in scene.bodies}
+        known = sorted(groups | owners)
         for target in self.targets:
-            if target not in groups | owners:
-                known = sorted(groups | owners)
-                raise ConfigError(
-                    f"randomizers.{self.name}.targets: there is no '{target}'; expected one of "
-                    f"{', '.join(known)}{did_you_mean(target, known)}"
-                )
+            check_known(target, known, f"randomizers.{self.name}.targets: there is no")
         wanted = set(self.targets) or groups
         for body in scene.bodies:
             if body.group in wanted or body.name.partition("/")[0] in wanted:
                 yield body
+
+    def change_targets(
+        self,
+        scene: Scene,
+        assets: AssetIndex,
+        draw: Callable[[], Mapping[str, Any] | None],
+        slots: tuple[int, ...] = (),
+    ) -> Scene:
+        """Return the scene with the materials of its targets changed, except printed ones.
+
+        Args:
+            scene: The scene.
+            assets: Library of its assets.
+            draw: Draws the changed fields of one target's materials; None = no change.
+            slots: Indices of the materials to change; empty = all.
+        """
+        changed = []
+        for body in self.find_targets(scene):
+            fields = draw()
+            if fields is not None:
+                changed.append(_set_materials(body, assets, fields, slots))
+        return scene.with_bodies(*changed)
+
+
+def check_known(name: str, known: Collection[str], fault: str) -> None:
+    """Raise ConfigError with a text that begins with ``fault`` if a name is not among the known."""
+    if name not in known:
+        raise ConfigError(
+            f"{fault} '{name}'; expected one of {', '.join(known)}{did_you_mean(name, known)}"
+        )
 
 
 def body_materials(body: Body, assets: AssetIndex) -> tuple[Material, ...]:
@@ -89,11 +132,12 @@ def body_materials(body: Body, assets: AssetIndex) -> tuple[Material, ...]:
     return body.materials or assets.materials(body.asset)
 
 
-def set_materials(body: Body, assets: AssetIndex, change: Callable[[Material], Material]) -> Body:
-    """Return the body with every material changed except printed ones."""
+def _set_materials(
+    body: Body, assets: AssetIndex, fields: Mapping[str, Any], slots: tuple[int, ...]
+) -> Body:
     changed = tuple(
-        material if material.printed else change(material)
-        for material in body_materials(body, assets)
+        material if material.printed or (slots and k not in slots) else replace(material, **fields)
+        for k, material in enumerate(body_materials(body, assets))
     )
     return replace(body, materials=changed)
 
@@ -106,13 +150,9 @@ def find_textures(assets: AssetIndex, names: tuple[str, ...], field: str) -> tup
     """
     textures = assets.find((), kind="texture")
     by_word = _BY_WORD.get(textures, lambda: _by_word(textures))
+    known = sorted(by_word)
     for name in names:
-        if name not in by_word:
-            known = sorted(by_word)
-            raise ConfigError(
-                f"{field}: there is no texture '{name}'; expected one of {', '.join(known)}"
-                f"{did_you_mean(name, known)}"
-            )
+        check_known(name, known, f"{field}: there is no texture")
     return tuple(sorted({texture for name in names for texture in by_word[name]}))
 
 
@@ -143,6 +183,17 @@ def set_emission(body: Body, assets: AssetIndex, emission_cd_m2: Mapping[str, Ve
             replace(m, emission_cd_m2=emission_cd_m2.get(m.role, m.emission_cd_m2)) for m in slots
         ),
     )
+
+
+def add_attributes(scene: Scene, attributes: Mapping[int, Iterable[tuple[str, str]]]) -> Scene:
+    """Return the scene with attributes added to those of some instances, by instance id."""
+    instances = []
+    for instance in scene.instances:
+        if instance.instance_id in attributes:
+            merged = dict(instance.attributes) | dict(attributes[instance.instance_id])
+            instance = replace(instance, attributes=tuple(sorted(merged.items())))  # noqa: PLW2901
+        instances.append(instance)
+    return replace(scene, instances=tuple(instances))
 
 
 def scale_emission(color: Vec3, luminance_cd_m2: float) -> Vec3:

@@ -6,15 +6,15 @@ import math
 from dataclasses import replace
 from typing import Annotated, Literal
 
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.distributions import Bounds, Normal, Scalar, Uniform
-from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.lens import COEFFICIENTS, Lens
 from gen_data.generator.core.scene import Camera, Scene
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.base import RandomizerBase, check_known
 
 PINHOLE_MAX_DEG = 170.0
 
@@ -27,14 +27,14 @@ class Coefficients(Strict):
         p1, p2: Tangential terms.
     """
 
-    k1: Scalar | None = None
-    k2: Scalar | None = None
-    k3: Scalar | None = None
-    k4: Scalar | None = None
-    k5: Scalar | None = None
-    k6: Scalar | None = None
-    p1: Scalar | None = None
-    p2: Scalar | None = None
+    k1: dist.Scalar | None = None
+    k2: dist.Scalar | None = None
+    k3: dist.Scalar | None = None
+    k4: dist.Scalar | None = None
+    k5: dist.Scalar | None = None
+    k6: dist.Scalar | None = None
+    p1: dist.Scalar | None = None
+    p2: dist.Scalar | None = None
 
 
 class CameraIntrinsics(RandomizerBase):
@@ -50,24 +50,16 @@ class CameraIntrinsics(RandomizerBase):
     type: Literal["camera_intrinsics"] = "camera_intrinsics"
     stage: Literal["scene", "view"] = "view"
     camera: str = ""
-    hfov_deg: Annotated[Scalar, Bounds(1, 360)] | None = Uniform(50.0, 70.0)
-    principal_offset_px: Scalar = Normal(0.0, 3.0, clip=(-10.0, 10.0))
+    hfov_deg: Annotated[dist.Scalar, dist.Bounds(1, 360)] | None = dist.Uniform(50.0, 70.0)
+    principal_offset_px: dist.Scalar = dist.Normal(0.0, 3.0, clip=(-10.0, 10.0))
     lens: Coefficients = Coefficients()
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with drawn lenses; lens models and image sizes stay.
-
-        Raises:
-            ConfigError: the camera is unknown, or its lens model lacks a drawn coefficient.
-            LayoutRejected: the drawn distortion folds over inside the image.
-        """
+        """Return the scene with drawn lenses; lens models and image sizes stay."""
         del assets
         known = [camera.name for camera in scene.cameras]
-        if self.camera and self.camera not in known:
-            raise ConfigError(
-                f"randomizers.{self.name}.camera: there is no camera '{self.camera}'; expected one "
-                f"of {', '.join(known)}{did_you_mean(self.camera, known)}"
-            )
+        if self.camera:
+            check_known(self.camera, known, f"randomizers.{self.name}.camera: there is no camera")
         cameras = tuple(
             self._draw_intrinsics(camera, rng) if self.camera in ("", camera.name) else camera
             for camera in scene.cameras
@@ -87,11 +79,8 @@ class CameraIntrinsics(RandomizerBase):
                 drawn = Intrinsics.from_hfov(before.width_px, before.height_px, hfov_rad, lens)
         except ValueError as error:
             raise self._rejection() from error
-        drawn = replace(
-            drawn,
-            cx_px=round(drawn.cx_px + offset_x, 4),
-            cy_px=round(drawn.cy_px + offset_y, 4),
-        )
+        cx_px, cy_px = round(drawn.cx_px + offset_x, 4), round(drawn.cy_px + offset_y, 4)
+        drawn = replace(drawn, cx_px=cx_px, cy_px=cy_px)
         if drawn.folds_over():
             raise self._rejection()
         return replace(camera, intrinsics=drawn)
@@ -99,7 +88,7 @@ class CameraIntrinsics(RandomizerBase):
     def _draw_lens(self, before: Lens, rng: Rng) -> Lens:
         drawn = []
         for name, default in zip(COEFFICIENTS[before.model], before.coefficients, strict=True):
-            given: Scalar | None = getattr(self.lens, name)
+            given: dist.Scalar | None = getattr(self.lens, name)
             drawn.append(default if given is None else round(given.draw(rng), 9))
         return replace(before, coefficients=tuple(drawn))
 

@@ -8,16 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config.distributions import (
-    Bounds,
-    Constant,
-    Flag,
-    NonNegative,
-    Normal,
-    Positive,
-    Scalar,
-)
-from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection
+from gen_data.generator.config import distributions as dist
+from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.lane_geometry import LaneLine
 from gen_data.generator.core.scene import Camera, LaneKind, Scene
@@ -55,24 +47,21 @@ class CameraOnLane(RandomizerBase):
     stage: Literal["scene", "view"] = "view"
     lanes: tuple[LaneKind, ...] = ("driving",)
     roads: tuple[str, ...] = ()
-    height_m: Positive = Constant(1.65)
-    lateral: Annotated[Scalar, Bounds(-1, 1)] = Constant(0.0)
-    yaw_deg: Scalar = Normal(0.0, 1.0, clip=(-3.0, 3.0))
-    pitch_deg: Annotated[Scalar, Bounds(-89, 89)] = Normal(0.0, 0.7, clip=(-2.0, 2.0))
-    roll_deg: Scalar = Normal(0.0, 0.5, clip=(-2.0, 2.0))
-    reversed: Flag = Constant(False)
+    height_m: dist.Positive = dist.Constant(1.65)
+    lateral: Annotated[dist.Scalar, dist.Bounds(-1, 1)] = dist.Constant(0.0)
+    yaw_deg: dist.Scalar = dist.Normal(0.0, 1.0, clip=(-3.0, 3.0))
+    pitch_deg: Annotated[dist.Scalar, dist.Bounds(-89, 89)] = dist.Normal(
+        0.0, 0.7, clip=(-2.0, 2.0)
+    )
+    roll_deg: dist.Scalar = dist.Normal(0.0, 0.5, clip=(-2.0, 2.0))
+    reversed: dist.Flag = dist.Constant(False)
     ahead_m: float = Field(40.0, ge=0)
     free_m: tuple[float, float] = (4.6, 1.9)
     clearance_m: float = Field(0.3, ge=0)
-    beam_cd: NonNegative = Constant(0.0)
+    beam_cd: dist.NonNegative = dist.Constant(0.0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with all cameras without a rig at one pose.
-
-        Raises:
-            ConfigError: the scene has no lane of these kinds and roads.
-            LayoutRejected: no free place was found.
-        """
+        """Return the scene with all cameras without a rig at one pose."""
         lines = [LaneLine(lane) for lane in scene.lanes if lane.kind in self.lanes]
         lines = [
             line
@@ -93,8 +82,8 @@ class CameraOnLane(RandomizerBase):
                 cameras = tuple(c if c.rig else _move_camera(c, pose[1]) for c in scene.cameras)
                 lit = replace(scene, cameras=cameras)
                 return self._add_beams(lit, pose[0], self.beam_cd.draw(rng))
-        remedy = f"other lanes, a smaller free_m, or less traffic (randomizers.{self.name})"
-        raise LayoutRejected(Rejection("no free place for a camera on a lane", remedy))
+        remedy = "other lanes, a smaller free_m, or less traffic"
+        raise self.reject("no free place for a camera on a lane", remedy)
 
     def _draw_pose(
         self, lines: list[LaneLine], ground: Ground, scene: Scene, assets: AssetIndex, rng: Rng

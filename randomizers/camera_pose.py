@@ -8,15 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config.distributions import (
-    Bounds,
-    NonNegative,
-    Normal,
-    Positive,
-    Scalar,
-    Uniform,
-)
-from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from gen_data.generator.config import distributions as dist
+from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Camera, Scene
 from gen_data.generator.core.se3 import look_at
@@ -43,20 +36,15 @@ class CameraPose(RandomizerBase):
     type: Literal["camera_pose"] = "camera_pose"
     stage: Literal["scene", "view"] = "view"
     camera: str = ""
-    distance_m: Positive = Uniform(0.8, 1.3)
-    azimuth_deg: Scalar = Uniform(0.0, 360.0)
-    elevation_deg: Annotated[Scalar, Bounds(-90, 90)] = Uniform(25.0, 65.0)
-    jitter_m: NonNegative = Uniform(0.0, 0.1)
-    roll_deg: Scalar = Normal(0.0, 3.0, clip=(-10.0, 10.0))
+    distance_m: dist.Positive = dist.Uniform(0.8, 1.3)
+    azimuth_deg: dist.Scalar = dist.Uniform(0.0, 360.0)
+    elevation_deg: Annotated[dist.Scalar, dist.Bounds(-90, 90)] = dist.Uniform(25.0, 65.0)
+    jitter_m: dist.NonNegative = dist.Uniform(0.0, 0.1)
+    roll_deg: dist.Scalar = dist.Normal(0.0, 3.0, clip=(-10.0, 10.0))
     clearance_m: float = Field(0.1, ge=0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with its cameras moved, all outside of bodies and inside the room.
-
-        Raises:
-            ConfigError: the camera is unknown or on a rig.
-            LayoutRejected: no free place was found.
-        """
+        """Return the scene with its cameras moved, all outside of bodies and inside the room."""
         known = [camera.name for camera in scene.cameras if not camera.rig]
         if self.camera and self.camera not in known:
             raise ConfigError(
@@ -89,9 +77,5 @@ class CameraPose(RandomizerBase):
             )
             if is_in_the_open(eye, scene, assets, self.clearance_m):
                 return replace(camera, T_world_camera=look_at(eye, target, roll).rounded())
-        raise LayoutRejected(
-            Rejection(
-                "no free place for a camera",
-                f"other distance_m, azimuth_deg or elevation_deg (randomizers.{self.name})",
-            )
-        )
+        remedy = "other distance_m, azimuth_deg or elevation_deg"
+        raise self.reject("no free place for a camera", remedy)

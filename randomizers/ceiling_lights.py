@@ -7,19 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config.distributions import (
-    Bounds,
-    Constant,
-    Count,
-    Flag,
-    Name,
-    NonNegative,
-    Probability,
-    Scalar,
-    Uniform,
-    UniformInteger,
-)
-from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.photometry import (
     add_fixture,
@@ -30,8 +18,8 @@ from gen_data.generator.core.photometry import (
 from gen_data.generator.core.scene import PANEL_KINDS, Light, LightKind, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.color_space import temperature_to_linear
+from gen_data.randomizers.base import RandomizerBase, check_known
+from gen_data.randomizers.color_space import Temperature, temperature_to_linear
 
 
 class CeilingLights(RandomizerBase):
@@ -49,13 +37,13 @@ class CeilingLights(RandomizerBase):
     """
 
     type: Literal["ceiling_lights"] = "ceiling_lights"
-    kind: Name = Constant("rectangle")
-    rows: Count = UniformInteger(1, 2)
-    columns: Count = UniformInteger(2, 3)
+    kind: dist.Name = dist.Constant("rectangle")
+    rows: dist.Count = dist.UniformInteger(1, 2)
+    columns: dist.Count = dist.UniformInteger(2, 3)
     size_m: tuple[Annotated[float, Field(gt=0.0)], Annotated[float, Field(gt=0.0)]] = (0.6, 0.6)
-    luminous_flux_lm: NonNegative = Uniform(2500.0, 4500.0)
-    temperature_k: Annotated[Scalar, Bounds(1667, 25000)] = Uniform(2700.0, 6500.0)
-    broken: Flag = Probability(0.05)
+    luminous_flux_lm: dist.NonNegative = dist.Uniform(2500.0, 4500.0)
+    temperature_k: Temperature = dist.Uniform(2700.0, 6500.0)
+    broken: dist.Flag = dist.Probability(0.05)
     visible: bool = True
     keep_existing: bool = False
 
@@ -80,14 +68,8 @@ class CeilingLights(RandomizerBase):
 
     def _draw_kind(self, rng: Rng) -> LightKind:
         drawn = self.kind.draw(rng)
-        if drawn == "rectangle":
-            return "rectangle"
-        if drawn == "disk":
-            return "disk"
-        raise ConfigError(
-            f"randomizers.{self.name}.kind: unknown panel '{drawn}'; expected one of "
-            f"{', '.join(PANEL_KINDS)}{did_you_mean(drawn, PANEL_KINDS)}"
-        )
+        check_known(drawn, PANEL_KINDS, f"randomizers.{self.name}.kind: unknown panel")
+        return "rectangle" if drawn == "rectangle" else "disk"
 
     def _make_panel(self, name: str, kind: LightKind, at_m: Vec3) -> Light:
         return Light(

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import colorsys
+from typing import Annotated
 
 import numpy as np
 
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.colorimetry import REC709_FROM_XYZ, luminance, srgb_decode
 from gen_data.generator.core.se3 import Vec3
+
+Temperature = Annotated[dist.Scalar, dist.Bounds(1667, 25_000)]
+"""Colour temperature [K] within the range of ``temperature_to_chromaticity``."""
 
 
 def hsv_to_linear(hue: float, saturation: float, value: float) -> Vec3:
     """Convert hue, saturation and value in sRGB, each in [0, 1], to linear RGB."""
     red, green, blue = colorsys.hsv_to_rgb(hue % 1.0, saturation, value)
-    return (
-        round(srgb_decode(red), 6),
-        round(srgb_decode(green), 6),
-        round(srgb_decode(blue), 6),
-    )
+    return (round(srgb_decode(red), 6), round(srgb_decode(green), 6), round(srgb_decode(blue), 6))
 
 
 def temperature_to_chromaticity(kelvin: float) -> tuple[float, float]:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
-from gen_data.generator.config.distributions import Chance, Probability, Uniform, UnitInterval
-from gen_data.generator.core.asset_types import Material
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import SurfaceRandomizer, set_materials
+from gen_data.randomizers.base import SurfaceRandomizer
 from gen_data.randomizers.color_space import hsv_to_linear
 
 
@@ -23,23 +21,18 @@ class Colors(SurfaceRandomizer):
     """
 
     type: Literal["colors"] = "colors"
-    probability: Chance = Probability(1.0)
-    hue: UnitInterval = Uniform(0.0, 1.0)
-    saturation: UnitInterval = Uniform(0.1, 0.9)
-    value: UnitInterval = Uniform(0.25, 0.95)
+    probability: dist.Chance = dist.Probability(1.0)
+    hue: dist.UnitInterval = dist.Uniform(0.0, 1.0)
+    saturation: dist.UnitInterval = dist.Uniform(0.1, 0.9)
+    value: dist.UnitInterval = dist.Uniform(0.25, 0.95)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with one colour per object, in every material slot."""
-        painted = []
-        for body in self.find_targets(scene):
+
+        def draw() -> dict[str, Any] | None:
             if not self.probability.draw(rng):
-                continue
-            color = hsv_to_linear(
-                self.hue.draw(rng), self.saturation.draw(rng), self.value.draw(rng)
-            )
+                return None
+            hsv = (self.hue.draw(rng), self.saturation.draw(rng), self.value.draw(rng))
+            return {"base_color": hsv_to_linear(*hsv), "texture": ""}
 
-            def paint(material: Material, color: tuple[float, float, float] = color) -> Material:
-                return replace(material, base_color=color, texture="")
-
-            painted.append(set_materials(body, assets, paint))
-        return scene.with_bodies(*painted)
+        return self.change_targets(scene, assets, draw)

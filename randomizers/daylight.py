@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from gen_data.generator.assets.skies.daylight import sun_color, sun_radius_rad
 from gen_data.generator.assets.skies.sky import SkyModel, mean_luminance_cd_m2, sun_lux
@@ -19,45 +19,28 @@ _SNOW_ALBEDO = 0.7
 _LAND_ALBEDO = 0.18
 
 
-@dataclass(frozen=True, slots=True)
-class Daylight:
-    """Parameters of outdoor light.
-
-    Attributes:
-        sun_altitude_deg: Angle above the horizon; negative at night.
-        sun_azimuth_deg: Direction from +X towards +Y.
-        cloudiness: 0 clear, 0.5 broken clouds, 1 overcast.
-        turbidity: Haze of clear air: 2 very clear, 6 hazy.
-        seed: Seed of the clouds.
-        snow: Whether snow covers the ground.
-        model: Sky model, as in ``gen_data.generator.assets.skies.sky.SkyModel``.
-    """
-
-    sun_altitude_deg: float
-    sun_azimuth_deg: float
-    cloudiness: float
-    turbidity: float
-    seed: int
-    snow: bool = False
-    model: str = "measured"
-
-
 def draw_cloud_seed(rng: Rng) -> int:
     """Draw a seed for the clouds of a sky."""
     return int(rng.integers(_CLOUD_SEEDS))
 
 
-def set_daylight(scene: Scene, light: Daylight) -> Scene:
-    """Return the scene with its suns and environment replaced; lamps stay."""
-    altitude_deg, cloudiness = round(light.sun_altitude_deg, 2), round(light.cloudiness, 3)
-    turbidity = round(light.turbidity, 2)
-    albedo = _SNOW_ALBEDO if light.snow else _LAND_ALBEDO
-    model = SkyModel(light.seed, altitude_deg, turbidity, cloudiness, albedo, light.model)
-    yaw = round(math.radians(light.sun_azimuth_deg % 360.0), 6)
-    named = "" if light.model == "measured" else f"&model={light.model}"
+def set_daylight(scene: Scene, sky: SkyModel, sun_azimuth_deg: float) -> Scene:
+    """Return the scene with its suns and environment replaced; lamps stay.
+
+    Args:
+        scene: The scene; its snow cover decides on the albedo of the ground.
+        sky: Parameters of the sky, which are rounded; its albedo is ignored.
+        sun_azimuth_deg: Direction of the sun from +X towards +Y.
+    """
+    altitude_deg, cloudiness = round(sky.sun_altitude_deg, 2), round(sky.cloudiness, 3)
+    turbidity = round(sky.turbidity, 2)
+    albedo = _SNOW_ALBEDO if scene.weather.snow_cover > 0.0 else _LAND_ALBEDO
+    model = SkyModel(sky.seed, altitude_deg, turbidity, cloudiness, albedo, sky.model)
+    yaw = round(math.radians(sun_azimuth_deg % 360.0), 6)
+    named = "" if sky.model == "measured" else f"&model={sky.model}"
     image = (
         f"environment/sky?cloudiness={cloudiness:g}&ground_albedo={albedo:g}{named}"
-        f"&seed={light.seed}&sun_altitude_deg={altitude_deg:g}&turbidity={turbidity:g}"
+        f"&seed={sky.seed}&sun_altitude_deg={altitude_deg:g}&turbidity={turbidity:g}"
     )
     environment = Environment(image, _significant(mean_luminance_cd_m2(model)), yaw)
     lamps = tuple(lamp for lamp in scene.lights if lamp.kind != "sun")
@@ -97,16 +80,10 @@ def _sun(model: SkyModel, yaw_rad: float) -> tuple[Light, ...]:
         round(-level * math.sin(yaw_rad), 6),
         round(-math.sin(altitude), 6),
     )
-    return (
-        Light(
-            SUN,
-            "sun",
-            direction=direction,
-            color=sun_color(altitude, model.turbidity),
-            illuminance_lux=_significant(lux),
-            angular_radius_rad=round(sun_radius_rad(model.cloudiness), 6),
-        ),
-    )
+    color, lux = sun_color(altitude, model.turbidity), _significant(lux)
+    light = Light(SUN, "sun", direction=direction, color=color, illuminance_lux=lux)
+    radius_rad = round(sun_radius_rad(model.cloudiness), 6)
+    return (replace(light, angular_radius_rad=radius_rad),)
 
 
 def _significant(value: float) -> float:

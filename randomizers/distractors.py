@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from gen_data.generator.config.distributions import Bounds, Count, UniformInteger
+from gen_data.generator.config import distributions as dist
 from gen_data.randomizers.objects import COUNT_MAX, Objects
 
 
@@ -14,10 +14,9 @@ class Distractors(Objects):
     Distractors have an instance id in the masks, so that occlusion by them is counted.
 
     Attributes:
-        group: Name of the template's object group; empty = the randomizer's own name.
         count: Number of distractors.
     """
 
     type: Literal["distractors"] = "distractors"  # type: ignore[assignment]
     name: str = "distractors"
-    count: Annotated[Count, Bounds(0, COUNT_MAX)] = UniformInteger(0, 4)
+    count: Annotated[dist.Count, dist.Bounds(0, COUNT_MAX)] = dist.UniformInteger(0, 4)

@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config.distributions import Bounds, Normal, Scalar
-from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from gen_data.generator.config import distributions as dist
+from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.lane_geometry import LaneLine
 from gen_data.generator.core.scene import Body, Scene
@@ -16,7 +16,7 @@ from gen_data.generator.core.streams import Rng
 from gen_data.generator.traffic.axles import find_axles
 from gen_data.generator.traffic.lane_routes import LaneGraph, lanes_through_point
 from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.free_space import Footprint, make_ground
+from gen_data.randomizers.free_space import Footprint, make_ground, standing_bodies
 
 TRIES = 32
 
@@ -43,26 +43,15 @@ class EgoOnLane(RandomizerBase):
     roads: tuple[str, ...] = ()
     route: tuple[Stop, ...] = ()
     ahead_m: float = Field(40.0, ge=0)
-    lateral_m: Annotated[Scalar, Bounds(-5, 5)] = Normal(0.0, 0.1, clip=(-0.3, 0.3))
+    lateral_m: Annotated[dist.Scalar, dist.Bounds(-5, 5)] = dist.Normal(0.0, 0.1, clip=(-0.3, 0.3))
     min_clearance_m: float = Field(0.5, ge=0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with the ego vehicle moved.
-
-        Raises:
-            ConfigError: the vehicle or a lane is unknown, or the route is not connected.
-            LayoutRejected: no free place was found.
-        """
+        """Return the scene with the ego vehicle moved."""
         body = find_ego(scene, self.ego, f"randomizers.{self.name}.ego")
         lines = self._select_lanes(scene)
         axles = find_axles(assets, body.asset, body.scale)
-        roads = {lane.road for lane in scene.lanes}
-        others = (
-            b
-            for b in scene.bodies
-            if b.instance_id and b.name != body.name and b.name.partition("/")[0] not in roads
-        )
-        ground = make_ground(others, assets)
+        ground = make_ground((b for b in standing_bodies(scene) if b.name != body.name), assets)
         total_m = sum(line.length_m for line in lines)
         for _ in range(TRIES):
             place, left_m = float(rng.uniform()) * total_m, self.lateral_m.draw(rng)
@@ -77,8 +66,8 @@ class EgoOnLane(RandomizerBase):
             footprint = Footprint.of(pose, assets.bounds_m(body.asset), body.scale)
             if ground.is_free(footprint.expand(self.min_clearance_m)):
                 return scene.with_bodies(replace(body, T_world_body=pose))
-        remedy = f"other roads, a smaller ahead_m or min_clearance_m (randomizers.{self.name})"
-        raise LayoutRejected(Rejection("no free place for the ego vehicle", remedy))
+        remedy = "other roads, a smaller ahead_m or min_clearance_m"
+        raise self.reject("no free place for the ego vehicle", remedy)
 
     def _select_lanes(self, scene: Scene) -> list[LaneLine]:
         """Select the lanes to start on."""

@@ -8,7 +8,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.config.distributions import LogUniform, NonNegative, Scalar, Uniform
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Environment, Scene
@@ -28,30 +28,12 @@ class EnvironmentLight(RandomizerBase):
 
     type: Literal["environment"] = "environment"
     images: tuple[str, ...] = ()
-    luminance_cd_m2: NonNegative = LogUniform(10.0, 80.0)
-    yaw_deg: Scalar = Uniform(0.0, 360.0)
+    luminance_cd_m2: dist.NonNegative = dist.LogUniform(10.0, 80.0)
+    yaw_deg: dist.Scalar = dist.Uniform(0.0, 360.0)
     visible: bool = Field(True)
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
         """Ids of the environment maps to draw from."""
-        return self._find_options(assets)
-
-    def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raise ConfigError if no environment has one of the names."""
-        del scene
-        self._find_options(assets)
-
-    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with a drawn environment map."""
-        environment = Environment(
-            image=choose(self._find_options(assets), rng),
-            luminance_cd_m2=round(self.luminance_cd_m2.draw(rng), 4),
-            yaw_rad=round(math.radians(self.yaw_deg.draw(rng)), 6),
-            visible=self.visible,
-        )
-        return replace(scene, environment=environment)
-
-    def _find_options(self, assets: AssetIndex) -> tuple[str, ...]:
         every = assets.find((), kind="environment")
         fitting = tuple(
             a.asset_id
@@ -66,3 +48,13 @@ class EnvironmentLight(RandomizerBase):
                 f"expected one of {', '.join(known)}{did_you_mean(self.images[0], known)}"
             )
         return fitting
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """Return the scene with a drawn environment map."""
+        environment = Environment(
+            image=choose(self.possible_assets(assets), rng),
+            luminance_cd_m2=round(self.luminance_cd_m2.draw(rng), 4),
+            yaw_rad=round(math.radians(self.yaw_deg.draw(rng)), 6),
+            visible=self.visible,
+        )
+        return replace(scene, environment=environment)

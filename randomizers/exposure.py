@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from gen_data.generator.config.distributions import Scalar, Uniform
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.streams import Rng
@@ -21,7 +21,7 @@ class Exposure(RandomizerBase):
 
     type: Literal["exposure"] = "exposure"
     stage: Literal["scene", "view"] = "view"
-    ev100: Scalar = Uniform(6.0, 8.5)
+    ev100: dist.Scalar = dist.Uniform(6.0, 8.5)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with drawn exposures."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -68,6 +68,14 @@ class Ground:
         dx, dy = delta.T
         near = others[dx * dx + dy * dy < reach * reach]
         return not rectangles_overlap(own[:4], own[4:6], near[:, :4], near[:, 4:6]).any()
+
+
+def standing_bodies(scene: Scene) -> Iterator[Body]:
+    """Yield the bodies with an instance id, except roads."""
+    roads = {lane.road for lane in scene.lanes}
+    for body in scene.bodies:
+        if body.instance_id and body.name.partition("/")[0] not in roads:
+            yield body
 
 
 def make_ground(bodies: Iterable[Body], assets: AssetIndex) -> Ground:

@@ -8,44 +8,34 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config.distributions import (
-    Bounds,
-    Constant,
-    Count,
-    Flag,
-    NonNegative,
-    Scalar,
-    Uniform,
-)
-from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection
+from gen_data.generator.config import distributions as dist
+from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.lane_geometry import LaneLine, pose_on_lane
 from gen_data.generator.core.members import Member, add_members, remove_members
 from gen_data.generator.core.scene import LaneKind, ObjectGroup, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.asset_groups import CategoryWeights, draw_asset, find_weighted_group
-from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.free_space import Footprint, Ground, make_ground
+from gen_data.randomizers.asset_groups import CategoryWeights, GroupRandomizer, draw_asset
+from gen_data.randomizers.free_space import Footprint, Ground, make_ground, standing_bodies
 
 COUNT_MAX = 2000
 """Largest count of the template's ``lane_objects`` element."""
 PER_LANE_MAX = 20_000
 """Largest number of places along one lane: one every 50 cm for 10 km."""
-SCALE = Bounds(0.001, 1000.0)
+SCALE = dist.Bounds(0.001, 1000.0)
 """Scales are rounded to four decimals: none in this range becomes 0."""
 SCATTER_TRIES = 20
 """Attempts to find a free place for one scattered object."""
 
 
-class LaneObjects(RandomizerBase):
+class LaneObjects(GroupRandomizer):
     """Replaces the members of a template's ``lane_objects`` group by drawn ones.
 
     Objects and gaps alternate along every lane of the group's kinds; objects that would overlap
     existing ones are left out.
 
     Attributes:
-        group: Name of the template's group; empty = the randomizer's own name.
         lanes: Kinds of lanes to use; empty = those of the group.
         roads: Names of the elements whose lanes to use; empty = all.
         gap_m: Gap between neighbours along a lane.
@@ -57,7 +47,6 @@ class LaneObjects(RandomizerBase):
         yaw_deg: Rotation from the lane's direction.
         reversed: Whether an object faces against the lane's direction.
         scale: Factor on an object's size.
-        weights: Relative frequency by category; 1 if not listed.
         min_clearance_m: Smallest distance to any other object.
         junctions: Whether to use lanes across junctions, too.
         uniform_area: Whether to scatter objects over the bounding rectangle of the lanes at any
@@ -67,58 +56,36 @@ class LaneObjects(RandomizerBase):
 
     type: Literal["lane_objects"] = "lane_objects"
     stage: Literal["scene"] = "scene"
-    group: str = ""
     lanes: tuple[LaneKind, ...] = ()
     roads: tuple[str, ...] = ()
-    gap_m: NonNegative = Uniform(3.0, 30.0)
+    gap_m: dist.NonNegative = dist.Uniform(3.0, 30.0)
     passes: int = Field(1, ge=1, le=8)
-    occupancy: Flag = Constant(True)
-    count: Annotated[Count, Bounds(0, COUNT_MAX)] | None = None
+    occupancy: dist.Flag = dist.Constant(True)
+    count: Annotated[dist.Count, dist.Bounds(0, COUNT_MAX)] | None = None
     min_count: int = Field(0, ge=0, le=COUNT_MAX)
-    lateral: Annotated[Scalar, Bounds(-1, 1)] = Constant(0.0)
-    yaw_deg: Scalar = Constant(0.0)
-    reversed: Flag = Constant(False)
-    scale: Annotated[Scalar, SCALE] = Constant(1.0)
-    weights: dict[str, Annotated[float, Field(ge=0)]] = Field({})
+    lateral: Annotated[dist.Scalar, dist.Bounds(-1, 1)] = dist.Constant(0.0)
+    yaw_deg: dist.Scalar = dist.Constant(0.0)
+    reversed: dist.Flag = dist.Constant(False)
+    scale: Annotated[dist.Scalar, SCALE] = dist.Constant(1.0)
     min_clearance_m: float = Field(0.15, ge=0)
     junctions: bool = False
     uniform_area: bool = False
 
-    def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raise ConfigError if the group or a category of the weights is unknown."""
-        self._find_group(scene, assets)
-
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with the group's members replaced.
-
-        Raises:
-            ConfigError: objects and gaps are so short that a lane has too many places.
-            LayoutRejected: there are too few free places.
-        """
-        group, weights = self._find_group(scene, assets)
+        """Return the scene with the group's members replaced."""
+        group, weights = self.find_group(scene, assets)
         scene = remove_members(scene, group.name)
         lines = self._select_lanes(scene, group)
-        roads = {lane.road for lane in scene.lanes}
-        ground = make_ground(
-            (b for b in scene.bodies if b.instance_id and b.name.partition("/")[0] not in roads),
-            assets,
-        )
+        ground = make_ground(standing_bodies(scene), assets)
         fill = self._scatter if self.uniform_area else self._fill_rows
         members = list(fill(lines, group, weights, ground, assets, rng))
         if len(members) < self.min_count:
-            remedy = (
-                "a smaller min_count, gap_m or min_clearance_m, or longer roads "
-                f"(randomizers.{self.name})"
-            )
-            raise LayoutRejected(Rejection("too few free places along lanes", remedy))
+            remedy = "a smaller min_count, gap_m or min_clearance_m, or longer roads"
+            raise self.reject("too few free places along lanes", remedy)
         if self.count is not None:
             wanted = self.count.draw(rng)
             members = [members[k] for k in sorted(rng.permutation(len(members))[:wanted].tolist())]
         return add_members(scene, group, members, assets)
-
-    def _find_group(self, scene: Scene, assets: AssetIndex) -> tuple[ObjectGroup, CategoryWeights]:
-        name = self.group or self.name
-        return find_weighted_group(scene, assets, name, self.weights, f"randomizers.{self.name}")
 
     def _select_lanes(self, scene: Scene, group: ObjectGroup) -> list[LaneLine]:
         """Select the lanes of the wanted kinds and roads."""
@@ -191,8 +158,8 @@ class LaneObjects(RandomizerBase):
                     yield Member(asset, pose, scale, collides=False)
                     break
             else:
-                remedy = f"a smaller count or min_clearance_m (randomizers.{self.name})"
-                raise LayoutRejected(Rejection("no free place for a scattered object", remedy))
+                remedy = "a smaller count or min_clearance_m"
+                raise self.reject("no free place for a scattered object", remedy)
 
     def _occupy(self, ground: Ground, pose: SE3, bounds_m: tuple[Vec3, Vec3]) -> bool:
         """Occupy the ground under an object if it is free; return whether it was."""

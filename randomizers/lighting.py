@@ -8,20 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from gen_data.generator.config.distributions import (
-    Bounds,
-    Constant,
-    Count,
-    LogUniform,
-    Name,
-    NonNegative,
-    Positive,
-    Scalar,
-    Uniform,
-    UniformInteger,
-    UnitInterval,
-)
-from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
+from gen_data.generator.config import distributions as dist
+from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.photometry import (
     add_fixture,
@@ -34,8 +22,8 @@ from gen_data.generator.core.photometry import (
 from gen_data.generator.core.scene import LIGHT_KINDS, PANEL_KINDS, Light, LightKind, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.color_space import temperature_to_linear
+from gen_data.randomizers.base import RandomizerBase, check_known
+from gen_data.randomizers.color_space import Temperature, temperature_to_linear
 from gen_data.randomizers.free_space import is_in_the_open, is_inside
 
 TRIES = 24
@@ -68,20 +56,20 @@ class Lighting(RandomizerBase):
     """
 
     type: Literal["lighting"] = "lighting"
-    count: Annotated[Count, Bounds(0, COUNT_MAX)] = UniformInteger(1, 3)
-    kind: Name = Constant("sphere")
-    illuminance_lux: NonNegative = LogUniform(250.0, 1200.0)
-    luminous_flux_lm: NonNegative | None = Field(None)
-    distance_m: Positive = Uniform(1.0, 1.9)
-    elevation_deg: Annotated[Scalar, Bounds(-90, 90)] = Uniform(35.0, 80.0)
-    azimuth_deg: Scalar = Uniform(0.0, 360.0)
-    temperature_k: Annotated[Scalar, Bounds(1667, 25000)] = Uniform(2700.0, 6500.0)
-    radius_m: NonNegative = Uniform(0.02, 0.12)
-    width_m: Positive = Uniform(0.4, 1.0)
-    panel_aspect: UnitInterval = Uniform(0.5, 1.0)
+    count: Annotated[dist.Count, dist.Bounds(0, COUNT_MAX)] = dist.UniformInteger(1, 3)
+    kind: dist.Name = dist.Constant("sphere")
+    illuminance_lux: dist.NonNegative = dist.LogUniform(250.0, 1200.0)
+    luminous_flux_lm: dist.NonNegative | None = Field(None)
+    distance_m: dist.Positive = dist.Uniform(1.0, 1.9)
+    elevation_deg: Annotated[dist.Scalar, dist.Bounds(-90, 90)] = dist.Uniform(35.0, 80.0)
+    azimuth_deg: dist.Scalar = dist.Uniform(0.0, 360.0)
+    temperature_k: Temperature = dist.Uniform(2700.0, 6500.0)
+    radius_m: dist.NonNegative = dist.Uniform(0.02, 0.12)
+    width_m: dist.Positive = dist.Uniform(0.4, 1.0)
+    panel_aspect: dist.UnitInterval = dist.Uniform(0.5, 1.0)
     visible: bool = False
-    cone_deg: Annotated[Scalar, Bounds(1, 90)] = Uniform(20.0, 40.0)
-    angular_radius_deg: Annotated[Scalar, Bounds(0, 20)] = Constant(0.27)
+    cone_deg: Annotated[dist.Scalar, dist.Bounds(1, 90)] = dist.Uniform(20.0, 40.0)
+    angular_radius_deg: Annotated[dist.Scalar, dist.Bounds(0, 20)] = dist.Constant(0.27)
     keep_existing: bool = False
 
     @model_validator(mode="after")
@@ -94,12 +82,7 @@ class Lighting(RandomizerBase):
         return self
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with its lights replaced; the total is split unevenly between them.
-
-        Raises:
-            ConfigError: the kind is unknown, or a sun was given a flux.
-            LayoutRejected: no free place was found for a light.
-        """
+        """Return the scene with its lights replaced; the total is split unevenly between them."""
         count = self.count.draw(rng)
         shares = [0.3 + float(rng.uniform()) for _ in range(count)]
         strength = self.illuminance_lux if self.luminous_flux_lm is None else self.luminous_flux_lm
@@ -146,12 +129,8 @@ class Lighting(RandomizerBase):
 
     def _draw_kind(self, rng: Rng) -> LightKind:
         drawn = self.kind.draw(rng)
-        kind = next((known for known in LIGHT_KINDS if known == drawn), None)
-        if kind is None:
-            raise ConfigError(
-                f"randomizers.{self.name}.kind: unknown light '{drawn}'; expected one of "
-                f"{', '.join(LIGHT_KINDS)}{did_you_mean(drawn, LIGHT_KINDS)}"
-            )
+        check_known(drawn, LIGHT_KINDS, f"randomizers.{self.name}.kind: unknown light")
+        kind = next(known for known in LIGHT_KINDS if known == drawn)
         if kind == "sun" and self.luminous_flux_lm is not None:
             raise ConfigError(
                 f"randomizers.{self.name}.luminous_flux_lm: a sun has no flux; give an "
@@ -185,12 +164,8 @@ class Lighting(RandomizerBase):
                     if is_in_the_open(position, scene, assets, margin_m):
                         return position
                     break
-        raise LayoutRejected(
-            Rejection(
-                "no free place for a light",
-                f"other distance_m, elevation_deg or azimuth_deg (randomizers.{self.name})",
-            )
-        )
+        remedy = "other distance_m, elevation_deg or azimuth_deg"
+        raise self.reject("no free place for a light", remedy)
 
 
 def _aim(light: Light, position_m: Vec3, target_m: Vec3) -> Light:

@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Annotated, Any, Literal
 
-from gen_data.generator.config.distributions import (
-    Bounds,
-    Chance,
-    Constant,
-    Flag,
-    Probability,
-    Scalar,
-    Uniform,
-    UnitInterval,
-)
-from gen_data.generator.core.asset_types import Material
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import SurfaceRandomizer, set_materials
+from gen_data.randomizers.base import SurfaceRandomizer
 
 
 class Materials(SurfaceRandomizer):
@@ -40,34 +29,26 @@ class Materials(SurfaceRandomizer):
     """
 
     type: Literal["materials"] = "materials"
-    probability: Chance = Probability(1.0)
-    roughness: UnitInterval = Uniform(0.15, 0.9)
-    metallic: Flag = Probability(0.1)
-    specular: UnitInterval = Uniform(0.3, 0.7)
-    coated: Flag = Constant(False)
-    coat: UnitInterval = Constant(1.0)
-    coat_roughness: UnitInterval = Uniform(0.0, 0.15)
-    clear: Flag = Constant(False)
-    transmission: UnitInterval = Constant(1.0)
-    ior: Annotated[Scalar, Bounds(1, 3)] = Constant(1.5)
-    solid: Flag = Constant(False)
+    probability: dist.Chance = dist.Probability(1.0)
+    roughness: dist.UnitInterval = dist.Uniform(0.15, 0.9)
+    metallic: dist.Flag = dist.Probability(0.1)
+    specular: dist.UnitInterval = dist.Uniform(0.3, 0.7)
+    coated: dist.Flag = dist.Constant(False)
+    coat: dist.UnitInterval = dist.Constant(1.0)
+    coat_roughness: dist.UnitInterval = dist.Uniform(0.0, 0.15)
+    clear: dist.Flag = dist.Constant(False)
+    transmission: dist.UnitInterval = dist.Constant(1.0)
+    ior: Annotated[dist.Scalar, dist.Bounds(1, 3)] = dist.Constant(1.5)
+    solid: dist.Flag = dist.Constant(False)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with one finish per object, in every material slot."""
-        finished = []
-        for body in self.find_targets(scene):
-            if not self.probability.draw(rng):
-                continue
-            changes = self._draw_changes(rng)
+        return self.change_targets(scene, assets, lambda: self._draw_changes(rng))
 
-            def finish(material: Material, changes: dict[str, Any] = changes) -> Material:
-                return replace(material, **changes)
-
-            finished.append(set_materials(body, assets, finish))
-        return scene.with_bodies(*finished)
-
-    def _draw_changes(self, rng: Rng) -> dict[str, Any]:
+    def _draw_changes(self, rng: Rng) -> dict[str, Any] | None:
         """Draw the changed fields of a material; no draw for a coat or glass that is not wanted."""
+        if not self.probability.draw(rng):
+            return None
         changes: dict[str, Any] = {
             "roughness": round(self.roughness.draw(rng), 4),
             "metallic": float(self.metallic.draw(rng)),

@@ -4,58 +4,39 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
-
-from gen_data.generator.config.distributions import (
-    Bounds,
-    Constant,
-    Count,
-    Flag,
-    Probability,
-    Scalar,
-    UniformInteger,
-)
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.members import Member, add_members, remove_members
-from gen_data.generator.core.scene import ObjectGroup, Scene
+from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.asset_groups import CategoryWeights, draw_asset, find_weighted_group
-from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.asset_groups import GroupRandomizer, draw_asset
 from gen_data.randomizers.placement import Item, find_floors, half_extents_m, lay_out
 
 COUNT_MAX = 500
 """Largest count of the template's ``objects`` element."""
 
 
-class Objects(RandomizerBase):
+class Objects(GroupRandomizer):
     """Replaces the objects of a group by drawn ones: their number, assets, sizes and start poses.
 
     The category is drawn first and then one of its assets, so that a category with many variants
     is not more frequent.
 
     Attributes:
-        group: Name of the template's object group; empty = the randomizer's own name.
         count: Number of objects.
         scale: Factor on an object's size.
         upright: Whether an object starts upright; otherwise at any rotation (placement drop only).
-        weights: Relative frequency by category; 1 if not listed.
     """
 
     type: Literal["objects"] = "objects"
     stage: Literal["scene"] = "scene"
-    group: str = ""
-    count: Annotated[Count, Bounds(0, COUNT_MAX)] = UniformInteger(4, 10)
-    scale: Annotated[Scalar, Bounds(0.001, 1000.0)] = Constant(1.0)
-    upright: Flag = Probability(0.6)
-    weights: dict[str, Annotated[float, Field(ge=0)]] = Field({})
-
-    def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raise ConfigError if the group or a category of the weights is unknown."""
-        self._find_group(scene, assets)
+    count: Annotated[dist.Count, dist.Bounds(0, COUNT_MAX)] = dist.UniformInteger(4, 10)
+    scale: Annotated[dist.Scalar, dist.Bounds(0.001, 1000.0)] = dist.Constant(1.0)
+    upright: dist.Flag = dist.Probability(0.6)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with the group's objects replaced."""
-        group, weights = self._find_group(scene, assets)
+        group, weights = self.find_group(scene, assets)
         scene = remove_members(scene, group.name)
         count = self.count.draw(rng)
         chosen = [assets.get(draw_asset(weights, rng)) for _ in range(count)]
@@ -77,7 +58,3 @@ class Objects(RandomizerBase):
             for asset, scale, pose in zip(chosen, scales, poses, strict=True)
         ]
         return add_members(scene, group, members, assets)
-
-    def _find_group(self, scene: Scene, assets: AssetIndex) -> tuple[ObjectGroup, CategoryWeights]:
-        name = self.group or self.name
-        return find_weighted_group(scene, assets, name, self.weights, f"randomizers.{self.name}")

@@ -5,13 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
-from gen_data.generator.config.distributions import (
-    LogUniform,
-    NonNegative,
-    Positive,
-    Uniform,
-    UnitInterval,
-)
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.streams import Rng
@@ -29,9 +23,9 @@ class PhysicsProperties(RandomizerBase):
 
     type: Literal["physics_properties"] = "physics_properties"
     stage: Literal["scene"] = "scene"
-    mass_factor: Positive = LogUniform(0.7, 1.4)
-    friction: NonNegative = Uniform(0.4, 0.9)
-    restitution: UnitInterval = Uniform(0.0, 0.1)
+    mass_factor: dist.Positive = dist.LogUniform(0.7, 1.4)
+    friction: dist.NonNegative = dist.Uniform(0.4, 0.9)
+    restitution: dist.UnitInterval = dist.Uniform(0.0, 0.1)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with drawn properties on every dynamic body."""

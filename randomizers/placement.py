@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from gen_data.generator.config.distributions import So3
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.errors import LayoutRejected, Rejection
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, ObjectGroup, Scene, SupportSurface
@@ -127,14 +127,14 @@ def _drop(group: ObjectGroup, item: Item, floor: Floor, rng: Rng, upright: bool)
     half_height_m = item.half_m[2] if upright else item.reach_m
     place = _find_lowest_place(floor, radius_m, rng)
     if place is None:
-        raise LayoutRejected(_no_place(group))
+        raise _no_place(group)
     x, y, top_m = place
     fall_m = float(rng.uniform(*DROP_M)) if not upright else DROP_M[0]
     z = top_m + half_height_m + fall_m
     if z + half_height_m > clearance_m:
-        raise LayoutRejected(_no_place(group))
+        raise _no_place(group)
     floor.taken.append((x, y, radius_m, z + half_height_m))
-    turn = _yaw(rng) if upright else SE3(quaternion_wxyz=So3().draw(rng))
+    turn = _yaw(rng) if upright else SE3(quaternion_wxyz=dist.So3().draw(rng))
     return floor.surface.T_world_surface @ SE3((x, y, z)) @ turn
 
 
@@ -175,7 +175,7 @@ def _find_bare_place(
         bare = floor.top_under(x, y, item.radius_m) == 0.0
         if bare and not floor.is_closed(x, y, item.radius_m):
             return floor, x, y
-    raise LayoutRejected(_no_place(group))
+    raise _no_place(group)
 
 
 def _arrange_in_grid(
@@ -188,7 +188,7 @@ def _arrange_in_grid(
         here = items[number * share : (number + 1) * share]
         cells = _find_cells(floor, here)
         if len(cells) < len(here):
-            raise LayoutRejected(_no_place(group))
+            raise _no_place(group)
         for item, (x, y) in zip(here, cells, strict=False):
             quarter = SE3.about_z(0.5 * math.pi * int(rng.integers(4)))
             poses.append(_stand(item, floor, (x, y, 0.0), quarter))
@@ -281,11 +281,8 @@ def _cylinder(
 
 def half_extents_m(low: Vec3, high: Vec3, scale: float) -> Vec3:
     """Half extents of a scaled bounding box."""
-    return (
-        0.5 * scale * (high[0] - low[0]),
-        0.5 * scale * (high[1] - low[1]),
-        0.5 * scale * (high[2] - low[2]),
-    )
+    x, y, z = (0.5 * scale * (b - a) for a, b in zip(low, high, strict=True))
+    return (x, y, z)
 
 
 def _yaw(rng: Rng) -> SE3:
@@ -296,8 +293,6 @@ def _transform(pose: SE3, point: Vec3) -> Vec3:
     return (pose @ SE3(point)).translation_m
 
 
-def _no_place(group: ObjectGroup) -> Rejection:
-    return Rejection(
-        "no free place for an object",
-        f"fewer objects (randomizers.{group.name}.count) or a larger surface",
-    )
+def _no_place(group: ObjectGroup) -> LayoutRejected:
+    remedy = f"fewer objects (randomizers.{group.name}.count) or a larger surface"
+    return LayoutRejected(Rejection("no free place for an object", remedy))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal, TypeVar
 
-from gen_data.generator.config.distributions import Normal, Scalar
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Camera, Device, Lidar, Scene
@@ -14,6 +15,8 @@ from gen_data.generator.core.scene_time import place_sensors
 from gen_data.generator.core.se3 import SE3, multiply_quaternions
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
+
+Sensor = TypeVar("Sensor", Camera, Lidar, Device)
 
 
 class RigCalibration(RandomizerBase):
@@ -29,15 +32,11 @@ class RigCalibration(RandomizerBase):
 
     type: Literal["rig_calibration"] = "rig_calibration"
     rig: str = ""
-    offset_m: Scalar = Normal(0.0, 0.005, clip=(-0.02, 0.02))
-    turn_deg: Scalar = Normal(0.0, 0.2, clip=(-1.0, 1.0))
+    offset_m: dist.Scalar = dist.Normal(0.0, 0.005, clip=(-0.02, 0.02))
+    turn_deg: dist.Scalar = dist.Normal(0.0, 0.2, clip=(-1.0, 1.0))
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene with perturbed sensor poses.
-
-        Raises:
-            ConfigError: the rig is unknown or carries no sensor.
-        """
+        """Return the scene with perturbed sensor poses."""
         del assets
         sensors: tuple[Camera | Lidar | Device, ...]
         sensors = (*scene.cameras, *scene.lidars, *scene.devices)
@@ -48,27 +47,20 @@ class RigCalibration(RandomizerBase):
                 f"sensors: {', '.join(known) or 'none'}{did_you_mean(self.rig, known)}"
             )
         rigs = {self.rig} if self.rig else set(known)
+
+        def perturb_all(sensors: tuple[Sensor, ...], pose: str) -> tuple[Sensor, ...]:
+            changes: Iterator[dict[str, Any]] = (
+                {pose: self._perturb(getattr(s, pose), rng)} if s.rig in rigs else {}
+                for s in sensors
+            )
+            return tuple(replace(s, **c) for s, c in zip(sensors, changes, strict=True))
+
         return place_sensors(
             replace(
                 scene,
-                cameras=tuple(
-                    replace(c, T_rig_camera=self._perturb(c.T_rig_camera, rng))
-                    if c.rig in rigs
-                    else c
-                    for c in scene.cameras
-                ),
-                lidars=tuple(
-                    replace(s, T_rig_lidar=self._perturb(s.T_rig_lidar, rng))
-                    if s.rig in rigs
-                    else s
-                    for s in scene.lidars
-                ),
-                devices=tuple(
-                    replace(d, T_rig_device=self._perturb(d.T_rig_device, rng))
-                    if d.rig in rigs
-                    else d
-                    for d in scene.devices
-                ),
+                cameras=perturb_all(scene.cameras, "T_rig_camera"),
+                lidars=perturb_all(scene.lidars, "T_rig_lidar"),
+                devices=perturb_all(scene.devices, "T_rig_device"),
             )
         )
 

@@ -8,16 +8,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 
-from gen_data.generator.config.distributions import (
-    Bounds,
-    Choice,
-    Flag,
-    LogUniform,
-    Positive,
-    Probability,
-    Scalar,
-    Uniform,
-)
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.asset_types import Keypoint
 from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.interfaces import AssetIndex
@@ -26,7 +17,7 @@ from gen_data.generator.core.scene import Body, Light, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, body_materials, scale_emission, set_emission
-from gen_data.randomizers.color_space import temperature_to_linear
+from gen_data.randomizers.color_space import Temperature, temperature_to_linear
 from gen_data.randomizers.daylight import is_dark
 
 _WHITE_K = 3400.0
@@ -55,16 +46,14 @@ class StreetLights(RandomizerBase):
 
     type: Literal["street_lights"] = "street_lights"
     when: Literal["dark", "always"] = "dark"
-    flux_lm: Positive = Uniform(4000.0, 10_000.0)
-    temperature_k: Annotated[Scalar, Bounds(1667, 25_000)] = Choice(
-        {2300.0: 2.0, 3000.0: 3.0, 4000.0: 2.0}
-    )
-    cone_deg: Annotated[Scalar, Bounds(10, 85)] = Uniform(62.0, 74.0)
-    broken: Flag = Probability(0.03)
-    lamp_luminance_cd_m2: Positive = LogUniform(8000.0, 30_000.0)
-    windows: Flag = Probability(0.35)
-    window_luminance_cd_m2: Positive = LogUniform(2.0, 20.0)
-    window_temperature_k: Annotated[Scalar, Bounds(1667, 25_000)] = Uniform(2400.0, 4500.0)
+    flux_lm: dist.Positive = dist.Uniform(4000.0, 10_000.0)
+    temperature_k: Temperature = dist.Choice({2300.0: 2.0, 3000.0: 3.0, 4000.0: 2.0})
+    cone_deg: Annotated[dist.Scalar, dist.Bounds(10, 85)] = dist.Uniform(62.0, 74.0)
+    broken: dist.Flag = dist.Probability(0.03)
+    lamp_luminance_cd_m2: dist.Positive = dist.LogUniform(8000.0, 30_000.0)
+    windows: dist.Flag = dist.Probability(0.35)
+    window_luminance_cd_m2: dist.Positive = dist.LogUniform(2.0, 20.0)
+    window_temperature_k: Temperature = dist.Uniform(2400.0, 4500.0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with its lamps on; the same scene by day."""

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config.distributions import Chance, Positive, Probability, Uniform
-from gen_data.generator.core.asset_types import Material
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import (
     SurfaceRandomizer,
-    body_materials,
     choose,
     find_texture_files,
     find_textures,
-    set_materials,
 )
 
 
@@ -34,45 +30,26 @@ class Textures(SurfaceRandomizer):
 
     type: Literal["textures"] = "textures"
     textures: tuple[str, ...] = Field(min_length=1)
-    probability: Chance = Probability(1.0)
-    scale_m: Positive = Uniform(0.15, 0.6)
+    probability: dist.Chance = dist.Probability(1.0)
+    scale_m: dist.Positive = dist.Uniform(0.15, 0.6)
     slots: tuple[int, ...] = ()
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
         """Ids of the texture files to draw from."""
         return find_texture_files(assets, self._find_options(assets))
 
-    def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Raise ConfigError if a name matches no texture."""
-        del scene
-        self._find_options(assets)
-
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with one texture per target."""
         options = self._find_options(assets)
-        covered = []
-        for body in self.find_targets(scene):
+
+        def draw() -> dict[str, Any] | None:
             if not self.probability.draw(rng):
-                continue
+                return None
             texture, scale_m = choose(options, rng), round(self.scale_m.draw(rng), 4)
+            white = (1.0, 1.0, 1.0)
+            return {"base_color": white, "texture": texture, "texture_scale_m": scale_m}
 
-            def cover(
-                material: Material, texture: str = texture, scale_m: float = scale_m
-            ) -> Material:
-                return replace(
-                    material, base_color=(1.0, 1.0, 1.0), texture=texture, texture_scale_m=scale_m
-                )
-
-            changed = set_materials(body, assets, cover)
-            if self.slots:
-                before = body_materials(body, assets)
-                mixed = tuple(
-                    new if slot in self.slots else old
-                    for slot, (new, old) in enumerate(zip(changed.materials, before, strict=True))
-                )
-                changed = replace(changed, materials=mixed)
-            covered.append(changed)
-        return scene.with_bodies(*covered)
+        return self.change_targets(scene, assets, draw, self.slots)
 
     def _find_options(self, assets: AssetIndex) -> tuple[str, ...]:
         """Ids of the textures to draw from."""

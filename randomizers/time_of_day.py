@@ -6,15 +6,16 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from gen_data.generator.config.distributions import Bounds, Scalar, Uniform, UnitInterval
+from gen_data.generator.assets.skies.sky import SkyModel
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.daylight import Daylight, draw_cloud_seed, set_daylight, shared_number
+from gen_data.randomizers.daylight import draw_cloud_seed, set_daylight, shared_number
 
-Altitude = Annotated[Scalar, Bounds(-90, 90)]
-Turbidity = Annotated[Scalar, Bounds(1.8, 8.0)]
+Altitude = Annotated[dist.Scalar, dist.Bounds(-90, 90)]
+Turbidity = Annotated[dist.Scalar, dist.Bounds(1.8, 8.0)]
 
 
 class TimeOfDay(RandomizerBase):
@@ -33,10 +34,10 @@ class TimeOfDay(RandomizerBase):
     """
 
     type: Literal["time_of_day"] = "time_of_day"
-    sun_altitude_deg: Altitude = Uniform(5.0, 60.0)
-    sun_azimuth_deg: Scalar = Uniform(0.0, 360.0)
-    cloudiness: UnitInterval | None = Field(None)
-    turbidity: Turbidity = Uniform(2.0, 4.0)
+    sun_altitude_deg: Altitude = dist.Uniform(5.0, 60.0)
+    sun_azimuth_deg: dist.Scalar = dist.Uniform(0.0, 360.0)
+    cloudiness: dist.UnitInterval | None = Field(None)
+    turbidity: Turbidity = dist.Uniform(2.0, 4.0)
     sky: Literal["measured", "preetham"] = "measured"
 
     @model_validator(mode="after")
@@ -62,9 +63,6 @@ class TimeOfDay(RandomizerBase):
         elif given is not None:
             cloudiness = given
         else:
-            cloudiness = Uniform(0.0, 0.6).draw(rng)
-        snow = scene.weather.snow_cover > 0.0
-        light = Daylight(
-            altitude_deg, azimuth_deg, cloudiness, turbidity, seed, snow=snow, model=self.sky
-        )
-        return set_daylight(scene, light)
+            cloudiness = dist.Uniform(0.0, 0.6).draw(rng)
+        sky = SkyModel(seed, altitude_deg, turbidity, cloudiness, model=self.sky)
+        return set_daylight(scene, sky, azimuth_deg)

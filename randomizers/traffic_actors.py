@@ -15,7 +15,7 @@ from gen_data.generator.traffic.axles import Axles, find_axles
 from gen_data.generator.traffic.conflict_zones import crosswalk_zones, heading
 from gen_data.generator.traffic.lane_routes import LaneGraph, LanePosition
 from gen_data.generator.traffic.signal_cycles import Approach, Cycle
-from gen_data.randomizers.free_space import Footprint
+from gen_data.randomizers.free_space import Footprint, standing_bodies
 from gen_data.randomizers.traffic_lights import Signal, runs_along
 
 PERSON = "person"
@@ -157,16 +157,11 @@ class Standing:
 def find_obstacles(scene: Scene, moving: Iterable[Body], assets: AssetIndex) -> Standing:
     """Find every body with an instance id, except roads and moving bodies."""
     moving_names = {body.name for body in moving}
-    roads = {lane.road for lane in scene.lanes}
     names: list[str] = []
     categories: list[str] = []
     rows: list[tuple[float, ...]] = []
-    for body in scene.bodies:
-        if (
-            not body.instance_id
-            or body.name in moving_names
-            or body.name.partition("/")[0] in roads
-        ):
+    for body in standing_bodies(scene):
+        if body.name in moving_names:
             continue
         category = assets.get(body.asset).category
         if category in POSTS:

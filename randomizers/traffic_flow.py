@@ -9,20 +9,23 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.config.distributions import Normal, Positive, Uniform
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.motion import StateChange, Trajectory
 from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Rng
-from gen_data.generator.traffic.body_trajectories import make_upright_trajectories
 from gen_data.generator.traffic.lane_routes import LaneGraph, draw_route, lanes_through_point
-from gen_data.generator.traffic.obb_overlap import first_overlap
 from gen_data.generator.traffic.pedestrian_paths import WalkNetwork, draw_path, make_walk_network
 from gen_data.generator.traffic.pedestrians import Pedestrian
 from gen_data.generator.traffic.signal_cycles import Approach, Cycle
-from gen_data.generator.traffic.simulation import SimulatedMotion, simulate
+from gen_data.generator.traffic.simulation import (
+    SimulatedMotion,
+    first_overlap,
+    make_upright_trajectories,
+    simulate,
+)
 from gen_data.generator.traffic.vehicles import LOOKAHEAD_M, Vehicle, Vehicles, make_vehicles
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.ego_on_lane import Stop
@@ -106,15 +109,15 @@ class TrafficFlow(RandomizerBase):
     duration_s: float = Field(10.0, gt=0, le=600)
     routes: dict[str, tuple[Stop, ...]] = Field({})
     signals: bool = True
-    green_s: Positive = Uniform(12.0, 25.0)
-    all_red_s: Positive = Uniform(1.5, 3.0)
-    lens_cd_m2: Positive = Uniform(5000.0, 10_000.0)
-    speed_factor: Positive = Normal(1.0, 0.1, clip=(0.75, 1.2))
-    headway_s: Positive = Normal(1.3, 0.25, clip=(0.8, 2.2))
-    walking_m_s: Positive = Normal(1.35, 0.2, clip=(0.8, 1.9))
+    green_s: dist.Positive = dist.Uniform(12.0, 25.0)
+    all_red_s: dist.Positive = dist.Uniform(1.5, 3.0)
+    lens_cd_m2: dist.Positive = dist.Uniform(5000.0, 10_000.0)
+    speed_factor: dist.Positive = dist.Normal(1.0, 0.1, clip=(0.75, 1.2))
+    headway_s: dist.Positive = dist.Normal(1.3, 0.25, clip=(0.8, 2.2))
+    walking_m_s: dist.Positive = dist.Normal(1.35, 0.2, clip=(0.8, 1.9))
     crossing: float = Field(0.4, ge=0, le=1)
-    brakelight_cd_m2: Positive = Uniform(6000.0, 15_000.0)
-    indicator_cd_m2: Positive = Uniform(15_000.0, 40_000.0)
+    brakelight_cd_m2: dist.Positive = dist.Uniform(6000.0, 15_000.0)
+    indicator_cd_m2: dist.Positive = dist.Uniform(15_000.0, 40_000.0)
 
     @property
     def motion_duration_s(self) -> float:
@@ -122,12 +125,7 @@ class TrafficFlow(RandomizerBase):
         return self.duration_s
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
-        """Return the scene at time 0, with trajectories and state changes.
-
-        Raises:
-            ConfigError: a route names an unknown vehicle or lane, or leaves the lanes.
-            LayoutRejected: the simulated bodies would collide.
-        """
+        """Return the scene at time 0, with trajectories and state changes."""
         streets = Streets.of(scene)
         signals = self._draw_signal_cycles(scene, assets, rng) if self.signals else []
         approaches = find_approaches(streets.driving, streets.crosswalks, signals)
@@ -246,15 +244,8 @@ class TrafficFlow(RandomizerBase):
                 graph = walks.crosswalks
             axis = graph.lines[member.place.lane].pose(member.place.at_m).rotation()[:2, 0]
             forward = bool(ahead[0] * axis[0] + ahead[1] * axis[1] >= 0.0)
-            path = draw_path(
-                walks,
-                member.place.lane,
-                member.place.at_m,
-                forward,
-                speed_m_s * self.duration_s + 2.0,
-                self.crossing,
-                rng,
-            )
+            place, length_m = member.place, speed_m_s * self.duration_s + 2.0
+            path = draw_path(walks, place.lane, place.at_m, forward, length_m, self.crossing, rng)
             left_m = member.place.left_m if forward else -member.place.left_m
             pedestrians.append(
                 Pedestrian(member.body.name, (x, y), ahead, speed_m_s, path, left_m)

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from gen_data.generator.config.distributions import Choice, Constant, Name, Positive, Uniform
-from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Instance, Scene
+from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase, body_materials, set_emission
+from gen_data.randomizers.base import (
+    RandomizerBase,
+    add_attributes,
+    body_materials,
+    check_known,
+    set_emission,
+)
 
 LIT: Mapping[str, tuple[str, ...]] = {
     "red": ("lens_red", "lens_stop"),
@@ -56,9 +61,9 @@ class TrafficLights(RandomizerBase):
     """
 
     type: Literal["traffic_lights"] = "traffic_lights"
-    state: Name = Choice({"red": 0.46, "green": 0.44, "yellow": 0.06, "red_yellow": 0.04})
-    luminance_cd_m2: Positive = Uniform(5000.0, 10000.0)
-    junction_m: Positive = Constant(40.0)
+    state: dist.Name = dist.Choice({"red": 0.46, "green": 0.44, "yellow": 0.06, "red_yellow": 0.04})
+    luminance_cd_m2: dist.Positive = dist.Uniform(5000.0, 10000.0)
+    junction_m: dist.Positive = dist.Constant(40.0)
 
     ROLES: ClassVar[frozenset[str]] = frozenset(COLORS)
 
@@ -68,28 +73,21 @@ class TrafficLights(RandomizerBase):
             read_signal(body) for body in scene.bodies if has_lenses(body, assets, self.ROLES)
         ]
         bodies: list[Body] = []
-        states: dict[int, str] = {}
+        states: dict[int, tuple[tuple[str, str]]] = {}
+        pedestrian = {i.instance_id for i in scene.instances if i.subcategory == "pedestrian"}
         for junction in group_junctions(signals, self.junction_m.draw(rng)):
             state, luminance = self._draw_state(rng), round(self.luminance_cd_m2.draw(rng), 2)
             for signal in junction:
                 own = state if runs_along(junction[0], signal) else _crossing_state(state)
                 bodies.append(show_state(signal.body, assets, own, luminance))
-                states[signal.body.instance_id] = own
-        instances = tuple(
-            label_state(instance, states[instance.instance_id])
-            if instance.instance_id in states
-            else instance
-            for instance in scene.instances
-        )
-        return replace(scene, instances=instances).with_bodies(*bodies)
+                number = signal.body.instance_id
+                shown = own if number not in pedestrian else "walk" if own == "green" else "stop"
+                states[number] = (("state", shown),)
+        return add_attributes(scene, states).with_bodies(*bodies)
 
     def _draw_state(self, rng: Rng) -> str:
         state = self.state.draw(rng)
-        if state not in LIT:
-            raise ConfigError(
-                f"randomizers.{self.name}.state: unknown state '{state}'; expected one of "
-                f"{', '.join(LIT)}{did_you_mean(state, LIT)}"
-            )
+        check_known(state, LIT, f"randomizers.{self.name}.state: unknown state")
         return state
 
 
@@ -137,11 +135,3 @@ def show_state(body: Body, assets: AssetIndex, state: str, luminance_cd_m2: floa
         r, g, b = (round(level * channel, 2) for channel in color)
         emission[role] = (r, g, b)
     return set_emission(body, assets, emission)
-
-
-def label_state(instance: Instance, state: str) -> Instance:
-    """Return the instance with its state as an attribute; stop or walk for pedestrian signals."""
-    if instance.subcategory == "pedestrian":
-        state = "walk" if state == "green" else "stop"
-    facts = {**dict(instance.attributes), "state": state}
-    return replace(instance, attributes=tuple(sorted(facts.items())))

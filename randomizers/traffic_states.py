@@ -20,7 +20,7 @@ from gen_data.generator.traffic.pedestrians import stride_m
 from gen_data.generator.traffic.signal_cycles import Approach
 from gen_data.generator.traffic.simulation import STEP_S
 from gen_data.generator.traffic.vehicles import Entry
-from gen_data.randomizers.base import body_materials, scale_emission, set_emission
+from gen_data.randomizers.base import add_attributes, body_materials, scale_emission, set_emission
 from gen_data.randomizers.traffic_lights import Signal, show_state
 from gen_data.randomizers.vehicle_lights import AMBER, RED
 
@@ -165,22 +165,11 @@ def apply_first_changes(scene: Scene, changes: Iterable[StateChange]) -> Scene:
     )
     by_id = {body.instance_id: first[body.name] for body in bodies if body.name in first}
     instances = tuple(
-        replace(
-            instance,
-            asset=by_id[instance.instance_id].asset or instance.asset,
-            attributes=tuple(
-                sorted(
-                    (
-                        dict(instance.attributes) | dict(by_id[instance.instance_id].attributes)
-                    ).items()
-                )
-            ),
-        )
-        if instance.instance_id in by_id
-        else instance
-        for instance in scene.instances
+        replace(i, asset=by_id[i.instance_id].asset or i.asset) if i.instance_id in by_id else i
+        for i in scene.instances
     )
-    return replace(scene, bodies=bodies, instances=instances)
+    changed = replace(scene, bodies=bodies, instances=instances)
+    return add_attributes(changed, {number: c.attributes for number, c in by_id.items()})
 
 
 def _hold(on: NDArray[np.bool_], steps: int) -> NDArray[np.bool_]:

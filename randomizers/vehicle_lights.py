@@ -7,19 +7,17 @@ from typing import Literal
 
 from pydantic import Field
 
-from gen_data.generator.config.distributions import (
-    Choice,
-    Flag,
-    Name,
-    Positive,
-    Probability,
-    Uniform,
-)
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Instance, Light, Scene
+from gen_data.generator.core.scene import Body, Light, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import SurfaceRandomizer, scale_emission, set_emission
+from gen_data.randomizers.base import (
+    SurfaceRandomizer,
+    add_attributes,
+    scale_emission,
+    set_emission,
+)
 from gen_data.randomizers.daylight import is_dark
 
 _WHITE: Vec3 = (1.02, 1.0, 0.94)
@@ -50,14 +48,14 @@ class VehicleLights(SurfaceRandomizer):
     """
 
     type: Literal["vehicle_lights"] = "vehicle_lights"
-    headlights: Flag = Probability(0.35)
-    braking: Flag = Probability(0.2)
-    indicator: Name = Choice({"none": 0.9, "left": 0.05, "right": 0.05})
-    headlight_cd_m2: Positive = Uniform(15_000.0, 40_000.0)
-    taillight_cd_m2: Positive = Uniform(600.0, 1500.0)
-    brakelight_cd_m2: Positive = Uniform(6000.0, 15_000.0)
-    indicator_cd_m2: Positive = Uniform(15_000.0, 40_000.0)
-    beam_cd: Positive = Uniform(9000.0, 14_000.0)
+    headlights: dist.Flag = dist.Probability(0.35)
+    braking: dist.Flag = dist.Probability(0.2)
+    indicator: dist.Name = dist.Choice({"none": 0.9, "left": 0.05, "right": 0.05})
+    headlight_cd_m2: dist.Positive = dist.Uniform(15_000.0, 40_000.0)
+    taillight_cd_m2: dist.Positive = dist.Uniform(600.0, 1500.0)
+    brakelight_cd_m2: dist.Positive = dist.Uniform(6000.0, 15_000.0)
+    indicator_cd_m2: dist.Positive = dist.Uniform(15_000.0, 40_000.0)
+    beam_cd: dist.Positive = dist.Uniform(9000.0, 14_000.0)
     beams: bool = Field(True)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
@@ -77,31 +75,17 @@ class VehicleLights(SurfaceRandomizer):
             )
             if dark and self.beams:
                 lights += _beams(self.name, body, assets, beam_cd)
-        return replace(
-            scene.with_bodies(*bodies),
-            lights=tuple(lights),
-            instances=tuple(
-                _label_instance(i, states.get(i.instance_id, ())) for i in scene.instances
-            ),
-        )
+        lit = replace(scene.with_bodies(*bodies), lights=tuple(lights))
+        return add_attributes(lit, states)
 
     def _draw_emission(self, on: bool, braking: bool, side: str, rng: Rng) -> dict[str, Vec3]:
         """Draw emission by role; every luminance is drawn, so that switches shift no other draw."""
-        head, tail, brake, blink = (
-            luminance.draw(rng)
-            for luminance in (
-                self.headlight_cd_m2,
-                self.taillight_cd_m2,
-                self.brakelight_cd_m2,
-                self.indicator_cd_m2,
-            )
-        )
+        head, tail = self.headlight_cd_m2.draw(rng), self.taillight_cd_m2.draw(rng)
+        brake, blink = self.brakelight_cd_m2.draw(rng), self.indicator_cd_m2.draw(rng)
         glow: dict[str, Vec3] = {}
         if on:
-            glow |= {
-                "headlight": scale_emission(_WHITE, head),
-                "taillight": scale_emission(RED, tail),
-            }
+            glow["headlight"] = scale_emission(_WHITE, head)
+            glow["taillight"] = scale_emission(RED, tail)
         if braking:
             glow["brakelight"] = scale_emission(RED, brake)
         for name in ("left", "right"):
@@ -138,8 +122,3 @@ def _beams(name: str, body: Body, assets: AssetIndex, beam_cd: float) -> list[Li
             beam = dipped_beam(f"{name}/{body.name}/{point.name}", place, beam_cd)
             lights.append(replace(beam, body=body.name))
     return lights
-
-
-def _label_instance(instance: Instance, states: tuple[tuple[str, str], ...]) -> Instance:
-    attributes = {**dict(instance.attributes), **dict(states)}
-    return replace(instance, attributes=tuple(sorted(attributes.items())))

@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.vehicles.plates import SEEDS, reseed_plate
-from gen_data.generator.config.distributions import (
-    Chance,
-    Constant,
-    Flag,
-    LogUniform,
-    Probability,
-    Uniform,
-    UnitInterval,
-)
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Scene
@@ -36,31 +29,16 @@ _SOILED = ("paint", "glass", "rim", "tyre", "trim", "chrome", "plate", "headligh
 
 @dataclass(frozen=True, slots=True)
 class Paint:
-    """A family of paints: ranges of hue, saturation and value (HSV in sRGB)."""
+    """A family of paints: ranges of hue, saturation and value (HSV in sRGB); its frequency."""
 
     hue: tuple[float, float]
     saturation: tuple[float, float]
     value: tuple[float, float]
+    weight: float
 
 
-PAINTS: dict[str, Paint] = {
-    "white": Paint((0.1, 0.16), (0.0, 0.04), (0.86, 0.93)),
-    "black": Paint((0.0, 1.0), (0.0, 0.15), (0.05, 0.13)),
-    "grey": Paint((0.55, 0.65), (0.0, 0.1), (0.24, 0.45)),
-    "silver": Paint((0.5, 0.65), (0.0, 0.06), (0.62, 0.75)),
-    "blue": Paint((0.57, 0.65), (0.6, 0.95), (0.2, 0.6)),
-    "red": Paint((0.96, 1.01), (0.75, 0.95), (0.35, 0.75)),
-    "green": Paint((0.3, 0.45), (0.35, 0.8), (0.15, 0.45)),
-    "brown": Paint((0.04, 0.1), (0.3, 0.6), (0.2, 0.45)),
-    "yellow": Paint((0.12, 0.15), (0.75, 0.95), (0.75, 0.9)),
-    "orange": Paint((0.04, 0.08), (0.8, 0.95), (0.75, 0.9)),
-}
-
-ON_ROADS = {
-    "white": 30.0, "black": 21.0, "grey": 21.0, "silver": 10.0, "blue": 9.0,
-    "red": 5.0, "green": 1.5, "brown": 1.2, "yellow": 0.7, "orange": 0.6,
-}  # fmt: skip
-"""The project's own weights, in the order of paint makers' annual reports."""
+PAINTS = load_table("gen_data.randomizers", "vehicle_paint", Paint)
+ON_ROADS = {name: paint.weight for name, paint in PAINTS.items()}
 
 
 class VehiclePaint(SurfaceRandomizer):
@@ -80,12 +58,12 @@ class VehiclePaint(SurfaceRandomizer):
 
     type: Literal["vehicle_paint"] = "vehicle_paint"
     weights: dict[str, Annotated[float, Field(ge=0)]] = Field(ON_ROADS)
-    probability: Chance = Probability(0.85)
-    roughness: UnitInterval = LogUniform(0.1, 0.3)
-    metallic: Flag = Probability(0.6)
-    dirt: UnitInterval = Uniform(0.0, 0.25)
+    probability: dist.Chance = dist.Probability(0.85)
+    roughness: dist.UnitInterval = dist.LogUniform(0.1, 0.3)
+    metallic: dist.Flag = dist.Probability(0.6)
+    dirt: dist.UnitInterval = dist.Uniform(0.0, 0.25)
     plates: bool = Field(True)
-    coat: UnitInterval = Constant(0.0)
+    coat: dist.UnitInterval = dist.Constant(0.0)
 
     def model_post_init(self, context: object) -> None:
         """Reject unknown colours, and weights that are all 0."""
@@ -107,8 +85,8 @@ class VehiclePaint(SurfaceRandomizer):
             painted = [_change_plates(body, int(rng.integers(SEEDS))) for body in painted]
         return scene.with_bodies(*painted)
 
-    def _draw_paint(self, rng: Rng) -> Material:
-        """Draw the material of a paint: colour, gloss and coat."""
+    def _draw_paint(self, rng: Rng) -> dict[str, Any]:
+        """Draw the fields of a paint's material: colour, gloss and coat."""
         names = sorted(self.weights)
         ends = [sum(self.weights[n] for n in names[: k + 1]) for k in range(len(names))]
         draw = float(rng.uniform()) * ends[-1]
@@ -119,34 +97,24 @@ class VehiclePaint(SurfaceRandomizer):
             for low, high in (paint.hue, paint.saturation, paint.value)
         )
         flakes = self.metallic.draw(rng) and name != "white"
-        material = Material(
-            base_color=hsv_to_linear(hue, saturation, value),
-            roughness=round(self.roughness.draw(rng), 4),
-            metallic=0.25 if flakes else 0.0,
-            specular=0.6,
-        )
-        coat = round(self.coat.draw(rng), 4)
-        if not coat:
-            return material
-        worn = round(_WORN * material.roughness, 4)
-        return replace(material, roughness=_PIGMENT, coat=coat, coat_roughness=worn)
+        roughness, coat = round(self.roughness.draw(rng), 4), round(self.coat.draw(rng), 4)
+        return {
+            "base_color": hsv_to_linear(hue, saturation, value),
+            "roughness": _PIGMENT if coat else roughness,
+            "metallic": 0.25 if flakes else 0.0,
+            "specular": 0.6,
+            "coat": coat,
+            "coat_roughness": round(_WORN * roughness, 4) if coat else Material().coat_roughness,
+            "texture": "",
+        }
 
 
-def _finish(body: Body, assets: AssetIndex, paint: Material | None, dirt: float) -> Body:
+def _finish(body: Body, assets: AssetIndex, paint: dict[str, Any] | None, dirt: float) -> Body:
     """Return the body with dust on it, and painted unless the paint is None."""
 
     def finish(material: Material) -> Material:
         if paint is not None and material.role == PAINT and not material.printed:
-            material = replace(
-                material,
-                base_color=paint.base_color,
-                roughness=paint.roughness,
-                metallic=paint.metallic,
-                specular=paint.specular,
-                coat=paint.coat,
-                coat_roughness=paint.coat_roughness,
-                texture="",
-            )
+            material = replace(material, **paint)
         return _soil(material, dirt) if material.role in _SOILED else material
 
     slots = body_materials(body, assets)

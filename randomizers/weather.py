@@ -1,40 +1,74 @@
-"""Weather, with the matching sun and sky."""
+"""Weather, with the matching sun and sky.
+
+A preset is a condition and a time of day in one name, as in ``HardRainSunset``.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from pydantic import Field, field_validator
 
-from gen_data.generator.config.distributions import (
-    Choice,
-    Name,
-    NonNegative,
-    Scalar,
-    Uniform,
-    UnitInterval,
-)
+from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.assets.skies.sky import SkyModel
+from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.scene import Weather as SceneWeather
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.daylight import Daylight, draw_cloud_seed, set_daylight
+from gen_data.randomizers.daylight import draw_cloud_seed, set_daylight
 from gen_data.randomizers.time_of_day import Altitude, Turbidity
-from gen_data.randomizers.weather_presets import PRESETS, Range
 
-_FIELDS = (
-    "fog_extinction_per_m",
-    "fog_height_m",
-    "rain_mm_h",
-    "snow_mm_h",
-    "wetness",
-    "puddles",
-    "snow_cover",
-    "lens_drops",
-)
+_FIELDS = ("fog_extinction_per_m", "fog_height_m", "rain_mm_h", "snow_mm_h", "wetness", "puddles",
+           "snow_cover", "lens_drops")  # fmt: skip
 _PATTERNS = 2**31
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """State of the sky, the air and the ground.
+
+    Attributes:
+        cloudiness, turbidity: Ranges of uniform draws.
+        weather: Typical values; the seed is drawn.
+    """
+
+    cloudiness: Range
+    turbidity: Range = (2.0, 3.5)
+    weather: SceneWeather = field(default_factory=SceneWeather)
+
+
+CONDITIONS = load_table("gen_data.randomizers", "weather_conditions", Condition)
+"""Conditions by the first part of a preset's name."""
+
+ALTITUDES_DEG: dict[str, Range] = {
+    "Noon": (32.0, 62.0),
+    "Morning": (8.0, 22.0),
+    "Sunset": (0.8, 6.0),
+    "Dusk": (-7.0, -3.0),
+    "Night": (-50.0, -16.0),
+}
+"""Range of the sun's altitude, by the last part of a preset's name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Preset:
+    """A condition at a time of day."""
+
+    condition: Condition
+    sun_altitude_deg: Range
+
+
+PRESETS: dict[str, Preset] = {
+    f"{name}{time}": Preset(condition, altitude_deg)
+    for name, condition in {**CONDITIONS, "MidRainy": CONDITIONS["MidRain"]}.items()
+    for time, altitude_deg in ALTITUDES_DEG.items()
+}
 
 
 class Weather(RandomizerBase):
@@ -61,44 +95,41 @@ class Weather(RandomizerBase):
     """
 
     type: Literal["weather"] = "weather"
-    preset: Name = Choice(("ClearNoon", "CloudyNoon", "ClearSunset", "WetNoon"))
+    preset: dist.Name = dist.Choice(("ClearNoon", "CloudyNoon", "ClearSunset", "WetNoon"))
     sun_altitude_deg: Altitude | None = Field(None)
-    sun_azimuth_deg: Scalar = Uniform(0.0, 360.0)
-    cloudiness: UnitInterval | None = Field(None)
+    sun_azimuth_deg: dist.Scalar = dist.Uniform(0.0, 360.0)
+    cloudiness: dist.UnitInterval | None = Field(None)
     turbidity: Turbidity | None = Field(None)
-    fog_extinction_per_m: NonNegative | None = Field(None)
-    fog_height_m: NonNegative | None = Field(None)
-    rain_mm_h: NonNegative | None = Field(None)
-    snow_mm_h: NonNegative | None = Field(None)
-    wetness: UnitInterval | None = Field(None)
-    puddles: UnitInterval | None = Field(None)
-    snow_cover: UnitInterval | None = Field(None)
-    lens_drops: UnitInterval | None = Field(None)
+    fog_extinction_per_m: dist.NonNegative | None = Field(None)
+    fog_height_m: dist.NonNegative | None = Field(None)
+    rain_mm_h: dist.NonNegative | None = Field(None)
+    snow_mm_h: dist.NonNegative | None = Field(None)
+    wetness: dist.UnitInterval | None = Field(None)
+    puddles: dist.UnitInterval | None = Field(None)
+    snow_cover: dist.UnitInterval | None = Field(None)
+    lens_drops: dist.UnitInterval | None = Field(None)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with drawn weather, sun and sky."""
         del assets
         preset = PRESETS[self.preset.draw(rng)]
         condition = preset.condition
-        light = Daylight(
-            _draw(self.sun_altitude_deg, preset.sun_altitude_deg, rng),
-            self.sun_azimuth_deg.draw(rng),
-            _draw(self.cloudiness, condition.cloudiness, rng),
-            _draw(self.turbidity, condition.turbidity, rng),
-            draw_cloud_seed(rng),
-        )
+        altitude_deg = _draw(self.sun_altitude_deg, preset.sun_altitude_deg, rng)
+        azimuth_deg = self.sun_azimuth_deg.draw(rng)
+        cloudiness = _draw(self.cloudiness, condition.cloudiness, rng)
+        turbidity = _draw(self.turbidity, condition.turbidity, rng)
+        sky = SkyModel(draw_cloud_seed(rng), altitude_deg, turbidity, cloudiness)
         values: dict[str, Any] = {"seed": int(rng.integers(_PATTERNS))}
         for name in _FIELDS:
-            given: Scalar | None = getattr(self, name)
+            given: dist.Scalar | None = getattr(self, name)
             if given is not None:
                 values[name] = round(given.draw(rng), 6)
         weather = replace(condition.weather, **values)
-        light = replace(light, snow=weather.snow_cover > 0.0)
-        return set_daylight(replace(scene, weather=weather), light)
+        return set_daylight(replace(scene, weather=weather), sky, azimuth_deg)
 
     @field_validator("preset")
     @classmethod
-    def _check_preset(cls, preset: Name) -> Name:
+    def _check_preset(cls, preset: dist.Name) -> dist.Name:
         """Reject unknown presets."""
         for name in preset.outcomes():
             if name not in PRESETS:
@@ -109,5 +140,5 @@ class Weather(RandomizerBase):
         return preset
 
 
-def _draw(given: Scalar | None, default: Range, rng: Rng) -> float:
-    return (given or Uniform(*default)).draw(rng)
+def _draw(given: dist.Scalar | None, default: Range, rng: Rng) -> float:
+    return (given or dist.Uniform(*default)).draw(rng)

@@ -6,7 +6,7 @@ from typing import Literal
 
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
-from gen_data.scene_templates.element import PlacedElement, add_static, stand_upright
+from gen_data.scene_templates.element import PlacedElement, add_background, stand_upright
 
 
 class Backdrop(PlacedElement):
@@ -21,11 +21,5 @@ class Backdrop(PlacedElement):
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add a static body; background has no instance."""
-        return add_static(
-            scene,
-            assets,
-            name=self.name,
-            asset=self.asset,
-            T_world_body=stand_upright(assets, self.asset, self.pose(scene)),
-            unlabelled=True,
-        )
+        pose = stand_upright(assets, self.asset, self.pose(scene))
+        return add_background(scene, assets, self.name, self.asset, pose)

@@ -6,9 +6,8 @@ from typing import Literal
 
 from gen_data.generator.assets.procedural.furniture import bin_interior_m
 from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene, SupportSurface
-from gen_data.generator.core.se3 import SE3
-from gen_data.scene_templates.element import PlacedElement, add_static, add_surface, parametric_id
+from gen_data.generator.core.scene import Scene
+from gen_data.scene_templates.element import PlacedElement, add_static, parametric_id
 
 
 class Bin(PlacedElement):
@@ -25,22 +24,7 @@ class Bin(PlacedElement):
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add a static body, its instance, and the surface of its floor."""
-        T_world_bin = self.pose(scene)
-        scene = add_static(
-            scene,
-            assets,
-            name=self.name,
-            asset=parametric_id("bin", size_m=self.size_m),
-            T_world_body=T_world_bin,
-            annotated=self.annotate,
-        )
+        asset, pose = parametric_id("bin", size_m=self.size_m), self.pose(scene)
+        scene = add_static(scene, assets, self.name, asset, pose, annotated=self.annotate)
         length_m, width_m, floor_m = bin_interior_m(self.size_m)
-        floor = SupportSurface(
-            name=self.name,
-            body=self.name,
-            T_world_surface=(T_world_bin @ SE3((0.0, 0.0, floor_m))).rounded(),
-            size_m=(length_m, width_m),
-            clearance_m=1.5,
-            walled=True,
-        )
-        return add_surface(scene, floor)
+        return self.add_surface(scene, floor_m, (length_m, width_m), clearance_m=1.5, walled=True)

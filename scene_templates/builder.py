@@ -51,14 +51,9 @@ def focus_region(scene: Scene) -> Region:
     points = np.concatenate([_content_corners(surface) for surface in surfaces])
     low, high = points.min(axis=0), points.max(axis=0)
     center, size = 0.5 * (low + high), high - low
-    return Region(
-        center_m=(
-            round(float(center[0]), 6),
-            round(float(center[1]), 6),
-            round(float(center[2]), 6),
-        ),
-        size_m=(round(float(size[0]), 6), round(float(size[1]), 6), round(float(size[2]), 6)),
-    )
+    x, y, z = (round(float(v), 6) for v in center)
+    length_m, width_m, height_m = (round(float(v), 6) for v in size)
+    return Region((x, y, z), (length_m, width_m, height_m))
 
 
 def _bounds_of_lanes(lanes: Sequence[Lane]) -> tuple[Vec3, Vec3]:

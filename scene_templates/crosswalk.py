@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -39,14 +39,9 @@ class Crosswalk(Element):
                 f"{where}.station_m: {self.station_m:g} is not on '{self.road}', which is "
                 f"{shape.length_m:g} m long"
             )
-        looks = {name: parameters[name] for name in ("seed", "wear") if name in parameters}
-        asset = parametric_id(
-            "crosswalk",
-            **non_default_fields(shape),
-            **looks,
-            station_m=self.station_m,
-            width_m=self.width_m,
-        )
+        looks: dict[str, Any] = {k: parameters[k] for k in ("seed", "wear") if k in parameters}
+        looks |= {"station_m": self.station_m, "width_m": self.width_m}
+        asset = parametric_id("crosswalk", **non_default_fields(shape), **looks)
         t = np.linspace(-shape.carriageway_m(-1), shape.carriageway_m(1), 7)
         flat = shape.line().points(np.full(7, self.station_m), t)
         center = world_points(np.column_stack([flat, height_m(shape, t)]), T_world_road)

@@ -36,11 +36,7 @@ class Ego(Element):
     lane: str = ""
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """Add the vehicle and its rig.
-
-        Raises:
-            ConfigError: no asset has the tags, or the lane is unknown.
-        """
+        """Add the vehicle and its rig."""
         asset = self.asset or self._find_asset(assets)
         lanes = [lane for lane in scene.lanes if lane.name == self.lane or not self.lane]
         lanes = [lane for lane in lanes if lane.kind == "driving" and not lane.junction]
@@ -53,13 +49,8 @@ class Ego(Element):
         T_body_rig = find_axles(assets, asset, 1.0).T_body_rear
         place = line.pose(0.5 * line.length_m)
         instance_id = next_instance_id(scene)
-        body = Body(
-            self.name,
-            asset,
-            (place @ T_body_rig.inverse()).rounded(),
-            instance_id=instance_id,
-            collides=False,
-        )
+        pose = (place @ T_body_rig.inverse()).rounded()
+        body = Body(self.name, asset, pose, instance_id=instance_id, collides=False)
         instance = Instance(instance_id, self.name, CATEGORY, 0, asset, annotated=False)
         return replace(
             scene,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from dataclasses import replace
+from typing import Any
 
 from pydantic import Field
 
@@ -63,6 +64,21 @@ class PlacedElement(Element):
             return local
         return find_surfaces(scene, self.on, f"elements.{self.name}.on")[0].T_world_surface @ local
 
+    def add_surface(
+        self, scene: Scene, height_m: float, size_m: tuple[float, float], **fields: Any
+    ) -> Scene:
+        """Add a level surface at a height above the element's origin.
+
+        Args:
+            scene: Scene with the element's body, which has its name.
+            height_m: Height.
+            size_m: Extent along the element's X and Y.
+            fields: Further fields of ``SupportSurface``.
+        """
+        pose = (self.pose(scene) @ SE3((0.0, 0.0, height_m))).rounded()
+        own = {"name": self.name, "body": self.name, "T_world_surface": pose, "size_m": size_m}
+        return replace(scene, surfaces=(*scene.surfaces, SupportSurface(**{**own, **fields})))
+
 
 def level_pose(at_m: tuple[float, float] | tuple[float, float, float], yaw_deg: float) -> SE3:
     """Pose with Z up at a position, whose height defaults to 0, rotated about the vertical."""
@@ -97,32 +113,29 @@ def next_instance_id(scene: Scene) -> int:
     return free_instance_ids(scene, 1)[0]
 
 
+def add_background(
+    scene: Scene, assets: AssetIndex, name: str, asset: str, T_world_body: SE3
+) -> Scene:
+    """Add a static body without an instance, such as walls and ground."""
+    assets.get(asset)
+    return replace(scene, bodies=(*scene.bodies, Body(name, asset, T_world_body.rounded())))
+
+
 def add_static(
     scene: Scene,
     assets: AssetIndex,
-    *,
     name: str,
     asset: str,
     T_world_body: SE3,
+    *,
     annotated: bool = False,
-    unlabelled: bool = False,
 ) -> Scene:
-    """Add a static body, and the instance that labels it.
-
-    ``unlabelled`` bodies (walls, ground) are background: they have no instance.
-    """
-    entry = assets.get(asset)
-    instance_id = 0 if unlabelled else next_instance_id(scene)
-    body = Body(name, asset, T_world_body.rounded(), instance_id=instance_id)
-    if unlabelled:
-        return replace(scene, bodies=(*scene.bodies, body))
-    instance = Instance(instance_id, name, entry.category, 0, asset, annotated=annotated)
+    """Add a static body, and the instance that labels it."""
+    number = next_instance_id(scene)
+    body = Body(name, asset, T_world_body.rounded(), instance_id=number)
+    category = assets.get(asset).category
+    instance = Instance(number, name, category, 0, asset, annotated=annotated)
     return replace(scene, bodies=(*scene.bodies, body), instances=(*scene.instances, instance))
-
-
-def add_surface(scene: Scene, surface: SupportSurface) -> Scene:
-    """Add a surface."""
-    return replace(scene, surfaces=(*scene.surfaces, surface))
 
 
 def stand_upright(assets: AssetIndex, asset: str, T_world_stand: SE3) -> SE3:

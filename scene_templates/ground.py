@@ -9,7 +9,12 @@ from pydantic import Field
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import SE3
-from gen_data.scene_templates.element import PlacedElement, add_static, parametric_id
+from gen_data.scene_templates.element import (
+    NAME_PATTERN,
+    PlacedElement,
+    add_background,
+    parametric_id,
+)
 from gen_data.scene_templates.road import Ground
 
 
@@ -30,18 +35,10 @@ class GroundElement(PlacedElement):
     relief_m: float = Field(0.04, ge=0, le=1)
     level_m: float = -0.05
     seed: int = Field(0, ge=0, le=1_000_000)
-    name: str = Field("ground", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("ground", pattern=NAME_PATTERN)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add a static body; background has no instance."""
-        asset = parametric_id(
-            "ground",
-            size_m=self.size_m,
-            cover=self.cover,
-            relief_m=self.relief_m,
-            seed=self.seed,
-        )
+        shape = {name: getattr(self, name) for name in ("size_m", "cover", "relief_m", "seed")}
         pose = self.pose(scene) @ SE3((0.0, 0.0, self.level_m))
-        return add_static(
-            scene, assets, name=self.name, asset=asset, T_world_body=pose, unlabelled=True
-        )
+        return add_background(scene, assets, self.name, parametric_id("ground", **shape), pose)

@@ -36,11 +36,7 @@ class LaneObjects(Element):
     annotate: bool = True
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """Add the group, and its objects evenly along the lanes.
-
-        Raises:
-            ConfigError: the template has no lane of these kinds before this element.
-        """
+        """Add the group, and its objects evenly along the lanes."""
         lines = [LaneLine(lane) for lane in scene.lanes if lane.kind in self.lanes]
         if not lines and self.count:
             known = ", ".join(sorted({lane.kind for lane in scene.lanes})) or "none"

@@ -36,6 +36,5 @@ class ParkingArea(RoadSurface, PlacedElement):
         pose = self.pose(scene)
         parameters = non_default_fields(shape) | self.surface_parameters()
         asset = parametric_id("parking_area", **parameters)
-        return add_street(
-            scene, assets, self.name, asset, pose, parking_lanes(shape, self.name, pose)
-        )
+        lanes = parking_lanes(shape, self.name, pose)
+        return add_street(scene, assets, self.name, asset, pose, lanes)

@@ -8,7 +8,12 @@ from pydantic import model_validator
 
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
-from gen_data.scene_templates.element import PlacedElement, add_static, stand_upright
+from gen_data.scene_templates.element import (
+    PlacedElement,
+    add_background,
+    add_static,
+    stand_upright,
+)
 
 
 class Prop(PlacedElement):
@@ -34,12 +39,7 @@ class Prop(PlacedElement):
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add a static body and, unless it is background, its instance."""
-        return add_static(
-            scene,
-            assets,
-            name=self.name,
-            asset=self.asset,
-            T_world_body=stand_upright(assets, self.asset, self.pose(scene)),
-            annotated=self.annotate,
-            unlabelled=self.hollow,
-        )
+        pose = stand_upright(assets, self.asset, self.pose(scene))
+        if self.hollow:
+            return add_background(scene, assets, self.name, self.asset, pose)
+        return add_static(scene, assets, self.name, self.asset, pose, annotated=self.annotate)

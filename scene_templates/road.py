@@ -18,7 +18,7 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.generator.roads.cross_section import RoadShape, non_default_fields
 from gen_data.generator.roads.junction_shape import JunctionShape, arm_pose
 from gen_data.generator.roads.lane_graph import link_lanes, road_lanes
-from gen_data.scene_templates.element import Element, add_static, level_pose, parametric_id
+from gen_data.scene_templates.element import Element, add_background, level_pose, parametric_id
 
 T = TypeVar("T")
 Width = float
@@ -120,14 +120,8 @@ class Road(RoadSurface, Element):
         given = {name: value for name, (value, default) in options.items() if value != default}
         given |= non_default_fields(shape) | self.surface_parameters()
         asset = parametric_id("road", **given)
-        return add_street(
-            scene,
-            assets,
-            self.name,
-            asset,
-            pose,
-            road_lanes(shape, self.name, pose, self.speed_m_s),
-        )
+        lanes = road_lanes(shape, self.name, pose, self.speed_m_s)
+        return add_street(scene, assets, self.name, asset, pose, lanes)
 
     def shape(self) -> RoadShape:
         """Return its cross section and course. Raises ConfigError if they are impossible."""
@@ -173,9 +167,7 @@ def add_street(
     lanes: tuple[Lane, ...],
 ) -> Scene:
     """Add a surface as background, and link its lanes to those that it meets."""
-    scene = add_static(
-        scene, assets, name=name, asset=asset, T_world_body=T_world_body, unlabelled=True
-    )
+    scene = add_background(scene, assets, name, asset, T_world_body)
     return replace(scene, lanes=link_lanes((*scene.lanes, *lanes)))
 
 

@@ -51,16 +51,8 @@ class Robot(PlacedElement):
         T_world_base = self.pose(scene).rounded()
         instance_id = next_instance_id(scene)
         parts = tuple(link for link in robot.links if link in robot.visuals)
-        instance = Instance(
-            instance_id,
-            self.name,
-            CATEGORY,
-            0,
-            asset,
-            annotated=self.annotate,
-            parts=parts,
-            T_world_instance=T_world_base,
-        )
+        instance = Instance(instance_id, self.name, CATEGORY, 0, asset, annotated=self.annotate)
+        instance = replace(instance, parts=parts, T_world_instance=T_world_base)
         articulation = Articulation(
             name=self.name,
             asset=asset,

@@ -10,7 +10,7 @@ from pydantic import Field
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import SE3
-from gen_data.scene_templates.element import Element, add_static, parametric_id
+from gen_data.scene_templates.element import NAME_PATTERN, Element, add_background, parametric_id
 
 CLEARANCE_M = 0.15
 """Smallest distance of cameras and lights from the walls."""
@@ -28,7 +28,7 @@ class Room(Element):
     size_m: tuple[float, float, float] = (5.0, 4.0, 2.8)
     door: bool = True
     window: bool = True
-    name: str = Field("room", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("room", pattern=NAME_PATTERN)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the room as background, without an instance."""
@@ -36,9 +36,7 @@ class Room(Element):
         asset = parametric_id(
             "room", size_m=self.size_m, door=int(self.door), window=int(self.window)
         )
-        scene = add_static(
-            scene, assets, name=self.name, asset=asset, T_world_body=SE3(), unlabelled=True
-        )
+        scene = add_background(scene, assets, self.name, asset, SE3())
         inside = (
             (-x / 2 + CLEARANCE_M, -y / 2 + CLEARANCE_M, CLEARANCE_M),
             (x / 2 - CLEARANCE_M, y / 2 - CLEARANCE_M, z - CLEARANCE_M),

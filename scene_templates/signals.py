@@ -37,11 +37,7 @@ class Signals(Element):
     annotate: bool = False
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
-        """Add one light per incoming road.
-
-        Raises:
-            ConfigError: no road leads to such a junction.
-        """
+        """Add one light per incoming road."""
         crossing = {lane.name for lane in scene.lanes if lane.road == self.junction}
         coming = [lane for lane in scene.lanes if _is_entry(lane, crossing, self.junction)]
         if not coming:
@@ -54,14 +50,8 @@ class Signals(Element):
             line = LaneLine(lane)
             right_m = 0.5 * lane.width_m + self.beside_m + SIGNAL_M
             stand = line.pose(line.length_m, -right_m) @ SE3.about_z(math.pi)
-            scene = add_static(
-                scene,
-                assets,
-                name=f"{self.name}/{number}",
-                asset=asset,
-                T_world_body=stand_upright(assets, asset, stand),
-                annotated=self.annotate,
-            )
+            name, pose = f"{self.name}/{number}", stand_upright(assets, asset, stand)
+            scene = add_static(scene, assets, name, asset, pose, annotated=self.annotate)
         return scene
 
 

@@ -7,12 +7,10 @@ from typing import Literal
 from pydantic import Field
 
 from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Scene, SupportSurface
-from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.scene import Scene
 from gen_data.scene_templates.element import (
     PlacedElement,
     add_static,
-    add_surface,
     extent_m,
     parametric_id,
     stand_upright,
@@ -45,21 +43,7 @@ class SurfaceElement(PlacedElement):
         if asset == "table":
             size_m = (*self.top_size_m, self.height_m)
             asset = parametric_id("table", size_m=size_m, style=self.style)
-        T_world_stand = self.pose(scene)
-        scene = add_static(
-            scene,
-            assets,
-            name=self.name,
-            asset=asset,
-            T_world_body=stand_upright(assets, asset, T_world_stand),
-            annotated=self.annotate,
-        )
+        pose = stand_upright(assets, asset, self.pose(scene))
+        scene = add_static(scene, assets, self.name, asset, pose, annotated=self.annotate)
         length_m, width_m, height_m = extent_m(assets, asset)
-        top = SupportSurface(
-            name=self.name,
-            body=self.name,
-            T_world_surface=(T_world_stand @ SE3((0.0, 0.0, height_m))).rounded(),
-            size_m=(length_m, width_m),
-            clearance_m=CLEARANCE_M,
-        )
-        return add_surface(scene, top)
+        return self.add_surface(scene, height_m, (length_m, width_m), clearance_m=CLEARANCE_M)

@@ -53,6 +53,7 @@ class World:
         }
         self._folder = Path(tempfile.mkdtemp(prefix="gen-data-physics-"))
         self._client: int = pybullet.connect(pybullet.DIRECT)
+        self._here = {"physicsClientId": self._client}
         self._solids: dict[str, _Solid] = {}
         self._names: dict[int, str] = {}
         self._bounds: dict[str, tuple[Array, Array]] = {}
@@ -65,16 +66,16 @@ class World:
     def close(self) -> None:
         """Close the connection and delete scratch files; may be called twice."""
         if self._client >= 0:
-            pybullet.disconnect(physicsClientId=self._client)
+            pybullet.disconnect(**self._here)
             shutil.rmtree(self._folder, ignore_errors=True)
         self._client = -1
 
     def reset(self) -> None:
         """Remove all bodies and restore the parameters."""
         self._solids, self._names, self._bounds = {}, {}, {}
-        pybullet.resetSimulation(physicsClientId=self._client)
-        pybullet.setGravity(0.0, 0.0, -GRAVITY_M_S2, physicsClientId=self._client)
-        pybullet.setPhysicsEngineParameter(physicsClientId=self._client, **self._parameters)
+        pybullet.resetSimulation(**self._here)
+        pybullet.setGravity(0.0, 0.0, -GRAVITY_M_S2, **self._here)
+        pybullet.setPhysicsEngineParameter(**self._here, **self._parameters)
 
     def add(
         self,
@@ -97,13 +98,11 @@ class World:
             basePosition=position,
             baseOrientation=orientation,
             useMaximalCoordinates=1,
-            physicsClientId=self._client,
+            **self._here,
         )
-        rolling = (
-            _ROLLING_FRICTION_SHARE * float(shape.half_extents_m.min()) * scale
-            if mass_kg > 0.0
-            else 0.0
-        )
+        rolling = 0.0
+        if mass_kg > 0.0:
+            rolling = _ROLLING_FRICTION_SHARE * float(shape.half_extents_m.min()) * scale
         pybullet.changeDynamics(
             number,
             -1,
@@ -112,7 +111,7 @@ class World:
             rollingFriction=rolling,
             spinningFriction=rolling,
             angularDamping=_ANGULAR_DAMPING,
-            physicsClientId=self._client,
+            **self._here,
         )
         self._solids[name] = _Solid(number, shape, scale, T_body_center)
         self._names[number] = name
@@ -122,23 +121,21 @@ class World:
         solid = self._solids.pop(name)
         del self._names[solid.number]
         self._bounds.pop(name, None)
-        pybullet.removeBody(solid.number, physicsClientId=self._client)
+        pybullet.removeBody(solid.number, **self._here)
 
     def ignore(self, name: str, others: Iterable[str]) -> None:
         """Disable collisions of a body with others."""
         number = self._solids[name].number
         for other in others:
             pybullet.setCollisionFilterPair(
-                number, self._solids[other].number, -1, -1, 0, physicsClientId=self._client
+                number, self._solids[other].number, -1, -1, 0, **self._here
             )
 
     def place(self, name: str, T_world_body: SE3) -> None:
         """Move a body to a pose, at rest."""
         solid = self._solids[name]
         position, orientation = _bullet_pose(T_world_body @ solid.T_body_center)
-        pybullet.resetBasePositionAndOrientation(
-            solid.number, position, orientation, physicsClientId=self._client
-        )
+        pybullet.resetBasePositionAndOrientation(solid.number, position, orientation, **self._here)
         self._bounds.pop(name, None)
 
     def pose(self, name: str) -> SE3:
@@ -158,63 +155,53 @@ class World:
         (low, high), (other_low, other_high) = self.bounds_m(one), self.bounds_m(other)
         if (low > other_high + limit_m).any() or (other_low > high + limit_m).any():
             return limit_m
-        points = pybullet.getClosestPoints(
-            self._solids[one].number,
-            self._solids[other].number,
-            distance=limit_m,
-            physicsClientId=self._client,
-        )
+        a, b = self._solids[one].number, self._solids[other].number
+        points = pybullet.getClosestPoints(a, b, distance=limit_m, **self._here)
         return min((float(point[8]) for point in points), default=limit_m)
 
     def step(self, count: int) -> None:
         """Simulate ``count`` steps."""
         for _ in range(count):
-            pybullet.stepSimulation(physicsClientId=self._client)
+            pybullet.stepSimulation(**self._here)
         self._bounds = {}
 
     def speed(self, name: str) -> tuple[float, float]:
         """Linear [m/s] and angular speed [rad/s] of a body."""
-        linear, angular = pybullet.getBaseVelocity(
-            self._solids[name].number, physicsClientId=self._client
-        )
+        linear, angular = pybullet.getBaseVelocity(self._solids[name].number, **self._here)
         return math.dist(linear, (0.0, 0.0, 0.0)), math.dist(angular, (0.0, 0.0, 0.0))
 
     def contacts(self) -> list[tuple[str, str, float]]:
         """All pairs of bodies in contact and their gap [m], negative if they overlap."""
-        pybullet.performCollisionDetection(physicsClientId=self._client)
-        points = pybullet.getContactPoints(physicsClientId=self._client)
+        pybullet.performCollisionDetection(**self._here)
+        points = pybullet.getContactPoints(**self._here)
         return [(self._names[p[1]], self._names[p[2]], float(p[8])) for p in points]
 
     def _center(self, solid: _Solid) -> SE3:
-        (px, py, pz), (x, y, z, w) = pybullet.getBasePositionAndOrientation(
-            solid.number, physicsClientId=self._client
-        )
+        pose = pybullet.getBasePositionAndOrientation(solid.number, **self._here)
+        (px, py, pz), (x, y, z, w) = pose
         return SE3((px, py, pz), (w, x, y, z))
 
     def _collision_shape(self, shape: CollisionShape, scale: float) -> int:
         if shape.boxes:
-            return int(
-                pybullet.createCollisionShapeArray(
-                    shapeTypes=[pybullet.GEOM_BOX] * len(shape.boxes),
-                    halfExtents=[_scale(half, scale) for _, half in shape.boxes],
-                    collisionFramePositions=[_scale(center, scale) for center, _ in shape.boxes],
-                    physicsClientId=self._client,
-                )
+            number = pybullet.createCollisionShapeArray(
+                shapeTypes=[pybullet.GEOM_BOX] * len(shape.boxes),
+                halfExtents=[_scale(half, scale) for _, half in shape.boxes],
+                collisionFramePositions=[_scale(center, scale) for center, _ in shape.boxes],
+                **self._here,
             )
+            return int(number)
         # pybullet takes compounds of hulls only from files, and caches files by name for the life
         # of the process: hence names by content.
         step = scale_step(scale)
         path = self._folder / f"{shape.key}_{step}.obj"
         if not path.exists():
             path.write_text(shape.obj(step))
-        return int(
-            pybullet.createCollisionShape(
-                pybullet.GEOM_MESH,
-                fileName=str(path),
-                meshScale=[scale, scale, scale],
-                physicsClientId=self._client,
-            )
+        size = [scale, scale, scale]
+        mesh = pybullet.GEOM_MESH
+        number = pybullet.createCollisionShape(
+            mesh, fileName=str(path), meshScale=size, **self._here
         )
+        return int(number)
 
 
 def _bullet_pose(pose: SE3) -> tuple[Vec3, tuple[float, float, float, float]]:

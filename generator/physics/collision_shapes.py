@@ -10,7 +10,7 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import blake2b
 from typing import TYPE_CHECKING, Any
@@ -128,7 +128,8 @@ def collision_shape(parts: ConvexParts) -> CollisionShape:
     center = (weights[:, None] * middles).sum(axis=0) / weights.sum()
     x, y, z = (round(float(v), 9) for v in center)
     offset = np.array([x, y, z])
-    hulls = tuple(Hull(part.vertices_m - offset, part.retreats, part.width_m) for part in measured)
+    inner = [part.hull for part in measured]
+    hulls = tuple(replace(hull, vertices_m=hull.vertices_m - offset) for hull in inner)
     boxes = [_as_box(hull.vertices_m) for hull in hulls]
     exact = tuple(box for box in boxes if box is not None)
     return CollisionShape(
@@ -138,16 +139,9 @@ def collision_shape(parts: ConvexParts) -> CollisionShape:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Part:
-    """Measures of one convex part.
+    """Measures of one convex part, in the asset's frame; the centre of mass has shape [3]."""
 
-    Attributes:
-        vertices_m, retreats, width_m: As in Hull, in the asset's frame.
-        center_m: Centre of mass, [3].
-    """
-
-    vertices_m: Array
-    retreats: Array
-    width_m: float
+    hull: Hull
     volume_m3: float
     center_m: Array
 
@@ -163,7 +157,7 @@ def _measure(parts_m: Sequence[Array]) -> list[_Part]:
         with contextlib.suppress(QhullError):
             hulls[k] = ConvexHull(part - middles[k])
     measured = [
-        _Part(p, np.zeros_like(p), 0.0, 0.0, m) for p, m in zip(parts_m, middles, strict=True)
+        _Part(Hull(p, np.zeros_like(p), 0.0), 0.0, m) for p, m in zip(parts_m, middles, strict=True)
     ]
     if not hulls:
         return measured
@@ -181,13 +175,9 @@ def _measure(parts_m: Sequence[Array]) -> list[_Part]:
     moments = np.add.reduceat(moments, starts)
     for n, (k, hull) in enumerate(hulls.items()):
         kept = np.sort(hull.vertices)
-        measured[k] = _Part(
-            parts_m[k][kept],
-            retreats[first[n] + kept],
-            _width_m(hull),
-            float(volumes_m3[n]),
-            middles[k] + moments[n] / volumes_m3[n],
-        )
+        shrinkable = Hull(parts_m[k][kept], retreats[first[n] + kept], _width_m(hull))
+        center = middles[k] + moments[n] / volumes_m3[n]
+        measured[k] = _Part(shrinkable, float(volumes_m3[n]), center)
     return measured
 
 

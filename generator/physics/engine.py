@@ -12,11 +12,10 @@ from gen_data.generator.core.scene import Articulation, Body, Scene
 from gen_data.generator.physics.bullet import World
 from gen_data.generator.physics.collision_shapes import CollisionShape, collision_shape
 from gen_data.generator.physics.manipulation.arm_goals import Arm, ArmState
+from gen_data.generator.physics.manipulation.joint_trajectories import TrajectoryRecording
 from gen_data.generator.physics.manipulation.manipulation_planner import TaskPlanner
-from gen_data.generator.physics.manipulation.trajectory_recording import TrajectoryRecording
 from gen_data.generator.physics.physics_config import PhysicsConfig
-from gen_data.generator.physics.placement_surfaces import candidate_surfaces
-from gen_data.generator.physics.settling import Settling
+from gen_data.generator.physics.settling import Settling, candidate_surfaces
 
 _DENSITY_KG_M3 = 300.0
 """Mass over bounding box for bodies without a mass: household objects are mostly hollow."""
@@ -121,11 +120,7 @@ class BulletEngine:
         return arms
 
     def _add_arm_tracks(
-        self,
-        scene: Scene,
-        fixed: list[str],
-        fallen: list[str],
-        arms: list[tuple[Arm, ArmState]],
+        self, scene: Scene, fixed: list[str], fallen: list[str], arms: list[tuple[Arm, ArmState]]
     ) -> Scene | Rejection:
         """The scene with trajectories of arms with tasks, and of the bodies they carry.
 
@@ -151,7 +146,7 @@ class BulletEngine:
                 return plan
             resting = planner.resting
             parts = [link for link in arm.robot.links if link in arm.robot.visuals]
-            recording.add(arm, plan.legs, parts)
+            recording.add(arm, plan, parts)
         return replace(
             scene,
             tracks=(*scene.tracks, *recording.tracks()),

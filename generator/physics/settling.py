@@ -1,15 +1,18 @@
-"""Settling: lets bodies fall until they rest, or rejects the layout with a reason."""
+"""Settling: lets bodies fall on their surfaces until they rest, or rejects the layout."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
+import numpy as np
+
+from gen_data.generator.core.asset_types import ConvexParts
 from gen_data.generator.core.errors import Rejection
-from gen_data.generator.core.scene import Body, SupportSurface
-from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.scene import Body, Scene, SupportSurface
+from gen_data.generator.core.se3 import SE3, Array
 from gen_data.generator.physics.bullet import World
+from gen_data.generator.physics.collision_shapes import CollisionShape, collision_shape
 from gen_data.generator.physics.physics_config import PhysicsConfig
-from gen_data.generator.physics.placement_surfaces import guard_walls, home_surface, is_supported
 
 _CHECK_EVERY_S = 0.05
 _LIFTS_MAX = 32
@@ -20,6 +23,11 @@ _TOUCH_M = 0.001
 _ATTEMPTS_MAX = 4
 _LOST_M = 0.3
 """An object this far below its lowest surface is lost."""
+_SINK_M = 0.02
+"""Tolerance of a body's bottom below its surface: more than any contact error."""
+_WALL_THICKNESS_M = 1.0
+_WALL_BELOW_M = 0.5
+_WALL_ABOVE_M = 5.0
 
 
 class Settling:
@@ -61,13 +69,16 @@ class Settling:
                 self._restart(body, pull=1.0 - 0.5**attempt)
             self._lower(loose, fixed, arms)
             if not self._rest_guarded():
-                return self._still_moving()
+                return Rejection(
+                    f"still moving after {self._config.settle_time_s_max} s",
+                    f"a larger physics.settle_time_s_max, or {self._fewer()}",
+                )
             loose = [body for body in self._falling if not self._is_supported(body)]
             if not loose:
                 break
             if any(self._homes[body.name] is None for body in loose):
                 return self._fell_off()
-        return self._fell_off() if loose else self._find_rejection()
+        return self._fell_off() if loose else self._check_overlaps()
 
     def _restart(self, body: Body, pull: float) -> None:
         """Put a body at its initial pose, moved by a share towards the middle of its surface."""
@@ -178,26 +189,86 @@ class Settling:
         surfaces = self._surfaces[body.name]
         return not surfaces or is_supported(surfaces, *self._world.bounds_m(body.name))
 
-    def _find_rejection(self) -> Rejection | None:
+    def _check_overlaps(self) -> Rejection | None:
         deepest = min((gap_m for _, _, gap_m in self._world.contacts()), default=0.0)
-        return self._overlapping() if deepest < -self._config.penetration_m_max else None
+        if deepest >= -self._config.penetration_m_max:
+            return None
+        remedy = f"{self._fewer()}, a larger surface, or a larger physics.penetration_m_max"
+        return Rejection("objects interpenetrate", remedy)
 
     def _fell_off(self) -> Rejection:
         guard = "" if self._config.guard_walls else ", or physics.guard_walls: true"
         return Rejection("object fell off", f"{self._fewer()}, or a larger surface{guard}")
 
-    def _still_moving(self) -> Rejection:
-        return Rejection(
-            f"still moving after {self._config.settle_time_s_max} s",
-            f"a larger physics.settle_time_s_max, or {self._fewer()}",
-        )
-
-    def _overlapping(self) -> Rejection:
-        return Rejection(
-            "objects interpenetrate",
-            f"{self._fewer()}, a larger surface, or a larger physics.penetration_m_max",
-        )
-
     def _fewer(self) -> str:
         groups = ", ".join(sorted({f"'{body.group}'" for body in self._falling if body.group}))
         return f"fewer objects in {groups} (count)" if groups else "fewer dynamic bodies"
+
+
+def candidate_surfaces(scene: Scene, body: Body) -> tuple[SupportSurface, ...]:
+    """Surfaces that a body may rest on: those of its group, or all if it has none."""
+    for group in scene.groups:
+        if group.name == body.group:
+            return tuple(s for s in scene.surfaces if s.name in group.surfaces)
+    return scene.surfaces
+
+
+def home_surface(
+    surfaces: Iterable[SupportSurface], low_m: Array, high_m: Array
+) -> SupportSurface | None:
+    """The nearest surface below a body with these bounds; None if there is none."""
+    below = [s for s in surfaces if _holds(s, low_m, high_m, slack_m=0.0)]
+    return max(below, key=lambda s: s.T_world_surface.translation_m[2], default=None)
+
+
+def is_supported(surfaces: Iterable[SupportSurface], low_m: Array, high_m: Array) -> bool:
+    """Whether a body with these bounds is above a surface extended by the body's size."""
+    size_m = float((high_m - low_m).max())
+    return any(_holds(s, low_m, high_m, slack_m=size_m) for s in surfaces)
+
+
+def is_within(surfaces: Iterable[SupportSurface], low_m: Array, high_m: Array) -> bool:
+    """Whether the whole footprint of a body with these bounds is above one surface."""
+    corners = [
+        np.array([x, y, low_m[2]]) for x in (low_m[0], high_m[0]) for y in (low_m[1], high_m[1])
+    ]
+    return any(all(_holds(s, at, at, slack_m=0.0) for at in corners) for s in surfaces)
+
+
+def guard_walls(surface: SupportSurface) -> list[tuple[CollisionShape, SE3]]:
+    """Shapes and poses of four walls around an open surface; [] for a walled one."""
+    if surface.walled:
+        return []
+    half_x, half_y = (0.5 * size for size in surface.size_m)
+    thick = _WALL_THICKNESS_M
+    along_x = _box(half_x + thick, 0.5 * thick)
+    along_y = _box(0.5 * thick, half_y + thick)
+    sides = [
+        (along_x, 0.0, half_y + 0.5 * thick),
+        (along_x, 0.0, -half_y - 0.5 * thick),
+        (along_y, half_x + 0.5 * thick, 0.0),
+        (along_y, -half_x - 0.5 * thick, 0.0),
+    ]
+    return [(shape, surface.T_world_surface @ SE3((x, y, 0.0))) for shape, x, y in sides]
+
+
+def _box(half_x: float, half_y: float) -> CollisionShape:
+    corners = [
+        (x, y, z)
+        for x in (-half_x, half_x)
+        for y in (-half_y, half_y)
+        for z in (-_WALL_BELOW_M, _WALL_ABOVE_M)
+    ]
+    return collision_shape(ConvexParts((np.array(corners),)))
+
+
+def _holds(surface: SupportSurface, low_m: Array, high_m: Array, slack_m: float) -> bool:
+    """Whether the centre of bounds is within the rectangle and their bottom not below it."""
+    center = 0.5 * (low_m + high_m)
+    x, y, _ = surface.T_world_surface.inverse().apply(center)
+    height = float(low_m[2]) - surface.T_world_surface.translation_m[2]
+    return (
+        abs(float(x)) <= 0.5 * surface.size_m[0] + slack_m
+        and abs(float(y)) <= 0.5 * surface.size_m[1] + slack_m
+        and height >= -_SINK_M
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -173,18 +173,11 @@ def junction_lanes(
     shape: JunctionShape, name: str, T_world_junction: SE3, speed_m_s: float, crosswalks: bool
 ) -> tuple[Lane, ...]:
     """Make the paths of all turns, sidewalks and frontages around the corners, and crosswalks."""
-    lanes = [
-        Lane(
-            f"{name}/{i}to{j}_{k}",
-            "driving",
-            _to_world(_turn_path(shape, i, j, k), shape, T_world_junction),
-            shape.lane_width_m,
-            road=name,
-            speed_m_s=speed_m_s,
-            junction=True,
-        )
-        for i, j, k in _list_turns(shape)
-    ]
+    lanes = []
+    for i, j, k in _list_turns(shape):
+        center = _to_world(_turn_path(shape, i, j, k), shape, T_world_junction)
+        lane = Lane(f"{name}/{i}to{j}_{k}", "driving", center, shape.lane_width_m, road=name)
+        lanes.append(replace(lane, speed_m_s=speed_m_s, junction=True))
     inner = KERB_WIDTH_M + shape.beside_m
     into = inner + min(FURNITURE_M, 0.5 * shape.sidewalk_m)
     beside: tuple[tuple[LaneKind, float, float], ...] = (
@@ -207,15 +200,10 @@ def junction_lanes(
 def _crosswalk(shape: JunctionShape, name: str, number: int, T_world_junction: SE3) -> Lane:
     r = shape.curve_end_m() + 0.5 * sum(CROSSWALK_M)
     t = np.linspace(-shape.half_m, shape.half_m, 5)
-    line = arm_points(shape, number, np.full(5, r), t)
-    return Lane(
-        f"{name}/crosswalk{number}",
-        "crosswalk",
-        _to_world(line, shape, T_world_junction),
-        CROSSWALK_M[1] - CROSSWALK_M[0],
-        road=name,
-        junction=True,
-    )
+    center = _to_world(arm_points(shape, number, np.full(5, r), t), shape, T_world_junction)
+    width_m = CROSSWALK_M[1] - CROSSWALK_M[0]
+    own = f"{name}/crosswalk{number}"
+    return Lane(own, "crosswalk", center, width_m, road=name, junction=True)
 
 
 def _list_turns(shape: JunctionShape) -> list[tuple[int, int, int]]:

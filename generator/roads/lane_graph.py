@@ -55,7 +55,7 @@ def path(
     line: ReferenceLine, t_m: float, z_m: float, forward: bool, T_world_road: SE3
 ) -> tuple[Vec3, ...]:
     """Points of a line parallel to a reference line, in the world."""
-    s = stations(line, _STEP_M)
+    s = stations(0.0, line.length_m, _STEP_M)
     s = s if forward else s[::-1]
     flat = line.points(s, np.full(len(s), t_m))
     return world_points(np.column_stack([flat, np.full(len(s), z_m)]), T_world_road)
@@ -67,10 +67,9 @@ def world_points(points: Array, T_world_road: SE3) -> tuple[Vec3, ...]:
     return tuple((float(x), float(y), float(z)) for x, y, z in placed)
 
 
-def stations(line: ReferenceLine, step_m: float) -> Array:
-    """Evenly spaced arc lengths from start to end, at most one step apart."""
-    count = max(1, math.ceil(line.length_m / step_m - 1e-9))
-    return np.linspace(0.0, line.length_m, count + 1)
+def stations(start_m: float, end_m: float, step_m: float) -> Array:
+    """Evenly spaced arc lengths [n] from start to end, at most one step apart."""
+    return np.linspace(start_m, end_m, max(1, math.ceil((end_m - start_m) / step_m - 1e-9)) + 1)
 
 
 def link_lanes(lanes: Sequence[Lane]) -> tuple[Lane, ...]:

@@ -373,23 +373,19 @@ def _read_sections(lanes: Element, length_m: float) -> tuple[Section, ...]:
 def _read_lane(element: Element) -> LaneRecord:
     mark = element.find("roadMark")
     height = element.find("height")
-    links = {tag: element.find(f"link/{tag}") for tag in ("predecessor", "successor")}
+    links = [element.find(f"link/{tag}") for tag in ("predecessor", "successor")]
     number = int(element.attrib["id"])
     width = _read_piecewise(element.findall("width"), "sOffset")
     if number != 0 and not width.pieces:
         raise ValueError(f"lane {number} has no width; add one")
-    return LaneRecord(
-        number=number,
-        kind=element.get("type", "none"),
-        width_m=width,
-        height_m=None
-        if height is None
-        else (_read_number(height, "inner"), _read_number(height, "outer")),
-        mark=Mark("none", 0.0)
-        if mark is None
-        else Mark(mark.get("type", "none"), float(mark.get("width", "0.12")) or 0.12),
-        **{tag: None if link is None else int(link.attrib["id"]) for tag, link in links.items()},
-    )
+    line, edges = Mark("none", 0.0), None
+    if mark is not None:
+        line = Mark(mark.get("type", "none"), float(mark.get("width", "0.12")) or 0.12)
+    if height is not None:
+        edges = (_read_number(height, "inner"), _read_number(height, "outer"))
+    before, after = (None if link is None else int(link.attrib["id"]) for link in links)
+    kind = element.get("type", "none")
+    return LaneRecord(number, kind, width, edges, line, predecessor=before, successor=after)
 
 
 def _read_piecewise(elements: Iterable[Element], start: str = "s") -> Piecewise:
@@ -405,15 +401,10 @@ def _read_road_link(element: Element | None) -> RoadLink | None:
 
 
 def _read_connection(element: Element) -> Connection:
-    return Connection(
-        incoming=element.attrib["incomingRoad"],
-        connecting=element.attrib["connectingRoad"],
-        contact=_read_contact(element),
-        lanes=tuple(
-            (int(link.attrib["from"]), int(link.attrib["to"]))
-            for link in element.findall("laneLink")
-        ),
-    )
+    links = [link.attrib for link in element.findall("laneLink")]
+    roads = element.attrib["incomingRoad"], element.attrib["connectingRoad"]
+    lanes = tuple((int(link["from"]), int(link["to"])) for link in links)
+    return Connection(*roads, _read_contact(element), lanes)
 
 
 def _read_contact(element: Element) -> Contact:

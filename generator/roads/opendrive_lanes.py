@@ -10,20 +10,14 @@ import numpy as np
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.scene import Lane, LaneKind
 from gen_data.generator.core.se3 import SE3
-from gen_data.generator.roads.lane_graph import FURNITURE_M, world_points
+from gen_data.generator.roads.lane_graph import FURNITURE_M, stations, world_points
 from gen_data.generator.roads.opendrive import Contact, LaneRecord, Network, Road, Section
 from gen_data.generator.roads.reference_line import Array
 
+_DRIVEN = ("driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "bidirectional",
+           "bus", "taxi")  # fmt: skip
 KINDS: dict[str, LaneKind] = {
-    "driving": "driving",
-    "entry": "driving",
-    "exit": "driving",
-    "onRamp": "driving",
-    "offRamp": "driving",
-    "connectingRamp": "driving",
-    "bidirectional": "driving",
-    "bus": "driving",
-    "taxi": "driving",
+    **dict.fromkeys(_DRIVEN, "driving"),
     "parking": "parking",
     "biking": "bicycle",
     "sidewalk": "sidewalk",
@@ -50,11 +44,6 @@ def origin_m(network: Network) -> tuple[float, float]:
     )  # fmt: skip
     low, high = ends.min(axis=0), ends.max(axis=0)
     return (round(float(low[0] + high[0]) / 2.0), round(float(low[1] + high[1]) / 2.0))
-
-
-def stations(start_m: float, end_m: float, step_m: float) -> Array:
-    """Evenly spaced arc lengths [n] from start to end, at most one step apart."""
-    return np.linspace(start_m, end_m, max(1, math.ceil((end_m - start_m) / step_m - 1e-9)) + 1)
 
 
 def heights_m(lane: LaneRecord) -> tuple[float, float]:

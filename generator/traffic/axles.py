@@ -39,10 +39,5 @@ def find_axles(assets: AssetIndex, asset: str, scale: float) -> Axles:
     x_rear = sum(rear) / len(rear) if rear else x0 + over
     x_front = sum(front) / len(front) if front else x1 - over
     place = SE3((scale * x_rear, scale * 0.5 * (y0 + y1), scale * z0)).rounded()
-    return Axles(
-        place,
-        scale * (x_front - x_rear),
-        scale * (x1 - x_rear),
-        scale * (x_rear - x0),
-        scale * (y1 - y0),
-    )
+    sizes = (scale * v for v in (x_front - x_rear, x1 - x_rear, x_rear - x0, y1 - y0))
+    return Axles(place, *sizes)

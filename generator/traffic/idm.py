@@ -32,19 +32,6 @@ class Drivers:
     acceleration_m_s2: Array
     braking_m_s2: Array
 
-    @classmethod
-    def like(
-        cls,
-        n: int,
-        headway_s: float = 1.2,
-        standstill_m: float = 2.0,
-        acceleration_m_s2: float = 1.5,
-        braking_m_s2: float = 2.0,
-    ) -> Drivers:
-        """Make ``n`` drivers with equal parameters."""
-        values = (headway_s, standstill_m, acceleration_m_s2, braking_m_s2)
-        return cls(*(np.full(n, value) for value in values))
-
 
 def free_acceleration(drivers: Drivers, speed_m_s: Array, wanted_m_s: Array) -> Array:
     """Acceleration [n] on a free road: ``a (1 - (v / v0)^4)``."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -124,19 +124,14 @@ def _nearest(segments: Array, x_m: float, y_m: float) -> tuple[int, float, float
 
 def draw_route(graph: LaneGraph, given: Sequence[str], length_m: float, rng: Rng) -> Route:
     """Extend the given lanes by drawn ones to a length, or to the end of the network."""
-    lanes, starts = [given[0]], [0.0]
-    end_m = graph.lines[given[0]].length_m
-    for name in given[1:]:
-        lanes, starts = [*lanes, name], [*starts, end_m]
-        end_m += graph.lines[name].length_m
-    while end_m < length_m:
+    lanes = list(given)
+    ends = list(accumulate(graph.lines[name].length_m for name in lanes))
+    ways = graph.successors(lanes[-1])
+    while ends[-1] < length_m and ways:
+        lanes.append(ways[int(rng.integers(len(ways)))])
+        ends.append(ends[-1] + graph.lines[lanes[-1]].length_m)
         ways = graph.successors(lanes[-1])
-        if not ways:
-            return Route(tuple(lanes), tuple(starts), end_m, dead_end=True)
-        name = ways[int(rng.integers(len(ways)))]
-        lanes, starts = [*lanes, name], [*starts, end_m]
-        end_m += graph.lines[name].length_m
-    return Route(tuple(lanes), tuple(starts), end_m, dead_end=not graph.successors(lanes[-1]))
+    return Route(tuple(lanes), (0.0, *ends[:-1]), ends[-1], dead_end=not ways)
 
 
 def points_at(graph: LaneGraph, route: Route, stations_m: Array) -> Array:

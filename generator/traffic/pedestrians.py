@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,9 +57,10 @@ class Pedestrian:
     left_m: float = 0.0
 
 
-@dataclass
 class Pedestrians:
     """State of n pedestrians; ``step`` changes it.
+
+    They start at full walking speed, except people who stand.
 
     Attributes:
         obstacles: Boxes of obstacles [b, 6]: centre, half extents, cosine and sine of the yaw.
@@ -71,27 +71,13 @@ class Pedestrians:
         off_m: Targeted offsets to the left of the paths [n].
     """
 
-    walkers: Sequence[Pedestrian]
-    approaches: Mapping[str, Approach]
-    obstacles: Array
-    xy_m: Array = field(init=False)
-    ahead: Array = field(init=False)
-    speed_m_s: Array = field(init=False)
-    walked_m: Array = field(init=False)
-    at_m: Array = field(init=False)
-    off_m: Array = field(init=False)
-    height_m: Array = field(init=False)
-    _let: list[int] = field(init=False)
-    _asks: list[bool] = field(init=False)
-    _lines: Array = field(init=False)
-    _sides: Array = field(init=False)
-    _wanted: Array = field(init=False)
-    _end_m: Array = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Start at full walking speed, except people who stand."""
-        n = len(self.walkers)
-        paths = [w.path for w in self.walkers]
+    def __init__(
+        self, walkers: Sequence[Pedestrian], approaches: Mapping[str, Approach], obstacles: Array
+    ) -> None:
+        self.walkers = walkers
+        self.approaches = approaches
+        n = len(walkers)
+        paths = [w.path for w in walkers]
         longest = max((len(p.points_m) for p in paths if p is not None), default=2)
         self._lines, self._sides = np.zeros((n, longest, 3)), np.zeros((n, longest, 2))
         for k, path in enumerate(paths):
@@ -100,15 +86,15 @@ class Pedestrians:
                 rows = np.minimum(np.arange(longest), m - 1)
                 self._lines[k] = path.points_m[rows]
                 self._sides[k] = np.stack([path.right_m[rows], path.left_m[rows]], axis=1)
-        self.xy_m = np.array([w.xy_m for w in self.walkers]).reshape(n, 2)
-        self.ahead = np.array([w.ahead for w in self.walkers]).reshape(n, 2)
-        self._wanted = np.array([w.speed_m_s if w.path else 0.0 for w in self.walkers])
-        self._end_m = np.array([w.path.end_m if w.path else 0.0 for w in self.walkers])
-        self.speed_m_s = self._wanted.copy()
+        self.xy_m: Array = np.array([w.xy_m for w in walkers]).reshape(n, 2)
+        self.ahead: Array = np.array([w.ahead for w in walkers]).reshape(n, 2)
+        self._wanted = np.array([w.speed_m_s if w.path else 0.0 for w in walkers])
+        self._end_m = np.array([w.path.end_m if w.path else 0.0 for w in walkers])
+        self.speed_m_s: Array = self._wanted.copy()
         self.walked_m, self.at_m = np.zeros(n), np.zeros(n)
-        self.off_m = np.array([w.left_m for w in self.walkers])
+        self.off_m = np.array([w.left_m for w in walkers])
         self.height_m = self._lines[:, 0, 2].copy()
-        self.obstacles = _select_near_boxes(self.obstacles, self._lines)
+        self.obstacles = _select_near_boxes(obstacles, self._lines)
         self._asks = [False] * n
         self._let = [
             sum(p.from_m < 0.05 for p in path.passages) if path is not None else 0 for path in paths
@@ -283,8 +269,3 @@ def stride_m(height_m: float) -> float:
     less when slower.
     """
     return 0.8 * height_m
-
-
-def stride_phases(walked_m: Array, stride: float, start: int, phases: int) -> list[int]:
-    """Phase of the stride at every distance walked, from ``start`` at 0."""
-    return [(start + math.floor(d / stride * phases)) % phases for d in walked_m.tolist()]

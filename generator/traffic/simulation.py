@@ -1,4 +1,4 @@
-"""Simulation of all vehicles and pedestrians."""
+"""Simulation of all vehicles and pedestrians: their motion, trajectories and first overlap."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.se3 import Array
+from gen_data.generator.core.boxes import rectangles_overlap
+from gen_data.generator.core.motion import Trajectory
+from gen_data.generator.core.se3 import SE3, Array, Vec3
 from gen_data.generator.traffic.lane_routes import STATION_M
 from gen_data.generator.traffic.pedestrians import Pedestrian, Pedestrians
 from gen_data.generator.traffic.signal_cycles import Approach
@@ -20,6 +22,8 @@ STEP_S = 0.05
 KNOT_S = 0.1
 """Interval of the poses: every second step."""
 _PER_KNOT = round(KNOT_S / STEP_S)
+STILL_M = 0.002
+"""Displacement up to which a body counts as static."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -48,11 +52,6 @@ class SimulatedMotion:
     look: Array
     walked_m: Array
     pace_m_s: Array
-
-    @property
-    def knots(self) -> int:
-        """Number of knots."""
-        return len(self.feet_m)
 
 
 def simulate(
@@ -109,11 +108,8 @@ def _collect_motion(
     if fleet is None:
         none = np.zeros((len(people), 0))
         station = speed = acceleration = none
-        axle, ahead, rise = (
-            np.zeros((*none[kept].shape, 3)),
-            np.zeros((*none[kept].shape, 2)),
-            none[kept],
-        )
+        knots, rise = len(none[kept]), none[kept]
+        axle, ahead = np.zeros((knots, 0, 3)), np.zeros((knots, 0, 2))
     else:
         station, speed, acceleration = (np.stack(column) for column in zip(*cars, strict=True))
         axle, ahead, rise = _vehicle_poses(fleet, station[kept])
@@ -137,3 +133,108 @@ def _interpolate(values: Array, along: Array) -> tuple[Array, Array]:
     rows = np.arange(len(values))
     mixed = (1.0 - f) * values[rows, k] + f * values[rows, k + 1]
     return mixed[..., 0], mixed[..., 1]
+
+
+def first_overlap(
+    moving: Array, half_m: Array, standing: Array, standing_half_m: Array
+) -> tuple[int, int, int] | None:
+    """Find the first overlap of two boxes, at least one of them moving; None = no overlap.
+
+    Args:
+        moving: Centres and directions of n boxes [t, n, 4]: x, y, cosine, sine.
+        half_m: Their half extents [n, 2].
+        standing: Centres and directions of m static boxes [m, 4].
+        standing_half_m: Their half extents [m, 2].
+
+    Returns:
+        Index of the instant, number of the moving box, and number of the other one: below n a
+        moving box, from n on a static one.
+    """
+    others = np.concatenate([half_m, standing_half_m])
+    reach = np.sqrt(others[:, 0] * others[:, 0] + others[:, 1] * others[:, 1])
+    still = np.broadcast_to(standing, (len(moving), *standing.shape))
+    every = np.concatenate([moving, still], axis=1)
+    found: tuple[int, int, int] | None = None
+    for i, j in _near_pairs(moving, every, reach):
+        d = every[:, j, :2] - moving[:, i, :2]
+        near = np.flatnonzero(
+            d[:, 0] * d[:, 0] + d[:, 1] * d[:, 1] < (reach[i] + reach[j]) * (reach[i] + reach[j])
+        )
+        hit = rectangles_overlap(moving[near, i], half_m[i], every[near, j], others[j])
+        if hit.any():
+            first = int(near[int(np.argmax(hit))])
+            if found is None or first < found[0]:
+                found = (first, i, j)
+    return found
+
+
+def _near_pairs(moving: Array, every: Array, reach_m: Array) -> list[tuple[int, int]]:
+    """Pairs with a moving box whose paths come close, by the bounding boxes of the paths."""
+    n = moving.shape[1]
+    low = every[..., :2].min(axis=0) - reach_m[:, None]
+    high = every[..., :2].max(axis=0) + reach_m[:, None]
+    apart = (low[:n, None] > high[None]) | (high[:n, None] < low[None])
+    near = ~apart.any(axis=2)
+    rows, columns = np.nonzero(near)
+    return [(int(i), int(j)) for i, j in zip(rows, columns, strict=True) if j > i or j >= n]
+
+
+def make_upright_trajectories(
+    names: Sequence[str],
+    ground_m: Array,
+    ahead: Array,
+    climb: Array,
+    offsets_m: Sequence[Vec3],
+) -> list[Trajectory | None]:
+    """Make trajectories of bodies on the ground; None for bodies that never move.
+
+    Args:
+        names: Names of the bodies [n].
+        ground_m: Points of support on the ground [t, n, 3].
+        ahead: Horizontal directions, unit [t, n, 2].
+        climb: Sines of the upward pitch angles [t, n].
+        offsets_m: Origin of each body [n], in a frame at that point with X ahead and Z up.
+    """
+    quaternions = _quaternions(ahead, climb)
+    level = np.sqrt(1.0 - climb * climb)[..., None]
+    c, s = ahead[..., :1], ahead[..., 1:]
+    rise = climb[..., None]
+    x, y, z = np.asarray(offsets_m).reshape(-1, 3).T[:, None, :, None]
+    origin = ground_m + np.concatenate(
+        [
+            x * c * level - y * s - z * c * rise,
+            x * s * level + y * c - z * s * rise,
+            x * rise + z * level,
+        ],
+        axis=2,
+    )
+    origin, quaternions = np.round(origin, 6) + 0.0, np.round(quaternions, 8) + 0.0
+    tracks: list[Trajectory | None] = []
+    for k, name in enumerate(names):
+        moved = np.abs(origin[:, k] - origin[0, k]).max() > STILL_M
+        knots = tuple(
+            SE3((a, b, d), (e, f, g, h))
+            for (a, b, d), (e, f, g, h) in zip(
+                origin[:, k].tolist(), quaternions[:, k].tolist(), strict=True
+            )
+        )
+        tracks.append(Trajectory(name, KNOT_S, knots) if moved else None)
+    return tracks
+
+
+def _quaternions(ahead: Array, climb: Array) -> Array:
+    """Unit quaternions [..., 4] of a yaw, then a pitch upwards, without trigonometric functions."""
+    c, s = ahead[..., 0], ahead[..., 1]
+    w, z = _half_angle(c, s)
+    up_w, up_y = _half_angle(np.sqrt(1.0 - climb * climb), -climb)
+    return np.stack([w * up_w, -z * up_y, w * up_y, z * up_w], axis=-1)
+
+
+def _half_angle(c: Array, s: Array) -> tuple[Array, Array]:
+    """Cosine (not negative) and sine of half an angle."""
+    # Divide by the larger of the two roots: the other one may vanish.
+    cosine, sine = np.sqrt(np.maximum(0.5 + 0.5 * c, 0.0)), np.sqrt(np.maximum(0.5 - 0.5 * c, 0.0))
+    forward = c >= 0.0
+    half_c = np.where(forward, cosine, 0.5 * np.abs(s) / np.maximum(sine, 0.5))
+    half_s = np.where(forward, 0.5 * s / np.maximum(cosine, 0.5), np.where(s < 0.0, -sine, sine))
+    return half_c, half_s

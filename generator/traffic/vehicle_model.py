@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from gen_data.generator.core.se3 import Array
 from gen_data.generator.traffic.conflict_zones import Zone
 from gen_data.generator.traffic.idm import (
     HARDEST_M_S2,
-    Drivers,
     equilibrium_speed,
     free_acceleration,
     interaction,
@@ -65,9 +64,8 @@ class _Approaching:
     after_s: float
 
 
-@dataclass
 class VehicleModel:
-    """State of all vehicles; ``step`` changes it.
+    """State of all vehicles, at first at the speed limits of their places; ``step`` changes it.
 
     Attributes:
         station_m, speed_m_s, acceleration_m_s2: Motion along the routes [n].
@@ -75,26 +73,18 @@ class VehicleModel:
         waited_s: Time since each vehicle stopped [n].
     """
 
-    fleet: Vehicles
-    approaches: Mapping[str, Approach]
-    station_m: Array = field(init=False)
-    speed_m_s: Array = field(init=False)
-    acceleration_m_s2: Array = field(init=False)
-    entered: list[int] = field(init=False)
-    waited_s: Array = field(init=False)
-    _at_lines: Drivers = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Start at the speed limits of the places."""
-        n = len(self.fleet.vehicles)
-        self._at_lines = replace(self.fleet.drivers, headway_s=np.full(n, AT_LINE_S))
-        self.station_m = self.fleet.first_m.copy()
-        self.acceleration_m_s2 = np.zeros(n)
-        self.waited_s = np.zeros(n)
-        fronts = self.station_m + self.fleet.front_m
+    def __init__(self, fleet: Vehicles, approaches: Mapping[str, Approach]) -> None:
+        self.fleet = fleet
+        self.approaches = approaches
+        n = len(fleet.vehicles)
+        self._at_lines = replace(fleet.drivers, headway_s=np.full(n, AT_LINE_S))
+        self.station_m: Array = fleet.first_m.copy()
+        self.acceleration_m_s2: Array = np.zeros(n)
+        self.waited_s: Array = np.zeros(n)
+        fronts = self.station_m + fleet.front_m
         self.entered = [
             sum(entry.at_m < front - 0.5 for entry in entries)
-            for entries, front in zip(self.fleet.entries, fronts.tolist(), strict=True)
+            for entries, front in zip(fleet.entries, fronts.tolist(), strict=True)
         ]
         self.speed_m_s = self._speed_limits(np.zeros(n))
 
@@ -191,11 +181,8 @@ class VehicleModel:
                 and leader_m_s is not None
                 and self._is_full(own, float(gap_m[i]), float(leader_m_s[i]))
             )
-            if (
-                full
-                or any(self._must_yield(own, other) for other in approaching)
-                or self._is_taken(own)
-            ):
+            yields = full or any(self._must_yield(own, other) for other in approaching)
+            if yields or self._is_taken(own):
                 stops[i] = min(stops[i], own.entry.at_m)
             else:
                 self.entered[i] += 1

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare
 
+from gen_data.generator.assets.skies.sky import SkyModel
 from gen_data.generator.config.distributions import Constant
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.scene import Body, Instance, Light, ObjectGroup, Scene
 from gen_data.generator.core.se3 import SE3
-from gen_data.randomizers.daylight import Daylight, set_daylight
+from gen_data.randomizers.daylight import set_daylight
 from gen_data.randomizers.vehicle_lights import VehicleLights
 from gen_data.randomizers.vehicle_paint import ON_ROADS, PAINTS, VehiclePaint
 from tests.randomizers.doubles import FakeAssets, rng_of
@@ -36,7 +37,7 @@ def road(count: int = 1, dark: bool = False) -> Scene:
     instances = tuple(Instance(k + 1, b.name, "car", 0, "wagon") for k, b in enumerate(bodies))
     group = ObjectGroup("traffic", (), ("wagon",), count, "along", lanes=("driving",))
     scene = Scene("test", bodies=bodies, instances=instances, groups=(group,))
-    return set_daylight(scene, Daylight(-30.0 if dark else 40.0, 0.0, 0.0, 2.5, 1))
+    return set_daylight(scene, SkyModel(1, -30.0 if dark else 40.0, 2.5, 0.0), 0.0)
 
 
 def slots(body: Body) -> dict[str, Material]:

@@ -20,7 +20,7 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.randomizers import TABLE
 from gen_data.randomizers.street_lights import StreetLights, spot_intensity_cd, white_balanced_color
 from gen_data.randomizers.time_of_day import TimeOfDay
-from gen_data.randomizers.weather_presets import ALTITUDES_DEG, CONDITIONS, PRESETS
+from gen_data.randomizers.weather import ALTITUDES_DEG, CONDITIONS, PRESETS
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 CARLA = (

@@ -19,9 +19,21 @@ from gen_data.generator.traffic.vehicles import make_vehicles
 from tests.traffic.roads import NO_BOXES, car, driven, fronts_m, lane
 
 
+def equal_drivers(
+    n: int,
+    headway_s: float = 1.2,
+    standstill_m: float = 2.0,
+    acceleration_m_s2: float = 1.5,
+    braking_m_s2: float = 2.0,
+) -> Drivers:
+    """Drivers with equal parameters."""
+    values = (headway_s, standstill_m, acceleration_m_s2, braking_m_s2)
+    return Drivers(*(np.full(n, value) for value in values))
+
+
 def test_free_road_acceleration_is_the_models() -> None:
     """A (1 - (v / v0)^4): all at standstill, 15/16 at half the speed, none at full speed."""
-    drivers = Drivers.like(3, acceleration_m_s2=1.6)
+    drivers = equal_drivers(3, acceleration_m_s2=1.6)
     free = free_acceleration(drivers, np.array([0.0, 7.0, 14.0]), np.full(3, 14.0))
 
     assert free.tolist() == pytest.approx([1.6, 1.5, 0.0])
@@ -29,7 +41,7 @@ def test_free_road_acceleration_is_the_models() -> None:
 
 def test_nobody_accelerates_in_the_equilibrium_gap() -> None:
     """(s0 + v T) / sqrt(1 - (v / v0)^4), Treiber, Hennecke, Helbing 2000, equation 6."""
-    drivers = Drivers.like(1, headway_s=1.5, standstill_m=2.0)
+    drivers = equal_drivers(1, headway_s=1.5, standstill_m=2.0)
     v, v0 = 10.0, 14.0
     gap = (2.0 + v * 1.5) / math.sqrt(1.0 - (v / v0) ** 4)
     speed, leader = np.array([v]), np.array([v])
@@ -42,7 +54,7 @@ def test_nobody_accelerates_in_the_equilibrium_gap() -> None:
 
 def test_braking_for_a_standing_obstacle_is_kinematic() -> None:
     """Far faster than the equilibrium, deceleration tends to (v^2 / 2 s)^2 / b."""
-    drivers = Drivers.like(1, headway_s=0.0, standstill_m=0.0, braking_m_s2=2.0)
+    drivers = equal_drivers(1, headway_s=0.0, standstill_m=0.0, braking_m_s2=2.0)
     taken = interaction(drivers, np.array([20.0]), np.array([50.0]), np.array([0.0]))
 
     assert taken[0] == pytest.approx((20.0**2 / (2 * 50.0)) ** 2 / 2.0)
@@ -50,7 +62,7 @@ def test_braking_for_a_standing_obstacle_is_kinematic() -> None:
 
 def test_speed_that_suits_a_gap_is_never_too_high() -> None:
     """At it, the model does not brake harder than easing off."""
-    drivers = Drivers.like(4)
+    drivers = equal_drivers(4)
     gaps = np.array([1.0, 5.0, 20.0, np.inf])
     speeds = equilibrium_speed(drivers, gaps, np.full(4, 14.0))
 

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from gen_data.generator.traffic.lane_routes import LaneGraph
-from gen_data.generator.traffic.obb_overlap import first_overlap
 from gen_data.generator.traffic.pedestrian_paths import draw_path, make_walk_network
 from gen_data.generator.traffic.pedestrians import Pedestrian
 from gen_data.generator.traffic.signal_cycles import AMBER_S, Approach, Cycle
-from gen_data.generator.traffic.simulation import SimulatedMotion, simulate
+from gen_data.generator.traffic.simulation import SimulatedMotion, first_overlap, simulate
 from gen_data.generator.traffic.vehicles import Vehicles
 from tests.traffic.roads import NO_BOXES, crossing, driven, fronts_m, lane, rng_of
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.traffic.body_trajectories import make_upright_trajectories
 from gen_data.generator.traffic.lane_routes import STATION_M
+from gen_data.generator.traffic.simulation import make_upright_trajectories
 from gen_data.generator.traffic.steering import follow_lines, normalize, rotate_small
 
 

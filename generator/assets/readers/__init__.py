@@ -17,15 +17,11 @@ from gen_data.generator.core.errors import AssetError, did_you_mean
 __all__ = ["MESH_SUFFIXES", "MeshSource", "read_mesh"]
 
 _READERS: dict[str, Callable[[Folder, str, bool], MeshSource]] = {
-    ".glb": read_gltf,
-    ".gltf": read_gltf,
+    **dict.fromkeys((".glb", ".gltf"), read_gltf),
     ".obj": read_obj,
     ".ply": read_ply,
     ".stl": read_stl,
-    ".usd": read_usd,
-    ".usda": read_usd,
-    ".usdc": read_usd,
-    ".usdz": read_usd,
+    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), read_usd),
 }
 MESH_SUFFIXES = frozenset(_READERS)
 

@@ -44,7 +44,9 @@ def gltf_material(description: Mapping[str, Any], images: Images) -> Material:
     further = description.get("extensions", {})
     *color, alpha = (float(c) for c in pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))
     red, green, blue = (fraction(c, "baseColorFactor") for c in color)
-    surface = _read_surface(pbr, images)
+    surface = _image_name(pbr, "metallicRoughnessTexture", images)
+    roughness, roughness_map = _read_channel(pbr, "roughnessFactor", surface, 1, images)
+    metallic, metallic_map = _read_channel(pbr, "metallicFactor", surface, 2, images)
     cover, cutoff, opacity = _read_alpha(description, pbr, alpha, images)
     emission, glow = _read_emission(description, further, images)
     coat = further.get("KHR_materials_clearcoat", {})
@@ -55,16 +57,16 @@ def gltf_material(description: Mapping[str, Any], images: Images) -> Material:
         albedo=_image_name(pbr, "baseColorTexture", images),
         alpha=cover,
         normal=_image_name(description, "normalTexture", images),
-        roughness=surface.roughness_map,
-        metallic=surface.metallic_map,
+        roughness=roughness_map,
+        metallic=metallic_map,
         occlusion=_occlusion_channel(description, images),
         emission=glow,
         cutoff=cutoff,
     )
     return Material(
         base_color=(red, green, blue),
-        roughness=surface.roughness,
-        metallic=surface.metallic,
+        roughness=roughness,
+        metallic=metallic,
         specular=round(min(((ior - 1.0) / (ior + 1.0)) ** 2 / 0.08, 1.0), 4),
         texture=maps.name(),
         emission_cd_m2=emission,
@@ -77,32 +79,17 @@ def gltf_material(description: Mapping[str, Any], images: Images) -> Material:
     )
 
 
-@dataclass(frozen=True)
-class _Surface:
-    roughness: float
-    metallic: float
-    roughness_map: str = ""
-    metallic_map: str = ""
-
-
-def _read_surface(pbr: Mapping[str, Any], images: Images) -> _Surface:
-    roughness = fraction(pbr.get("roughnessFactor", 1.0), "roughnessFactor")
-    metallic = fraction(pbr.get("metallicFactor", 1.0), "metallicFactor")
-    name = _image_name(pbr, "metallicRoughnessTexture", images)
-    if not name:
-        return _Surface(round(roughness, 4), round(metallic, 4))
-    pixels = images.pixels(name)
-    maps = ["", ""]
-    for k, at in enumerate((1, 2)):
-        channel = pixels[..., at]
-        if float(channel.std()) < EVEN:
-            mean = float(channel.mean()) / 255.0
-            roughness, metallic = (
-                (roughness * mean, metallic) if k == 0 else (roughness, metallic * mean)
-            )
-        else:
-            maps[k] = f"{name}!{at}"
-    return _Surface(round(roughness, 4), round(metallic, 4), maps[0], maps[1])
+def _read_channel(
+    pbr: Mapping[str, Any], factor: str, image: str, channel: int, images: Images
+) -> tuple[float, str]:
+    """A factor and the channel of its image; a uniform channel is multiplied into the factor."""
+    value = fraction(pbr.get(factor, 1.0), factor)
+    if not image:
+        return round(value, 4), ""
+    pixels = images.pixels(image)[..., channel]
+    if float(pixels.std()) < EVEN:
+        return round(value * (float(pixels.mean()) / 255.0), 4), ""
+    return round(value, 4), f"{image}!{channel}"
 
 
 def _read_alpha(

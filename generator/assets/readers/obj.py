@@ -185,17 +185,14 @@ def _read_slots(folder: Folder, relative: str, s: _Statements) -> tuple[Material
             defined |= _read_mtl(folder, path)
         else:
             missing = path
-    return tuple(
-        MaterialSlot(
-            name,
-            _drop_tint(defined[name]),
-            from_file=True,
-            declared_color=defined[name].base_color,
-        )
-        if name in defined
-        else MaterialSlot(name, missing_library=missing if name else "")
-        for name in s.materials
-    )
+    slots = []
+    for name in s.materials:
+        slot = MaterialSlot(name, missing_library=missing if name else "")
+        if name in defined:
+            tint, shown = defined[name].base_color, _drop_tint(defined[name])
+            slot = MaterialSlot(name, shown, from_file=True, declared_color=tint)
+        slots.append(slot)
+    return tuple(slots)
 
 
 @dataclass

@@ -106,11 +106,8 @@ class StageFile:
         if not bound.opacity_image[0]:
             return bound.material
         kept = float(self._pixels(bound.opacity_image).mean()) / 255.0
-        return replace(
-            bound.material,
-            opacity=round(bound.material.opacity * kept, 4),
-            transmission=0.0,
-        )
+        opacity = round(bound.material.opacity * kept, 4)
+        return replace(bound.material, opacity=opacity, transmission=0.0)
 
     def _pixels(self, image: tuple[str, int]) -> UInt8:
         """One channel of an image; white if the image lacks it."""

@@ -11,8 +11,8 @@ from gen_data.generator.roads.junction_shape import JunctionShape
 from gen_data.generator.roads.parking_shape import ParkingShape
 
 
-def _surface(name: str, **parameters: object) -> Family:
-    build = Lazy(f"gen_data.generator.assets.roads.{name}:{name}")
+def _surface(path: str, **parameters: object) -> Family:
+    build, name = Lazy(f"gen_data.generator.assets.roads.{path}"), path.partition(":")[2]
     return Family(name, name, ("street",), 0, 0.0, False, 1, parameters, build)
 
 
@@ -26,7 +26,7 @@ FAMILIES: Mapping[str, Family] = {
     family.name: family
     for family in (
         _surface(
-            "road",
+            "road:road",
             **_SHAPE,
             **_LOOKS,
             markings="dashed",
@@ -36,10 +36,10 @@ FAMILIES: Mapping[str, Family] = {
             apron_m=6.0,
             rails=(0.0, 0.0),
         ),
-        _surface("junction", **_JUNCTION, **_LOOKS, crossings="zebra"),
-        _surface("crosswalk", **_SHAPE, seed=0, wear=0.3, station_m=20.0, width_m=4.0),
-        _surface("parking_area", **_PARKING, **_LOOKS),
-        _surface("ground", seed=0, size_m=(800.0, 800.0), cover="grass", relief_m=0.04),
+        _surface("junction:junction", **_JUNCTION, **_LOOKS, crossings="zebra"),
+        _surface("road:crosswalk", **_SHAPE, seed=0, wear=0.3, station_m=20.0, width_m=4.0),
+        _surface("parking_area:parking_area", **_PARKING, **_LOOKS),
+        _surface("ground:ground", seed=0, size_m=(800.0, 800.0), cover="grass", relief_m=0.04),
     )
 }
 

@@ -9,23 +9,14 @@ import numpy as np
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import Array, Patch, make_solid_in_place
 from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, surface
-from gen_data.generator.assets.roads.road_materials import street_materials
+from gen_data.generator.assets.roads.road_materials import SLOT_OF, street_materials
+from gen_data.generator.roads.lane_graph import stations
 from gen_data.generator.roads.opendrive import Network, Road, Section
-from gen_data.generator.roads.opendrive_lanes import heights_m, origin_m, stations
+from gen_data.generator.roads.opendrive_lanes import heights_m, origin_m
 
 _STEP_M = 2.5
 _DASH_M, _GAP_M = 3.0, 6.0
 _SEED, _WEAR = 0, 0.3
-_SLOT_OF = {
-    "sidewalk": "pavement",
-    "walking": "pavement",
-    "none": "ground",
-    "border": "verge",
-    "median": "verge",
-    "curb": "kerb",
-    "parking": "asphalt_new",
-    "shoulder": "asphalt",
-}
 
 
 def network_solid(network: Network) -> Solid:
@@ -58,7 +49,7 @@ def _strips(road: Road, section: Section, slots: dict[str, int]) -> Iterator[Pat
             if abs(float(inner[0] - below[0])) > 1e-6:
                 yield _band(road, s, (t_in, t_in), (below, inner), side, "kerb", slots)
             if float(np.abs(t_out - t_in).max()) > 1e-3:
-                slot = _SLOT_OF.get(lane.kind, "asphalt")
+                slot = SLOT_OF.get(lane.kind, "asphalt")
                 yield _band(road, s, (t_in, t_out), (inner, outer), side, slot, slots)
             below = outer
 

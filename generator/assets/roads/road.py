@@ -1,4 +1,4 @@
-"""A stretch of road: carriageway, markings, kerbs, sidewalks, verges, and the traces of use."""
+"""Roads: carriageway, markings, kerbs, sidewalks, verges, traces of use; zebra crossings."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import Array, Patch, make_solid_in_place
 from gen_data.generator.assets.procedural.surface_shapes import block
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
-from gen_data.generator.assets.roads.deck import Deck, surface
-from gen_data.generator.assets.roads.markings import bay_lines, paint_stripe, stripes
-from gen_data.generator.assets.roads.road_materials import street_materials
+from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, Deck, surface
+from gen_data.generator.assets.roads.markings import ZEBRA_BAR_M, bay_lines, paint_stripe, stripes
+from gen_data.generator.assets.roads.road_materials import SLOT_OF, street_materials
 from gen_data.generator.roads.cross_section import (
     APRON_DROPS,
     APRON_FALL_M,
@@ -64,17 +64,12 @@ def road(  # noqa: PLR0913 - a family's parameters are its function's
     profile = RoadShape(**shape)
     deck = make_deck(profile, seed, wear, paving, ground)
     rng = variant_rng("road", seed)
-    patches = [
-        *_carriageway(deck, profile),
-        *(p for side in (1, -1) for p in _beside(deck, profile, side, apron_m)),
-        *(
-            patch
-            for stripe in stripes(profile, markings, edge_lines, dash_m, line_m)
-            for patch in paint_stripe(deck, stripe, profile.length_m)
-        ),
-        *_wear(deck, profile, wear, rng),
-        *_covers(deck, profile, rng),
-    ]
+    patches = list(_carriageway(deck, profile))
+    for side in (1, -1):
+        patches += _beside(deck, profile, side, apron_m)
+    for stripe in stripes(profile, markings, edge_lines, dash_m, line_m):
+        patches += paint_stripe(deck, stripe, profile.length_m)
+    patches += [*_wear(deck, profile, wear, rng), *_covers(deck, profile, rng)]
     for side in (1, -1):
         for strip in strips(profile, side):
             if strip.kind == "parking":
@@ -109,24 +104,13 @@ def _columns(profile: RoadShape) -> Iterator[float]:
                 yield side * (strip.inner_m + _BATTER_M)
 
 
-_SLOT_OF = {
-    "median": "verge",
-    "driving": "asphalt",
-    "bicycle": "asphalt_new",
-    "shoulder": "asphalt",
-    "parking": "asphalt_new",
-    "verge": "verge",
-    "sidewalk": "pavement",
-}
-
-
 def _carriageway(deck: Deck, profile: RoadShape) -> Iterator[Patch]:
     for side in (1, -1):
         for strip in strips(profile, side):
             if strip.kind != "kerb":
                 t0, t1 = sorted((side * strip.inner_m, side * strip.outer_m))
                 t = deck.t_m[(deck.t_m >= t0 - 1e-6) & (deck.t_m <= t1 + 1e-6)]
-                yield deck.ribbon((0.0, profile.length_m), tuple(t), _SLOT_OF[strip.kind])
+                yield deck.ribbon((0.0, profile.length_m), tuple(t), SLOT_OF[strip.kind])
 
 
 def _beside(deck: Deck, profile: RoadShape, side: int, apron_m: float) -> Iterator[Patch]:
@@ -264,3 +248,36 @@ def _hulls(deck: Deck, profile: RoadShape) -> list[Array]:
                 top[:, 2] = np.tile([strip.inner_z_m, strip.outer_z_m], 2)
                 hulls.append(np.concatenate([top, top - np.array([0.0, 0.0, 0.3])]))
     return hulls
+
+
+def crosswalk(
+    *, seed: int = 0, wear: float = 0.3, station_m: float = 20.0, width_m: float = 4.0, **shape: Any
+) -> Solid:
+    """Bars across a road, in the road's frame, over asphalt that hides its other lines.
+
+    Args:
+        seed: Of textures; the road's own.
+        wear: 0 freshly painted to 1 worn out; the road's own.
+        station_m: Its middle, along the road.
+        width_m: Along the road, the length of its bars.
+        shape: Fields of ``RoadShape``.
+    """
+    profile = RoadShape(**shape)
+    deck = make_deck(profile, seed, wear, "paving", "grass")
+    low, high = -profile.carriageway_m(-1), profile.carriageway_m(1)
+    span = (station_m - 0.5 * width_m, station_m + 0.5 * width_m)
+    columns = deck.t_m[(deck.t_m > low + 0.4) & (deck.t_m < high - 0.4)]
+    inner = (low + 0.36, *(float(t) for t in columns), high - 0.36)
+    patches = [deck.ribbon(span, inner, "asphalt", PAINT_LIFT_M + 0.0008)]
+    count = int((high - low - 1.5 * ZEBRA_BAR_M) // (2.0 * ZEBRA_BAR_M)) + 1
+    first = 0.5 * (low + high) - (count - 0.5) * ZEBRA_BAR_M
+    for k in range(count):
+        t0 = first + 2.0 * k * ZEBRA_BAR_M
+        t1 = t0 + ZEBRA_BAR_M
+        bar = deck.columns_between(t0, t1)
+        patches.append(deck.ribbon(span, bar, "marking", PAINT_LIFT_M + 0.002))
+    s, t = np.meshgrid(span, [low, high], indexing="ij")
+    top = deck.at(s, t).reshape(-1, 3)
+    hull = np.concatenate([top, top - np.array([0.0, 0.0, 0.02])])
+    materials = tuple(street_materials(seed, wear, "paving", "grass").values())
+    return make_solid_in_place(patches, materials, [hull])

@@ -6,64 +6,42 @@ cities", LBNL-43442, 2000 (new asphalt 0.04-0.05, aged 0.1-0.15, concrete 0.25-0
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
 
-SCALES_M: Mapping[str, float] = {
-    "asphalt": 6.0,
-    "asphalt_new": 5.0,
-    "marking": 2.0,
-    "kerb": 2.0,
-    "pavement": 3.0,
-    "verge": 5.0,
-    "ground": 7.0,
-}
-"""Length of one repeat of a slot's texture; other slots give their own coordinates."""
-
-GROUNDS: Mapping[str, str] = {
-    "grass": "texture/grass",
-    "paving": "texture/paving",
-    "cobbles": "texture/cobbles",
-    "gravel": "texture/gravel",
-    "earth": "texture/earth",
-    "asphalt": "texture/asphalt",
-}
+SCALES_M = load_table(__package__, "texture_scales", float)
+SLOT_OF = load_table(__package__, "slots", str)
+GROUNDS = ("grass", "paving", "cobbles", "gravel", "earth", "asphalt")
+"""Covers of the land, each a family of textures."""
 
 
 def textured_material(
-    texture: str, role: str, roughness: float, color: Vec3 = (1.0, 1.0, 1.0)
+    name: str, role: str, roughness: float, color: Vec3 = (1.0, 1.0, 1.0)
 ) -> Material:
-    """A surface with texture coordinates of its own."""
-    return Material(base_color=color, roughness=roughness, texture=texture, role=role)
+    """A surface with texture coordinates of its own; the name is that of a texture's id."""
+    return Material(color, roughness, texture=f"texture/{name}", role=role)
 
 
 def ground_material(ground: str, seed: int) -> Material:
     """The surface of a ``GROUNDS`` word."""
-    role = "grass" if ground == "grass" else "pavement" if ground != "asphalt" else "asphalt"
-    return textured_material(f"{GROUNDS[ground]}?seed={seed % 4}", role, 0.95)
+    role = ground if ground in ("grass", "asphalt") else "pavement"
+    return textured_material(f"{ground}?seed={seed % 4}", role, 0.95)
 
 
 def street_materials(seed: int, wear: float, paving: str, ground: str) -> dict[str, Material]:
     """Every slot of a street by name, in slot order."""
     worn = f"{round(wear, 1):g}"
     return {
-        "asphalt": textured_material(
-            f"texture/asphalt?seed={seed % 6}&wear={worn}", "asphalt", 0.92
-        ),
-        "asphalt_new": textured_material(
-            f"texture/asphalt?seed={6 + seed % 3}&wear=0", "asphalt", 0.88
-        ),
-        "marking": textured_material(
-            f"texture/road_paint?seed={seed % 3}&wear={worn}", "marking", 0.75
-        ),
-        "kerb": textured_material("texture/concrete?seed=1", "kerb", 0.85, (0.95, 0.94, 0.91)),
+        "asphalt": textured_material(f"asphalt?seed={seed % 6}&wear={worn}", "asphalt", 0.92),
+        "asphalt_new": textured_material(f"asphalt?seed={6 + seed % 3}&wear=0", "asphalt", 0.88),
+        "marking": textured_material(f"road_paint?seed={seed % 3}&wear={worn}", "marking", 0.75),
+        "kerb": textured_material("concrete?seed=1", "kerb", 0.85, (0.95, 0.94, 0.91)),
         "pavement": ground_material(paving, seed),
         "verge": ground_material("grass", seed + 1),
         "ground": ground_material(ground, seed),
         "tar": Material(base_color=(0.022, 0.022, 0.023), roughness=0.55, role="asphalt"),
-        "manhole": textured_material("texture/manhole?seed=0", "", 0.6),
-        "drain": textured_material("texture/drain?seed=0", "", 0.6),
+        "manhole": textured_material("manhole?seed=0", "", 0.6),
+        "drain": textured_material("drain?seed=0", "", 0.6),
         "steel": Material(base_color=(0.56, 0.57, 0.58), roughness=0.5, metallic=0.9),
     }

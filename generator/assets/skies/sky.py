@@ -16,6 +16,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.environments import normalize_luminance, pixel_directions
 from gen_data.generator.assets.procedural.noise import smoothstep
 from gen_data.generator.assets.skies import daylight
@@ -32,32 +33,7 @@ _ROWS = 512
 _MEAN_ROWS = 64
 # Less light than this share of the rest is not computed.
 _NEGLIGIBLE = 1e-3
-# Perez coefficients A to E as [factor on turbidity, constant]: luminance, x, y (Preetham, A.2).
-_PEREZ_LUMINANCE = (
-    (0.1787, -1.4630), (-0.3554, 0.4275), (-0.0227, 5.3251), (0.1206, -2.5771), (-0.0670, 0.3703),
-)  # fmt: skip
-_PEREZ_X = (
-    (-0.0193, -0.2592), (-0.0665, 0.0008), (-0.0004, 0.2125), (-0.0641, -0.8989), (-0.0033, 0.0452),
-)  # fmt: skip
-_PEREZ_Y = (
-    (-0.0167, -0.2608), (-0.0950, 0.0092), (-0.0079, 0.2102), (-0.0441, -1.6537), (-0.0109, 0.0529),
-)  # fmt: skip
-# Zenith chromaticity: rows for turbidity squared, turbidity, 1; columns for the sun's zenith
-# distance cubed, squared, itself, 1.
-_ZENITH_X = np.array(
-    [
-        [0.00166, -0.00375, 0.00209, 0.0],
-        [-0.02903, 0.06377, -0.03202, 0.00394],
-        [0.11693, -0.21196, 0.06052, 0.25886],
-    ]
-)
-_ZENITH_Y = np.array(
-    [
-        [0.00275, -0.00610, 0.00317, 0.0],
-        [-0.04214, 0.08970, -0.04153, 0.00516],
-        [0.15346, -0.26756, 0.06670, 0.26688],
-    ]
-)
+_TABLES = load_table(__package__, "preetham", tuple[tuple[float, ...], ...])
 # A cloud deck (about 6600 K), the clear horizon, a city's glow, clean night air, land from afar.
 _DECK = np.array((0.967, 1.0, 1.097))
 _HORIZON = np.array((0.89, 1.0, 1.32))
@@ -168,8 +144,8 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float, pale: float =
     # Gradation is constant along a row, and all three formulas share the same cosines.
     rows_up, cosine_squared = up[:, :1], np.clip(towards, -1.0, 1.0) ** 2
 
-    def relative(coefficients: tuple[tuple[float, float], ...]) -> Array:
-        c = [factor * turbidity + constant for factor, constant in coefficients]
+    def relative(table: str) -> Array:
+        c = [factor * turbidity + constant for factor, constant in _TABLES[table]]
         zenith = np.full(1, zenith_distance)
         at_zenith = _perez(np.ones(1), zenith, np.cos(zenith) ** 2, c)
         return _perez(rows_up, angle, cosine_squared, c) / at_zenith
@@ -177,9 +153,9 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float, pale: float =
     powers = np.array([zenith_distance**3, zenith_distance**2, zenith_distance, 1.0])
     turbidities = np.array([turbidity**2, turbidity, 1.0])
     terms = turbidities[:, None] * powers
-    x = float((_ZENITH_X * terms).sum()) * relative(_PEREZ_X)
-    y = float((_ZENITH_Y * terms).sum()) * relative(_PEREZ_Y)
-    luminance = relative(_PEREZ_LUMINANCE)
+    x = float((np.array(_TABLES["zenith_x"]) * terms).sum()) * relative("x")
+    y = float((np.array(_TABLES["zenith_y"]) * terms).sum()) * relative("y")
+    luminance = relative("luminance")
     xyz = np.stack([x / y, np.ones_like(x), (1.0 - x - y) / y], axis=-1)
     rgb = np.maximum(np.einsum("hwc,kc->hwk", xyz, REC709_FROM_XYZ, optimize=False), 0.02)
     # Preetham's fit turns pink at the horizon of clear air, which in truth is pale.

@@ -19,14 +19,13 @@ from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles import rider as people
 from gen_data.generator.assets.vehicles.body_shell import drop_uvs
 from gen_data.generator.assets.vehicles.rider import Seat, blob, limb
+from gen_data.generator.assets.vehicles.vehicle_materials import COLORS, materials
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
-from gen_data.generator.assets.vehicles.vehicle_materials import materials
 from gen_data.generator.core.asset_types import Keypoint, Material
 from gen_data.generator.core.se3 import Vec3
 
 STYLES = ("city", "mountain", "road")
 
-_PAINTS = ("#151618", "#e6e6e2", "#1f4f91", "#a3201c", "#2f5a42", "#6d7276", "#c97a1e", "#2aa3a0")
 _CRANK_M = 0.17
 
 
@@ -62,7 +61,7 @@ def bicycle(seed: int) -> Solid:
     rng = variant_rng("bicycle", seed)
     frame = _FRAMES[in_turn(STYLES, seed)]
     parts = _machine(in_turn(STYLES, seed), frame, rng.between(0.0, 2.0 * math.pi), rng)
-    paint = hex_to_linear(rng.choose(_PAINTS))
+    paint = hex_to_linear(rng.choose(COLORS["bicycles"]))
     return _solid(parts, frame, materials(rng, paint), 1.0)
 
 
@@ -77,7 +76,7 @@ def cyclist(seed: int) -> Solid:
     frame, turn = _FRAMES[in_turn(STYLES, seed)], rng.between(0.0, 2.0 * math.pi)
     parts = _machine(in_turn(STYLES, seed), frame, turn, rng)
     parts += people.rider(_seat(frame, turn), rng)
-    paint = hex_to_linear(rng.choose(_PAINTS))
+    paint = hex_to_linear(rng.choose(COLORS["bicycles"]))
     finish = materials(rng, paint, clothes=people.draw_clothes(rng))
     return _solid(parts, frame, finish, 1.7)
 
@@ -104,9 +103,8 @@ def spoked_wheel(radius_m: float, tyre_m: float, spokes: int) -> Patch:
         turn = 2.0 * math.pi * k / spokes
         end = (radius_m - 2.2 * tyre_m) * np.array([math.cos(turn), math.sin(turn), 0.0])
         start = np.array([0.02 * end[1], -0.02 * end[0], 0.03 * (-1) ** k])
-        wires.append(
-            sweep(np.array([start, end]), circle(0.0022, 3), capped=False, slot=Slot.CHROME)
-        )
+        wire = np.array([start, end])
+        wires.append(sweep(wire, circle(0.0022, 3), capped=False, slot=Slot.CHROME))
     return join_patches([tyre, rim, hub, *wires]).rotated("x", -0.5 * math.pi)
 
 
@@ -132,9 +130,7 @@ def _machine(style: str, frame: _Frame, turn_rad: float, rng: VariantRng) -> lis
     parts += [*_tubes(frame), *_bars(style, frame), *_drive(frame, turn_rad)]
     x, z = frame.saddle
     parts.append(blob((x, 0.0, z), (0.135, 0.07, 0.035), Slot.TRIM))
-    parts.append(
-        limb([_in_plane((x + 0.1, z)), _in_plane((x + 0.15, z))], (0.03, 0.016), Slot.TRIM)
-    )
+    parts.append(limb([(x + 0.1, 0.0, z), (x + 0.15, 0.0, z)], (0.03, 0.016), Slot.TRIM))
     x, z = frame.head
     parts.append(blob((x + 0.08, 0.0, z + 0.02), (0.035, 0.03, 0.03), Slot.HEADLIGHT))
     x, z = frame.saddle
@@ -160,12 +156,8 @@ def _tubes(frame: _Frame) -> list[Patch]:
         out = np.array([0.0, sign * 0.055, 0.0])
         rear = np.array([-frame.axle, sign * 0.065, frame.wheel_m])
         front = np.array([frame.axle, sign * 0.055, frame.wheel_m])
-        for start, end in (
-            (crank + 0.6 * out, rear),
-            (seat + 0.3 * out, rear),
-            (fork + out, front),
-        ):
-            parts.append(limb([start, end], (0.012, 0.009), Slot.PAINT, 5))
+        stays = [(crank + 0.6 * out, rear), (seat + 0.3 * out, rear), (fork + out, front)]
+        parts += [limb(stay, (0.012, 0.009), Slot.PAINT, 5) for stay in stays]
     return parts
 
 
@@ -178,13 +170,8 @@ def _bars(style: str, frame: _Frame) -> list[Patch]:
         corner = np.array([stem[0] + 0.06, sign * (y - 0.04), z])
         path = [stem, corner, grip]
         if style == "road":
-            path = [
-                stem,
-                np.array([x - 0.08, sign * y, z]),
-                grip + np.array([0.02, 0.0, 0.0]),
-                grip + np.array([0.01, 0.0, -0.11]),
-                grip + np.array([-0.1, 0.0, -0.13]),
-            ]
+            drop = np.array([(0.02, 0.0, 0.0), (0.01, 0.0, -0.11), (-0.1, 0.0, -0.13)])
+            path = [stem, np.array([x - 0.08, sign * y, z]), *(grip + drop)]
         parts.append(limb(path, (0.012,) * len(path), Slot.TRIM, 5))
         tip = grip + np.array([-0.09, sign * 0.02, 0.0])
         if style != "road":
@@ -207,14 +194,8 @@ def _drive(frame: _Frame, turn_rad: float) -> list[Patch]:
         axle, (px, py, pz) = np.array([x, sign * 0.07, z]), pedal
         arm = [axle, np.array([px, sign * 0.07, pz])]
         parts.append(limb(arm, (0.012, 0.01), Slot.CHROME, 5))
-        parts.append(
-            block(
-                (px - 0.045, py - 0.045, pz - 0.012),
-                (px + 0.045, py + 0.045, pz + 0.012),
-                0.0,
-                Slot.TRIM,
-            )
-        )
+        low, high = (px - 0.045, py - 0.045, pz - 0.012), (px + 0.045, py + 0.045, pz + 0.012)
+        parts.append(block(low, high, 0.0, Slot.TRIM))
     rear = np.array([-frame.axle, -0.05, frame.wheel_m])
     for up in (1.0, -1.0):
         near, far = (np.array([0.0, 0.0, up * r]) for r in (0.085, 0.035))
@@ -226,14 +207,8 @@ def _drive(frame: _Frame, turn_rad: float) -> list[Patch]:
 def _mudguard(frame: _Frame, sign: float, arc_rad: tuple[float, float]) -> Patch:
     turn = np.linspace(*arc_rad, 9)
     radius = frame.wheel_m + 0.02
-    path = np.stack(
-        [
-            sign * frame.axle + radius * np.cos(turn),
-            0 * turn,
-            frame.wheel_m + radius * np.sin(turn),
-        ],
-        axis=1,
-    )
+    x, z = sign * frame.axle + radius * np.cos(turn), frame.wheel_m + radius * np.sin(turn)
+    path = np.stack([x, 0 * turn, z], axis=1)
     section = np.array([(0.004, 0.0), (-0.006, 0.028), (-0.006, -0.028)])
     return join_patches(
         sweep(np.array(pair), section, up=(0.0, 0.0, 1.0), slot=Slot.PAINT)
@@ -244,28 +219,15 @@ def _mudguard(frame: _Frame, sign: float, arc_rad: tuple[float, float]) -> Patch
 def _rack(frame: _Frame) -> list[Patch]:
     x, z = -frame.axle, 2.0 * frame.wheel_m + 0.07
     top = block((x - 0.2, -0.06, z), (x + 0.2, 0.06, z + 0.015), 0.0, Slot.TRIM)
-    stays = [
-        limb([np.array([x, s * 0.07, frame.wheel_m]), np.array([x - 0.1, s * 0.06, z])],
-             (0.006, 0.006), Slot.TRIM, 4)
-        for s in (1.0, -1.0)
-    ]  # fmt: skip
-    return [top, *stays]
+    ends = [[(x, s * 0.07, frame.wheel_m), (x - 0.1, s * 0.06, z)] for s in (1.0, -1.0)]
+    return [top, *(limb(stay, (0.006, 0.006), Slot.TRIM, 4) for stay in ends)]
 
 
 def _seat(frame: _Frame, turn_rad: float) -> Seat:
     x, y, z = frame.grip
-    return Seat(
-        hips=(frame.saddle[0], 0.0, frame.saddle[1] + 0.1),
-        grips=((x, y, z), (x, -y, z)),
-        soles=_soles(frame, turn_rad),
-        lean_rad=frame.lean_rad,
-        full_face=False,
-    )
-
-
-def _soles(frame: _Frame, turn_rad: float) -> tuple[Vec3, Vec3]:
-    left, right = ((x, y, z + 0.03) for x, y, z in _pedals(frame, turn_rad))
-    return left, right
+    left, right = ((px, py, pz + 0.03) for px, py, pz in _pedals(frame, turn_rad))
+    hips = (frame.saddle[0], 0.0, frame.saddle[1] + 0.1)
+    return Seat(hips, ((x, y, z), (x, -y, z)), (left, right), frame.lean_rad, full_face=False)
 
 
 def _in_plane(point: tuple[float, float]) -> Array:

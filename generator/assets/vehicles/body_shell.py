@@ -24,6 +24,8 @@ Curve = Callable[[Array], Array]
 Mask = NDArray[np.bool_]
 Level = Callable[[Patch], Array]
 """Values at the corners of a patch, shape [n, 3]; positive inside."""
+Bounds = tuple[float | None, float | None]
+"""Lower and upper bound; None = unbounded."""
 
 # Distance of lines from the surface under them.
 _PROUD_M = 0.002
@@ -104,6 +106,11 @@ def plan(front: Point2, rear: Point2, sides: int) -> BodyOutline:
     )
 
 
+def level_height(height_m: float) -> Curve:
+    """The same height [m] at every x."""
+    return lambda x: np.full_like(x, height_m)
+
+
 def smooth_height(points: Sequence[Point2]) -> Curve:
     """A smooth height [m] over x through points of ascending x; constant outside."""
     dense = spline(points, 24 * len(points))
@@ -175,16 +182,17 @@ def split_patch(patch: Patch, level: Level) -> tuple[Patch, Patch, Array]:
     return join_patches(inside), join_patches(outside), np.concatenate(lines)
 
 
-def assign_slot(patch: Patch, slot: int, *levels: Level) -> Patch:
-    """The patch with everything in a slot that lies inside all of the levels.
+def paint(patch: Patch, slot: int, *further: Level, **bounds: Bounds) -> Patch:
+    """The patch with everything in a slot that lies inside ``levels(**bounds)`` and further levels.
 
     Triangles that lie outside of any one level stay as they are.
     """
+    inside = (*levels(**bounds), *further)
     touched = np.ones(len(patch.slots), dtype=bool)
-    for level in levels:
+    for level in inside:
         touched &= np.any(level(patch) > 1e-7, axis=1)
     done, patch = [take_triangles(patch, ~touched)], take_triangles(patch, touched)
-    for level in levels:
+    for level in inside:
         patch, outside, _ = split_patch(patch, level)
         done.append(outside)
     return join_patches([*done, patch.painted(slot)])
@@ -193,15 +201,15 @@ def assign_slot(patch: Patch, slot: int, *levels: Level) -> Patch:
 def refine_patch(patch: Patch, axis: str, places_m: Sequence[float]) -> Patch:
     """The patch with edges added along planes, so that round holes come out round."""
     for place in places_m:
-        patch = join_patches(split_patch(patch, level_above(axis, place))[:2])
+        patch = join_patches(split_patch(patch, _level(axis, place, 1.0))[:2])
     return patch
 
 
-def gap(patch: Patch, x_m: float, width_m: float, slot: int, *levels: Level) -> Patch:
-    """A dark line across the side at ``x_m``, a little in front of the patch."""
-    for level in levels:
+def gap(patch: Patch, x_m: float, width_m: float, slot: int, **bounds: Bounds) -> Patch:
+    """A dark line across the side at ``x_m`` between bounds, a little in front of the patch."""
+    for level in levels(**bounds):
         patch = split_patch(patch, level)[0]
-    line = split_patch(patch, level_above("x", x_m))[2] + np.array([0.0, _PROUD_M, 0.0])
+    line = split_patch(patch, _level("x", x_m, 1.0))[2] + np.array([0.0, _PROUD_M, 0.0])
     upward = (line[:, 0, 2] < line[:, 1, 2])[:, None, None]
     line = np.where(upward, line, line[:, ::-1])
     half = np.array([0.5 * width_m, 0.0, 0.0])
@@ -213,31 +221,27 @@ def gap(patch: Patch, x_m: float, width_m: float, slot: int, *levels: Level) -> 
     )
 
 
-def level_above(axis: str, limit_m: float, slope: float = 0.0, over: str = "x") -> Level:
-    """Positive where a coordinate exceeds ``limit_m + slope * over``."""
-    i, j = "xyz".index(axis), "xyz".index(over)
-    return lambda p: p.corners_m[..., i] - limit_m - slope * p.corners_m[..., j]
+def levels(**bounds: Bounds) -> tuple[Level, ...]:
+    """Levels that are positive between a lower and an upper bound, in the given order.
+
+    ``x``, ``y`` and ``z`` bound coordinates [m], ``ring`` the place along the ring, ``row`` the row
+    of the stack, whose lid begins at 1.
+    """
+    return tuple(
+        _level(name, limit, sign)
+        for name, pair in bounds.items()
+        for limit, sign in zip(pair, (1.0, -1.0), strict=True)
+        if limit is not None
+    )
 
 
-def level_below(axis: str, limit_m: float, slope: float = 0.0, over: str = "x") -> Level:
-    """Positive where a coordinate is smaller than ``limit_m + slope * over``."""
-    i, j = "xyz".index(axis), "xyz".index(over)
-    return lambda p: limit_m + slope * p.corners_m[..., j] - p.corners_m[..., i]
-
-
-def level_between(axis: str, low_m: float, high_m: float) -> tuple[Level, Level]:
-    """Two levels, both positive where a coordinate lies between two values."""
-    return level_above(axis, low_m), level_below(axis, high_m)
-
-
-def stations_along(low: float, high: float) -> tuple[Level, Level]:
-    """Two levels, both positive where the place along the ring lies between two values."""
-    return (lambda p: p.uvs[..., 0] - low), (lambda p: high - p.uvs[..., 0])
-
-
-def rows_between(low: float, high: float) -> tuple[Level, Level]:
-    """Two levels, both positive where the row lies between two values; the lid begins at 1."""
-    return (lambda p: p.uvs[..., 1] - low), (lambda p: high - p.uvs[..., 1])
+def _level(name: str, limit: float, sign: float) -> Level:
+    """Positive where a value exceeds (sign 1) or falls below (sign -1) a limit."""
+    if name in ("ring", "row"):
+        column = ("ring", "row").index(name)
+        return lambda p: sign * (p.uvs[..., column] - limit)
+    axis = "xyz".index(name)
+    return lambda p: sign * (p.corners_m[..., axis] - limit)
 
 
 def round_x_z(x_m: float, z_m: float, radius_m: float, beyond_y_m: float) -> Level:

@@ -9,27 +9,24 @@ import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import Point2, block, rounded_box
+from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles import body_shell
 from gen_data.generator.assets.vehicles.body_shell import (
     BODY_ROWS,
     BodyOutline,
     Curve,
-    Level,
     Row,
-    assign_slot,
     body_rows,
-    level_above,
-    level_below,
-    level_between,
-    rows_between,
-    stations_along,
+    level_height,
+    paint,
 )
 from gen_data.generator.assets.vehicles.vehicle_materials import SIDES
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.assets.vehicles.wheels import Axles
-from gen_data.generator.core.asset_types import Keypoint
+from gen_data.generator.core.asset_types import Keypoint, Material
 
 
 @dataclass(frozen=True)
@@ -127,6 +124,11 @@ class Design:
 DESIGNS = load_table(__package__, "designs", Design)
 
 
+def make_vehicle(design: Design, steer_deg: float, finish: tuple[Material, ...]) -> Solid:
+    """The vehicle of a design with steered front wheels."""
+    return make_solid([bodywork(design, steer_deg)], finish, _collision(design), _keypoints(design))
+
+
 def bodywork(design: Design, steer_deg: float) -> Patch:
     """The whole vehicle, both sides."""
     ring = body_shell.plan(*design.body_ends, sides=20)
@@ -140,7 +142,7 @@ def bodywork(design: Design, steer_deg: float) -> Patch:
     )
 
 
-def collision(design: Design) -> list[Array]:
+def _collision(design: Design) -> list[Array]:
     """Body and glass house as boxes."""
     x, y, axles = 0.5 * design.length_m, design.half_m, design.axles
     house = 0.5 * (1.0 + design.roof_share) * 0.92 * y
@@ -156,7 +158,7 @@ def collision(design: Design) -> list[Array]:
     ]  # fmt: skip
 
 
-def keypoints(design: Design) -> tuple[Keypoint, ...]:
+def _keypoints(design: Design) -> tuple[Keypoint, ...]:
     """Hubs and lamps."""
     x, y = 0.5 * design.length_m, design.half_m
     head, tail = design.lamp_m
@@ -166,10 +168,7 @@ def keypoints(design: Design) -> tuple[Keypoint, ...]:
 def _lower(design: Design, ring: BodyOutline) -> Patch:
     x, y = 0.5 * design.length_m, design.half_m
     rows = body_rows("car", x, -x, y)
-
-    def floor(at: Array) -> Array:
-        return np.full_like(at, design.clearance_m)
-
+    floor = level_height(design.clearance_m)
     body = body_shell.stack(ring, rows, floor, design.shoulder(), crown_m=0.055, lid_rows=2)
     # The part under the glass house is never visible.
     hidden = np.all(
@@ -186,85 +185,59 @@ def _lower_paint(design: Design, ring: BodyOutline, patch: Patch) -> Patch:
     """Bumpers, lamps, grille and the gaps around doors and lids."""
     x, floor = 0.5 * design.length_m, design.clearance_m
     sill = floor + (0.15 if design.cladding else 0.07)
-    patch = assign_slot(patch, Slot.UNDERBODY, *rows_between(-2.0, 0.0))
-    patch = assign_slot(patch, Slot.TRIM, *rows_between(0.0, 2.0), level_below("z", sill))
+    patch = paint(patch, Slot.UNDERBODY, row=(-2.0, 0.0))
+    patch = paint(patch, Slot.TRIM, row=(0.0, 2.0), z=(None, sill))
     if design.cladding:
         axles = design.axles
         for x_m in (axles.front_m, axles.rear_m):
             arch = body_shell.round_x_z(x_m, axles.radius_m, axles.arch_m + 0.055, 0.4)
-            patch = assign_slot(patch, Slot.TRIM, *rows_between(0.0, 1.0), arch)
+            patch = paint(patch, Slot.TRIM, arch, row=(0.0, 1.0))
     patch = _front_paint(design, ring, patch)
     patch = _rear_paint(design, ring, patch)
-    hood = level_between("x", x - 0.3, design.x(design.cowl) + 0.1)
-    return assign_slot(patch, Slot.TRIM, *rows_between(0.975, 0.988), *hood)
+    hood = (x - 0.3, design.x(design.cowl) + 0.1)
+    return paint(patch, Slot.TRIM, row=(0.975, 0.988), x=hood)
 
 
 def _gaps(design: Design, plain: Patch) -> list[Patch]:
     """The lines around the doors."""
-    sides = (rows_between(0.1, 0.99)[0], rows_between(0.1, 0.99)[1], level_above("y", 0.5))
     return [
-        body_shell.gap(plain, design.x(share), 0.009, Slot.TRIM, *sides) for share in design.seams
+        body_shell.gap(plain, design.x(share), 0.009, Slot.TRIM, row=(0.1, 0.99), y=(0.5, None))
+        for share in design.seams
     ]
 
 
 def _front_paint(design: Design, ring: BodyOutline, patch: Patch) -> Patch:
-    x, z, y = 0.5 * design.length_m, design.lamp_m[0], design.half_m
-    front = level_above("x", x - 0.8)
-    outer = ring.front(0.93) + 0.03
-    bezel = (
-        front,
-        *stations_along(ring.front(0.44), outer),
-        *level_between("z", z - 0.085, z + 0.075),
-        level_above("z", z - 0.17, 0.13 / y, "y"),
-    )
-    patch = assign_slot(patch, Slot.TRIM, *bezel)
-    lens = (front, *stations_along(ring.front(0.52), ring.front(0.93) + 0.022),
-            *level_between("z", z - 0.055, z + 0.066))  # fmt: skip
-    patch = assign_slot(patch, Slot.HEADLIGHT, *lens)
-    turn = (front, *stations_along(ring.front(0.8), ring.front(0.93) + 0.01),
-            *level_between("z", z - 0.055, z - 0.025))  # fmt: skip
-    patch = assign_slot(patch, Slot.INDICATOR_LEFT, *turn)
-    grille = (front, level_below("y", 0.4 * y), *level_between("z", z - 0.11, z + 0.04))
-    patch = assign_slot(patch, Slot.TRIM, *grille)
-    intake = (
-        front,
-        level_below("y", 0.68 * y),
-        *level_between("z", design.clearance_m + 0.08, z - 0.28),
-    )
-    return assign_slot(patch, Slot.TRIM, *intake)
+    z, y, floor = design.lamp_m[0], design.half_m, design.clearance_m
+    front, lamp, outer = (0.5 * design.length_m - 0.8, None), ring.front, ring.front(0.93)
+
+    def bezel(p: Patch) -> Array:
+        return p.corners_m[..., 2] - (z - 0.17) - 0.13 / y * p.corners_m[..., 1]
+
+    around = (lamp(0.44), outer + 0.03)
+    patch = paint(patch, Slot.TRIM, bezel, x=front, ring=around, z=(z - 0.085, z + 0.075))
+    lens = (lamp(0.52), outer + 0.022)
+    patch = paint(patch, Slot.HEADLIGHT, x=front, ring=lens, z=(z - 0.055, z + 0.066))
+    wink = (lamp(0.8), outer + 0.01)
+    patch = paint(patch, Slot.INDICATOR_LEFT, x=front, ring=wink, z=(z - 0.055, z - 0.025))
+    patch = paint(patch, Slot.TRIM, x=front, y=(None, 0.4 * y), z=(z - 0.11, z + 0.04))
+    return paint(patch, Slot.TRIM, x=front, y=(None, 0.68 * y), z=(floor + 0.08, z - 0.28))
 
 
 def _rear_paint(design: Design, ring: BodyOutline, patch: Patch) -> Patch:
-    x, z, y = 0.5 * design.length_m, design.lamp_m[1], design.half_m
-    rear = level_below("x", -x + 0.6)
+    z, y = design.lamp_m[1], design.half_m
+    rear, rows = (None, -0.5 * design.length_m + 0.6), (0.1, 0.985)
     low, high = (z - 0.22, z + 0.2) if design.upright_lamps else (z - 0.09, z + 0.08)
     inner = 0.78 if design.upright_lamps else 0.5
-    reach = (
-        rear,
-        *stations_along(ring.rear(0.93) - 0.02, ring.rear(inner)),
-        *rows_between(0.1, 0.985),
-    )
-    patch = assign_slot(patch, Slot.TAILLIGHT, *reach, *level_between("z", low, high))
-    stop = (rear, *stations_along(ring.rear(0.93) - 0.02, ring.rear(0.5 * inner + 0.4)))
-    patch = assign_slot(
-        patch,
-        Slot.BRAKELIGHT,
-        *stop,
-        *rows_between(0.1, 0.985),
-        *level_between("z", low, 0.5 * (low + high)),
-    )
-    wink = (rear, *stations_along(ring.rear(0.9), ring.rear(0.5 * inner + 0.4)))
-    height = level_between("z", low, low + 0.28 * (high - low))
-    patch = assign_slot(patch, Slot.INDICATOR_LEFT, *wink, *rows_between(0.1, 0.985), *height)
-    lid = (rear, level_below("y", 0.7 * y), *level_between("z", z - 0.335, z - 0.327))
-    patch = assign_slot(patch, Slot.TRIM, *lid)
-    skirt = (
-        rear,
-        level_below("y", 0.72 * y),
-        level_below("z", design.clearance_m + 0.17),
-        *rows_between(0, 2),
-    )
-    return assign_slot(patch, Slot.TRIM, *skirt)
+    outer, stop = ring.rear(0.93) - 0.02, ring.rear(0.5 * inner + 0.4)
+    lamp = (outer, ring.rear(inner))
+    patch = paint(patch, Slot.TAILLIGHT, x=rear, ring=lamp, row=rows, z=(low, high))
+    middle = (low, 0.5 * (low + high))
+    patch = paint(patch, Slot.BRAKELIGHT, x=rear, ring=(outer, stop), row=rows, z=middle)
+    wink, height = (ring.rear(0.9), stop), (low, low + 0.28 * (high - low))
+    patch = paint(patch, Slot.INDICATOR_LEFT, x=rear, ring=wink, row=rows, z=height)
+    patch = paint(patch, Slot.TRIM, x=rear, y=(None, 0.7 * y), z=(z - 0.335, z - 0.327))
+    skirt = (None, design.clearance_m + 0.17)
+    return paint(patch, Slot.TRIM, x=rear, y=(None, 0.72 * y), z=skirt, row=(0, 2))
 
 
 def _house(design: Design) -> Patch:
@@ -293,20 +266,18 @@ def _house(design: Design) -> Patch:
 
 
 def _glaze(design: Design, ring: BodyOutline, house: Patch) -> Patch:
-    glass: list[tuple[Level, ...]] = [
-        (*stations_along(-1.0, ring.front(0.83)), *rows_between(0.04, 0.91))
-    ]
+    def before_end(p: Patch) -> Array:
+        end = design.x(design.windows_to)
+        return p.corners_m[..., 0] - end + 0.25 * p.corners_m[..., 2]
+
+    house = paint(house, Slot.GLASS, ring=(-1.0, ring.front(0.83)), row=(0.04, 0.91))
     if design.rear_window:
-        glass.append((*stations_along(ring.rear(0.8), 2.0), *rows_between(0.16, 0.87)))
-    start = ring.front(0.92) + 0.035
-    sides = (*stations_along(start, ring.rear(0.92) - 0.03), *rows_between(0.09, 0.9),
-             level_above("x", design.x(design.windows_to), -0.25, "z"))  # fmt: skip
-    glass.append(sides)
-    for levels in glass:
-        house = assign_slot(house, Slot.GLASS, *levels)
+        house = paint(house, Slot.GLASS, ring=(ring.rear(0.8), 2.0), row=(0.16, 0.87))
+    side, rows = (ring.front(0.92) + 0.035, ring.rear(0.92) - 0.03), (0.09, 0.9)
+    house = paint(house, Slot.GLASS, before_end, ring=side, row=rows)
     for share in design.pillars:
-        post = level_between("x", design.x(share) - 0.035, design.x(share) + 0.035)
-        house = assign_slot(house, Slot.TRIM, *post, *sides)
+        post = (design.x(share) - 0.035, design.x(share) + 0.035)
+        house = paint(house, Slot.TRIM, before_end, x=post, ring=side, row=rows)
     return house
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
@@ -13,29 +11,20 @@ from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles.body_shell import (
     BodyOutline,
-    Curve,
-    assign_slot,
     body_rows,
     drop_uvs,
-    level_above,
-    level_below,
-    level_between,
+    level_height,
     mirror_half,
+    paint,
     plan,
     refine_patch,
-    rows_between,
     stack,
-    stations_along,
     take_triangles,
 )
-from gen_data.generator.assets.vehicles.vehicle_materials import SIDES, materials
+from gen_data.generator.assets.vehicles.vehicle_materials import COLORS, SIDES, materials
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.assets.vehicles.wheels import Axles
 
-_LIVERIES = (
-    ("#e9e8e3", "#2458a6"), ("#f2c318", "#33383c"), ("#c3221f", "#e9e8e3"), ("#2f7d4a", "#e9e8e3"),
-    ("#1f4f91", "#e9e8e3"), ("#e9e8e3", "#c3221f"),
-)  # fmt: skip
 _FLOOR_M = 0.26
 _HALF_M = 1.275
 
@@ -45,7 +34,7 @@ def bus(seed: int) -> Solid:
     rng = variant_rng("bus", seed)
     x, top = 0.5 * rng.between(11.2, 12.2), rng.between(2.95, 3.08)
     axles = Axles(x - 2.72, -x + 3.35, 1.08, 0.48, 0.29, 0.56, 0)
-    livery = rng.choose(_LIVERIES)
+    livery = rng.choose(COLORS["liveries"]).split()
     body = _body(x, top, axles, striped=rng.chance(0.6))
     body = _doors(body, (x - 0.55, x - 6.0, *((x - 9.6,) if rng.chance(0.5) else ())), top)
     parts = [body, *(drop_uvs(p) for p in [*axles.wheels(0.0), *_fittings(x, top)])]
@@ -61,55 +50,34 @@ def bus(seed: int) -> Solid:
 def _body(x: float, top: float, axles: Axles, *, striped: bool) -> Patch:
     ring = plan((40.0, 3.6), (60.0, 7.0), sides=16)
     rows = body_rows("bus", x, -x, _HALF_M)
-
-    def level(height_m: float) -> Curve:
-        return lambda at: np.full_like(at, height_m)
-
-    half = stack(ring, rows, level(_FLOOR_M), level(top - 0.04), crown_m=0.04, lid_rows=2)
-    half = assign_slot(half, Slot.UNDERBODY, *rows_between(-2.0, 0.0))
+    low, high = level_height(_FLOOR_M), level_height(top - 0.04)
+    half = stack(ring, rows, low, high, crown_m=0.04, lid_rows=2)
+    half = paint(half, Slot.UNDERBODY, row=(-2.0, 0.0))
     half = _paint_body(half, ring, top, striped=striped)
     around = [hub + 0.28 * k for hub in (axles.front_m, axles.rear_m) for k in (-2, -1, 0, 1, 2)]
     near = (half.corners_m[..., 2].min(axis=1) < 1.1) & (half.corners_m[..., 1].max(axis=1) > 0.9)
-    low = refine_patch(take_triangles(half, near), "x", around)
-    low, wells = axles.wells(low, _HALF_M)
-    return mirror_half(join_patches([take_triangles(half, ~near), low, *wells]), SIDES)
+    cut, wells = axles.wells(refine_patch(take_triangles(half, near), "x", around), _HALF_M)
+    return mirror_half(join_patches([take_triangles(half, ~near), cut, *wells]), SIDES)
 
 
 def _paint_body(half: Patch, ring: BodyOutline, top: float, *, striped: bool) -> Patch:
     """Stripe, windows, lamps."""
     if striped:
-        half = assign_slot(half, Slot.SECOND_PAINT, *level_between("z", 0.55, 0.95))
-    half = assign_slot(half, Slot.TRIM, *rows_between(0.0, 0.5), level_below("z", 0.36))
-    corner, tail = ring.front(0.92), ring.rear(0.92)
-    front = (*stations_along(-1.0, corner), level_above("x", 0.0))
-    half = assign_slot(half, Slot.GLASS, *front, *level_between("z", 0.98, top - 0.12))
-    rear = (*stations_along(ring.rear(0.84), 2.0), level_below("x", 0.0))
-    half = assign_slot(half, Slot.GLASS, *rear, *level_between("z", 1.75, top - 0.45))
-    side = (*stations_along(corner + 0.004, tail - 0.003), *level_between("z", 1.12, top - 0.38))
-    half = assign_slot(half, Slot.GLASS, *side)
-    lamp = (
-        *stations_along(ring.front(0.6), corner),
-        *level_between("z", 0.62, 0.82),
-        level_above("x", 0.0),
-    )
-    half = assign_slot(half, Slot.HEADLIGHT, *lamp)
-    wink = (
-        *stations_along(ring.front(0.84), corner),
-        *level_between("z", 0.82, 0.88),
-        level_above("x", 0),
-    )
-    half = assign_slot(half, Slot.INDICATOR_LEFT, *wink)
-    for slot, low, high in (
+        half = paint(half, Slot.SECOND_PAINT, z=(0.55, 0.95))
+    half = paint(half, Slot.TRIM, row=(0.0, 0.5), z=(None, 0.36))
+    corner, tail, front, rear = ring.front(0.92), ring.rear(0.92), (0.0, None), (None, 0.0)
+    half = paint(half, Slot.GLASS, ring=(-1.0, corner), x=front, z=(0.98, top - 0.12))
+    half = paint(half, Slot.GLASS, ring=(ring.rear(0.84), 2.0), x=rear, z=(1.75, top - 0.45))
+    half = paint(half, Slot.GLASS, ring=(corner + 0.004, tail - 0.003), z=(1.12, top - 0.38))
+    half = paint(half, Slot.HEADLIGHT, ring=(ring.front(0.6), corner), z=(0.62, 0.82), x=front)
+    wink = (ring.front(0.84), corner)
+    half = paint(half, Slot.INDICATOR_LEFT, ring=wink, z=(0.82, 0.88), x=front)
+    for slot, *z in (
         (Slot.TAILLIGHT, 1.0, 1.18),
         (Slot.BRAKELIGHT, 1.18, 1.32),
         (Slot.INDICATOR_LEFT, 1.32, 1.44),
     ):
-        lens = (
-            *stations_along(tail, ring.rear(0.78)),
-            *level_between("z", low, high),
-            level_below("x", 0),
-        )
-        half = assign_slot(half, slot, *lens)
+        half = paint(half, slot, ring=(tail, ring.rear(0.78)), z=(z[0], z[1]), x=rear)
     return half
 
 
@@ -117,14 +85,8 @@ def _doors(body: Patch, fronts_m: tuple[float, ...], top: float) -> Patch:
     """Glazed double doors on the right side."""
     for front in fronts_m:
         for k in (0, 1):
-            leaf = level_between("x", front - 0.62 * (k + 1) + 0.03, front - 0.62 * k - 0.02)
-            body = assign_slot(
-                body,
-                Slot.GLASS,
-                level_below("y", -0.9),
-                *leaf,
-                *level_between("z", 0.4, top - 0.45),
-            )
+            leaf = (front - 0.62 * (k + 1) + 0.03, front - 0.62 * k - 0.02)
+            body = paint(body, Slot.GLASS, y=(None, -0.9), x=leaf, z=(0.4, top - 0.45))
     return body
 
 

@@ -18,15 +18,13 @@ from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles import rider as people
 from gen_data.generator.assets.vehicles.body_shell import drop_uvs
 from gen_data.generator.assets.vehicles.rider import Seat, blob, limb
+from gen_data.generator.assets.vehicles.vehicle_materials import COLORS, materials
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
-from gen_data.generator.assets.vehicles.vehicle_materials import materials
 from gen_data.generator.assets.vehicles.wheels import wheel
 from gen_data.generator.core.asset_types import Keypoint
 from gen_data.generator.core.se3 import Vec3
 
 STYLES = ("naked", "sport", "scooter")
-
-_PAINTS = ("#121314", "#b01d1a", "#1f4f91", "#e6e6e2", "#2f6b3d", "#c97a1e", "#6d7276", "#7fb8b0")
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ def motorcycle(seed: int) -> Solid:
     ridden = _is_ridden(seed)
     if ridden:
         parts += people.rider(_seat(build), rng)
-    paint = hex_to_linear(rng.choose(_PAINTS))
+    paint = hex_to_linear(rng.choose(COLORS["motorcycles"]))
     finish = materials(rng, paint, clothes=people.draw_clothes(rng), plate_rows=2)
     reach = build.axle + build.wheel_m
     hull = [
@@ -93,14 +91,8 @@ def _running_gear(build: _Build) -> list[Patch]:
     for sign in (1.0, -1.0):
         side = np.array([0.0, sign * 0.5 * (build.tyre_m + 0.05), 0.0])
         hub = np.array([build.axle, 0.0, build.wheel_m]) + side
-        parts.append(
-            limb(
-                [hub, np.array([build.fork[0], 0.0, build.fork[1]]) + side],
-                (0.024, 0.021),
-                Slot.CHROME,
-                7,
-            )
-        )
+        top = np.array([build.fork[0], 0.0, build.fork[1]]) + side
+        parts.append(limb([hub, top], (0.024, 0.021), Slot.CHROME, 7))
         rear = np.array([-build.axle, 0.0, build.wheel_m]) + side
         parts.append(limb([rear, np.array([-0.12, 0.0, 0.42]) + side], (0.022, 0.03), Slot.TRIM, 5))
         grip = np.array([gx, sign * gy, gz])
@@ -150,31 +142,21 @@ def _bodies(style: str, build: _Build) -> list[Patch]:
     if style == "scooter":
         return _scooter(build)
     x, z = build.seat
-    tail = [np.array(p) for p in ((x + 0.05, 0.0, z - 0.07), (-0.55, 0.0, z - 0.01),
-                                  (-0.76, 0.0, z + 0.05))]  # fmt: skip
+    saddle = [(x + 0.25, 0.0, z - 0.02), (x, 0.0, z - 0.045), (-0.62, 0.0, z + 0.03)]
+    tail = [(x + 0.05, 0.0, z - 0.07), (-0.55, 0.0, z - 0.01), (-0.76, 0.0, z + 0.05)]
     parts = [
         blob((0.1, 0.0, 0.86), (0.3, 0.15, 0.14), Slot.PAINT, 0.12),
-        limb(
-            [
-                np.array([x + 0.25, 0.0, z - 0.02]),
-                np.array([x, 0.0, z - 0.045]),
-                np.array([-0.62, 0.0, z + 0.03]),
-            ],
-            (0.075, 0.115, 0.08),
-            Slot.TRIM,
-            8,
-        ),
+        limb(saddle, (0.075, 0.115, 0.08), Slot.TRIM, 8),
         limb(tail, (0.11, 0.095, 0.05), Slot.PAINT, 8),
         block((-0.18, -0.15, 0.3), (0.22, 0.15, 0.6), 0.05, Slot.UNDERBODY),
         blob((0.14, 0.0, 0.58), (0.15, 0.17, 0.14), Slot.RIM, -0.5),
         blob((-0.05, 0.0, 0.4), (0.19, 0.2, 0.12), Slot.RIM),
     ]
     for sign in (1.0, -1.0):
-        frame = [np.array([0.33, sign * 0.08, 0.88]), np.array([0.0, sign * 0.16, 0.72]),
-                 np.array([-0.16, sign * 0.12, 0.42])]  # fmt: skip
+        frame = [(0.33, sign * 0.08, 0.88), (0.0, sign * 0.16, 0.72), (-0.16, sign * 0.12, 0.42)]
         parts.append(limb(frame, (0.03, 0.03, 0.03), Slot.TRIM, 6))
-    pipe = [np.array(p) for p in ((0.25, -0.1, 0.5), (0.2, -0.12, 0.27), (-0.15, -0.15, 0.25),
-                                  (-0.45, -0.19, 0.38), (-0.78, -0.2, 0.5))]  # fmt: skip
+    pipe = [(0.25, -0.1, 0.5), (0.2, -0.12, 0.27), (-0.15, -0.15, 0.25), (-0.45, -0.19, 0.38),
+            (-0.78, -0.2, 0.5)]  # fmt: skip
     parts.append(limb(pipe, (0.025, 0.025, 0.03, 0.055, 0.055), Slot.CHROME, 8))
     if style == "sport":
         parts += _fairing()
@@ -194,26 +176,18 @@ def _fairing() -> list[Patch]:
 
 def _scooter(build: _Build) -> list[Patch]:
     x, z = build.seat
-    shield = [np.array(p) for p in ((0.36, 0.0, 0.98), (0.4, 0.0, 0.7), (0.33, 0.0, 0.34),
-                                    (0.1, 0.0, 0.24))]  # fmt: skip
-    wide = sweep(
-        np.array(shield),
-        circle(1.0, 10),
-        up=(0.0, 1.0, 0.0),
-        slot=Slot.PAINT,
-        scale=np.array([(0.12, 0.07), (0.22, 0.07), (0.2, 0.06), (0.17, 0.05)]),
-    )
+    shield = np.array([(0.36, 0.0, 0.98), (0.4, 0.0, 0.7), (0.33, 0.0, 0.34), (0.1, 0.0, 0.24)])
+    sizes = np.array([(0.12, 0.07), (0.22, 0.07), (0.2, 0.06), (0.17, 0.05)])
+    saddle = [(x + 0.2, 0.0, z - 0.05), (x - 0.05, 0.0, z - 0.06), (x - 0.4, 0.0, z - 0.01)]
     return [
-        wide,
+        sweep(shield, circle(1.0, 10), up=(0.0, 1.0, 0.0), slot=Slot.PAINT, scale=sizes),
         blob((0.39, 0.0, 0.98), (0.13, 0.16, 0.1), Slot.PAINT),
         block((-0.15, -0.17, 0.22), (0.36, 0.17, 0.29), 0.02, Slot.TRIM),
         blob((-0.45, 0.0, 0.52), (0.42, 0.2, 0.24), Slot.PAINT, 0.06),
-        limb([np.array([x + 0.2, 0.0, z - 0.05]), np.array([x - 0.05, 0.0, z - 0.06]),
-              np.array([x - 0.4, 0.0, z - 0.01])], (0.09, 0.13, 0.09), Slot.TRIM, 8),
+        limb(saddle, (0.09, 0.13, 0.09), Slot.TRIM, 8),
         block((-0.7, 0.06, 0.17), (-0.25, 0.14, 0.34), 0.04, Slot.UNDERBODY),
-        limb([np.array([-0.3, -0.13, 0.24]), np.array([-0.78, -0.15, 0.32])], (0.04, 0.055),
-             Slot.CHROME, 8),
-    ]  # fmt: skip
+        limb([(-0.3, -0.13, 0.24), (-0.78, -0.15, 0.32)], (0.04, 0.055), Slot.CHROME, 8),
+    ]
 
 
 def _seat(build: _Build) -> Seat:

@@ -26,13 +26,8 @@ GLYPHS = load_table(__package__, "glyphs", str)
 _LETTERS = "ABCDEFGHJKLMNPRSTUVWXYZ"
 _DIGITS = "0123456789"
 _PATTERNS = ("LL DDDD", "LLL DDD", "DD LLL D", "L DDD LL", "LL DD LL")
-_SCHEMES = (
-    ("#f1f1ec", "#17181a"),
-    ("#f1f1ec", "#17181a"),
-    ("#f1f1ec", "#1a3f7a"),
-    ("#f0c419", "#17181a"),
-    ("#eef2ee", "#1d6b3a"),
-)
+_SCHEMES = (("#f1f1ec", "#17181a"), ("#f1f1ec", "#17181a"), ("#f1f1ec", "#1a3f7a"),
+            ("#f0c419", "#17181a"), ("#eef2ee", "#1d6b3a"))  # fmt: skip
 # Plates of cars are 0.52 m by 0.11 m, those of motorcycles 0.18 m by 0.15 m, in two rows.
 _DRAWN_PX = {1: (1300, 275), 2: (600, 500)}
 _SIZE_PX = {1: (256, 64), 2: (128, 128)}

@@ -15,13 +15,10 @@ from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Array, Patch
 from gen_data.generator.assets.procedural.surface_shapes import ball, circle, spline, sweep
 from gen_data.generator.assets.procedural.variant_rng import VariantRng
+from gen_data.generator.assets.vehicles.vehicle_materials import COLORS
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.core.se3 import Vec3
 
-_SKINS = ("#f0cdb0", "#e0b08c", "#c68e64", "#8d5a3a", "#5a3825")
-_TOPS = ("#1f3a5f", "#b3231d", "#20242a", "#e8e6e0", "#d9d12a", "#2f6b4a", "#6b6f76", "#d96a1f")
-_BOTTOMS = ("#1c1e22", "#2b3a55", "#4b4a45", "#1c1e22", "#7a6a52")
-_HELMETS = ("#e8e8e6", "#1a1b1d", "#b3231d", "#1f4f91", "#d9d12a")
 _STATURE_M = 1.74
 _THIGH_M, _SHIN_M = 0.245 * _STATURE_M, 0.246 * _STATURE_M
 _UPPER_ARM_M, _FOREARM_M = 0.186 * _STATURE_M, 0.17 * _STATURE_M
@@ -48,8 +45,8 @@ class Seat:
 
 def draw_clothes(rng: VariantRng) -> tuple[Vec3, ...]:
     """Colours of skin, top, bottom, shoes and helmet, linear RGB."""
-    codes = (_SKINS, _TOPS, _BOTTOMS, ("#18181a", "#e2e2de", "#4a3627"), _HELMETS)
-    return tuple(hex_to_linear(rng.choose(options)) for options in codes)
+    kinds = ("skins", "tops", "bottoms", "shoes", "helmets")
+    return tuple(hex_to_linear(rng.choose(COLORS[kind])) for kind in kinds)
 
 
 def rider(seat: Seat, rng: VariantRng) -> list[Patch]:
@@ -66,13 +63,13 @@ def rider(seat: Seat, rng: VariantRng) -> list[Patch]:
 
 
 def limb(
-    path: Sequence[Array], radii_m: Sequence[float], slot: int, sides: int = 8, bend: int = 2
+    path: Sequence[Array | Vec3], radii_m: Sequence[float], slot: int, sides: int = 8
 ) -> Patch:
     """A tapering round bar through points, rounded where it bends."""
     points = np.array(path, dtype=np.float64)
     if len(path) > 2:
         both = np.concatenate([points, np.array(radii_m)[:, None]], axis=1)
-        smooth = spline(both.tolist(), bend * (len(path) - 1) + 1)
+        smooth = spline(both.tolist(), 2 * (len(path) - 1) + 1)
         points, radii_m = smooth[:, :3], smooth[:, 3].tolist()
     start = np.abs(points[1] - points[0])
     up = (0.0, 1.0, 0.0) if start[1] < 0.8 * math.sqrt(float((start**2).sum())) else (1.0, 0.0, 0.0)
@@ -112,21 +109,16 @@ def _trunk(hips: Array, spine: Array) -> list[Patch]:
 
 def _head(neck: Array, seat: Seat, nod_rad: float) -> list[Patch]:
     middle = neck + np.array([0.07, 0.0, 0.13])
-    throat = limb(
-        [neck - np.array([0.01, 0.0, 0.03]), middle - np.array([0.01, 0.0, 0.04])],
-        (0.06, 0.055),
-        Slot.SKIN,
-    )
+    ends = [neck - (0.01, 0.0, 0.03), middle - (0.01, 0.0, 0.04)]
+    throat = limb(ends, (0.06, 0.055), Slot.SKIN)
     if seat.full_face:
         shell = blob(
-            middle + np.array([0.005, 0.0, 0.01]), (0.148, 0.122, 0.145), Slot.HELMET, nod_rad
+            np.add(middle, (0.005, 0.0, 0.01)), (0.148, 0.122, 0.145), Slot.HELMET, nod_rad
         )
-        visor = blob(
-            middle + np.array([0.05, 0.0, 0.02]), (0.11, 0.113, 0.058), Slot.GLASS, nod_rad
-        )
+        visor = blob(np.add(middle, (0.05, 0.0, 0.02)), (0.11, 0.113, 0.058), Slot.GLASS, nod_rad)
         return [throat, shell, visor]
     face = blob(middle, (0.1, 0.078, 0.12), Slot.SKIN, nod_rad)
-    helmet = blob(middle + np.array([-0.015, 0.0, 0.065]), (0.14, 0.1, 0.085), Slot.HELMET, nod_rad)
+    helmet = blob(np.add(middle, (-0.015, 0.0, 0.065)), (0.14, 0.1, 0.085), Slot.HELMET, nod_rad)
     return [throat, face, helmet]
 
 
@@ -143,9 +135,5 @@ def _leg(hip: Array, sole: Array, sign: float) -> list[Patch]:
     knee = joint(hip, ankle, _THIGH_M, _SHIN_M, np.array([1.0, 0.12 * sign, 0.5]))
     trouser = limb([hip, knee, ankle], (0.088, 0.062, 0.045), Slot.BOTTOM)
     heel, toe = ankle + np.array([-0.05, 0.0, -0.05]), sole + np.array([0.13, 0.0, 0.03])
-    shoe = limb(
-        [heel, 0.5 * (heel + toe) + np.array([0.0, 0.0, 0.012]), toe],
-        (0.045, 0.05, 0.032),
-        Slot.SHOES,
-    )
-    return [trouser, shoe]
+    path = [heel, 0.5 * (heel + toe) + (0.0, 0.0, 0.012), toe]
+    return [trouser, limb(path, (0.045, 0.05, 0.032), Slot.SHOES)]

@@ -12,26 +12,19 @@ from gen_data.generator.assets.procedural.surface_shapes import block
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles.body_shell import (
-    Curve,
-    assign_slot,
     body_rows,
     drop_uvs,
     gap,
-    level_above,
-    level_below,
-    level_between,
+    level_height,
     mirror_half,
+    paint,
     plan,
-    rows_between,
     stack,
-    stations_along,
 )
-from gen_data.generator.assets.vehicles.vehicle_materials import SIDES, materials
+from gen_data.generator.assets.vehicles.vehicle_materials import COLORS, SIDES, materials
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.assets.vehicles.wheels import Axles
 
-_CABS = ("#e6e6e3", "#e6e6e3", "#1d4f96", "#b3231d", "#2d6b45", "#d9a514", "#3d4247")
-_BOXES = ("#e4e4e0", "#e4e4e0", "#dcdcd6", "#c9ccce", "#2a5c9c", "#b52b22", "#e0b022")
 _FLOOR_M = 0.42
 _HALF_M = 1.16
 
@@ -48,7 +41,7 @@ def truck(seed: int) -> Solid:
     if rng.chance(0.6):
         fitted.append(_spoiler(x, cab, roof, top))
     parts += [drop_uvs(p) for p in fitted]
-    cab_paint, box_paint = (hex_to_linear(rng.choose(codes)) for codes in (_CABS, _BOXES))
+    cab_paint, box_paint = (hex_to_linear(rng.choose(COLORS[k])) for k in ("cabs", "boxes"))
     hull = [
         hulls.box((x - cab, -_HALF_M, _FLOOR_M), (x, _HALF_M, roof)),
         hulls.box((-x, -1.25, 0.95), (x - cab - 0.12, 1.25, top)),
@@ -61,34 +54,22 @@ def truck(seed: int) -> Solid:
 def _cab(x: float, length: float, roof: float, axles: Axles) -> Patch:
     ring = plan((14.0, 3.0), (40.0, 9.0), sides=9)
     rows = body_rows("truck", x, x - length, _HALF_M)
-
-    def level(height_m: float) -> Curve:
-        return lambda at: np.full_like(at, height_m)
-
-    half = stack(ring, rows, level(_FLOOR_M), level(roof - 0.05), crown_m=0.05, lid_rows=2)
-    half = assign_slot(half, Slot.UNDERBODY, *rows_between(-2.0, 0.0))
-    belt = _FLOOR_M + 0.5 * (roof - _FLOOR_M)
-    half = assign_slot(half, Slot.TRIM, *rows_between(0.0, 1.0), level_below("z", 0.6))
-    corner = ring.front(0.9)
-    screen = (*stations_along(-1.0, corner), *level_between("z", belt - 0.05, roof - 0.3))
-    half = assign_slot(half, Slot.GLASS, *screen)
-    door = x - length + 0.42
-    side = (*stations_along(ring.front(0.92) + 0.04, 1.0), level_above("x", door))
-    window = (*side, *level_between("z", belt, roof - 0.33))
-    half = assign_slot(half, Slot.GLASS, *window)
-    grille = (
-        level_above("x", x - 0.4),
-        level_below("y", 0.78),
-        *level_between("z", 0.92, belt - 0.24),
-    )
-    half = assign_slot(half, Slot.TRIM, *grille)
-    lamp = (*stations_along(ring.front(0.66), ring.front(0.92)), *level_between("z", 0.63, 0.82))
-    half = assign_slot(half, Slot.HEADLIGHT, *lamp, level_above("x", x - 0.6))
-    wink = (*stations_along(ring.front(0.83), ring.front(0.92) + 0.03), level_above("x", x - 0.7))
-    half = assign_slot(half, Slot.INDICATOR_LEFT, *wink, *level_between("z", 0.82, 0.9))
+    low, high = level_height(_FLOOR_M), level_height(roof - 0.05)
+    half = stack(ring, rows, low, high, crown_m=0.05, lid_rows=2)
+    half = paint(half, Slot.UNDERBODY, row=(-2.0, 0.0))
+    belt, door = _FLOOR_M + 0.5 * (roof - _FLOOR_M), x - length + 0.42
+    half = paint(half, Slot.TRIM, row=(0.0, 1.0), z=(None, 0.6))
+    half = paint(half, Slot.GLASS, ring=(-1.0, ring.front(0.9)), z=(belt - 0.05, roof - 0.3))
+    side = (ring.front(0.92) + 0.04, 1.0)
+    half = paint(half, Slot.GLASS, ring=side, x=(door, None), z=(belt, roof - 0.33))
+    half = paint(half, Slot.TRIM, x=(x - 0.4, None), y=(None, 0.78), z=(0.92, belt - 0.24))
+    lamp = (ring.front(0.66), ring.front(0.92))
+    half = paint(half, Slot.HEADLIGHT, ring=lamp, z=(0.63, 0.82), x=(x - 0.6, None))
+    wink = (ring.front(0.83), ring.front(0.92) + 0.03)
+    half = paint(half, Slot.INDICATOR_LEFT, ring=wink, x=(x - 0.7, None), z=(0.82, 0.9))
     panels, wells = axles.wells(half, _HALF_M)
     gaps = [
-        gap(panels, at, 0.012, Slot.TRIM, level_above("y", 0.7), *rows_between(0.1, 0.93))
+        gap(panels, at, 0.012, Slot.TRIM, y=(0.7, None), row=(0.1, 0.93))
         for at in (door - 0.08, x - 0.42)
     ]
     return mirror_half(join_patches([panels, *wells, *gaps]), SIDES)

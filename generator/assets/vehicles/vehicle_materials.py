@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.assets.vehicles import plates
@@ -37,22 +40,20 @@ class VehicleSlot(IntEnum):
     HELMET = 18
 
 
+COLORS = load_table(__package__, "colors", tuple[str, ...])
+_MATERIALS = load_table(__package__, "materials", Material)
+_WORN = tuple(VehicleSlot)[VehicleSlot.SKIN :]
+"""Slots of a rider."""
 SIDES = ((VehicleSlot.INDICATOR_LEFT, VehicleSlot.INDICATOR_RIGHT),)
 """Slots that a mirror image exchanges."""
-
-# Weights after the ranking of Axalta's and BASF's yearly colour reports for Europe.
-_PAINTS = (
-    (0.2, "#e9eaea"), (0.05, "#d8d4c8"), (0.2, "#0d0e10"), (0.14, "#4a4d50"), (0.09, "#2b2e31"),
-    (0.11, "#a5a9ac"), (0.06, "#1d3a6e"), (0.04, "#12233f"), (0.05, "#8f1418"), (0.02, "#b8471b"),
-    (0.02, "#2c4a36"), (0.02, "#5a4634"),
-)  # fmt: skip
 
 
 def draw_paint(rng: VariantRng) -> Vec3:
     """Colour of a private car, linear RGB."""
-    shares = np.cumsum([weight for weight, _ in _PAINTS])
+    weights, codes = zip(*(row.split() for row in COLORS["cars"]), strict=True)
+    shares = np.cumsum([float(weight) for weight in weights])
     index = int(np.searchsorted(shares, float(rng.random()), side="right"))
-    return hex_to_linear(_PAINTS[min(index, len(_PAINTS) - 1)][1])
+    return hex_to_linear(codes[min(index, len(codes) - 1)])
 
 
 def materials(
@@ -73,35 +74,16 @@ def materials(
     """
     tint = rng.between(0.015, 0.035)
     rim = rng.between(0.35, 0.75) if rng.random() < 0.75 else 0.04
-    skin, top, bottom, shoes, helmet = clothes or ((0.4,) * 3,) * 5
-    return (
-        Material(paint, rng.between(0.15, 0.25), specular=0.6, role="paint"),
-        Material((tint, 1.1 * tint, 1.15 * tint), 0.05, specular=0.8, role="glass"),
-        Material((0.013, 0.013, 0.014), 0.5, specular=0.35, role="trim"),
-        Material((0.008, 0.008, 0.008), 0.9, role="underbody"),
-        Material((0.02, 0.02, 0.02), 0.85, role="tyre"),
-        Material((rim, rim, 1.02 * rim), 0.3, 0.9, role="rim"),
-        Material((0.62, 0.65, 0.68), 0.1, specular=0.9, role="headlight"),
-        _lens((0.3, 0.008, 0.01), "taillight"),
-        _lens((0.42, 0.012, 0.014), "brakelight"),
-        _lens((0.72, 0.3, 0.05), "indicator_left"),
-        _lens((0.72, 0.3, 0.05), "indicator_right"),
-        _plate(rng, plate_rows),
-        Material((0.75, 0.76, 0.77), 0.15, 1.0, role="chrome"),
-        Material(second, 0.35, role="paint"),
-        Material(skin, 0.5, role="skin"),
-        Material(top, 0.85, role="top"),
-        Material(bottom, 0.85, role="bottom"),
-        Material(shoes, 0.6, role="shoes"),
-        Material(helmet, 0.3, role="trim"),
+    gloss, plate = rng.between(0.15, 0.25), int(rng.random() * plates.SEEDS)
+    drawn: dict[VehicleSlot, dict[str, Any]] = {
+        VehicleSlot.PAINT: {"base_color": paint, "roughness": gloss},
+        VehicleSlot.GLASS: {"base_color": (tint, 1.1 * tint, 1.15 * tint)},
+        VehicleSlot.RIM: {"base_color": (rim, rim, 1.02 * rim)},
+        VehicleSlot.PLATE: {"texture": plates.plate_id(plate, plate_rows)},
+        VehicleSlot.SECOND_PAINT: {"base_color": second},
+    }
+    for slot, color in zip(_WORN, clothes or ((0.4,) * 3,) * 5, strict=True):
+        drawn[slot] = {"base_color": color}
+    return tuple(
+        replace(_MATERIALS[slot.name.lower()], **drawn.get(slot, {})) for slot in VehicleSlot
     )
-
-
-def _plate(rng: VariantRng, rows: int) -> Material:
-    seed = int(rng.random() * plates.SEEDS)
-    texture = plates.plate_id(seed, rows)
-    return Material((0.9, 0.9, 0.9), 0.4, texture=texture, printed=True, role="plate")
-
-
-def _lens(color: Vec3, role: str) -> Material:
-    return Material(color, roughness=0.12, specular=0.7, role=role)

@@ -49,7 +49,15 @@ class ArmState:
 
 
 class Arm:
-    """A robot in a world; its links are the bodies ``<articulation>/<link>``."""
+    """A robot in a world; its links are the bodies ``<articulation>/<link>``.
+
+    Attributes:
+        articulation: The robot in the scene.
+        robot: Its model.
+        links: Links with collision geometry.
+        moving: Those of them that can move.
+        bodies: Names of the bodies of all its links.
+    """
 
     def __init__(
         self,
@@ -58,42 +66,18 @@ class Arm:
         shapes: dict[str, CollisionShape],
         world: World,
     ) -> None:
-        self._articulation = articulation
-        self._robot = robot
+        self.articulation = articulation
+        self.robot = robot
+        self.links = [link for link in robot.links if link in shapes]
+        base = rigid_group(robot, robot.links[0])
+        self.moving = [link for link in self.links if link not in base]
+        self.bodies = [self.body(link) for link in self.links]
         self._world = world
         self._shapes = shapes
-        self._links = [link for link in robot.links if link in shapes]
-        base = rigid_group(robot, robot.links[0])
-        self._moving = [link for link in self._links if link not in base]
         self._fingers = finger_links(robot)
         poses = link_poses(robot, articulation.T_world_base, articulation.joint_positions)
-        for link in self._links:
+        for link in self.links:
             world.add(self.body(link), shapes[link], poses[link])
-
-    @property
-    def bodies(self) -> list[str]:
-        """Names of the bodies of all its links."""
-        return [self.body(link) for link in self._links]
-
-    @property
-    def articulation(self) -> Articulation:
-        """The robot in the scene."""
-        return self._articulation
-
-    @property
-    def robot(self) -> RobotModel:
-        """The robot's model."""
-        return self._robot
-
-    @property
-    def links(self) -> list[str]:
-        """Links with collision geometry."""
-        return self._links
-
-    @property
-    def moving(self) -> list[str]:
-        """Links with collision geometry that can move."""
-        return self._moving
 
     def radius_m(self, link: str) -> float:
         """Radius of a link's collision geometry about the link's origin."""
@@ -103,20 +87,20 @@ class Arm:
 
     def body(self, link: str) -> str:
         """Name of a link's body."""
-        return f"{self._articulation.name}/{link}"
+        return f"{self.articulation.name}/{link}"
 
     def show(self, positions: Sequence[float]) -> None:
         """Pose the links in the world at these joint positions [rad or m]."""
-        poses = link_poses(self._robot, self._articulation.T_world_base, positions)
-        for link in self._moving:
+        poses = link_poses(self.robot, self.articulation.T_world_base, positions)
+        for link in self.moving:
             self._world.place(self.body(link), poses[link])
 
     def grasp_pose(self, positions: Sequence[float]) -> SE3:
         """``T_world_grasp`` at these joint positions; ``T_world_root`` without a gripper."""
-        poses = link_poses(self._robot, self._articulation.T_world_base, positions)
-        gripper = self._robot.gripper
+        poses = link_poses(self.robot, self.articulation.T_world_base, positions)
+        gripper = self.robot.gripper
         if gripper is None:
-            return poses[self._robot.links[0]]
+            return poses[self.robot.links[0]]
         return poses[gripper.link] @ gripper.T_link_grasp
 
     def solve(self, fixed: Sequence[str], placed: Sequence[str]) -> ArmState | Rejection:
@@ -126,11 +110,11 @@ class Arm:
             fixed: Names of bodies that never move.
             placed: Names of dynamic bodies that are already at rest.
         """
-        goal = self._articulation.goal
+        goal = self.articulation.goal
         if goal is None:
-            state = ArmState(round_positions(self._articulation.joint_positions))
+            state = ArmState(round_positions(self.articulation.joint_positions))
             self._show_state(state, "")
-            collides = self._touches_any(self._moving, fixed)
+            collides = self._touches_any(self.moving, fixed)
             return self._reject(Failure.COLLIDES, goal) if collides else state
         obstacles = [name for name in (*fixed, *placed) if name != goal.grasped_object]
         failures = {Failure.CANNOT_REACH}
@@ -150,35 +134,33 @@ class Arm:
         if goal.kind == "joints":
             yield from self._joint_candidates(goal)
             return
-        gripper = self._robot.gripper
+        gripper = self.robot.gripper
         if gripper is None:
             return
-        chain = make_chain(self._robot, gripper)
-        hand = Hand(self._robot, gripper, self._world, self.body) if goal.kind == "hold" else None
-        T_base_world = self._articulation.T_world_base.inverse()
+        chain = make_chain(self.robot, gripper)
+        hand = Hand(self.robot, gripper, self._world, self.body) if goal.kind == "hold" else None
+        T_base_world = self.articulation.T_world_base.inverse()
         for T_world_grasp in goal.pose_candidates:
-            grasp = (
-                hand.grasp(goal.grasped_object, T_world_grasp)
-                if hand
-                else Grasp(goal.gripper_opening)
-            )
+            grasp: Grasp | None = Grasp(goal.gripper_opening)
+            if hand:
+                grasp = hand.grasp(goal.grasped_object, T_world_grasp)
             if grasp is None:
                 yield Failure.DOES_NOT_FIT
                 continue
             for arm_positions in solve_all(chain, T_base_world @ T_world_grasp):
-                positions = all_positions(self._robot, arm_positions, grasp.opening)
+                positions = all_positions(self.robot, arm_positions, grasp.opening)
                 yield ArmState(positions, self._held_pose(positions, grasp))
 
     def _joint_candidates(self, goal: ArmGoal) -> Iterator[ArmState | Failure]:
-        count = sum(is_arm_joint(joint, self._robot) for joint in self._robot.movable)
+        count = sum(is_arm_joint(joint, self.robot) for joint in self.robot.movable)
         for candidate in goal.joint_candidates:
             if len(candidate) != count:
                 raise ValueError(
-                    f"{self._articulation.name}: a joint candidate has {len(candidate)} "
+                    f"{self.articulation.name}: a joint candidate has {len(candidate)} "
                     f"positions, the arm has {count} joints"
                 )
-            positions = all_positions(self._robot, candidate, goal.gripper_opening)
-            ok = is_within_limits(self._robot, positions)
+            positions = all_positions(self.robot, candidate, goal.gripper_opening)
+            ok = is_within_limits(self.robot, positions)
             yield ArmState(positions) if ok else Failure.CANNOT_REACH
 
     def _held_pose(self, positions: tuple[float, ...], grasp: Grasp) -> SE3 | None:
@@ -192,22 +174,22 @@ class Arm:
             self._world.place(held, state.T_world_held)
 
     def _collides(self, obstacles: Sequence[str], held: str) -> bool:
-        if self._touches_any(self._moving, obstacles):
+        if self._touches_any(self.moving, obstacles):
             return True
         if held:
-            palm = [link for link in self._links if link not in self._fingers]
+            palm = [link for link in self.links if link not in self._fingers]
             if self._touches_any(palm, [held]) or self._touches(held, obstacles):
                 return True
         return self._collides_with_itself()
 
     def _collides_with_itself(self) -> bool:
-        allowed = self._robot.no_collide
+        allowed = self.robot.no_collide
         return any(
             (one, other) not in allowed
             and (other, one) not in allowed
             and self._touches(self.body(one), [self.body(other)])
-            for k, one in enumerate(self._links)
-            for other in self._links[k + 1 :]
+            for k, one in enumerate(self.links)
+            for other in self.links[k + 1 :]
         )
 
     def _touches_any(self, links: Sequence[str], others: Sequence[str]) -> bool:
@@ -217,7 +199,7 @@ class Arm:
         return any(self._world.gap_m(name, other, limit_m=0.0) < 0.0 for other in others)
 
     def _reject(self, failure: Failure, goal: ArmGoal | None) -> Rejection:
-        name = self._articulation.name
+        name = self.articulation.name
         if failure is Failure.DOES_NOT_FIT:
             remedy = f"let arm '{name}' hold smaller objects, or lower their scale"
         elif goal is None:

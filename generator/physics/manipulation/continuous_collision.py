@@ -47,24 +47,13 @@ class Obstacles:
 
 
 @dataclass(frozen=True, slots=True)
-class Collision:
-    """The first collision on a leg.
-
-    Attributes:
-        obstacle: Name of the body that is hit; ``ITSELF`` for a link of the same arm.
-    """
-
-    obstacle: str
-
-
-@dataclass(frozen=True, slots=True)
 class _Pair:
     """Two bodies to keep apart.
 
     Attributes:
         gap_min_m: A smaller gap is a collision.
         travel_m: Upper bound of their relative motion over the whole leg.
-        obstacle: As in ``Collision``.
+        obstacle: Name of the other body; ``ITSELF`` for a link of the same arm.
     """
 
     one: str
@@ -88,8 +77,8 @@ class CollisionSweep:
         holding = rigid_group(arm.robot, self._hand) if gripper else frozenset()
         self._holding = holding | set(finger_links(arm.robot))
 
-    def first_collision(self, leg: Leg, obstacles: Obstacles) -> Collision | None:
-        """The first collision along a leg; None if it is free."""
+    def first_collision(self, leg: Leg, obstacles: Obstacles) -> str | None:
+        """Name of the first body hit along a leg, or ``ITSELF``; None if it is free."""
         self._show(leg, 0.0)
         pairs = list(self._pairs(leg, obstacles))
         share = 0.0
@@ -99,7 +88,7 @@ class CollisionSweep:
             for pair in pairs:
                 spare_m = self._world.gap_m(pair.one, pair.other, _GAP_LIMIT_M) - pair.gap_min_m
                 if spare_m < 0.0:
-                    return Collision(pair.obstacle)
+                    return pair.obstacle
                 if pair.travel_m > 0.0:
                     advance = min(advance, max(spare_m, _ADVANCE_MIN_M) / pair.travel_m)
             if share >= 1.0:

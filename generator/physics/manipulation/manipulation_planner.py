@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 from gen_data.generator.core.errors import Rejection
 from gen_data.generator.core.kinematics import all_positions, gripper_opening, is_within_limits
@@ -12,15 +11,11 @@ from gen_data.generator.core.scene import ArmGoal, SupportSurface
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.physics.bullet import World
 from gen_data.generator.physics.manipulation.arm_goals import Arm, ArmState
-from gen_data.generator.physics.manipulation.continuous_collision import (
-    ITSELF,
-    Collision,
-    Obstacles,
-)
+from gen_data.generator.physics.manipulation.continuous_collision import ITSELF, Obstacles
 from gen_data.generator.physics.manipulation.grasping import Grasp, Hand
 from gen_data.generator.physics.manipulation.joint_trajectories import Held, Leg, time_leg
 from gen_data.generator.physics.manipulation.motion_planner import MotionPlanner, Positions
-from gen_data.generator.physics.placement_surfaces import home_surface, is_within
+from gen_data.generator.physics.settling import home_surface, is_within
 
 CANNOT_REACH = "its pose or joint positions are out of reach"
 NOTHING_TO_GRASP = "no listed object lies free and fits between the fingers"
@@ -48,13 +43,6 @@ _STABLE_M = 0.002
 _HALF_TURN = SE3(quaternion_wxyz=(0.0, 0.0, 0.0, 1.0))
 """The same grasp with the fingers exchanged."""
 _FLIP = SE3(quaternion_wxyz=(0.0, 1.0, 0.0, 0.0))
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """Timed legs that accomplish all goals of an arm, in order; () for an arm without a task."""
-
-    legs: tuple[Leg, ...]
 
 
 class TaskPlanner:
@@ -96,8 +84,8 @@ class TaskPlanner:
         self._held = self._initial_held(held, state) if held else None
         self.resting.pop(held, None)
 
-    def plan(self) -> Plan | Rejection:
-        """The legs to all goals, or the reason why one of them cannot be accomplished."""
+    def plan(self) -> list[Leg] | Rejection:
+        """Timed legs to all goals, in order, or the reason why one cannot be accomplished."""
         legs: list[Leg] = []
         for number, goal in enumerate(self._arm.articulation.task, 1):
             self._restore_world()
@@ -107,7 +95,7 @@ class TaskPlanner:
             legs += [time_leg(leg, self._arm.robot, goal.speed) for leg in planned]
             self.positions = legs[-1].end
         self._restore_world()
-        return Plan(tuple(legs))
+        return legs
 
     def _plan_goal(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
         """Untimed legs to one goal."""
@@ -115,10 +103,10 @@ class TaskPlanner:
             return self._plan_grasp(goal, number)
         if goal.kind == "place":
             return self._plan_place(goal, number)
-        collisions: list[Collision] = []
+        collisions: list[str] = []
         for end in self._goal_configurations(goal):
             path = self._plan_path(end)
-            if not isinstance(path, Collision):
+            if not isinstance(path, str):
                 return path
             collisions.append(path)
         return self._reject(collisions, CANNOT_REACH, number)
@@ -134,7 +122,7 @@ class TaskPlanner:
             found = self._motion.configurations(pose, self.positions, opening)
             yield from found[:_CONFIGURATIONS_MAX]
 
-    def _plan_path(self, end: Positions) -> list[Leg] | Collision:
+    def _plan_path(self, end: Positions) -> list[Leg] | str:
         """Legs from the current configuration to another, clear of all resting bodies."""
         self._restore_world()
         obstacles = Obstacles(self._fixed, list(self.resting))
@@ -146,7 +134,7 @@ class TaskPlanner:
         """Legs that grasp and lift one of the goal's objects."""
         if self._hand is None or self._held is not None:
             return self._reject([], NOTHING_TO_GRASP, number)
-        collisions: list[Collision] = []
+        collisions: list[str] = []
         for body in goal.objects:
             rest = self._rest_on_surface(body)
             if rest is None:
@@ -155,7 +143,7 @@ class TaskPlanner:
                 self._find_grasps(self._hand, body), body, rest
             ):
                 legs = self._plan_lift(*candidate)
-                if not isinstance(legs, Collision):
+                if not isinstance(legs, str):
                     self._held = candidate[0]
                     del self.resting[body]
                     return legs
@@ -194,7 +182,7 @@ class TaskPlanner:
         self._restore_world()
         return sorted(grasps, key=lambda grasp: grasp.opening)
 
-    def _plan_lift(self, held: Held, closed: Positions, lifted: Positions) -> list[Leg] | Collision:
+    def _plan_lift(self, held: Held, closed: Positions, lifted: Positions) -> list[Leg] | str:
         """Legs that open the gripper, approach, close and lift."""
         motion = self._motion
         above, around = motion.with_opening(lifted, 1.0), motion.with_opening(closed, 1.0)
@@ -203,7 +191,7 @@ class TaskPlanner:
         collision = motion.first_collision(approach, self._contact_allowed())
         collision = collision or motion.first_collision(lift, self._contact_allowed(held.body))
         path = collision or self._plan_path(above)
-        return path if isinstance(path, Collision) else [*path, approach, Leg(around, closed), lift]
+        return path if isinstance(path, str) else [*path, approach, Leg(around, closed), lift]
 
     def _rest_on_surface(self, body: str) -> SE3 | None:
         """``T_surface_rest`` of a body that rests on a surface alone; None if it is not alone."""
@@ -223,10 +211,10 @@ class TaskPlanner:
         held = self._held
         if held is None:
             return self._reject([], NOTHING_HELD, number)
-        collisions: list[Collision] = []
+        collisions: list[str] = []
         for T_world_rest, closed, above in self._place_candidates(held, goal.pose_candidates):
             legs = self._plan_release(held, T_world_rest, closed, above)
-            if not isinstance(legs, Collision):
+            if not isinstance(legs, str):
                 self.resting[held.body] = T_world_rest.rounded()
                 self._held = None
                 return legs
@@ -253,7 +241,7 @@ class TaskPlanner:
 
     def _plan_release(
         self, held: Held, T_world_rest: SE3, closed: Positions, above: Positions
-    ) -> list[Leg] | Collision:
+    ) -> list[Leg] | str:
         """Legs that lower the held body, open the gripper and retreat."""
         motion = self._motion
         opened, away = motion.with_opening(closed, 1.0), motion.with_opening(above, 1.0)
@@ -265,7 +253,7 @@ class TaskPlanner:
         for leg in (release, retreat):
             collision = collision or motion.first_collision(leg, self._contact_allowed(held.body))
         path = collision or self._plan_path(above)
-        return path if isinstance(path, Collision) else [*path, lower, release, retreat]
+        return path if isinstance(path, str) else [*path, lower, release, retreat]
 
     def _is_stable(self, body: str, T_world_rest: SE3) -> bool:
         """Whether a body stays at a pose: on a surface, apart from others, and at rest."""
@@ -331,12 +319,11 @@ class TaskPlanner:
             pose = self._arm.grasp_pose(self.positions) @ self._held.T_grasp_held
             self._world.place(self._held.body, pose)
 
-    def _reject(self, collisions: Sequence[Collision], otherwise: str, number: int) -> Rejection:
+    def _reject(self, collisions: Sequence[str], otherwise: str, number: int) -> Rejection:
         """The first collision as the reason; ``otherwise`` if there was none."""
         reason = otherwise
         if collisions:
-            obstacle = collisions[0].obstacle
-            reason = "it hits " + (obstacle if obstacle == ITSELF else f"'{obstacle}'")
+            reason = "it hits " + (ITSELF if collisions[0] == ITSELF else f"'{collisions[0]}'")
         name = self._arm.articulation.name
         return Rejection(
             f"arm '{name}', goal {number} of its task: {reason}",

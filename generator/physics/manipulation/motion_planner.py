@@ -10,11 +10,7 @@ from gen_data.generator.core.motion import Trajectory
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.physics.bullet import World
 from gen_data.generator.physics.manipulation.arm_goals import Arm
-from gen_data.generator.physics.manipulation.continuous_collision import (
-    Collision,
-    CollisionSweep,
-    Obstacles,
-)
+from gen_data.generator.physics.manipulation.continuous_collision import CollisionSweep, Obstacles
 from gen_data.generator.physics.manipulation.inverse_kinematics import (
     EXACT,
     make_chain,
@@ -88,14 +84,14 @@ class MotionPlanner:
         ]
         return max(times) + 0.1 * sum(times)
 
-    def first_collision(self, leg: Leg, obstacles: Obstacles) -> Collision | None:
-        """The first collision along a leg; None if it is free."""
+    def first_collision(self, leg: Leg, obstacles: Obstacles) -> str | None:
+        """Name of the first body hit along a leg, or ``ITSELF``; None if it is free."""
         return self._sweep.first_collision(leg, obstacles)
 
     def plan(
         self, start: Positions, end: Positions, held: Held | None, obstacles: Obstacles
-    ) -> list[Leg] | Collision:
-        """Free legs from one configuration to another, or the collision on the direct leg."""
+    ) -> list[Leg] | str:
+        """Free legs from one configuration to another, or the body hit by the direct leg."""
         direct = Leg(start, end, held=held)
         collision = self.first_collision(direct, obstacles)
         if collision is None:
