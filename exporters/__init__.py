@@ -23,6 +23,7 @@ TABLE = PluginTable[Exporter](
         "semantickitti": "gen_data.exporters.semantickitti:SemanticKitti",
         "tables": "gen_data.exporters.measurement_tables:Tables",
         "usd": "gen_data.exporters.usd:Usd",
+        "webdataset": "gen_data.exporters.webdataset:WebDataset",
     },
     (Exporter,),
 )

@@ -11,6 +11,10 @@ from gen_data.exporters import TABLE
 from gen_data.generator import annotations
 
 
+PACKED = {"webdataset"}
+"""Formats with several samples in a file."""
+
+
 def files(folder: Path) -> dict[str, bytes]:
     """Every file below a folder."""
     found = (p for p in folder.rglob("*") if p.is_file())
@@ -44,7 +48,7 @@ def test_shards_can_be_written_in_any_order(exporter: Any, world: Any, tmp_path:
     backwards = world.export(exporter, info, samples, tmp_path / "b", backwards=True)
 
     assert files(forwards) == files(backwards)
-    assert len(files(forwards)) > len(samples)
+    assert len(files(forwards)) > (1 if exporter.type in PACKED else len(samples))
 
 
 def test_the_size_of_shards_leaves_no_trace(exporter: Any, world: Any, tmp_path: Path) -> None:
