@@ -19,7 +19,7 @@ case. A sensor that does not read at a sample has no field there.
 Tar files hold a fixed number of samples and no time, user or mode of the machine; images are the
 shards' PNG files, ``gen_data.exporters.image_files`` states their units.
 
-Reference: https://github.com/webdataset/webdataset (class ``WebDataset``, function ``base_plus_ext``).
+Reference: https://github.com/webdataset/webdataset, ``WebDataset`` and ``base_plus_ext``.
 """
 
 from __future__ import annotations

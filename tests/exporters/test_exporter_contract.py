@@ -10,7 +10,6 @@ import pytest
 from gen_data.exporters import TABLE
 from gen_data.generator import annotations
 
-
 PACKED = {"webdataset"}
 """Formats with several samples in a file."""
 

@@ -135,8 +135,9 @@ def shifted_masks(members: Members) -> Members:
             masks = [row["segmentation"] for row in rows]
             for row, mask in zip(rows, [*masks[1:], *masks[:1]], strict=True):
                 row["segmentation"] = mask
-            data = json.dumps(labels).encode()
-        changed.append((name, data))
+            changed.append((name, json.dumps(labels).encode()))
+        else:
+            changed.append((name, data))
     return changed
 
 
