@@ -24,6 +24,7 @@ BYTES_DEPEND_ON = {
     "mapbox_earcut": "mapbox-earcut",
     "numpy": "numpy",
     "pxr": "usd-core",
+    "pyarrow": "pyarrow",
     "pybullet": "pybullet",
     "pycocotools": "pycocotools",
     "pyoidn": "pyoidn",
