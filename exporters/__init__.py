@@ -23,6 +23,7 @@ TABLE = PluginTable[Exporter](
         "pointclouds": "gen_data.exporters.pointclouds:PointClouds",
         "semantickitti": "gen_data.exporters.semantickitti:SemanticKitti",
         "tables": "gen_data.exporters.measurement_tables:Tables",
+        "tfrecord": "gen_data.exporters.tfrecord:TfRecord",
         "usd": "gen_data.exporters.usd:Usd",
         "webdataset": "gen_data.exporters.webdataset:WebDataset",
     },

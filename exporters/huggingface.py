@@ -40,7 +40,7 @@ import yaml
 from pydantic import Field
 
 from gen_data.exporters.base import ExporterBase
-from gen_data.exporters.fragments import fragment_rows, write_fragment
+from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
 from gen_data.exporters.rle import encode_rle
 from gen_data.exporters.sensor_selection import instant_s, rgb_cameras
 from gen_data.exporters.sequences import write_text
@@ -215,8 +215,7 @@ class _SplitFiles:
 
         if self._writer is None:
             per_file = self.style.rows_per_file
-            number, count = self._written // per_file, -(-self.total // per_file)
-            name = f"{self.split}-{number:05d}-of-{count:05d}"
+            name = numbered_stem(self.split, self._written, self.total, per_file)
             self.folder.mkdir(parents=True, exist_ok=True)
             # PNG files do not shrink, and repeated values are rare: neither pays.
             self._writer = ParquetWriter(

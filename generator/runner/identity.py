@@ -21,6 +21,7 @@ BYTES_DEPEND_ON = {
     "cv2": "opencv-python-headless",
     "deflate": "deflate",
     "fast_simplification": "fast-simplification",
+    "google_crc32c": "google-crc32c",
     "mapbox_earcut": "mapbox-earcut",
     "numpy": "numpy",
     "pxr": "usd-core",

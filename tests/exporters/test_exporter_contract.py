@@ -10,7 +10,7 @@ import pytest
 from gen_data.exporters import TABLE
 from gen_data.generator import annotations
 
-PACKED = {"huggingface", "webdataset"}
+PACKED = {"huggingface", "tfrecord", "webdataset"}
 """Formats with several samples in a file."""
 
 
