@@ -47,7 +47,7 @@ def test_shards_can_be_written_in_any_order(exporter: Any, world: Any, tmp_path:
     backwards = world.export(exporter, info, samples, tmp_path / "b", backwards=True)
 
     assert files(forwards) == files(backwards)
-    assert len(files(forwards)) > (1 if exporter.type in PACKED else len(samples))
+    assert len(files(forwards)) >= (2 if exporter.type in PACKED else len(samples))
 
 
 def test_the_size_of_shards_leaves_no_trace(exporter: Any, world: Any, tmp_path: Path) -> None:
