@@ -29,7 +29,6 @@ the key ``huggingface`` of the Parquet schema.
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -41,6 +40,14 @@ from pydantic import Field
 
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
+from gen_data.exporters.parquet_tables import (
+    GROUP_ROWS,
+    IMAGE,
+    list_feature,
+    open_parquet,
+    table_schema,
+    value_feature,
+)
 from gen_data.exporters.rle import encode_rle
 from gen_data.exporters.sensor_selection import instant_s, rgb_cameras
 from gen_data.exporters.sequences import write_text
@@ -56,8 +63,6 @@ if TYPE_CHECKING:
 
 IMAGES = "images"
 DECIMALS = 9
-GROUP_ROWS = 100
-"""Rows of a row group, at most: viewers load whole groups."""
 GROUP_BYTES = 64_000_000
 """Image bytes of a row group after which the next one begins."""
 WIDE = frozenset(
@@ -211,23 +216,11 @@ class _SplitFiles:
         self._group, self._group_bytes = [], 0
 
     def _open(self) -> ParquetWriter:
-        from pyarrow.parquet import ParquetWriter
-
         if self._writer is None:
             per_file = self.style.rows_per_file
             name = numbered_stem(self.split, self._written, self.total, per_file)
-            self.folder.mkdir(parents=True, exist_ok=True)
-            # PNG files do not shrink, and repeated values are rare: neither pays.
-            self._writer = ParquetWriter(
-                self.folder / f"{name}.parquet",
-                self.schema,
-                version="2.6",
-                data_page_version="1.0",
-                compression="none",
-                use_dictionary=False,
-                write_statistics=False,
-                store_schema=True,
-            )
+            path = self.folder / f"{name}.parquet"
+            self._writer = open_parquet(path, self.schema)
         return self._writer
 
     def _close_file(self) -> None:
@@ -236,76 +229,42 @@ class _SplitFiles:
             self._writer = None
 
 
-def _value(dtype: str) -> dict[str, Any]:
-    return {"dtype": dtype, "_type": "Value"}
-
-
-def _list(feature: Mapping[str, Any], length: int = -1) -> dict[str, Any]:
-    """Feature of a list; older releases of ``datasets`` know this name of it only."""
-    return {"feature": feature, "length": length, "_type": "Sequence"}
-
-
 def table_features(info: DatasetInfo) -> dict[str, Any]:
     """Features by column, in the JSON form of ``datasets``."""
     others = sorted({c for s in rgb_cameras(info) for c in info.media[s]} - {Channel.RGB})
     return {
-        "image": {"_type": "Image"},
-        **{c.value: _value("binary") if c in WIDE else {"_type": "Image"} for c in others},
-        "image_id": _value("int64"),
-        "width": _value("int32"),
-        "height": _value("int32"),
-        "sample": _value("int64"),
-        "scene": _value("int64"),
-        "view": _value("int32"),
-        "step": _value("int32"),
-        "time_s": _value("float64"),
-        "sensor": _value("string"),
-        "K": _list(_value("float64"), 9),
-        "T_world_camera": _list(_value("float64"), 16),
-        "objects": {k: _list(feature) for k, feature in object_features(info).items()},
+        "image": IMAGE,
+        **{c.value: value_feature("binary") if c in WIDE else IMAGE for c in others},
+        "image_id": value_feature("int64"),
+        "width": value_feature("int32"),
+        "height": value_feature("int32"),
+        "sample": value_feature("int64"),
+        "scene": value_feature("int64"),
+        "view": value_feature("int32"),
+        "step": value_feature("int32"),
+        "time_s": value_feature("float64"),
+        "sensor": value_feature("string"),
+        "K": list_feature(value_feature("float64"), 9),
+        "T_world_camera": list_feature(value_feature("float64"), 16),
+        "objects": {k: list_feature(feature) for k, feature in object_features(info).items()},
     }
 
 
 def object_features(info: DatasetInfo) -> dict[str, Any]:
     """Features of one object."""
     return {
-        "id": _value("int64"),
-        "instance_id": _value("int32"),
+        "id": value_feature("int64"),
+        "instance_id": value_feature("int32"),
         "category": {"names": list(info.categories), "_type": "ClassLabel"},
-        "bbox": _list(_value("float32"), 4),
-        "area": _value("int64"),
-        "iscrowd": _value("bool"),
-        "rle": _value("string"),
-        "visible_fraction": _value("float32"),
-        "occlusion": _value("float32"),
-        "truncation": _value("float32"),
-        "box3d": _list(_value("float32")),
+        "bbox": list_feature(value_feature("float32"), 4),
+        "area": value_feature("int64"),
+        "iscrowd": value_feature("bool"),
+        "rle": value_feature("string"),
+        "visible_fraction": value_feature("float32"),
+        "occlusion": value_feature("float32"),
+        "truncation": value_feature("float32"),
+        "box3d": list_feature(value_feature("float32")),
     }
-
-
-def table_schema(features: Mapping[str, Any]) -> pyarrow.Schema:
-    """Parquet schema of features, which are also in its metadata."""
-    import pyarrow
-
-    columns = [(name, _arrow_type(feature)) for name, feature in features.items()]
-    described = json.dumps({"info": {"features": features}})
-    return pyarrow.schema(columns, metadata={"huggingface": described})
-
-
-def _arrow_type(feature: Mapping[str, Any]) -> pyarrow.DataType:
-    import pyarrow
-
-    match feature.get("_type"):
-        case "Image":
-            return pyarrow.struct({"bytes": pyarrow.binary(), "path": pyarrow.string()})
-        case "ClassLabel":
-            return pyarrow.int64()
-        case "Sequence":
-            # A list_ of length -1 has any length.
-            return pyarrow.list_(_arrow_type(feature["feature"]), feature["length"])
-        case "Value":
-            return pyarrow.type_for_alias(feature["dtype"])
-    return pyarrow.struct({name: _arrow_type(inner) for name, inner in feature.items()})
 
 
 def _row(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
