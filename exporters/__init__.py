@@ -19,6 +19,7 @@ TABLE = PluginTable[Exporter](
         "kitti_raw": "gen_data.exporters.kitti_raw:KittiRaw",
         "kitti_stereo": "gen_data.exporters.kitti_stereo:KittiStereo",
         "kitti_tracking": "gen_data.exporters.kitti_tracking:KittiTracking",
+        "lerobot": "gen_data.exporters.lerobot:LeRobot",
         "mcap": "gen_data.exporters.mcap:Mcap",
         "motchallenge": "gen_data.exporters.motchallenge:MotChallenge",
         "pointclouds": "gen_data.exporters.pointclouds:PointClouds",

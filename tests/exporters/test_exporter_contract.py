@@ -9,6 +9,7 @@ import pytest
 
 from gen_data.exporters import TABLE
 from gen_data.generator import annotations
+from tests.exporters.drives import drive_info
 
 PACKED = {"huggingface", "tfrecord", "webdataset"}
 """Formats with several samples in a file."""
@@ -21,9 +22,11 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def given(exporter: Any, world: Any) -> tuple[Any, Any]:
-    """The seven frames; a drive with two cameras for formats of pairs."""
+    """The seven frames; a drive with two cameras for formats of pairs, or with an arm."""
     if exporter.type == "kitti_stereo":
         return world.pairs()
+    if exporter.type == "lerobot":
+        return drive_info(world), world.reach()
     return world.info(7, lidars=("top",)), world.samples
 
 
