@@ -14,6 +14,7 @@ TABLE = PluginTable[Exporter](
     {
         "birdseye": "gen_data.exporters.birdseye:Birdseye",
         "coco": "gen_data.exporters.coco:Coco",
+        "croissant": "gen_data.exporters.croissant:Croissant",
         "huggingface": "gen_data.exporters.huggingface:HuggingFace",
         "kitti": "gen_data.exporters.kitti:Kitti",
         "kitti_raw": "gen_data.exporters.kitti_raw:KittiRaw",

@@ -20,7 +20,14 @@ from gen_data.exporters.image_files import write_media
 from gen_data.generator import annotations
 from gen_data.generator.annotations.annotate import Thresholds, annotate_objects
 from gen_data.generator.annotations.boxes3d import oriented_box
-from gen_data.generator.core.asset_types import SURFACES, Joint, Keypoint, Material, RobotModel
+from gen_data.generator.core.asset_types import (
+    SURFACES,
+    Asset,
+    Joint,
+    Keypoint,
+    Material,
+    RobotModel,
+)
 from gen_data.generator.core.boxes import BoxPx, tight_box
 from gen_data.generator.core.capture import (
     POINT,
@@ -439,6 +446,10 @@ class Sky:
             for k, name in enumerate(ARM_JOINTS)
         )
         return RobotModel(links, joints, {}, {}, (0.0, 0.0), None, frozenset())
+
+    def get(self, asset_id: str) -> Asset:
+        licence = "CC0-1.0" if asset_id.startswith("environment/") else "Apache-2.0"
+        return Asset(asset_id, "object", "", (), licence, "nobody", "nowhere", "")
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
         return ()
