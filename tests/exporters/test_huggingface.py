@@ -8,6 +8,7 @@ import re
 import shutil
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -134,6 +135,20 @@ def test_flow_is_binary_and_missing_channels_are_null(world: Any, tmp_path: Path
     for row in rows:
         assert (row["flow_forward"] is not None) == (row["sensor"] == "left")
         assert row["image"]["bytes"].startswith(b"\x89PNG")
+
+
+def test_ignored_objects_are_crowds(world: Any, tmp_path: Path) -> None:
+    """As in COCO, which excludes them from scores."""
+    sample = world.samples[0]
+    truth = sample.truth["color"]
+    first, *others = truth.objects
+    objects = (replace(first, ignored=True), *others)
+    ignored = replace(sample, truth={"color": replace(truth, objects=objects)})
+    folder = world.export(HuggingFace(), world.info(1), [ignored], tmp_path)
+
+    (row,) = read(folder / "data/train-00000-of-00001.parquet").to_pylist()
+
+    assert row["objects"]["iscrowd"] == [True] + [False] * (len(row["objects"]["id"]) - 1)
 
 
 def test_a_data_set_without_photographs_is_refused(world: Any) -> None:

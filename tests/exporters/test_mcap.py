@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -206,6 +207,20 @@ def test_sensors_have_their_own_instants(world: Any, slow: Any, tmp_path: Path) 
         START_NS,
         START_NS + 2 * STEP_NS,
     ]
+
+
+def test_ignored_objects_are_left_out(world: Any, samples: Any, tmp_path: Path) -> None:
+    """There is no mark for "do not score"."""
+    left = samples[0].truth["left"]
+    objects = tuple(replace(thing, ignored=True) for thing in left.objects)
+    sample = replace(samples[0], truth={"left": replace(left, objects=objects)})
+    folder = world.export(Mcap(), drive_info(world), [sample], tmp_path)
+
+    found = {topic: m for topic, _, _, m in messages(folder / "train/street-000000.mcap")}
+
+    assert left.objects
+    assert not found["/camera/left/annotations"].points
+    assert not found["/objects"].entities
 
 
 def test_fields_of_points_cover_the_record() -> None:
