@@ -27,9 +27,11 @@ import json
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal
 
+import yaml
 from pydantic import PrivateAttr
 
 from gen_data.exporters.base import ExporterBase
@@ -173,7 +175,7 @@ class Croissant(ExporterBase):
             "citeAs": self.cite_as,
         }
         return {
-            "@context": CONTEXT,
+            "@context": _read_context(),
             "@type": "sc:Dataset",
             "name": info.name,
             "description": _description(info),
@@ -336,6 +338,13 @@ def _row(sample: Sample, sensor: str) -> dict[str, Any]:
     return {"image": image, "objects": objects}
 
 
+def _read_context() -> dict[str, Any]:
+    """Read the terms of Croissant, the JSON-LD context."""
+    text = (files("gen_data.exporters") / "croissant_context.yaml").read_text("utf-8")
+    context: dict[str, Any] = yaml.safe_load(text)
+    return context
+
+
 def _description(info: DatasetInfo) -> str:
     return (
         f"Synthetic images with exact labels, rendered by gen-data from the configuration "
@@ -348,16 +357,16 @@ def _image_records() -> dict[str, Any]:
     records = _table_records(
         "images", "Images with the intrinsics of their cameras.", IMAGE_COLUMNS
     )
-    files = {"fileSet": {"@id": "image-files"}}
+    source = {"fileSet": {"@id": "image-files"}}
     for column in records["field"]:
         if column["@id"] == "images/file_name":
-            column["references"] = {**files, "extract": {"fileProperty": "filename"}}
+            column["references"] = {**source, "extract": {"fileProperty": "filename"}}
     content = {
         "@type": "cr:Field",
         "@id": "images/content",
         "name": "images/content",
         "dataType": "sc:ImageObject",
-        "source": {**files, "extract": {"fileProperty": "content"}},
+        "source": {**source, "extract": {"fileProperty": "content"}},
     }
     return {**records, "field": [*records["field"], content]}
 
@@ -391,46 +400,6 @@ def _sensor_line(sensor: SensorInfo) -> str:
     rate = f"{sensor.rate_hz:g} Hz" if sensor.rate_hz is not None else "every step"
     return f"| {sensor.name} | {kind} | {parts} | {rate} |"
 
-
-CONTEXT = {
-    "@language": "en",
-    "@vocab": "https://schema.org/",
-    "citeAs": "cr:citeAs",
-    "column": "cr:column",
-    "conformsTo": "dct:conformsTo",
-    "cr": "http://mlcommons.org/croissant/",
-    "data": {"@id": "cr:data", "@type": "@json"},
-    "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
-    "dct": "http://purl.org/dc/terms/",
-    "equivalentProperty": "cr:equivalentProperty",
-    "examples": {"@id": "cr:examples", "@type": "@json"},
-    "extract": "cr:extract",
-    "field": "cr:field",
-    "fileProperty": "cr:fileProperty",
-    "fileObject": "cr:fileObject",
-    "fileSet": "cr:fileSet",
-    "format": "cr:format",
-    "includes": "cr:includes",
-    "isLiveDataset": "cr:isLiveDataset",
-    "jsonPath": "cr:jsonPath",
-    "key": "cr:key",
-    "md5": "cr:md5",
-    "parentField": "cr:parentField",
-    "path": "cr:path",
-    "rai": "http://mlcommons.org/croissant/RAI/",
-    "recordSet": "cr:recordSet",
-    "references": "cr:references",
-    "regex": "cr:regex",
-    "repeated": "cr:repeated",
-    "replace": "cr:replace",
-    "samplingRate": "cr:samplingRate",
-    "sc": "https://schema.org/",
-    "separator": "cr:separator",
-    "source": "cr:source",
-    "subField": "cr:subField",
-    "transform": "cr:transform",
-}
-"""Terms of Croissant 1.0 (specification, appendix "JSON-LD context")."""
 
 _CARD = """# {name}
 
