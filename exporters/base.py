@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import TypeVar
 
 from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
 
 E = TypeVar("E", bound="ExporterBase")
@@ -35,3 +37,22 @@ class ExporterBase(Strict):
         """Return the exporter for writing; formats with geometry keep the library."""
         del assets
         return self
+
+
+def check_installed(exporter: str, **packages: str) -> None:
+    """Reject a format whose writing library is absent.
+
+    Args:
+        exporter: Type of the exporter.
+        packages: Names of packages by the modules that they install.
+
+    Raises:
+        ConfigError: a module is missing; the text names the remedy.
+    """
+    absent = sorted({name for module, name in packages.items() if find_spec(module) is None})
+    if absent:
+        noun = "package" if len(absent) == 1 else "packages"
+        raise ConfigError(
+            f"exporter '{exporter}' needs the {noun} {', '.join(absent)}: "
+            "pip install 'gen-data[formats]'"
+        )

@@ -205,6 +205,23 @@ class Coco(ExporterBase):
         return row | _optional_keys(thing)
 
 
+def image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
+    """Labels of one image, without paths: the row of ``images`` and its ``annotations``.
+
+    For formats that keep the labels of each image beside it. Annotations also have the name of
+    their ``category``.
+    """
+    row = _image(info, sample, sensor)
+    visible = (thing for thing in sample.truth[sensor].objects if thing.box is not None)
+    style = Coco()
+    annotations = [
+        style._annotation(info, sample, sensor, thing) | {"category": thing.instance.category}
+        for thing in visible
+    ]
+    without_paths = {k: v for k, v in row.items() if k not in ("file_name", "files")}
+    return without_paths | {"annotations": annotations}
+
+
 def _optional_keys(thing: ObjectTruth) -> dict[str, Any]:
     """Keys of the enabled annotations of an object."""
     keys: dict[str, Any] = {

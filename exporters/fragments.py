@@ -38,3 +38,8 @@ def fragment_rows(
     for shard_dir in shard_dirs:
         for line in fragment_lines([shard_dir / exporter], name):
             yield shard_dir, json.loads(line)
+
+
+def numbered_stem(split: str, position: int, total: int, per_file: int) -> str:
+    """Name of the file with row ``position`` of a split, such as ``train-00002-of-00005``."""
+    return f"{split}-{position // per_file:05d}-of-{-(-total // per_file):05d}"

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.scene_assets import assets_in
 from gen_data.generator.core.serialization import canonical_json, from_plain
 from gen_data.generator.runner.durable_files import IRREGULAR, hash_file, tree_sizes
 
@@ -85,7 +85,7 @@ def describe_shard(
     counts = []
     assets: set[str] = set()
     for sample in samples:
-        assets |= _assets_in(sample.scene)
+        assets |= assets_in(sample.scene)
         if sample.view_index == 0 and sample.step_index == 0:
             scenes += 1
             rejections += sample.attempts - 1
@@ -120,19 +120,6 @@ def sum_counts(counts: Iterable[SplitCount]) -> tuple[SplitCount, ...]:
         SplitCount(split, samples[split], dict(sorted(objects[split].items())))
         for split in sorted(samples)
     )
-
-
-def _assets_in(scene: Scene) -> set[str]:
-    """Asset ids of a scene; the links of a robot count as the robot."""
-    links = tuple(f"{articulation.name}/" for articulation in scene.articulations)
-    bodies = [b for b in scene.bodies if not (links and b.name.startswith(links))]
-    materials = (material for body in scene.bodies for material in body.materials)
-    return {
-        scene.environment.image,
-        *(articulation.asset for articulation in scene.articulations),
-        *(body.asset for body in bodies),
-        *(material.texture.partition("#")[0] for material in materials if material.texture),
-    }
 
 
 def _count(sample: Sample) -> SplitCount:

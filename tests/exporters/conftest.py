@@ -20,7 +20,14 @@ from gen_data.exporters.image_files import write_media
 from gen_data.generator import annotations
 from gen_data.generator.annotations.annotate import Thresholds, annotate_objects
 from gen_data.generator.annotations.boxes3d import oriented_box
-from gen_data.generator.core.asset_types import SURFACES, Keypoint, Material
+from gen_data.generator.core.asset_types import (
+    SURFACES,
+    Asset,
+    Joint,
+    Keypoint,
+    Material,
+    RobotModel,
+)
 from gen_data.generator.core.boxes import BoxPx, tight_box
 from gen_data.generator.core.capture import (
     POINT,
@@ -36,9 +43,19 @@ from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.lane_geometry import LaneBorder
 from gen_data.generator.core.lens import LensModel
 from gen_data.generator.core.measurement_dtypes import TABLE_COLUMNS, table_rows
-from gen_data.generator.core.motion import Trajectory
+from gen_data.generator.core.motion import JointTrajectory, Trajectory
 from gen_data.generator.core.sample import BirdseyeMap, EgoTruth, ImageTruth, Sample
-from gen_data.generator.core.scene import Body, Camera, Device, Instance, Lidar, Rig, Scene
+from gen_data.generator.core.scene import (
+    ArmGoal,
+    Articulation,
+    Body,
+    Camera,
+    Device,
+    Instance,
+    Lidar,
+    Rig,
+    Scene,
+)
 from gen_data.generator.core.scene_time import RIG_AXES, add_twists, place_sensors, scene_at
 from gen_data.generator.core.se3 import SE3, Array, look_at
 from gen_data.generator.runner.shard import drop_pixels
@@ -326,6 +343,27 @@ def make_pairs() -> tuple[DatasetInfo, list[Sample]]:
     return make_info(8, names, ("top",), media=media, steps_per_scene=4), samples
 
 
+ARM_JOINTS = ("shoulder", "elbow")
+
+
+def make_reach() -> list[Sample]:
+    """The drive with an arm of two joints that carries the crate for three steps, then rests."""
+    track = JointTrajectory(STEP_S, ((0.0, 0.5), (0.1, 0.4), (0.2, 0.3), (0.3, 0.2)))
+    goals = (ArmGoal("grasp", objects=("crate/4",)), ArmGoal("place"))
+    arm = Articulation("arm", "toys/arm", 9, SE3(), (0.0, 0.5), task=goals, joint_track=track)
+    samples = []
+    for sample in make_drive():
+        positions = track.positions(sample.scene.time_s)
+        carried = Trajectory("crate/4", STEP_S, (SE3(), SE3((0.0, 0.0, 0.1))))
+        scene = replace(
+            sample.scene,
+            articulations=(replace(arm, joint_positions=positions),),
+            tracks=(carried,),
+        )
+        samples.append(replace(sample, scene=scene))
+    return samples
+
+
 def frame_of(scene: Scene) -> EgoTruth:
     """A map of 40 m in which half of the ground is drivable, and boxes."""
     drivable = np.zeros((80, 80), bool)
@@ -399,7 +437,19 @@ def make_info(
 
 
 class Sky:
-    """A library of which a world without bodies takes no more than light."""
+    """A library of which a world without bodies takes no more than light and one arm."""
+
+    def robot(self, asset_id: str) -> RobotModel:
+        links = ("base", *(f"{name}_link" for name in ARM_JOINTS))
+        joints = tuple(
+            Joint(name, "revolute", links[k], links[k + 1], SE3(), (0.0, 0.0, 1.0), -3.0, 3.0)
+            for k, name in enumerate(ARM_JOINTS)
+        )
+        return RobotModel(links, joints, {}, {}, (0.0, 0.0), None, frozenset())
+
+    def get(self, asset_id: str) -> Asset:
+        licence = "CC0-1.0" if asset_id.startswith("environment/") else "Apache-2.0"
+        return Asset(asset_id, "object", "", (), licence, "nobody", "nowhere", "")
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
         return ()
@@ -443,6 +493,7 @@ class World:
     export = staticmethod(export)
     ego_pose = staticmethod(ego_pose)
     drive = staticmethod(make_drive)
+    reach = staticmethod(make_reach)
     pairs = staticmethod(make_pairs)
 
     def __init__(self) -> None:

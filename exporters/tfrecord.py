@@ -1,0 +1,281 @@
+"""TFRecord: ``tf.train.Example`` with the keys of TensorFlow's Object Detection API.
+
+::
+
+    train-00000-of-00002.tfrecord     one record per image of every camera
+    label_map.pbtxt                   ids and names of the categories, from 1
+
+Keys of the API: ``image/encoded`` (PNG), ``image/format``, ``image/height``, ``image/width``,
+``image/filename``, ``image/source_id`` (COCO's image id), ``image/key/sha256``, and by object
+``image/object/bbox/{xmin,xmax,ymin,ymax}`` (fractions of width and height),
+``image/object/class/{text,label}``, ``image/object/area`` (visible pixels),
+``image/object/is_crowd``, ``image/object/{difficult,truncated}``. With ``masks: png``,
+``image/object/mask`` has a PNG per object, 1 = visible.
+
+An image without objects has the same keys, with empty lists. Additional keys:
+``image/depth/encoded`` and the like, PNG files of the camera's other channels;
+``image/sensor``, ``image/sample``, ``image/scene``, ``image/intrinsics`` (3 x 3) and
+``image/T_world_camera`` (4 x 4), row by row; ``image/object/instance_id``.
+
+A record is its length (uint64), the masked CRC32C of the length, the data, and the masked CRC32C of
+the data. Feature maps are written sorted by key, so that the same values give the same bytes.
+
+References: https://www.tensorflow.org/tutorials/load_data/tfrecord#tfrecords_format_details;
+tensorflow/core/example/{example,feature}.proto; https://protobuf.dev/programming-guides/encoding;
+tensorflow/models, research/object_detection/core/standard_fields.py (TfExampleFields).
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from gen_data.exporters.base import ExporterBase, check_installed
+from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
+from gen_data.exporters.png import RowFilter, encode_png
+from gen_data.exporters.sensor_selection import rgb_cameras
+from gen_data.exporters.sequences import write_bytes, write_text
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
+
+IMAGES = "images"
+DIFFICULT = 0.25
+"""Visible fraction below which an object is difficult; the API leaves the choice to data sets."""
+
+LABELS = "labels.bin"
+
+FLOATS = frozenset(
+    {
+        *(f"image/object/bbox/{side}" for side in ("xmin", "xmax", "ymin", "ymax")),
+        "image/object/area",
+        "image/intrinsics",
+        "image/T_world_camera",
+    }
+)
+"""Keys whose values are floats."""
+INTEGERS = frozenset(
+    {
+        *(f"image/{name}" for name in ("height", "width", "sample", "scene")),
+        *(
+            f"image/object/{name}"
+            for name in ("class/label", "is_crowd", "difficult", "truncated", "instance_id")
+        ),
+    }
+)
+"""Keys whose values are integers; all others are bytes. An empty list has a kind, too."""
+
+Feature = Sequence[bytes] | Sequence[int] | Sequence[float]
+
+
+class TfRecord(ExporterBase):
+    """TFRecord files with the keys of the Object Detection API.
+
+    Attributes:
+        rows_per_file: Images in each file except the last one of a split.
+        masks: Whether objects have their visible masks as PNG files.
+    """
+
+    type: Literal["tfrecord"] = "tfrecord"
+    rows_per_file: int = Field(1000, ge=1)
+    masks: Literal["png", "none"] = "none"
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Names of the annotators that it reads."""
+        return frozenset({"instance_masks"} if self.masks == "png" else ())
+
+    def check(self, info: DatasetInfo) -> None:
+        """Reject a data set that this format cannot represent.
+
+        Raises:
+            ConfigError: no sensor writes the rgb channel, or the CRC library is missing.
+        """
+        check_installed(self.type, google_crc32c="google-crc32c")
+        if not rgb_cameras(info):
+            raise ConfigError(
+                f"exporter '{self.type}': no sensor writes the rgb channel; add an rgb_camera"
+            )
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write the encoded labels of all images to one file, and a JSON line per image."""
+        self.check(info)
+        rows: list[dict[str, Any]] = []
+        parts: list[bytes] = []
+        offset = 0
+        for sample in samples:
+            for sensor in rgb_cameras(info):
+                if sensor not in sample.truth:
+                    continue
+                labels = encode_features(self._labels(sample, sensor))
+                where = {"split": sample.split, "sample": sample.index, "sensor": sensor}
+                rows.append(where | {"offset": offset, "size": len(labels)})
+                parts.append(labels)
+                offset += len(labels)
+        write_fragment(shard_dir / self.type, IMAGES, rows)
+        write_bytes(shard_dir / self.type / LABELS, b"".join(parts))
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Join labels and images to records, and write the label map."""
+        totals = Counter(row["split"] for _, row in fragment_rows(shard_dirs, self.type, IMAGES))
+        written: Counter[str] = Counter()
+        dataset_dir.mkdir(parents=True, exist_ok=True)
+        for shard_dir, row in fragment_rows(shard_dirs, self.type, IMAGES):
+            split = row["split"]
+            stem = numbered_stem(split, written[split], totals[split], self.rows_per_file)
+            example = encode_example(
+                self._read_labels(shard_dir, row)
+                + encode_features(_images(info, shard_dir, row["sensor"], row["sample"]))
+            )
+            # A split's records come in order, but splits alternate: files are opened per record.
+            with (dataset_dir / f"{stem}.tfrecord").open("ab") as file:
+                file.write(frame_record(example))
+            written[split] += 1
+        write_text(dataset_dir / "label_map.pbtxt", label_map(info.categories))
+
+    def _labels(self, sample: Sample, sensor: str) -> dict[str, Feature]:
+        """Labels of one image by key, without its pixels."""
+        truth = sample.truth[sensor]
+        things = [thing for thing in truth.objects if thing.box is not None]
+        labels = _image_labels(sample, sensor) | _object_labels(truth, things)
+        if self.masks == "png":
+            labels["image/object/mask"] = [_mask_png(truth, thing) for thing in things]
+        return labels
+
+    def _read_labels(self, shard_dir: Path, row: Mapping[str, Any]) -> bytes:
+        with (shard_dir / self.type / LABELS).open("rb") as file:
+            file.seek(row["offset"])
+            return file.read(row["size"])
+
+
+def _image_labels(sample: Sample, sensor: str) -> dict[str, Feature]:
+    camera = sample.truth[sensor].camera
+    return {
+        "image/filename": [f"{sample.index:09d}_{sensor}.png".encode()],
+        "image/source_id": [str(sample.image_id(sensor)).encode()],
+        "image/format": [b"png"],
+        "image/height": [camera.intrinsics.height_px],
+        "image/width": [camera.intrinsics.width_px],
+        "image/sensor": [sensor.encode()],
+        "image/sample": [sample.index],
+        "image/scene": [sample.scene_index],
+        "image/intrinsics": camera.intrinsics.matrix().ravel().tolist(),
+        "image/T_world_camera": camera.T_world_camera.matrix().ravel().tolist(),
+    }
+
+
+def _object_labels(truth: ImageTruth, things: Sequence[ObjectTruth]) -> dict[str, Feature]:
+    """Labels of visible objects: lists of equal length."""
+    width, height = truth.camera.intrinsics.width_px, truth.camera.intrinsics.height_px
+    boxes = [thing.box for thing in things if thing.box is not None]
+    instances = [thing.instance for thing in things]
+    return {
+        "image/object/bbox/xmin": [box.x_min / width for box in boxes],
+        "image/object/bbox/xmax": [box.x_max / width for box in boxes],
+        "image/object/bbox/ymin": [box.y_min / height for box in boxes],
+        "image/object/bbox/ymax": [box.y_max / height for box in boxes],
+        "image/object/class/text": [thing.category.encode() for thing in instances],
+        "image/object/class/label": [thing.category_id for thing in instances],
+        "image/object/area": [float(thing.visible_px) for thing in things],
+        "image/object/is_crowd": [int(thing.ignored) for thing in things],
+        "image/object/difficult": [int(_is_difficult(thing)) for thing in things],
+        "image/object/truncated": [int((thing.truncation or 0.0) > 0.0) for thing in things],
+        "image/object/instance_id": [thing.instance_id for thing in instances],
+    }
+
+
+def _is_difficult(thing: ObjectTruth) -> bool:
+    return thing.visible_fraction is not None and thing.visible_fraction < DIFFICULT
+
+
+def _mask_png(truth: ImageTruth, thing: ObjectTruth) -> bytes:
+    """Visible mask as a PNG file of the image's size, 1 = visible."""
+    assert thing.mask is not None, "the annotation instance_masks is in `needs`"
+    camera, mask = truth.camera.intrinsics, thing.mask
+    pixels = np.zeros((camera.height_px, camera.width_px), np.uint8)
+    rows, columns = mask.pixels.shape
+    pixels[mask.y_px : mask.y_px + rows, mask.x_px : mask.x_px + columns] = mask.pixels
+    return encode_png(pixels, RowFilter.UP, 1)
+
+
+def _images(info: DatasetInfo, shard_dir: Path, sensor: str, index: int) -> dict[str, Feature]:
+    """PNG files of a camera by key."""
+    images: dict[str, Feature] = {}
+    for channel in info.media[sensor]:
+        data = media_path(shard_dir, sensor, channel, index).read_bytes()
+        if channel is Channel.RGB:
+            images["image/encoded"] = [data]
+            images["image/key/sha256"] = [sha256(data).hexdigest().encode()]
+        else:
+            images[f"image/{channel.value}/encoded"] = [data]
+    return images
+
+
+def label_map(categories: Sequence[str]) -> str:
+    """Label map of the Object Detection API, a text protobuf; ids start at 1."""
+    # JSON's escapes are valid in a text protobuf.
+    items = (
+        f"item {{\n  id: {number}\n  name: {json.dumps(name, ensure_ascii=False)}\n}}\n"
+        for number, name in enumerate(categories, 1)
+    )
+    return "".join(items)
+
+
+def encode_example(features: bytes) -> bytes:
+    """Wire format of ``tf.train.Example`` from entries of its feature map."""
+    return _message(1, features)
+
+
+def encode_features(features: Mapping[str, Feature]) -> bytes:
+    """Wire format of entries of ``Features.feature``, sorted by key."""
+    entries = (
+        _message(1, key.encode()) + _message(2, _encode_feature(key, features[key]))
+        for key in sorted(features)
+    )
+    return b"".join(_message(1, entry) for entry in entries)
+
+
+def _encode_feature(key: str, values: Feature) -> bytes:
+    """Wire format of a ``Feature``: a list of bytes (1), floats (2) or integers (3)."""
+    if key in FLOATS:
+        return _message(2, _message(1, struct.pack(f"<{len(values)}f", *values)))
+    if key in INTEGERS:
+        return _message(3, _message(1, b"".join(_varint(int(value)) for value in values)))
+    return _message(1, b"".join(_message(1, value) for value in values if isinstance(value, bytes)))
+
+
+def _message(number: int, data: bytes) -> bytes:
+    """A length-delimited field: tag, size, bytes."""
+    return _varint(number << 3 | 2) + _varint(len(data)) + data
+
+
+def _varint(value: int) -> bytes:
+    """Base-128 number, the lowest seven bits first; ``value`` is not negative."""
+    data = bytearray()
+    while value > 0x7F:
+        data.append(value & 0x7F | 0x80)
+        value >>= 7
+    data.append(value)
+    return bytes(data)
+
+
+def frame_record(data: bytes) -> bytes:
+    """One record of a TFRecord file."""
+    size = struct.pack("<Q", len(data))
+    return b"".join((size, _masked_crc(size), data, _masked_crc(data)))
+
+
+def _masked_crc(data: bytes) -> bytes:
+    import google_crc32c
+
+    crc = google_crc32c.value(data)
+    return struct.pack("<I", ((crc >> 15 | crc << 17) + 0xA282EAD8) & 0xFFFFFFFF)

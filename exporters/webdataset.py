@@ -1,0 +1,176 @@
+"""WebDataset: tar files of samples, to be read in sequence.
+
+::
+
+    train/street-000000.tar, train/street-000001.tar, ...    val/..., test/...
+        000000012.json              labels of the sample
+        000000012.color.rgb.png     images: <camera>.<channel>.png
+        000000012.top.points.npy    laser scans: <lidar>.points.npy, records of ``POINT``
+        000000012.imu.rows.npy      rows of other devices: <device>.rows.npy
+
+The key of a sample is its index; everything after the first dot is the name of a field, in lower
+case. A sensor that does not read at a sample has no field there.
+
+``json`` has ``index``, ``scene``, ``view``, ``step``, ``split``, ``time_s``, ``categories``,
+``depth_scale_m``, ``cameras`` and ``lidars``. A camera's entry is COCO's row of its image
+(``gen_data.exporters.coco``) with the rows of its objects under ``annotations``; a scanner's is its
+``T_world_lidar`` and the instant of its sweep.
+
+Tar files hold a fixed number of samples and no time, user or mode of the machine; images are the
+shards' PNG files, ``gen_data.exporters.image_files`` states their units.
+
+Reference: https://github.com/webdataset/webdataset, ``WebDataset`` and ``base_plus_ext``.
+"""
+
+from __future__ import annotations
+
+import io
+import tarfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.coco import image_labels
+from gen_data.exporters.fragments import fragment_rows, write_fragment
+from gen_data.exporters.point_cloud_io import scanner_at_sweep
+from gen_data.exporters.sensor_selection import has_scans
+from gen_data.exporters.sequences import sequence_number
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import DatasetInfo, cloud_path, media_path, table_path
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.serialization import canonical_json
+
+SAMPLES = "samples"
+
+
+class WebDataset(ExporterBase):
+    """Tar files of samples: images, scans, rows and labels of all sensors.
+
+    Attributes:
+        samples_per_tar: Samples in each tar file except the last one of a split.
+    """
+
+    type: Literal["webdataset"] = "webdataset"
+    samples_per_tar: int = Field(500, ge=1)
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Names of the annotators that it reads."""
+        return frozenset({"instance_masks", "boxes2d"})
+
+    def check(self, info: DatasetInfo) -> None:
+        """Reject names of sensors that are equal in lower case.
+
+        Raises:
+            ConfigError: two names differ in case only.
+        """
+        seen: dict[str, str] = {}
+        for name in (sensor.name for sensor in info.sensors):
+            other = seen.setdefault(name.lower(), name)
+            if other != name:
+                raise ConfigError(
+                    f"exporter '{self.type}': sensors '{other}' and '{name}' differ in case only, "
+                    "but fields have lower-case names; rename one of them"
+                )
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write one JSON line per sample: its labels."""
+        self.check(info)
+        rows = ({"split": s.split, "labels": sample_labels(info, s)} for s in samples)
+        write_fragment(shard_dir / self.type, SAMPLES, rows)
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Pack the samples of each split, in order."""
+        tars: dict[str, _TarFiles] = {}
+        try:
+            for shard_dir, row in fragment_rows(shard_dirs, self.type, SAMPLES):
+                split, labels = row["split"], row["labels"]
+                if split not in tars:
+                    stem = "_".join(info.name.split())
+                    tars[split] = _TarFiles(dataset_dir / split / stem, self.samples_per_tar)
+                key = f"{labels['index']:09d}"
+                tars[split].add(key, _fields(info, shard_dir, labels))
+        finally:
+            for files in tars.values():
+                files.close()
+
+
+def sample_labels(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
+    """Labels of all sensors of a sample; see the top of this module."""
+    return {
+        "index": sample.index,
+        "scene": sample.scene_index,
+        "view": sample.view_index,
+        "step": sample.step_index,
+        "sequence": sequence_number(info, sample.index),
+        "split": sample.split,
+        "time_s": sample.scene.time_s,
+        "categories": info.categories,
+        "depth_scale_m": info.depth_scale_m,
+        "cameras": {name: image_labels(info, sample, name) for name in sorted(sample.truth)},
+        "lidars": {
+            name: {
+                "time_s": cloud.time_s,
+                "T_world_lidar": scanner_at_sweep(sample, name).T_world_lidar.matrix().tolist(),
+            }
+            for name, cloud in sorted(sample.capture.clouds.items())
+        },
+    }
+
+
+def _fields(
+    info: DatasetInfo, shard_dir: Path, labels: Mapping[str, Any]
+) -> Iterator[tuple[str, bytes]]:
+    """Yield name and bytes of each field of a sample, sorted by name."""
+    index = labels["index"]
+    paths = {
+        f"{camera}.{channel.value}.png": media_path(shard_dir, camera, channel, index)
+        for camera in labels["cameras"]
+        for channel in info.media[camera]
+    }
+    for lidar in info.lidars:
+        if has_scans(shard_dir, lidar, index):
+            paths[f"{lidar}.points.npy"] = cloud_path(shard_dir, lidar, index)
+    for device in info.devices:
+        path = table_path(shard_dir, device, index)
+        if path.exists():
+            paths[f"{device}.rows.npy"] = path
+    for name in sorted({"json", *paths}):
+        data = paths[name].read_bytes() if name in paths else canonical_json(labels).encode()
+        yield name.lower(), data
+
+
+class _TarFiles:
+    """Tar files of one split; each is opened with its first sample."""
+
+    def __init__(self, stem: Path, samples_per_tar: int) -> None:
+        self._stem, self._samples_per_tar = stem, samples_per_tar
+        self._samples = 0
+        self._tar: tarfile.TarFile | None = None
+
+    def add(self, key: str, fields: Iterable[tuple[str, bytes]]) -> None:
+        """Append a sample."""
+        if self._samples % self._samples_per_tar == 0:
+            self._open_next()
+        assert self._tar is not None, "opened with the first sample"
+        self._samples += 1
+        for name, data in fields:
+            # A new TarInfo has time 0, user 0 without a name, and mode 0644.
+            member = tarfile.TarInfo(f"{key}.{name}")
+            member.size = len(data)
+            self._tar.addfile(member, io.BytesIO(data))
+
+    def close(self) -> None:
+        """Finish the open tar file."""
+        if self._tar is not None:
+            self._tar.close()
+
+    def _open_next(self) -> None:
+        self.close()
+        number = self._samples // self._samples_per_tar
+        path = self._stem.with_name(f"{self._stem.name}-{number:06d}.tar")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._tar = tarfile.open(path, "w", format=tarfile.USTAR_FORMAT)  # noqa: SIM115

@@ -1,0 +1,183 @@
+"""Croissant export: tables and card by themselves, metadata by the package mlcroissant."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import logging
+import shutil
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gen_data.exporters.croissant import Croissant
+from gen_data.generator.core.errors import ConfigError
+
+
+@pytest.fixture(scope="module")
+def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Seven frames of a street in two splits."""
+    exporter = Croissant(url="https://example.org", date_published="2026-01-31", cite_as="nobody")
+    folder = tmp_path_factory.mktemp("croissant")
+    return world.export(exporter, world.info(7), world.samples, folder)
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def visible(sample: Any) -> list[Any]:
+    return [t for t in sample.truth["color"].objects if t.box is not None]
+
+
+def test_tables_list_images_and_objects(dataset: Path, world: Any) -> None:
+    """Ids are COCO's; the empty frame has an image and no object."""
+    images, objects = table(dataset / "images.csv"), table(dataset / "objects.csv")
+
+    assert [int(row["image_id"]) for row in images] == [s.image_id("color") for s in world.samples]
+    expected = [
+        (sample.image_id("color"), thing.instance.category, thing.box.x_min, thing.box.width_px)
+        for sample in world.samples
+        for thing in visible(sample)
+    ]
+    written = [
+        (int(row["image_id"]), row["category"], int(row["x"]), int(row["width"])) for row in objects
+    ]
+    assert written == expected
+    names = [row["name"] for row in table(dataset / "categories.csv")]
+    assert names == list(world.categories)
+
+
+def test_images_are_links(dataset: Path) -> None:
+    """No image is stored twice."""
+    shard = dataset.parent / "shards/000001"
+
+    assert (dataset / "images/val/000000004_color.png").samefile(shard / "color/rgb/000000004.png")
+
+
+def test_files_are_described_with_their_sums(dataset: Path) -> None:
+    """Sizes and digests are those of the files."""
+    metadata = json.loads((dataset / "croissant.json").read_text())
+    files = [f for f in metadata["distribution"] if f["@type"] == "cr:FileObject"]
+
+    assert [f["contentUrl"] for f in files] == ["images.csv", "objects.csv", "categories.csv"]
+    for file in files:
+        data = (dataset / file["contentUrl"]).read_bytes()
+        assert file["sha256"] == hashlib.sha256(data).hexdigest()
+        assert file["contentSize"] == f"{len(data)} B"
+
+
+def test_the_card_counts_and_states_licences(dataset: Path, world: Any) -> None:
+    """Scenes, images and objects by split; licences of the assets in use, here of the sky."""
+    card = (dataset / "README.md").read_text()
+    train = [s for s in world.samples if s.split == "train"]
+    cars = {
+        split: sum(
+            t.instance.category == "car"
+            for s in world.samples
+            if s.split == split
+            for t in visible(s)
+        )
+        for split in ("train", "val")
+    }
+
+    assert f"| train | 5 | 5 | {sum(len(visible(s)) for s in train)} |" in card
+    assert f"| 1 | car | {cars['train']} | {cars['val']} |" in card
+    assert "The assets in its scenes:\n\n- CC0-1.0\n" in card
+    assert "| color | camera | rgb, depth, instance, category | every step |" in card
+
+
+def test_a_licence_of_the_publisher_replaces_those_of_assets(world: Any, tmp_path: Path) -> None:
+    """In metadata and card."""
+    exporter = Croissant(license="CC-BY-4.0")
+    folder = world.export(exporter, world.info(7), world.samples, tmp_path)
+
+    assert json.loads((folder / "croissant.json").read_text())["license"] == "CC-BY-4.0"
+    assert "The data set:\n\n- CC-BY-4.0\n" in (folder / "README.md").read_text()
+
+
+def test_a_data_set_without_photographs_is_refused(world: Any) -> None:
+    """Every row of the table has an image."""
+    with pytest.raises(ConfigError, match="no sensor writes the rgb channel"):
+        Croissant().check(world.info(7, media={"color": ()}))
+
+
+def faults(folder: Path, world: Any) -> list[str]:
+    """Differences between what mlcroissant loads and the samples."""
+    logging.disable()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import mlcroissant
+
+        try:
+            loaded = mlcroissant.Dataset(jsonld=str(folder / "croissant.json"))
+            issues = loaded.metadata.ctx.issues
+            found = [*issues.errors, *issues.warnings]
+            images = list(loaded.records("images"))
+            objects = list(loaded.records("objects"))
+            categories = list(loaded.records("categories"))
+        except (mlcroissant.ValidationError, mlcroissant.GenerationError, ValueError) as error:
+            return [f"{type(error).__name__}: {error}"]
+        finally:
+            logging.disable(logging.NOTSET)
+    for file in loaded.metadata.distribution:
+        url = getattr(file, "content_url", None)
+        if url and hashlib.sha256((folder / url).read_bytes()).hexdigest() != file.sha256:
+            found.append(f"sum of {url}")
+    if [c["categories/name"].decode() for c in categories] != list(world.categories):
+        found.append("categories")
+    by_id = {row["images/image_id"]: row for row in images}
+    for sample in world.samples:
+        row = by_id.get(sample.image_id("color"))
+        if row is None:
+            found.append(f"image {sample.index}")
+            continue
+        (expected,) = (
+            a for c, a in sample.capture.readings["color"].channels.items() if c.value == "rgb"
+        )
+        if not np.array_equal(np.asarray(row["images/content"]), expected):
+            found.append(f"pixels {sample.index}")
+    boxes = [(o["objects/x"], o["objects/y"], o["objects/width"]) for o in objects]
+    truth = [(t.box.x_min, t.box.y_min, t.box.width_px) for s in world.samples for t in visible(s)]
+    return found if boxes == truth else [*found, "boxes"]
+
+
+@pytest.mark.slow
+def test_mlcroissant_loads_all_record_sets(dataset: Path, world: Any) -> None:
+    """Without an error or a warning; images join their rows."""
+    assert faults(dataset, world) == []
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda d: edit(d / "croissant.json", '"column": "x"', '"column": "left"'),
+        lambda d: edit(d / "croissant.json", '"column": "x"', '"column": "y"'),
+        lambda d: edit(d / "images.csv", "000000000_color", "000000001_color"),
+        lambda d: edit(d / "croissant.json", '"license"', '"licence"'),
+        lambda d: (d / "images/train/000000001_color.png").unlink(),
+    ],
+    ids=["no such column", "another column", "wrong join", "no licence", "image missing"],
+)
+def test_damage_is_found(
+    damage: Callable[[Path], Any], dataset: Path, world: Any, tmp_path: Path
+) -> None:
+    """The same reader finds faults in damaged copies."""
+    copy = tmp_path / "copy"
+    shutil.copytree(dataset, copy)
+    damage(copy)
+
+    assert faults(copy, world)

@@ -1,0 +1,179 @@
+"""WebDataset export, judged by the package webdataset."""
+
+from __future__ import annotations
+
+import gc
+import io
+import json
+import shutil
+import tarfile
+import warnings
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import webdataset
+from pycocotools import mask as coco_mask
+
+from gen_data.exporters.webdataset import WebDataset
+from gen_data.generator.core.capture import POINT
+from gen_data.generator.core.errors import ConfigError
+
+# pycocotools' decoder predates numpy 2's __array__(copy=...).
+pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
+
+Members = list[tuple[str, bytes]]
+
+
+@pytest.fixture(scope="module")
+def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Seven frames of a street, two in each tar file."""
+    info = world.info(7, lidars=("top",))
+    return world.export(
+        WebDataset(samples_per_tar=2), info, world.samples, tmp_path_factory.mktemp("tars")
+    )
+
+
+def read(folder: Path) -> list[dict[str, Any]]:
+    """Decoded samples of all tar files of a split, as a user reads them."""
+    urls = sorted(str(path) for path in folder.glob("*.tar"))
+    with warnings.catch_warnings():
+        # The reader leaves closing of its files to the garbage collector.
+        warnings.simplefilter("ignore", ResourceWarning)
+        loaded = webdataset.WebDataset(urls, shardshuffle=False, nodesplitter=None)
+        samples = list(loaded.decode("pil"))
+        del loaded
+        gc.collect()
+    return samples
+
+
+def faults(folder: Path, world: Any) -> list[str]:
+    """Differences between the tar files of a split and the samples."""
+    found = []
+    expected = [s for s in world.samples if s.split == folder.name]
+    samples = read(folder)
+    keys = [sample["__key__"] for sample in samples]
+    if keys != [f"{s.index:09d}" for s in expected]:
+        return [f"keys {keys}"]
+    for sample, truth in zip(samples, expected, strict=True):
+        fields = {name for name in sample if not name.startswith("__")}
+        pngs = {f"color.{c}.png" for c in ("rgb", "depth", "instance", "category")}
+        if fields != {"json", "top.points.npy", "imu.rows.npy", *pngs}:
+            found.append(f"fields {fields}")
+            continue
+        labels = sample["json"]
+        rows = labels["cameras"]["color"]["annotations"]
+        seen = {t.instance.instance_id: t for t in truth.truth["color"].objects if t.box}
+        if {row["instance_id"] for row in rows} != set(seen):
+            found.append("objects")
+        image = np.asarray(sample["color.rgb.png"])
+        for row in rows:
+            mask = coco_mask.decode(row["segmentation"]).astype(bool)
+            # The world paints instance k in green 20 k.
+            if not np.array_equal(mask, image[..., 1] == 20 * row["instance_id"]):
+                found.append(f"mask {row['id']}")
+        if sample["top.points.npy"].dtype != POINT:
+            found.append("points")
+    return found
+
+
+def test_samples_are_read_back_with_all_fields(dataset: Path, world: Any) -> None:
+    """Images, scans, rows and labels under one key; splits have folders of their own."""
+    assert faults(dataset / "train", world) == []
+    assert faults(dataset / "val", world) == []
+    assert sorted(p.name for p in (dataset / "train").iterdir()) == [
+        f"street-{k:06d}.tar" for k in range(3)
+    ]
+
+
+def test_tar_files_show_nothing_of_the_machine(dataset: Path) -> None:
+    """Time, owner and mode are constant; members are regular files, sorted."""
+    for path in dataset.rglob("*.tar"):
+        with tarfile.open(path) as tar:
+            members = tar.getmembers()
+        assert {(m.mtime, m.uid, m.gid, m.uname, m.gname, m.mode) for m in members} == {
+            (0, 0, 0, "", "", 0o644)
+        }
+        assert all(m.isfile() for m in members)
+        assert [m.name for m in members] == sorted(m.name for m in members)
+
+
+def test_images_are_the_bytes_of_the_shards(dataset: Path) -> None:
+    """They are not encoded a second time."""
+    shard = dataset.parent / "shards/000001"
+    with tarfile.open(dataset / "train/street-000001.tar") as tar:
+        member = tar.extractfile("000000003.color.depth.png")
+        assert member is not None
+        assert member.read() == (shard / "color/depth/000000003.png").read_bytes()
+
+
+def test_sensors_that_do_not_read_have_no_field(world: Any, slow: Any, tmp_path: Path) -> None:
+    """The right camera and the scanner read at every second step."""
+    info = world.info(8, ("left", "right"), ("top",), devices={}, steps_per_scene=4)
+    folder = world.export(WebDataset(), info, slow, tmp_path)
+
+    fields = [{n for n in s if n.endswith((".rgb.png", ".npy"))} for s in read(folder / "train")]
+
+    whole, less = {"left.rgb.png", "right.rgb.png", "top.points.npy"}, {"left.rgb.png"}
+    assert fields == [whole, less, whole, less]
+
+
+def renamed(members: Members, old: str, new: str) -> Members:
+    return [(name.replace(old, new), data) for name, data in members]
+
+
+def shifted_masks(members: Members) -> Members:
+    """Masks of the neighbouring object."""
+    changed = []
+    for name, data in members:
+        if name.endswith(".json"):
+            labels = json.loads(data)
+            rows = labels["cameras"]["color"]["annotations"]
+            masks = [row["segmentation"] for row in rows]
+            for row, mask in zip(rows, [*masks[1:], *masks[:1]], strict=True):
+                row["segmentation"] = mask
+            changed.append((name, json.dumps(labels).encode()))
+        else:
+            changed.append((name, data))
+    return changed
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda m: [(n, d) for n, d in m if n != "000000000.color.depth.png"],
+        lambda m: renamed(m, "000000000.color", "000000000.x.color"),
+        lambda m: sorted(m, key=lambda item: item[0].split(".", 1)[1]),
+        lambda m: renamed(m, "000000001", "000000002"),
+        shifted_masks,
+    ],
+    ids=["missing field", "dot in key", "fields not adjacent", "wrong key", "wrong masks"],
+)
+def test_damage_is_found(
+    damage: Callable[[Members], Members], dataset: Path, world: Any, tmp_path: Path
+) -> None:
+    """The same reader finds faults in damaged copies."""
+    copy = tmp_path / "train"
+    shutil.copytree(dataset / "train", copy)
+    path = copy / "street-000000.tar"
+    with tarfile.open(path) as tar:
+        files = [(m.name, tar.extractfile(m)) for m in tar.getmembers()]
+        members = [(name, file.read()) for name, file in files if file is not None]
+    with tarfile.open(path, "w") as tar:
+        for name, data in damage(members):
+            member = tarfile.TarInfo(name)
+            member.size = len(data)
+            tar.addfile(member, io.BytesIO(data))
+
+    assert faults(copy, world)
+
+
+def test_names_that_differ_in_case_are_refused(world: Any) -> None:
+    """Fields have lower-case names."""
+    info = world.info(7, ("color", "Color"))
+
+    with pytest.raises(ConfigError, match=r"'color' and 'Color' differ in case"):
+        WebDataset().check(replace(info))
