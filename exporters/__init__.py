@@ -13,6 +13,7 @@ TABLE = PluginTable[Exporter](
     "exporter",
     {
         "birdseye": "gen_data.exporters.birdseye:Birdseye",
+        "bop": "gen_data.exporters.bop:Bop",
         "coco": "gen_data.exporters.coco:Coco",
         "kitti": "gen_data.exporters.kitti:Kitti",
         "kitti_raw": "gen_data.exporters.kitti_raw:KittiRaw",

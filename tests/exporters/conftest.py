@@ -20,7 +20,14 @@ from gen_data.exporters.image_files import write_media
 from gen_data.generator import annotations
 from gen_data.generator.annotations.annotate import Thresholds, annotate_objects
 from gen_data.generator.annotations.boxes3d import oriented_box
-from gen_data.generator.core.asset_types import SURFACES, Keypoint, Material
+from gen_data.generator.core.asset_types import (
+    SURFACES,
+    Asset,
+    Keypoint,
+    Material,
+    MeshData,
+    Symmetry,
+)
 from gen_data.generator.core.boxes import BoxPx, tight_box
 from gen_data.generator.core.capture import (
     POINT,
@@ -398,8 +405,47 @@ def make_info(
     return replace(info, **changes)
 
 
-class Sky:
-    """A library of which a world without bodies takes no more than light."""
+def with_bodies(samples: Sequence[Sample]) -> list[Sample]:
+    """The samples with a body per instance, whose asset names its shape and category."""
+    embodied = []
+    for sample in samples:
+        bodies = tuple(
+            Body(t.name, f"{t.asset}/{t.category}", t.T_world_instance, instance_id=t.instance_id)
+            for t in sample.scene.instances
+        )
+        embodied.append(replace(sample, scene=replace(sample.scene, bodies=bodies)))
+    return embodied
+
+
+class Props:
+    """A library of light and of the meshes of ``with_bodies``."""
+
+    def get(self, asset_id: str) -> Asset:
+        """Crates look the same after half a turn about Z, and ellipsoids about X too."""
+        _, shape, category = asset_id.split("/")
+        middle = (0.0, 0.0, 0.5 * SIZES_M[category][2])
+        turns = [Symmetry((0.0, 0.0, 1.0), 2)] if category == "crate" else []
+        turns += [Symmetry((1.0, 0.0, 0.0), 2, middle)] if shape == "ellipsoid" else []
+        nobody = ("CC0-1.0", "", "", "")
+        return Asset(asset_id, "object", category, (), *nobody, symmetries=tuple(turns))
+
+    def mesh(self, asset_id: str) -> MeshData:
+        """On the ground, as the instances are."""
+        import trimesh
+
+        _, shape, category = asset_id.split("/")
+        length, width, height = SIZES_M[category]
+        box = shape == "box"
+        solid = trimesh.creation.box() if box else trimesh.creation.icosphere(4, radius=0.5)
+        vertices = (solid.vertices + np.array([0.0, 0.0, 0.5])) * (length, width, height)
+        return MeshData(
+            np.asarray(vertices, np.float32),
+            np.asarray(solid.faces, np.int32),
+            np.asarray(solid.vertex_normals, np.float32),
+            np.zeros((len(vertices), 2), np.float32),
+            np.zeros(len(solid.faces), np.int32),
+            (Material(),),
+        )
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
         return ()
@@ -419,7 +465,7 @@ def export(
     keep_arrays: bool = False,
 ) -> Path:
     """Write samples shard by shard, merge the shards, and return the data set's folder."""
-    exporter = exporter.with_assets(Sky())
+    exporter = exporter.with_assets(Props())
     shards = [list(samples[i : i + shard_size]) for i in range(0, len(samples), shard_size)]
     shard_dirs = [folder / f"shards/{k:06d}" for k in range(len(shards))]
     work = list(zip(shards, shard_dirs, strict=True))
@@ -444,6 +490,7 @@ class World:
     ego_pose = staticmethod(ego_pose)
     drive = staticmethod(make_drive)
     pairs = staticmethod(make_pairs)
+    with_bodies = staticmethod(with_bodies)
 
     def __init__(self) -> None:
         splits = ("train", "train", "val", "train", "val", "train", "train")

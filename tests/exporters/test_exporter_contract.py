@@ -18,9 +18,11 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def given(exporter: Any, world: Any) -> tuple[Any, Any]:
-    """The seven frames; a drive with two cameras for formats of pairs."""
+    """The seven frames; a drive with two cameras for formats of pairs; bodies for models."""
     if exporter.type == "kitti_stereo":
         return world.pairs()
+    if exporter.type == "bop":
+        return world.info(7), world.with_bodies(world.samples)
     return world.info(7, lidars=("top",)), world.samples
 
 
