@@ -139,9 +139,10 @@ def ray_cast(scene: Scene, camera: Camera) -> SensorReading:
 
 
 def _normals(points: Array) -> NDArray[np.float32]:
-    """Of the surface through neighbouring points, either side; 0 where there is none."""
+    """Of the surface through neighbouring points, to the camera; 0 where there is none."""
     finite = np.where(np.isfinite(points), points, 0.0)
     normals = np.cross(np.gradient(finite, axis=1), np.gradient(finite, axis=0))
+    normals *= -np.sign((normals * finite).sum(axis=-1, keepdims=True))
     length = np.linalg.norm(normals, axis=-1, keepdims=True)
     return np.divide(normals, length, where=length > 0, out=np.zeros_like(normals)).astype("f4")
 
