@@ -23,6 +23,7 @@ TABLE = PluginTable[Exporter](
         "motchallenge": "gen_data.exporters.motchallenge:MotChallenge",
         "pointclouds": "gen_data.exporters.pointclouds:PointClouds",
         "semantickitti": "gen_data.exporters.semantickitti:SemanticKitti",
+        "solo": "gen_data.exporters.solo:Solo",
         "tables": "gen_data.exporters.measurement_tables:Tables",
         "usd": "gen_data.exporters.usd:Usd",
     },
