@@ -15,6 +15,7 @@ TABLE = PluginTable[Exporter](
         "birdseye": "gen_data.exporters.birdseye:Birdseye",
         "bop": "gen_data.exporters.bop:Bop",
         "coco": "gen_data.exporters.coco:Coco",
+        "control_clips": "gen_data.exporters.control_clips:ControlClips",
         "hdf5": "gen_data.exporters.hdf5:Hdf5",
         "kitti": "gen_data.exporters.kitti:Kitti",
         "kitti_raw": "gen_data.exporters.kitti_raw:KittiRaw",

@@ -171,7 +171,8 @@ def write_hdf5(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
 def _shuffled(array: NDArray[Any]) -> bytes:
     """Bytes as HDF5's filter ``shuffle`` orders them: all first ones, all second ones, ..."""
     flat = np.ascontiguousarray(array).reshape(-1)
-    return flat.view(np.uint8).reshape(-1, array.itemsize).T.tobytes()
+    columns: NDArray[np.uint8] = flat.view(np.uint8).reshape(-1, array.itemsize)
+    return columns.T.tobytes()
 
 
 def _read(
@@ -180,7 +181,7 @@ def _read(
     path = media_path(shard_dir, camera, channel, index)
     pixels = read_image(path, channel, info.depth_scale_m)
     if channel is Channel.NORMALS:
-        return ((pixels * BLENDER_AXES + 1.0) * 0.5).astype(np.float32)
+        pixels = ((pixels * BLENDER_AXES + 1.0) * 0.5).astype(np.float32)
     return pixels
 
 

@@ -35,6 +35,7 @@ from numpy.typing import NDArray
 
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.fragments import fragment_rows, write_fragment
+from gen_data.exporters.id_colors import id_color
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sensor_selection import check_pinholes, instant_s, rgb_cameras
@@ -75,9 +76,6 @@ UNITY_SENSOR = np.diag([1.0, -1.0, 1.0])
 """Our camera's axes in Unity's: Y points up. Equal to its inverse."""
 UNITY_OBJECT = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 """Axes of our objects (X front, Y left, Z up) in Unity's (X right, Y up, Z front)."""
-
-COLOR_STEP = 0x9E3779
-"""Odd, so that multiples by different ids are different modulo 2^24; about 0.618 of it."""
 
 FRAMES = "frames"
 
@@ -177,12 +175,6 @@ class _Counter:
             self.sequence += 1
 
 
-def id_color(number: int) -> list[int]:
-    """RGBA colour of an instance or label; different for all numbers from 1 to 2^24 - 1."""
-    value = number * COLOR_STEP % (1 << 24)
-    return [value >> 16, value >> 8 & 255, value & 255, 255]
-
-
 def _capture(sample: Sample, name: str) -> dict[str, Any]:
     """Facts of one image, without file names."""
     truth = sample.truth[name]
@@ -212,8 +204,7 @@ def _capture(sample: Sample, name: str) -> dict[str, Any]:
                 "imageFormat": "Png",
                 "dimension": size,
                 "instances": [
-                    {**_label(thing), "color": id_color(thing.instance.instance_id)}
-                    for thing in seen
+                    {**_label(thing), "color": _rgba(thing.instance.instance_id)} for thing in seen
                 ],
             },
             {
@@ -221,7 +212,7 @@ def _capture(sample: Sample, name: str) -> dict[str, Any]:
                 "imageFormat": "Png",
                 "dimension": size,
                 "instances": [
-                    {"labelName": label, "pixelValue": id_color(number)}
+                    {"labelName": label, "pixelValue": _rgba(number)}
                     for number, label in sorted(
                         {(t.instance.category_id, t.instance.category) for t in seen}
                     )
@@ -229,6 +220,10 @@ def _capture(sample: Sample, name: str) -> dict[str, Any]:
             },
         ],
     }
+
+
+def _rgba(number: int) -> list[int]:
+    return [*id_color(number), 255]
 
 
 def _head(annotation: str, sensor: str) -> dict[str, Any]:
@@ -317,8 +312,8 @@ def _write_segmentation(folder: Path, sample: Sample, name: str) -> None:
         assert thing.mask is not None, "the annotation instance_masks is in `needs`"
         x, y, pixels = thing.mask.x_px, thing.mask.y_px, thing.mask.pixels
         crop = (slice(y, y + pixels.shape[0]), slice(x, x + pixels.shape[1]))
-        instances[crop][pixels] = id_color(thing.instance.instance_id)[:3]
-        labels[crop][pixels] = id_color(thing.instance.category_id)[:3]
+        instances[crop][pixels] = id_color(thing.instance.instance_id)
+        labels[crop][pixels] = id_color(thing.instance.category_id)
     for kind, image in ((INSTANCES, instances), (LABELS, labels)):
         path = folder / _shard_name(sample.index, name, kind)
         write_bytes(path, encode_png(image, RowFilter.UP, 1))
@@ -388,7 +383,7 @@ def _write_definitions(info: DatasetInfo, folder: Path, counter: _Counter) -> No
 def _annotation_definitions(info: DatasetInfo) -> Iterator[dict[str, Any]]:
     names = list(enumerate(info.categories, 1))
     ids = [{"label_id": number, "label_name": name} for number, name in names]
-    colors = [{"label_name": name, "pixel_value": id_color(number)} for number, name in names]
+    colors = [{"label_name": name, "pixel_value": _rgba(number)} for number, name in names]
     for annotation, kind in TYPES.items():
         yield {
             "@type": PREFIX + kind,

@@ -15,7 +15,8 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from gen_data.exporters.solo import Solo, id_color
+from gen_data.exporters.id_colors import id_color, paint_ids
+from gen_data.exporters.solo import Solo
 from gen_data.generator.core.errors import ConfigError
 
 SIGNS = np.stack(np.meshgrid([-1, 1], [-1, 1], [-1, 1]), -1).reshape(-1, 3)
@@ -276,15 +277,17 @@ def test_ignored_objects_are_left_out(world: Any, tmp_path: Path) -> None:
         assert 1 not in [row.instanceId for row in rows]
         assert len(rows) == len(objects) - 1
     path = root / "train/sequence.0/step0.color.instance segmentation.png"
-    assert not (np.asarray(Image.open(path)) == id_color(1)[:3]).all(-1).any()
+    assert not (np.asarray(Image.open(path)) == id_color(1)).all(-1).any()
 
 
 def test_colors_differ() -> None:
-    """Of all ids that an instance may have; none is black."""
-    colors = {tuple(id_color(number)) for number in range(1, 65_536)}
+    """Of all ids that an instance may have; only 0 is black."""
+    colors = [id_color(number) for number in range(65_536)]
 
-    assert len(colors) == 65_535
-    assert (0, 0, 0, 255) not in colors
+    assert len(set(colors)) == 65_536
+    assert colors[0] == (0, 0, 0)
+    ids = np.arange(65_536, dtype=np.uint16).reshape(256, 256)
+    np.testing.assert_array_equal(paint_ids(ids).reshape(-1, 3), colors)
 
 
 def test_sequences_of_different_lengths_are_refused(world: Any) -> None:
