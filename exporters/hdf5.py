@@ -171,8 +171,7 @@ def write_hdf5(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
 def _shuffled(array: NDArray[Any]) -> bytes:
     """Bytes as HDF5's filter ``shuffle`` orders them: all first ones, all second ones, ..."""
     flat = np.ascontiguousarray(array).reshape(-1)
-    columns: NDArray[np.uint8] = flat.view(np.uint8).reshape(-1, array.itemsize)
-    return columns.T.tobytes()
+    return bytes(flat.view(np.uint8).reshape(-1, array.itemsize).T.tobytes())
 
 
 def _read(

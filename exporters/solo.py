@@ -11,7 +11,8 @@
 A sequence is a view with its steps. Where SOLO's conventions differ from ours:
 
 * **Frames** are left-handed. World: ours with Y and Z exchanged (Y up). Sensor: X right, Y up, Z
-  forward. Boxes: X right, Y up, Z to the object's front; ``size`` in that order.
+  forward. Boxes: X right, Y up, Z to the object's front; ``size`` in that order. An object whose
+  centre is behind the sensor has no 3D box.
 * **Quaternions** are ``x y z w``.
 * **matrix** is the upper left part of OpenGL's projection matrix, row by row, with the far plane at
   infinity: ``m00 = 2 fx / W``, ``m11 = 2 fy / H``.
@@ -198,7 +199,10 @@ def _capture(sample: Sample, name: str) -> dict[str, Any]:
         "matrix": _projection(camera.intrinsics),
         "annotations": [
             {**_head(BOX2D, name), "values": [_box2d(thing) for thing in seen]},
-            {**_head(BOX3D, name), "values": [_box3d(thing, T_world_camera) for thing in seen]},
+            {
+                **_head(BOX3D, name),
+                "values": [_box3d(t, T_world_camera) for t in seen if _is_ahead(t)],
+            },
             {
                 **_head(INSTANCES, name),
                 "imageFormat": "Png",
@@ -253,6 +257,12 @@ def _box2d(thing: ObjectTruth) -> dict[str, Any]:
         "origin": [box.x_min, box.y_min],
         "dimension": [box.width_px, box.height_px],
     }
+
+
+def _is_ahead(thing: ObjectTruth) -> bool:
+    """Whether the centre of an object's 3D box lies in front of the camera."""
+    assert thing.box3d_camera is not None, "the annotation boxes3d is in `needs`"
+    return thing.box3d_camera.T_frame_box.translation_m[2] > 0.0
 
 
 def _box3d(thing: ObjectTruth, T_world_camera: SE3) -> dict[str, Any]:

@@ -262,6 +262,21 @@ def test_sequences_have_steps(world: Any, samples: Any, tmp_path: Path) -> None:
     assert read_json(root / "train")[2].timestamp == pytest.approx(0.2)
 
 
+def test_centres_behind_the_sensor_have_no_3d_box(world: Any, tmp_path: Path) -> None:
+    """Readers divide by their depth; the 2D box stays."""
+    near = world.instance(1, "car", -0.5, 1.6, 0.0)
+    far = world.instance(2, "crate", 9.0, 0.0, 0.0)
+    sample = world.sample(0, (near, far), [world.camera()])
+    assert [t.instance.instance_id for t in sample.truth["color"].objects] == [1, 2]
+
+    root = world.export(Solo(), world.info(1), [sample], tmp_path)
+
+    (frame,) = read_json(root / "train")
+    flat, solid, *_ = frame.captures[0].annotations
+    assert [row.instanceId for row in flat.values] == [1, 2]
+    assert [row.instanceId for row in solid.values] == [2]
+
+
 def test_ignored_objects_are_left_out(world: Any, tmp_path: Path) -> None:
     """SOLO has no regions to ignore."""
     sample = world.samples[0]
