@@ -19,8 +19,8 @@ estimators of relative depth have. Sequences need the fixed range, since depth w
 ``metadata.jsonl`` is that of Hugging Face's ``imagefolder``: its columns are ``image``, ``depth``,
 ``segmentation``, ``edges`` and ``text``. diffusers' ``train_controlnet.py`` takes them by name.
 
-Videos are MPEG-4, written by OpenCV: their bytes are the same in every run, but may differ between
-versions of OpenCV, which no other file does. The last row or column of an odd size is cut off.
+Videos are MPEG-4, written by OpenCV: their bytes are the same in every run on a machine, but its
+encoder chooses code by processor. The last row or column of an odd size is cut off.
 
 References: the documentation of Cosmos-Transfer 2.5 and of Hugging Face datasets; Canny, "A
 computational approach to edge detection", 1986; Ranftl et al., "Towards robust monocular depth

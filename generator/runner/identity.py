@@ -21,6 +21,7 @@ BYTES_DEPEND_ON = {
     "cv2": "opencv-python-headless",
     "deflate": "deflate",
     "fast_simplification": "fast-simplification",
+    "h5py": "h5py",
     "mapbox_earcut": "mapbox-earcut",
     "numpy": "numpy",
     "pxr": "usd-core",
