@@ -157,12 +157,13 @@ class Bop(ExporterBase):
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Number the models, link models and images, and write the JSON files of each folder."""
         camera = pinhole_camera(info, self.camera, self.type)
-        ids = _write_models(info, shard_dirs, dataset_dir)
+        ids = _write_models([d / self.type for d in shard_dirs], dataset_dir)
         write_text(dataset_dir / "dataset_info.md", _dataset_info(info, camera, len(ids)))
         targets: list[dict[str, int]] = []
         rows = fragment_rows(shard_dirs, self.type, IMAGES)
+        size = self._folder_size(info)
         # Rows come in the order of samples, so that one folder after the other is complete.
-        for number, members in groupby(rows, lambda item: self._folder_number(info, item[1])):
+        for number, members in groupby(rows, lambda item: int(item[1]["index"]) // size):
             by_split: dict[str, list[tuple[Path, dict[str, Any]]]] = {}
             for shard_dir, row in members:
                 by_split.setdefault(row["split"], []).append((shard_dir, row))
@@ -170,7 +171,7 @@ class Bop(ExporterBase):
                 if not (dataset_dir / "camera.json").exists():
                     write_text(dataset_dir / "camera.json", _camera_json(images[0][1]))
                 folder = dataset_dir / split / f"{number:06d}"
-                scene = [self._numbered(info, row, ids) for _, row in images]
+                scene = [_numbered(row, size, ids) for _, row in images]
                 _write_scene(info, folder, scene)
                 for (shard_dir, _), image in zip(images, scene, strict=True):
                     self._link_image(info, camera, shard_dir, image, folder)
@@ -178,20 +179,9 @@ class Bop(ExporterBase):
                     targets += [t for image in scene for t in _targets(number, image)]
         write_text(dataset_dir / "test_targets_bop19.json", canonical_json(targets) + "\n")
 
-    def _folder_number(self, info: DatasetInfo, row: Mapping[str, Any]) -> int:
-        size = CHUNK if self.folders == "thousand" else info.views_per_scene * info.steps_per_scene
-        return int(row["index"]) // size
-
-    def _numbered(
-        self, info: DatasetInfo, row: Mapping[str, Any], ids: Mapping[str, int]
-    ) -> dict[str, Any]:
-        """The row with its image id and object ids."""
-        size = CHUNK if self.folders == "thousand" else info.views_per_scene * info.steps_per_scene
-        gt = [
-            {**{k: v for k, v in g.items() if k != "key"}, "obj_id": ids[g["key"]]}
-            for g in row["gt"]
-        ]
-        return {**row, "im_id": row["index"] % size, "gt": gt}
+    def _folder_size(self, info: DatasetInfo) -> int:
+        """Samples per folder."""
+        return CHUNK if self.folders == "thousand" else info.views_per_scene * info.steps_per_scene
 
     def _link_image(
         self,
@@ -364,20 +354,17 @@ def _write_masks(folder: Path, sample: Sample, camera: str, things: Sequence[Obj
             (folder / kind / name).write_bytes(png)
 
 
-def _write_models(
-    info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path
-) -> dict[str, int]:
-    """Link the models and describe them; return object ids by key."""
-    del info
+def _write_models(folders: Sequence[Path], dataset_dir: Path) -> dict[str, int]:
+    """Link the models of all shards and describe them; return object ids by key."""
     found: dict[str, tuple[Path, dict[str, Any]]] = {}
-    for shard_dir in shard_dirs:
-        for line in fragment_lines([shard_dir / "bop"], MODELS):
+    for folder in folders:
+        for line in fragment_lines([folder], MODELS):
             row = json.loads(line)
-            found.setdefault(row["key"], (shard_dir, row))
+            found.setdefault(row["key"], (folder, row))
     order = sorted(found, key=lambda k: (found[k][1]["asset"], found[k][1]["scale"], k))
     ids = {key: number for number, key in enumerate(order, 1)}
     for key, number in ids.items():
-        source = found[key][0] / "bop" / MODELS / f"{key}.ply"
+        source = found[key][0] / MODELS / f"{key}.ply"
         link_or_copy(source, dataset_dir / MODELS / f"obj_{number:06d}.ply")
     infos = [(ids[key], found[key][1]["info"]) for key in order]
     write_text(dataset_dir / MODELS / "models_info.json", _numbered_json(infos))
@@ -385,6 +372,15 @@ def _write_models(
     facts = [(ids[key], {name: found[key][1][name] for name in names}) for key in order]
     write_text(dataset_dir / "objects.json", _numbered_json(facts))
     return ids
+
+
+def _numbered(row: Mapping[str, Any], size: int, ids: Mapping[str, int]) -> dict[str, Any]:
+    """The row of an image with its number in its folder, and with object ids instead of keys."""
+    poses = []
+    for pose in row["gt"]:
+        known = {name: value for name, value in pose.items() if name != "key"}
+        poses.append({**known, "obj_id": ids[pose["key"]]})
+    return {**row, "im_id": row["index"] % size, "gt": poses}
 
 
 def _write_scene(info: DatasetInfo, folder: Path, images: Sequence[Mapping[str, Any]]) -> None:
