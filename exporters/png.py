@@ -44,11 +44,16 @@ def encode_png(pixels: NDArray[Any], row_filter: RowFilter, level: int) -> bytes
     if pixels.dtype not in (np.uint8, np.uint16) or pixels.shape[2:] not in ((), (3,)):
         raise ValueError(f"cannot write {pixels.dtype} pixels of shape {pixels.shape} as PNG")
     height, width = pixels.shape[:2]
-    bit_depth = 8 * pixels.dtype.itemsize
-    header = struct.pack(
-        ">IIBBBBB", width, height, bit_depth, _RGB if pixels.ndim == 3 else _GREY, 0, 0, 0
-    )
     data = deflate.zlib_compress(_filter_rows(pixels, row_filter), level)
+    color = _RGB if pixels.ndim == 3 else _GREY
+    return assemble_png(height, width, data, 8 * pixels.dtype.itemsize, color)
+
+
+def assemble_png(
+    height_px: int, width_px: int, data: bytes | bytearray, bit_depth: int = 8, color: int = _GREY
+) -> bytes:
+    """Put compressed rows into a PNG file; by default of an 8-bit grey image."""
+    header = struct.pack(">IIBBBBB", width_px, height_px, bit_depth, color, 0, 0, 0)
     return b"".join(
         [SIGNATURE, *_chunk(b"IHDR", header), *_chunk(b"IDAT", data), *_chunk(b"IEND", b"")]
     )

@@ -24,6 +24,7 @@ BYTES_DEPEND_ON = {
     "foxglove_schemas_protobuf": "foxglove-schemas-protobuf",
     "google": "protobuf",
     "google_crc32c": "google-crc32c",
+    "h5py": "h5py",
     "mapbox_earcut": "mapbox-earcut",
     "mcap": "mcap",
     "mcap_protobuf": "mcap-protobuf-support",

@@ -26,7 +26,9 @@ from gen_data.generator.core.asset_types import (
     Joint,
     Keypoint,
     Material,
+    MeshData,
     RobotModel,
+    Symmetry,
 )
 from gen_data.generator.core.boxes import BoxPx, tight_box
 from gen_data.generator.core.capture import (
@@ -149,9 +151,10 @@ def ray_cast(scene: Scene, camera: Camera) -> SensorReading:
 
 
 def _normals(points: Array) -> NDArray[np.float32]:
-    """Of the surface through neighbouring points, either side; 0 where there is none."""
+    """Of the surface through neighbouring points, to the camera; 0 where there is none."""
     finite = np.where(np.isfinite(points), points, 0.0)
     normals = np.cross(np.gradient(finite, axis=1), np.gradient(finite, axis=0))
+    normals *= -np.sign((normals * finite).sum(axis=-1, keepdims=True))
     length = np.linalg.norm(normals, axis=-1, keepdims=True)
     return np.divide(normals, length, where=length > 0, out=np.zeros_like(normals)).astype("f4")
 
@@ -436,8 +439,20 @@ def make_info(
     return replace(info, **changes)
 
 
-class Sky:
-    """A library of which a world without bodies takes no more than light and one arm."""
+def with_bodies(samples: Sequence[Sample]) -> list[Sample]:
+    """The samples with a body per instance, whose asset names its shape and category."""
+    embodied = []
+    for sample in samples:
+        bodies = tuple(
+            Body(t.name, f"{t.asset}/{t.category}", t.T_world_instance, instance_id=t.instance_id)
+            for t in sample.scene.instances
+        )
+        embodied.append(replace(sample, scene=replace(sample.scene, bodies=bodies)))
+    return embodied
+
+
+class Props:
+    """A library of light, of one arm and of the meshes of ``with_bodies``."""
 
     def robot(self, asset_id: str) -> RobotModel:
         links = ("base", *(f"{name}_link" for name in ARM_JOINTS))
@@ -448,8 +463,34 @@ class Sky:
         return RobotModel(links, joints, {}, {}, (0.0, 0.0), None, frozenset())
 
     def get(self, asset_id: str) -> Asset:
-        licence = "CC0-1.0" if asset_id.startswith("environment/") else "Apache-2.0"
-        return Asset(asset_id, "object", "", (), licence, "nobody", "nowhere", "")
+        """Crates look the same after half a turn about Z, and ellipsoids about X too."""
+        if asset_id.count("/") != 2:
+            licence = "CC0-1.0" if asset_id.startswith("environment/") else "Apache-2.0"
+            return Asset(asset_id, "object", "", (), licence, "nobody", "nowhere", "")
+        _, shape, category = asset_id.split("/")
+        middle = (0.0, 0.0, 0.5 * SIZES_M[category][2])
+        turns = [Symmetry((0.0, 0.0, 1.0), 2)] if category == "crate" else []
+        turns += [Symmetry((1.0, 0.0, 0.0), 2, middle)] if shape == "ellipsoid" else []
+        nobody = ("CC0-1.0", "", "", "")
+        return Asset(asset_id, "object", category, (), *nobody, symmetries=tuple(turns))
+
+    def mesh(self, asset_id: str) -> MeshData:
+        """On the ground, as the instances are."""
+        import trimesh
+
+        _, shape, category = asset_id.split("/")
+        length, width, height = SIZES_M[category]
+        box = shape == "box"
+        solid = trimesh.creation.box() if box else trimesh.creation.icosphere(4, radius=0.5)
+        vertices = (solid.vertices + np.array([0.0, 0.0, 0.5])) * (length, width, height)
+        return MeshData(
+            np.asarray(vertices, np.float32),
+            np.asarray(solid.faces, np.int32),
+            np.asarray(solid.vertex_normals, np.float32),
+            np.zeros((len(vertices), 2), np.float32),
+            np.zeros(len(solid.faces), np.int32),
+            (Material(),),
+        )
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
         return ()
@@ -469,7 +510,7 @@ def export(
     keep_arrays: bool = False,
 ) -> Path:
     """Write samples shard by shard, merge the shards, and return the data set's folder."""
-    exporter = exporter.with_assets(Sky())
+    exporter = exporter.with_assets(Props())
     shards = [list(samples[i : i + shard_size]) for i in range(0, len(samples), shard_size)]
     shard_dirs = [folder / f"shards/{k:06d}" for k in range(len(shards))]
     work = list(zip(shards, shard_dirs, strict=True))
@@ -495,6 +536,7 @@ class World:
     drive = staticmethod(make_drive)
     reach = staticmethod(make_reach)
     pairs = staticmethod(make_pairs)
+    with_bodies = staticmethod(with_bodies)
 
     def __init__(self) -> None:
         splits = ("train", "train", "val", "train", "val", "train", "train")

@@ -22,11 +22,13 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def given(exporter: Any, world: Any) -> tuple[Any, Any]:
-    """The seven frames; a drive with two cameras for formats of pairs, or with an arm."""
+    """The seven frames; a drive with two cameras or an arm, or bodies, for formats of these."""
     if exporter.type == "kitti_stereo":
         return world.pairs()
     if exporter.type == "lerobot":
         return drive_info(world), world.reach()
+    if exporter.type == "bop":
+        return world.info(7), world.with_bodies(world.samples)
     return world.info(7, lidars=("top",)), world.samples
 
 

@@ -1,0 +1,239 @@
+"""One container per image with all its arrays, under the keys of BlenderProc.
+
+::
+
+    <split>/000000012_color.hdf5    or .npz
+    categories.json                 names by category id
+
+=========================  =====================  ================================================
+key                        array                  meaning
+=========================  =====================  ================================================
+colors                     uint8 [h, w, 3]        sRGB
+depth, distance            float32 [h, w]         along the optical axis, along the ray [m]; inf
+normals                    float32 [h, w, 3]      ``(n + 1) / 2``, X right, Y up, Z to the camera;
+                                                  0.5
+instance_segmaps           uint16 [h, w]          instance id; 0
+category_id_segmaps        uint16 [h, w]          category id; 0
+nocs                       float32 [h, w, 3]      position in the object's box, [0, 1]; 0
+forward_flow,              float32 [h, w, 2]      displacement to the right and down [px]; NaN
+backward_flow
+instance_attribute_maps    JSON                   list: ``idx``, ``category_id``, ``name``, ... of
+                                                  each visible object, after the background
+campose                    JSON                   list of one: ``cam2world_matrix`` (X right, Y up,
+                                                  Z backwards, as in Blender), ``location``,
+                                                  ``cam_K``, ``fov_x``, ``fov_y`` [rad]
+K                          float64 [3, 3]         intrinsics
+T_world_camera             float64 [4, 4]         pose; X right, Y down, Z forward
+=========================  =====================  ================================================
+
+A channel that the camera does not write has no key; those that BlenderProc does not have keep their
+names (``part``, ``disparity``, ...). ``K`` and ``cam_K`` refer to pixel centres at whole numbers,
+as BlenderProc's do: the principal point is ours minus 0.5. Instances without an entry in
+``instance_attribute_maps`` are not annotated. JSON texts are byte strings.
+
+Reference: the writer and the documentation of BlenderProc 2, https://dlr-rm.github.io/BlenderProc.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, Literal
+
+import deflate
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.fragments import fragment_rows, write_fragment
+from gen_data.exporters.image_files import link_or_copy, read_image
+from gen_data.exporters.npz import npz_bytes
+from gen_data.exporters.sequences import write_text
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.core.serialization import canonical_json
+
+KEYS = {
+    Channel.RGB: "colors",
+    Channel.Z_DEPTH: "depth",
+    Channel.RANGE: "distance",
+    Channel.NORMALS: "normals",
+    Channel.INSTANCE: "instance_segmaps",
+    Channel.CATEGORY: "category_id_segmaps",
+    Channel.OBJECT_COORDINATES: "nocs",
+    Channel.FLOW_FORWARD: "forward_flow",
+    Channel.FLOW_BACKWARD: "backward_flow",
+}
+"""BlenderProc's keys; other channels keep their names."""
+
+BLENDER_AXES = np.array([1.0, -1.0, -1.0])
+"""Signs of our camera axes along those of Blender: Y up, Z backwards."""
+
+LEVEL = 1
+"""Compression level."""
+
+FILES = "files"
+
+
+class Hdf5(ExporterBase):
+    """A container per image, with the keys of BlenderProc.
+
+    Attributes:
+        container: ``hdf5``, or ``npz`` for NumPy alone.
+    """
+
+    type: Literal["hdf5"] = "hdf5"
+    container: Literal["hdf5", "npz"] = "hdf5"
+
+    def check(self, info: DatasetInfo) -> None:
+        """Reject a data set without images, or a machine without h5py.
+
+        Raises:
+            ConfigError: no camera writes a channel, or the package is missing.
+        """
+        if not any(info.media.values()):
+            raise ConfigError(
+                f"exporter '{self.type}': no camera writes a channel; add an rgb_camera"
+            )
+        if self.container == "hdf5" and find_spec("h5py") is None:
+            raise ConfigError(
+                "exporter 'hdf5' needs the package h5py: pip install 'gen-data[formats]', "
+                "or set container: npz"
+            )
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write one container per image.
+
+        Raises:
+            ConfigError: see ``check``.
+            StorageError: an image of the shard is missing.
+        """
+        self.check(info)
+        folder = shard_dir / self.type
+        rows = []
+        for sample in samples:
+            for camera, channels in info.media.items():
+                if camera not in sample.truth or not channels:
+                    continue
+                arrays = {
+                    KEYS.get(c, c.value): _read(info, shard_dir, camera, c, sample.index)
+                    for c in channels
+                }
+                arrays |= _camera_arrays(sample.truth[camera])
+                name = f"{sample.split}/{sample.index:09d}_{camera}.{self.container}"
+                self._write(folder / name, arrays)
+                rows.append({"file": name})
+        write_fragment(folder, FILES, rows)
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Link the containers of all shards into one tree."""
+        categories = {str(k): name for k, name in enumerate(info.categories, 1)}
+        write_text(dataset_dir / "categories.json", canonical_json(categories) + "\n")
+        for shard_dir, row in fragment_rows(shard_dirs, self.type, FILES):
+            link_or_copy(shard_dir / self.type / row["file"], dataset_dir / row["file"])
+
+    def _write(self, path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if self.container == "npz":
+            path.write_bytes(npz_bytes(arrays, LEVEL))
+        else:
+            write_hdf5(path, arrays)
+
+
+def write_hdf5(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Write arrays by name as an HDF5 file; images are one compressed chunk each."""
+    import h5py
+
+    with h5py.File(path, "w", libver="earliest") as file:
+        for name, array in arrays.items():
+            if array.size <= 16:
+                file.create_dataset(name, data=array)
+                continue
+            dataset = file.create_dataset(
+                name,
+                array.shape,
+                array.dtype,
+                chunks=array.shape,
+                compression="gzip",
+                compression_opts=LEVEL,
+                shuffle=array.itemsize > 1,
+            )
+            # HDF5's own zlib takes several times as long, and its bytes depend on the build.
+            packed = deflate.zlib_compress(_shuffled(array), LEVEL)
+            dataset.id.write_direct_chunk((0,) * array.ndim, bytes(packed))
+
+
+def _shuffled(array: NDArray[Any]) -> bytes:
+    """Bytes as HDF5's filter ``shuffle`` orders them: all first ones, all second ones, ..."""
+    flat = np.ascontiguousarray(array).reshape(-1)
+    return bytes(flat.view(np.uint8).reshape(-1, array.itemsize).T.tobytes())
+
+
+def _read(
+    info: DatasetInfo, shard_dir: Path, camera: str, channel: Channel, index: int
+) -> NDArray[Any]:
+    path = media_path(shard_dir, camera, channel, index)
+    pixels = read_image(path, channel, info.depth_scale_m)
+    if channel is Channel.NORMALS:
+        pixels = ((pixels * BLENDER_AXES + 1.0) * 0.5).astype(np.float32)
+    return pixels
+
+
+def _camera_arrays(truth: ImageTruth) -> dict[str, NDArray[Any]]:
+    """Arrays of an image that are no channel."""
+    seen = [thing for thing in truth.objects if thing.box is not None]
+    background: dict[str, Any] = {"idx": 0, "category_id": 0, "name": "background"}
+    T_world_camera = np.round(truth.camera.T_world_camera.matrix(), 9) + 0.0
+    return {
+        "instance_attribute_maps": _text([background, *(_attributes(thing) for thing in seen)]),
+        "campose": _text([_camera_pose(truth, T_world_camera)]),
+        "K": _intrinsics(truth),
+        "T_world_camera": T_world_camera,
+    }
+
+
+def _attributes(thing: ObjectTruth) -> dict[str, Any]:
+    instance = thing.instance
+    facts = {
+        "idx": instance.instance_id,
+        "category_id": instance.category_id,
+        "name": instance.name,
+        "category": instance.category,
+        "asset": instance.asset,
+    }
+    if instance.subcategory:
+        facts["subcategory"] = instance.subcategory
+    if thing.ignored:
+        facts["ignored"] = True
+    return {**dict(instance.attributes), **facts}
+
+
+def _intrinsics(truth: ImageTruth) -> Array:
+    """K for pixel centres at whole numbers, [3, 3]."""
+    k = np.round(truth.camera.intrinsics.matrix(), 9)
+    k[:2, 2] -= 0.5
+    return k
+
+
+def _camera_pose(truth: ImageTruth, T_world_camera: Array) -> dict[str, Any]:
+    """Pose with Blender's camera axes, and the field of view."""
+    camera = truth.camera.intrinsics
+    pose = T_world_camera.copy()
+    pose[:3, :3] *= BLENDER_AXES
+    return {
+        "cam2world_matrix": (pose + 0.0).tolist(),
+        "location": pose[:3, 3].tolist(),
+        "cam_K": _intrinsics(truth).tolist(),
+        "fov_x": round(2.0 * math.atan(0.5 * camera.width_px / camera.fx_px), 9),
+        "fov_y": round(2.0 * math.atan(0.5 * camera.height_px / camera.fy_px), 9),
+    }
+
+
+def _text(value: Any) -> NDArray[np.bytes_]:
+    """JSON as a byte string, [] (a scalar)."""
+    return np.array(canonical_json(value).encode("utf-8"))

@@ -1,0 +1,256 @@
+"""Control clips: signals against the readings they come from, and the layouts of their readers."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from gen_data.exporters.control_clips import ControlClips, inverse_depth
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+
+FIXED = ControlClips(near_m=5.0, far_m=60.0)
+
+
+def image(path: Path) -> Any:
+    pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    assert pixels is not None, f"{path} is missing"
+    return pixels if pixels.ndim == 2 else pixels[..., ::-1]
+
+
+def rows_of(split: Path) -> list[Any]:
+    return [json.loads(line) for line in (split / "metadata.jsonl").read_text().splitlines()]
+
+
+def problems(root: Path, samples: list[Any], camera: str = "color") -> Iterator[str]:
+    """Contradictions between a data set and its samples."""
+    listed = [(split, row) for split in sorted(root.iterdir()) for row in rows_of(split)]
+    by_sample = {}
+    for split, row in listed:
+        clip = json.loads((split / row["clip"] / "clip.json").read_text())
+        by_sample[clip["samples"][row["frame"]]] = (split, row, clip)
+    if sorted(by_sample) != [s.index for s in samples]:
+        yield "other samples"
+        return
+    for sample in samples:
+        split, row, clip = by_sample[sample.index]
+        for text in wrong_frame(split, row, clip, sample.capture.readings[camera].channels):
+            yield f"sample {sample.index}: {text}"
+        if split.name != sample.split:
+            yield f"sample {sample.index}: split"
+
+
+def wrong_frame(split: Path, row: Any, clip: Any, channels: Any) -> Iterator[str]:
+    """One frame: image, depth, segmentation, edges."""
+    rgb = image(split / row["image_file_name"])
+    if not np.array_equal(rgb, channels[Channel.RGB]):
+        yield "image"
+    near, far = (clip["depth"][key][row["frame"]] for key in ("near_m", "far_m"))
+    grey = image(split / row["depth_file_name"]).astype(float)
+    # Depth that a grey value stands for; within half a step of it.
+    inverse = grey / 255.0 * (1.0 / near - 1.0 / far) + 1.0 / far
+    truth = np.clip(1.0 / channels[Channel.Z_DEPTH].astype(float), 1.0 / far, 1.0 / near)
+    if (np.abs(inverse - truth) > 0.51 / 255.0 * (1.0 / near - 1.0 / far) + 1e-4).any():
+        yield "depth"
+    colors = image(split / row["segmentation_file_name"]).reshape(-1, 3)
+    ids = channels[Channel.INSTANCE].reshape(-1)
+    pairs = {(int(i), *map(int, c)) for i, c in zip(ids, colors, strict=True)}
+    if len(pairs) != len(np.unique(ids)) or len({p[1:] for p in pairs}) != len(pairs):
+        yield "segmentation"
+    if colors[ids == 0].any():
+        yield "background is not black"
+    grey_rgb = cv2.cvtColor(np.ascontiguousarray(rgb), cv2.COLOR_RGB2GRAY)
+    low, high = clip["edges"]["canny_low"], clip["edges"]["canny_high"]
+    if not np.array_equal(image(split / row["edges_file_name"]), cv2.Canny(grey_rgb, low, high)):
+        yield "edges"
+
+
+@pytest.fixture(scope="module")
+def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Seven frames of a street."""
+    folder = tmp_path_factory.mktemp("clips")
+    return world.export(ControlClips(), world.info(7), world.samples, folder)
+
+
+def test_signals_follow_from_the_images(dataset: Path, world: Any) -> None:
+    """Depth within half a grey value, one colour per instance, edges of the written image."""
+    assert list(problems(dataset, world.samples)) == []
+
+
+def repaint(kind: str, change: Callable[[Any], Any]) -> Callable[[Path], None]:
+    def damage(root: Path) -> None:
+        path = root / f"train/000000/{kind}/000000.png"
+        cv2.imwrite(str(path), change(cv2.imread(str(path), cv2.IMREAD_UNCHANGED)))
+
+    return damage
+
+
+def other_frame(root: Path) -> None:
+    one, other = (root / f"train/00000{k}/depth/000000.png" for k in (0, 1))
+    one.unlink()
+    shutil.copyfile(other, one)
+
+
+def other_range(root: Path) -> None:
+    path = root / "train/000000/clip.json"
+    clip = json.loads(path.read_text())
+    clip["depth"]["near_m"][0] *= 1.1
+    path.write_text(json.dumps(clip))
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        repaint("depth", lambda pixels: 255 - pixels),
+        repaint("edges", lambda pixels: np.roll(pixels, 1, axis=1)),
+        repaint("rgb", lambda pixels: pixels[..., ::-1]),
+        repaint("segmentation", lambda pixels: np.where(pixels > 99, 255, 0).astype(np.uint8)),
+        other_frame,
+        other_range,
+    ],
+)
+def test_damage_is_noticed(
+    dataset: Path, world: Any, tmp_path: Path, damage: Callable[[Path], None]
+) -> None:
+    """The comparison fails for a data set that is slightly wrong."""
+    root = tmp_path / "copy"
+    shutil.copytree(dataset, root)
+
+    damage(root)
+
+    assert list(problems(root, world.samples))
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_hugging_face_reads_images_and_text(
+    dataset: Path, world: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Columns of train_controlnet.py: image, conditioning images by name, text."""
+    monkeypatch.setenv("HF_HUB_OFFLINE", "1")
+    from datasets import load_dataset
+
+    train = load_dataset(str(dataset), split="train", cache_dir=str(tmp_path))
+
+    samples = [sample for sample in world.samples if sample.split == "train"]
+    assert len(train) == len(samples)
+    for row, listed, sample in zip(train, rows_of(dataset / "train"), samples, strict=True):
+        rgb = sample.capture.readings["color"].channels[Channel.RGB]
+        np.testing.assert_array_equal(np.asarray(row["image"]), rgb)
+        for kind in ("depth", "segmentation", "edges"):
+            expected = image(dataset / "train" / listed[f"{kind}_file_name"])
+            np.testing.assert_array_equal(np.asarray(row[kind]), expected)
+        assert row["text"] == listed["text"]
+
+
+def test_a_sequence_is_one_clip(world: Any, samples: Any, tmp_path: Path) -> None:
+    """With videos of the same frames, and parameters that name them."""
+    exporter = FIXED.model_copy(update={"video": True, "camera": "left", "edges_weight": 1.0})
+    info = world.info(8, ("left", "right"), steps_per_scene=4)
+
+    root = world.export(exporter, info, samples, tmp_path)
+
+    assert list(problems(root, samples, "left")) == []
+    clip = root / "val/000001"
+    facts = json.loads((clip / "clip.json").read_text())
+    assert (facts["rate_hz"], facts["samples"]) == (10.0, [4, 5, 6, 7])
+    assert facts["depth"]["near_m"] == [5.0] * 4
+    parameters = json.loads((clip / "cosmos_transfer.json").read_text())
+    assert parameters["prompt"] == (clip / "caption.txt").read_text().strip()
+    weights = {k: parameters[k]["control_weight"] for k in ("depth", "seg", "edge")}
+    assert weights == {"depth": 0.5, "seg": 0.5, "edge": 1.0}
+    names = {"rgb": parameters["video_path"], "depth": parameters["depth"]["control_path"],
+             "segmentation": parameters["seg"]["control_path"],
+             "edges": parameters["edge"]["control_path"]}  # fmt: skip
+    for kind, name in names.items():
+        video = cv2.VideoCapture(str(clip / name))
+        assert video.get(cv2.CAP_PROP_FPS) == 10.0
+        for k in range(4):
+            read, pixels = video.read()
+            expected = cv2.imread(str(clip / kind / f"{k:06d}.png"))
+            assert read and pixels.shape == expected.shape
+            assert np.abs(pixels.astype(int) - expected).mean() < 8
+        assert not video.read()[0]
+
+
+def test_videos_have_the_same_bytes_in_every_run(world: Any, samples: Any, tmp_path: Path) -> None:
+    """Within one version of OpenCV."""
+    exporter = FIXED.model_copy(update={"video": True})
+    info = world.info(8, ("left", "right"), steps_per_scene=4)
+
+    one, other = (world.export(exporter, info, samples, tmp_path / name) for name in "ab")
+
+    videos = sorted(p.relative_to(one) for p in one.rglob("*.mp4"))
+    assert len(videos) == 8
+    assert all((one / p).read_bytes() == (other / p).read_bytes() for p in videos)
+
+
+def test_inverse_depth_is_linear_in_one_over_depth() -> None:
+    """White at the near end, black at the far end and where there is nothing."""
+    depth = np.array([[1.0, 2.0, 4.0, np.inf, 0.5, 9.0]], np.float32)
+
+    pixels, span = inverse_depth(depth, (1.0, 4.0))
+
+    assert span == (1.0, 4.0)
+    assert pixels.tolist() == [[255, 85, 0, 0, 255, 0]]
+
+
+@pytest.mark.parametrize(
+    ("depth", "pixels", "span"),
+    [([2.0, 4.0, np.inf], [255, 0, 0], (2.0, 4.0)), ([3.0, 3.0], [255, 255], (3.0, 3.0)),
+     ([np.inf, np.inf], [0, 0], (0.0, 0.0))],
+)  # fmt: skip
+def test_the_range_of_one_image(depth: Any, pixels: Any, span: Any) -> None:
+    """Its own, also for a wall parallel to the image and for an empty sky."""
+    found, used = inverse_depth(np.array([depth], np.float32), None)
+
+    assert found.tolist() == [pixels]
+    assert used == span
+
+
+@pytest.mark.parametrize(
+    ("exporter", "steps", "message"),
+    [
+        (ControlClips(), 4, "depth of a sequence needs a fixed range"),
+        (ControlClips(near_m=5.0), 1, "expected both, with near_m < far_m, or neither"),
+        (ControlClips(near_m=5.0, far_m=5.0), 1, "expected both, with near_m < far_m, or neither"),
+    ],
+)
+def test_ranges_that_make_no_sense_are_refused(
+    world: Any, exporter: ControlClips, steps: int, message: str
+) -> None:
+    """Before anything is rendered."""
+    with pytest.raises(ConfigError, match=message):
+        exporter.check(world.info(8, steps_per_scene=steps))
+
+
+@pytest.mark.parametrize(
+    ("segmentation", "missing"), [("instance", Channel.INSTANCE), ("category", Channel.CATEGORY)]
+)
+def test_missing_channels_are_named(world: Any, segmentation: Any, missing: Channel) -> None:
+    """The camera writes the painted ids, and depth."""
+    known = (Channel.RGB, Channel.Z_DEPTH)
+    info = world.info(1, media={"color": known})
+    with pytest.raises(ConfigError, match=f"does not write the channel {missing}"):
+        ControlClips(segmentation=segmentation).check(info)
+    with pytest.raises(ConfigError, match="does not write the channel depth"):
+        ControlClips().check(replace(world.info(1, media={"color": (Channel.RGB, missing)})))
+
+
+def test_categories_have_a_colour_each(world: Any, tmp_path: Path) -> None:
+    """Both crates the same one."""
+    exporter = ControlClips(segmentation="category")
+
+    root = world.export(exporter, world.info(1), world.samples[:1], tmp_path)
+
+    colors = image(root / "train/000000/segmentation/000000.png")
+    ids = world.samples[0].capture.readings["color"].channels[Channel.CATEGORY]
+    assert len(np.unique(colors.reshape(-1, 3), axis=0)) == len(np.unique(ids))

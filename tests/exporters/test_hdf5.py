@@ -1,0 +1,201 @@
+"""Containers with BlenderProc's keys, read by h5py and NumPy and held against the street."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from gen_data.exporters.hdf5 import Hdf5, write_hdf5
+from gen_data.exporters.npz import npz_bytes
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+from tests.exporters.conftest import MEDIA, SIZES_M
+
+CONTAINERS = ("hdf5", "npz")
+
+
+def load(path: Path) -> dict[str, Any]:
+    if path.suffix == ".npz":
+        with np.load(path, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    with h5py.File(path) as file:
+        return {name: np.asarray(file[name]) for name in file}
+
+
+def problems(path: Path, sample: Any) -> Iterator[str]:
+    """Contradictions between a container and the geometry of its street."""
+    data = load(path)
+    reading = sample.capture.readings["color"]
+    if not np.array_equal(data["colors"], reading.channels[Channel.RGB]):
+        yield "colors"
+    if not np.array_equal(data["instance_segmaps"], reading.channels[Channel.INSTANCE]):
+        yield "instance_segmaps"
+    entries = {row["idx"]: row for row in json.loads(data["instance_attribute_maps"].item())}
+    if set(entries) != {0, *np.unique(data["instance_segmaps"]).tolist()}:
+        yield "instance_attribute_maps lists other instances"
+    for number, row in entries.items():
+        there = data["category_id_segmaps"][data["instance_segmaps"] == number]
+        if (there != row["category_id"]).any():
+            yield f"category of instance {number}"
+    yield from wrong_geometry(data, sample, entries)
+    (camera,) = json.loads(data["campose"].item())
+    # Blender's camera looks along -Z: its third axis is the opposite of the optical axis.
+    pose = np.array(camera["cam2world_matrix"])
+    if not np.allclose(-pose[:3, 2], data["T_world_camera"][:3, 2]) or not np.isclose(
+        np.linalg.det(pose[:3, :3]), 1.0
+    ):
+        yield "campose"
+
+
+def wrong_geometry(data: Any, sample: Any, entries: Any) -> Iterator[str]:
+    """Points through depth, K and pose; K is for pixel centres at whole numbers."""
+    rows, columns = np.indices(data["depth"].shape)
+    rays = np.stack([columns, rows, np.ones_like(rows)], -1) @ np.linalg.inv(data["K"]).T
+    seen = np.isfinite(data["depth"])
+    camera = rays[seen] * data["depth"][seen][:, None]
+    world = camera @ data["T_world_camera"][:3, :3].T + data["T_world_camera"][:3, 3]
+    ids = data["instance_segmaps"][seen]
+    # A unit of the depth image is a millimetre, which grows along the ray.
+    slack = 0.0006 * np.linalg.norm(rays[seen], axis=1) + 1e-5
+    if (np.abs(world[ids == 0][:, 2]) > slack[ids == 0]).any():
+        yield "ground is not at height 0"
+    for thing in sample.scene.instances:
+        here = ids == thing.instance_id
+        if not thing.asset.endswith("box") or thing.instance_id not in entries:
+            continue
+        local = thing.T_world_instance.inverse().apply(world[here])
+        half = 0.5 * np.array(SIZES_M[thing.category])
+        from_centre = np.abs(local - [0.0, 0.0, half[2]]) - half
+        if (np.abs(from_centre.max(axis=1)) > slack[here]).any():
+            yield f"instance {thing.instance_id} is not where it stands"
+    up = data["normals"][seen][ids == 0] * 2.0 - 1.0
+    # Pixels beside an object mix two surfaces.
+    if len(up) and np.median(up @ [0.0, 1.0, 0.0]) < 0.99:
+        yield "normals of the ground do not point up"
+
+
+@pytest.fixture(scope="module", params=CONTAINERS)
+def dataset(world: Any, request: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Seven frames with normals."""
+    info = world.info(7, media={"color": (*MEDIA, Channel.NORMALS)})
+    folder = tmp_path_factory.mktemp(request.param)
+    return world.export(Hdf5(container=request.param), info, world.samples, folder)
+
+
+def test_containers_hold_the_street(dataset: Path, world: Any) -> None:
+    """Colours, depth, normals, ids, attributes and cameras of every frame agree."""
+    paths = sorted(dataset.rglob("0*"), key=lambda p: p.name)
+    assert [p.parent.name for p in paths] == [s.split for s in world.samples]
+    for path, sample in zip(paths, world.samples, strict=True):
+        assert list(problems(path, sample)) == []
+
+
+def rewrite(path: Path, arrays: dict[str, Any]) -> None:
+    path.unlink()
+    if path.suffix == ".npz":
+        path.write_bytes(npz_bytes(arrays, 1))
+    else:
+        write_hdf5(path, arrays)
+
+
+def half_a_pixel(data: dict[str, Any]) -> None:
+    data["K"] = data["K"] + np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
+
+
+def blue_first(data: dict[str, Any]) -> None:
+    data["colors"] = np.ascontiguousarray(data["colors"][..., ::-1])
+
+
+def range_as_depth(data: dict[str, Any]) -> None:
+    data["depth"] = (data["depth"] * 1.05).astype(np.float32)
+
+
+def camera_axes(data: dict[str, Any]) -> None:
+    data["campose"] = np.array(
+        json.dumps([{"cam2world_matrix": data["T_world_camera"].tolist()}]).encode()
+    )
+
+
+def opencv_normals(data: dict[str, Any]) -> None:
+    data["normals"] = (1.0 - data["normals"]).astype(np.float32)
+
+
+def lost_instance(data: dict[str, Any]) -> None:
+    rows = json.loads(data["instance_attribute_maps"].item())[:-1]
+    data["instance_attribute_maps"] = np.array(json.dumps(rows).encode())
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [half_a_pixel, blue_first, range_as_depth, camera_axes, opencv_normals, lost_instance],
+)
+def test_damage_is_noticed(
+    dataset: Path, world: Any, tmp_path: Path, damage: Callable[[dict[str, Any]], None]
+) -> None:
+    """The comparison fails for a container that is slightly wrong."""
+    source = next((dataset / "train").glob("000000000_*"))
+    path = tmp_path / source.name
+    shutil.copyfile(source, path)
+    assert list(problems(path, world.samples[0])) == []
+    data = load(path)
+
+    damage(data)
+    rewrite(path, data)
+
+    assert list(problems(path, world.samples[0]))
+
+
+def test_images_are_compressed_by_standard_filters(dataset: Path) -> None:
+    """Other programs decode them: the archive passes its checksums, HDF5 knows the filters."""
+    path = next((dataset / "train").iterdir())
+    if path.suffix == ".npz":
+        with zipfile.ZipFile(path) as archive:
+            assert archive.testzip() is None
+        return
+    with h5py.File(path) as file:
+        assert file["colors"].compression == file["depth"].compression == "gzip"
+        assert file["depth"].shuffle and not file["colors"].shuffle
+
+
+def test_channels_without_blenderprocs_key_keep_their_name(world: Any, tmp_path: Path) -> None:
+    """A channel that is not written has no key."""
+    info = world.info(1, media={"color": (Channel.RGB, Channel.PART)})
+
+    root = world.export(Hdf5(), info, world.samples[:1], tmp_path)
+
+    keys = set(load(root / "train/000000000_color.hdf5"))
+    assert keys == {
+        "colors", "part", "instance_attribute_maps", "campose", "K", "T_world_camera",
+    }  # fmt: skip
+
+
+def test_each_camera_has_a_container(world: Any, samples: Any, tmp_path: Path) -> None:
+    """Of a drive with two cameras."""
+    root = world.export(Hdf5(), world.info(8, ("left", "right")), samples, tmp_path)
+
+    names = sorted(p.name for p in (root / "train").iterdir())
+    assert names[:2] == ["000000000_left.hdf5", "000000000_right.hdf5"]
+    assert len(names) == 8
+
+
+def test_a_missing_package_is_named(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Before anything is rendered; NumPy's archives need none."""
+    monkeypatch.setattr("gen_data.exporters.hdf5.find_spec", lambda name: None)
+
+    with pytest.raises(ConfigError, match=r"pip install 'gen-data\[formats\]'"):
+        Hdf5().check(world.info(1))
+    Hdf5(container="npz").check(world.info(1))
+
+
+def test_a_data_set_without_images_is_refused(world: Any) -> None:
+    """Such as one of laser scans."""
+    with pytest.raises(ConfigError, match="no camera writes a channel"):
+        Hdf5().check(world.info(1, (), ("top",)))

@@ -1,0 +1,65 @@
+"""Binary masks as PNG files, read by two independent decoders."""
+
+from __future__ import annotations
+
+import io
+
+import cv2
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from PIL import Image
+
+from gen_data.exporters.mask_png import encode_mask
+from gen_data.generator.core.sample import MaskPx
+
+
+def decoded(png: bytes) -> np.ndarray:
+    """Pixels as OpenCV reads them, after Pillow has read the same."""
+    image = Image.open(io.BytesIO(png))
+    assert image.mode == "L"
+    pixels = cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_UNCHANGED)
+    np.testing.assert_array_equal(np.asarray(image), pixels)
+    return np.asarray(pixels)
+
+
+@given(
+    crop=hnp.arrays(bool, hnp.array_shapes(min_dims=2, max_dims=2, max_side=40)),
+    above=st.integers(0, 700),
+    left=st.integers(0, 700),
+    below=st.integers(0, 30),
+    right=st.integers(0, 30),
+)
+@settings(max_examples=150, deadline=None)
+def test_any_mask_comes_back(
+    crop: np.ndarray, above: int, left: int, below: int, right: int
+) -> None:
+    """Also at the image's edges, where runs of different rows meet."""
+    expected = np.pad(crop, [(above, below), (left, right)]).astype(np.uint8) * 255
+
+    png = encode_mask(MaskPx(left, above, crop), *expected.shape)
+
+    np.testing.assert_array_equal(decoded(png), expected)
+
+
+def test_runs_of_every_length() -> None:
+    """A row of set pixels: the longest copy, two of them, and each possible rest."""
+    for width in range(1, 600):
+        png = encode_mask(MaskPx(0, 0, np.ones((1, width), bool)), 2, width)
+
+        np.testing.assert_array_equal(decoded(png), [[255] * width, [0] * width])
+
+
+def test_nothing_is_an_empty_image() -> None:
+    """Of an invisible object."""
+    for mask in (None, MaskPx(0, 0, np.zeros((0, 0), bool))):
+        assert not decoded(encode_mask(mask, 48, 64)).any()
+
+
+def test_a_full_image_is_small() -> None:
+    """Its bytes are those of the runs."""
+    png = encode_mask(MaskPx(0, 0, np.ones((480, 640), bool)), 480, 640)
+
+    assert decoded(png).min() == 255
+    assert len(png) < 8_000
