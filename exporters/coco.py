@@ -12,6 +12,10 @@ file, such as COCO's ``person_keypoints_train.json``. It lists all images and th
 category, with ``keypoints`` and ``num_keypoints`` (0 if an object has no keypoints); the category
 has ``keypoints`` and the 1-based ``skeleton``.
 
+Masks are run lengths, or polygons along the edges of pixels (``segmentation: polygon``), of which
+pycocotools draws exactly the mask; torchvision's reference recipe for detection reads polygons
+only. Regions that a label map ignores have ``iscrowd`` 1, and run lengths in either case.
+
 Every annotation has COCO's own keys, and ``attributes``: the object's name, asset, subcategory and
 the attributes of its asset. Images have ``attributes`` too, the shared values of their scene, and
 the values of ``weather`` other than zero. Annotators that are enabled add these keys:
@@ -70,6 +74,7 @@ from typing import Any, Literal
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.mask_polygons import mask_polygons
 from gen_data.exporters.rle import encode_rle
 from gen_data.exporters.sensor_selection import instant_s, rgb_cameras
 from gen_data.exporters.sequences import sequence_number
@@ -102,8 +107,8 @@ class Coco(ExporterBase):
     """COCO instances, one JSON file per split; images of all sensors with the rgb channel."""
 
     type: Literal["coco"] = "coco"
-    segmentation: Literal["rle", "none"] = "rle"
-    """Run-length encoded visible masks, or no masks."""
+    segmentation: Literal["rle", "polygon", "none"] = "rle"
+    """Visible masks as run lengths, as polygons along the edges of their pixels, or none."""
     amodal: bool = True
     """Also write the box of the silhouette and, with the annotation amodal_masks, its mask."""
 
@@ -186,7 +191,7 @@ class Coco(ExporterBase):
             "category_id": instance.category_id,
             "bbox": _xywh(thing.box),
             "area": thing.visible_px,
-            "iscrowd": 0,
+            "iscrowd": int(thing.ignored),
             "segmentation": [],
             "instance_id": instance.instance_id,
             "attributes": _facts(instance),
@@ -194,9 +199,13 @@ class Coco(ExporterBase):
         if info.steps_per_scene > 1:
             sequence = sequence_number(info, sample.index)
             row["track_id"] = sequence * ANNOTATION_STRIDE + instance.instance_id
-        if self.segmentation == "rle":
+        if self.segmentation != "none":
             assert thing.mask is not None, "the annotation instance_masks is in `needs`"
-            row["segmentation"] = encode_rle(thing.mask, camera.height_px, camera.width_px)
+            # COCO's crowds have run lengths in either case.
+            if self.segmentation == "polygon" and not thing.ignored:
+                row["segmentation"] = [p.ravel().tolist() for p in mask_polygons(thing.mask)]
+            else:
+                row["segmentation"] = encode_rle(thing.mask, camera.height_px, camera.width_px)
         if self.amodal and thing.amodal_box is not None:
             row["amodal_bbox"] = _xywh(thing.amodal_box)
         if self.amodal and thing.amodal_mask is not None:
