@@ -14,6 +14,7 @@ TABLE = PluginTable[Exporter](
     {
         "birdseye": "gen_data.exporters.birdseye:Birdseye",
         "coco": "gen_data.exporters.coco:Coco",
+        "coco_panoptic": "gen_data.exporters.coco_panoptic:CocoPanoptic",
         "kitti": "gen_data.exporters.kitti:Kitti",
         "kitti_raw": "gen_data.exporters.kitti_raw:KittiRaw",
         "kitti_stereo": "gen_data.exporters.kitti_stereo:KittiStereo",

@@ -168,14 +168,14 @@ class Coco(ExporterBase):
         for split in splits:
             images = partial(fragment_lines, fragments, f"{split}.images")
             rows = fragment_lines(fragments, f"{split}.annotations")
-            header = _header(info, _categories(info))
-            _write_dataset(folder / f"instances_{split}.json", header, images(), rows)
+            header = dataset_header(info, _categories(info))
+            write_dataset(folder / f"instances_{split}.json", header, images(), rows)
             for category_id, skeleton in skeletons.items():
                 lines = fragment_lines(fragments, f"{split}.keypoints.{category_id}")
                 name = info.categories[category_id - 1]
                 path = folder / f"{'_'.join(name.split())}_keypoints_{split}.json"
-                header = _header(info, [_keypoint_category(category_id, name, skeleton)])
-                _write_dataset(path, header, images(), _keypoint_rows(lines, skeleton))
+                header = dataset_header(info, [_keypoint_category(category_id, name, skeleton)])
+                write_dataset(path, header, images(), _keypoint_rows(lines, skeleton))
             for shard_dir, image in fragment_rows(shard_dirs, self.type, f"{split}.images"):
                 _link_images(image, split, shard_dir, dataset_dir)
 
@@ -189,7 +189,7 @@ class Coco(ExporterBase):
             "id": sample.annotation_id(sensor, instance.instance_id),
             "image_id": sample.image_id(sensor),
             "category_id": instance.category_id,
-            "bbox": _xywh(thing.box),
+            "bbox": box_xywh(thing.box),
             "area": thing.visible_px,
             "iscrowd": int(thing.ignored),
             "segmentation": [],
@@ -207,7 +207,7 @@ class Coco(ExporterBase):
             else:
                 row["segmentation"] = encode_rle(thing.mask, camera.height_px, camera.width_px)
         if self.amodal and thing.amodal_box is not None:
-            row["amodal_bbox"] = _xywh(thing.amodal_box)
+            row["amodal_bbox"] = box_xywh(thing.amodal_box)
         if self.amodal and thing.amodal_mask is not None:
             mask = thing.amodal_mask
             row["amodal_segmentation"] = encode_rle(mask, camera.height_px, camera.width_px)
@@ -261,9 +261,14 @@ def _image_keys(truth: ImageTruth, camera: Intrinsics) -> dict[str, Any]:
     return keys
 
 
+def image_name(index: int, sensor: str) -> str:
+    """File name of a camera's image of one sample."""
+    return f"{index:09d}_{sensor}.png"
+
+
 def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     camera = sample.truth[sensor].camera
-    file_name = f"{sample.index:09d}_{sensor}.png"
+    file_name = image_name(sample.index, sensor)
     others = [c for c in info.media[sensor] if c is not Channel.RGB]
     row = {
         "id": sample.image_id(sensor),
@@ -371,7 +376,8 @@ def _keypoint_category(category_id: int, name: str, skeleton: Skeleton) -> dict[
     }
 
 
-def _header(info: DatasetInfo, categories: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def dataset_header(info: DatasetInfo, categories: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Sections of a COCO file other than images and annotations."""
     return {
         "info": {
             "description": info.name,
@@ -386,7 +392,7 @@ def _header(info: DatasetInfo, categories: Sequence[Mapping[str, Any]]) -> dict[
     }
 
 
-def _write_dataset(
+def write_dataset(
     path: Path, header: Mapping[str, Any], images: Iterable[str], annotations: Iterable[str]
 ) -> None:
     """One JSON document, streamed: annotations of all images are never in memory together."""
@@ -409,7 +415,8 @@ def _link_images(image: Mapping[str, Any], split: str, shard_dir: Path, dataset_
         link_or_copy(source, dataset_dir / target)
 
 
-def _xywh(box: BoxPx) -> list[int]:
+def box_xywh(box: BoxPx) -> list[int]:
+    """COCO's box: left, top, width, height [px]."""
     return [box.x_min, box.y_min, box.width_px, box.height_px]
 
 
