@@ -24,6 +24,7 @@ TABLE = PluginTable[Exporter](
         "semantickitti": "gen_data.exporters.semantickitti:SemanticKitti",
         "tables": "gen_data.exporters.measurement_tables:Tables",
         "usd": "gen_data.exporters.usd:Usd",
+        "voc": "gen_data.exporters.voc:Voc",
         "yolo": "gen_data.exporters.yolo:Yolo",
     },
     (Exporter,),

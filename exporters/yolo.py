@@ -28,7 +28,7 @@ Reference: https://docs.ultralytics.com/datasets, and ``ultralytics.data.utils``
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -133,7 +133,7 @@ class Yolo(ExporterBase):
         camera = sample.truth[sensor].camera.intrinsics
         size = np.array([camera.width_px, camera.height_px], np.float64)
         listed = [t for t in sample.truth[sensor].objects if t.box is not None and not t.ignored]
-        form = {
+        form: dict[str, Callable[[ObjectTruth], Any]] = {
             "detect": partial(_detect_row, size),
             "segment": partial(_segment_row, size),
             "pose": partial(_pose_row, size),
@@ -241,13 +241,12 @@ def inner_rectangle(points: Polygon, width_px: int, height_px: int) -> Array:
         ],
         axis=1,
     )
-    slack = 1e-6
-    inside = ((corners >= -slack) & (corners <= np.array([width_px, height_px]) + slack)).all(
-        (1, 2)
-    )
-    inside[0] = True
-    area = np.where(inside, (u1 - u0) * (v1 - v0), np.inf)
-    found: Array = corners[int(np.argmin(area))]
+    slack_px = 1e-6
+    limits = np.array([width_px, height_px]) + slack_px
+    inside = np.all((corners >= -slack_px) & (corners <= limits), axis=(1, 2))
+    candidates = np.where(inside, (u1 - u0) * (v1 - v0), np.inf)
+    candidates[0] = (u1[0] - u0[0]) * (v1[0] - v0[0])
+    found: Array = corners[int(np.argmin(candidates))]
     return found
 
 
