@@ -13,6 +13,7 @@ TABLE = PluginTable[Exporter](
     "exporter",
     {
         "birdseye": "gen_data.exporters.birdseye:Birdseye",
+        "cityscapes": "gen_data.exporters.cityscapes:Cityscapes",
         "coco": "gen_data.exporters.coco:Coco",
         "coco_panoptic": "gen_data.exporters.coco_panoptic:CocoPanoptic",
         "kitti": "gen_data.exporters.kitti:Kitti",

@@ -34,10 +34,9 @@ SURFACES = ("", "asphalt", "marking", "pavement", "kerb", "grass", "sky")
 SKY = SURFACES.index("sky")
 SKY_FROM_M = 100.0
 """Depth images that end nearer than this do not tell the sky from a distant wall."""
-TILE_M = 16.0
-"""Maps are centred on multiples of this, so that the cameras of a rig share them."""
-MAPS = ((0.05, 64.0), (0.25, 320.0))
-"""Side of a cell and reach [m] of each map, the finest first."""
+MAPS = ((0.05, 64.0, 32.0), (0.25, 320.0, 128.0))
+"""Side of a cell, reach and step [m] of each map, the finest first. Maps are centred on multiples
+of the step, so that the cameras of a rig and many views of a scene share them."""
 _SUBPIXEL_BITS = 4
 
 
@@ -147,11 +146,11 @@ def _extent_m2(piece: _Piece) -> float:
 def _look_up(ground: tuple[_Piece, ...], view: Camera, p_world: Array) -> UInt8:
     """Surfaces below points [n, 3]; 0 outside all maps."""
     x, y, _ = view.T_world_camera.translation_m
-    middle = (TILE_M * round(x / TILE_M), TILE_M * round(y / TILE_M))
     found = np.zeros(len(p_world), np.uint8)
     left = np.ones(len(p_world), bool)
-    for cell_m, reach_m in MAPS:
-        count = 2 * round((reach_m + TILE_M) / cell_m)
+    for cell_m, reach_m, step_m in MAPS:
+        middle = (step_m * round(x / step_m), step_m * round(y / step_m))
+        count = 2 * round((reach_m + 0.5 * step_m) / cell_m)
         cells = np.floor((p_world[:, :2] - middle) / cell_m + 0.5 * count)
         inside = left & ((cells >= 0) & (cells < count)).all(axis=1)
         if inside.any():

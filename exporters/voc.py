@@ -133,16 +133,17 @@ class Voc(ExporterBase):
         # VOC's files name objects by their order; ignored ones have no number in label images.
         listed.sort(key=lambda thing: thing.ignored)
         stem = Path(image_name(sample.index, sensor)).stem
+        file_name = f"{stem}.{'jpg' if self.images == 'jpeg' else 'png'}"
         row = {
             "stem": stem,
-            "file_name": f"{stem}.{'jpg' if self.images == 'jpeg' else 'png'}",
+            "file_name": file_name,
             "sensor": sensor,
             "sample": sample.index,
             "split": sample.split,
             "shown": _shown(listed),
         }
         folder = shard_dir / self.type
-        text = annotation_text(info, truth, listed, row["file_name"])
+        text = annotation_text(info, truth, listed, file_name)
         write_bytes(folder / f"{stem}.xml", text.encode())
         classes, objects = label_images(truth, listed)
         colors = voc_palette()
@@ -155,7 +156,7 @@ class Voc(ExporterBase):
 
     def _image(self, shard_dir: Path, row: dict[str, Any]) -> Path:
         if self.images == "jpeg":
-            return shard_dir / self.type / row["file_name"]
+            return shard_dir / self.type / str(row["file_name"])
         return media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
 
 
