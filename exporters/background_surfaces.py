@@ -2,9 +2,9 @@
 
 The instance images of a renderer name objects and scenery; ground and sky have instance 0 there.
 The ground is looked up by the position of each pixel's point, from its depth, on a map of the
-background bodies, drawn from above by the roles of their materials. Its resolution is 5 cm within
-64 m around the camera and 25 cm beyond; depths are those of the 16-bit image. Overpasses are not
-told from the road below.
+background bodies, drawn from above by the roles of their materials. Its resolution is 1 cm within
+12 m around the camera, 5 cm within 64 m and 25 cm beyond; depths are those of the 16-bit image.
+Overpasses are not told from the road below. Ground beyond the range of the depth image is unknown.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SURFACES = ("", "asphalt", "marking", "pavement", "kerb", "grass", "sky")
 SKY = SURFACES.index("sky")
 SKY_FROM_M = 100.0
 """Depth images that end nearer than this do not tell the sky from a distant wall."""
-MAPS = ((0.05, 64.0, 32.0), (0.25, 320.0, 128.0))
+MAPS = ((0.01, 12.0, 4.0), (0.05, 64.0, 32.0), (0.25, 320.0, 128.0))
 """Side of a cell, reach and step [m] of each map, the finest first. Maps are centred on multiples
 of the step, so that the cameras of a rig and many views of a scene share them."""
 _SUBPIXEL_BITS = 4
@@ -160,7 +160,7 @@ def _look_up(ground: tuple[_Piece, ...], view: Camera, p_world: Array) -> UInt8:
     return found
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=6)
 def _draw_map(
     ground: tuple[_Piece, ...], middle_m: tuple[float, float], cell_m: float, count: int
 ) -> UInt8:

@@ -134,7 +134,7 @@ class Cityscapes(ExporterBase):
                 continue
             labels, instances = find_labels(info, sample, camera, shard_dir, self._assets)
             stem = shard_dir / self.type / f"{sample.index:09d}"
-            pixels = {
+            pixels: dict[str, NDArray[Any]] = {
                 "labelIds": labels,
                 "instanceIds": instances,
                 "color": city_classes().colors[labels],
