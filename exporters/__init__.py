@@ -16,6 +16,7 @@ TABLE = PluginTable[Exporter](
         "cityscapes": "gen_data.exporters.cityscapes:Cityscapes",
         "coco": "gen_data.exporters.coco:Coco",
         "coco_panoptic": "gen_data.exporters.coco_panoptic:CocoPanoptic",
+        "cvat": "gen_data.exporters.cvat:Cvat",
         "kitti": "gen_data.exporters.kitti:Kitti",
         "kitti_raw": "gen_data.exporters.kitti_raw:KittiRaw",
         "kitti_stereo": "gen_data.exporters.kitti_stereo:KittiStereo",
