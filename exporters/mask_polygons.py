@@ -52,8 +52,10 @@ def mask_polygons(mask: MaskPx) -> list[Polygon]:
 def join_polygons(polygons: Sequence[Polygon]) -> Polygon:
     """Join polygons to a single one by lines that lead to each and back.
 
-    Each polygon is joined to the nearest vertex of those before it (Manhattan distance). For
-    formats with one polygon per object.
+    Each polygon is joined to the vertex, of those before it, that is nearest to its first vertex,
+    from its own vertex nearest to that one (Manhattan distances; not the shortest line of all
+    pairs, whose search would grow with the square of the vertices). For formats with one polygon
+    per object.
 
     Raises:
         ValueError: there is no polygon.
@@ -62,8 +64,8 @@ def join_polygons(polygons: Sequence[Polygon]) -> Polygon:
         raise ValueError("there is no polygon to join")
     joined = polygons[0]
     for polygon in polygons[1:]:
-        distances = np.abs(joined[:, None, :] - polygon[None, :, :]).sum(axis=-1)
-        here, there = np.unravel_index(int(np.argmin(distances)), distances.shape)
+        here = int(np.argmin(np.abs(joined - polygon[0]).sum(axis=1)))
+        there = int(np.argmin(np.abs(polygon - joined[here]).sum(axis=1)))
         detour = np.concatenate([polygon[there:], polygon[: there + 1]])
         joined = np.concatenate([joined[: here + 1], detour, joined[here:]])
     return joined
