@@ -52,23 +52,30 @@ def mask_polygons(mask: MaskPx) -> list[Polygon]:
 def join_polygons(polygons: Sequence[Polygon]) -> Polygon:
     """Join polygons to a single one by lines that lead to each and back.
 
-    Each polygon is joined to the vertex, of those before it, that is nearest to its first vertex,
-    from its own vertex nearest to that one (Manhattan distances; not the shortest line of all
-    pairs, whose search would grow with the square of the vertices). For formats with one polygon
-    per object.
+    Each polygon is joined to the vertex of the longest one that is nearest to its first vertex,
+    from its own vertex nearest to that one. For formats with one polygon per object.
 
     Raises:
         ValueError: there is no polygon.
     """
     if not polygons:
         raise ValueError("there is no polygon to join")
-    joined = polygons[0]
-    for polygon in polygons[1:]:
-        here = int(np.argmin(np.abs(joined - polygon[0]).sum(axis=1)))
-        there = int(np.argmin(np.abs(polygon - joined[here]).sum(axis=1)))
-        detour = np.concatenate([polygon[there:], polygon[: there + 1]])
-        joined = np.concatenate([joined[: here + 1], detour, joined[here:]])
-    return joined
+    if len(polygons) == 1:
+        return polygons[0]
+    from scipy.spatial import cKDTree
+
+    longest = max(range(len(polygons)), key=lambda k: len(polygons[k]))
+    base = polygons[longest]
+    others = [polygon for k, polygon in enumerate(polygons) if k != longest]
+    _, nearest = cKDTree(base).query(np.stack([polygon[0] for polygon in others]))
+    pieces, begin = [], 0
+    for k in np.argsort(nearest, kind="stable").tolist():
+        end, polygon = int(nearest[k]) + 1, others[k]
+        there = int(np.argmin(((polygon - base[end - 1]) ** 2).sum(axis=1)))
+        detour = [polygon[there:], polygon[: there + 1], base[end - 1 : end]]
+        pieces += [base[begin:end], *detour]
+        begin = end
+    return np.concatenate([*pieces, base[begin:]])
 
 
 @dataclass(frozen=True, eq=False, slots=True)

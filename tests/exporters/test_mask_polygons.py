@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ def area(polygon: NDArray[np.int64]) -> float:
     return 0.5 * float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())
 
 
+@settings(deadline=None)
 @given(masks)
 def test_polygons_cover_exactly_the_pixels(pixels: NDArray[np.bool_]) -> None:
     """With any number of parts, holes, islands in holes, and pixels that touch at corners."""
@@ -46,6 +47,7 @@ def test_polygons_cover_exactly_the_pixels(pixels: NDArray[np.bool_]) -> None:
     assert all(area(polygon) > 0 for polygon in polygons)
 
 
+@settings(deadline=None)
 @given(masks)
 def test_edges_run_along_the_edges_of_pixels(pixels: NDArray[np.bool_]) -> None:
     """Every edge is horizontal or vertical and has a length."""
@@ -54,6 +56,7 @@ def test_edges_run_along_the_edges_of_pixels(pixels: NDArray[np.bool_]) -> None:
         assert ((edges != 0).sum(axis=1) == 1).all()
 
 
+@settings(deadline=None)
 @given(masks.filter(lambda pixels: bool(pixels.any())))
 def test_a_joined_polygon_covers_the_same_pixels(pixels: NDArray[np.bool_]) -> None:
     """The connecting lines have no area."""
