@@ -12,6 +12,10 @@ file, such as COCO's ``person_keypoints_train.json``. It lists all images and th
 category, with ``keypoints`` and ``num_keypoints`` (0 if an object has no keypoints); the category
 has ``keypoints`` and the 1-based ``skeleton``.
 
+Masks are run lengths, or polygons along the edges of pixels (``segmentation: polygon``), of which
+pycocotools draws exactly the mask; torchvision's reference recipe for detection reads polygons
+only. Regions that a label map ignores have ``iscrowd`` 1, and run lengths in either case.
+
 Every annotation has COCO's own keys, and ``attributes``: the object's name, asset, subcategory and
 the attributes of its asset. Images have ``attributes`` too, the shared values of their scene, and
 the values of ``weather`` other than zero. Annotators that are enabled add these keys:
@@ -70,6 +74,7 @@ from typing import Any, Literal
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.mask_polygons import mask_polygons
 from gen_data.exporters.rle import encode_rle
 from gen_data.exporters.sensor_selection import instant_s, rgb_cameras
 from gen_data.exporters.sequences import sequence_number
@@ -102,8 +107,8 @@ class Coco(ExporterBase):
     """COCO instances, one JSON file per split; images of all sensors with the rgb channel."""
 
     type: Literal["coco"] = "coco"
-    segmentation: Literal["rle", "none"] = "rle"
-    """Run-length encoded visible masks, or no masks."""
+    segmentation: Literal["rle", "polygon", "none"] = "rle"
+    """Visible masks as run lengths, as polygons along the edges of their pixels, or none."""
     amodal: bool = True
     """Also write the box of the silhouette and, with the annotation amodal_masks, its mask."""
 
@@ -163,14 +168,14 @@ class Coco(ExporterBase):
         for split in splits:
             images = partial(fragment_lines, fragments, f"{split}.images")
             rows = fragment_lines(fragments, f"{split}.annotations")
-            header = _header(info, _categories(info))
-            _write_dataset(folder / f"instances_{split}.json", header, images(), rows)
+            header = dataset_header(info, _categories(info))
+            write_dataset(folder / f"instances_{split}.json", header, images(), rows)
             for category_id, skeleton in skeletons.items():
                 lines = fragment_lines(fragments, f"{split}.keypoints.{category_id}")
                 name = info.categories[category_id - 1]
                 path = folder / f"{'_'.join(name.split())}_keypoints_{split}.json"
-                header = _header(info, [_keypoint_category(category_id, name, skeleton)])
-                _write_dataset(path, header, images(), _keypoint_rows(lines, skeleton))
+                header = dataset_header(info, [_keypoint_category(category_id, name, skeleton)])
+                write_dataset(path, header, images(), _keypoint_rows(lines, skeleton))
             for shard_dir, image in fragment_rows(shard_dirs, self.type, f"{split}.images"):
                 _link_images(image, split, shard_dir, dataset_dir)
 
@@ -184,9 +189,9 @@ class Coco(ExporterBase):
             "id": sample.annotation_id(sensor, instance.instance_id),
             "image_id": sample.image_id(sensor),
             "category_id": instance.category_id,
-            "bbox": _xywh(thing.box),
+            "bbox": box_xywh(thing.box),
             "area": thing.visible_px,
-            "iscrowd": 0,
+            "iscrowd": int(thing.ignored),
             "segmentation": [],
             "instance_id": instance.instance_id,
             "attributes": _facts(instance),
@@ -194,11 +199,15 @@ class Coco(ExporterBase):
         if info.steps_per_scene > 1:
             sequence = sequence_number(info, sample.index)
             row["track_id"] = sequence * ANNOTATION_STRIDE + instance.instance_id
-        if self.segmentation == "rle":
+        if self.segmentation != "none":
             assert thing.mask is not None, "the annotation instance_masks is in `needs`"
-            row["segmentation"] = encode_rle(thing.mask, camera.height_px, camera.width_px)
+            # COCO's crowds have run lengths in either case.
+            if self.segmentation == "polygon" and not thing.ignored:
+                row["segmentation"] = [p.ravel().tolist() for p in mask_polygons(thing.mask)]
+            else:
+                row["segmentation"] = encode_rle(thing.mask, camera.height_px, camera.width_px)
         if self.amodal and thing.amodal_box is not None:
-            row["amodal_bbox"] = _xywh(thing.amodal_box)
+            row["amodal_bbox"] = box_xywh(thing.amodal_box)
         if self.amodal and thing.amodal_mask is not None:
             mask = thing.amodal_mask
             row["amodal_segmentation"] = encode_rle(mask, camera.height_px, camera.width_px)
@@ -269,9 +278,14 @@ def _image_keys(truth: ImageTruth, camera: Intrinsics) -> dict[str, Any]:
     return keys
 
 
+def image_name(index: int, sensor: str) -> str:
+    """File name of a camera's image of one sample."""
+    return f"{index:09d}_{sensor}.png"
+
+
 def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     camera = sample.truth[sensor].camera
-    file_name = f"{sample.index:09d}_{sensor}.png"
+    file_name = image_name(sample.index, sensor)
     others = [c for c in info.media[sensor] if c is not Channel.RGB]
     row = {
         "id": sample.image_id(sensor),
@@ -379,7 +393,8 @@ def _keypoint_category(category_id: int, name: str, skeleton: Skeleton) -> dict[
     }
 
 
-def _header(info: DatasetInfo, categories: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def dataset_header(info: DatasetInfo, categories: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Sections of a COCO file other than images and annotations."""
     return {
         "info": {
             "description": info.name,
@@ -394,7 +409,7 @@ def _header(info: DatasetInfo, categories: Sequence[Mapping[str, Any]]) -> dict[
     }
 
 
-def _write_dataset(
+def write_dataset(
     path: Path, header: Mapping[str, Any], images: Iterable[str], annotations: Iterable[str]
 ) -> None:
     """One JSON document, streamed: annotations of all images are never in memory together."""
@@ -417,7 +432,8 @@ def _link_images(image: Mapping[str, Any], split: str, shard_dir: Path, dataset_
         link_or_copy(source, dataset_dir / target)
 
 
-def _xywh(box: BoxPx) -> list[int]:
+def box_xywh(box: BoxPx) -> list[int]:
+    """COCO's box: left, top, width, height [px]."""
     return [box.x_min, box.y_min, box.width_px, box.height_px]
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 UInt8 = NDArray[np.uint8]
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
-_GREY, _RGB = 0, 2
+_GREY, _RGB, _PALETTE = 0, 2, 3
 
 
 class RowFilter(IntEnum):
@@ -78,3 +78,22 @@ def _filter_rows(pixels: NDArray[Any], row_filter: RowFilter) -> UInt8:
 def _chunk(kind: bytes, data: bytes | bytearray) -> list[bytes | bytearray]:
     check = deflate.crc32(data, deflate.crc32(kind))
     return [struct.pack(">I", len(data)), kind, data, struct.pack(">I", check)]
+
+
+def encode_palette_png(pixels: UInt8, colors: UInt8, level: int) -> bytes:
+    """Encode an image of indices with the colours that viewers show.
+
+    Args:
+        pixels: Indices of colours, uint8 [h, w].
+        colors: RGB, uint8 [n, 3], n at most 256.
+        level: libdeflate's compression level, 1 (fastest) to 12.
+    """
+    height, width = pixels.shape
+    header = struct.pack(">IIBBBBB", width, height, 8, _PALETTE, 0, 0, 0)
+    chunks = [
+        *_chunk(b"IHDR", header),
+        *_chunk(b"PLTE", colors.tobytes()),
+        *_chunk(b"IDAT", deflate.zlib_compress(_filter_rows(pixels, RowFilter.UP), level)),
+        *_chunk(b"IEND", b""),
+    ]
+    return b"".join([SIGNATURE, *chunks])

@@ -33,6 +33,26 @@ def rgb_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
     )
 
 
+def check_channels(info: DatasetInfo, channels: Iterable[Channel], exporter: str) -> None:
+    """Reject a data set without cameras that write rgb, or with one that lacks other channels.
+
+    Raises:
+        ConfigError: a channel is missing.
+    """
+    if not rgb_cameras(info):
+        raise ConfigError(
+            f"exporter '{exporter}': no sensor of {_join_names(info.cameras)} writes the rgb "
+            "channel; add an rgb_camera"
+        )
+    for camera in rgb_cameras(info):
+        missing = [c.value for c in channels if c not in info.media[camera]]
+        if missing:
+            raise ConfigError(
+                f"exporter '{exporter}': camera '{camera}' does not write the channel "
+                f"{_join_names(missing)}; add it to the channels of the sensor"
+            )
+
+
 def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> None:
     """Reject lenses that a format of rectified images cannot describe.
 

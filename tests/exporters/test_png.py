@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 from PIL import Image
 
-from gen_data.exporters.png import SIGNATURE, RowFilter, encode_png
+from gen_data.exporters.png import SIGNATURE, RowFilter, encode_palette_png, encode_png
 
 
 def noise(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
@@ -58,3 +58,14 @@ def test_other_arrays_are_refused(wrong: NDArray[Any]) -> None:
     """Neither floating point nor two channels."""
     with pytest.raises(ValueError, match="cannot write"):
         encode_png(wrong, RowFilter.SUB, 1)
+
+
+def test_an_image_of_indices_has_its_palette() -> None:
+    """Pillow reads both, and the colours through them."""
+    colors = noise((256, 3), np.uint8)
+    pixels = noise((9, 31), np.uint8)
+
+    with Image.open(io.BytesIO(encode_palette_png(pixels, colors, 2))) as image:
+        assert image.mode == "P"
+        np.testing.assert_array_equal(np.asarray(image), pixels)
+        np.testing.assert_array_equal(np.asarray(image.convert("RGB")), colors[pixels])

@@ -1,0 +1,177 @@
+"""Kinds of surfaces behind pixels without an instance: ground of streets, and sky.
+
+The instance images of a renderer name objects and scenery; ground and sky have instance 0 there.
+The ground is looked up by the position of each pixel's point, from its depth, on a map of the
+background bodies, drawn from above by the roles of their materials. Its resolution is 1 cm within
+12 m around the camera, 5 cm within 64 m and 25 cm beyond; depths are those of the 16-bit image.
+Overpasses are not told from the road below. Ground beyond the range of the depth image is unknown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.exporters.image_files import DEPTH_UNITS_MAX, read_image
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, media_path
+from gen_data.generator.core.rolling_shutter_projection import world_points
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.scene import Body, Camera
+from gen_data.generator.core.se3 import Array
+
+UInt8 = NDArray[np.uint8]
+UInt16 = NDArray[np.uint16]
+
+SURFACES = ("", "asphalt", "marking", "pavement", "kerb", "grass", "sky")
+"""Values of surface images: roles of materials of the ground, and the sky; 0 = unknown."""
+SKY = SURFACES.index("sky")
+SKY_FROM_M = 100.0
+"""Depth images that end nearer than this do not tell the sky from a distant wall."""
+MAPS = ((0.01, 12.0, 4.0), (0.05, 64.0, 32.0), (0.25, 320.0, 128.0))
+"""Side of a cell, reach and step [m] of each map, the finest first. Maps are centred on multiples
+of the step, so that the cameras of a rig and many views of a scene share them."""
+_SUBPIXEL_BITS = 4
+
+
+def read_surfaces(
+    info: DatasetInfo,
+    sample: Sample,
+    camera: str,
+    shard_dir: Path,
+    assets: AssetLibrary,
+) -> tuple[UInt16, UInt8]:
+    """Read the instance image of a camera, and find the surfaces behind it.
+
+    Args:
+        info: The data set.
+        sample: Its scene and the truth of the camera are used.
+        camera: Sensor that writes the instance channel; without the depth channel, nothing is
+            known of the background.
+        shard_dir: Folder of the images.
+        assets: Meshes and materials of the background.
+
+    Returns:
+        Instance ids, uint16 [h, w], 0 = none; and indices of ``SURFACES`` where there is no
+        instance, uint8 [h, w].
+
+    Raises:
+        StorageError: an image is missing.
+    """
+    path = media_path(shard_dir, camera, Channel.INSTANCE, sample.index)
+    instances = read_image(path, Channel.INSTANCE, info.depth_scale_m).astype(np.uint16, copy=False)
+    surfaces = np.zeros(instances.shape, np.uint8)
+    free = instances == 0
+    ground = _ground_of(sample.scene_of(camera).bodies, assets)
+    sky_known = DEPTH_UNITS_MAX * info.depth_scale_m >= SKY_FROM_M
+    known = Channel.Z_DEPTH in info.media[camera] and free.any()
+    if not (known and (ground or sky_known)):
+        return instances, surfaces
+    path = media_path(shard_dir, camera, Channel.Z_DEPTH, sample.index)
+    depth_m = read_image(path, Channel.Z_DEPTH, info.depth_scale_m)
+    view, far = sample.truth[camera].camera, ~np.isfinite(depth_m)
+    if sky_known:
+        surfaces[free & far & _shows_sky(view)] = SKY
+    rows, columns = np.nonzero(free & ~far)
+    if ground:
+        p_camera = view.intrinsics.unproject(depth_m)[rows, columns]
+        p_world = world_points(sample.scene_of(camera), view, p_camera, rows)
+        surfaces[rows, columns] = _look_up(ground, view, p_world)
+    return instances, surfaces
+
+
+def _shows_sky(view: Camera) -> NDArray[np.bool_]:
+    """Pixels that look forwards and above the horizon, [h, w]."""
+    rays = view.intrinsics.pixel_rays()
+    up = view.T_world_camera.inverse().rotate(np.array([0.0, 0.0, 1.0]))
+    rises = rays[..., 0] * up[0] + rays[..., 1] * up[1] + rays[..., 2] * up[2]
+    shown: NDArray[np.bool_] = (rays[..., 2] > 0.0) & (rises > 0.0)
+    return shown
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Piece:
+    """Triangles of one surface of one body from above.
+
+    Attributes:
+        number: Index of ``SURFACES``.
+        corners_m: World X and Y, [n, 3, 2].
+    """
+
+    number: int
+    corners_m: Array
+
+
+def _ground_of(bodies: Sequence[Body], assets: AssetLibrary) -> tuple[_Piece, ...]:
+    """Pieces of the ground; wide bodies first, as others lie on them."""
+    pieces: list[_Piece] = []
+    for body in bodies:
+        if body.instance_id == 0 and body.motion == "static":
+            pieces += _pieces(body, assets)
+    return tuple(sorted(pieces, key=_extent_m2, reverse=True))
+
+
+@lru_cache(maxsize=64)
+def _pieces(body: Body, assets: AssetLibrary) -> tuple[_Piece, ...]:
+    """Pieces of a body with a ground surface, markings last; empty for most bodies."""
+    materials = body.materials or assets.materials(body.asset)
+    numbers = [SURFACES.index(m.role) if m.role in SURFACES[1:SKY] else 0 for m in materials]
+    if not any(numbers):
+        return ()
+    mesh = assets.mesh(body.asset)
+    vertices = body.T_world_body.apply(mesh.vertices_m.astype(np.float64) * body.scale)
+    triangles = vertices[mesh.faces]
+    u, v = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    up = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] > 0.0
+    of_face = np.array(numbers)[mesh.face_slots]
+    marking = SURFACES.index("marking")
+    order = sorted(set(numbers) - {0}, key=lambda number: number == marking)
+    return tuple(_Piece(k, triangles[up & (of_face == k)][..., :2]) for k in order)
+
+
+def _extent_m2(piece: _Piece) -> float:
+    """Area of the rectangle around a piece, rounded to whole hectares; ties keep their order."""
+    if not len(piece.corners_m):
+        return 0.0
+    size = np.ptp(piece.corners_m.reshape(-1, 2), axis=0)
+    return float(round(size[0] * size[1] / 1e4))
+
+
+def _look_up(ground: tuple[_Piece, ...], view: Camera, p_world: Array) -> UInt8:
+    """Surfaces below points [n, 3]; 0 outside all maps."""
+    x, y, _ = view.T_world_camera.translation_m
+    found = np.zeros(len(p_world), np.uint8)
+    left = np.ones(len(p_world), bool)
+    for cell_m, reach_m, step_m in MAPS:
+        middle = (step_m * round(x / step_m), step_m * round(y / step_m))
+        count = 2 * round((reach_m + 0.5 * step_m) / cell_m)
+        cells = np.floor((p_world[:, :2] - middle) / cell_m + 0.5 * count)
+        inside = left & ((cells >= 0) & (cells < count)).all(axis=1)
+        if inside.any():
+            column, row = cells[inside].astype(np.intp).T
+            found[inside] = _draw_map(ground, middle, cell_m, count)[row, column]
+        left &= ~inside
+    return found
+
+
+@lru_cache(maxsize=6)
+def _draw_map(
+    ground: tuple[_Piece, ...], middle_m: tuple[float, float], cell_m: float, count: int
+) -> UInt8:
+    """Surface of each cell of a square map, [count, count]; rows along Y, columns along X."""
+    drawn = np.zeros((count, count), np.uint8)
+    scale = 1 << _SUBPIXEL_BITS
+    for piece in ground:
+        # OpenCV has the centres of pixels at whole numbers.
+        cells = (piece.corners_m - middle_m) / cell_m + 0.5 * count - 0.5
+        near = (cells.max(axis=1) > -1).all(axis=1) & (cells.min(axis=1) < count).all(axis=1)
+        # Corners of large triangles stay far below the limit of 2^31 sixteenths of a cell.
+        for corners in np.rint(cells[near] * scale).astype(np.int32):
+            cv2.fillConvexPoly(drawn, corners, piece.number, cv2.LINE_8, _SUBPIXEL_BITS)
+    return drawn

@@ -1,0 +1,310 @@
+"""Cityscapes: label, instance and colour images of one camera, polygons, and its calibration.
+
+::
+
+    leftImg8bit/<split>/<city>/<city>_000012_000000_leftImg8bit.png
+    gtFine/<split>/<city>/<city>_000012_000000_gtFine_labelIds.png      8-bit class
+    gtFine/<split>/<city>/<city>_000012_000000_gtFine_instanceIds.png   16-bit
+    gtFine/<split>/<city>/<city>_000012_000000_gtFine_color.png         RGB
+    gtFine/<split>/<city>/<city>_000012_000000_gtFine_polygons.json
+    camera/<split>/<city>/<city>_000012_000000_camera.json
+    rightImg8bit/...  disparity/...                                     with a second camera
+
+The city is the name of the data set, its letters and digits; numbers are those of the sequence and
+of the instant in it.
+
+* **Classes** are the 34 of the benchmark with ids from 0: by category for objects and scenery, by
+  surface for ground and sky, which need images of depth (``background_surfaces``). The vehicle that
+  carries the camera is ``ego vehicle``. A rider and the two-wheeler are one object of the class
+  ``rider``.
+* **Instances** have ``1000 * class + k``, k from 0 within the class and image; pixels of other
+  classes have the class alone. So do, as groups, objects of a counted class that are not annotated
+  or that are below the thresholds; evaluation leaves groups out.
+* **Ignored** objects are ``unlabeled``.
+* **Polygons** run through the centres of pixels, larger ones first: drawn by cityscapesscripts
+  they give ``labelIds`` again. An object in several parts has several polygons.
+* **Calibration**: the focal length in pixels, the principal point with pixel centres at whole
+  numbers, and the pose on the rig (X forward, Y left, Z up; yaw, pitch, roll in radians, applied in
+  this order; positive pitch looks down); zero without a rig.
+* **Disparity**: 16-bit, ``(value - 1) / 256`` pixels, 0 = none.
+
+Reference: Cordts et al., "The Cityscapes Dataset for Semantic Urban Scene Understanding", CVPR
+2016; cityscapesscripts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import PrivateAttr
+
+from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.cityscapes_classes import UInt8, city_classes
+from gen_data.exporters.fragments import fragment_rows, write_fragment
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.png import RowFilter, encode_png
+from gen_data.exporters.sensor_selection import pinhole_camera, rgb_cameras
+from gen_data.exporters.sequences import (
+    camera_mount,
+    check_frame_names,
+    frame_facts,
+    write_bytes,
+    write_text,
+)
+from gen_data.generator.core.boxes import tight_box
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError, StorageError
+from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, media_path
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.scene import Camera, Scene
+from gen_data.generator.core.scene_time import RIG_AXES
+from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.core.stereo import baseline_m
+
+PER_CLASS = 1000
+"""Numbers of instances per class and image; further ones become groups."""
+UNLABELED, EGO_VEHICLE = "unlabeled", "ego vehicle"
+IMAGES = ("labelIds", "instanceIds", "color")
+
+
+class Cityscapes(ExporterBase):
+    """Cityscapes' fine annotations of one camera."""
+
+    type: Literal["cityscapes"] = "cityscapes"
+    camera: str = ""
+    """Sensor of the images; empty = the first one, by name, with the rgb channel."""
+    right: str = ""
+    """Second camera of a rectified pair; empty = none. The first one then needs disparity."""
+    _assets: AssetLibrary | None = PrivateAttr(None)
+
+    @property
+    def has_own_classes(self) -> bool:
+        """Classes are those of the benchmark."""
+        return True
+
+    def check(self, info: DatasetInfo) -> None:
+        """Reject a data set that this format cannot represent.
+
+        Raises:
+            ConfigError: the camera is missing, is no pinhole or lacks a channel, or there are too
+                many samples.
+        """
+        camera = pinhole_camera(info, self.camera, self.type)
+        needed = [Channel.INSTANCE, *([Channel.DISPARITY] if self.right else [])]
+        for channel in needed:
+            if channel not in info.media[camera]:
+                raise ConfigError(
+                    f"exporter '{self.type}': camera '{camera}' does not write the channel "
+                    f"{channel}; add it to the channels of the sensor"
+                )
+        others = [name for name in rgb_cameras(info) if name != camera]
+        if self.right and self.right not in others:
+            raise ConfigError(
+                f"exporter '{self.type}': right: '{self.right}' is not another camera that writes "
+                f"the rgb channel; expected one of: {', '.join(others) or 'none'}"
+            )
+        check_frame_names(info, self.type)
+
+    def with_assets(self, assets: AssetLibrary) -> Cityscapes:
+        """Return the exporter with a library of the ground's meshes."""
+        bound = self.model_copy()
+        bound._assets = assets
+        return bound
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write label images, polygons and calibration of each sample, and a line for it.
+
+        Raises:
+            ConfigError: see ``check``, or the cameras are no rectified pair.
+            StorageError: an image is missing.
+        """
+        assert self._assets is not None, "call with_assets first"
+        self.check(info)
+        camera = pinhole_camera(info, self.camera, self.type)
+        rows = []
+        for sample in samples:
+            if camera not in sample.truth or (self.right and self.right not in sample.truth):
+                continue
+            labels, instances = find_labels(info, sample, camera, shard_dir, self._assets)
+            stem = shard_dir / self.type / f"{sample.index:09d}"
+            pixels: dict[str, NDArray[Any]] = {
+                "labelIds": labels,
+                "instanceIds": instances,
+                "color": city_classes().colors[labels],
+            }
+            for name, image in pixels.items():
+                write_bytes(_beside(stem, f"{name}.png"), encode_png(image, RowFilter.UP, 2))
+            polygons = {
+                "imgHeight": labels.shape[0],
+                "imgWidth": labels.shape[1],
+                "objects": list(polygons_of(instances)),
+            }
+            write_text(_beside(stem, "polygons.json"), canonical_json(polygons) + "\n")
+            facts = camera_facts(sample.scene_of(camera), camera, self.right)
+            write_text(_beside(stem, "camera.json"), canonical_json(facts) + "\n")
+            if self.right:
+                source = media_path(shard_dir, camera, Channel.DISPARITY, sample.index)
+                write_bytes(_beside(stem, "disparity.png"), disparity_png(source))
+            rows.append(frame_facts(info, sample))
+        write_fragment(shard_dir / self.type, "frames", rows)
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Link the files of all shards under Cityscapes' names."""
+        camera = pinhole_camera(info, self.camera, self.type)
+        city = "".join(c for c in info.name if c.isalnum() and c.isascii()).lower() or "city"
+        for shard_dir, row in fragment_rows(shard_dirs, self.type, "frames"):
+            index = row["index"]
+            name = f"{city}_{row['sequence']:06d}_{row['step']:06d}"
+            stem = shard_dir / self.type / f"{index:09d}"
+            links = [(_beside(stem, f"{k}.png"), f"gtFine_{k}.png") for k in IMAGES]
+            links.append((_beside(stem, "polygons.json"), "gtFine_polygons.json"))
+            links.append((_beside(stem, "camera.json"), "camera.json"))
+            rgb = {"leftImg8bit": camera, **({"rightImg8bit": self.right} if self.right else {})}
+            for kind, sensor in rgb.items():
+                links.append((media_path(shard_dir, sensor, Channel.RGB, index), f"{kind}.png"))
+            if self.right:
+                links.append((_beside(stem, "disparity.png"), "disparity.png"))
+            for source, suffix in links:
+                kind = suffix.split("_")[0].split(".")[0]
+                folder = dataset_dir / kind / row["split"] / city
+                link_or_copy(source, folder / f"{name}_{suffix}")
+
+
+def find_labels(
+    info: DatasetInfo, sample: Sample, camera: str, shard_dir: Path, assets: AssetLibrary
+) -> tuple[UInt8, UInt16]:
+    """Find class and instance of every pixel.
+
+    Returns:
+        ``labelIds`` [h, w] and ``instanceIds`` [h, w].
+
+    Raises:
+        StorageError: an image is missing.
+    """
+    ids, surfaces = read_surfaces(info, sample, camera, shard_dir, assets)
+    classes, scene = city_classes(), sample.scene_of(camera)
+    size = 1 + max(int(ids.max()), max((i.instance_id for i in scene.instances), default=0))
+    label_of, code_of = np.zeros(size, np.uint8), np.zeros(size, np.uint16)
+    truth = {thing.instance.instance_id: thing for thing in sample.truth[camera].objects}
+    ego, counts = _carrier(scene, camera), dict.fromkeys(classes.by_name, 0)
+    for instance in sorted(scene.instances, key=lambda i: i.instance_id):
+        number = instance.instance_id
+        thing = truth.get(number)
+        kind = classes.of_instance(instance)
+        if number == ego:
+            kind = classes.by_name[EGO_VEHICLE]
+        elif thing is not None and thing.ignored:
+            kind = classes.by_name[UNLABELED]
+        label_of[number] = code_of[number] = kind.number
+        shown = thing is not None and thing.box is not None
+        if kind.counted and shown and counts[kind.name] < PER_CLASS:
+            code_of[number] = PER_CLASS * kind.number + counts[kind.name]
+            counts[kind.name] += 1
+    of_surface = np.array([classes.of_surface(name).number for name in SURFACES], np.uint8)
+    background = of_surface[surfaces]
+    labels: UInt8 = np.where(ids > 0, label_of[ids], background)
+    instances: UInt16 = np.where(ids > 0, code_of[ids], background)
+    return labels, instances
+
+
+def polygons_of(instances: UInt16) -> Iterator[dict[str, Any]]:
+    """Yield the objects of a polygons file: outlines through centres of pixels, larger ones first.
+
+    Regions in holes of others are smaller than these, so that they are drawn later.
+    """
+    classes = list(city_classes().by_name.values())
+    outlines: list[tuple[float, str, NDArray[np.int32]]] = []
+    for code in np.flatnonzero(np.bincount(instances.ravel())).tolist():
+        kind = classes[code // PER_CLASS if code >= PER_CLASS else code]
+        name = kind.name + ("group" if kind.counted and code < PER_CLASS else "")
+        for points in _outlines(instances == code):
+            outlines.append((cv2.contourArea(points), name, points))
+    for _, name, points in sorted(outlines, key=lambda item: -item[0]):
+        yield {"label": name, "polygon": points.tolist()}
+
+
+def _outlines(mask: NDArray[np.bool_]) -> Iterator[NDArray[np.int32]]:
+    """Yield the outlines [n, 2] of a mask's parts, at least three points each.
+
+    Pixels of one part have common edges: what a part surrounds, also by pixels that only touch at
+    corners, then consists of other parts.
+    """
+    box = tight_box(mask)
+    assert box is not None, "codes are those of pixels"
+    crop = mask[box.y_min : box.y_max, box.x_min : box.x_max].astype(np.uint8)
+    count, parts, facts, _ = cv2.connectedComponentsWithStats(crop, connectivity=4)
+    for part in range(1, count):
+        x, y, width, height, _ = facts[part].tolist()
+        piece = (parts[y : y + height, x : x + width] == part).astype(np.uint8)
+        (contour,), _ = cv2.findContours(piece, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+        points = contour[:, 0] + np.array([box.x_min + x, box.y_min + y], np.int32)
+        # Drawing needs three points, also for single pixels and lines.
+        yield np.concatenate([points, points[[-1] * max(0, 3 - len(points))]])
+
+
+def camera_facts(scene: Scene, camera: str, right: str) -> dict[str, Any]:
+    """Content of a camera file.
+
+    Raises:
+        ConfigError: the cameras are no rectified pair.
+    """
+    view = scene.camera(camera)
+    pose = camera_mount(scene, camera).T_rig_sensor @ RIG_AXES
+    r = pose.rotation()
+    x, y, z = pose.translation_m if view.rig else (0.0, 0.0, 0.0)
+    extrinsic = {
+        "baseline": _baseline(view, scene.camera(right)) if right else 0.0,
+        "pitch": math.asin(max(-1.0, min(1.0, -float(r[2, 0])))),
+        "roll": math.atan2(float(r[2, 1]), float(r[2, 2])),
+        "yaw": math.atan2(float(r[1, 0]), float(r[0, 0])),
+        "x": x,
+        "y": y,
+        "z": z,
+    }
+    k = view.intrinsics
+    intrinsic = {"fx": k.fx_px, "fy": k.fy_px, "u0": k.cx_px - 0.5, "v0": k.cy_px - 0.5}
+    return {"extrinsic": _rounded(extrinsic), "intrinsic": _rounded(intrinsic)}
+
+
+def disparity_png(source: Path) -> bytes:
+    """Convert an image of disparities, 256 per pixel and 0 = none, to Cityscapes' offset of 1.
+
+    Raises:
+        StorageError: the file is missing or no PNG.
+    """
+    image = cv2.imread(str(source), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise StorageError(f"{source}: missing or no PNG")
+    units = np.where(image > 0, np.minimum(image.astype(np.uint32) + 1, 65_535), 0)
+    return encode_png(units.astype(np.uint16), RowFilter.SUB, 1)
+
+
+def _carrier(scene: Scene, camera: str) -> int:
+    """Instance id of the vehicle that carries a camera; 0 without a rig."""
+    rig = scene.camera(camera).rig
+    return scene.body(scene.rig(rig).body).instance_id if rig else 0
+
+
+def _baseline(left: Camera, right: Camera) -> float:
+    try:
+        return baseline_m(left, right)
+    except ValueError as error:
+        raise ConfigError(
+            f"exporter 'cityscapes': cameras '{left.name}' and '{right.name}' are not a rectified "
+            f"pair: {error}"
+        ) from error
+
+
+def _rounded(values: Mapping[str, float]) -> dict[str, float]:
+    return {name: round(value, 9) + 0.0 for name, value in values.items()}
+
+
+def _beside(stem: Path, name: str) -> Path:
+    return stem.parent / f"{stem.name}_{name}"

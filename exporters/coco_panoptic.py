@@ -1,0 +1,256 @@
+"""COCO panoptic: every pixel belongs to at most one segment, a thing or stuff.
+
+::
+
+    annotations/panoptic_<split>.json                       none for a split without images
+    annotations/panoptic_<split>/000000012_color.png        RGB; id = R + 256 G + 65536 B, 0 = void
+    <split>/000000012_color.png                             images{file_name}, as in ``coco``
+
+* **Things** are the annotated objects with a visible pixel: one segment each, with the categories
+  and ids of ``coco``.
+* **Stuff** is one segment per category and image: scenery that has an instance and no annotation
+  (``building``, ``tree``, ``table``, ...), by its category; where images of depth are written, also
+  ``road``, ``pavement``, ``grass`` and ``sky`` (see ``background_surfaces``). Categories of stuff
+  that occur in the data set have the ids after those of things, in alphabetical order.
+* **Void** are pixels of neither: ignored objects, annotated objects below the thresholds, and
+  unannotated objects of a category of things (the hood of the ego vehicle), so that evaluation
+  ignores what is predicted there.
+
+Ids of segments are numbers within an image, scattered over all colours: things count from 1 by
+instance, stuff follows 65536. Box and area are those of the segment's pixels.
+
+References: https://cocodataset.org/#format-data; Kirillov et al., "Panoptic Segmentation", CVPR
+2019; panopticapi.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import PrivateAttr
+
+from gen_data.exporters.background_surfaces import SURFACES, read_surfaces
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.coco import box_xywh, dataset_header, image_name, write_dataset
+from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.label_colors import voc_palette
+from gen_data.exporters.png import RowFilter, encode_png
+from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
+from gen_data.exporters.sequences import write_bytes
+from gen_data.generator.core.boxes import tight_box
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, media_path
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.serialization import canonical_json
+
+UInt32 = NDArray[np.uint32]
+
+STUFF_OF_SURFACE = {
+    "asphalt": "road",
+    "marking": "road",
+    "pavement": "pavement",
+    "kerb": "pavement",
+    "grass": "grass",
+    "sky": "sky",
+}
+"""Names of stuff by surface of the background."""
+FIRST_STUFF = 65_536
+"""Number of an image's first segment of stuff; those of things are instance ids, of 16 bits."""
+_SCATTER = 0x9E3779B1
+"""Odd, so that multiplication modulo 2^24 gives every number one id, and only 0 the id 0."""
+
+
+class CocoPanoptic(ExporterBase):
+    """COCO panoptic segmentation of all cameras with the channels rgb and instance."""
+
+    type: Literal["coco_panoptic"] = "coco_panoptic"
+    _assets: AssetLibrary | None = PrivateAttr(None)
+
+    def check(self, info: DatasetInfo) -> None:
+        """Reject a data set that this format cannot represent.
+
+        Raises:
+            ConfigError: no camera writes the rgb channel, or one writes no instance channel.
+        """
+        check_channels(info, (Channel.INSTANCE,), self.type)
+
+    def with_assets(self, assets: AssetLibrary) -> CocoPanoptic:
+        """Return the exporter with a library of the ground's meshes."""
+        bound = self.model_copy()
+        bound._assets = assets
+        return bound
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write an id image and a JSON line per image, and the names of stuff.
+
+        Raises:
+            ConfigError: see ``check``.
+            StorageError: an image is missing.
+        """
+        assert self._assets is not None, "call with_assets first"
+        self.check(info)
+        rows: dict[str, list[dict[str, Any]]] = {}
+        for sample in samples:
+            for sensor in rgb_cameras(info):
+                if sensor in sample.truth:
+                    row = _write_segments(info, sample, sensor, shard_dir, self._assets)
+                    rows.setdefault(f"{sample.split}.images", []).append(row)
+        folder = shard_dir / self.type
+        folder.mkdir(parents=True, exist_ok=True)
+        for stem, lines in rows.items():
+            write_fragment(folder, stem, lines)
+        listed = (s["category"] for lines in rows.values() for line in lines for s in line["stuff"])
+        write_fragment(folder, "stuff", [{"name": name} for name in sorted(set(listed))])
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Number the categories of stuff, join the lines of all shards, and link the images."""
+        folders = [shard_dir / self.type for shard_dir in shard_dirs]
+        names = {json.loads(line)["name"] for line in fragment_lines(folders, "stuff")}
+        categories = _categories(info.categories, sorted(names))
+        ids = {category["name"]: category["id"] for category in categories}
+        splits = sorted({p.name.split(".")[0] for f in folders for p in f.glob("*.images.jsonl")})
+        (dataset_dir / "annotations").mkdir(parents=True, exist_ok=True)
+        for split in splits:
+            stem = f"{split}.images"
+            path = dataset_dir / f"annotations/panoptic_{split}.json"
+            write_dataset(
+                path,
+                dataset_header(info, categories),
+                map(_image_line, fragment_lines(folders, stem)),
+                _annotation_lines(fragment_lines(folders, stem), ids),
+            )
+            for shard_dir, row in fragment_rows(shard_dirs, self.type, stem):
+                name, sensor, index = row["file_name"], row["sensor"], row["sample"]
+                link_or_copy(shard_dir / self.type / name, path.with_suffix("") / name)
+                source = media_path(shard_dir, sensor, Channel.RGB, index)
+                link_or_copy(source, dataset_dir / split / name)
+
+
+def _write_segments(
+    info: DatasetInfo, sample: Sample, sensor: str, shard_dir: Path, assets: AssetLibrary
+) -> dict[str, Any]:
+    """Write the id image of one camera, and return its line."""
+    segments, stuff = find_segments(info, sample, sensor, shard_dir, assets)
+    name = image_name(sample.index, sensor)
+    # The bytes of a little-endian id are red, green, blue and 0.
+    pixels = segments.astype("<u4", copy=False).view(np.uint8).reshape(*segments.shape, 4)[..., :3]
+    write_bytes(shard_dir / f"coco_panoptic/{name}", encode_png(pixels, RowFilter.UP, 2))
+    return {
+        "id": sample.image_id(sensor),
+        "file_name": name,
+        "width": segments.shape[1],
+        "height": segments.shape[0],
+        "sensor": sensor,
+        "sample": sample.index,
+        "things": [
+            {
+                "id": segment_id(thing.instance.instance_id),
+                "category_id": thing.instance.category_id,
+                "area": thing.visible_px,
+                "bbox": box_xywh(thing.box),
+                "iscrowd": 0,
+            }
+            for thing in sample.truth[sensor].objects
+            if thing.box is not None and not thing.ignored
+        ],
+        "stuff": [_stuff_facts(segments, k, name) for k, name in enumerate(stuff, FIRST_STUFF)],
+    }
+
+
+def find_segments(
+    info: DatasetInfo, sample: Sample, sensor: str, shard_dir: Path, assets: AssetLibrary
+) -> tuple[UInt32, list[str]]:
+    """Find the segment of every pixel.
+
+    Returns:
+        Ids of segments, uint32 [h, w]: ``segment_id`` of the instance ids of things, and of
+        ``FIRST_STUFF + k`` for the k-th name of stuff; 0 = void. Names of stuff, sorted.
+
+    Raises:
+        StorageError: an image is missing.
+    """
+    instances, surfaces = read_surfaces(info, sample, sensor, shard_dir, assets)
+    shown = np.flatnonzero(np.bincount(instances.ravel()))
+    listed = {i.instance_id: i for i in sample.scene_of(sensor).instances}
+    stuff_of = {
+        number: listed[number].category
+        for number in shown.tolist()
+        if number in listed and not listed[number].annotated
+    }
+    seen = np.flatnonzero(np.bincount(surfaces.ravel()))
+    ground = {k: STUFF_OF_SURFACE[SURFACES[k]] for k in seen.tolist() if k}
+    known = sorted({*stuff_of.values(), *ground.values()} - set(info.categories))
+    ids = {name: segment_id(FIRST_STUFF + k) for k, name in enumerate(known)}
+    of_instance = np.zeros(int(instances.max()) + 1, np.uint32)
+    for thing in sample.truth[sensor].objects:
+        if thing.box is not None and not thing.ignored:
+            number = thing.instance.instance_id
+            of_instance[number] = segment_id(number)
+    for number, name in stuff_of.items():
+        of_instance[number] = ids.get(name, 0)
+    of_surface = np.zeros(len(SURFACES), np.uint32)
+    for k, name in ground.items():
+        of_surface[k] = ids.get(name, 0)
+    segments: UInt32 = of_instance[instances]
+    if ground:
+        segments = np.where(surfaces > 0, of_surface[surfaces], segments)
+    return segments, known
+
+
+def segment_id(number: int) -> int:
+    """Id of a segment, below 2^24, by its number; 0 = void."""
+    return number * _SCATTER & 0xFFFFFF
+
+
+def _stuff_facts(segments: UInt32, number: int, name: str) -> dict[str, Any]:
+    """Facts of a segment of stuff; its category has an id when all names are known."""
+    mask = segments == segment_id(number)
+    box = tight_box(mask)
+    assert box is not None, "names of stuff are those of pixels"
+    return {
+        "id": segment_id(number),
+        "category": name,
+        "area": int(np.count_nonzero(mask)),
+        "bbox": box_xywh(box),
+        "iscrowd": 0,
+    }
+
+
+def _categories(things: Sequence[str], stuff: Sequence[str]) -> list[dict[str, Any]]:
+    colors = voc_palette()
+    return [
+        {
+            "id": k,
+            "name": name,
+            "supercategory": "object" if k <= len(things) else "background",
+            "isthing": int(k <= len(things)),
+            "color": colors[1 + (k - 1) % 255].tolist(),
+        }
+        for k, name in enumerate([*things, *stuff], 1)
+    ]
+
+
+def _image_line(line: str) -> str:
+    row = json.loads(line)
+    return canonical_json({key: row[key] for key in ("id", "file_name", "width", "height")})
+
+
+def _annotation_lines(lines: Iterable[str], ids: Mapping[str, int]) -> Iterator[str]:
+    for line in lines:
+        row = json.loads(line)
+        stuff = [{**s, "category_id": ids[s["category"]]} for s in row["stuff"]]
+        for segment in stuff:
+            del segment["category"]
+        yield canonical_json(
+            {
+                "image_id": row["id"],
+                "file_name": row["file_name"],
+                "segments_info": [*row["things"], *stuff],
+            }
+        )

@@ -1,0 +1,303 @@
+"""Cityscapes export, held against ``coco``; the slow test reads it with cityscapesscripts."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image, ImageDraw
+from pycocotools import mask as coco_mask
+
+from gen_data.exporters.cityscapes import Cityscapes
+from gen_data.exporters.cityscapes_classes import city_classes
+from gen_data.exporters.coco import Coco
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+
+# pycocotools' decoder predates numpy 2's __array__(copy=...).
+pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
+
+CLASS_OF = {"car": 26, "crate": 5, "pedestrian": 24}
+
+
+@pytest.fixture(scope="module")
+def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The street with a tree that is not annotated, and its COCO export."""
+    tree = replace(
+        world.instance(9, "crate", 12.0, 1.0, 0.2), category="tree", category_id=0, annotated=False
+    )
+    wood = world.sample(7, (world.instance(1, "crate", 8.0, 1.6, 0.4), tree), [world.camera()])
+    folder = tmp_path_factory.mktemp("cityscapes")
+    for exporter in (Cityscapes(), Coco()):
+        info = world.info(8, depth_scale_m=1 / 256)
+        world.export(exporter, info, [*world.samples, wood], folder / exporter.type)
+    return folder
+
+
+def files_of(root: Path, index: int) -> dict[str, Path]:
+    """Files of a frame of the split train by their suffix."""
+    stem = f"street/street_{index:06d}_000000_"
+    gt = root / "gtFine/train"
+    return {
+        **{k: gt / f"{stem}gtFine_{k}.png" for k in ("labelIds", "instanceIds", "color")},
+        "polygons": gt / f"{stem}gtFine_polygons.json",
+        "camera": root / f"camera/train/{stem}camera.json",
+        "image": root / f"leftImg8bit/train/{stem}leftImg8bit.png",
+    }
+
+
+def pixels(path: Path) -> Any:
+    with Image.open(path) as image:
+        return np.asarray(image).astype(np.int64)
+
+
+def redrawn(path: Path) -> Any:
+    """Labels as cityscapesscripts draws them: polygons in their order, over each other."""
+    truth = json.loads(path.read_text())
+    numbers = {name: c.number for name, c in city_classes().by_name.items()}
+    image = Image.new("L", (truth["imgWidth"], truth["imgHeight"]), 0)
+    draw = ImageDraw.Draw(image)
+    for thing in truth["objects"]:
+        label = thing["label"].removesuffix("group")
+        draw.polygon([tuple(p) for p in thing["polygon"]], fill=numbers[label])
+    return np.asarray(image)
+
+
+def problems(root: Path, dataset: Path) -> list[str]:
+    """Differences between the files of each frame, and from COCO's masks."""
+    found = []
+    coco = json.loads((dataset / "coco/dataset/annotations/instances_train.json").read_text())
+    names = {c["id"]: c["name"] for c in coco["categories"]}
+    colors = np.array([c.color for c in city_classes().by_name.values()])
+    for image in coco["images"]:
+        files = files_of(root, image["sample"])
+        missing = [name for name, path in files.items() if not path.exists()]
+        if missing:
+            found.append(f"no {missing[0]}")
+            continue
+        labels, codes = pixels(files["labelIds"]), pixels(files["instanceIds"])
+        if not np.array_equal(np.where(codes >= 1000, codes // 1000, codes), labels):
+            found.append("instances differ from labels")
+        if not np.array_equal(pixels(files["color"]), colors[labels]):
+            found.append("colours differ from labels")
+        if not np.array_equal(redrawn(files["polygons"]), labels):
+            found.append("polygons differ from labels")
+        counts: dict[int, int] = {}
+        for row in coco["annotations"]:
+            if row["image_id"] != image["id"]:
+                continue
+            mask = coco_mask.decode(row["segmentation"]).astype(bool)
+            number = CLASS_OF[names[row["category_id"]]]
+            code = number
+            if number >= 24:
+                code = 1000 * number + counts.setdefault(number, 0)
+                counts[number] += 1
+                if not np.array_equal(codes == code, mask):
+                    found.append("an instance differs from COCO's")
+            if not (codes[mask] == code).all():
+                found.append("an instance differs from COCO's")
+    return found
+
+
+def test_label_images_and_polygons_agree_with_coco(dataset: Path) -> None:
+    """Counted classes have numbers; crates are dynamic and have none."""
+    assert problems(dataset / "cityscapes/dataset", dataset) == []
+
+
+def _shift(name: str) -> Callable[[Path], None]:
+    def damage(root: Path) -> None:
+        path = files_of(root, 0)[name]
+        with Image.open(path) as image:
+            moved = Image.fromarray(np.roll(np.asarray(image), 1, axis=1))
+        path.unlink()
+        moved.save(path)
+
+    return damage
+
+
+def _shift_polygons(root: Path) -> None:
+    path = files_of(root, 0)["polygons"]
+    truth = json.loads(path.read_text())
+    for thing in truth["objects"]:
+        thing["polygon"] = [[x + 1, y] for x, y in thing["polygon"]]
+    path.unlink()
+    path.write_text(json.dumps(truth))
+
+
+def _reverse_polygons(root: Path) -> None:
+    path = files_of(root, 0)["polygons"]
+    truth = json.loads(path.read_text())
+    truth["objects"].reverse()
+    path.unlink()
+    path.write_text(json.dumps(truth))
+
+
+@pytest.mark.parametrize(
+    ("damage", "named"),
+    [
+        (_shift("labelIds"), "instances differ from labels"),
+        (_shift("instanceIds"), "an instance differs from COCO's"),
+        (_shift("color"), "colours differ from labels"),
+        (_shift_polygons, "polygons differ from labels"),
+        (_reverse_polygons, "polygons differ from labels"),
+        (lambda root: files_of(root, 0)["camera"].unlink(), "no camera"),
+    ],
+)
+def test_damage_is_found(
+    dataset: Path, tmp_path: Path, damage: Callable[[Path], None], named: str
+) -> None:
+    """The check above is able to fail."""
+    root = tmp_path / "copy"
+    shutil.copytree(dataset / "cityscapes/dataset", root)
+
+    damage(root)
+
+    assert named in problems(root, dataset)
+
+
+def test_scenery_and_sky_have_classes(dataset: Path) -> None:
+    """A tree without annotation is vegetation; what is above the horizon is sky."""
+    labels = pixels(files_of(dataset / "cityscapes/dataset", 7)["labelIds"])
+    codes = pixels(files_of(dataset / "cityscapes/dataset", 7)["instanceIds"])
+    instances = pixels(dataset / "coco/dataset/instance/train/000000007_color.png")
+
+    assert (labels[instances == 9] == 21).all()
+    assert (codes[instances == 9] == 21).all()
+    assert (instances == 9).any()
+    assert (labels[:60][instances[:60] == 0] == 23).all()
+
+
+def test_images_are_links_to_the_shards(dataset: Path) -> None:
+    """No photograph is stored twice."""
+    shard = dataset / "cityscapes/shards/000000/color/rgb/000000002.png"
+    root = dataset / "cityscapes/dataset/leftImg8bit/val/street"
+
+    assert (root / "street_000002_000000_leftImg8bit.png").samefile(shard)
+
+
+def test_calibration_is_that_of_the_camera(world: Any, samples: Any, tmp_path: Path) -> None:
+    """On the rig: 0.3 m ahead, 1.6 m up, level; pixel centres at whole numbers."""
+    info = world.info(8, ("left", "right"), ("top",), steps_per_scene=4)
+
+    folder = world.export(Cityscapes(camera="left"), info, samples, tmp_path)
+
+    path = folder / "camera/train/street/street_000000_000003_camera.json"
+    facts = json.loads(path.read_text())
+    assert facts["extrinsic"] == pytest.approx(
+        {"baseline": 0, "pitch": 0, "roll": 0, "yaw": 0, "x": 0.3, "y": 0, "z": 1.6}, abs=1e-6
+    )
+    focal_px = 80 / math.tan(0.6)
+    assert facts["intrinsic"] == pytest.approx(
+        {"fx": focal_px, "fy": focal_px, "u0": 79.5, "v0": 59.5}, abs=1e-6
+    )
+
+
+def test_a_pair_has_disparities_and_a_baseline(world: Any, tmp_path: Path) -> None:
+    """(value - 1) / 256 pixels; times depth they are focal length times baseline."""
+    info, pairs = world.pairs()
+    channels = {"left": (*info.media["left"], Channel.INSTANCE), "right": (Channel.RGB,)}
+    info = replace(
+        info, sensors=tuple(replace(s, channels=channels.get(s.name, ())) for s in info.sensors)
+    )
+
+    folder = world.export(Cityscapes(camera="left", right="right"), info, pairs, tmp_path)
+
+    stem = "train/street/street_000000_000001"
+    facts = json.loads((folder / f"camera/{stem}_camera.json").read_text())
+    assert facts["extrinsic"]["baseline"] == pytest.approx(0.54)
+    values = pixels(folder / f"disparity/{stem}_disparity.png")
+    depth = pairs[1].capture.readings["left"].channels[Channel.Z_DEPTH]
+    near = np.isfinite(depth) & (depth < 15)
+    expected = facts["intrinsic"]["fx"] * 0.54 / depth[near]
+    np.testing.assert_allclose((values[near] - 1) / 256, expected, atol=0.003)
+    assert (values[~np.isfinite(depth)] == 0).all()
+    assert (folder / f"rightImg8bit/{stem}_rightImg8bit.png").exists()
+
+
+def test_riders_vans_and_the_ego_vehicle(world: Any, samples: Any, tmp_path: Path) -> None:
+    """Classes come from the table; the carrier of the camera from its rig."""
+    classes = city_classes()
+    bicycle = replace(world.instance(1, "car", 0, 0, 0), category="bicycle")
+    assert classes.of_instance(bicycle).name == "bicycle"
+    ridden = replace(bicycle, attributes=(("rider", "yes"),))
+    assert classes.of_instance(ridden).name == "rider"
+    assert classes.of_instance(replace(bicycle, category="van")).name == "car"
+    assert classes.of_instance(replace(bicycle, category="sofa")).name == "dynamic"
+    sofa = replace(bicycle, category="sofa", annotated=False)
+    assert classes.of_instance(sofa).name == "static"
+
+    scene = samples[0].scene
+    bodies = tuple(replace(b, instance_id=1) if b.name == "ego" else b for b in scene.bodies)
+    own = replace(samples[0], scene=replace(scene, bodies=bodies))
+    info = world.info(1, ("left", "right"), ("top",))
+    folder = world.export(Cityscapes(camera="left"), info, [own], tmp_path)
+    codes = pixels(files_of(folder, 0)["instanceIds"])
+    ids = samples[0].capture.readings["left"].channels[Channel.INSTANCE]
+    assert (codes[ids == 1] == 1).all()
+
+
+def test_ignored_objects_are_unlabeled(world: Any, tmp_path: Path) -> None:
+    """Which evaluation leaves out."""
+    sample = world.samples[0]
+    truth = sample.truth["color"]
+    first, *others = truth.objects
+    marked = replace(truth, objects=(replace(first, ignored=True), *others))
+
+    changed = replace(sample, truth={"color": marked})
+    folder = world.export(Cityscapes(), world.info(1), [changed], tmp_path)
+
+    labels = pixels(files_of(folder, 0)["labelIds"])
+    ids = sample.capture.readings["color"].channels[Channel.INSTANCE]
+    assert (labels[ids == first.instance.instance_id] == 0).all()
+
+
+def test_a_missing_channel_is_refused(world: Any) -> None:
+    """Before anything is rendered."""
+    info = world.info(1, media={"color": (Channel.RGB,)})
+
+    with pytest.raises(ConfigError, match="does not write the channel instance; add it"):
+        Cityscapes().check(info)
+    with pytest.raises(ConfigError, match="does not write the channel disparity"):
+        Cityscapes(right="other").check(world.info(1))
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")
+def test_the_official_scripts_read_it(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Polygons give the label images; the ground truth as prediction has IoU 1."""
+    root = dataset / "cityscapes/dataset"
+    monkeypatch.setenv("CITYSCAPES_DATASET", str(root))
+    # cityscapesscripts still has the name that numpy 2.4 removed.
+    monkeypatch.setattr(np, "in1d", np.isin, raising=False)
+    import cityscapesscripts.evaluation.evalPixelLevelSemanticLabeling as pixel_level  # noqa: N813
+    from cityscapesscripts.helpers.annotation import Annotation
+    from cityscapesscripts.helpers.labels import labels as official
+    from cityscapesscripts.preparation.json2labelImg import createLabelImage
+
+    ours = [(c.name, c.number, c.color, c.counted) for c in city_classes().by_name.values()]
+    assert ours == [(k.name, k.id, k.color, k.hasInstances) for k in official if k.id >= 0]
+
+    paths = sorted((root / "gtFine/train/street").glob("*_labelIds.png"))
+    for path in paths:
+        annotation = Annotation()
+        annotation.fromJsonFile(str(path).replace("labelIds.png", "polygons.json"))
+        drawn = np.asarray(createLabelImage(annotation, "ids"))
+        np.testing.assert_array_equal(drawn, pixels(path))
+
+    names = [str(path) for path in paths]
+    arguments = pixel_level.args
+    arguments.quiet, arguments.JSONOutput, arguments.evalInstLevelScore = True, False, True
+    result = pixel_level.evaluateImgLists(names, names, arguments)
+    scores = SimpleNamespace(**result)
+    assert scores.averageScoreClasses == pytest.approx(1.0)
+    assert scores.averageScoreInstClasses == pytest.approx(1.0)
+    shifted = pixel_level.evaluateImgLists(names, names[::-1], arguments)
+    assert shifted["averageScoreClasses"] < 0.9

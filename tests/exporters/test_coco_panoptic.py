@@ -1,0 +1,245 @@
+"""COCO panoptic export, held against the instances of ``coco`` and the definition of PQ."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from PIL import Image
+from pycocotools import mask as coco_mask
+
+from gen_data.exporters.coco import Coco
+from gen_data.exporters.coco_panoptic import CocoPanoptic
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
+
+# pycocotools' decoder predates numpy 2's __array__(copy=...).
+pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
+
+
+def scenery(world: Any) -> Any:
+    """A tree and a hood, neither annotated, behind and beside an annotated crate."""
+    tree = replace(world.instance(5, "crate", 12.0, 1.0, 0.2), annotated=False)
+    hood = replace(world.instance(6, "car", 9.0, -3.0, 0.0), annotated=False)
+    things = (
+        world.instance(1, "crate", 8.0, 1.6, 0.4),
+        world.instance(2, "pedestrian", 9.0, -2.0, 1.0),
+        replace(tree, category="tree", category_id=0),
+        replace(hood, category_id=0),
+    )
+    return world.sample(7, things, [world.camera()])
+
+
+@pytest.fixture(scope="module")
+def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The street and a frame with scenery, with its instances beside."""
+    folder = tmp_path_factory.mktemp("panoptic")
+    samples = [*world.samples, scenery(world)]
+    for exporter in (CocoPanoptic(), Coco()):
+        # The depth of 16-bit images reaches the sky.
+        info = world.info(8, depth_scale_m=1 / 256)
+        world.export(exporter, info, samples, folder / exporter.type)
+    return folder
+
+
+def segments_of(path: Path) -> NDArray[np.int64]:
+    """Ids as panopticapi's rgb2id reads them."""
+    with Image.open(path) as image:
+        assert (image.format, image.mode) == ("PNG", "RGB")
+        r, g, b = np.moveaxis(np.asarray(image).astype(np.int64), -1, 0)
+    return r + 256 * g + 65_536 * b
+
+
+def read(folder: Path, split: str = "train") -> Any:
+    """The JSON of a split."""
+    return json.loads((folder / f"annotations/panoptic_{split}.json").read_text())
+
+
+def problems(folder: Path) -> list[str]:
+    """What the format's definition forbids."""
+    truth, found = read(folder), []
+    isthing = {c["id"]: c["isthing"] for c in truth["categories"]}
+    if [a["image_id"] for a in truth["annotations"]] != [i["id"] for i in truth["images"]]:
+        found.append("images and annotations differ")
+    for annotation in truth["annotations"]:
+        path = folder / "annotations/panoptic_train" / annotation["file_name"]
+        if not path.exists():
+            found.append("no id image")
+            continue
+        ids = segments_of(path)
+        listed = {s["id"]: s for s in annotation["segments_info"]}
+        if {0, *listed} != {0, *np.unique(ids).tolist()} or 0 in listed:
+            found.append("ids differ")
+        stuff = [s["category_id"] for s in listed.values() if not isthing[s["category_id"]]]
+        if len(stuff) != len(set(stuff)):
+            found.append("stuff in two segments")
+        for number, segment in listed.items():
+            mask = ids == number
+            y, x = np.nonzero(mask)
+            if segment["area"] != mask.sum():
+                found.append("area")
+            elif segment["bbox"] != [x.min(), y.min(), np.ptp(x) + 1, np.ptp(y) + 1]:
+                found.append("box")
+    return found
+
+
+def panoptic_quality(folder: Path, predicted: Callable[[NDArray[Any]], NDArray[Any]]) -> float:
+    """PQ of changed id images (Kirillov et al. 2019, equation 1): mean over categories.
+
+    Segments match if they have the category and an IoU above 0.5; void counts for neither.
+    """
+    truth = read(folder)
+    scores: dict[int, list[float]] = {}
+    for annotation in truth["annotations"]:
+        ids = segments_of(folder / "annotations/panoptic_train" / annotation["file_name"])
+        guess = np.where(ids > 0, predicted(ids), 0)
+        for segment in annotation["segments_info"]:
+            number, row = segment["id"], scores.setdefault(segment["category_id"], [0, 0])
+            union = ((ids == number) | (guess == number)).sum()
+            overlap = ((ids == number) & (guess == number)).sum() / union
+            row[0] += overlap if overlap > 0.5 else 0
+            row[1] += 1 if overlap > 0.5 else 0.5 + 0.5 * bool((guess == number).any())
+    return float(np.mean([iou / count for iou, count in scores.values()]))
+
+
+def test_it_keeps_the_definition_and_scores_one(dataset: Path) -> None:
+    """The ground truth as prediction has PQ 1; shifted by some pixels it has not."""
+    folder = dataset / "coco_panoptic/dataset"
+
+    assert problems(folder) == []
+    assert panoptic_quality(folder, lambda ids: ids) == 1.0
+    assert panoptic_quality(folder, lambda ids: np.roll(ids, 4, axis=1)) < 0.9
+
+
+def _swap_channels(folder: Path) -> None:
+    for path in (folder / "annotations/panoptic_train").iterdir():
+        with Image.open(path) as image:
+            Image.fromarray(np.asarray(image)[..., ::-1].copy()).save(
+                path.with_suffix(".new"), "PNG"
+            )
+        path.with_suffix(".new").replace(path)
+
+
+def _change_json(change: Callable[[Any], None]) -> Callable[[Path], None]:
+    def damage(folder: Path) -> None:
+        truth = read(folder)
+        change(truth)
+        path = folder / "annotations/panoptic_train.json"
+        path.unlink()
+        path.write_text(json.dumps(truth))
+
+    return damage
+
+
+def _remove_image(folder: Path) -> None:
+    next((folder / "annotations/panoptic_train").iterdir()).unlink()
+
+
+@pytest.mark.parametrize(
+    ("damage", "named"),
+    [
+        (_swap_channels, "ids differ"),
+        (_remove_image, "no id image"),
+        (_change_json(lambda t: t["annotations"].pop()), "images and annotations differ"),
+        (_change_json(lambda t: t["annotations"][0]["segments_info"].pop()), "ids differ"),
+        (_change_json(lambda t: _first(t).update(area=_first(t)["area"] + 1)), "area"),
+        (_change_json(lambda t: _first(t)["bbox"].__setitem__(2, 1)), "box"),
+    ],
+)
+def test_damage_is_found(
+    dataset: Path, tmp_path: Path, damage: Callable[[Path], None], named: str
+) -> None:
+    """The check above is able to fail."""
+    folder = tmp_path / "copy"
+    shutil.copytree(dataset / "coco_panoptic/dataset", folder)
+
+    damage(folder)
+
+    assert named in problems(folder)
+
+
+def _first(truth: Any) -> Any:
+    return truth["annotations"][0]["segments_info"][0]
+
+
+def test_things_are_the_instances_of_coco(dataset: Path) -> None:
+    """One segment per annotation, with the same pixels, category and image."""
+    folder = dataset / "coco_panoptic/dataset"
+    truth = read(folder)
+    instances = json.loads((dataset / "coco/dataset/annotations/instances_train.json").read_text())
+    things = {c["id"] for c in truth["categories"] if c["isthing"]}
+    count = 0
+    for annotation in truth["annotations"]:
+        ids = segments_of(folder / "annotations/panoptic_train" / annotation["file_name"])
+        rows = [a for a in instances["annotations"] if a["image_id"] == annotation["image_id"]]
+        listed = [s for s in annotation["segments_info"] if s["category_id"] in things]
+        assert len(listed) == len(rows)
+        for segment, row in zip(listed, rows, strict=True):
+            mask = coco_mask.decode(row["segmentation"]).astype(bool)
+            np.testing.assert_array_equal(ids == segment["id"], mask)
+            assert (segment["category_id"], segment["bbox"]) == (row["category_id"], row["bbox"])
+            count += 1
+    assert count > 10
+
+
+def test_scenery_is_stuff_and_unannotated_cars_are_void(dataset: Path) -> None:
+    """Names of stuff that occur follow the things; a hood is neither thing nor background."""
+    folder = dataset / "coco_panoptic/dataset"
+    truth = read(folder)
+    names = {c["id"]: (c["name"], c["isthing"]) for c in truth["categories"]}
+
+    assert names == {
+        1: ("car", 1), 2: ("crate", 1), 3: ("pedestrian", 1), 4: ("sky", 0), 5: ("tree", 0),
+    }  # fmt: skip
+    (annotation,) = (a for a in truth["annotations"] if a["file_name"] == "000000007_color.png")
+    shown = [names[s["category_id"]][0] for s in annotation["segments_info"]]
+    assert shown == ["crate", "pedestrian", "sky", "tree"]
+    ids = segments_of(folder / "annotations/panoptic_train/000000007_color.png")
+    with Image.open(dataset / "coco/dataset/instance/train/000000007_color.png") as image:
+        instances = np.asarray(image)
+    assert (instances == 6).any()
+    assert (ids[instances == 6] == 0).all()
+    (tree,) = (s for s in annotation["segments_info"] if s["category_id"] == 5)
+    np.testing.assert_array_equal(ids == tree["id"], instances == 5)
+
+
+def test_the_sky_is_above_the_horizon(dataset: Path) -> None:
+    """The level camera has it in its upper half, behind everything."""
+    truth = read(dataset / "coco_panoptic/dataset")
+    for annotation in truth["annotations"]:
+        (sky,) = (s for s in annotation["segments_info"] if s["category_id"] == 4)
+        _, top, _, height = sky["bbox"]
+        assert (top, height) == (0, 60)
+
+
+def test_ignored_objects_are_void(world: Any, tmp_path: Path) -> None:
+    """Evaluation leaves out what is predicted there."""
+    sample = world.samples[0]
+    truth = sample.truth["color"]
+    first, *others = truth.objects
+    marked = replace(truth, objects=(replace(first, ignored=True), *others))
+
+    changed = replace(sample, truth={"color": marked})
+    folder = world.export(CocoPanoptic(), world.info(1), [changed], tmp_path)
+
+    (annotation,) = read(folder)["annotations"]
+    assert len(annotation["segments_info"]) == len(others)
+    ids = segments_of(folder / "annotations/panoptic_train" / annotation["file_name"])
+    mask = first.mask
+    crop = ids[mask.y_px : first.box.y_max, mask.x_px : first.box.x_max]
+    assert (crop[mask.pixels] == 0).all()
+
+
+def test_a_camera_without_instance_images_is_refused(world: Any) -> None:
+    """Before anything is rendered."""
+    info = world.info(1, media={"color": (Channel.RGB, Channel.CATEGORY)})
+
+    with pytest.raises(ConfigError, match="'color' does not write the channel instance; add it"):
+        CocoPanoptic().check(info)
