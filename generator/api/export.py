@@ -68,7 +68,7 @@ def export(
     exporters = ready_exporters(config, stored.info, open_library(config.asset_folders))
     return write_exports(
         stored,
-        config.resolved,
+        config,
         exporters,
         Path(out),
         workers=len(os.sched_getaffinity(0)) if workers is None else workers,

@@ -11,9 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from gen_data.exporters.image_files import link_or_copy
+from gen_data.generator.assemble.config import Config
+from gen_data.generator.assets.library import open_library
 from gen_data.generator.core.interfaces import (
     DatasetInfo,
     Exporter,
@@ -22,6 +23,7 @@ from gen_data.generator.core.interfaces import (
     table_path,
 )
 from gen_data.generator.core.sample import Sample
+from gen_data.generator.pipeline.finalize_scene import Timeline
 from gen_data.generator.runner.labels import LABELS_NAME
 from gen_data.generator.runner.progress import RunProgress, Summary
 from gen_data.generator.runner.provenance import SCENES_NAME
@@ -32,10 +34,15 @@ from gen_data.generator.runner.stored import StoredSamples
 
 @dataclass(frozen=True)
 class StoredPipeline:
-    """A pipeline that reads its samples from a finished data set; picklable."""
+    """A pipeline that reads its samples from a finished data set; picklable.
+
+    Attributes:
+        asset_folders: Of the data set's configuration.
+    """
 
     stored: StoredSamples
     exporters: Mapping[str, Exporter]
+    asset_folders: tuple[Path, ...] = ()
 
     @property
     def info(self) -> DatasetInfo:
@@ -44,7 +51,16 @@ class StoredPipeline:
 
     def sample(self, index: int) -> Sample:
         """Read a sample; its images are decoded on access."""
-        return self.stored.sample(index)
+        sample = self.stored.sample(index)
+        readings = (*sample.capture.readings.values(), *sample.capture.clouds.values())
+        times_s = {one.sensor: one.time_s for one in readings}
+        apart = {name: t for name, t in times_s.items() if t != sample.scene.time_s}
+        if not apart:
+            return sample
+        # Sensors with an offset see the scene of another instant, which files do not hold.
+        ids = {name: number for number, name in enumerate(self.info.categories, 1)}
+        timeline = Timeline(sample.scene, open_library(self.asset_folders), ids)
+        return replace(sample, instants={name: timeline.at(t) for name, t in apart.items()})
 
     def __call__(self) -> StoredPipeline:
         """Make the pipeline of a process."""
@@ -92,7 +108,7 @@ class LinkedFiles:
 
 def export(
     stored: StoredSamples,
-    config: Mapping[str, Any],
+    config: Config,
     exporters: Mapping[str, Exporter],
     out: Path,
     *,
@@ -104,7 +120,7 @@ def export(
 
     Args:
         stored: The data set.
-        config: Its resolved configuration, with these exporters.
+        config: Its configuration, with these exporters.
         exporters: By name; checked.
         out: Folder of the new data set. Its shards are hard links to those of the old one, or
             copies on another file system.
@@ -119,8 +135,8 @@ def export(
     text = licences.read_text("utf-8") if licences.exists() else None
     files = LinkedFiles(stored)
     return run(
-        replace(stored.plan, config=config),
-        StoredPipeline(stored, exporters),
+        replace(stored.plan, config=config.resolved),
+        StoredPipeline(stored, exporters, config.asset_folders),
         out,
         workers=workers,
         resume_command=resume_command,

@@ -87,3 +87,21 @@ def test_a_foreign_or_damaged_folder_is_named(dataset: Path, tmp_path: Path) -> 
     assert foreign.returncode == broken.returncode == 4
     assert "is not a gen-data data set" in foreign.stderr
     assert "000001: its scenes or labels cannot be read" in broken.stderr
+
+
+@pytest.mark.slow
+def test_sensors_at_other_instants_export_the_same_bytes(tmp_path: Path) -> None:
+    """Boxes of a delayed scanner are those of its own instant, also in a later export."""
+    made = gen_data(
+        "--config", "tabletop_sequence.yaml", "--n", "2", "--workers", "1", "--out", "made",
+        "--set", "steps_per_scene=2", "--set", "splits={train: 1, val: 0, test: 0}",
+        "--set", "sensors=[{type: rgb_camera, name: color, size_px: [96, 72]}, "
+        "{type: pseudo_lidar, time_offset_s: 0.15}]",
+        "--set", "exporters=[{type: pointclouds}]", cwd=tmp_path,
+    )  # fmt: skip
+    assert made.returncode == 0, made.stderr
+
+    done = gen_data("export", "made", "-f", "pointclouds", "-o", "again", cwd=tmp_path)
+
+    assert done.returncode == 0, done.stderr
+    assert digest(tmp_path / "again") == digest(tmp_path / "made")
