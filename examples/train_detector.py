@@ -137,17 +137,23 @@ def detect(model: Detector, image: np.ndarray, size: int) -> list[tuple[list[flo
     return found
 
 
-def train(args: argparse.Namespace, classes: tuple[str, ...]) -> Detector:
-    """Train for the given time."""
-    torch.manual_seed(args.seed)
-    rng = np.random.default_rng(args.seed)
+def open_source(args: argparse.Namespace) -> gen_data.SampleSequence:
+    """The samples to train on, with the classes of their label map if they have one."""
     source = Path(args.source)
     if (source / "manifest.json").is_file():
-        samples: gen_data.StoredDataset | gen_data.Dataset = gen_data.open(source)
-        options: dict[str, int] = {}
+        samples: gen_data.SampleSequence = gen_data.open(source)
     else:
         samples = gen_data.Dataset(args.source, seed=args.seed)
-        options = {"epoch_size": args.epoch_size}
+    has_map = bool((samples.config.get("labels") or {}).get("map"))
+    return samples.relabelled() if has_map else samples
+
+
+def train(args: argparse.Namespace, samples: gen_data.SampleSequence) -> Detector:
+    """Train for the given time."""
+    classes = samples.categories
+    torch.manual_seed(args.seed)
+    rng = np.random.default_rng(args.seed)
+    options = {} if samples.is_bounded else {"epoch_size": args.epoch_size}
     loader: gen_data.Loader = gen_data.Loader(
         samples, detection_target, batch_size=args.batch, shuffle=True, seed=args.seed,
         workers=args.workers, **options,
@@ -260,10 +266,8 @@ def main() -> None:
     parser.add_argument("--bootstrap", type=int, default=200)
     parser.add_argument("--out", type=Path, help="also write AP as JSON here")
     args = parser.parse_args()
-    source = Path(args.source)
-    is_stored = (source / "manifest.json").is_file()
-    classes = (gen_data.open(source) if is_stored else gen_data.Dataset(args.source)).categories
-    evaluate(args, train(args, classes), classes)
+    samples = open_source(args)
+    evaluate(args, train(args, samples), samples.categories)
 
 
 if __name__ == "__main__":

@@ -213,9 +213,9 @@ class AppliedLabelMap:
 
     def map_sample(self, sample: Sample) -> Sample:
         """The sample with mapped labels."""
-        truth = {name: self._map_image(image) for name, image in sample.truth.items()}
-        instants = {name: self._map_scene(scene) for name, scene in sample.instants.items()}
-        return replace(sample, truth=truth, scene=self._map_scene(sample.scene), instants=instants)
+        truth = {name: self.map_image(image) for name, image in sample.truth.items()}
+        instants = {name: self.map_scene(scene) for name, scene in sample.instants.items()}
+        return replace(sample, truth=truth, scene=self.map_scene(sample.scene), instants=instants)
 
     @property
     def _has_classes(self) -> bool:
@@ -227,7 +227,8 @@ class AppliedLabelMap:
         listed = enumerate(self.label_map.classes_of.items(), 1)
         return {category: (name, k) for k, (name, own) in listed for category in own}
 
-    def _map_image(self, truth: ImageTruth) -> ImageTruth:
+    def map_image(self, truth: ImageTruth) -> ImageTruth:
+        """The annotations of an image with mapped objects."""
         return replace(truth, objects=tuple(self._map_objects(truth.objects)))
 
     def _map_objects(self, objects: Iterable[ObjectTruth]) -> Iterator[ObjectTruth]:
@@ -265,7 +266,7 @@ class AppliedLabelMap:
         name, number = self._class_of.get(instance.category, (instance.category, 0))
         return replace(instance, category=name, category_id=number)
 
-    def _map_scene(self, scene: Scene) -> Scene:
+    def map_scene(self, scene: Scene) -> Scene:
         """The scene whose instances are mapped; those of other categories are not annotated."""
         known = self._class_of if self.label_map.classes is not None else None
         instances = tuple(

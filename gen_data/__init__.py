@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from gen_data.generator import __version__
 
 if TYPE_CHECKING:
-    from gen_data.generator.api.dataset import Dataset, StoredDataset
+    from gen_data.generator.api.dataset import Dataset, SampleSequence, StoredDataset
     from gen_data.generator.api.dataset import open_dataset as open  # noqa: A004
     from gen_data.generator.api.export import export
     from gen_data.generator.api.generate import generate
@@ -49,6 +49,7 @@ _HOMES = {
     "Dataset": "gen_data.generator.api.dataset",
     "Loader": "gen_data.generator.api.loader",
     "Sample": "gen_data.generator.api.sample",
+    "SampleSequence": "gen_data.generator.api.dataset",
     "Scene": "gen_data.generator.core.scene",
     "StoredDataset": "gen_data.generator.api.dataset",
     "export": "gen_data.generator.api.export",
@@ -85,6 +86,7 @@ __all__ = [
     "Sample",
     "SampleError",
     "SampleIndexError",
+    "SampleSequence",
     "Scene",
     "SceneRejected",
     "StorageError",

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.api.config import ConfigLike, load_config
+from gen_data.generator.api.relabelling import LabelMapLike, RelabelledSamples, load_label_map
 from gen_data.generator.api.sample import Sample, SampleRecord
 from gen_data.generator.core.errors import ConfigError, SampleIndexError, did_you_mean
 from gen_data.generator.runner.stored import StoredSamples
@@ -113,6 +114,19 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
     def config(self) -> Mapping[str, Any]:
         """The resolved configuration as plain dictionaries, lists, strings and numbers."""
         return self._source.config
+
+    def relabelled(self, label_map: LabelMapLike | None = None) -> SampleSequence:
+        """The same samples with the classes and objects of a label map.
+
+        Args:
+            label_map: File or dictionary with the content of ``labels.map`` of a configuration;
+                None = that of this data set's configuration.
+
+        Raises:
+            ConfigError: it is invalid, or the configuration has none.
+        """
+        loaded = load_label_map(label_map, self.config)
+        return SampleSequence(RelabelledSamples(self._source, loaded), self._indices)
 
     def scene_indices(self, positions: NDArray[np.int64]) -> NDArray[np.int64]:
         """Numbers of the scenes of samples, which are cheapest to read one scene after the other.

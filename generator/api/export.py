@@ -83,15 +83,10 @@ def label_map_override(path: Path) -> str:
     Raises:
         ConfigError: the file is no label map; the message lists all errors with their positions.
     """
-    from gen_data.exporters.label_map import LabelMap
-    from gen_data.generator.config.problems import Problems
-    from gen_data.generator.config.validation import validate
-    from gen_data.generator.config.yaml_tree import load_yaml
+    from gen_data.generator.api.relabelling import load_label_map
 
-    problems, document = Problems(), load_yaml(path)
-    validate(document, LabelMap, problems)
-    problems.raise_if_any()
-    return f"labels.map={json.dumps(document.plain())}"
+    label_map = load_label_map(path, {})
+    return f"labels.map={label_map.model_dump_json(exclude_unset=True)}"
 
 
 def _check_annotations(made: Config, wanted: Config) -> None:

@@ -52,8 +52,9 @@ class StoredPipeline:
     def sample(self, index: int) -> Sample:
         """Read a sample; its images are decoded on access."""
         sample = self.stored.sample(index)
-        readings = (*sample.capture.readings.values(), *sample.capture.clouds.values())
-        times_s = {one.sensor: one.time_s for one in readings}
+        capture = sample.capture
+        times_s = {name: one.time_s for name, one in capture.readings.items()}
+        times_s |= {name: one.time_s for name, one in capture.clouds.items()}
         apart = {name: t for name, t in times_s.items() if t != sample.scene.time_s}
         if not apart:
             return sample

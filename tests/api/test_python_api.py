@@ -328,3 +328,27 @@ def test_normals_are_read_as_unit_vectors(tmp_path: Path) -> None:
     assert (read[0, 0] == 0.0).all()
     angles = np.arccos(np.clip((read * normals).sum(axis=-1), -1.0, 1.0))[1:]
     assert np.degrees(angles).max() < 0.7
+
+
+def test_relabelled_samples_have_the_classes_of_the_map(stored: gen_data.StoredDataset) -> None:
+    """Only their objects, with the ids of the map's order; images stay, pickles too."""
+    names = sorted({b.category for s in stored for b in s.boxes2d["color"]})
+    chosen = {"second": names[1], "first": [names[0]]}
+    mapped = stored.relabelled({"classes": chosen})
+
+    assert mapped.categories == ("second", "first")
+    for plain, one in zip(stored, pickle.loads(pickle.dumps(mapped)), strict=True):
+        expected = [b for b in plain.boxes2d["color"] if b.category in names[:2]]
+        boxes = one.boxes2d["color"]
+        assert [b.xyxy for b in boxes] == [b.xyxy for b in expected]
+        assert [b.category_id for b in boxes] == [2 - names.index(b.category) for b in expected]
+        assert np.array_equal(one.cameras["color"].rgb, plain.cameras["color"].rgb)
+        assert {i.category for i in one.scene.instances if i.annotated} <= {"first", "second"}
+
+
+def test_a_label_map_must_be_given_or_configured(stored: gen_data.StoredDataset) -> None:
+    """With the place of a fault."""
+    with pytest.raises(gen_data.ConfigError, match=r"labels\.map: the configuration has none"):
+        stored.relabelled()
+    with pytest.raises(gen_data.ConfigError, match=r"<label map>:1:\d+: classess: unknown key"):
+        stored.relabelled({"classess": {}})

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -39,13 +41,48 @@ def test_the_first_data_set_is_drawn(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_loader_reads_every_sample_in_each_epoch(tmp_path: Path) -> None:
-    """Two epochs of two batches, with the same number of boxes in another order."""
+def test_both_loaders_give_the_same_batches(tmp_path: Path) -> None:
+    """Two epochs of two batches, every sample once per epoch, in an order of its own."""
     lines = run(tmp_path, str(EXAMPLES / "train_loader.py")).splitlines()
-    boxes = [int(line.split()[-2]) for line in lines if line.startswith("epoch")]
+    finished = [line.removeprefix("finished, ") for line in lines if line.startswith("finished")]
+    rendered = [line.removeprefix("rendered, ") for line in lines if line.startswith("rendered")]
+    numbers = [json.loads(re.search(r"\[.*\]", line)[0]) for line in finished]
 
-    assert len(boxes) == 4
-    assert sum(boxes[:2]) == sum(boxes[2:]) > 0
+    assert finished == rendered
+    assert len(finished) == 4
+    assert sorted(numbers[0] + numbers[1]) == sorted(numbers[2] + numbers[3]) == list(range(8))
+    assert numbers[:2] != numbers[2:]
+
+
+@pytest.mark.slow
+def test_the_detector_learns_what_it_has_seen(tmp_path: Path) -> None:
+    """Half a minute on twenty images: boxes of one class are found again on the same images."""
+    options = (
+        "--n", "20", "--workers", "1", "--seed", "4", "--out", "set",
+        "--set", "sensors.color.size_px=[160, 120]", "--set", "splits={train: 1, val: 0, test: 0}",
+        "--set", "labels.map={classes: {thing: [mug, bowl, cup, bottle, plate, can, jar, apple, "
+        "banana, orange, book, vase, carton]}}",
+    )  # fmt: skip
+    run(tmp_path, "-m", "gen_data", "--config", "tabletop.yaml", *options)
+    script = str(EXAMPLES / "train_detector.py")
+    training = ("--split", "train", "--minutes", "0.5", "--size", "128", "--bootstrap", "20")
+    lines = run(
+        tmp_path,
+        script,
+        "set",
+        "--eval",
+        "set/coco",
+        *training,
+        "--workers",
+        "0",
+        "--out",
+        "ap.json",
+    ).splitlines()
+
+    assert [line.split()[0] for line in lines[-2:]] == ["AP", "AP50"]
+    low, high = (float(v) for v in re.findall(r"\d\.\d+", lines[-1])[1:3])
+    assert low <= json.loads((tmp_path / "ap.json").read_text())["ap50"] <= high
+    assert json.loads((tmp_path / "ap.json").read_text())["ap50"] > 0.05
 
 
 @pytest.mark.slow

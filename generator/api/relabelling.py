@@ -1,0 +1,125 @@
+"""Samples whose labels a label map has changed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gen_data.generator.api.sample import SampleRecord
+from gen_data.generator.core.capture import Capture
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.sample import EgoTruth, ImageTruth
+from gen_data.generator.core.scene import Scene
+
+if TYPE_CHECKING:
+    from gen_data.exporters.label_map import AppliedLabelMap, LabelMap
+    from gen_data.generator.api.dataset import SampleSource
+
+LabelMapLike = str | PathLike[str] | Mapping[str, Any]
+"""A file with a label map, or its content."""
+
+
+@dataclass(frozen=True, eq=False)
+class RelabelledSample:
+    """A sample with mapped labels; its images are those of the other one."""
+
+    record: SampleRecord
+    applied: AppliedLabelMap
+
+    @property
+    def index(self) -> int:
+        """Number of the sample."""
+        return self.record.index
+
+    @property
+    def split(self) -> str:
+        """Its split."""
+        return self.record.split
+
+    @property
+    def capture(self) -> Capture:
+        """Readings of all sensors."""
+        return self.record.capture
+
+    @property
+    def frame(self) -> EgoTruth | None:
+        """Annotations of the sample as a whole."""
+        return self.record.frame
+
+    @cached_property
+    def truth(self) -> Mapping[str, ImageTruth]:
+        """Mapped annotations by camera."""
+        return {name: self.applied.map_image(t) for name, t in self.record.truth.items()}
+
+    @cached_property
+    def scene(self) -> Scene:
+        """The world with mapped instances."""
+        return self.applied.map_scene(self.record.scene)
+
+
+@dataclass(frozen=True)
+class RelabelledSamples:
+    """Samples of another source, with mapped labels; picklable."""
+
+    source: SampleSource
+    label_map: LabelMap
+
+    def sample(self, index: int) -> SampleRecord:
+        """Return the sample of that number."""
+        return RelabelledSample(self.source.sample(index), self._applied)
+
+    @property
+    def categories(self) -> tuple[str, ...]:
+        """Names of the classes in the order of their ids."""
+        return self._applied.info.categories
+
+    @property
+    def config(self) -> Mapping[str, Any]:
+        """The resolved configuration of the source."""
+        return self.source.config
+
+    def close(self) -> None:
+        """Release the engines of the source."""
+        self.source.close()
+
+    @cached_property
+    def _applied(self) -> AppliedLabelMap:
+        from gen_data.exporters.label_map import AppliedLabelMap
+
+        categories = self.source.categories
+        self.label_map.check(categories)
+        return AppliedLabelMap(self.label_map, DatasetInfo("", 0, 1, 1, categories, ()))
+
+
+def load_label_map(source: LabelMapLike | None, config: Mapping[str, Any]) -> LabelMap:
+    """Read a label map; None = that of the configuration.
+
+    Raises:
+        ConfigError: it is invalid, or the configuration has none.
+    """
+    from gen_data.exporters.label_map import LabelMap
+    from gen_data.generator.config.problems import Problems
+    from gen_data.generator.config.validation import validate
+    from gen_data.generator.config.yaml_tree import load_yaml, parse_yaml
+
+    if source is None:
+        own = (config.get("labels") or {}).get("map")
+        if own is None:
+            raise ConfigError("labels.map: the configuration has none; give a file or a mapping")
+        source = own
+    if isinstance(source, Mapping):
+        import yaml
+
+        document = parse_yaml(yaml.safe_dump(dict(source), sort_keys=False), "<label map>")
+    else:
+        document = load_yaml(Path(source))
+    problems = Problems()
+    loaded = validate(document, LabelMap, problems)
+    problems.raise_if_any()
+    assert loaded is not None
+    return loaded
