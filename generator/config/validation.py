@@ -115,7 +115,11 @@ def locate_error(detail: ErrorDetails, model: type[BaseModel]) -> Fault:
     last = len(detail["loc"]) - is_in_parent
     for number, part in enumerate(detail["loc"]):
         owner = owner.without_nothing()
-        if owner.branches:
+        if owner.branches and isinstance(part, int):
+            # An index, not the name of an alternative: a list whose text form pydantic does not
+            # know, such as a file that stands for it.
+            owner = next((b for b in owner.branches if b.schema.get("type") == "array"), owner)
+        if owner.branches and not isinstance(part, int):
             union, branch = (path, owner), str(part)
             owner = max(owner.branches, key=lambda schema: schema.label_score(str(part)))
         elif part != "[key]":

@@ -58,9 +58,9 @@ def test_a_file_of_the_user_comes_before_a_shipped_one(
 def test_configuration_overrides_its_template_by_element_name(tmp_path: Path) -> None:
     """Only what is named changes; the rest of the element stays the template's."""
     source = written(tmp_path, "template: tabletop\nelements: {table: {height_m: 0.9}}\n" + CAMERA)
-    nominal = {e.name: e for e in load_config("tabletop.yaml").elements}
+    nominal = {e.name: e for e in load_config("tabletop.yaml").probes[0].elements}
 
-    table = {e.name: e for e in load_config(source).elements}["table"]
+    table = {e.name: e for e in load_config(source).probes[0].elements}["table"]
 
     assert table.height_m == 0.9
     assert table.top_size_m == nominal["table"].top_size_m
@@ -98,9 +98,9 @@ def test_command_line_wins_over_file_and_template() -> None:
 
 def test_without_leaves_a_randomizer_out() -> None:
     """The others keep their order; an unknown name is refused."""
-    names = [r.name for r in load_config("tabletop.yaml").randomizers]
+    names = [r.name for r in load_config("tabletop.yaml").probes[0].randomizers]
 
-    kept = [r.name for r in load_config("tabletop.yaml", without=("colors",)).randomizers]
+    kept = [r.name for r in load_config("tabletop.yaml", without=("colors",)).probes[0].randomizers]
 
     assert kept == [name for name in names if name != "colors"]
     assert "did you mean 'colors'?" in refusal("tabletop.yaml", without=("colour",))

@@ -63,7 +63,7 @@ def box_m(body: Body) -> tuple[np.ndarray, np.ndarray]:
 def randomized(name: str, streams: Streams) -> Scene | None:
     """One attempt at a scene, without physics; None where a randomizer found no valid draw."""
     scene = scene_of(name)
-    for randomizer in sorted(spec(name).randomizers, key=lambda r: r.stage == Stage.VIEW):
+    for randomizer in sorted(spec(name).probes[0].randomizers, key=lambda r: r.stage == Stage.VIEW):
         try:
             scene = randomizer(scene, library(), streams.rng(randomizer.name))
         except LayoutRejected:

@@ -106,9 +106,9 @@ def test_kept_scene_renders_to_the_same_pixels(dataset: Path) -> None:
     from gen_data.generator.assemble.pipeline_factory import PipelineFactory
     from gen_data.generator.core.capture import Channel
     from gen_data.generator.core.streams import Streams
-    from gen_data.generator.runner.provenance import read_scenes
+    from gen_data.generator.runner.stored import StoredSamples
 
-    kept = list(read_scenes(dataset / "shards" / "000002" / "scenes.jsonl"))[3]
+    kept = StoredSamples(dataset).kept_scene(13)
     scene = kept.scene
     config = load_config(str(dataset))
     pipeline = PipelineFactory(config, n=15)()
@@ -144,14 +144,13 @@ def test_every_object_is_labelled_where_it_is_seen(dataset: Path) -> None:
 
 def test_licences_name_what_was_used_and_nothing_else(dataset: Path) -> None:
     """The families in LICENSES-ASSETS.md are those of the scenes that were kept."""
-    from gen_data.generator.runner.provenance import read_scenes
+    from gen_data.generator.runner.stored import StoredSamples
 
-    used = set()
-    for path in sorted((dataset / "shards").glob("*/scenes.jsonl")):
-        for kept in read_scenes(path):
-            used |= {b.asset for b in kept.scene.bodies if not b.name.startswith("arm/")}
-            used |= {m.texture for b in kept.scene.bodies for m in b.materials if m.texture}
-            used |= {a.asset for a in kept.scene.articulations} | {kept.scene.environment.image}
+    used, stored = set(), StoredSamples(dataset)
+    for scene in (stored.kept_scene(index).scene for index in range(stored.n)):
+        used |= {b.asset for b in scene.bodies if not b.name.startswith("arm/")}
+        used |= {m.texture for b in scene.bodies for m in b.materials if m.texture}
+        used |= {a.asset for a in scene.articulations} | {scene.environment.image}
     rows = (dataset / "LICENSES-ASSETS.md").read_text().splitlines()[4:]
     listed = {name for row in rows for name in row.split("|")[4].strip().split(", ")}
 

@@ -48,11 +48,12 @@ def test_recording_is_accepted_by_rerun(tmp_path: Path) -> None:
 
 
 def test_describe_lists_and_explains(tmp_path: Path) -> None:
-    """Every plug-in is named; one is explained with its fields."""
+    """Every plug-in and template is named; one is explained with its fields."""
     listed = gen_data("describe", cwd=tmp_path)
     explained = gen_data("describe", "lighting", cwd=tmp_path)
 
-    assert "tabletop" not in listed.stdout and "coco, kitti" in listed.stdout
+    assert "template: bin_picking, highway" in listed.stdout
+    assert "kitti_stereo" in listed.stdout
     assert "illuminance_lux" in explained.stdout
 
 

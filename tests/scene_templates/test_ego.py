@@ -64,6 +64,6 @@ def test_a_configuration_adds_an_element_that_its_template_lacks(tmp_path: Path)
     (tmp_path / "more.yaml").write_text(text + "elements: {ego: {type: ego, tags: [car]}}\n")
     (tmp_path / "wrong.yaml").write_text(text + "elements: {ego: {tags: [car]}}\n")
 
-    assert load_config(str(tmp_path / "more.yaml")).elements[-1] == Ego(name="ego")
+    assert load_config(str(tmp_path / "more.yaml")).probes[0].elements[-1] == Ego(name="ego")
     with pytest.raises(ConfigError, match="the template has no element 'ego'"):
         load_config(str(tmp_path / "wrong.yaml"))

@@ -241,7 +241,7 @@ BAD = {
 def test_what_cannot_be_is_told_in_one_message(message: str) -> None:
     """Wrong routes, names and durations."""
     name, text = BAD[message]
-    names = [randomizer.name for randomizer in spec().randomizers]
+    names = [randomizer.name for randomizer in spec().probes[0].randomizers]
     wrong = load_config(
         "street_sequence", overrides=[*SMALL, f"randomizers[{names.index(name)}].{text}"]
     )
@@ -263,7 +263,7 @@ def test_a_route_through_a_wall_is_refused() -> None:
 
 def test_a_given_route_is_driven() -> None:
     """Through the junction to the left: the ego vehicle ends on the road it was sent to."""
-    names = [randomizer.name for randomizer in spec().randomizers]
+    names = [randomizer.name for randomizer in spec().probes[0].randomizers]
     route = "[main/forward0, cross/2to1_0, left/forward0]"
     asked = load_config(
         "street_sequence",

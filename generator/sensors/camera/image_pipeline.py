@@ -320,6 +320,7 @@ def _effect(field: str, neutral: float, apply: Callable[[Float32, float], Float3
         drawn = getattr(shot.pipeline, field).draw(shot.rng)
         return light if drawn == neutral else replace(light, values=apply(light.values, drawn))
 
+    stage.__name__ = f"_{field.removesuffix('_px')}"
     return stage
 
 

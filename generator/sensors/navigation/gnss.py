@@ -1,5 +1,19 @@
 """GNSS receiver: geodetic position, velocity and their accuracy.
 
+Example, for a scene with a rig ``ego``::
+
+    sensors:
+      - type: gnss
+        name: gps
+        rig: ego
+        model: ZED-F9P
+        rate_hz: 10
+
+``sample.measurements["gps"]`` then holds the fixes since the last step, with the fields ``time_s``,
+``latitude_deg``, ``longitude_deg``, ``altitude_m``, ``velocity_east_m_s`` ...,
+``horizontal_sigma_m``, ``vertical_sigma_m``, ``satellites`` and ``quality`` (as in NMEA GGA).
+Positions and velocities are NaN without a fix.
+
 Errors are white noise and a first-order Gauss-Markov process (Brown and Hwang, "Introduction to
 Random Signals and Applied Kalman Filtering"), scaled by the dilution of precision of the visible
 satellites (Langley, "Dilution of Precision", GPS World 1999).

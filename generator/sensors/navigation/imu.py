@@ -1,5 +1,18 @@
 """Inertial measurement unit (IMU): accelerometer and gyroscope.
 
+Example, for a scene with a rig ``ego``::
+
+    sensors:
+      - type: imu
+        name: imu
+        rig: ego
+        model: ADIS16448
+        rate_hz: 100
+
+``sample.measurements["imu"]`` then holds the readings since the last step, with the fields
+``time_s``, ``force_x_m_s2`` ... ``force_z_m_s2`` (specific force) and ``rate_x_rad_s`` ...
+``rate_z_rad_s`` (angular rate), axes X forward, Y left, Z up. At rest ``force_z_m_s2`` is 9.8.
+
 The errors of each axis are a turn-on bias, a random walk of the bias, and white noise, the terms
 of data sheets and calibrations (IEEE Std 952; Woodman, "An introduction to inertial navigation",
 2007). White noise of density ``n`` sampled at rate ``f`` has standard deviation ``n sqrt(f)``; a

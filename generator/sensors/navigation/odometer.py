@@ -1,5 +1,17 @@
 """Wheel odometer: distance, speed, yaw rate, steering angle and wheel speeds.
 
+Example, for a scene with a rig ``ego`` at the middle of the rear axle::
+
+    sensors:
+      - type: odometer
+        name: wheels
+        rig: ego
+        rate_hz: 50
+
+``sample.measurements["wheels"]`` then holds the readings since the last step, with the fields
+``time_s``, ``distance_m``, ``speed_m_s``, ``yaw_rate_rad_s``, ``steering_rad`` and the rim speeds
+``wheel_rear_left_m_s`` ... ``wheel_front_right_m_s``.
+
 Wheels roll without slip, with Ackermann geometry at the front; the steering angle is that of the
 bicycle model, ``atan(wheelbase * yaw rate / speed)``.
 """

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from gen_data.generator.assemble.config import load_config
+from gen_data.generator.config.distributions import Constant
 from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.intrinsics import Intrinsics
@@ -187,7 +188,7 @@ def test_deprecated_keys_are_read_with_a_warning_that_names_the_new_ones(tmp_pat
         (camera,) = load_config(own).sensors
 
     pipeline = camera.image_pipeline
-    assert pipeline.glare.mean() == 0.02
+    assert pipeline.glare == Constant(0.02)
     assert pipeline.exposure_control.f_number == 4.0
     assert pipeline.image_sensor.bits == 10
     told = [str(warning.message) for warning in warned]
