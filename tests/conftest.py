@@ -5,7 +5,9 @@ With ``GEN_DATA_CI`` set, a skipped test is a failed one: what skips everywhere 
 
 from __future__ import annotations
 
+import atexit
 import os
+import shutil
 import tempfile
 from collections.abc import Generator
 from typing import Any
@@ -15,6 +17,7 @@ import pytest
 # Packs that happen to be installed on this machine must not change what tests see; processes that
 # tests start inherit it. Set before anything asks, hence not in a fixture.
 os.environ["GEN_DATA_ASSETS"] = tempfile.mkdtemp(prefix="gen-data-no-packs-")
+atexit.register(shutil.rmtree, os.environ["GEN_DATA_ASSETS"], ignore_errors=True)
 
 SKIPS_ALLOWED_IN_CI = (
     "root may write everywhere",  # CI runs as root in some places

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import shutil
 import tempfile
+import weakref
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,6 +53,8 @@ class World:
             "useSplitImpulse": 1,
         }
         self._folder = Path(tempfile.mkdtemp(prefix="gen-data-physics-"))
+        # Also when a program ends, or drops the world, without closing it.
+        self._remove_folder = weakref.finalize(self, shutil.rmtree, self._folder, True)
         self._client: int = pybullet.connect(pybullet.DIRECT)
         self._here = {"physicsClientId": self._client}
         self._solids: dict[str, _Solid] = {}
@@ -67,7 +70,7 @@ class World:
         """Close the connection and delete scratch files; may be called twice."""
         if self._client >= 0:
             pybullet.disconnect(**self._here)
-            shutil.rmtree(self._folder, ignore_errors=True)
+            self._remove_folder()
         self._client = -1
 
     def reset(self) -> None:
