@@ -37,7 +37,7 @@ def full_street(library: Library, seed: int) -> tuple[Scene, TrafficFlow]:
     ]
     config = load_config("street_sequence.yaml", seed=seed, overrides=overrides)
     streams = Streams(seed, 0)
-    scene, randomizers = scene_source(config, library)(streams)
+    scene, randomizers, _ = scene_source(config, library)(streams)
     for randomizer in randomizers:
         if isinstance(randomizer, TrafficFlow):
             return scene, randomizer.model_copy(update={"duration_s": 5.0})
