@@ -76,11 +76,10 @@ from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fr
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.mask_polygons import mask_polygons
 from gen_data.exporters.rle import encode_rle
-from gen_data.exporters.sensor_selection import instant_s, rgb_cameras
+from gen_data.exporters.sensor_selection import check_channels, instant_s, rgb_cameras
 from gen_data.exporters.sequences import sequence_number
 from gen_data.generator.core.boxes import BoxPx, OrientedBox
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo, media_path
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.lens import COEFFICIENTS, Lens
@@ -123,11 +122,7 @@ class Coco(ExporterBase):
         Raises:
             ConfigError: no sensor writes the rgb channel.
         """
-        if not rgb_cameras(info):
-            raise ConfigError(
-                f"exporter '{self.type}': no sensor of {', '.join(info.cameras)} writes the rgb "
-                "channel; add an rgb_camera"
-            )
+        check_channels(info, (), self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write one JSON line per image and per annotation, by split.

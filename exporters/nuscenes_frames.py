@@ -12,7 +12,13 @@ from numpy.typing import NDArray
 from gen_data.exporters.nuscenes_classes import category_of
 from gen_data.exporters.nuscenes_files import quarter_turns, turned_pose
 from gen_data.exporters.sensor_selection import instant_s
-from gen_data.exporters.sequences import Mount, camera_mount, lidar_mount, relative_pose
+from gen_data.exporters.sequences import (
+    Mount,
+    camera_mount,
+    device_mount,
+    lidar_mount,
+    relative_pose,
+)
 from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.intrinsics import Intrinsics
@@ -38,15 +44,6 @@ class Channel:
     sensor: str
     name: str
     modality: Modality
-
-
-def device_mount(scene: Scene, name: str) -> Mount:
-    """Mount of a device."""
-    device = scene.device(name)
-    if device.rig:
-        return Mount(device.rig, device.T_rig_device)
-    carrier = camera_mount(scene, device.camera)
-    return Mount(carrier.rig, carrier.T_rig_sensor @ RIG_AXES @ device.T_rig_device)
 
 
 def channel_mount(scene: Scene, channel: Channel) -> Mount:

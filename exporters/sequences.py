@@ -139,10 +139,21 @@ def camera_mount(scene: Scene, name: str) -> Mount:
 def lidar_mount(scene: Scene, name: str) -> Mount:
     """Mount of a laser scanner."""
     lidar = scene.lidar(name)
-    if lidar.rig:
-        return Mount(lidar.rig, lidar.T_rig_lidar)
-    carrier = camera_mount(scene, lidar.camera)
-    return Mount(carrier.rig, carrier.T_rig_sensor @ RIG_AXES @ lidar.T_rig_lidar)
+    return _carried_mount(scene, lidar.rig, lidar.camera, lidar.T_rig_lidar)
+
+
+def device_mount(scene: Scene, name: str) -> Mount:
+    """Mount of a device."""
+    device = scene.device(name)
+    return _carried_mount(scene, device.rig, device.camera, device.T_rig_device)
+
+
+def _carried_mount(scene: Scene, rig: str, camera: str, T_rig_sensor: SE3) -> Mount:
+    """Mount of a sensor on a rig; on its camera if it has none."""
+    if rig:
+        return Mount(rig, T_rig_sensor)
+    carrier = camera_mount(scene, camera)
+    return Mount(carrier.rig, carrier.T_rig_sensor @ RIG_AXES @ T_rig_sensor)
 
 
 def mounted_pose(scene: Scene, mount: Mount) -> SE3:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
@@ -33,6 +34,21 @@ def load_config(
     if isinstance(config, Mapping):
         return parse_config(_yaml_text(config), "<config>", "config", **choice)
     return load_config(fspath(config), **choice)
+
+
+def count_workers(workers: int | None) -> int:
+    """Number of worker processes; None = one per core.
+
+    Raises:
+        ConfigError: it is negative.
+    """
+    if workers is None:
+        return len(os.sched_getaffinity(0))
+    if workers < 0:
+        raise ConfigError(
+            f"workers: {workers}; expected at least 1, or 0 to generate in this process"
+        )
+    return workers
 
 
 def _yaml_text(config: Mapping[str, Any]) -> str:

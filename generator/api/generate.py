@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gen_data.generator.api.config import ConfigLike, load_config
+from gen_data.generator.api.config import ConfigLike, count_workers, load_config
 from gen_data.generator.core.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -63,10 +62,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
 
     if n < 1:
         raise ConfigError(f"n: {n} samples cannot be made; expected at least 1")
-    if workers is not None and workers < 0:
-        raise ConfigError(
-            f"workers: {workers}; expected at least 1, or 0 to generate in this process"
-        )
+    processes = count_workers(workers)
     loaded = load_config(config, seed=seed, overrides=overrides, without=without)
     general = loaded.general
     scenes = -(-n // (general.views_per_scene * general.steps_per_scene))
@@ -77,7 +73,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
             make_plan(factory),
             factory,
             Path(out) if out is not None else Path("out") / loaded.name,
-            workers=len(os.sched_getaffinity(0)) if workers is None else workers,
+            workers=processes,
             resume_command=resume_command,
             licences=partial(format_licences, factory),
             settings=Settings(full_check=repair),

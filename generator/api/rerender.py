@@ -9,6 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gen_data.generator.api.config import count_workers
 from gen_data.generator.core.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
             load_config(source, overrides=texts),
             Path(out),
             redraw=redraw,
-            workers=len(os.sched_getaffinity(0)) if workers is None else workers,
+            workers=count_workers(workers),
             resume_command=resume_command,
             progress=on_progress,
         )
