@@ -172,9 +172,10 @@ def train(args: argparse.Namespace, samples: gen_data.SampleSequence) -> Detecto
             images, truths = [], []
             for image, target in batch:
                 padded, scale = prepare(image.transpose(1, 2, 0), args.size)
-                boxes = target["boxes"] * scale
+                kept = target["iscrowd"] == 0
+                boxes = target["boxes"][kept] * scale
                 images.append(augment(padded, boxes, rng) / 255.0)
-                truths.append(encode(boxes, target["labels"], len(classes), args.size))
+                truths.append(encode(boxes, target["labels"][kept], len(classes), args.size))
             pixels = torch.from_numpy(np.stack(images).astype(np.float32)).permute(0, 3, 1, 2)
             truth = tuple(torch.from_numpy(np.stack(part)) for part in zip(*truths, strict=True))
             loss = loss_of(*model(pixels), truth)

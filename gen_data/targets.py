@@ -38,7 +38,8 @@ def detection_target(sample: Sample, camera: str = "") -> tuple[NDArray[np.uint8
 
     Returns:
         The image, and ``boxes`` float32 [n, 4], ``labels`` int64 [n], ``area`` float32 [n],
-        ``iscrowd`` int64 [n], ``image_id`` int64 [].
+        ``iscrowd`` int64 [n]: 1 for objects that a label map ignores, which training leaves out;
+        ``image_id`` int64 [].
     """
     reading = _camera(sample, camera)
     return _channels_first(reading.rgb), _boxes(sample, reading, _visible(reading))
@@ -187,6 +188,6 @@ def _boxes(sample: Sample, reading: CameraReading, objects: Sequence[ObjectTruth
         "boxes": np.array(boxes, np.float32).reshape(-1, 4)[chosen],
         "labels": np.array([t.instance.category_id for t in objects], np.int64),
         "area": np.array([t.visible_px for t in objects], np.float32),
-        "iscrowd": np.zeros(len(objects), np.int64),
+        "iscrowd": np.array([t.ignored for t in objects], np.int64),
         "image_id": np.array(sample.index, np.int64),
     }

@@ -352,3 +352,13 @@ def test_a_label_map_must_be_given_or_configured(stored: gen_data.StoredDataset)
         stored.relabelled()
     with pytest.raises(gen_data.ConfigError, match=r"<label map>:1:\d+: classess: unknown key"):
         stored.relabelled({"classess": {}})
+
+
+def test_targets_mark_objects_that_a_label_map_ignores(stored: gen_data.StoredDataset) -> None:
+    """``iscrowd`` is 1, as for COCO's regions that training leaves out."""
+    name = stored[0].boxes2d["color"][0].category
+    _, target = gen_data.targets.detection_target(stored.relabelled({"ignore": [name]})[0])
+    ignored = [box.category == name for box in stored[0].boxes2d["color"]]
+
+    assert 0 < sum(ignored) < len(ignored)
+    assert target["iscrowd"].tolist() == [int(flag) for flag in ignored]
