@@ -28,13 +28,13 @@ def pack_imported(imported: ImportedMesh) -> Arrays:
     arrays: Arrays = {f"{_IMAGE}{name}": image for name, image in imported.images.items()}
     if imported.mesh is not None:
         arrays |= {name: getattr(imported.mesh, name) for name in _MESH_ARRAYS}
-        arrays["materials"] = _encode_text(canonical_json(imported.mesh.materials))
+        arrays["materials"] = encode_text(canonical_json(imported.mesh.materials))
     if imported.collision is not None:
         parts = imported.collision.parts_m
         arrays["part_sizes"] = np.array([len(part) for part in parts], dtype=np.int64)
         arrays["parts_m"] = np.concatenate(parts) if parts else np.zeros((0, 3))
     if imported.keypoints:
-        arrays["keypoints"] = _encode_text(canonical_json(imported.keypoints))
+        arrays["keypoints"] = encode_text(canonical_json(imported.keypoints))
     return arrays
 
 
@@ -77,5 +77,6 @@ def unpack_texture(arrays: Arrays) -> TextureData:
     return TextureData(arrays["albedo"], **{name: arrays.get(name) for name in _OPTIONAL_IMAGES})
 
 
-def _encode_text(text: str) -> UInt8:
+def encode_text(text: str) -> UInt8:
+    """UTF-8 bytes of a text as an array."""
     return np.frombuffer(text.encode(), dtype=np.uint8)

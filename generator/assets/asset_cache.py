@@ -133,15 +133,28 @@ class Store:
         return len(self._memory)
 
 
-def _load(path: Path, key: str) -> Arrays | None:
-    """Load the arrays of a file; None if it is missing, damaged, or has another key."""
+def encode_arrays(key: str, arrays: Arrays) -> bytes:
+    """Encode arrays in the format of a cache file."""
+    listed = [[name, array.dtype.str, array.shape] for name, array in arrays.items()]
+    head = json.dumps({"key": key, "arrays": listed}).encode()
+    head += b" " * _padding(_PREFIX.size + len(head))
+    body = bytearray(struct.pack("<I", len(head)) + head)
+    for array in arrays.values():
+        body += array.tobytes() + bytes(_padding(array.nbytes))
+    return struct.pack("<I", zlib.crc32(body)) + body
+
+
+def decode_arrays(data: bytes, key: str) -> Arrays | None:
+    """Decode the arrays of a cache file; None if they are damaged or have another key.
+
+    Arrays hold numbers only, so that data of any origin can be decoded.
+    """
     try:
-        data = path.read_bytes()
         check, size = _PREFIX.unpack_from(data)
         if zlib.crc32(memoryview(data)[4:]) != check:
             return None
         head = json.loads(data[_PREFIX.size : _PREFIX.size + size])
-    except (OSError, ValueError, struct.error):
+    except (ValueError, struct.error):
         return None
     if head["key"] != key:
         return None
@@ -153,14 +166,17 @@ def _load(path: Path, key: str) -> Arrays | None:
     return arrays
 
 
+def _load(path: Path, key: str) -> Arrays | None:
+    """Load the arrays of a file; None if it is missing, damaged, or has another key."""
+    try:
+        return decode_arrays(path.read_bytes(), key)
+    except OSError:
+        return None
+
+
 def _store(path: Path, key: str, arrays: Arrays) -> None:
-    listed = [[name, array.dtype.str, array.shape] for name, array in arrays.items()]
-    head = json.dumps({"key": key, "arrays": listed}).encode()
-    head += b" " * _padding(_PREFIX.size + len(head))
-    body = bytearray(struct.pack("<I", len(head)) + head)
-    for array in arrays.values():
-        body += array.tobytes() + bytes(_padding(array.nbytes))
-    _write_atomically(path, lambda file: file.write(struct.pack("<I", zlib.crc32(body)) + body))
+    data = encode_arrays(key, arrays)
+    _write_atomically(path, lambda file: file.write(data))
 
 
 def _padding(size: int) -> int:

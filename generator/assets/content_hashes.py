@@ -18,9 +18,11 @@ from urllib.parse import unquote
 
 from gen_data.generator.assets.asset_cache import DiskCache
 from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.parsing import parse_layer_references, unpack_value
+from gen_data.generator.assets.sandbox import run_sandboxed
 from gen_data.generator.assets.urdf import read_urdf
 from gen_data.generator.core.errors import AssetError
-from gen_data.generator.usd.stage_reader import SUFFIXES, layer_references
+from gen_data.generator.usd.stage_reader import SUFFIXES
 
 _NAME = "digests.json"
 _MISSING = ""
@@ -156,7 +158,8 @@ def _references(folder: Folder, name: str) -> Iterator[str]:
     elif suffix == ".gltf":
         yield from (unquote(uri) for uri in _uris(folder.read(name)))
     elif suffix in SUFFIXES:
-        yield from layer_references(folder.path(name))
+        arrays = run_sandboxed(parse_layer_references, folder.root, {name: _MISSING}, name)
+        yield from unpack_value(tuple[str, ...], arrays)
 
 
 def _uris(data: bytes) -> list[str]:

@@ -8,12 +8,11 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gen_data.generator.assets.asset_arrays import pack_imported, unpack_imported
+from gen_data.generator.assets.asset_arrays import unpack_imported
 from gen_data.generator.assets.asset_cache import FORMAT, Arrays, DiskCache, Store, content_key
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.content_hashes import ContentHashes
@@ -29,20 +28,25 @@ from gen_data.generator.assets.folder_index import (
     read_index,
     user_folder,
 )
-from gen_data.generator.assets.image_decoding import decode_image, decode_radiance
 from gen_data.generator.assets.importer import (
     VERSION,
     ImportedMesh,
-    import_link,
-    import_object,
-    import_road_network,
-    road_network_lanes,
 )
 from gen_data.generator.assets.installed_packs import pack_assets
+from gen_data.generator.assets.parsing import (
+    parse_image,
+    parse_lanes,
+    parse_link,
+    parse_object,
+    parse_road_network,
+    parse_stage,
+    unpack_value,
+)
 from gen_data.generator.assets.robot_models import robot_model
+from gen_data.generator.assets.sandbox import run_sandboxed
 from gen_data.generator.assets.texture_maps import compose_texture, find_maps
 from gen_data.generator.assets.urdf import Urdf, read_urdf
-from gen_data.generator.assets.usd_stages import is_stage, stage_model
+from gen_data.generator.assets.usd_stages import is_stage
 from gen_data.generator.core.asset_types import (
     Asset,
     Float32,
@@ -55,8 +59,6 @@ from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.scene import Lane, StageModel
 
 _BUILT_IN = Path(__file__).with_name("pybullet.yaml")
-
-T = TypeVar("T", bound=np.generic)
 
 
 class FileLibrary:
@@ -111,20 +113,16 @@ class FileLibrary:
         """Geometry of an object, a robot's link or a stage's piece."""
         part = self._part(asset_id)
         one = part[0] if part else self._entries()[asset_id]
-        entry, folder = one.entry, Folder(one.root)
-        name = part[1] if part else ""
+        entry, name = one.entry, part[1] if part else ""
 
         def compute() -> Arrays:
             if isinstance(entry, RobotEntry):
-                made = import_link(folder, entry, one.asset_id, self._urdf(one), name)
-            elif _is_road_network(entry):
-                made = import_road_network(folder, entry.file)
-            elif isinstance(entry, MeshEntry):
-                made = import_object(folder, entry, one.asset_id, name)
-            else:
-                raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not an object")
-            self._check_unchanged(one, folder)
-            return pack_imported(made)
+                return self._parse(one, parse_link, entry, one.asset_id, name)
+            if _is_road_network(entry):
+                return self._parse(one, parse_road_network, entry.file)
+            if isinstance(entry, MeshEntry):
+                return self._parse(one, parse_object, entry, one.asset_id, name)
+            raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not an object")
 
         if isinstance(entry, RobotEntry) and not part:
             links = ", ".join(f"{asset_id}/{n}" for n in list(self._urdf(one).links)[:2])
@@ -137,10 +135,11 @@ class FileLibrary:
         one = self._entries().get(asset_id)
         if one is None or not _is_road_network(one.entry):
             return ()
-        folder = Folder(one.root)
-        lanes = road_network_lanes(folder, one.entry.file)
-        self._check_unchanged(one, folder)
-        return lanes
+        return self._store.get(
+            content_key({"asset": self._key(one), "part": "lanes"}),
+            lambda: self._parse(one, parse_lanes, one.entry.file),
+            lambda arrays: unpack_value(tuple[Lane, ...], arrays),
+        )
 
     def robot(self, asset_id: str) -> RobotModel:
         """Kinematics of a robot."""
@@ -156,9 +155,11 @@ class FileLibrary:
         if not isinstance(entry, MeshEntry) or not is_stage(entry):
             raise AssetError(f"asset '{asset_id}': not a stage; give a .usd, .usda, .usdc or .usdz")
         if asset_id not in self._stages:
-            folder = Folder(one.root)
-            self._stages[asset_id] = stage_model(folder, entry, asset_id)
-            self._check_unchanged(one, folder)
+            self._stages[asset_id] = self._store.get(
+                content_key({"asset": self._key(one), "part": "stage"}),
+                lambda: self._parse(one, parse_stage, entry, asset_id),
+                lambda arrays: unpack_value(StageModel, arrays),
+            )
         return self._stages[asset_id]
 
     def texture(self, texture_id: str) -> TextureData:
@@ -174,47 +175,47 @@ class FileLibrary:
         maps = find_maps(name)
         if maps is not None:
             return compose_texture(
-                maps, lambda image: self._image(owner, one, folder, image, alpha=True)
+                maps, lambda image: self._image(owner, one, folder, image, "rgba")
             )
-        pixels = self._image(owner, one, folder, name, alpha=False)
+        pixels = self._image(owner, one, folder, name, "rgb")
         return TextureData(np.ascontiguousarray(pixels[..., :3]))
 
     def _image(
-        self, owner: str, one: IndexedAsset, folder: Folder, name: str, *, alpha: bool
+        self, owner: str, one: IndexedAsset, folder: Folder, name: str, channels: str
     ) -> UInt8:
         """Pixels of an image, embedded in a mesh file or beside it."""
         if one.kind == "object" and name in (images := self.imported(owner).images):
             return images[name]
-        place = str(folder.root / name)
-        return self._decode_cached(
-            folder, name, place, "rgba" if alpha else "albedo",
-            lambda: decode_image(folder.read(name), place, alpha=alpha),
-        )  # fmt: skip
+        pixels: UInt8 = self._decode_cached(folder, name, channels)
+        return pixels
 
     def environment(self, asset_id: str) -> Float32:
         """Pixels of a panorama."""
         one = self._entries()[asset_id]
         if one.kind != "environment":
             raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not an environment")
-        folder, name = Folder(one.root), one.entry.file
-        place = str(folder.root / name)
-        return self._decode_cached(
-            folder, name, place, "radiance", lambda: decode_radiance(folder.read(name), place)
-        )  # fmt: skip
+        radiance: Float32 = self._decode_cached(Folder(one.root), one.entry.file, "radiance")
+        return radiance
 
-    def _decode_cached(
-        self, folder: Folder, name: str, place: str, what: str, compute: Callable[[], NDArray[T]]
-    ) -> NDArray[T]:
+    def _decode_cached(self, folder: Folder, name: str, channels: str) -> Any:
         """Decode an image file, or take it from the store by the hash of its bytes."""
         if not folder.exists(name):
-            raise AssetError(f"{place}: no such image; add it or correct the reference to it")
+            raise AssetError(
+                f"{folder.root / name}: no such image; add it or correct the reference to it"
+            )
         digests = self._digests.of(folder, name)
         key: dict[str, object] = {"format": FORMAT, "image": digests[name]}
-        if what == "rgba":
-            key["channels"] = what
+        if channels == "rgba":
+            key["channels"] = channels
         return self._store.get(
-            content_key(key), lambda: {what: compute()}, lambda arrays: arrays[what]
+            content_key(key),
+            lambda: run_sandboxed(parse_image, folder.root, digests, name, channels),
+            lambda arrays: next(iter(arrays.values())),
         )
+
+    def _parse(self, one: IndexedAsset, parse: Callable[..., Arrays], *arguments: object) -> Arrays:
+        """Call a function of ``parsing`` for the files of an asset."""
+        return run_sandboxed(parse, one.root, self._files(one), *arguments)
 
     def _entries(self) -> dict[str, IndexedAsset]:
         if self._listed is None:
@@ -289,13 +290,6 @@ class FileLibrary:
                 for name, digest in self._digests.of(folder, file).items()
             }
         return self._hashed[one.asset_id]
-
-    def _check_unchanged(self, one: IndexedAsset, folder: Folder) -> None:
-        """Raise AssetError if a file that was parsed differs from the file that was hashed."""
-        known = self._files(one)
-        for name, digest in folder.digests.items():
-            if known.get(name, digest) != digest:
-                raise AssetError(f"{folder.root / name}: changed while it was read; start again")
 
 
 def _convert_symmetries(entry: MeshEntry) -> tuple[Symmetry, ...]:

@@ -1,0 +1,105 @@
+"""Parsing of an asset's files to plain arrays; these functions run in the sandbox.
+
+Each checks that the bytes it parsed have the digests under which its result is stored.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from gen_data.generator.assets.asset_arrays import encode_text, pack_imported
+from gen_data.generator.assets.asset_cache import Arrays
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.folder_index import MeshEntry, RobotEntry
+from gen_data.generator.assets.image_decoding import decode_image, decode_radiance
+from gen_data.generator.assets.importer import (
+    import_link,
+    import_object,
+    import_road_network,
+    road_network_lanes,
+)
+from gen_data.generator.assets.urdf import read_urdf
+from gen_data.generator.assets.usd_stages import stage_model
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.serialization import canonical_json, from_plain
+from gen_data.generator.usd.stage_reader import layer_references
+
+T = TypeVar("T")
+Digests = Mapping[str, str]
+"""``{path in the folder: sha256}`` of an asset's files."""
+_TEXT = "text"
+
+
+def parse_object(
+    root: Path, digests: Digests, entry: MeshEntry, asset_id: str, piece: str
+) -> Arrays:
+    """Import an object, or a piece of a stage (``importer.import_object``)."""
+    folder = Folder(root)
+    return _checked(folder, digests, pack_imported(import_object(folder, entry, asset_id, piece)))
+
+
+def parse_link(root: Path, digests: Digests, entry: RobotEntry, robot_id: str, link: str) -> Arrays:
+    """Import a link of a robot (``importer.import_link``)."""
+    folder = Folder(root)
+    urdf = read_urdf(folder, entry.file)
+    return _checked(
+        folder, digests, pack_imported(import_link(folder, entry, robot_id, urdf, link))
+    )
+
+
+def parse_road_network(root: Path, digests: Digests, file: str) -> Arrays:
+    """Import the surface of a road network."""
+    folder = Folder(root)
+    return _checked(folder, digests, pack_imported(import_road_network(folder, file)))
+
+
+def parse_lanes(root: Path, digests: Digests, file: str) -> Arrays:
+    """Read the lanes of a road network, for ``unpack_value``."""
+    folder = Folder(root)
+    return _checked(folder, digests, _pack_value(road_network_lanes(folder, file)))
+
+
+def parse_stage(root: Path, digests: Digests, entry: MeshEntry, asset_id: str) -> Arrays:
+    """Read pieces, lights and cameras of a stage, for ``unpack_value``."""
+    folder = Folder(root)
+    return _checked(folder, digests, _pack_value(stage_model(folder, entry, asset_id)))
+
+
+def parse_image(root: Path, digests: Digests, name: str, channels: str) -> Arrays:
+    """Decode an image to ``{channels: pixels}``; ``channels`` is rgb, rgba or radiance."""
+    folder = Folder(root)
+    data, place = folder.read(name), str(root / name)
+    pixels: Any = (
+        decode_radiance(data, place)
+        if channels == "radiance"
+        else decode_image(data, place, alpha=channels == "rgba")
+    )
+    return _checked(folder, digests, {channels: pixels})
+
+
+def parse_layer_references(root: Path, digests: Digests, file: str) -> Arrays:
+    """List the files that a layer of a stage refers to, for ``unpack_value``."""
+    folder = Folder(root)
+    return _checked(folder, digests, _pack_value(layer_references(folder.path(file))))
+
+
+def unpack_value(kind: type[T], arrays: Arrays) -> T:
+    """Restore the value of a function above that does not return geometry."""
+    return from_plain(kind, json.loads(arrays[_TEXT].tobytes()))
+
+
+def _pack_value(value: object) -> Arrays:
+    return {_TEXT: encode_text(canonical_json(value))}
+
+
+def _checked(folder: Folder, digests: Digests, arrays: Arrays) -> Arrays:
+    """The arrays. Raises AssetError if a parsed file differs from the one that was hashed."""
+    for name, digest in folder.digests.items():
+        if digests.get(name, digest) != digest:
+            raise AssetError(f"{folder.root / name}: changed while it was read; start again")
+    return {name: np.ascontiguousarray(array) for name, array in arrays.items()}

@@ -1,0 +1,112 @@
+"""The child process of ``sandbox.Sandbox``."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import pickle
+import resource
+import select
+import signal
+import sys
+import traceback
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from gen_data.generator.assets.asset_cache import Arrays, encode_arrays
+from gen_data.generator.assets.sandbox import LENGTH
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.processes import end_with_parent
+
+_IDLE_S = 5.0
+_FILES_MAX = 256
+_CLONE_NEWUSER, _CLONE_NEWNET = 0x10000000, 0x40000000  # <linux/sched.h>
+
+
+def main() -> None:
+    """Serve requests from standard input until it ends or stays silent."""
+    end_with_parent(int(sys.argv[1]))
+    # An interrupt from the terminal reaches the whole group; the parent decides.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    replies = os.dup(1)
+    # Libraries print warnings, which must not mix with replies.
+    os.dup2(2, 1)
+    _give_up_rights()
+    while select.select([0], [], [], _IDLE_S)[0]:
+        head = _read(LENGTH.size)
+        if not head:
+            break
+        reply = _serve(_read(LENGTH.unpack(head)[0]))
+        _write(replies, LENGTH.pack(len(reply)) + reply)
+
+
+def _give_up_rights() -> None:
+    """No core dumps, few open files and, where permitted, no network."""
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    files = min(_FILES_MAX, resource.getrlimit(resource.RLIMIT_NOFILE)[1])
+    resource.setrlimit(resource.RLIMIT_NOFILE, (files, files))
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    if sys.platform == "linux":
+        # An own network namespace has no interfaces. Unprivileged users need a user namespace,
+        # which some systems forbid; then only the readers themselves avoid the network.
+        libc = ctypes.CDLL(None)
+        if libc.unshare(_CLONE_NEWNET) != 0:
+            libc.unshare(_CLONE_NEWUSER | _CLONE_NEWNET)
+
+
+def _serve(request: bytes) -> bytes:
+    """Encoded result, or error, of a request."""
+    function, arguments, cpu_s, memory_bytes = pickle.loads(request)
+    try:
+        _limit(cpu_s, memory_bytes)
+        return encode_arrays("", function(*arguments))
+    except AssetError as error:
+        return _encode_error(str(error), expected=True)
+    except MemoryError:
+        message = f"{arguments[0]}: a file needs more than {memory_bytes / 1e9:.1f} GB; simplify it"
+        return _encode_error(message, expected=True)
+    except Exception:
+        return _encode_error(traceback.format_exc(), expected=False)
+
+
+def _limit(cpu_s: float, memory_bytes: int) -> None:
+    """Limit processor time, memory and file sizes from now on; the first kills the process."""
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    used_s = usage.ru_utime + usage.ru_stime
+    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+    resource.setrlimit(resource.RLIMIT_CPU, (int(used_s + cpu_s) + 1, hard))
+    # Archives of stages are unpacked to a temporary folder.
+    hard = resource.getrlimit(resource.RLIMIT_FSIZE)[1]
+    resource.setrlimit(resource.RLIMIT_FSIZE, (memory_bytes, hard))
+    with suppress(OSError, ValueError):
+        # Writable memory, and not the address space, of which native libraries reserve gigabytes.
+        held = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
+        hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
+        resource.setrlimit(resource.RLIMIT_DATA, (held + memory_bytes, hard))
+
+
+def _encode_error(message: str, *, expected: bool) -> bytes:
+    text = json.dumps({"message": message, "expected": expected})
+    arrays: Arrays = {"error": np.frombuffer(text.encode(), np.uint8)}
+    return encode_arrays("", arrays)
+
+
+def _read(size: int) -> bytes:
+    """Read ``size`` bytes from standard input; fewer at its end."""
+    data = b""
+    while len(data) < size and (part := os.read(0, size - len(data))):
+        data += part
+    return data
+
+
+def _write(descriptor: int, data: bytes) -> None:
+    view = memoryview(data)
+    while view:
+        view = view[os.write(descriptor, view) :]
+
+
+if __name__ == "__main__":
+    main()
