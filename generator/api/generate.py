@@ -38,7 +38,8 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
         seed: Replaces the configuration's seed.
         overrides: ``KEY=VALUE`` texts, as for ``gen-data --set``.
         without: Names of randomizers to leave out.
-        repair: Hash all existing files and generate damaged shards again.
+        repair: Hash all existing files first, generate damaged shards again, restore a damaged
+            ``plan.json``, and move files that do not belong to the data set out of it.
         on_progress: Called after each sample and shard.
         resume_command: Command that error messages give for resuming.
 
@@ -76,6 +77,6 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
             workers=processes,
             resume_command=resume_command,
             licences=partial(format_licences, factory),
-            settings=Settings(full_check=repair),
+            settings=Settings(repair=repair),
             progress=on_progress,
         )

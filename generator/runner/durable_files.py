@@ -112,6 +112,17 @@ def tree_sizes(folder: Path) -> dict[str, int]:
     return dict(sorted(sizes.items()))
 
 
+def empty_folders(folder: Path) -> tuple[str, ...]:
+    """Paths, relative to ``folder``, of the folders in it that contain nothing at all; sorted."""
+    return tuple(
+        sorted(
+            Path(inner).relative_to(folder).as_posix()
+            for inner, folders, names in os.walk(folder)
+            if not folders and not names and inner != str(folder)
+        )
+    )
+
+
 def free_bytes(path: Path) -> int:
     """Free bytes for this user on the file system of the nearest existing parent."""
     while not path.exists():
