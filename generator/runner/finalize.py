@@ -43,7 +43,7 @@ def finalize(
     store: LocalStore,
     pipeline: PipelineLike,
     licences: LicencesOf | None,
-    sealed_before: SealedBefore | None = None,
+    sealed_before: SealedBefore,
 ) -> str:
     """Merge, summarise and seal a data set whose shards are all committed.
 
@@ -52,7 +52,7 @@ def finalize(
         store: Its folder.
         pipeline: For its exporters and facts.
         licences: Makes the text of ``LICENSES-ASSETS.md``; None = no such file.
-        sealed_before: Seal of the same data set before it was damaged; None = there was none.
+        sealed_before: Seal of the same data set before it was damaged; no ids if there was none.
 
     Returns:
         Id of the data set; see ``seal.dataset_id``.
@@ -74,8 +74,7 @@ def finalize(
             write_durably(store.root / LICENCES_NAME, licences(used).encode(), scratch)
         entries = sorted(_entries(plan, store, records, names, known), key=_by_path)
         sums = sums_text(entries)
-        if sealed_before is not None:
-            sealed_before.expect(entries)
+        sealed_before.expect(entries)
         folders = [f"{n}/{inner}" for n in names for inner in empty_folders(store.root / n)]
         manifest = _manifest(plan, pipeline.info, records, entries, folders)
         sealed = [*entries, _entry_of_bytes(MANIFEST_NAME, manifest)]

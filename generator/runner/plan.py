@@ -83,14 +83,27 @@ def load_plan(folder: Path) -> Plan:
     """
     path = folder / PLAN_NAME
     try:
-        return from_plain(Plan, json.loads(path.read_bytes()))
+        data = path.read_bytes()
     except FileNotFoundError:
         raise StorageError(f"{path}: missing; {folder} is not a gen-data data set") from None
-    except (OSError, ValueError, TypeError, KeyError, AttributeError) as error:
+    except OSError as error:
+        raise StorageError(f"{path}: cannot be read ({error.strerror})") from None
+    return parse_plan(data, folder)
+
+
+def parse_plan(data: bytes, folder: Path) -> Plan:
+    """Parse the contents of ``plan.json`` of the data set in ``folder``.
+
+    Raises:
+        StorageError: they are damaged.
+    """
+    try:
+        return from_plain(Plan, json.loads(data))
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise StorageError(
-            f"{path}: damaged, or written by another version of gen-data ({error}); nothing was "
-            "changed.\n  With the configuration of the data set, this command restores it:\n"
-            f"    gen-data --config FILE --n N --out {shlex.quote(str(folder))} --repair"
+            f"{folder / PLAN_NAME}: damaged, or written by another version of gen-data ({error}); "
+            "nothing was changed.\n  This command restores it:\n"
+            f"    gen-data repair {shlex.quote(str(folder))}"
         ) from None
 
 

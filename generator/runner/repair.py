@@ -66,10 +66,7 @@ def restore_plan(store: LocalStore, plan: Plan) -> None:
 def quarantine_extra(store: LocalStore) -> None:
     """Move files and empty folders that do not belong to a finished data set to quarantine."""
     with store.errors():
-        for finding in find_deviations(store.root):
-            if finding.kind == "extra":
+        # More than once: a folder that held nothing else becomes empty.
+        while extra := [f for f in find_deviations(store.root) if f.kind == "extra"]:
+            for finding in extra:
                 store.set_aside(store.root / finding.path)
-        # Folders that held nothing else have become empty.
-        while emptied := [f for f in find_deviations(store.root) if f.kind == "extra"]:
-            for finding in emptied:
-                (store.root / finding.path).rmdir()

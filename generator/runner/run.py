@@ -11,6 +11,7 @@ from pathlib import Path
 from gen_data.generator.core.errors import GenDataError
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.runner.finalize import LicencesOf, finalize
+from gen_data.generator.runner.numerics_guard import admit_numerics
 from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
 from gen_data.generator.runner.processes import run_supervisor
 from gen_data.generator.runner.progress import RunMonitor, RunProgress, Summary
@@ -47,10 +48,11 @@ class Settings:
             files that do not belong to the data set to ``run/quarantine``. Without it, damaged
             shards are also generated again, but files of an unfinished data set are hashed last.
         limits: Limits on silence, deaths and memory of workers.
-        write_media, write_records: See ``Job``; picklable.
+        allow_mixed_numerics, write_media, write_records: See ``Job``; picklable.
     """
 
     repair: bool = False
+    allow_mixed_numerics: bool = False
     limits: Limits = field(default_factory=Limits)
     write_media: MediaWriter = write_images
     write_records: RecordWriter = write_records
@@ -87,6 +89,7 @@ def run(  # noqa: PLR0913  (every argument is the choice of the caller)
         StorageError: the folder belongs to another data set, or cannot be written.
         ConfigError: another run is writing there.
         SampleError: a sample cannot be generated; WorkerLost if it kills its process.
+        NumericsError: this machine computes differently from the one that began the data set.
         DeterminismError: a shard, or a repaired data set, came out differently the second time.
         Interrupted: Ctrl-C or SIGTERM; committed shards stay.
     """
@@ -99,9 +102,23 @@ def run(  # noqa: PLR0913  (every argument is the choice of the caller)
                 restore_plan(store, plan)
             store.state(plan)
         with store.locked():
-            job = Job(plan, store, make_pipeline, settings.write_media, settings.write_records)
+            job = Job(
+                plan,
+                store,
+                make_pipeline,
+                settings.write_media,
+                settings.write_records,
+                # Bytes that must equal those sealed before need no other guard.
+                settings.allow_mixed_numerics or bool(_read_seal(store, plan).ids),
+            )
             run_ = _Run(job, workers, progress or _silent, settings, interruption)
             return replace(run_.execute(licences), folder=str(out))
+
+
+def _read_seal(store: LocalStore, plan: Plan) -> SealedBefore:
+    """Read the seal of this very data set, which repair must not change; it may have none."""
+    same = read_or_empty(store.root / PLAN_NAME) == plan_bytes(plan)
+    return read_seal(store.root) if same else SealedBefore(frozenset(), {})
 
 
 @dataclass(frozen=True)
@@ -120,7 +137,7 @@ class _Run:
                 finished = store.state(plan) is FolderState.FINISHED
                 if finished and self._is_intact():
                     return self._summarize_finished()
-                sealed_before = self._read_seal()
+                sealed_before = _read_seal(store, plan)
             store.prepare(plan)
             hashed = finished or self.settings.repair
             scan = store.scan(plan, hashed)
@@ -176,14 +193,9 @@ class _Run:
             monitor.log({"note": f"{len(damaged)} damaged shard(s) are replaced: {listed}"})
             self._generate(Scan(damaged), monitor)
 
-    def _read_seal(self) -> SealedBefore | None:
-        """Read the seal of this very data set, which does not change by repair."""
-        plan, store = self.job.plan, self.job.store
-        same = read_or_empty(store.root / PLAN_NAME) == plan_bytes(plan)
-        return read_seal(store.root) if same else None
-
     def _generate_here(self, scan: Scan, monitor: RunMonitor) -> None:
         with self.job.make_pipeline() as pipeline:
+            admit_numerics(self.job, pipeline)
             for shard in scan.missing:
 
                 def on_sample(sample: Sample, shard: int = shard) -> None:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+import shlex
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -34,6 +34,8 @@ from gen_data.generator.runner.store import (
 SAMPLE_NAME = re.compile(r"(?:^|[/_])(\d{6,9})[._]")
 SHARD_PATH = re.compile(rf"{SHARDS_NAME}/(\d+)[/.]")
 SHOWN_MAX = 50
+REPAIRABLE = frozenset({"missing", "extra", "size", "digest", "inconsistent"})
+"""Kinds of deviations from the manifest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +43,8 @@ class Finding:
     """One deviation from the manifest.
 
     Attributes:
-        kind: ``missing``, ``extra``, ``size``, ``digest`` or ``inconsistent``.
+        kind: ``missing``, ``extra``, ``size``, ``digest`` or ``inconsistent``; of samples
+            ``invalid``, ``unreadable`` or ``irreproducible`` (see ``deep_verify``).
         path: Relative to the data set's root.
         text: Description of the deviation.
         samples: Affected samples, in words; empty = all or none.
@@ -89,19 +92,37 @@ def verify(folder: Path, full: bool = False) -> Report:
     Raises:
         VerificationError: the folder has no finished data set, or deviations, which it lists.
     """
+    report = summarize(folder, full)
+    found = find_deviations(folder, full)
+    if found:
+        raise VerificationError(describe_findings(folder, found))
+    return report
+
+
+def summarize(folder: Path, full: bool = False) -> Report:
+    """Sizes of a data set, with ``full`` as in ``verify``.
+
+    Raises:
+        VerificationError: the folder has no finished data set.
+    """
     if not (folder / MANIFEST_NAME).is_file():
         raise VerificationError(
             f"{folder}: not a finished data set: {MANIFEST_NAME} is missing. "
             "The command that started it finishes it."
         )
-    found = find_deviations(folder, full)
-    if found:
-        listed = "\n".join(f"  {finding}" for finding in found[:SHOWN_MAX])
-        more = f"\n  and {len(found) - SHOWN_MAX} more" if len(found) > SHOWN_MAX else ""
-        raise VerificationError(f"{folder}: {len(found)} deviation(s):\n{listed}{more}")
     sizes = _actual_sizes(folder)
-    manifest = json.loads((folder / MANIFEST_NAME).read_bytes())
-    return Report(manifest["dataset_id"], manifest["n"], len(sizes), sum(sizes.values()), full)
+    manifest = parse_object(read_or_empty(folder / MANIFEST_NAME)) or {}
+    identity, n = str(manifest.get("dataset_id", "")), manifest.get("n", 0)
+    return Report(identity, n, len(sizes), sum(sizes.values()), full)
+
+
+def describe_findings(folder: Path, found: Sequence[Finding]) -> str:
+    """Message that lists deviations, with the command that repairs them."""
+    listed = "\n".join(f"  {finding}" for finding in found[:SHOWN_MAX])
+    more = f"\n  and {len(found) - SHOWN_MAX} more" if len(found) > SHOWN_MAX else ""
+    damaged = any(finding.kind in REPAIRABLE for finding in found)
+    remedy = f"\n  Repair: gen-data repair {shlex.quote(str(folder))}" if damaged else ""
+    return f"{folder}: {len(found)} deviation(s):\n{listed}{more}{remedy}"
 
 
 def find_deviations(folder: Path, full: bool = False) -> list[Finding]:
@@ -143,7 +164,7 @@ class _Check:
 
     def _compare_folders(self, merged: Iterable[str]) -> Iterator[Finding]:
         declared = {*self._empty_folders, *merged}
-        actual = {f for f in empty_folders(self._folder) if f.partition("/")[0] != RUN_NAME}
+        actual = set(empty_folders(self._folder, without=RUN_NAME))
         for path in sorted(declared ^ actual):
             finding = partial(Finding, path=path, samples=self._samples_of(path))
             if path in actual:
@@ -230,5 +251,4 @@ class _Check:
 
 
 def _actual_sizes(folder: Path) -> dict[str, int]:
-    sizes = tree_sizes(folder)
-    return {path: size for path, size in sizes.items() if not path.startswith(f"{RUN_NAME}/")}
+    return tree_sizes(folder, without=RUN_NAME)

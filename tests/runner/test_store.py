@@ -23,7 +23,7 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.generator.runner import durable_files
 from gen_data.generator.runner.plan import load_plan
 from gen_data.generator.runner.provenance import parse_scene, scene_line
-from gen_data.generator.runner.run import Settings, run
+from gen_data.generator.runner.run import run
 from gen_data.generator.runner.shard import Job, make_shard
 from gen_data.generator.runner.store import FolderState, LocalStore
 from gen_data.generator.runner.verify import verify
