@@ -132,7 +132,7 @@ def repair(folder: Path, source: Path | None, workers: int | None) -> None:
     """
     from rich.console import Console
 
-    from gen_data.generator.api.trust import repair as restore
+    from gen_data.generator.api.repair import repair as restore
     from gen_data.generator.cli.generate_command import print_summary, progress_bar
     from gen_data.generator.runner.plan import PLAN_NAME, load_plan
 
@@ -192,7 +192,7 @@ def repro(source: str, index: int, out: Path | None, rerendered_from: Path | Non
 
     Prints a digest per stage. Exit code 5 if a stage differs, 6 if the sample cannot be generated.
     """
-    from gen_data.generator.api.trust import reproduce
+    from gen_data.generator.api.reproduce import reproduce
 
     result = reproduce(source, index, out, rerendered_from=rerendered_from)
     for stage, digest in result.digests.items():
