@@ -25,6 +25,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     overrides: Sequence[str] = (),
     without: Sequence[str] = (),
     repair: bool = False,
+    allow_mixed_numerics: bool = False,
     on_progress: Callable[[RunProgress], None] | None = None,
     resume_command: str = "the same call of gen_data.generate",
 ) -> Summary:
@@ -38,7 +39,10 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
         seed: Replaces the configuration's seed.
         overrides: ``KEY=VALUE`` texts, as for ``gen-data --set``.
         without: Names of randomizers to leave out.
-        repair: Hash all existing files and generate damaged shards again.
+        repair: Hash all existing files first, generate damaged shards again, restore a damaged
+            ``plan.json``, and move files that do not belong to the data set out of it.
+        allow_mixed_numerics: Go on on a machine that computes differently from the one that began
+            the data set; ``run/numerics.json`` lists all of them.
         on_progress: Called after each sample and shard.
         resume_command: Command that error messages give for resuming.
 
@@ -76,6 +80,6 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
             workers=processes,
             resume_command=resume_command,
             licences=partial(format_licences, factory),
-            settings=Settings(full_check=repair),
+            settings=Settings(repair=repair, allow_mixed_numerics=allow_mixed_numerics),
             progress=on_progress,
         )

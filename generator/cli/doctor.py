@@ -6,8 +6,11 @@ unsupported processor, is one failed check.
 
 from __future__ import annotations
 
+import hashlib
 import multiprocessing
+import os
 import platform
+import resource
 import shutil
 import subprocess
 import tempfile
@@ -25,6 +28,8 @@ from gen_data.generator import __version__
 from gen_data.generator.core.errors import GenDataError, SampleError
 from gen_data.generator.core.processes import silence_stdio
 
+FILES_MIN = 64
+MEMORY_MIN_BYTES = 2_000_000_000
 REINSTALL = "reinstall it: pip install --force-reinstall --no-deps {}"
 
 
@@ -115,6 +120,18 @@ def _try_cache() -> str:
     with tempfile.TemporaryFile(dir=folder) as file:
         file.write(b"ok")
     return f"{folder}, {shutil.disk_usage(folder).free / 1e9:.1f} GB free"
+
+
+def _try_limits() -> str:
+    """Limits of this user on files, memory and file sizes."""
+    files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    _expect(files == resource.RLIM_INFINITY or files >= FILES_MIN, f"only {files} open files")
+    for name, kind in (("memory", resource.RLIMIT_AS), ("file size", resource.RLIMIT_FSIZE)):
+        limit, _ = resource.getrlimit(kind)
+        few = limit != resource.RLIM_INFINITY and limit < MEMORY_MIN_BYTES
+        _expect(not few, f"{name} is limited to {limit / 1e6:.0f} MB")
+    free = os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    return f"{files} open files, {free / 1e9:.1f} GB of memory free, {os.cpu_count()} cores"
 
 
 def _try_renderer() -> str:
@@ -218,14 +235,21 @@ def _try_preview() -> str:
 
 def _try_sample() -> str:
     """Generate one small sample of the shipped tabletop, through every stage."""
+    from gen_data.generator.annotations.sample_checks import sample_faults
     from gen_data.generator.assemble.config import load_config
     from gen_data.generator.assemble.pipeline_factory import open_pipeline
 
     config = load_config("tabletop.yaml", overrides=("sensors[0].size_px=[160, 120]",))
     with open_pipeline(config) as pipeline:
+        before = pipeline.numerics()
         sample = pipeline.sample(0)
+        after = pipeline.numerics()
+    _expect(before == after, f"the same computations gave two results: {before}, then {after}")
+    _expect(not list(sample_faults(pipeline.info, sample)), "the sample is not valid")
     labelled = sum(len(truth.objects) for truth in sample.truth.values())
-    return f"{labelled} objects labelled, {sample.attempts} layout attempt(s)"
+    digest = hashlib.sha256("".join(before.values()).encode()).hexdigest()
+    attempts = f"{sample.attempts} layout attempt(s)"
+    return f"{labelled} objects labelled, {attempts}, numerics class {digest[:12]}"
 
 
 def _try_denoiser() -> str:
@@ -247,6 +271,7 @@ def _try_packs() -> str:
 CHECKS = (
     Check("python", _try_python, REINSTALL.format("gen-data numpy")),
     Check("cache", _try_cache, "make the folder writable, or point XDG_CACHE_HOME elsewhere"),
+    Check("limits", _try_limits, "raise them with ulimit -n, -v and -f"),
     Check("renderer", _try_renderer, REINSTALL.format("warp-lang")),
     Check("physics", _try_physics, REINSTALL.format("pybullet")),
     Check("meshes", _try_meshes, REINSTALL.format("scipy trimesh fast-simplification")),

@@ -1,4 +1,4 @@
-"""Commands that print information: ``verify``, ``describe``, ``schema``."""
+"""Commands that print information: ``describe``, ``formats``, ``schema``."""
 
 from __future__ import annotations
 
@@ -7,17 +7,6 @@ import json
 from pathlib import Path
 
 import click
-
-
-@click.command()
-@click.argument("folder", type=click.Path(path_type=Path))
-@click.option("--full", is_flag=True, help="Hash every file, not only sizes.")
-def verify(folder: Path, full: bool) -> None:
-    """Check a data set against its manifest: sizes, or every sha256 with --full."""
-    from gen_data.generator.runner.verify import verify as check
-
-    report = check(folder, full=full)
-    click.echo(f"{folder}: {report}")
 
 
 @click.command()

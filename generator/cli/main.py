@@ -34,7 +34,10 @@ class LazyCommands(click.Group):
         "contact-sheet": "gen_data.generator.cli.preview_commands:contact_sheet",
         "assets": "gen_data.generator.cli.asset_commands:assets",
         "report": "gen_data.generator.cli.report_command:report",
-        "verify": "gen_data.generator.cli.info_commands:verify",
+        "verify": "gen_data.generator.cli.verification_commands:verify",
+        "repair": "gen_data.generator.cli.verification_commands:repair",
+        "diff": "gen_data.generator.cli.verification_commands:diff",
+        "repro": "gen_data.generator.cli.verification_commands:repro",
         "describe": "gen_data.generator.cli.info_commands:describe",
         "formats": "gen_data.generator.cli.info_commands:formats",
         "schema": "gen_data.generator.cli.info_commands:schema",
@@ -51,7 +54,10 @@ class LazyCommands(click.Group):
         "contact-sheet": "Draw samples with their labels on one PNG.",
         "assets": "Install, list, show, verify and remove packs of assets.",
         "report": "Statistics of a data set, compared with KITTI's.",
-        "verify": "Check a data set against its manifest.",
+        "verify": "Check a data set: sizes, checksums, labels, reproducibility.",
+        "repair": "Restore damaged files of a data set, byte for byte.",
+        "diff": "Name the first difference of two data sets.",
+        "repro": "Generate one sample by itself and compare it with the stored one.",
         "describe": "Explain a plug-in, distribution, template or configuration.",
         "formats": "List the output formats.",
         "schema": "Print the JSON Schema of configurations.",
@@ -102,7 +108,12 @@ An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configu
     "--out", "-o", type=click.Path(path_type=Path), help="Folder [default: out/<config>]."
 )
 @click.option("--workers", "-w", type=int, help="Worker processes [default: one per core].")
-@click.option("--repair", is_flag=True, help="Hash existing files; generate damaged shards again.")
+@click.option("--repair", is_flag=True, help="Hash existing files first; restore damaged ones.")
+@click.option(
+    "--allow-mixed-numerics",
+    is_flag=True,
+    help="Resume on a machine whose computations differ in the last bits.",
+)
 @configuration_options
 @click.pass_context
 def cli(
@@ -113,6 +124,7 @@ def cli(
     seed: int | None,
     workers: int | None,
     repair: bool,
+    allow_mixed_numerics: bool,
     overrides: tuple[str, ...],
     without: tuple[str, ...],
 ) -> None:
@@ -132,7 +144,14 @@ def cli(
     from gen_data.generator.cli.generate_command import generate_with_progress
 
     choice = ConfigurationOptions(config, seed, overrides, without)
-    generate_with_progress(choice, n, out=out, workers=workers, repair=repair)
+    generate_with_progress(
+        choice,
+        n,
+        out=out,
+        workers=workers,
+        repair=repair,
+        allow_mixed_numerics=allow_mixed_numerics,
+    )
 
 
 def main() -> None:

@@ -64,6 +64,10 @@ class DeterminismError(GenDataError):
     exit_code = 5
 
 
+class NumericsError(DeterminismError):
+    """A machine or a worker process computes differently from the one that began the data set."""
+
+
 class SampleError(GenDataError):
     """A sample cannot be made."""
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 import operator
 import types
 import typing
@@ -61,6 +62,18 @@ def canonical_json(value: Any) -> str:
     return json.dumps(
         to_plain(value), sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False
     )
+
+
+def find_not_finite(plain: Any, place: str = "") -> str:
+    """Path of the first number in plain JSON values that is NaN or infinite; empty if none is."""
+    if isinstance(plain, float):
+        return "" if math.isfinite(plain) else place
+    items: Iterable[tuple[str, Any]] = ()
+    if isinstance(plain, Mapping):
+        items = ((f"{place}.{key}" if place else str(key), v) for key, v in plain.items())
+    elif isinstance(plain, (list, tuple)):
+        items = ((f"{place}[{i}]", v) for i, v in enumerate(plain))
+    return next(filter(None, (find_not_finite(v, inner) for inner, v in items)), "")
 
 
 _ATOMS = frozenset({str, int, float, bool, type(None)})

@@ -35,6 +35,7 @@ from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.scene_time import place_sensors
 from gen_data.generator.core.streams import Streams
 from gen_data.generator.pipeline.finalize_scene import Timeline, finalize_scene
+from gen_data.generator.pipeline.numerics import numerics_digests
 from gen_data.generator.pipeline.splits import Assignment, split_of
 
 if TYPE_CHECKING:
@@ -154,6 +155,10 @@ class Pipeline:
         """Stop the physics engine."""
         self._physics = None
         self._resources.close()
+
+    def numerics(self) -> Mapping[str, str]:
+        """Digests of small computations with these engines; see ``numerics_digests``."""
+        return numerics_digests(self.renderer, self._physics)
 
     def sample(self, index: int) -> Sample:
         """Generate sample number ``index``, from 0.

@@ -96,20 +96,47 @@ def make_folder(path: Path) -> None:
         sync_path(folder.parent)
 
 
-def tree_sizes(folder: Path) -> dict[str, int]:
+def tree_sizes(folder: Path, without: str = "") -> dict[str, int]:
     """``{path relative to folder: bytes}`` of its contents, sorted; empty if it does not exist.
 
-    Anything but files and folders, such as a symbolic link, has the size IRREGULAR.
+    Anything but files and folders, such as a symbolic link, has the size IRREGULAR. The folder
+    named ``without`` directly in ``folder`` is left out.
     """
     sizes: dict[str, int] = {}
-    for inner, folders, names in os.walk(folder):
+    for inner, folders, names in _walk(folder, without):
         links = [name for name in folders if Path(inner, name).is_symlink()]
+        prefix = _prefix(inner, folder)
         for name in (*names, *links):
-            path = Path(inner, name)
-            status = path.lstat()
+            status = os.lstat(f"{inner}/{name}")
             regular = stat.S_ISREG(status.st_mode)
-            sizes[path.relative_to(folder).as_posix()] = status.st_size if regular else IRREGULAR
+            sizes[prefix + name] = status.st_size if regular else IRREGULAR
     return dict(sorted(sizes.items()))
+
+
+def empty_folders(folder: Path, without: str = "") -> tuple[str, ...]:
+    """Paths, relative to ``folder``, of the folders in it that contain nothing at all; sorted.
+
+    The folder named ``without`` directly in ``folder`` is left out.
+    """
+    return tuple(
+        sorted(
+            _prefix(inner, folder).rstrip("/")
+            for inner, folders, names in _walk(folder, without)
+            if not folders and not names and inner != str(folder)
+        )
+    )
+
+
+def _walk(folder: Path, without: str) -> Iterator[tuple[str, list[str], list[str]]]:
+    for inner, folders, names in os.walk(folder):
+        if without in folders and inner == str(folder):
+            folders.remove(without)
+        yield inner, folders, names
+
+
+def _prefix(inner: str, folder: Path) -> str:
+    """``inner`` relative to ``folder``, as the beginning of the paths of its entries."""
+    return "" if inner == str(folder) else inner[len(str(folder)) :].lstrip("/") + "/"
 
 
 def free_bytes(path: Path) -> int:

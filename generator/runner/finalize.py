@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.runner.durable_files import (
     Inode,
+    empty_folders,
     get_inode,
     hash_file,
     move_durably,
@@ -23,6 +23,7 @@ from gen_data.generator.runner.durable_files import (
 )
 from gen_data.generator.runner.error_context import explain_errors
 from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
+from gen_data.generator.runner.seal import Entry, SealedBefore, dataset_id, sums_text
 from gen_data.generator.runner.shard import PipelineLike
 from gen_data.generator.runner.shard_record import ShardRecord, sum_counts
 from gen_data.generator.runner.store import (
@@ -37,27 +38,28 @@ LicencesOf = Callable[[Sequence[str]], str]
 """Formats the licences of the assets with these ids."""
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """One file of the data set as a whole; ``path`` is relative to its root."""
-
-    path: str
-    bytes: int
-    sha256: str
-
-
 def finalize(
-    plan: Plan, store: LocalStore, pipeline: PipelineLike, licences: LicencesOf | None
+    plan: Plan,
+    store: LocalStore,
+    pipeline: PipelineLike,
+    licences: LicencesOf | None,
+    sealed_before: SealedBefore,
 ) -> str:
     """Merge, summarise and seal a data set whose shards are all committed.
 
-    ``licences`` makes the text of ``LICENSES-ASSETS.md``; None = no such file.
+    Args:
+        plan: Of the data set.
+        store: Its folder.
+        pipeline: For its exporters and facts.
+        licences: Makes the text of ``LICENSES-ASSETS.md``; None = no such file.
+        sealed_before: Seal of the same data set before it was damaged; no ids if there was none.
 
     Returns:
-        Id of the data set, as defined by ``dataset_id``.
+        Id of the data set; see ``seal.dataset_id``.
 
     Raises:
         StorageError: a shard is not committed, or a file cannot be written.
+        DeterminismError: the result is not what was sealed before; nothing is sealed.
     """
     with store.errors():
         records = _all_records(plan, store)
@@ -72,25 +74,14 @@ def finalize(
             write_durably(store.root / LICENCES_NAME, licences(used).encode(), scratch)
         entries = sorted(_entries(plan, store, records, names, known), key=_by_path)
         sums = sums_text(entries)
-        manifest = _manifest(plan, pipeline.info, records, entries)
+        sealed_before.expect(entries)
+        folders = [f"{n}/{inner}" for n in names for inner in empty_folders(store.root / n)]
+        manifest = _manifest(plan, pipeline.info, records, entries, folders)
         sealed = [*entries, _entry_of_bytes(MANIFEST_NAME, manifest)]
         lines = sums_text(sorted(sealed, key=_by_path))
         write_durably(store.root / SUMS_NAME, lines.encode(), scratch)
         write_durably(store.manifest_path, manifest, scratch)
     return dataset_id(sums)
-
-
-def sums_text(entries: list[Entry]) -> str:
-    """The format of ``sha256sum``."""
-    return "".join(f"{entry.sha256}  {entry.path}\n" for entry in entries)
-
-
-def dataset_id(sums: str) -> str:
-    """Identity of a data set: sha256 of ``SHA256SUMS`` without the manifest's own line.
-
-    ``grep -v '  manifest.json$' SHA256SUMS | sha256sum`` prints it.
-    """
-    return hashlib.sha256(sums.encode()).hexdigest()
 
 
 def _all_records(plan: Plan, store: LocalStore) -> list[ShardRecord]:
@@ -153,9 +144,16 @@ def _entries(
 
 
 def _manifest(
-    plan: Plan, info: DatasetInfo, records: list[ShardRecord], entries: list[Entry]
+    plan: Plan,
+    info: DatasetInfo,
+    records: list[ShardRecord],
+    entries: list[Entry],
+    folders: list[str],
 ) -> bytes:
-    """Contents of the manifest, without time, host, path or number of workers."""
+    """Contents of the manifest, without time, host, path or number of workers.
+
+    ``folders`` are the empty folders outside of shards.
+    """
     sized_by_records = {file.sha256 for record in records for file in record.files}
     manifest = {
         "format_version": plan.format_version,
@@ -172,6 +170,7 @@ def _manifest(
         "shards": [hashlib.sha256(record.to_bytes()).hexdigest() for record in records],
         # Sizes of the files that equal no file of a shard.
         "files": {e.path: e.bytes for e in entries if e.sha256 not in sized_by_records},
+        "empty_folders": folders,
         "versions": plan.versions,
     }
     return (canonical_json(manifest) + "\n").encode()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +13,11 @@ from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
 from gen_data.generator.runner.durable_files import write_durably
 
-FORMAT_VERSION = 1
-"""Version of the folder layout, the shard records and the manifest."""
+FORMAT_VERSION = 2
+"""Version of the folder layout, the shard records and the manifest.
+
+Since version 2, records have checksums, and records and manifest list empty folders.
+"""
 
 PLAN_NAME = "plan.json"
 
@@ -79,13 +83,27 @@ def load_plan(folder: Path) -> Plan:
     """
     path = folder / PLAN_NAME
     try:
-        return from_plain(Plan, json.loads(path.read_bytes()))
+        data = path.read_bytes()
     except FileNotFoundError:
         raise StorageError(f"{path}: missing; {folder} is not a gen-data data set") from None
+    except OSError as error:
+        raise StorageError(f"{path}: cannot be read ({error.strerror})") from None
+    return parse_plan(data, folder)
+
+
+def parse_plan(data: bytes, folder: Path) -> Plan:
+    """Parse the contents of ``plan.json`` of the data set in ``folder``.
+
+    Raises:
+        StorageError: they are damaged.
+    """
+    try:
+        return from_plain(Plan, json.loads(data))
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise StorageError(
-            f"{path}: damaged, or written by another version of gen-data ({error}); nothing was "
-            "changed. Restore the file from a copy, or choose another folder with --out"
+            f"{folder / PLAN_NAME}: damaged, or written by another version of gen-data ({error}); "
+            "nothing was changed.\n  This command restores it:\n"
+            f"    gen-data repair {shlex.quote(str(folder))}"
         ) from None
 
 
@@ -95,18 +113,19 @@ def compare_plans(old: Plan, new: Plan) -> list[str]:
     Fields of the configuration are named as in YAML, all others as in Plan.
     """
     was, now = to_plain(old), to_plain(new)
-    lines = list(_differences("", was.pop("config"), now.pop("config")))
-    return lines + list(_differences("", was, now))
+    lines = list(differences("", was.pop("config"), now.pop("config")))
+    return lines + list(differences("", was, now))
 
 
-def _differences(place: str, was: Any, now: Any) -> Iterator[str]:
+def differences(place: str, was: Any, now: Any) -> Iterator[str]:
+    """Differences of two plain JSON values at ``place``, one line per field."""
     if isinstance(was, dict) and isinstance(now, dict):
         for key in sorted({*was, *now}):
             inner = f"{place}.{key}" if place else str(key)
-            yield from _differences(inner, was.get(key, _ABSENT), now.get(key, _ABSENT))
+            yield from differences(inner, was.get(key, _ABSENT), now.get(key, _ABSENT))
     elif isinstance(was, list) and isinstance(now, list) and len(was) == len(now):
         for i, (left, right) in enumerate(zip(was, now, strict=True)):
-            yield from _differences(f"{place}[{i}]", left, right)
+            yield from differences(f"{place}[{i}]", left, right)
     elif canonical_json(was) != canonical_json(now):
         yield f"{place}: was {_format(was)}, now {_format(now)}"
 

@@ -31,7 +31,7 @@ class RunProgress:
     """Progress of a run.
 
     Attributes:
-        phase: ``samples`` or ``merging``.
+        phase: ``samples``, ``checking`` or ``merging``.
         done: Existing samples, including those of earlier runs and of unfinished shards.
         total: Samples of the data set.
         samples_per_s: Mean rate of this run; 0 until the first sample.
@@ -86,7 +86,7 @@ class Summary:
             return [
                 (
                     "samples",
-                    f"{self.samples} (all there, nothing to do; --repair compares every byte)",
+                    f"{self.samples} (all there, every sha256 equal; nothing to do)",
                 ),
                 ("id", self.dataset_id[:16]),
             ]

@@ -23,6 +23,7 @@ from gen_data.generator.core.streams import Streams
 from gen_data.generator.pipeline import Pipeline
 from gen_data.generator.pipeline.pipeline import DrawnView
 from gen_data.generator.runner.identity import format_licences, make_plan
+from gen_data.generator.runner.plan import Plan
 from gen_data.generator.runner.progress import RunProgress, Summary
 from gen_data.generator.runner.run import run
 from gen_data.generator.runner.stored import StoredSamples
@@ -74,6 +75,10 @@ class RerenderedScenes:
     def __exit__(self, *exception: object) -> None:
         """Drop what was read."""
         self.plan.stored.close()
+
+    def numerics(self) -> Mapping[str, str]:
+        """Digests of small computations; see ``Pipeline.numerics``."""
+        return self.pipeline.numerics()
 
     def sample(self, index: int) -> Sample:
         """Render the scene of a sample again.
@@ -195,13 +200,7 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
             randomizers.
         GenDataError: see ``run``.
     """
-    changes = Changes(was, now)
-    changes.check(redraw)
-    factory = PipelineFactory(now, stored.n, known_categories=stored.categories)
-    maker = RerenderFactory(stored, factory, changes.sensors, changes.randomizers | set(redraw))
-    plan = replace(
-        make_plan(factory), name=stored.plan.name, scenes_of=f"{stored.dataset_id} {sorted(redraw)}"
-    )
+    plan, maker = rerender_plan(stored, was, now, redraw)
     return run(
         plan,
         maker,
@@ -209,8 +208,26 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
         workers=workers,
         resume_command=resume_command,
         progress=progress,
-        licences=lambda used: format_licences(factory, used),
+        licences=lambda used: format_licences(maker.factory, used),
     )
+
+
+def rerender_plan(
+    stored: StoredSamples, was: Config, now: Config, redraw: Sequence[str]
+) -> tuple[Plan, RerenderFactory]:
+    """Plan of a re-rendering, and what makes its pipelines; arguments as of ``rerender``.
+
+    Raises:
+        ConfigError: see ``rerender``.
+    """
+    changes = Changes(was, now)
+    changes.check(redraw)
+    factory = PipelineFactory(now, stored.n, known_categories=stored.categories)
+    maker = RerenderFactory(stored, factory, changes.sensors, changes.randomizers | set(redraw))
+    plan = replace(
+        make_plan(factory), name=stored.plan.name, scenes_of=f"{stored.dataset_id} {sorted(redraw)}"
+    )
+    return plan, maker
 
 
 CHANGEABLE = frozenset(

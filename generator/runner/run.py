@@ -11,9 +11,12 @@ from pathlib import Path
 from gen_data.generator.core.errors import GenDataError
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.runner.finalize import LicencesOf, finalize
-from gen_data.generator.runner.plan import Plan
+from gen_data.generator.runner.numerics_guard import admit_numerics
+from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
 from gen_data.generator.runner.processes import run_supervisor
 from gen_data.generator.runner.progress import RunMonitor, RunProgress, Summary
+from gen_data.generator.runner.repair import quarantine_extra, restore_plan
+from gen_data.generator.runner.seal import SealedBefore, read_or_empty, read_seal
 from gen_data.generator.runner.shard import (
     EnteredPipeline,
     Job,
@@ -41,13 +44,15 @@ class Settings:
     """Settings of a run; they change no byte of the data set.
 
     Attributes:
-        full_check: On resumption, hash existing files instead of comparing sizes. This also
-            repairs a damaged data set: damaged shards are generated again.
+        repair: Hash existing files before anything else, restore a damaged ``plan.json``, and move
+            files that do not belong to the data set to ``run/quarantine``. Without it, damaged
+            shards are also generated again, but files of an unfinished data set are hashed last.
         limits: Limits on silence, deaths and memory of workers.
-        write_media, write_records: See ``Job``; picklable.
+        allow_mixed_numerics, write_media, write_records: See ``Job``; picklable.
     """
 
-    full_check: bool = False
+    repair: bool = False
+    allow_mixed_numerics: bool = False
     limits: Limits = field(default_factory=Limits)
     write_media: MediaWriter = write_images
     write_records: RecordWriter = write_records
@@ -84,7 +89,8 @@ def run(  # noqa: PLR0913  (every argument is the choice of the caller)
         StorageError: the folder belongs to another data set, or cannot be written.
         ConfigError: another run is writing there.
         SampleError: a sample cannot be generated; WorkerLost if it kills its process.
-        DeterminismError: a shard came out differently the second time.
+        NumericsError: this machine computes differently from the one that began the data set.
+        DeterminismError: a shard, or a repaired data set, came out differently the second time.
         Interrupted: Ctrl-C or SIGTERM; committed shards stay.
     """
     settings = settings or Settings()
@@ -92,11 +98,27 @@ def run(  # noqa: PLR0913  (every argument is the choice of the caller)
     message = f"finished shards are kept; resume with:\n    {resume_command}"
     with Interruption(message) as interruption:
         with interruption.immediate(), store.errors():
+            if settings.repair:
+                restore_plan(store, plan)
             store.state(plan)
         with store.locked():
-            job = Job(plan, store, make_pipeline, settings.write_media, settings.write_records)
+            job = Job(
+                plan,
+                store,
+                make_pipeline,
+                settings.write_media,
+                settings.write_records,
+                # Bytes that must equal those sealed before need no other guard.
+                settings.allow_mixed_numerics or bool(_read_seal(store, plan).ids),
+            )
             run_ = _Run(job, workers, progress or _silent, settings, interruption)
             return replace(run_.execute(licences), folder=str(out))
+
+
+def _read_seal(store: LocalStore, plan: Plan) -> SealedBefore:
+    """Read the seal of this very data set, which repair must not change; it may have none."""
+    same = read_or_empty(store.root / PLAN_NAME) == plan_bytes(plan)
+    return read_seal(store.root) if same else SealedBefore(frozenset(), {})
 
 
 @dataclass(frozen=True)
@@ -112,18 +134,25 @@ class _Run:
         plan, store = self.job.plan, self.job.store
         with self.interruption.immediate():
             with store.errors():
-                state = store.state(plan)
-                if state is FolderState.FINISHED and self._is_intact():
+                finished = store.state(plan) is FolderState.FINISHED
+                if finished and self._is_intact():
                     return self._summarize_finished()
+                sealed_before = _read_seal(store, plan)
             store.prepare(plan)
-            scan = store.scan(plan, self.settings.full_check)
+            hashed = finished or self.settings.repair
+            scan = store.scan(plan, hashed)
         monitor = RunMonitor(store, scan, plan.n, self.progress)
         monitor.show("samples")
         try:
             self._generate(scan, monitor)
+            if not hashed:
+                self._replace_damaged(scan, monitor)
             with self.interruption.immediate():
                 monitor.show("merging")
-                dataset_id = finalize(plan, store, self.job.make_pipeline(), licences)
+                pipeline = self.job.make_pipeline()
+                dataset_id = finalize(plan, store, pipeline, licences, sealed_before)
+                if self.settings.repair:
+                    quarantine_extra(store)
         finally:
             # This may also fail on a faulty disk; the next run starts with it.
             with suppress(OSError):
@@ -149,8 +178,24 @@ class _Run:
         if supervisor.error is not None:
             raise supervisor.error
 
+    def _replace_damaged(self, scan: Scan, monitor: RunMonitor) -> None:
+        """Hash the shards of earlier runs, so that no damage is sealed; replace damaged ones."""
+        plan, store = self.job.plan, self.job.store
+        if len(scan.missing) == plan.shard_count:
+            return
+        made = set(scan.missing)
+        with self.interruption.immediate():
+            monitor.show("checking")
+            earlier = (shard for shard in range(plan.shard_count) if shard not in made)
+            damaged = store.quarantine_damaged(plan, earlier)
+        if damaged:
+            listed = ", ".join(map(str, damaged[:10]))
+            monitor.log({"note": f"{len(damaged)} damaged shard(s) are replaced: {listed}"})
+            self._generate(Scan(damaged), monitor)
+
     def _generate_here(self, scan: Scan, monitor: RunMonitor) -> None:
         with self.job.make_pipeline() as pipeline:
+            admit_numerics(self.job, pipeline)
             for shard in scan.missing:
 
                 def on_sample(sample: Sample, shard: int = shard) -> None:
@@ -162,9 +207,11 @@ class _Run:
                     raise objection
 
     def _is_intact(self) -> bool:
-        """Whether a finished data set is undamaged; additional files do not matter."""
-        found = find_deviations(self.job.store.root, self.settings.full_check)
-        return all(finding.kind == "extra" for finding in found)
+        """Whether a finished data set is undamaged; additional files matter to repair only."""
+        found = find_deviations(self.job.store.root, full=True)
+        return not found or (
+            not self.settings.repair and all(finding.kind == "extra" for finding in found)
+        )
 
     def _summarize_finished(self) -> Summary:
         manifest = json.loads(self.job.store.manifest_path.read_bytes())

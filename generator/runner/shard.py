@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from gen_data.generator.core.capture import Capture, SensorReading
+from gen_data.generator.core.errors import SampleError
 from gen_data.generator.core.interfaces import DatasetInfo, Exporter
 from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.serialization import find_not_finite, to_plain
 from gen_data.generator.runner.error_context import explain_errors
 from gen_data.generator.runner.labels import LABELS_NAME, labels_line
 from gen_data.generator.runner.plan import Plan
@@ -61,15 +63,35 @@ class EnteredPipeline(PipelineLike, Protocol):
 
 
 def write_images(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
-    """Write the images of a sample to their places in a shard; imports OpenCV when first used."""
-    from gen_data.exporters.image_files import write_media
+    """Check a sample, then write its images to their places in a shard.
 
+    Imports OpenCV when first used.
+
+    Raises:
+        SampleError: the sample is not valid; the message names the field.
+    """
+    from gen_data.exporters.image_files import write_media
+    from gen_data.generator.annotations.sample_checks import check_sample
+
+    check_sample(info, sample)
     write_media(info, sample, shard_dir)
 
 
 def write_records(sample: Sample, base: Sample | None, shard_dir: Path) -> None:
-    """Add the lines of a sample to ``scenes.jsonl`` and ``labels.jsonl``."""
-    for name, line in ((SCENES_NAME, scene_line(sample, base)), (LABELS_NAME, labels_line(sample))):
+    """Add the lines of a sample to ``scenes.jsonl`` and ``labels.jsonl``.
+
+    Raises:
+        SampleError: a number is NaN or infinite; the message names the field.
+    """
+    try:
+        lines = {SCENES_NAME: scene_line(sample, base), LABELS_NAME: labels_line(sample)}
+    except ValueError as error:
+        parts = {"scene": sample.scene, "truth": sample.truth, "frame": sample.frame}
+        field = find_not_finite(to_plain(parts))
+        if not field:
+            raise
+        raise SampleError(f"{field}: is NaN or infinite; expected a finite number") from error
+    for name, line in lines.items():
         with (shard_dir / name).open("a", encoding="utf-8") as file:
             file.write(line + "\n")
 
@@ -82,6 +104,7 @@ class Job:
         make_pipeline: Makes the same pipeline in any process.
         write_media: Writes the images of one sample.
         write_records: Adds scene and labels of one sample.
+        allow_mixed_numerics: Accept machines that compute differently; see ``admit_numerics``.
     """
 
     plan: Plan
@@ -89,6 +112,7 @@ class Job:
     make_pipeline: Callable[[], EnteredPipeline]
     write_media: MediaWriter = write_images
     write_records: RecordWriter = write_records
+    allow_mixed_numerics: bool = False
 
 
 @dataclass(frozen=True)

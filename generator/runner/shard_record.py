@@ -1,7 +1,12 @@
-"""Records of committed shards; the existence of its record *is* the commit of a shard."""
+"""Records of committed shards; the existence of its record *is* the commit of a shard.
+
+A record ends in a checksum of itself: its digests decide whether files are damaged, so that a
+damaged record must be found before anything is compared with it.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections import Counter
 from collections.abc import Iterable, Mapping
@@ -11,8 +16,13 @@ from pathlib import Path
 from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene_assets import assets_in
-from gen_data.generator.core.serialization import canonical_json, from_plain
-from gen_data.generator.runner.durable_files import IRREGULAR, hash_file, tree_sizes
+from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
+from gen_data.generator.runner.durable_files import (
+    IRREGULAR,
+    empty_folders,
+    hash_file,
+    tree_sizes,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +54,7 @@ class ShardRecord:
         splits: Counts, sorted by split.
         assets: Ids of all objects, robots, textures and environments in its samples, sorted.
         files: Sorted by path.
+        empty_folders: Folders without any file, relative to the shard's folder, sorted.
     """
 
     shard: int
@@ -54,6 +65,7 @@ class ShardRecord:
     splits: tuple[SplitCount, ...]
     assets: tuple[str, ...]
     files: tuple[FileRecord, ...]
+    empty_folders: tuple[str, ...] = ()
 
     @property
     def size_bytes(self) -> int:
@@ -61,14 +73,30 @@ class ShardRecord:
         return sum(file.bytes for file in self.files)
 
     def to_bytes(self) -> bytes:
-        """Contents of the record's file: one line of canonical JSON."""
-        return (canonical_json(self) + "\n").encode()
+        """Contents of the record's file: one line of canonical JSON.
+
+        Its ``sha256`` is that of the same line without it.
+        """
+        checksum = hashlib.sha256(canonical_json(self).encode()).hexdigest()
+        return (canonical_json({**to_plain(self), "sha256": checksum}) + "\n").encode()
 
 
 def parse_record(data: bytes) -> ShardRecord | None:
-    """Parse the bytes of a record; None if they are damaged."""
+    """Parse the bytes of a record; None if a single bit of them is damaged."""
+    record = parse_unchecked_record(data)
+    return record if record is not None and record.to_bytes() == data else None
+
+
+def parse_unchecked_record(data: bytes) -> ShardRecord | None:
+    """Parse the bytes of a record whose digest is known otherwise; None if they are no record.
+
+    Records of format version 1 have no checksum; the manifest of a finished data set has their
+    digests.
+    """
     try:
-        return from_plain(ShardRecord, json.loads(data))
+        plain = json.loads(data)
+        plain.pop("sha256", None)
+        return from_plain(ShardRecord, plain)
     except (ValueError, TypeError, KeyError, AttributeError):
         return None
 
@@ -106,6 +134,7 @@ def describe_shard(
         sum_counts(counts),
         tuple(sorted(assets)),
         files,
+        empty_folders(folder),
     )
 
 

@@ -6,7 +6,8 @@
     coco/ kitti/ ...        merged results of exporters
     SHA256SUMS              every file but run/ and itself, for ``sha256sum -c``
     manifest.json           written last: it marks the data set as finished
-    run/                    lock, log, unfinished and quarantined files; no part of the data set
+    run/                    lock, log, a copy of the plan, unfinished and quarantined files; no part
+                            of the data set
 
 Nothing is inferred from the files in a folder: a shard either matches its record or is generated
 again.
@@ -21,7 +22,7 @@ import shlex
 import shutil
 import socket
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from enum import Enum
@@ -29,6 +30,7 @@ from pathlib import Path
 
 from gen_data.generator.core.errors import ConfigError, DeterminismError, StorageError
 from gen_data.generator.runner.durable_files import (
+    empty_folders,
     hash_file,
     make_folder,
     move_durably,
@@ -55,6 +57,8 @@ RUN_NAME = "run"
 SHARDS_NAME = "shards"
 REMEDY = "choose another folder with --out"
 SCRATCH_FOLDERS_MAX = 1_000_000
+RUN_NAMES = frozenset({"lock", "tmp", "tmp-doomed", PLAN_NAME})
+"""Contents of ``run`` before ``plan.json`` is written."""
 
 
 class FolderState(Enum):
@@ -119,9 +123,13 @@ class LocalStore:
         """Path of the record of a committed shard."""
         return self._shards_dir / f"{shard:06d}.json"
 
+    def has_shards(self) -> bool:
+        """Whether the folder of shards exists."""
+        return os.path.lexists(self._shards_dir)
+
     def reproduce_command(self, index: int) -> str:
         """Command that generates one sample of this data set by itself."""
-        return f"gen-data contact-sheet {shlex.quote(str(self.root))} --first {index} --n 1"
+        return f"gen-data repro {shlex.quote(str(self.root))} --index {index}"
 
     def errors(self) -> AbstractContextManager[None]:
         """Context that turns OSErrors into StorageErrors with the resume command."""
@@ -170,20 +178,36 @@ class LocalStore:
             os.close(descriptor)
 
     def prepare(self, plan: Plan) -> None:
-        """Prepare the folder for shards: remove unfinished files, write the plan.
+        """Prepare the folder for shards: remove unfinished files, write the plan and its copy.
 
         An existing manifest is removed: call this only if shards are missing.
         """
         with self.errors():
             self.clear_scratch()
             make_folder(self.scratch_root)
-            path = self.root / PLAN_NAME
+            self._clear_places()
+            path, copy = self.root / PLAN_NAME, self.run_dir / PLAN_NAME
             if not path.exists() or path.read_bytes() != plan_bytes(plan):
-                write_plan(plan, self.root, self.scratch_root)
+                # Sums of fewer samples would not be those of this plan.
+                (self.root / SUMS_NAME).unlink(missing_ok=True)
+            # The copy first: repair takes it for the plan when the two differ.
+            for kept in (copy, path):
+                if not kept.exists() or kept.read_bytes() != plan_bytes(plan):
+                    write_plan(plan, kept.parent, self.scratch_root)
             make_folder(self._shards_dir)
             if self.manifest_path.exists():
                 self.manifest_path.unlink()
                 sync_path(self.root)
+
+    def _clear_places(self) -> None:
+        """Quarantine whatever is in the place of a file or folder and is none."""
+        for name in (PLAN_NAME, MANIFEST_NAME, SUMS_NAME, LICENCES_NAME):
+            path = self.root / name
+            if os.path.lexists(path) and (path.is_symlink() or not path.is_file()):
+                self.set_aside(path)
+        folder = self._shards_dir
+        if os.path.lexists(folder) and (folder.is_symlink() or not folder.is_dir()):
+            self.set_aside(folder)
 
     def clear_scratch(self) -> None:
         """Remove unfinished files. The folder is renamed first, out of reach of late writers."""
@@ -224,11 +248,8 @@ class LocalStore:
 
     def record(self, shard: int) -> ShardRecord | None:
         """Read the record of a shard; None if it is missing or damaged."""
-        try:
-            data = self.record_path(shard).read_bytes()
-        except FileNotFoundError:
-            return None
-        return parse_record(data)
+        path = self.record_path(shard)
+        return parse_record(path.read_bytes()) if path.is_file() else None
 
     def scan(self, plan: Plan, full: bool = False) -> Scan:
         """Check every record and the sizes of its files, or their digests when ``full``.
@@ -251,14 +272,27 @@ class LocalStore:
                     rejections += record.rejections
             return Scan(missing, samples, size, rejections)
 
+    def quarantine_damaged(self, plan: Plan, shards: Iterable[int]) -> list[int]:
+        """Hash the files of these shards, and quarantine those that differ from their records.
+
+        Returns:
+            The quarantined shards.
+        """
+        with self.errors():
+            damaged = [s for s in shards if self._intact_record(plan, s, full=True) is None]
+            for shard in damaged:
+                self.quarantine(shard)
+        return damaged
+
     def quarantine(self, shard: int) -> None:
         """Move the record and the folder of a shard, if they exist, out of the data set."""
         # The record first: without it, the folder is not a shard.
         for path in (self.record_path(shard), self.shard_dir(shard)):
-            if path.exists():
-                self._quarantine(path)
+            if os.path.lexists(path):
+                self.set_aside(path)
 
-    def _quarantine(self, path: Path) -> Path:
+    def set_aside(self, path: Path) -> Path:
+        """Move a file or folder to ``run/quarantine``; returns its new path."""
         folder = self.run_dir / "quarantine"
         make_folder(folder)
         taken = {entry.name for entry in folder.iterdir()}
@@ -274,7 +308,11 @@ class LocalStore:
         folder, indices = self.shard_dir(shard), plan.samples_of(shard)
         if (record.shard, record.first, record.end) != (shard, indices.start, indices.stop):
             return None
+        if folder.is_symlink():
+            return None
         if tree_sizes(folder) != {file.path: file.bytes for file in record.files}:
+            return None
+        if empty_folders(folder) != record.empty_folders:
             return None
         if full and any(hash_file(folder / f.path) != f.sha256 for f in record.files):
             return None
@@ -284,14 +322,15 @@ class LocalStore:
         if committed == again:
             shutil.rmtree(folder)
             return
-        kept = self._quarantine(folder)
+        kept = self.set_aside(folder)
         first = {file.path: file.sha256 for file in committed.files}
         second = {file.path: file.sha256 for file in again.files}
         paths = sorted(p for p in {*first, *second} if first.get(p) != second.get(p))
         raise DeterminismError(
             f"shard {committed.shard} came out differently the second time: "
             f"{', '.join(paths[:3]) or 'its record'}{' ...' if len(paths) > 3 else ''}.\n"
-            f"  Compare {self.shard_dir(committed.shard)} with {kept}"
+            f"  Compare: gen-data diff {shlex.quote(str(self.shard_dir(committed.shard)))} "
+            f"{shlex.quote(str(kept))}"
         )
 
     def _check_parents(self) -> None:
@@ -344,4 +383,4 @@ def _is_run_dir(folder: Path) -> bool:
     """Whether a folder is absent, or left by a run that was killed before it wrote its plan."""
     if not folder.exists():
         return True
-    return folder.is_dir() and {p.name for p in folder.iterdir()} <= {"lock", "tmp", "tmp-doomed"}
+    return folder.is_dir() and {p.name for p in folder.iterdir()} <= RUN_NAMES

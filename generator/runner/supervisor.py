@@ -12,7 +12,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
-from gen_data.generator.core.errors import DeterminismError, GenDataError, StorageError, WorkerLost
+from gen_data.generator.core.errors import (
+    DeterminismError,
+    GenDataError,
+    NumericsError,
+    StorageError,
+    WorkerLost,
+)
 from gen_data.generator.runner.worker_events import (
     Abort,
     Action,
@@ -204,10 +210,19 @@ class Supervisor:
 
     def _report(self, error: GenDataError, worker: _Worker) -> list[Action]:
         worker.state = State.LEAVING
+        if isinstance(error, NumericsError):
+            return self._refuse(error)
         if isinstance(error, (StorageError, DeterminismError)):
             # The other workers would fail in the same way.
             return self._abort(error)
         return self._drain(error)
+
+    def _refuse(self, error: NumericsError) -> list[Action]:
+        """Go on without a worker that computes differently, unless it was the last one."""
+        if all(worker.state is State.LEAVING for worker in self._alive.values()):
+            return self._drain(error)
+        self.workers = max(1, self.workers - 1)
+        return [Note(f"a worker takes no work: {error}")]
 
     def _drain(self, error: GenDataError) -> list[Action]:
         """Assign no more shards; those in progress are finished."""

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import re
-from collections.abc import Iterator
+import shlex
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from gen_data.generator.core.errors import StorageError, VerificationError
-from gen_data.generator.runner.durable_files import Inode, get_inode, hash_file, tree_sizes
-from gen_data.generator.runner.finalize import dataset_id
-from gen_data.generator.runner.plan import Plan, load_plan
-from gen_data.generator.runner.shard_record import ShardRecord, parse_record
+from gen_data.generator.runner.durable_files import (
+    IRREGULAR,
+    Inode,
+    empty_folders,
+    get_inode,
+    hash_file,
+    tree_sizes,
+)
+from gen_data.generator.runner.plan import PLAN_NAME, Plan, load_plan
+from gen_data.generator.runner.seal import parse_object, read_or_empty, read_sums
+from gen_data.generator.runner.shard_record import ShardRecord, parse_unchecked_record
 from gen_data.generator.runner.store import (
     MANIFEST_NAME,
     RUN_NAME,
@@ -24,10 +31,11 @@ from gen_data.generator.runner.store import (
     LocalStore,
 )
 
-SUM_LINE = re.compile(r"([0-9a-f]{64})  (\S.*)")
 SAMPLE_NAME = re.compile(r"(?:^|[/_])(\d{6,9})[._]")
 SHARD_PATH = re.compile(rf"{SHARDS_NAME}/(\d+)[/.]")
 SHOWN_MAX = 50
+REPAIRABLE = frozenset({"missing", "extra", "size", "digest", "inconsistent"})
+"""Kinds of deviations from the manifest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +43,8 @@ class Finding:
     """One deviation from the manifest.
 
     Attributes:
-        kind: ``missing``, ``extra``, ``size``, ``digest`` or ``inconsistent``.
+        kind: ``missing``, ``extra``, ``size``, ``digest`` or ``inconsistent``; of samples
+            ``invalid``, ``unreadable`` or ``irreproducible`` (see ``deep_verify``).
         path: Relative to the data set's root.
         text: Description of the deviation.
         samples: Affected samples, in words; empty = all or none.
@@ -83,19 +92,37 @@ def verify(folder: Path, full: bool = False) -> Report:
     Raises:
         VerificationError: the folder has no finished data set, or deviations, which it lists.
     """
+    report = summarize(folder, full)
+    found = find_deviations(folder, full)
+    if found:
+        raise VerificationError(describe_findings(folder, found))
+    return report
+
+
+def summarize(folder: Path, full: bool = False) -> Report:
+    """Sizes of a data set, with ``full`` as in ``verify``.
+
+    Raises:
+        VerificationError: the folder has no finished data set.
+    """
     if not (folder / MANIFEST_NAME).is_file():
         raise VerificationError(
             f"{folder}: not a finished data set: {MANIFEST_NAME} is missing. "
             "The command that started it finishes it."
         )
-    found = find_deviations(folder, full)
-    if found:
-        listed = "\n".join(f"  {finding}" for finding in found[:SHOWN_MAX])
-        more = f"\n  and {len(found) - SHOWN_MAX} more" if len(found) > SHOWN_MAX else ""
-        raise VerificationError(f"{folder}: {len(found)} deviation(s):\n{listed}{more}")
     sizes = _actual_sizes(folder)
-    manifest = json.loads((folder / MANIFEST_NAME).read_bytes())
-    return Report(manifest["dataset_id"], manifest["n"], len(sizes), sum(sizes.values()), full)
+    manifest = parse_object(read_or_empty(folder / MANIFEST_NAME)) or {}
+    identity, n = str(manifest.get("dataset_id", "")), manifest.get("n", 0)
+    return Report(identity, n, len(sizes), sum(sizes.values()), full)
+
+
+def describe_findings(folder: Path, found: Sequence[Finding]) -> str:
+    """Message that lists deviations, with the command that repairs them."""
+    listed = "\n".join(f"  {finding}" for finding in found[:SHOWN_MAX])
+    more = f"\n  and {len(found) - SHOWN_MAX} more" if len(found) > SHOWN_MAX else ""
+    damaged = any(finding.kind in REPAIRABLE for finding in found)
+    remedy = f"\n  Repair: gen-data repair {shlex.quote(str(folder))}" if damaged else ""
+    return f"{folder}: {len(found)} deviation(s):\n{listed}{more}{remedy}"
 
 
 def find_deviations(folder: Path, full: bool = False) -> list[Finding]:
@@ -103,7 +130,7 @@ def find_deviations(folder: Path, full: bool = False) -> list[Finding]:
     try:
         plan = load_plan(folder)
     except StorageError as error:
-        return [Finding("inconsistent", "plan.json", str(error))]
+        return [Finding("inconsistent", PLAN_NAME, str(error))]
     return list(_Check(folder, plan).run(full))
 
 
@@ -114,14 +141,15 @@ class _Check:
         self._folder = folder
         self._plan = plan
         self._store = LocalStore(folder)
-        self._sums: dict[str, str] = {}
+        self._sums: Mapping[str, str] = {}
         self._sizes: dict[str, int] = {}
+        self._empty_folders: set[str] = set()
         self._hashed: dict[Inode, str] = {}
 
     def run(self, full: bool) -> Iterator[Finding]:
         """Yield all deviations."""
-        manifest_bytes = _read_or_empty(self._folder / MANIFEST_NAME)
-        manifest = _parse_object(manifest_bytes)
+        manifest_bytes = read_or_empty(self._folder / MANIFEST_NAME)
+        manifest = parse_object(manifest_bytes)
         if manifest is None:
             yield Finding("inconsistent", MANIFEST_NAME, "is not a manifest")
             return
@@ -130,19 +158,30 @@ class _Check:
         actual = _actual_sizes(self._folder)
         for path in sorted({*self._sums, *actual} - {SUMS_NAME}):
             yield from self._compare(path, actual.get(path), full)
+        # Format version 1 does not say which folders are empty.
+        if "empty_folders" in manifest:
+            yield from self._compare_folders(manifest["empty_folders"])
+
+    def _compare_folders(self, merged: Iterable[str]) -> Iterator[Finding]:
+        declared = {*self._empty_folders, *merged}
+        actual = set(empty_folders(self._folder, without=RUN_NAME))
+        for path in sorted(declared ^ actual):
+            finding = partial(Finding, path=path, samples=self._samples_of(path))
+            if path in actual:
+                yield finding("extra", text="is an empty folder that does not belong here")
+            else:
+                yield finding("missing", text="is missing, or no empty folder any more")
 
     def _read_sums(self, manifest: dict[str, Any], manifest_bytes: bytes) -> Iterator[Finding]:
         finding = partial(Finding, "inconsistent", SUMS_NAME)
-        lines = _read_or_empty(self._folder / SUMS_NAME).decode(errors="replace").splitlines()
-        matches = [SUM_LINE.fullmatch(line) for line in lines]
-        self._sums = {match[2]: match[1] for match in matches if match}
-        if None in matches or len(self._sums) != len(lines):
+        sums = read_sums(self._folder)
+        self._sums = sums.digests
+        if sums.damaged:
             yield finding("a line is damaged or double")
         own = self._sums.get(MANIFEST_NAME)
         if own != hashlib.sha256(manifest_bytes).hexdigest():
             yield Finding("digest", MANIFEST_NAME, f"its sha256 is not the one in {SUMS_NAME}")
-        others = "".join(f"{line}\n" for line in lines if not line.endswith(f"  {MANIFEST_NAME}"))
-        if manifest.get("dataset_id") != dataset_id(others):
+        if manifest.get("dataset_id") != sums.dataset_id:
             yield finding(f"does not belong to {MANIFEST_NAME}: its sha256 is not dataset_id")
 
     def _read_sizes(self, manifest: dict[str, Any]) -> Iterator[Finding]:
@@ -153,8 +192,8 @@ class _Check:
             yield Finding("inconsistent", MANIFEST_NAME, "number of shards is not the plan's")
         for shard, digest in enumerate(digests[: self._plan.shard_count]):
             path = self._relative(self._store.record_path(shard))
-            data = _read_or_empty(self._store.record_path(shard))
-            record = parse_record(data)
+            data = read_or_empty(self._store.record_path(shard))
+            record = parse_unchecked_record(data)
             if record is None or hashlib.sha256(data).hexdigest() != digest:
                 text = "its sha256 is not the one in the manifest" if data else "is missing"
                 yield Finding("digest", path, text, self._samples_of(path))
@@ -169,6 +208,7 @@ class _Check:
 
     def _compare_record(self, shard: int, record: ShardRecord) -> Iterator[Finding]:
         folder = self._relative(self._store.shard_dir(shard))
+        self._empty_folders.update(f"{folder}/{inner}" for inner in record.empty_folders)
         for file in record.files:
             path = f"{folder}/{file.path}"
             self._sizes[path] = file.bytes
@@ -182,9 +222,11 @@ class _Check:
             yield finding("extra", text="does not belong to the data set")
         elif size is None:
             yield finding("missing", text="is missing")
+        elif size == IRREGULAR:
+            yield finding("size", text="is no regular file")
         elif size != self._sizes.get(path, size):
             yield finding("size", text=f"has {size} bytes instead of {self._sizes[path]}")
-        elif full and self._digest(path) != self._sums[path]:
+        elif (full or path == PLAN_NAME) and self._digest(path) != self._sums[path]:
             yield finding("digest", text="its bytes differ (sha256)")
 
     def _digest(self, path: str) -> str:
@@ -209,17 +251,4 @@ class _Check:
 
 
 def _actual_sizes(folder: Path) -> dict[str, int]:
-    sizes = tree_sizes(folder)
-    return {path: size for path, size in sizes.items() if not path.startswith(f"{RUN_NAME}/")}
-
-
-def _read_or_empty(path: Path) -> bytes:
-    return path.read_bytes() if path.is_file() else b""
-
-
-def _parse_object(data: bytes) -> dict[str, Any] | None:
-    try:
-        value = json.loads(data)
-    except ValueError:
-        return None
-    return value if isinstance(value, dict) else None
+    return tree_sizes(folder, without=RUN_NAME)

@@ -105,6 +105,10 @@ def _make_shards(number: int, connection: Connection, job: Job) -> None:
         gc.collect()
         gc.freeze()
         gc.disable()
+        # Imports numpy, therefore only after ``end_with_parent``.
+        from gen_data.generator.runner.numerics_guard import admit_numerics
+
+        admit_numerics(job, pipeline)
         connection.send(Ready(number))
         while (shard := connection.recv()) is not None:
             _make_shard(number, connection, job, pipeline, shard)

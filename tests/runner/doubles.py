@@ -173,6 +173,8 @@ def fake_sample(index: int) -> Sample:
     camera = Camera("color", IDENTITY, intrinsics)
     instance = Instance(1, f"thing-{index}", CATEGORIES[index % 2], index % 2 + 1, "asset")
     pixels = rng.uniform(size=(2, 3)) < 0.7
+    # The mask fills its box, as every tight mask does.
+    pixels[0, 0] = pixels[-1, -1] = True
     mask = MaskPx(1, 1, pixels)
     truth = ObjectTruth(instance, int(pixels.sum()), BoxPx(1, 1, 4, 3), mask=mask)
     light = Light("sun", "sun", illuminance_lux=float(rng.uniform(100.0, 900.0)))

@@ -1,0 +1,75 @@
+"""Repair of a data set: the function behind ``gen-data repair``."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gen_data.generator.api.config import count_workers
+from gen_data.generator.core.errors import StorageError
+
+if TYPE_CHECKING:
+    from gen_data.generator.runner.progress import RunProgress, Summary
+
+
+def repair(
+    folder: str | PathLike[str],
+    *,
+    source: str | PathLike[str] | None = None,
+    workers: int | None = None,
+    on_progress: Callable[[RunProgress], None] | None = None,
+    resume_command: str = "the same call of repair",
+) -> Summary:
+    """Restore what is damaged or missing in a data set, byte for byte, from its own plan.
+
+    Damaged shards are generated again, merged files are written again, and files that do not belong
+    to the data set are moved to ``run/quarantine``, where the damaged ones are, too.
+
+    Args:
+        folder: A data set; an unfinished one is finished.
+        source: The data set whose scenes were rendered again, if it was made by ``rerender``.
+        workers: Processes; None = one per core, 0 = this process.
+        on_progress: Called after each sample and shard.
+        resume_command: Command that error messages give for resuming.
+
+    Returns:
+        Summary of the run; ``already_complete`` if there was nothing to repair.
+
+    Raises:
+        StorageError: the plan is lost, or this installation would make other bytes.
+        ConfigError: ``source`` is missing or another data set.
+        DeterminismError: the repaired data set differs from the sealed one; it stays unfinished.
+    """
+    from threadpoolctl import threadpool_limits
+
+    from gen_data.generator.runner.plan import parse_plan
+    from gen_data.generator.runner.regeneration import plan_regeneration, refuse_changes
+    from gen_data.generator.runner.repair import read_declared_plan
+    from gen_data.generator.runner.run import Settings, run
+    from gen_data.generator.runner.store import LocalStore
+
+    path = Path(folder)
+    data = read_declared_plan(LocalStore(path.absolute()))
+    if data is None:
+        raise StorageError(
+            f"{path}: its plan.json is damaged or missing, and there is no intact copy in run/.\n"
+            "  With the configuration of the data set, this command restores it:\n"
+            f"    gen-data --config FILE --n N --out {shlex.quote(str(path))} --repair"
+        )
+    plan = parse_plan(data, path)
+    made = plan_regeneration(path, plan, None if source is None else Path(source))
+    refuse_changes(path, made.changes, "repair it")
+    with threadpool_limits(limits=1):
+        return run(
+            plan,
+            made.make_pipeline,
+            path,
+            workers=count_workers(workers),
+            resume_command=resume_command,
+            licences=made.licences,
+            settings=Settings(repair=True),
+            progress=on_progress,
+        )

@@ -1,0 +1,213 @@
+"""Commands that check and restore data sets: ``verify``, ``repair``, ``diff``, ``repro``."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from gen_data.generator.core.errors import (
+    ConfigError,
+    DeterminismError,
+    GenDataError,
+    VerificationError,
+)
+
+if TYPE_CHECKING:
+    from gen_data.generator.runner.verify import Finding
+
+VERIFY_HELP = """Check a data set against its manifest. Exit code 7 if it deviates.
+
+\b
+gen-data verify out/street                  sizes, records, manifest, foreign files
+gen-data verify out/street --full           every sha256
+gen-data verify out/street --deep           every sample decoded, its labels checked
+gen-data verify out/street --regenerate 20  20 random samples generated again
+"""
+
+
+@click.command(help=VERIFY_HELP)
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--full", is_flag=True, help="Hash every file, not only sizes.")
+@click.option("--deep", is_flag=True, help="Also decode every sample and check its labels.")
+@click.option(
+    "--regenerate",
+    type=click.IntRange(min=1),
+    metavar="K",
+    help="Also generate K random samples again, and compare their bytes.",
+)
+@click.option(
+    "--semantic",
+    is_flag=True,
+    help="With --regenerate: compare decoded contents, as after an update of an encoder.",
+)
+@click.option(
+    "--source", type=click.Path(path_type=Path), help="With --regenerate, after rerender: source."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+def verify(
+    folder: Path,
+    full: bool,
+    deep: bool,
+    regenerate: int | None,
+    semantic: bool,
+    source: Path | None,
+    as_json: bool,
+) -> None:
+    """Check a data set."""
+    from gen_data.generator.runner.deep_verify import choose_samples
+    from gen_data.generator.runner.verify import describe_findings, find_deviations, summarize
+
+    if semantic and regenerate is None:
+        raise ConfigError("--semantic: needs --regenerate K, whose comparison it changes")
+    found: list[Finding] = []
+    notes: list[str] = []
+    try:
+        report = summarize(folder, full or deep)
+        found = find_deviations(folder, full or deep)
+        # Damaged files would be reported once more by every further check.
+        if not found and deep:
+            found += _find_invalid(folder)
+            notes.append("every sample decoded and valid")
+        if not found and regenerate is not None:
+            indices = choose_samples(folder, regenerate)
+            found += _find_irreproducible(folder, indices, semantic, source)
+            listed = ", ".join(map(str, indices[:10])) + (" ..." if len(indices) > 10 else "")
+            what = "contents" if semantic else "bytes"
+            notes.append(f"{len(indices)} samples generated again with equal {what} ({listed})")
+        if found:
+            raise VerificationError(describe_findings(folder, found))
+    except GenDataError as error:
+        if as_json:
+            _print_json({"folder": str(folder), "ok": False, "error": str(error)}, found)
+        raise
+    if as_json:
+        facts = {
+            name: getattr(report, name) for name in ("dataset_id", "samples", "files", "bytes")
+        }
+        _print_json({"folder": str(folder), "ok": True, **facts, "checks": notes}, found)
+    else:
+        click.echo(f"{folder}: {'; '.join([str(report), *notes])}")
+
+
+def _find_invalid(folder: Path) -> list[Finding]:
+    from gen_data.generator.runner.deep_verify import find_invalid_samples
+
+    return list(find_invalid_samples(folder))
+
+
+def _find_irreproducible(
+    folder: Path, indices: list[int], semantic: bool, source: Path | None
+) -> list[Finding]:
+    from threadpoolctl import threadpool_limits
+
+    from gen_data.generator.runner.deep_verify import find_irreproducible_samples
+
+    with threadpool_limits(limits=1):
+        return list(find_irreproducible_samples(folder, indices, semantic, source))
+
+
+def _print_json(facts: dict[str, object], found: list[Finding]) -> None:
+    deviations = [
+        {"kind": f.kind, "path": f.path, "samples": f.samples, "text": f.text} for f in found
+    ]
+    click.echo(json.dumps({**facts, "deviations": deviations}, ensure_ascii=False))
+
+
+@click.command()
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option(
+    "--source", type=click.Path(path_type=Path), help="After rerender: the data set it was made of."
+)
+@click.option("--workers", "-w", type=int, help="Worker processes [default: one per core].")
+def repair(folder: Path, source: Path | None, workers: int | None) -> None:
+    """Restore what is damaged or missing in a data set, byte for byte, from its own plan.
+
+    Damaged and foreign files are moved to FOLDER/run/quarantine.
+    """
+    from rich.console import Console
+
+    from gen_data.generator.api.repair import repair as restore
+    from gen_data.generator.cli.generate_command import print_summary, progress_bar
+    from gen_data.generator.runner.plan import PLAN_NAME, load_plan
+
+    # A damaged plan is restored below; until then the number of samples is not known.
+    try:
+        n = load_plan(folder).n if (folder / PLAN_NAME).is_file() else 0
+    except GenDataError:
+        n = 0
+    console = Console(stderr=True)
+    with progress_bar(console, n) as show:
+        summary = restore(
+            folder,
+            source=source,
+            workers=workers,
+            on_progress=show,
+            resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
+        )
+    print_summary(console, summary)
+
+
+@click.command()
+@click.argument("one", type=click.Path(path_type=Path, exists=True))
+@click.argument("other", type=click.Path(path_type=Path, exists=True))
+@click.option("--semantic", is_flag=True, help="Compare decoded contents, not bytes of files.")
+def diff(one: Path, other: Path, semantic: bool) -> None:
+    """Name the first difference of two data sets: sample, stage and field.
+
+    Stages are scene, geometry, render, labels and encode. Two folders of one shard can be compared,
+    too. Exit code 5 if there is a difference.
+    """
+    from gen_data.generator.runner.diff import compare
+
+    result = compare(one, other, semantic)
+    for line in _listed(result.plan, 20):
+        click.echo(f"plan: {line}")
+    if result.sample is not None:
+        raise DeterminismError(str(result.sample))
+    if result.file:
+        raise DeterminismError(f"all samples are equal; first difference of exports: {result.file}")
+    click.echo(f"{result.samples} samples are equal, with all exported files")
+
+
+@click.command()
+@click.argument("source", metavar="FOLDER_OR_CONFIG")
+@click.option("--index", "-i", type=int, required=True, help="Number of the sample, from 0.")
+@click.option(
+    "--out", "-o", type=click.Path(path_type=Path), help="Keep the sample in this new folder."
+)
+@click.option(
+    "--source",
+    "rerendered_from",
+    type=click.Path(path_type=Path),
+    help="After rerender: the data set it was made of.",
+)
+def repro(source: str, index: int, out: Path | None, rerendered_from: Path | None) -> None:
+    """Generate one sample of a data set by itself, and compare it with the stored one.
+
+    Prints a digest per stage. Exit code 5 if a stage differs, 6 if the sample cannot be generated.
+    """
+    from gen_data.generator.api.reproduce import reproduce
+
+    result = reproduce(source, index, out, rerendered_from=rerendered_from)
+    for stage, digest in result.digests.items():
+        click.echo(f"{stage:<9} {digest}")
+    for line in _listed(result.changes, 20):
+        click.echo(f"this installation differs: {line}", err=True)
+    if result.difference is not None:
+        raise DeterminismError(str(result.difference))
+    if result.stored:
+        click.echo(f"sample {index} is equal to the stored one")
+    else:
+        click.echo(f"sample {index} was generated; there is no stored one to compare it with")
+
+
+def _listed(lines: tuple[str, ...], most: int) -> Iterator[str]:
+    yield from lines[:most]
+    if len(lines) > most:
+        yield f"and {len(lines) - most} more"

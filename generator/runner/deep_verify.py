@@ -1,0 +1,111 @@
+"""Verification beyond checksums: every sample decoded and checked, some generated again.
+
+Checksums find what changed after a data set was sealed. These checks find what was wrong before:
+invalid labels, and samples that this installation would generate differently.
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from gen_data.generator.annotations.sample_checks import sample_faults
+from gen_data.generator.core.errors import GenDataError
+from gen_data.generator.runner.labels import LABELS_NAME
+from gen_data.generator.runner.plan import load_plan
+from gen_data.generator.runner.provenance import SCENES_NAME
+from gen_data.generator.runner.regeneration import compare_regenerated, plan_regeneration
+from gen_data.generator.runner.store import SHARDS_NAME, LocalStore
+from gen_data.generator.runner.stored import StoredSamples
+from gen_data.generator.runner.verify import Finding
+
+
+def find_invalid_samples(folder: Path) -> Iterator[Finding]:
+    """Decode every sample of a finished data set, and check it as before it was written.
+
+    Raises:
+        StorageError: the folder holds no finished data set.
+    """
+    stored = StoredSamples(folder)
+    for shard in range(stored.plan.shard_count):
+        yield from _lax_json(stored, shard)
+        for index in stored.plan.samples_of(shard):
+            where = f"{SHARDS_NAME}/{stored.shard_dir(shard).name}"
+            samples = f"sample {index}"
+            try:
+                for field, fact in sample_faults(stored.info, stored.sample(index)):
+                    yield Finding("invalid", where, f"{field}: {fact}", samples)
+            except GenDataError as error:
+                yield Finding("unreadable", where, str(error), samples)
+            except (ValueError, KeyError, TypeError, IndexError) as error:
+                text = f"does not fit the data set ({type(error).__name__}: {error})"
+                yield Finding("unreadable", where, text, samples)
+        stored.close()
+
+
+def _lax_json(stored: StoredSamples, shard: int) -> Iterator[Finding]:
+    """Lines that are no strict JSON: Python also reads NaN and Infinity."""
+
+    def refuse(name: str) -> None:
+        raise ValueError(f"{name} is no JSON")
+
+    for name in (SCENES_NAME, LABELS_NAME):
+        path = stored.shard_dir(shard) / name
+        lines = path.read_bytes().splitlines() if path.is_file() else []
+        for number, line in enumerate(lines, 1):
+            # Most lines have neither word, so that they need not be parsed once more.
+            if b"NaN" not in line and b"Infinity" not in line:
+                continue
+            try:
+                json.loads(line, parse_constant=refuse)
+            except ValueError as error:
+                where = path.relative_to(stored.folder).as_posix()
+                yield Finding("invalid", where, f"line {number}: {error}")
+
+
+def choose_samples(folder: Path, count: int) -> list[int]:
+    """Indices of ``count`` samples, or of all if there are fewer; ascending.
+
+    They are others every time: repeated verification covers more and more of the data set.
+
+    Raises:
+        StorageError: the plan is missing or damaged.
+    """
+    n = load_plan(folder).n
+    if count >= n:
+        return list(range(n))
+    chosen: set[int] = set()
+    while len(chosen) < count:
+        chosen.add(secrets.randbelow(n))
+    return sorted(chosen)
+
+
+def find_irreproducible_samples(
+    folder: Path,
+    indices: Sequence[int],
+    semantic: bool = False,
+    source: Path | None = None,
+) -> Iterator[Finding]:
+    """Generate samples again, and compare them with the stored ones.
+
+    Args:
+        folder: A data set; unfinished ones need the shards of the samples.
+        indices: Of the samples.
+        semantic: Compare decoded contents, not bytes: other releases of encoders are equal then.
+        source: See ``plan_regeneration``.
+
+    Raises:
+        GenDataError: see ``plan_regeneration`` and ``compare_regenerated``.
+    """
+    plan = load_plan(folder)
+    regeneration = plan_regeneration(folder, plan, source)
+    store = LocalStore(folder)
+    found = compare_regenerated(store, plan, regeneration, indices, semantic)
+    for difference in found:
+        where = f"{SHARDS_NAME}/{store.shard_dir(difference.index // plan.shard_size).name}"
+        text = f"generated again, it differs in stage {difference.stage}: {difference.text}"
+        if regeneration.changes:
+            text += f" (this installation differs: {'; '.join(regeneration.changes[:3])})"
+        yield Finding("irreproducible", where, text, f"sample {difference.index}")

@@ -1,0 +1,120 @@
+"""Comparison of two data sets, or of two folders of one shard."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.runner.durable_files import tree_sizes
+from gen_data.generator.runner.labels import LABELS_NAME
+from gen_data.generator.runner.plan import PLAN_NAME, Plan, compare_plans, load_plan
+from gen_data.generator.runner.provenance import SCENES_NAME
+from gen_data.generator.runner.sample_stages import Difference, SampleFiles, compare_samples
+from gen_data.generator.runner.seal import read_sums
+from gen_data.generator.runner.store import MANIFEST_NAME, SHARDS_NAME, LocalStore
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Result of a comparison.
+
+    Attributes:
+        samples: Number of samples that both have.
+        plan: Differences of the plans, one line per field.
+        sample: The first difference of the first sample that differs.
+        file: Path of the first other file that differs: what an exporter wrote.
+    """
+
+    samples: int
+    plan: tuple[str, ...] = ()
+    sample: Difference | None = None
+    file: str = ""
+
+    @property
+    def equal(self) -> bool:
+        """Whether all common samples and all exported files are equal."""
+        return self.sample is None and not self.file
+
+
+def compare(one: Path, other: Path, semantic: bool = False) -> Comparison:
+    """Compare two data sets, or two folders of the same shard, such as a quarantined one.
+
+    Args:
+        one: A folder.
+        other: A folder of the same kind.
+        semantic: Compare contents only, not the bytes of encoded files.
+
+    Raises:
+        StorageError: a folder is neither, or a file cannot be read.
+    """
+    if (one / PLAN_NAME).is_file() and (other / PLAN_NAME).is_file():
+        return _compare_datasets(one, other, semantic)
+    for folder in (one, other):
+        if not (folder / SCENES_NAME).is_file():
+            raise StorageError(
+                f"{folder}: no data set and no folder of a shard; expected two of the same kind"
+            )
+    indices = [_first_index(one) + i for i in range(_count_lines(one / SCENES_NAME))]
+    for index in indices:
+        found = compare_samples(SampleFiles(one, index), SampleFiles(other, index), semantic)
+        if found is not None:
+            return Comparison(len(indices), sample=found)
+    return Comparison(len(indices), file="" if semantic else _first_differing_file(one, other))
+
+
+def _compare_datasets(one: Path, other: Path, semantic: bool) -> Comparison:
+    plans = load_plan(one), load_plan(other)
+    changes = tuple(compare_plans(*plans))
+    n = min(plan.n for plan in plans)
+    for index in _samples_to_compare(one, other, plans, n):
+        files = [
+            SampleFiles(LocalStore(folder).shard_dir(index // plan.shard_size), index)
+            for folder, plan in zip((one, other), plans, strict=True)
+        ]
+        found = compare_samples(files[0], files[1], semantic)
+        if found is not None:
+            return Comparison(n, changes, sample=found)
+    if semantic:
+        return Comparison(n, changes)
+    was, now = read_sums(one).digests, read_sums(other).digests
+    for path in sorted({*was, *now}):
+        exported = path.partition("/")[0] not in (SHARDS_NAME, PLAN_NAME, MANIFEST_NAME)
+        if exported and was.get(path) != now.get(path):
+            return Comparison(n, changes, file=path)
+    return Comparison(n, changes)
+
+
+def _samples_to_compare(one: Path, other: Path, plans: tuple[Plan, Plan], n: int) -> Iterator[int]:
+    """Indices of the samples whose files may differ: shards with equal records are skipped."""
+    if plans[0].shard_size != plans[1].shard_size:
+        yield from range(n)
+        return
+    for shard in range(-(-n // plans[0].shard_size)):
+        records = [LocalStore(folder).record(shard) for folder in (one, other)]
+        if records[0] is None or records[0] != records[1]:
+            yield from (i for i in plans[0].samples_of(shard) if i < n)
+
+
+def _first_differing_file(one: Path, other: Path) -> str:
+    paths = sorted({*tree_sizes(one), *tree_sizes(other)})
+    return next((path for path in paths if not _are_equal(one / path, other / path)), "")
+
+
+def _are_equal(one: Path, other: Path) -> bool:
+    return one.is_file() and other.is_file() and one.read_bytes() == other.read_bytes()
+
+
+def _first_index(folder: Path) -> int:
+
+    try:
+        with (folder / LABELS_NAME).open("rb") as file:
+            return int(json.loads(file.readline())["index"])
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise StorageError(f"{folder / LABELS_NAME}: cannot be read ({error})") from None
+
+
+def _count_lines(path: Path) -> int:
+    return path.read_bytes().count(b"\n")

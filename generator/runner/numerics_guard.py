@@ -1,0 +1,91 @@
+"""Admission of machines to a data set: all of them must compute alike.
+
+``run/numerics.json`` has one line per class of machines that generated samples. It is no part of
+the data set: its identity is what was generated, not where.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Mapping
+from pathlib import Path
+
+from gen_data.generator.core.errors import NumericsError
+from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.runner.durable_files import sync_path
+from gen_data.generator.runner.shard import Job, PipelineLike
+
+NUMERICS_NAME = "numerics.json"
+
+
+def admit_numerics(job: Job, pipeline: PipelineLike) -> None:
+    """Compare this process with the one that began the data set; the first one is recorded.
+
+    Pipelines without ``numerics``, such as those of exports, compute nothing that could differ.
+
+    Raises:
+        NumericsError: its results differ, and the job does not allow that.
+    """
+    compute = getattr(pipeline, "numerics", None)
+    if compute is None:
+        return
+    digests: Mapping[str, str] = compute()
+    entry = {"digests": dict(digests), "machine": platform.machine(), "processor": processor_name()}
+    path = job.store.run_dir / NUMERICS_NAME
+    with job.store.errors():
+        _record_first(path, entry, job.store.scratch_dir())
+        known = _read(path)
+        if not known or any(dict(digests) == one.get("digests") for one in known):
+            return
+        if not job.allow_mixed_numerics:
+            raise NumericsError(_describe(known[0], entry))
+        with path.open("a", encoding="utf-8") as file:
+            file.write(canonical_json(entry) + "\n")
+
+
+def processor_name() -> str:
+    """Model of the processor; empty if unknown."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor()
+    return next((line.partition(": ")[2] for line in lines if line.startswith("model name")), "")
+
+
+def _record_first(path: Path, entry: Mapping[str, object], scratch: Path) -> None:
+    """Write the entry, unless there is one: of several workers, the first one wins."""
+    if path.exists():
+        return
+    unfinished = scratch / path.name
+    unfinished.write_text(canonical_json(entry) + "\n", encoding="utf-8")
+    sync_path(unfinished)
+    try:
+        os.link(unfinished, path)
+    except FileExistsError:
+        return
+    sync_path(path.parent)
+
+
+def _read(path: Path) -> list[dict[str, object]]:
+    """Entries of the file; none if it is damaged, as it guards nothing then."""
+    try:
+        rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    except (OSError, ValueError):
+        return []
+    return [row for row in rows if isinstance(row, dict)]
+
+
+def _describe(first: Mapping[str, object], entry: Mapping[str, object]) -> str:
+    was, now = first.get("digests"), entry["digests"]
+    assert isinstance(now, dict)
+    known = was if isinstance(was, dict) else {}
+    kinds = ", ".join(sorted(k for k in {*known, *now} if known.get(k) != now.get(k)))
+    return (
+        f"this machine computes differently from the one that began the data set ({kinds}): "
+        f"processor was '{first.get('processor', '')}', now '{entry['processor']}'.\n"
+        "  Its samples would differ in their last bits, so that the data set could not be made "
+        "again on one machine.\n"
+        "  Resume on a machine of the first kind, or accept that with --allow-mixed-numerics"
+    )

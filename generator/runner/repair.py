@@ -1,0 +1,72 @@
+"""Repair of what is not a shard: the plan, and files that do not belong to the data set.
+
+Damaged shards need nothing special: a run generates all shards that do not match their records.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.runner.durable_files import make_folder, write_durably
+from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
+from gen_data.generator.runner.seal import read_or_empty, read_sums
+from gen_data.generator.runner.store import LocalStore
+from gen_data.generator.runner.verify import find_deviations
+
+
+def read_declared_plan(store: LocalStore) -> bytes | None:
+    """Bytes of the plan that a data set was started with: of ``plan.json``, or of its copy.
+
+    Which of them is undamaged follows from ``SHA256SUMS``; without it, both must be equal.
+
+    Returns:
+        None if it is not known.
+    """
+    own = read_or_empty(store.root / PLAN_NAME)
+    copy = read_or_empty(store.run_dir / PLAN_NAME)
+    declared = read_sums(store.root).digests.get(PLAN_NAME)
+    for data in (own, copy):
+        if data and declared == hashlib.sha256(data).hexdigest():
+            return data
+    return own if own and own == copy else None
+
+
+def restore_plan(store: LocalStore, plan: Plan) -> None:
+    """Replace a damaged or missing ``plan.json`` by ``plan``, if that is what it was.
+
+    Changes nothing if the folder is not a data set of this plan: the run says so then.
+
+    Raises:
+        StorageError: the file is damaged, and ``plan`` is not what it was.
+    """
+    path, data = store.root / PLAN_NAME, plan_bytes(plan)
+    current = read_or_empty(path)
+    sums = read_sums(store.root)
+    declared = {sums.digests.get(PLAN_NAME)} - {None}
+    if not declared:
+        copy = read_or_empty(store.run_dir / PLAN_NAME)
+        declared = {hashlib.sha256(copy).hexdigest()} if copy else set()
+    started = os.path.lexists(path) or store.has_shards()
+    if not started or not declared or hashlib.sha256(current).hexdigest() in declared:
+        return
+    if hashlib.sha256(data).hexdigest() not in declared:
+        raise StorageError(
+            f"{path}: damaged or missing, and the configuration and --n are not those of this data "
+            "set; nothing was changed. Repeat the command with the ones that it was made with"
+        )
+    with store.locked(), store.errors():
+        if os.path.lexists(path):
+            store.set_aside(path)
+        make_folder(store.scratch_root)
+        write_durably(path, data, store.scratch_root)
+
+
+def quarantine_extra(store: LocalStore) -> None:
+    """Move files and empty folders that do not belong to a finished data set to quarantine."""
+    with store.errors():
+        # More than once: a folder that held nothing else becomes empty.
+        while extra := [f for f in find_deviations(store.root) if f.kind == "extra"]:
+            for finding in extra:
+                store.set_aside(store.root / finding.path)
