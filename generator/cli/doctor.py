@@ -24,6 +24,7 @@ import click
 from gen_data.generator import __version__
 from gen_data.generator.core.errors import GenDataError, SampleError
 from gen_data.generator.core.processes import silence_stdio
+from gen_data.generator.core.temporary_folders import temporary_folder
 
 REINSTALL = "reinstall it: pip install --force-reinstall --no-deps {}"
 
@@ -176,8 +177,8 @@ def _try_openexr() -> str:
     import numpy as np
     import OpenEXR
 
-    with tempfile.TemporaryDirectory(prefix="gen-data-doctor-") as folder:
-        path = str(Path(folder, "probe.exr"))
+    with temporary_folder("doctor") as folder:
+        path = str(folder / "probe.exr")
         header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
         OpenEXR.File(header, {"RGB": np.ones((2, 2, 3), np.float32)}).write(path)
         read = OpenEXR.File(path).channels()["RGB"].pixels

@@ -17,7 +17,18 @@ import click
 
 from gen_data.generator import __version__
 from gen_data.generator.cli.options import ConfigurationOptions, configuration_options
-from gen_data.generator.core.errors import ConfigError, ConfigWarning, GenDataError, Interrupted
+from gen_data.generator.cli.stop_signals import (
+    handle_stop_signals,
+    ignore_stop_signals,
+    is_stop_requested,
+)
+from gen_data.generator.core.errors import (
+    ConfigError,
+    ConfigWarning,
+    GenDataError,
+    Interrupted,
+    OutOfMemory,
+)
 from gen_data.generator.core.processes import SINGLE_THREADED
 
 
@@ -140,7 +151,10 @@ def main() -> None:
     for name in SINGLE_THREADED:
         os.environ[name] = "1"
     warnings.showwarning = partial(_show_warning, warnings.showwarning)
-    sys.exit(_exit_code())
+    code = _exit_code()
+    if code == Interrupted.exit_code:
+        ignore_stop_signals()
+    sys.exit(code)
 
 
 def _show_warning(
@@ -159,6 +173,7 @@ def _show_warning(
 
 def _exit_code() -> int:
     try:
+        handle_stop_signals()
         cli.main(standalone_mode=False)
     except click.exceptions.Exit as leave:
         return leave.exit_code
@@ -177,4 +192,13 @@ def _exit_code() -> int:
             raise
         click.echo(f"gen-data: {error}", err=True)
         return error.exit_code
+    except MemoryError:
+        click.echo(f"gen-data: {OutOfMemory.text}", err=True)
+        return OutOfMemory.exit_code
+    except Exception:
+        # Libraries turn a KeyboardInterrupt in their imports or callbacks into other errors.
+        if not is_stop_requested():
+            raise
+        click.echo("gen-data: interrupted", err=True)
+        return Interrupted.exit_code
     return 0

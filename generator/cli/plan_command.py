@@ -121,24 +121,21 @@ def _estimated_bytes(config: Config, info: DatasetInfo) -> float:
 def _measured(choice: ConfigurationOptions, n: int, probe: int) -> Iterator[tuple[str, str]]:
     """Time and size of a run, from a few samples in a temporary folder."""
     import os
-    import tempfile
-    from pathlib import Path
 
     from gen_data.generator.api.generate import generate
+    from gen_data.generator.core.temporary_folders import temporary_folder
 
-    with tempfile.TemporaryDirectory(prefix="gen-data-plan-") as folder:
+    with temporary_folder("plan") as folder:
         summary = generate(
             choice.source,
             probe,
-            out=Path(folder) / "probe",
+            out=folder / "probe",
             workers=0,
             seed=choice.seed,
             overrides=(*choice.overrides, "splits={train: 1, val: 0, test: 0}"),
             without=choice.without,
         )
-        files = [
-            p for p in Path(folder, "probe").rglob("*") if p.is_file() and "run" not in p.parts
-        ]
+        files = [p for p in (folder / "probe").rglob("*") if p.is_file() and "run" not in p.parts]
         # Hard links of exports take no space.
         size = sum({p.stat().st_ino: p.stat().st_size for p in files}.values())
     cores = len(os.sched_getaffinity(0))

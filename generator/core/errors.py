@@ -70,6 +70,15 @@ class SampleError(GenDataError):
     exit_code = 6
 
 
+class OutOfMemory(SampleError):
+    """A process got no more memory from the system."""
+
+    text = (
+        "out of memory: the system refused more memory to this process; raise its limit "
+        "(ulimit -v), or use smaller images and --workers 1"
+    )
+
+
 class WorkerLost(SampleError):
     """A worker process died repeatedly on the same shard."""
 

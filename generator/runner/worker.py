@@ -13,7 +13,6 @@ import gc
 import os
 import pickle
 import resource
-import signal
 import sys
 import tempfile
 import traceback
@@ -23,7 +22,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gen_data.generator.core.errors import GenDataError
-from gen_data.generator.core.processes import end_with_parent
+from gen_data.generator.core.processes import end_with_parent, ignore_interrupts
 from gen_data.generator.runner.error_context import unexpected_error
 from gen_data.generator.runner.worker_events import Failed, Ready, SampleDone, ShardDone
 
@@ -42,8 +41,7 @@ def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
         parent_pid: Process whose end also ends this one.
     """
     end_with_parent(parent_pid)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    ignore_interrupts()
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     faulthandler.enable()
     connection = Connection(connection_fd)

@@ -21,7 +21,7 @@ from pathlib import Path
 import warp as wp
 
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.processes import end_with_parent, silence_stdio
+from gen_data.generator.core.processes import interrupts_blocked, silence_stdio, tie
 
 # Not -march=native: fused multiply-adds would change bytes between machines. The inlining threshold
 # saves a quarter of all ray time.
@@ -103,9 +103,17 @@ def load_kernels(device_name: str, names: Sequence[str]) -> None:
 def _compile_in_parallel(device: str, cores: int) -> bool:
     """Distribute the modules over one process per core; returns whether all succeeded."""
     shares = [EVERY_FRAME[k::cores] for k in range(min(cores, len(EVERY_FRAME)))]
-    here = [sys.executable, "-m", __name__, str(os.getpid()), device]
-    running = [subprocess.Popen([*here, *share], stdout=subprocess.DEVNULL) for share in shares]
-    codes = [process.wait() for process in running]
+    running: list[subprocess.Popen[bytes]] = []
+    try:
+        for share in shares:
+            command = tie([sys.executable, "-m", __name__, device, *share])
+            with interrupts_blocked():
+                running.append(subprocess.Popen(command, stdout=subprocess.DEVNULL))
+        codes = [process.wait() for process in running]
+    finally:
+        # After an interruption, the host program may go on.
+        for process in running:
+            process.kill()
     return not any(codes)
 
 
@@ -118,5 +126,4 @@ def _digest() -> str:
 
 
 if __name__ == "__main__":
-    end_with_parent(int(sys.argv[1]))
-    load_kernels(sys.argv[2], sys.argv[3:])
+    load_kernels(sys.argv[1], sys.argv[2:])
