@@ -23,6 +23,7 @@ from gen_data.generator.cli.stop_signals import (
     is_stop_requested,
 )
 from gen_data.generator.core.errors import (
+    CacheWarning,
     ConfigError,
     ConfigWarning,
     GenDataError,
@@ -165,7 +166,7 @@ def _show_warning(
     **options: Any,
 ) -> None:
     """Print our own warnings as plain messages; those of libraries as usual."""
-    if category in (FutureWarning, ConfigWarning):
+    if category in (FutureWarning, ConfigWarning, CacheWarning):
         click.echo(f"gen-data: warning: {message}", err=True)
     else:
         show_others(message, category, *place, **options)

@@ -49,9 +49,9 @@ def handle_stop_signals() -> None:
 
 
 def ignore_stop_signals() -> None:
-    """Let this process end with its own exit code; the thread still watches for repeated signals.
+    """Let an interrupted process end with its own exit code, for at most ``PATIENCE_S``.
 
-    Python restores the default of signals with handlers before it ends: a signal then would kill it.
+    Python restores the default handlers before it ends, and a signal would kill it then.
     """
     for number in _installed:
         signal.signal(number, signal.SIG_IGN)

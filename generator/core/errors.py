@@ -34,6 +34,10 @@ class ConfigWarning(UserWarning):
     """A configuration is valid, but probably not meant like this."""
 
 
+class CacheWarning(UserWarning):
+    """A cache was damaged and repaired."""
+
+
 class AssetError(GenDataError):
     """An asset is missing, unreadable or unfit."""
 

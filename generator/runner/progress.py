@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from gen_data.generator.core.errors import GenDataError, StorageError
+from gen_data.generator.core.errors import CacheWarning, GenDataError, StorageError
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.runner.durable_files import free_bytes
 from gen_data.generator.runner.worker_events import (
@@ -15,6 +16,7 @@ from gen_data.generator.runner.worker_events import (
     Event,
     Exited,
     Note,
+    Ready,
     SampleDone,
     ShardDone,
     Spawn,
@@ -149,6 +151,10 @@ class RunMonitor:
             objection = self._on_shard(event)
         elif isinstance(event, Note):
             self.log({"note": event.text})
+        elif isinstance(event, Ready):
+            for text in event.warnings:
+                self.log({"warning": text})
+                warnings.warn(text, CacheWarning, stacklevel=2)
         elif isinstance(event, Spawn):
             self._workers.add(event.worker)
         elif isinstance(event, Exited):
