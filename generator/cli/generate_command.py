@@ -30,6 +30,7 @@ def generate_with_progress(
     out: Path | None,
     workers: int | None,
     repair: bool = False,
+    force: bool = False,
 ) -> None:
     """Generate samples 0 to n - 1, or the missing ones, and print a summary.
 
@@ -47,6 +48,7 @@ def generate_with_progress(
             overrides=choice.overrides,
             without=choice.without,
             repair=repair,
+            force=force,
             on_progress=show,
             resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
         )

@@ -115,6 +115,7 @@ An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configu
 )
 @click.option("--workers", "-w", type=int, help="Worker processes [default: one per core].")
 @click.option("--repair", is_flag=True, help="Hash existing files; generate damaged shards again.")
+@click.option("--force", is_flag=True, help="Start although the disk is probably too small.")
 @configuration_options
 @click.pass_context
 def cli(
@@ -125,6 +126,7 @@ def cli(
     seed: int | None,
     workers: int | None,
     repair: bool,
+    force: bool,
     overrides: tuple[str, ...],
     without: tuple[str, ...],
 ) -> None:
@@ -144,7 +146,7 @@ def cli(
     from gen_data.generator.cli.generate_command import generate_with_progress
 
     choice = ConfigurationOptions(config, seed, overrides, without)
-    generate_with_progress(choice, n, out=out, workers=workers, repair=repair)
+    generate_with_progress(choice, n, out=out, workers=workers, repair=repair, force=force)
 
 
 def main() -> None:

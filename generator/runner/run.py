@@ -11,6 +11,7 @@ from pathlib import Path
 from gen_data.generator.core.errors import GenDataError
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.runner.finalize import LicencesOf, finalize
+from gen_data.generator.runner.free_space import SpaceCheck
 from gen_data.generator.runner.plan import Plan
 from gen_data.generator.runner.processes import run_supervisor
 from gen_data.generator.runner.progress import RunMonitor, RunProgress, Summary
@@ -43,11 +44,16 @@ class Settings:
     Attributes:
         full_check: On resumption, hash existing files instead of comparing sizes. This also
             repairs a damaged data set: damaged shards are generated again.
+        sample_bytes: Estimated size of a sample; 0 = unknown. A data set that will not fit on the
+            disk is refused.
+        is_forced: Generate it until the disk is full.
         limits: Limits on silence, deaths and memory of workers.
         write_media, write_records: See ``Job``; picklable.
     """
 
     full_check: bool = False
+    sample_bytes: float = 0.0
+    is_forced: bool = False
     limits: Limits = field(default_factory=Limits)
     write_media: MediaWriter = write_images
     write_records: RecordWriter = write_records
@@ -113,11 +119,15 @@ class _Run:
         with self.interruption.immediate():
             with store.errors():
                 state = store.state(plan)
+                if state is FolderState.NEW:
+                    self._space.before_start(plan.n)
                 if state is FolderState.FINISHED and self._is_intact():
                     return self._summarize_finished()
             store.prepare(plan)
             scan = store.scan(plan, self.settings.full_check)
-        monitor = RunMonitor(store, scan, plan.n, self.progress)
+        if scan.samples == 0:
+            self._space.before_start(plan.n)
+        monitor = RunMonitor(store, scan, plan.n, self.progress, self._space)
         monitor.show("samples")
         try:
             self._generate(scan, monitor)
@@ -129,6 +139,10 @@ class _Run:
             with suppress(OSError):
                 store.clear_scratch()
         return self._summarize(dataset_id, scan, monitor)
+
+    @property
+    def _space(self) -> SpaceCheck:
+        return SpaceCheck(self.job.store, self.settings.sample_bytes, self.settings.is_forced)
 
     def _generate(self, scan: Scan, monitor: RunMonitor) -> None:
         if not scan.missing:
