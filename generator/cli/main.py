@@ -29,6 +29,7 @@ from gen_data.generator.core.errors import (
     GenDataError,
     Interrupted,
     OutOfMemory,
+    is_out_of_memory,
 )
 from gen_data.generator.core.processes import SINGLE_THREADED
 
@@ -195,13 +196,13 @@ def _exit_code() -> int:
             raise
         click.echo(f"gen-data: {error}", err=True)
         return error.exit_code
-    except MemoryError:
+    except Exception as error:
+        # Libraries turn a KeyboardInterrupt in their imports or callbacks into other errors.
+        if is_stop_requested():
+            click.echo("gen-data: interrupted", err=True)
+            return Interrupted.exit_code
+        if not is_out_of_memory(error):
+            raise
         click.echo(f"gen-data: {OutOfMemory.text}", err=True)
         return OutOfMemory.exit_code
-    except Exception:
-        # Libraries turn a KeyboardInterrupt in their imports or callbacks into other errors.
-        if not is_stop_requested():
-            raise
-        click.echo("gen-data: interrupted", err=True)
-        return Interrupted.exit_code
     return 0

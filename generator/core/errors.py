@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import errno
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -81,6 +82,22 @@ class OutOfMemory(SampleError):
         "out of memory: the system refused more memory to this process; raise its limit "
         "(ulimit -v), or use smaller images and --workers 1"
     )
+
+
+def is_out_of_memory(error: BaseException) -> bool:
+    """Whether lack of memory caused an error, also of a library that could not be loaded."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, MemoryError) or getattr(cause, "errno", None) == errno.ENOMEM:
+            return True
+        if any(text in str(cause) for text in _NO_MEMORY):
+            return True
+        cause = cause.__cause__ or cause.__context__
+    return False
+
+
+_NO_MEMORY = ("failed to map segment from shared object", "Cannot allocate memory")
+"""Texts of the dynamic loader and of the C library."""
 
 
 class WorkerLost(SampleError):

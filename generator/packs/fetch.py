@@ -67,6 +67,9 @@ def fetch(pack: Pack, folder: Path) -> Path:
 
 def check_archive(pack: Pack, archive: Path) -> None:
     """Raise AssetError unless a file has the pinned hash of a pack's archive."""
+    if archive.exists() and not archive.is_file():
+        # A device such as /dev/zero never ends, and a pipe waits for a writer.
+        raise AssetError(f"{archive}: is not a regular file; expected the archive of {pack.source}")
     try:
         digest = file_digest(archive)
     except OSError as error:

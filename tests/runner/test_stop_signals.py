@@ -115,6 +115,21 @@ def test_an_error_that_an_interruption_caused_is_no_traceback(tmp_path: Path) ->
     assert (process.returncode, message.strip()) == (130, "gen-data: interrupted")
 
 
+@pytest.mark.parametrize(
+    "error",
+    ["MemoryError", "ImportError('x.so: failed to map segment from shared object')"],
+)
+def test_lack_of_memory_is_one_line(tmp_path: Path, error: str) -> None:
+    """Under ``ulimit -v``, libraries cannot even be loaded; a traceback tells nothing."""
+    process = start(f"\n    begun()\n    raise {error}\n", tmp_path)
+
+    message = process.communicate(timeout=HANG_S)[1]
+
+    assert process.returncode == 6
+    assert message.startswith("gen-data: out of memory: the system refused more memory")
+    assert len(message.splitlines()) == 1
+
+
 def test_the_second_ctrl_c_is_immediate(tmp_path: Path) -> None:
     """Cleaning up takes ten minutes; the second signal ends it."""
     process = start(CLEANS_UP_FOR_LONG, tmp_path)
