@@ -13,11 +13,14 @@ Only the names in ``__all__`` are public; everything else may change between rel
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
 from gen_data.generator import __version__
 
+# ``typing`` would delay the moment from which the command line handles Ctrl-C.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from typing import Any
+
     from gen_data.generator.api.dataset import Dataset, SampleSequence, StoredDataset
     from gen_data.generator.api.dataset import open_dataset as open  # noqa: A004
     from gen_data.generator.api.export import export

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.base_model import NAME_PATTERN, Strict
 from gen_data.generator.core.asset_types import Asset, Material
 from gen_data.generator.core.bounded_cache import ObjectCache
 from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, did_you_mean
@@ -29,7 +29,7 @@ class RandomizerBase(Strict):
         stage: scene: drawn once and shared by all views. view: drawn for every view.
     """
 
-    name: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field(pattern=NAME_PATTERN)
     stage: Literal["scene", "view"] = "scene"
 
     @property

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+from pydantic import Field
+
 from gen_data.generator.config import distributions as dist
+from gen_data.generator.config.base_model import NAME_PATTERN
 from gen_data.randomizers.objects import COUNT_MAX, Objects
 
 
@@ -18,5 +21,5 @@ class Distractors(Objects):
     """
 
     type: Literal["distractors"] = "distractors"  # type: ignore[assignment]
-    name: str = "distractors"
+    name: str = Field("distractors", pattern=NAME_PATTERN)
     count: Annotated[dist.Count, dist.Bounds(0, COUNT_MAX)] = dist.UniformInteger(0, 4)

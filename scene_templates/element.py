@@ -10,14 +10,12 @@ from typing import Any
 from pydantic import Field
 
 from gen_data.generator.assets.asset_ids import AssetId, ParameterValue
-from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.base_model import NAME_PATTERN, Strict
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.members import free_instance_ids
 from gen_data.generator.core.scene import Body, Instance, Scene, SupportSurface
 from gen_data.generator.core.se3 import SE3, Vec3
-
-NAME_PATTERN = r"^[A-Za-z][A-Za-z0-9_-]*$"
 
 
 class Element(Strict):

@@ -6,11 +6,11 @@ from typing import Literal
 
 from pydantic import Field
 
+from gen_data.generator.config.base_model import NAME_PATTERN
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.scene_templates.element import (
-    NAME_PATTERN,
     PlacedElement,
     add_background,
     parametric_id,

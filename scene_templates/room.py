@@ -7,10 +7,11 @@ from typing import Literal
 
 from pydantic import Field
 
+from gen_data.generator.config.base_model import NAME_PATTERN
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import SE3
-from gen_data.scene_templates.element import NAME_PATTERN, Element, add_background, parametric_id
+from gen_data.scene_templates.element import Element, add_background, parametric_id
 
 CLEARANCE_M = 0.15
 """Smallest distance of cameras and lights from the walls."""

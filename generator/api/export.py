@@ -50,6 +50,10 @@ def export(
             not have.
         Interrupted: Ctrl-C or SIGTERM; the same call goes on.
     """
+    from gen_data.generator.runner.store import LocalStore
+
+    LocalStore(Path(out)).check_unlocked()
+
     from gen_data.generator.assemble.config import load_config
     from gen_data.generator.assemble.pipeline_factory import ready_exporters
     from gen_data.generator.assets.library import open_library

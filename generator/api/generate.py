@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from os import PathLike
 from pathlib import Path
@@ -26,6 +26,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     without: Sequence[str] = (),
     repair: bool = False,
     allow_mixed_numerics: bool = False,
+    force: bool = False,
     on_progress: Callable[[RunProgress], None] | None = None,
     resume_command: str = "the same call of gen_data.generate",
 ) -> Summary:
@@ -43,6 +44,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
             ``plan.json``, and move files that do not belong to the data set out of it.
         allow_mixed_numerics: Go on on a machine that computes differently from the one that began
             the data set; ``run/numerics.json`` lists all of them.
+        force: Start although the disk is probably too small.
         on_progress: Called after each sample and shard.
         resume_command: Command that error messages give for resuming.
 
@@ -57,21 +59,27 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     Warns:
         ConfigWarning: ``n`` is so small that a split of the configuration stays empty.
     """
-    from threadpoolctl import threadpool_limits
-
-    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-    from gen_data.generator.pipeline.splits import warn_of_empty_splits
-    from gen_data.generator.runner.identity import format_licences, make_plan
-    from gen_data.generator.runner.run import Settings, run
+    from gen_data.generator.runner.store import LocalStore
 
     if n < 1:
         raise ConfigError(f"n: {n} samples cannot be made; expected at least 1")
     processes = count_workers(workers)
+    LocalStore(_guess_folder(config, out)).check_unlocked()
+
+    from threadpoolctl import threadpool_limits
+
+    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+    from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
+    from gen_data.generator.pipeline.splits import warn_of_empty_splits
+    from gen_data.generator.runner.identity import format_licences, make_plan
+    from gen_data.generator.runner.run import Settings, run
+
     loaded = load_config(config, seed=seed, overrides=overrides, without=without)
     general = loaded.general
     scenes = -(-n // (general.views_per_scene * general.steps_per_scene))
     warn_of_empty_splits(scenes, loaded.split_shares, general.splits.assign, general.seed)
     factory = PipelineFactory(loaded, n)
+    factory.check()
     with threadpool_limits(limits=1):
         return run(
             make_plan(factory),
@@ -80,6 +88,18 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
             workers=processes,
             resume_command=resume_command,
             licences=partial(format_licences, factory),
-            settings=Settings(repair=repair, allow_mixed_numerics=allow_mixed_numerics),
+            settings=Settings(
+                repair=repair,
+                allow_mixed_numerics=allow_mixed_numerics,
+                sample_bytes=estimate_sample_bytes(loaded, factory.info),
+                is_forced=force,
+            ),
             progress=on_progress,
         )
+
+
+def _guess_folder(config: ConfigLike, out: str | PathLike[str] | None) -> Path:
+    """Folder of the data set, as far as it is known before the configuration is read."""
+    if out is not None:
+        return Path(out)
+    return Path("out") / ("config" if isinstance(config, Mapping) else Path(config).stem)

@@ -49,6 +49,10 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
         ConfigError: the change is invalid, or would change the scenes.
         Interrupted: Ctrl-C or SIGTERM; the same call goes on.
     """
+    from gen_data.generator.runner.store import LocalStore
+
+    LocalStore(Path(out)).check_unlocked()
+
     from threadpoolctl import threadpool_limits
 
     from gen_data.generator.assemble.config import load_config

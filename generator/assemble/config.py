@@ -355,12 +355,15 @@ def _plugins(listed: Node, key: str, table: PluginTable[P], problems: Problems) 
         problems.add(listed.position, key, f"expected a list of {table.kind}s")
     made: list[P] = []
     names: set[str] = set()
+    tag = "name" if key in VARYING else "type"
     for number, node in enumerate(listed.items):
         plugin = _plugin(node, f"{key}[{number}]", table, problems)
-        name = getattr(plugin, "name", None) if key in VARYING else None
+        name = getattr(plugin, tag, None)
         if name is not None and name in names:
             fact = f"the name '{name}' is taken; expected a name of its own"
-            problems.add((node.get("name") or node).position, f"{key}[{number}].name", fact)
+            if tag == "type":
+                fact = f"the {table.kind} '{name}' is listed twice; expected it once"
+            problems.add((node.get(tag) or node).position, f"{key}[{number}].{tag}", fact)
         if name is not None:
             names.add(name)
         if plugin is not None:

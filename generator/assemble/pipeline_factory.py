@@ -13,6 +13,7 @@ from gen_data.generator.annotations.annotate import annotate_ego, annotate_readi
 from gen_data.generator.assemble.config import Config, SceneConfig
 from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, default_plugin
 from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.config.error_positions import located_errors
 from gen_data.generator.config.problems import Problems
 from gen_data.generator.config.yaml_tree import find_text
 from gen_data.generator.core.capture import Channel
@@ -79,6 +80,20 @@ class PipelineFactory:
         scenes = tuple(nominal_scene(self.config, scene, library) for scene in self.config.probes)
         _check_references(self.config, scenes, library)
         return scenes
+
+    def check(self) -> None:
+        """Refuse what no sample could be generated or exported with, before any engine starts.
+
+        Raises:
+            ConfigError: a sequence is too long, or a format cannot hold the data set.
+        """
+        _check_durations(self.config)
+        ready_exporters(self.config, self.info, open_library(self.config.asset_folders))
+
+    @property
+    def info(self) -> DatasetInfo:
+        """Facts about the data set."""
+        return dataset_info(self.config, self.n, self.categories)
 
     @cached_property
     def categories(self) -> tuple[str, ...]:
@@ -175,11 +190,12 @@ def _check_durations(config: Config) -> None:
         for randomizer in scene.randomizers:
             duration_s = randomizer.motion_duration_s
             if duration_s is not None and duration_s < lasts_s - 1e-9:
-                raise ConfigError(
-                    f"randomizers.{randomizer.name}.duration_s: {duration_s:g} s is shorter than "
-                    f"the sequences, {steps} steps of {step_s:g} s; "
-                    f"expected at least {lasts_s:g}"
-                )
+                with located_errors(config.document):
+                    raise ConfigError(
+                        f"randomizers.{randomizer.name}.duration_s: {duration_s:g} s is shorter "
+                        f"than the sequences, {steps} steps of {step_s:g} s; "
+                        f"expected at least {lasts_s:g}"
+                    )
 
 
 def _strides(info: DatasetInfo) -> dict[str, int]:
@@ -211,20 +227,23 @@ def nominal_scene(config: Config, scene_config: SceneConfig, assets: AssetIndex)
     Raises:
         ConfigError: an element or a sensor does not fit into it.
     """
+    template = config.general.template or config.name
     try:
-        scene = build_scene(config.general.template or config.name, scene_config.elements, assets)
+        with located_errors(config.document):
+            scene = build_scene(template, scene_config.elements, assets)
     except UnknownAsset as error:
         place = find_text(config.document, error.asset_id)
         if place is None:
             raise
         raise UnknownAsset(f"{place[0]}: {place[1]}: {error}", error.asset_id) from None
     scene = replace(scene, shared=scene_config.shared, step_s=config.general.step_s)
-    for sensor in scene_config.sensors:
-        scene = sensor.mount(scene)
-        info = sensor.describe()
-        _check_mounted(scene, info)
-        if info.needs_clear_view:
-            check_not_buried(scene, info.name, assets)
+    with located_errors(config.document):
+        for sensor in scene_config.sensors:
+            scene = sensor.mount(scene)
+            info = sensor.describe()
+            _check_mounted(scene, info)
+            if info.needs_clear_view:
+                check_not_buried(scene, info.name, assets)
     return scene
 
 
@@ -277,6 +296,7 @@ def ready_exporters(config: Config, info: DatasetInfo, library: Library) -> dict
         exporter = own if label_map.is_identity else MappedExporter(own, label_map)
         if exporter.type in exporters:
             raise ConfigError(f"exporters: '{exporter.type}' is listed twice")
-        exporter.check(info)
+        with located_errors(config.document):
+            exporter.check(info)
         exporters[exporter.type] = exporter.with_assets(library)
     return exporters

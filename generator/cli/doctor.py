@@ -27,6 +27,7 @@ import click
 from gen_data.generator import __version__
 from gen_data.generator.core.errors import GenDataError, SampleError
 from gen_data.generator.core.processes import silence_stdio
+from gen_data.generator.core.temporary_folders import temporary_folder
 
 FILES_MIN = 64
 MEMORY_MIN_BYTES = 2_000_000_000
@@ -193,8 +194,8 @@ def _try_openexr() -> str:
     import numpy as np
     import OpenEXR
 
-    with tempfile.TemporaryDirectory(prefix="gen-data-doctor-") as folder:
-        path = str(Path(folder, "probe.exr"))
+    with temporary_folder("doctor") as folder:
+        path = str(folder / "probe.exr")
         header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
         OpenEXR.File(header, {"RGB": np.ones((2, 2, 3), np.float32)}).write(path)
         read = OpenEXR.File(path).channels()["RGB"].pixels

@@ -31,6 +31,7 @@ def generate_with_progress(
     workers: int | None,
     repair: bool = False,
     allow_mixed_numerics: bool = False,
+    force: bool = False,
 ) -> None:
     """Generate samples 0 to n - 1, or the missing ones, and print a summary.
 
@@ -49,6 +50,7 @@ def generate_with_progress(
             without=choice.without,
             repair=repair,
             allow_mixed_numerics=allow_mixed_numerics,
+            force=force,
             on_progress=show,
             resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
         )

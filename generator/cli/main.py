@@ -17,7 +17,20 @@ import click
 
 from gen_data.generator import __version__
 from gen_data.generator.cli.options import ConfigurationOptions, configuration_options
-from gen_data.generator.core.errors import ConfigError, ConfigWarning, GenDataError, Interrupted
+from gen_data.generator.cli.stop_signals import (
+    handle_stop_signals,
+    ignore_stop_signals,
+    is_stop_requested,
+)
+from gen_data.generator.core.errors import (
+    CacheWarning,
+    ConfigError,
+    ConfigWarning,
+    GenDataError,
+    Interrupted,
+    OutOfMemory,
+    is_out_of_memory,
+)
 from gen_data.generator.core.processes import SINGLE_THREADED
 
 
@@ -114,6 +127,7 @@ An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configu
     is_flag=True,
     help="Resume on a machine whose computations differ in the last bits.",
 )
+@click.option("--force", is_flag=True, help="Start although the disk is probably too small.")
 @configuration_options
 @click.pass_context
 def cli(
@@ -125,6 +139,7 @@ def cli(
     workers: int | None,
     repair: bool,
     allow_mixed_numerics: bool,
+    force: bool,
     overrides: tuple[str, ...],
     without: tuple[str, ...],
 ) -> None:
@@ -151,6 +166,7 @@ def cli(
         workers=workers,
         repair=repair,
         allow_mixed_numerics=allow_mixed_numerics,
+        force=force,
     )
 
 
@@ -159,7 +175,10 @@ def main() -> None:
     for name in SINGLE_THREADED:
         os.environ[name] = "1"
     warnings.showwarning = partial(_show_warning, warnings.showwarning)
-    sys.exit(_exit_code())
+    code = _exit_code()
+    if code == Interrupted.exit_code:
+        ignore_stop_signals()
+    sys.exit(code)
 
 
 def _show_warning(
@@ -170,7 +189,7 @@ def _show_warning(
     **options: Any,
 ) -> None:
     """Print our own warnings as plain messages; those of libraries as usual."""
-    if category in (FutureWarning, ConfigWarning):
+    if category in (FutureWarning, ConfigWarning, CacheWarning):
         click.echo(f"gen-data: warning: {message}", err=True)
     else:
         show_others(message, category, *place, **options)
@@ -178,6 +197,7 @@ def _show_warning(
 
 def _exit_code() -> int:
     try:
+        handle_stop_signals()
         cli.main(standalone_mode=False)
     except click.exceptions.Exit as leave:
         return leave.exit_code
@@ -196,4 +216,13 @@ def _exit_code() -> int:
             raise
         click.echo(f"gen-data: {error}", err=True)
         return error.exit_code
+    except Exception as error:
+        # Libraries turn a KeyboardInterrupt in their imports or callbacks into other errors.
+        if is_stop_requested():
+            click.echo("gen-data: interrupted", err=True)
+            return Interrupted.exit_code
+        if not is_out_of_memory(error):
+            raise
+        click.echo(f"gen-data: {OutOfMemory.text}", err=True)
+        return OutOfMemory.exit_code
     return 0

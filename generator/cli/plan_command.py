@@ -12,21 +12,6 @@ from gen_data.generator.cli.options import ConfigurationOptions, configuration_o
 
 if TYPE_CHECKING:
     from gen_data.generator.assemble.config import Config
-    from gen_data.generator.core.interfaces import DatasetInfo
-
-BYTES_PER_PIXEL = {
-    "rgb": 1.3,
-    "depth": 0.75,
-    "range": 0.75,
-    "instance": 0.01,
-    "part": 0.01,
-    "category": 0.01,
-    "normals": 0.5,
-    "object_coordinates": 0.6,
-    "measured_depth": 0.9,
-    "infrared": 1.2,
-}
-"""Sizes of PNG files, measured on tabletop and street; other channels are taken as 1."""
 
 
 @click.command("plan")
@@ -72,6 +57,7 @@ def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
         dataset_info,
         ready_exporters,
     )
+    from gen_data.generator.assemble.size_estimate import estimate_image_bytes
     from gen_data.generator.assets.library import open_library
     from gen_data.generator.config.schema import docstring_summary
     from gen_data.generator.pipeline.splits import split_of
@@ -103,42 +89,27 @@ def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
     for name, exporter in exporters.items():
         own = next(e for e in config.exporters if e.type == exporter.type)
         yield f"export {name}", docstring_summary(type(own))
-    yield "size, estimated", f"{_estimated_bytes(config, info) * n / 1e9:.2f} GB of images"
-
-
-def _estimated_bytes(config: Config, info: DatasetInfo) -> float:
-    """Bytes of the images of a sample, from their sizes."""
-    total = 0.0
-    for sensor in config.sensors:
-        size_px = getattr(sensor, "size_px", None)
-        if size_px is not None:
-            channels = info.sensor(sensor.name).channels
-            rates = (BYTES_PER_PIXEL.get(channel.value, 1.0) for channel in channels)
-            total += size_px[0] * size_px[1] * sum(rates)
-    return total
+    yield "size, estimated", f"{estimate_image_bytes(config, info) * n / 1e9:.2f} GB of images"
 
 
 def _measured(choice: ConfigurationOptions, n: int, probe: int) -> Iterator[tuple[str, str]]:
     """Time and size of a run, from a few samples in a temporary folder."""
     import os
-    import tempfile
-    from pathlib import Path
 
     from gen_data.generator.api.generate import generate
+    from gen_data.generator.core.temporary_folders import temporary_folder
 
-    with tempfile.TemporaryDirectory(prefix="gen-data-plan-") as folder:
+    with temporary_folder("plan") as folder:
         summary = generate(
             choice.source,
             probe,
-            out=Path(folder) / "probe",
+            out=folder / "probe",
             workers=0,
             seed=choice.seed,
             overrides=(*choice.overrides, "splits={train: 1, val: 0, test: 0}"),
             without=choice.without,
         )
-        files = [
-            p for p in Path(folder, "probe").rglob("*") if p.is_file() and "run" not in p.parts
-        ]
+        files = [p for p in (folder / "probe").rglob("*") if p.is_file() and "run" not in p.parts]
         # Hard links of exports take no space.
         size = sum({p.stat().st_ino: p.stat().st_size for p in files}.values())
     cores = len(os.sched_getaffinity(0))

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pydantic import BaseModel, ConfigDict
 
+NAME_PATTERN = r"^[A-Za-z][A-Za-z0-9_-]{0,63}$"
+"""Names of elements, randomizers and sensors, which become names of files and folders."""
+
 
 class Strict(BaseModel):
     """A frozen model without silent conversions.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import errno
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -32,6 +33,10 @@ class SampleIndexError(ConfigError, IndexError):
 
 class ConfigWarning(UserWarning):
     """A configuration is valid, but probably not meant like this."""
+
+
+class CacheWarning(UserWarning):
+    """A cache was damaged and repaired."""
 
 
 class AssetError(GenDataError):
@@ -72,6 +77,31 @@ class SampleError(GenDataError):
     """A sample cannot be made."""
 
     exit_code = 6
+
+
+class OutOfMemory(SampleError):
+    """A process got no more memory from the system."""
+
+    text = (
+        "out of memory: the system refused more memory to this process; raise its limit "
+        "(ulimit -v), or use smaller images and --workers 1"
+    )
+
+
+def is_out_of_memory(error: BaseException) -> bool:
+    """Whether lack of memory caused an error, also of a library that could not be loaded."""
+    cause: BaseException | None = error
+    while cause is not None:
+        if isinstance(cause, MemoryError) or getattr(cause, "errno", None) == errno.ENOMEM:
+            return True
+        if any(text in str(cause) for text in _NO_MEMORY):
+            return True
+        cause = cause.__cause__ or cause.__context__
+    return False
+
+
+_NO_MEMORY = ("failed to map segment from shared object", "Cannot allocate memory")
+"""Texts of the dynamic loader and of the C library."""
 
 
 class WorkerLost(SampleError):

@@ -6,7 +6,7 @@ import ctypes
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 SINGLE_THREADED = (
@@ -36,6 +36,30 @@ def end_with_parent(parent_pid: int) -> None:
         os._exit(1)
 
 
+def tie(command: Sequence[str]) -> list[str]:
+    """Command that runs another one, which ends with this process and ignores Ctrl-C itself.
+
+    Start it with SIGINT blocked (``interrupts_blocked``): Ctrl-C may come before it is ignored.
+    """
+    return [sys.executable, "-P", __file__, str(os.getpid()), *command]
+
+
+@contextmanager
+def interrupts_blocked() -> Iterator[None]:
+    """Block SIGINT: a new process inherits the mask until it ignores SIGINT itself."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def ignore_interrupts() -> None:
+    """Ignore SIGINT, also in later programs of this process, and unblock it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
 @contextmanager
 def silence_stdio() -> Iterator[None]:
     """Discard the output of native code on standard output and standard error.
@@ -56,3 +80,9 @@ def silence_stdio() -> Iterator[None]:
             os.dup2(copy, fd)
             os.close(copy)
         os.close(nowhere)
+
+
+if __name__ == "__main__":
+    end_with_parent(int(sys.argv[1]))
+    ignore_interrupts()
+    os.execvp(sys.argv[2], sys.argv[2:])

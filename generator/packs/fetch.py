@@ -13,6 +13,7 @@ from pathlib import Path
 import yaml
 
 from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.processes import tie
 from gen_data.generator.packs.pack_table import ClientName, Pack
 
 _TIMEOUT_S = 1800
@@ -45,10 +46,13 @@ def fetch(pack: Pack, folder: Path) -> Path:
         AssetError: if the client is missing, has no network, or fails otherwise.
     """
     command = _command(pack)
+    temporary = folder / "tmp"
+    temporary.mkdir()
     try:
+        # A client that is killed leaves its temporary files, which go with the folder.
         done = subprocess.run(
-            command, cwd=folder, capture_output=True, text=True,
-            errors="replace", timeout=_TIMEOUT_S, stdin=subprocess.DEVNULL, check=False,
+            tie(["/usr/bin/env", f"TMPDIR={temporary}", *command]), cwd=folder, capture_output=True,
+            text=True, errors="replace", timeout=_TIMEOUT_S, stdin=subprocess.DEVNULL, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
         raise _client_error(pack, command, f"took longer than {_TIMEOUT_S} s") from None
@@ -63,6 +67,9 @@ def fetch(pack: Pack, folder: Path) -> Path:
 
 def check_archive(pack: Pack, archive: Path) -> None:
     """Raise AssetError unless a file has the pinned hash of a pack's archive."""
+    if archive.exists() and not archive.is_file():
+        # A device such as /dev/zero never ends, and a pipe waits for a writer.
+        raise AssetError(f"{archive}: is not a regular file; expected the archive of {pack.source}")
     try:
         digest = file_digest(archive)
     except OSError as error:
@@ -96,8 +103,8 @@ def _command(pack: Pack) -> list[str]:
         )
     names = {"package": pack.package, "version": pack.version}
     # Messages are matched, so they must be in English.
-    english = ["/usr/bin/env", "LC_ALL=C"]
-    return english + start + [argument.format(**names) for argument in client.arguments]
+    arguments = [argument.format(**names) for argument in client.arguments]
+    return ["/usr/bin/env", "LC_ALL=C", *start, *arguments]
 
 
 def _client_error(pack: Pack, command: list[str], what: str) -> AssetError:

@@ -7,15 +7,13 @@ last, body numbers, and poses of the centre of mass.
 from __future__ import annotations
 
 import math
-import shutil
-import tempfile
 import weakref
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 
 from gen_data.generator.core.processes import silence_stdio
 from gen_data.generator.core.se3 import SE3, Array, Vec3
+from gen_data.generator.core.temporary_folders import TemporaryFolder
 from gen_data.generator.physics.collision_shapes import CollisionShape, scale_step
 
 with silence_stdio():  # it prints its build time
@@ -52,9 +50,10 @@ class World:
             "contactBreakingThreshold": 0.02,
             "useSplitImpulse": 1,
         }
-        self._folder = Path(tempfile.mkdtemp(prefix="gen-data-physics-"))
+        folder = TemporaryFolder("physics")
+        self._folder = folder.path
         # Also when a program ends, or drops the world, without closing it.
-        self._remove_folder = weakref.finalize(self, shutil.rmtree, self._folder, True)
+        self._remove_folder = weakref.finalize(self, folder.remove)
         self._client: int = pybullet.connect(pybullet.DIRECT)
         self._here = {"physicsClientId": self._client}
         self._solids: dict[str, _Solid] = {}

@@ -7,17 +7,15 @@ its command line can.
 from __future__ import annotations
 
 import errno
-import os
 import socket
 import subprocess
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.processes import end_with_parent
+from gen_data.generator.core.processes import tie
 
 LOOPBACK = "127.0.0.1"
 GRPC_PORT = 9876
@@ -68,10 +66,7 @@ def serve_web(host: str) -> Viewer:
     port, web_port = _find_free_port(host, GRPC_PORT), _find_free_port(host, WEB_PORT)
     listening = ("--bind", host, "--port", str(port), "--web-viewer-port", str(web_port))
     command = (str(_executable()), "--serve-web", *listening)
-    process = subprocess.Popen(
-        [sys.executable, "-m", __name__, str(os.getpid()), *command],
-        stdout=subprocess.DEVNULL,
-    )
+    process = subprocess.Popen(tie(command), stdout=subprocess.DEVNULL)
     _wait_until_listening(process, host, port)
     _wait_until_listening(process, host, web_port)
     # A wildcard is no address to connect to.
@@ -122,8 +117,3 @@ def _wait_until_listening(process: subprocess.Popen[bytes], host: str, port: int
         f"the Rerun viewer did not start (exit code {process.wait()}; see above); a desktop window "
         "takes a display: without one use --web, or --save and open the file elsewhere"
     )
-
-
-if __name__ == "__main__":
-    end_with_parent(int(sys.argv[1]))
-    os.execv(sys.argv[2], sys.argv[2:])

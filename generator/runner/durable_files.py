@@ -17,6 +17,7 @@ from pathlib import Path
 
 from gen_data.generator.core.errors import StorageError
 
+FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
 CHUNK_BYTES = 1 << 20
 Inode = tuple[int, int]
 IRREGULAR = -1
@@ -139,6 +140,14 @@ def _prefix(inner: str, folder: Path) -> str:
     return "" if inner == str(folder) else inner[len(str(folder)) :].lstrip("/") + "/"
 
 
+def format_bytes(size: float) -> str:
+    """A size with its unit: ``1.2 GB``."""
+    for factor, unit in ((1e12, "TB"), (1e9, "GB"), (1e6, "MB")):
+        if size >= factor:
+            return f"{size / factor:.1f} {unit}"
+    return f"{size / 1e3:.1f} kB"
+
+
 def free_bytes(path: Path) -> int:
     """Free bytes for this user on the file system of the nearest existing parent."""
     while not path.exists():
@@ -159,11 +168,10 @@ def storage_error(error: OSError, folder: Path, resume_command: str) -> StorageE
     """Error for a failed file operation in ``folder``."""
     path = os.fsdecode(error.filename) if error.filename is not None else str(folder)
     name = errno.errorcode.get(error.errno or 0, type(error).__name__)
-    try:
-        free = f"{free_bytes(folder):,} bytes free"
-    except OSError:
-        free = "free space unknown"
-    message = f"{path}: {error.strerror or error} ({name}); {free}."
+    message = f"{path}: {error.strerror or error} ({name})"
+    if error.errno in FULL:
+        message += f"; {_describe_free_space(folder)}"
+    message += "."
     if not resume_command:
         return StorageError(message)
     advice = (
@@ -172,6 +180,13 @@ def storage_error(error: OSError, folder: Path, resume_command: str) -> StorageE
         else "Nothing was written. Choose another folder with --out, or remove the cause and run"
     )
     return StorageError(f"{message}\n  {advice}:\n    {resume_command}")
+
+
+def _describe_free_space(folder: Path) -> str:
+    try:
+        return f"{format_bytes(free_bytes(folder))} are free"
+    except OSError:
+        return "the free space is unknown"
 
 
 def _is_folder(path: Path) -> bool:

@@ -6,7 +6,12 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from gen_data.generator.core.errors import GenDataError, SampleError
+from gen_data.generator.core.errors import (
+    GenDataError,
+    OutOfMemory,
+    SampleError,
+    is_out_of_memory,
+)
 
 TRACE_LINES = 12
 CACHE_DAMAGE = ("Failed to find forward kernel", "Failed to load CPU module")
@@ -31,7 +36,12 @@ def explain_errors(place: str, command: str = "") -> Iterator[None]:
 
 
 def unexpected_error(error: Exception, place: str, command: str = "") -> SampleError:
-    """Make a SampleError with the end of the traceback, which cannot be pickled itself."""
+    """Make a SampleError with the end of the traceback, which cannot be pickled itself.
+
+    Lack of memory is one line: a traceback tells nothing about it.
+    """
+    if is_out_of_memory(error):
+        return OutOfMemory(f"{place}: {OutOfMemory.text}")
     trace = "".join(traceback.format_exception(type(error), error, error.__traceback__))
     lines = [f"{place}: {type(error).__name__}: {error}"]
     lines += [f"  {line}" for line in trace.rstrip().splitlines()[-TRACE_LINES:]]

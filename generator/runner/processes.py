@@ -17,13 +17,13 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
 
 from gen_data.generator.core.errors import GenDataError
-from gen_data.generator.core.processes import SINGLE_THREADED
+from gen_data.generator.core.processes import SINGLE_THREADED, interrupts_blocked
 from gen_data.generator.runner.shard import Job
 from gen_data.generator.runner.supervisor import Supervisor
 from gen_data.generator.runner.termination_signals import Interruption
@@ -136,7 +136,7 @@ class WorkerPool:
         ours, theirs = Pipe(duplex=True)
         arguments = (number, theirs.fileno(), self._job_fd, os.getpid())
         log_path = self._logs / f"worker-{number}.log"
-        with theirs, log_path.open("wb") as log, _interrupts_blocked():
+        with theirs, log_path.open("wb") as log, interrupts_blocked():
             process = subprocess.Popen(
                 [sys.executable, "-c", START_WORKER, *map(str, arguments), *sys.path],
                 stdin=subprocess.DEVNULL,
@@ -188,16 +188,6 @@ def run_supervisor(
             if interruption.pending:
                 deadline_s = clock() + JOIN_S
                 execute(supervisor.handle(Abort(interruption.take()), clock()))
-
-
-@contextmanager
-def _interrupts_blocked() -> Iterator[None]:
-    """Block SIGINT: a new process inherits the mask until it ignores SIGINT itself."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _count_out_of_memory_kills() -> int:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from gen_data.generator.core.errors import GenDataError, StorageError
+from gen_data.generator.core.errors import CacheWarning, GenDataError
 from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.runner.durable_files import free_bytes
+from gen_data.generator.runner.free_space import SpaceCheck
 from gen_data.generator.runner.worker_events import (
     Action,
     Event,
     Exited,
     Note,
+    Ready,
     SampleDone,
     ShardDone,
     Spawn,
@@ -22,8 +24,6 @@ from gen_data.generator.runner.worker_events import (
 
 if TYPE_CHECKING:
     from gen_data.generator.runner.store import LocalStore, Scan
-
-FREE_SPACE_MARGIN = 1.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,12 +117,14 @@ class RunMonitor:
         scan: Scan,
         total: int,
         report: Callable[[RunProgress], None],
+        space: SpaceCheck,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._store = store
         self._scan = scan
         self._total = total
         self._report = report
+        self._space = space
         self._clock = clock
         self._started_s = clock()
         self._in_flight: dict[int, tuple[int, int]] = {}
@@ -149,6 +151,10 @@ class RunMonitor:
             objection = self._on_shard(event)
         elif isinstance(event, Note):
             self.log({"note": event.text})
+        elif isinstance(event, Ready):
+            for text in event.warnings:
+                self.log({"warning": text})
+                warnings.warn(text, CacheWarning, stacklevel=2)
         elif isinstance(event, Spawn):
             self._workers.add(event.worker)
         elif isinstance(event, Exited):
@@ -210,28 +216,9 @@ class RunMonitor:
                 "cpu_s_per_sample": self.mean_cpu_s(),
             }
         )
-        return self._check_free_space()
-
-    def _check_free_space(self) -> StorageError | None:
-        """Error if the disk will be full before the end, extrapolated from the committed shards."""
         samples = self._scan.samples + self.made
-        rest = (self._scan.bytes + self.bytes) / samples * (self._total - samples)
-        with self._store.errors():
-            free = free_bytes(self._store.root)
-        if free >= FREE_SPACE_MARGIN * rest:
-            return None
-        return StorageError(
-            f"{self._store.root}: the other {self._total - samples} samples need about "
-            f"{_format_bytes(rest)} and {_format_bytes(free)} are free; stopped before the disk is "
-            f"full.\n  After making room, resume with:\n    {self._store.resume_command}"
-        )
-
-
-def _format_bytes(size: float) -> str:
-    for factor, unit in ((1e9, "GB"), (1e6, "MB")):
-        if size >= factor:
-            return f"{size / factor:.1f} {unit}"
-    return f"{size / 1e3:.1f} kB"
+        sample_bytes = (self._scan.bytes + self.bytes) / samples
+        return self._space.after_shard(sample_bytes, self._total - samples)
 
 
 def _with_note(text: str, number: int, note: str) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 from gen_data.generator.core.errors import GenDataError
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.runner.finalize import LicencesOf, finalize
+from gen_data.generator.runner.free_space import SpaceCheck
 from gen_data.generator.runner.numerics_guard import admit_numerics
 from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
 from gen_data.generator.runner.processes import run_supervisor
@@ -47,12 +48,17 @@ class Settings:
         repair: Hash existing files before anything else, restore a damaged ``plan.json``, and move
             files that do not belong to the data set to ``run/quarantine``. Without it, damaged
             shards are also generated again, but files of an unfinished data set are hashed last.
+        sample_bytes: Estimated size of a sample; 0 = unknown. A data set that will not fit on the
+            disk is refused.
+        is_forced: Generate it until the disk is full.
         limits: Limits on silence, deaths and memory of workers.
         allow_mixed_numerics, write_media, write_records: See ``Job``; picklable.
     """
 
     repair: bool = False
     allow_mixed_numerics: bool = False
+    sample_bytes: float = 0.0
+    is_forced: bool = False
     limits: Limits = field(default_factory=Limits)
     write_media: MediaWriter = write_images
     write_records: RecordWriter = write_records
@@ -134,14 +140,19 @@ class _Run:
         plan, store = self.job.plan, self.job.store
         with self.interruption.immediate():
             with store.errors():
-                finished = store.state(plan) is FolderState.FINISHED
+                state = store.state(plan)
+                if state is FolderState.NEW:
+                    self._space.before_start(plan.n)
+                finished = state is FolderState.FINISHED
                 if finished and self._is_intact():
                     return self._summarize_finished()
                 sealed_before = _read_seal(store, plan)
             store.prepare(plan)
             hashed = finished or self.settings.repair
             scan = store.scan(plan, hashed)
-        monitor = RunMonitor(store, scan, plan.n, self.progress)
+        if scan.samples == 0:
+            self._space.before_start(plan.n)
+        monitor = RunMonitor(store, scan, plan.n, self.progress, self._space)
         monitor.show("samples")
         try:
             self._generate(scan, monitor)
@@ -158,6 +169,10 @@ class _Run:
             with suppress(OSError):
                 store.clear_scratch()
         return self._summarize(dataset_id, scan, monitor)
+
+    @property
+    def _space(self) -> SpaceCheck:
+        return SpaceCheck(self.job.store, self.settings.sample_bytes, self.settings.is_forced)
 
     def _generate(self, scan: Scan, monitor: RunMonitor) -> None:
         if not scan.missing:

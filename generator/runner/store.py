@@ -111,6 +111,10 @@ class LocalStore:
         return self.root / SHARDS_NAME
 
     @property
+    def _lock_path(self) -> Path:
+        return self.run_dir / "lock"
+
+    @property
     def scratch_root(self) -> Path:
         """Folder of unfinished and temporary files; cleared before and after a run."""
         return self.run_dir / "tmp"
@@ -167,13 +171,27 @@ class LocalStore:
         """
         with self.errors():
             make_folder(self.run_dir)
-            descriptor = os.open(
-                self.run_dir / "lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644
-            )
+            descriptor = os.open(self._lock_path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
             with self.errors():
                 self._lock(descriptor)
             yield
+        finally:
+            os.close(descriptor)
+
+    def check_unlocked(self) -> None:
+        """Refuse a folder in which another run is writing, before anything else is loaded.
+
+        Raises:
+            ConfigError: another process holds the lock; the message names host and pid.
+        """
+        try:
+            descriptor = os.open(self._lock_path, os.O_RDWR | os.O_CLOEXEC)
+        except OSError:
+            # Never written to, or not writable: found out later, with a message.
+            return
+        try:
+            self._acquire(descriptor)
         finally:
             os.close(descriptor)
 
@@ -366,17 +384,28 @@ class LocalStore:
         return False
 
     def _lock(self, descriptor: int) -> None:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            owner = os.read(descriptor, 4096).decode(errors="replace").strip() or "(starting)"
-            raise ConfigError(
-                f"{self.root}: another run is writing here: {owner}. "
-                "Wait for it, stop it, or choose another folder with --out."
-            ) from None
+        self._acquire(descriptor)
         os.ftruncate(descriptor, 0)
         owner = json.dumps({"host": socket.gethostname(), "pid": os.getpid()})
         os.write(descriptor, f"{owner}\n".encode())
+
+    def _acquire(self, descriptor: int) -> None:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise ConfigError(
+                f"{self.root}: another run is writing here: {_describe_owner(descriptor)}. "
+                "Wait for it, stop it, or choose another folder with --out."
+            ) from None
+
+
+def _describe_owner(descriptor: int) -> str:
+    """Host and pid that the holder of a lock wrote into its file."""
+    try:
+        owner = json.loads(os.read(descriptor, 4096))
+        return f"process {owner['pid']} on host {owner['host']}"
+    except (ValueError, KeyError, TypeError):
+        return "a process that has just started"
 
 
 def _is_run_dir(folder: Path) -> bool:

@@ -41,8 +41,8 @@ class Limits:
     """Limits on silence, deaths and memory of workers.
 
     Attributes:
-        silence_s: A worker that sends nothing for this long counts as hung and is killed. Covers
-            the start of its engines, too.
+        silence_s: A worker that sends nothing for this long counts as hung and is killed.
+        start_s: The same for the start of its engines, in which kernels may be compiled.
         farewell_s: Time that a dismissed worker has to exit.
         shard_attempts: Deaths on one shard until it is abandoned.
         lost_shards: Abandoned shards until the run is abandoned.
@@ -51,6 +51,7 @@ class Limits:
     """
 
     silence_s: float = 300.0
+    start_s: float = 300.0
     farewell_s: float = 10.0
     shard_attempts: int = 3
     lost_shards: int = 3
@@ -192,13 +193,17 @@ class Supervisor:
     def _kill_silent(self, now_s: float) -> list[Action]:
         actions: list[Action] = []
         for number, worker in sorted(self._alive.items()):
-            leaving = worker.state is State.LEAVING
-            patience_s = self.limits.farewell_s if leaving else self.limits.silence_s
+            patience_s = self._patience_s(worker.state)
             waits = worker.state is State.IDLE
             if not waits and not worker.killed and now_s - worker.heard_s > patience_s:
                 worker.killed = f"no sign of life for {patience_s:g} s"
                 actions += [Note(f"worker {number}: {worker.killed}"), Kill(number)]
         return actions
+
+    def _patience_s(self, state: State) -> float:
+        if state is State.LEAVING:
+            return self.limits.farewell_s
+        return self.limits.start_s if state is State.STARTING else self.limits.silence_s
 
     def _abort(self, error: GenDataError) -> list[Action]:
         self._drain(error)

@@ -1,4 +1,4 @@
-"""SIGINT and SIGTERM as a flag and a file descriptor, instead of an exception at any point."""
+"""Signals to stop as a flag and a file descriptor, instead of an exception at any point."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from types import FrameType
 
 from gen_data.generator.core.errors import Interrupted
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class Interruption:
@@ -34,7 +34,9 @@ class Interruption:
         """Install the signal handlers."""
         if threading.current_thread() is threading.main_thread():
             for number in SIGNALS:
-                self._before[number] = signal.signal(number, self._on_signal)
+                # ``nohup`` makes its command ignore SIGHUP, which stays ignored.
+                if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+                    self._before[number] = signal.signal(number, self._on_signal)
         return self
 
     def __exit__(self, *exception: object) -> None:

@@ -13,17 +13,19 @@ import gc
 import os
 import pickle
 import resource
-import signal
 import sys
 import tempfile
 import traceback
+import warnings
+from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from gen_data.generator.core.errors import GenDataError
-from gen_data.generator.core.processes import end_with_parent
+from gen_data.generator.core.errors import CacheWarning, ConfigWarning, GenDataError
+from gen_data.generator.core.processes import end_with_parent, ignore_interrupts
 from gen_data.generator.runner.error_context import unexpected_error
 from gen_data.generator.runner.worker_events import Failed, Ready, SampleDone, ShardDone
 
@@ -42,8 +44,7 @@ def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
         parent_pid: Process whose end also ends this one.
     """
     end_with_parent(parent_pid)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    ignore_interrupts()
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     faulthandler.enable()
     connection = Connection(connection_fd)
@@ -99,6 +100,8 @@ def _picklable_base(kind: type[GenDataError]) -> type[GenDataError]:
 
 
 def _make_shards(number: int, connection: Connection, job: Job) -> None:
+    notices: list[str] = []
+    warnings.showwarning = partial(_show_warning, notices, warnings.showwarning)
     with job.make_pipeline() as pipeline:
         # Existing objects live until the end. Collecting the others between shards suffices;
         # automatic collection takes 2 % of the run.
@@ -109,10 +112,24 @@ def _make_shards(number: int, connection: Connection, job: Job) -> None:
         from gen_data.generator.runner.numerics_guard import admit_numerics
 
         admit_numerics(job, pipeline)
-        connection.send(Ready(number))
+        connection.send(Ready(number, tuple(notices)))
         while (shard := connection.recv()) is not None:
             _make_shard(number, connection, job, pipeline, shard)
             _release_memory()
+
+
+def _show_warning(
+    notices: list[str],
+    show: Callable[..., None],
+    message: Warning | str,
+    category: type[Warning],
+    *place: Any,
+    **options: Any,
+) -> None:
+    """Keep the texts of our own warnings, for the user; all go to the log of the worker."""
+    if category in (CacheWarning, ConfigWarning):
+        notices.append(str(message))
+    show(message, category, *place, **options)
 
 
 def _make_shard(

@@ -11,9 +11,14 @@ from gen_data.generator.core.errors import GenDataError
 
 @dataclass(frozen=True, slots=True)
 class Ready:
-    """The engines of a worker have started; it waits for a shard."""
+    """The engines of a worker have started; it waits for a shard.
+
+    Attributes:
+        warnings: Texts for the user.
+    """
 
     worker: int
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

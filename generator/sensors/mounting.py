@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.base_model import NAME_PATTERN, Strict
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex, Modality, SensorInfo
 from gen_data.generator.core.measurement_dtypes import TABLE_COLUMNS, TIME_DECIMALS
@@ -77,7 +77,7 @@ class Instrument(Mounted):
     """
 
     kind: ClassVar[str]
-    name: str = Field("instrument", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("instrument", pattern=NAME_PATTERN)
     rig: str = "ego"
 
     @property

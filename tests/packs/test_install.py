@@ -139,6 +139,12 @@ def test_no_network_and_other_failures_are_told_apart(
     assert names_in(tmp_path / "packs") == set()
 
 
+def test_an_archive_without_an_end_is_refused(pack: Pack, tmp_path: Path) -> None:
+    """A device is never read."""
+    with pytest.raises(AssetError, match=r"/dev/zero: is not a regular file; expected the archive"):
+        install(pack, tmp_path / "packs", Path("/dev/zero"))
+
+
 def test_a_killed_installation_leaves_nothing_behind(
     pack: Pack, archive: Path, tmp_path: Path
 ) -> None:

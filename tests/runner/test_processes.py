@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from gen_data.generator.core.errors import SampleError, SceneRejected, WorkerLost
+from gen_data.generator.core.errors import OutOfMemory, SampleError, SceneRejected, WorkerLost
 from gen_data.generator.runner.run import Limits, Settings
 from gen_data.generator.runner.worker import make_sendable
 from tests.runner.doubles import RESUME, Trouble, make, notes_of, tree_digest, write_raw_images
@@ -262,6 +262,18 @@ def test_a_damaged_kernel_cache_is_named_with_its_remedy(text: str) -> None:
     """Warp says what it missed; a user needs to know what to delete."""
     assert "delete its folder, ~/.cache/warp" in str(make_sendable(RuntimeError(text)))
     assert "~/.cache/warp" not in str(make_sendable(RuntimeError("something else")))
+
+
+def test_lack_of_memory_in_a_worker_is_one_line() -> None:
+    """Whatever the library makes of it."""
+    error = RuntimeError("Failed to load the shared library 'warp.so'")
+    error.__cause__ = OSError("warp.so: failed to map segment from shared object")
+
+    for cause in (MemoryError(), error):
+        sent = make_sendable(cause)
+        assert type(sent) is OutOfMemory
+        assert str(sent).startswith("a worker could not start: out of memory")
+        assert "\n" not in str(sent)
 
 
 def test_an_error_that_cannot_travel_arrives_as_its_nearest_relative() -> None:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+import gen_data
 from gen_data.generator.core.capture import Capture
 from gen_data.generator.core.errors import ConfigError, DeterminismError, SampleError, StorageError
 from gen_data.generator.core.intrinsics import Intrinsics
@@ -287,7 +288,7 @@ def test_a_second_run_on_the_folder_is_refused(tmp_path: Path) -> None:
 
     with (
         store.locked(),
-        pytest.raises(ConfigError, match=rf'another run.*"pid": {os.getpid()}') as caught,
+        pytest.raises(ConfigError, match=rf"another run.*process {os.getpid()} on host") as caught,
     ):
         make(tmp_path / "out")
     assert caught.value.exit_code == 2
@@ -446,7 +447,7 @@ def test_a_kill_at_every_operation_is_resumed_to_the_same_bytes(
 def test_every_errno_at_every_operation_is_one_message_and_resumable(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, reference_digest: str
 ) -> None:
-    """Path, errno, free bytes and the resume command; then the same bytes once it is gone.
+    """Path, errno and the resume command; then the same bytes once it is gone.
 
     Where the fault only hits the tidying up after the manifest, the run succeeds.
     """
@@ -460,11 +461,20 @@ def test_every_errno_at_every_operation_is_one_message_and_resumable(
                 make(out)
             except StorageError as error:
                 message = str(error)
-        facts = (f"({errno.errorcode[number]})", str(out), "bytes free", RESUME)
+        facts = (f"({errno.errorcode[number]})", str(out), RESUME)
         assert all(fact in message for fact in facts) or (out / "manifest.json").exists()
         make(out)
         assert tree_digest(out) == reference_digest, f"{errno.errorcode[number]} at operation {k}"
         shutil.rmtree(out)
+
+
+def test_a_second_run_is_refused_before_its_configuration_is_read(tmp_path: Path) -> None:
+    """Within a second, although the configuration of this one does not even exist."""
+    with LocalStore(tmp_path).locked(), pytest.raises(ConfigError, match=r"another run .* on host"):
+        gen_data.generate("no-such-file.yaml", 1, out=tmp_path)
+
+    with pytest.raises(ConfigError, match="no-such-file"):
+        gen_data.generate("no-such-file.yaml", 1, out=tmp_path)
 
 
 def survives_power_cut(
@@ -568,7 +578,7 @@ def test_a_run_that_will_not_fit_stops_after_its_first_shard(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """6 of 10 samples to go at about 1.2 kB each: 2 kB free are not enough, the shard stays."""
-    monkeypatch.setattr("gen_data.generator.runner.progress.free_bytes", lambda path: 2_000)
+    monkeypatch.setattr("gen_data.generator.runner.free_space.free_bytes", lambda path: 2_000)
 
     with pytest.raises(StorageError, match="other 6 samples need about") as caught:
         make(tmp_path / "out")

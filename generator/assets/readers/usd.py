@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from gen_data.generator.assets.texture_maps import TextureMaps
 from gen_data.generator.assets.triangle_soup import MaterialSlot, TriangleSoup, join_soups
 from gen_data.generator.core.asset_types import Material, UInt8
 from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.temporary_folders import temporary_folder
 from gen_data.generator.usd.material_reader import BoundMaterial
 from gen_data.generator.usd.stage_reader import SUFFIXES, OpenStage, StagePart, layer_references
 
@@ -150,8 +150,8 @@ def open_stage(folder: Folder, relative: str) -> Iterator[StageFile]:
         _check_layers(folder, relative)
         yield StageFile(_open_composed(folder, relative, place), folder, packed=False)
         return
-    with TemporaryDirectory(prefix="gen-data-usdz-") as name:
-        inside = Folder(Path(name))
+    with temporary_folder("usdz") as unpacked:
+        inside = Folder(unpacked)
         first = _unpack(folder.read(relative), inside, place)
         _check_layers(inside, first)
         yield StageFile(_open_composed(inside, first, place), inside, packed=True)

@@ -13,6 +13,7 @@ import hashlib
 import os
 import subprocess
 import sys
+import warnings
 from collections.abc import Sequence
 from functools import cache
 from importlib import import_module
@@ -20,8 +21,9 @@ from pathlib import Path
 
 import warp as wp
 
-from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.processes import end_with_parent, silence_stdio
+from gen_data.generator.core.errors import CacheWarning, ConfigError
+from gen_data.generator.core.processes import interrupts_blocked, silence_stdio, tie
+from gen_data.generator.renderers.warp.kernel_cache import remove_damaged_modules
 
 # Not -march=native: fused multiply-adds would change bytes between machines. The inlining threshold
 # saves a quarter of all ray time.
@@ -80,15 +82,23 @@ def compile_kernels(device: str) -> None:
     """Fill Warp's cache for a device with the kernels of ``EVERY_FRAME``, if they are missing.
 
     Of several processes that find the cache empty, one compiles and the others wait.
+
+    Warns:
+        CacheWarning: compiled kernels were damaged; they are compiled again.
     """
     cores = len(os.sched_getaffinity(0))
-    stamp = Path(wp.config.kernel_cache_dir) / f"gen-data-{_digest()}-{device[:4]}"
-    if stamp.exists() or cores == 1:
-        return
-    with stamp.with_suffix(".lock").open("a") as lock:
+    folder = Path(wp.config.kernel_cache_dir)
+    stamp = folder / f"gen-data-{_digest()}-{device[:4]}"
+    with (folder / "gen-data.lock").open("a") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if not stamp.exists() and _compile_in_parallel(device, cores):
+        damaged = remove_damaged_modules(folder)
+        if damaged:
+            fact = f"{folder}: {len(damaged)} compiled kernel module(s) were damaged"
+            warnings.warn(f"{fact} and are compiled again", CacheWarning, stacklevel=2)
+        is_filled = stamp.exists() and not damaged
+        if cores > 1 and not is_filled and _compile_in_parallel(device, cores):
             stamp.touch()
+            remove_damaged_modules(folder)
 
 
 def load_kernels(device_name: str, names: Sequence[str]) -> None:
@@ -103,9 +113,17 @@ def load_kernels(device_name: str, names: Sequence[str]) -> None:
 def _compile_in_parallel(device: str, cores: int) -> bool:
     """Distribute the modules over one process per core; returns whether all succeeded."""
     shares = [EVERY_FRAME[k::cores] for k in range(min(cores, len(EVERY_FRAME)))]
-    here = [sys.executable, "-m", __name__, str(os.getpid()), device]
-    running = [subprocess.Popen([*here, *share], stdout=subprocess.DEVNULL) for share in shares]
-    codes = [process.wait() for process in running]
+    running: list[subprocess.Popen[bytes]] = []
+    try:
+        for share in shares:
+            command = tie([sys.executable, "-m", __name__, device, *share])
+            with interrupts_blocked():
+                running.append(subprocess.Popen(command, stdout=subprocess.DEVNULL))
+        codes = [process.wait() for process in running]
+    finally:
+        # After an interruption, the host program may go on.
+        for process in running:
+            process.kill()
     return not any(codes)
 
 
@@ -118,5 +136,4 @@ def _digest() -> str:
 
 
 if __name__ == "__main__":
-    end_with_parent(int(sys.argv[1]))
-    load_kernels(sys.argv[2], sys.argv[3:])
+    load_kernels(sys.argv[1], sys.argv[2:])

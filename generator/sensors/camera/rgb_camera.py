@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
+from gen_data.generator.config.base_model import NAME_PATTERN
 from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.errors import ConfigError, SampleError, did_you_mean
 from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
@@ -67,7 +68,7 @@ class RgbCamera(Mounted):
     """
 
     type: Literal["rgb_camera"] = "rgb_camera"
-    name: str = Field("color", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("color", pattern=NAME_PATTERN)
     size_px: tuple[SidePx, SidePx] = (640, 480)
     hfov_deg: float = Field(60.0, ge=1, le=360)
     lens: LensConfig = Pinhole()

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
-from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.base_model import NAME_PATTERN, Strict
 from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.errors import SampleError
 from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
@@ -94,7 +94,7 @@ class DepthCamera(Mounted):
     """
 
     type: Literal["depth_camera"] = "depth_camera"
-    name: str = Field("depth_camera", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("depth_camera", pattern=NAME_PATTERN)
     model: str | DepthModel = "kinect_v2"
     size_px: tuple[SidePx, SidePx] | None = None
     hfov_deg: float | None = Field(None, ge=1, le=150)

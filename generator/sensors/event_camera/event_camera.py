@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gen_data.generator.config.base_model import NAME_PATTERN
 from gen_data.generator.core.capture import Channel, Measurements
 from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
@@ -214,7 +215,7 @@ class EventCamera(Mounted):
     """
 
     type: Literal["event_camera"] = "event_camera"
-    name: str = Field("events", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("events", pattern=NAME_PATTERN)
     camera: str = "color"
     size_px: tuple[SidePx, SidePx] = (346, 260)
     hfov_deg: float = Field(60.0, ge=1, le=170)

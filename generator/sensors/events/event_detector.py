@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gen_data.generator.config.base_model import NAME_PATTERN
 from gen_data.generator.core.capture import Channel, Measurements
 from gen_data.generator.core.errors import SampleError
 from gen_data.generator.core.interfaces import Renderer
@@ -65,7 +66,7 @@ class EventDetector(Instrument):
 
     kind: ClassVar[str] = "watcher"
     type: Literal["watcher"] = "watcher"
-    name: str = Field("watcher", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("watcher", pattern=NAME_PATTERN)
     events: tuple[Occurrence, ...] = Field(EVERYTHING, min_length=1)
     obstacle_m: float = Field(20.0, gt=0, le=500)
     light_m: float = Field(50.0, gt=0, le=500)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, WithJsonSchema, field_validator
 
+from gen_data.generator.config.base_model import NAME_PATTERN
 from gen_data.generator.core.capture import POINT, Channel, LidarRays, PointCloud
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
@@ -88,7 +89,7 @@ class LidarSensor(Mounted):
     """
 
     type: Literal["lidar"] = "lidar"
-    name: str = Field("lidar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("lidar", pattern=NAME_PATTERN)
     model: str | LidarModel = "HDL-64E"
     beams: Annotated[tuple[Beam, ...], WithJsonSchema(BEAMS_SCHEMA)] = Field((), max_length=4096)
     rotation_hz: float | None = Field(None, gt=0, le=100)

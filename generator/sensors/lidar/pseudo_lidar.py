@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from gen_data.generator.config.base_model import NAME_PATTERN
 from gen_data.generator.core.capture import POINT, Channel, LidarRays, PointCloud
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
@@ -45,7 +46,7 @@ class PseudoLidar(Mounted):
     """
 
     type: Literal["pseudo_lidar"] = "pseudo_lidar"
-    name: str = Field("pseudo_lidar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("pseudo_lidar", pattern=NAME_PATTERN)
     camera: str = "color"
     offset_m: Vec3 = (0.0, 0.0, 0.3)
     stride_px: int = Field(8, ge=1, le=256)

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.base_model import NAME_PATTERN, Strict
 from gen_data.generator.core.capture import Channel, LidarRays, Measurements
 from gen_data.generator.core.geodesy import GeodeticOrigin, to_geodetic
 from gen_data.generator.core.interfaces import Renderer
@@ -102,7 +102,7 @@ class Gnss(Instrument):
 
     kind: ClassVar[str] = "gnss"
     type: Literal["gnss"] = "gnss"
-    name: str = Field("gnss", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("gnss", pattern=NAME_PATTERN)
     model: Annotated[str, AfterValidator(lambda name: check_preset(PRESETS, name))] = "standalone"
     origin_deg: tuple[Annotated[float, Field(ge=-89, le=89)], Degrees] = (49.0114, 8.4244)
     origin_altitude_m: float = Field(115.0, ge=-1000, le=20_000)

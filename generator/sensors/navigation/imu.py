@@ -27,7 +27,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.base_model import NAME_PATTERN, Strict
 from gen_data.generator.core.capture import Channel, Measurements
 from gen_data.generator.core.interfaces import Renderer
 from gen_data.generator.core.measurement_dtypes import IMU, table_rows
@@ -76,7 +76,7 @@ class Imu(Instrument):
 
     kind: ClassVar[str] = "imu"
     type: Literal["imu"] = "imu"
-    name: str = Field("imu", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("imu", pattern=NAME_PATTERN)
     model: Annotated[str, AfterValidator(lambda name: check_preset(PRESETS, name))] = "RT3003"
     rate_hz: float | None = Field(100.0, gt=0, le=10_000)
     noise: float = Field(1.0, ge=0)

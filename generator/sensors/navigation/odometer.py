@@ -23,6 +23,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from gen_data.generator.config.base_model import NAME_PATTERN
 from gen_data.generator.core.capture import Channel, Measurements
 from gen_data.generator.core.interfaces import Renderer
 from gen_data.generator.core.measurement_dtypes import table_rows
@@ -53,7 +54,7 @@ class Odometer(Instrument):
 
     kind: ClassVar[str] = "odometer"
     type: Literal["odometer"] = "odometer"
-    name: str = Field("odometer", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("odometer", pattern=NAME_PATTERN)
     wheelbase_m: float = Field(2.7, gt=0, le=20)
     track_m: float = Field(1.55, gt=0, le=10)
     scale_error: float = Field(0.005, ge=0, le=0.5)

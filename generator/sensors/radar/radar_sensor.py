@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
-from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.base_model import NAME_PATTERN, Strict
 from gen_data.generator.core.capture import Channel, LidarHits, LidarRays, Measurements
 from gen_data.generator.core.interfaces import Renderer
 from gen_data.generator.core.measurement_dtypes import table_rows
@@ -89,7 +89,7 @@ class Radar(Instrument):
 
     kind: ClassVar[str] = "radar"
     type: Literal["radar"] = "radar"
-    name: str = Field("radar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("radar", pattern=NAME_PATTERN)
     model: Annotated[str, AfterValidator(lambda name: check_preset(PRESETS, name))] = "ARS408-21"
     false_alarms: float = Field(1.0, ge=0, le=1000)
     noise: float = Field(1.0, ge=0)

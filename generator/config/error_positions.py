@@ -1,0 +1,55 @@
+"""Positions for errors of plug-ins, which know their name but no document."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from gen_data.generator.config.problems import refuse
+from gen_data.generator.config.yaml_tree import Node
+from gen_data.generator.core.errors import ConfigError
+
+_FIELD = re.compile(
+    r"(?P<list>elements|randomizers|sensors)\.(?P<name>[\w-]+)(\.(?P<field>[\w.]+))?: (?P<fact>.*)",
+    re.DOTALL,
+)
+_PLUGIN = re.compile(r"(?P<list>sensor|exporter) '(?P<name>[\w-]+)': (?P<fact>.*)", re.DOTALL)
+
+
+@contextmanager
+def located_errors(document: Node) -> Iterator[None]:
+    """Add ``file:line:column`` to a ConfigError of a plug-in of a document.
+
+    Its message begins with ``elements.<name>.<field>:``, ``randomizers...``, ``sensors...``,
+    ``sensor '<name>':`` or ``exporter '<type>':``; others stay as they are.
+    """
+    try:
+        yield
+    except ConfigError as error:
+        found = _FIELD.fullmatch(str(error)) or _PLUGIN.fullmatch(str(error))
+        if found is None or type(error) is not ConfigError:
+            raise
+        parts = found.groupdict()
+        key = parts["list"] if parts["list"].endswith("s") else f"{parts['list']}s"
+        number = _find_item(document, key, parts["name"])
+        if number is None:
+            raise
+        item, field = document.entries[key].items[number], parts.get("field") or ""
+        # A field with its default has no position of its own.
+        node = item.get(*field.split(".")) if field else None
+        path = f"{key}[{number}].{field}" if field else f"{key}[{number}]"
+        # "elements.table.on" and "elements[2].on" are the same; "sensor 'left'" tells more.
+        fact = parts["fact"] if key == parts["list"] else str(error)
+        refuse((node or item).position, path, fact)
+
+
+def _find_item(document: Node, key: str, name: str) -> int | None:
+    """Number of the first item of a list with this name, or else of this type or text."""
+    items = document.entries[key].items if key in document.entries else ()
+    for tag in ("name", "type"):
+        for number, item in enumerate(items):
+            node = item.get(tag)
+            if node is not None and node.content == name:
+                return number
+    return None

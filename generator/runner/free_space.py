@@ -1,0 +1,65 @@
+"""Free space on the disk: whether a data set fits, before its first shard and after each one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.runner.durable_files import format_bytes, free_bytes
+
+if TYPE_CHECKING:
+    from gen_data.generator.runner.store import LocalStore
+
+MARGIN = 1.05
+RESERVE_BYTES = 64 << 10
+"""Space that stays free, for the log of the run and the message about its end."""
+
+
+@dataclass(frozen=True)
+class SpaceCheck:
+    """Compares the need of the missing samples with the free space.
+
+    Attributes:
+        estimate_bytes: Size of a sample, estimated from the configuration; 0 = unknown.
+        is_forced: Whether only a full disk stops the run.
+    """
+
+    store: LocalStore
+    estimate_bytes: float = 0.0
+    is_forced: bool = False
+
+    def before_start(self, samples: int) -> None:
+        """Refuse a data set of this many samples that will not fit.
+
+        Raises:
+            StorageError: with the need, and all remedies.
+        """
+        need = self.estimate_bytes * samples
+        if self.is_forced or need == 0.0:
+            return
+        free = self._free_bytes()
+        if free < MARGIN * need + RESERVE_BYTES:
+            raise StorageError(
+                f"{self.store.root}: {samples} samples need about {format_bytes(need)} and "
+                f"{format_bytes(free)} are free; expected {format_bytes(MARGIN * need)} or more.\n"
+                "  Make room, choose a folder on another disk with --out, reduce --n, or generate "
+                "until the disk is full with --force."
+            )
+
+    def after_shard(self, sample_bytes: float, samples: int) -> StorageError | None:
+        """Error if the other samples will not fit, with the measured size of a sample."""
+        need = 0.0 if self.is_forced else MARGIN * sample_bytes * samples
+        free = self._free_bytes()
+        if free >= need + RESERVE_BYTES or samples == 0:
+            return None
+        return StorageError(
+            f"{self.store.root}: the other {samples} samples need about "
+            f"{format_bytes(sample_bytes * samples)} and {format_bytes(free)} are free; stopped "
+            "before the disk is full.\n  After making room, resume with:\n"
+            f"    {self.store.resume_command}"
+        )
+
+    def _free_bytes(self) -> int:
+        with self.store.errors():
+            return free_bytes(self.store.root)

@@ -1,0 +1,59 @@
+"""Errors that plug-ins find themselves have the position of their entry."""
+
+from __future__ import annotations
+
+import pytest
+
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+from gen_data.generator.core.errors import ConfigError
+
+LONG = "a" * 65
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        (f"sensors.color.name={LONG}", "--set:1:20: sensors[0].name: 'aaa"),
+        (f"randomizers.clutter.name={LONG}", "--set:1:26: randomizers[0].name: 'aaa"),
+        ("randomizers.distractors.name=a b", "--set:1:30: randomizers[1].name: 'a b' does not"),
+        (f"elements.clutter.name={LONG}", "--set:1:23: elements[3].name: 'aaa"),
+        (
+            "exporters=[{type: coco}, {type: coco}]",
+            "--set:1:33: exporters[1].type: the exporter 'coco' is listed twice; expected it once",
+        ),
+        ("randomizers.clutter.count=1000000000", "--set:1:27: randomizers[0].count: 1000000000"),
+    ],
+)
+def test_names_counts_and_repetitions_are_refused_when_read(override: str, message: str) -> None:
+    """Names of any length were accepted, and the disk refused them after the start."""
+    with pytest.raises(ConfigError) as caught:
+        load_config("tabletop.yaml", overrides=[override])
+
+    assert str(caught.value).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        (
+            "exporters=[{type: kitti}]",
+            "--set:1:12: exporters[0]: exporter 'kitti': frame names have six digits, but there "
+            "are 1000001 samples; expected at most 1000000",
+        ),
+        (
+            "elements.clutter.on=floor",
+            "--set:1:21: elements[3].on: there is no surface 'floor'; expected one of table",
+        ),
+    ],
+)
+def test_errors_across_plugins_are_found_before_any_engine_starts(
+    override: str, message: str
+) -> None:
+    """They came from the first worker, without a position."""
+    factory = PipelineFactory(load_config("tabletop.yaml", overrides=[override]), 1_000_001)
+
+    with pytest.raises(ConfigError) as caught:
+        factory.check()
+
+    assert str(caught.value).startswith(message)

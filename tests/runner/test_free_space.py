@@ -1,0 +1,71 @@
+"""Whether a data set fits, before anything is written and while it grows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.runner import free_space
+from gen_data.generator.runner.free_space import RESERVE_BYTES, SpaceCheck
+from gen_data.generator.runner.run import Settings
+from gen_data.generator.runner.store import LocalStore
+from tests.runner.doubles import make, write_raw_images
+
+FREE_BYTES = 8_000_000
+"""Of the disk in these tests."""
+
+
+@pytest.fixture(autouse=True)
+def _disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(free_space, "free_bytes", lambda path: FREE_BYTES)
+
+
+def estimated(sample_bytes: float, *, force: bool = False) -> Settings:
+    return Settings(write_media=write_raw_images, sample_bytes=sample_bytes, is_forced=force)
+
+
+def test_a_data_set_that_will_not_fit_is_refused_before_anything_is_written(tmp_path: Path) -> None:
+    """Ten samples of 1 MB on a disk with 8 MB: need, free space and remedies; no shard."""
+    with pytest.raises(StorageError) as caught:
+        make(tmp_path / "out", settings=estimated(1e6))
+
+    assert str(caught.value) == (
+        f"{tmp_path}/out: 10 samples need about 10.0 MB and 8.0 MB are free; expected 10.5 MB or "
+        "more.\n  Make room, choose a folder on another disk with --out, reduce --n, or generate "
+        "until the disk is full with --force."
+    )
+    assert not (tmp_path / "out/plan.json").exists()
+
+
+def test_the_need_has_a_margin_of_5_percent(tmp_path: Path) -> None:
+    """At 1.05 times the need and the reserve, a run starts; with less it does not."""
+    fits = (FREE_BYTES - RESERVE_BYTES) / 1.05 / 10
+    with pytest.raises(StorageError):
+        make(tmp_path / "out", settings=estimated(fits + 1.0))
+
+    assert make(tmp_path / "out", settings=estimated(fits - 1.0)).made == 10
+
+
+def test_force_starts_all_the_same(tmp_path: Path) -> None:
+    """The estimate may be wrong, and the user may know better."""
+    assert make(tmp_path / "out", settings=estimated(1e12, force=True)).made == 10
+
+
+def test_what_is_there_already_needs_no_estimate(tmp_path: Path) -> None:
+    """A finished data set is accepted on a full disk."""
+    make(tmp_path / "out")
+
+    assert make(tmp_path / "out", settings=estimated(1e12)).already_complete
+
+
+def test_a_run_ends_before_the_last_byte_of_the_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Even with --force: the log of the run needs space."""
+    monkeypatch.setattr(free_space, "free_bytes", lambda path: RESERVE_BYTES - 1)
+    check = SpaceCheck(LocalStore(tmp_path, "again"), 1.0, is_forced=True)
+
+    assert "65.5 kB are free; stopped before the disk is full" in str(check.after_shard(100.0, 5))
+    assert check.after_shard(100.0, 0) is None

@@ -1,0 +1,144 @@
+"""Ctrl-C, SIGTERM and SIGHUP during any command: real processes that run a few lines."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.runner.test_processes import HANG_S, ROOT, wait_for
+
+START = """
+import pathlib, signal, sys, time
+import click
+from gen_data.generator.cli import main as command_line, stop_signals
+stop_signals.PATIENCE_S = 1.0
+def begun():
+    pathlib.Path(sys.argv[1]).touch()
+@click.command()
+@click.argument("marker")
+def command(marker):
+{body}
+command_line.cli = command
+command_line.main()
+"""
+"""The command line with another command; it touches a file when it has begun."""
+
+SLEEPS = """
+    try:
+        begun()
+        time.sleep(600)
+    finally:
+        print("cleaned up", flush=True)
+"""
+SWALLOWS = """
+    begun()
+    for _ in range(600):
+        try:
+            time.sleep(1)
+        except KeyboardInterrupt:
+            pass
+"""
+COMPUTES = """
+    import hashlib
+    begun()
+    hashlib.pbkdf2_hmac("sha256", b"", b"", 2**31 - 1)
+"""
+TRANSLATES = """
+    begun()
+    try:
+        time.sleep(600)
+    except KeyboardInterrupt:
+        raise ImportError("a library could not be imported")
+"""
+CLEANS_UP_FOR_LONG = """
+    stop_signals.PATIENCE_S = 600.0
+    try:
+        begun()
+        time.sleep(600)
+    finally:
+        begun_cleaning = pathlib.Path(sys.argv[1] + "-cleaning").touch()
+        time.sleep(600)
+"""
+
+
+def start(body: str, folder: Path) -> subprocess.Popen[str]:
+    """Start the command and wait until it has begun."""
+    marker = folder / "begun"
+    process = subprocess.Popen(
+        [sys.executable, "-c", START.format(body=body), str(marker)],
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    wait_for(marker.exists)
+    return process
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_lets_a_command_clean_up(tmp_path: Path, number: signal.Signals) -> None:
+    """Exit code 130, one line, and what the command does at its end is done."""
+    process = start(SLEEPS, tmp_path)
+
+    process.send_signal(number)
+
+    printed, message = process.communicate(timeout=HANG_S)
+    assert (process.returncode, printed) == (130, "cleaned up\n")
+    assert message.strip() == "gen-data: interrupted"
+
+
+@pytest.mark.parametrize("body", [SWALLOWS, COMPUTES], ids=["swallowed", "native code"])
+def test_a_signal_that_has_no_effect_ends_the_process_all_the_same(
+    tmp_path: Path, body: str
+) -> None:
+    """Code that drops KeyboardInterrupt, or computes for hours, is ended after the patience."""
+    process = start(body, tmp_path)
+
+    process.terminate()
+
+    message = process.communicate(timeout=HANG_S)[1]
+    assert (process.returncode, message.strip()) == (130, "gen-data: interrupted")
+
+
+def test_an_error_that_an_interruption_caused_is_no_traceback(tmp_path: Path) -> None:
+    """Libraries report an interrupted import as ImportError."""
+    process = start(TRANSLATES, tmp_path)
+
+    process.send_signal(signal.SIGINT)
+
+    message = process.communicate(timeout=HANG_S)[1]
+    assert (process.returncode, message.strip()) == (130, "gen-data: interrupted")
+
+
+@pytest.mark.parametrize(
+    "error",
+    ["MemoryError", "ImportError('x.so: failed to map segment from shared object')"],
+)
+def test_lack_of_memory_is_one_line(tmp_path: Path, error: str) -> None:
+    """Under ``ulimit -v``, libraries cannot even be loaded; a traceback tells nothing."""
+    process = start(f"\n    begun()\n    raise {error}\n", tmp_path)
+
+    message = process.communicate(timeout=HANG_S)[1]
+
+    assert process.returncode == 6
+    assert message.startswith("gen-data: out of memory: the system refused more memory")
+    assert len(message.splitlines()) == 1
+
+
+def test_the_second_ctrl_c_is_immediate(tmp_path: Path) -> None:
+    """Cleaning up takes ten minutes; the second signal ends it."""
+    process = start(CLEANS_UP_FOR_LONG, tmp_path)
+    process.send_signal(signal.SIGINT)
+    wait_for((tmp_path / "begun-cleaning").exists)
+    time.sleep(0.2)
+
+    process.send_signal(signal.SIGINT)
+
+    message = process.communicate(timeout=HANG_S)[1]
+    assert process.returncode == 130
+    assert message.strip() == "gen-data: interrupted twice, stopped at once"
