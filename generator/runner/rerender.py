@@ -214,7 +214,16 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
 
 
 CHANGEABLE = frozenset(
-    {"sensors", "render", "annotations", "exporters", "labels", "randomizers", "shared"}
+    {
+        "annotations",
+        "dataset",
+        "exporters",
+        "labels",
+        "randomizers",
+        "render",
+        "sensors",
+        "shared",
+    }
 )
 """Sections in which a configuration may differ from that of the data set."""
 
