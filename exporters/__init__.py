@@ -26,6 +26,7 @@ TABLE = PluginTable[Exporter](
         "kitti_raw": "gen_data.exporters.kitti_raw:KittiRaw",
         "kitti_stereo": "gen_data.exporters.kitti_stereo:KittiStereo",
         "kitti_tracking": "gen_data.exporters.kitti_tracking:KittiTracking",
+        "label_studio": "gen_data.exporters.label_studio:LabelStudio",
         "lerobot": "gen_data.exporters.lerobot:LeRobot",
         "mcap": "gen_data.exporters.mcap:Mcap",
         "motchallenge": "gen_data.exporters.motchallenge:MotChallenge",

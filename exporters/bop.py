@@ -63,6 +63,7 @@ from gen_data.exporters.rigid_models import (
 from gen_data.exporters.rle import run_lengths
 from gen_data.exporters.sensor_selection import pinhole_camera
 from gen_data.exporters.sequences import check_frame_names, write_bytes, write_text
+from gen_data.generator.core.bounded_cache import ByteCache
 from gen_data.generator.core.boxes import BoxPx
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import StorageError
@@ -77,6 +78,9 @@ TARGET_VISIBILITY = 0.1
 
 CHUNK = 1000
 """Samples of a folder with ``folders: thousand``, as in BOP's own synthetic training images."""
+
+MODEL_CACHE_BYTES = 64 << 20
+"""Memory of a process for models that occur in several shards."""
 
 NO_BOX = [-1, -1, -1, -1]
 IMAGES, MODELS = "images", "models"
@@ -96,6 +100,7 @@ class Bop(ExporterBase):
     folders: Literal["scene", "thousand"] = "scene"
 
     _assets: AssetLibrary | None = PrivateAttr(None)
+    _built: ByteCache[Model] = PrivateAttr(default_factory=lambda: ByteCache(MODEL_CACHE_BYTES))
 
     @property
     def needs(self) -> frozenset[str]:
@@ -116,6 +121,7 @@ class Bop(ExporterBase):
         """Return the exporter with a library of meshes."""
         bound = self.model_copy()
         bound._assets = assets
+        bound._built = ByteCache(MODEL_CACHE_BYTES)
         return bound
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
@@ -129,7 +135,7 @@ class Bop(ExporterBase):
         self.check(info)
         camera = pinhole_camera(info, self.camera, self.type)
         folder = shard_dir / self.type
-        models = _ModelFiles(folder / MODELS, self._assets)
+        models = _ModelFiles(folder / MODELS, self._assets, self._built)
         rows = []
         for sample in samples:
             if camera not in sample.truth:
@@ -207,8 +213,8 @@ class Bop(ExporterBase):
 class _ModelFiles:
     """Models of a shard; each is built and written at its first use."""
 
-    def __init__(self, folder: Path, assets: AssetLibrary) -> None:
-        self._folder, self._assets = folder, assets
+    def __init__(self, folder: Path, assets: AssetLibrary, built: ByteCache[Model]) -> None:
+        self._folder, self._assets, self._built = folder, assets, built
         self._rows: dict[str, dict[str, Any]] = {}
         self._keys: dict[tuple[Piece, ...], str] = {}
 
@@ -218,7 +224,7 @@ class _ModelFiles:
             self._keys[pieces] = model_key(pieces)
         key = self._keys[pieces]
         if key not in self._rows:
-            model = build_model(pieces, self._assets)
+            model = self._built.get(key, lambda: build_model(pieces, self._assets))
             write_bytes(self._folder / f"{key}.ply", ply_bytes(model))
             self._rows[key] = _model_facts(key, pieces, thing, model)
         return key
@@ -461,8 +467,8 @@ _DATASET_INFO = """\
 Synthetic images of the camera `{camera}`; {models} models in millimetres.
 
 * `objects.json` maps each obj_id to its asset, scale and category.
-* `models_info.json` has the symmetries that assets state; an object without the keys may still
-  look symmetric.
+* `models_info.json` has the symmetries that assets state, by shape and own materials; an object
+  without the keys may still look symmetric.
 * `cam_K` has pixel centres at i + 0.5.
 * Vertex colours are those of the asset; images may show the object in other materials.
 """

@@ -7,7 +7,6 @@ RFC 1951, 1996, sections 3.2.5 (lengths) and 3.2.6 (fixed Huffman codes), and RF
 
 from __future__ import annotations
 
-import zlib
 from functools import cache
 
 import numpy as np
@@ -27,6 +26,8 @@ _TOKEN_BITS = 20
 _LENGTH_EXTRA_BITS = (0,) * 8 + (1,) * 4 + (2,) * 4 + (3,) * 4 + (4,) * 4 + (5,) * 4
 """Extra bits of the length codes 257 to 284."""
 
+_ADLER_MODULUS = 65521
+
 _ZLIB_HEADER = b"\x78\x01"
 
 Bits = str
@@ -36,34 +37,77 @@ Bits = str
 def encode_mask(mask: MaskPx | None, height_px: int, width_px: int) -> bytes:
     """Encode a mask, which must lie inside the image, as a PNG file; None is an empty mask."""
     # Each row begins with the number of its filter: 0, which continues a run of zeros.
-    rows: NDArray[np.uint8] = np.zeros((height_px, 1 + width_px), np.uint8)
-    borders = np.zeros(0, np.int64)
-    if mask is not None and mask.pixels.size:
+    stride = 1 + width_px
+    size = height_px * stride
+    borders, checksum = np.zeros(0, np.int64), adler32_of_runs(np.zeros(0, np.int64), size)
+    if mask is not None and mask.pixels.any():
         height, width = mask.pixels.shape
-        left, lines = 1 + mask.x_px, rows[mask.y_px : mask.y_px + height]
-        np.multiply(mask.pixels, INSIDE, out=lines[:, left : left + width], dtype=np.uint8)
-        # The row after the last one may be part of the run of zeros that a border ends.
-        flat = rows[mask.y_px : mask.y_px + height + 1].ravel()
-        borders = np.flatnonzero(flat[1:] != flat[:-1]) + 1 + mask.y_px * (1 + width_px)
-    ends = np.append(borders, rows.size)
-    lengths = np.diff(ends, prepend=0)
-    data = _ZLIB_HEADER + _deflate_runs(lengths) + zlib.adler32(rows.data).to_bytes(4, "big")
+        lines: NDArray[np.bool_] = np.zeros((height + 1, stride), np.bool_)
+        lines[:height, 1 + mask.x_px : 1 + mask.x_px + width] = mask.pixels
+        # The row below the mask has the zero that ends a run in the last column.
+        flat = lines.ravel()
+        borders = np.flatnonzero(flat[1:] != flat[:-1]) + 1 + mask.y_px * stride
+        checksum = adler32_of_runs(borders, size)
+    lengths = np.diff(np.append(borders, size), prepend=0)
+    lengths = lengths[: len(lengths) - (lengths[-1] == 0)]
+    data = _ZLIB_HEADER + _deflate_runs(lengths) + checksum.to_bytes(4, "big")
     return assemble_png(height_px, width_px, data)
+
+
+def adler32_of_runs(borders: NDArray[np.int64], size: int) -> int:
+    """Adler-32 checksum of ``size`` bytes that alternate between 0 and 255 at the borders.
+
+    Source: RFC 1950, section 8.2: sums of the bytes, and of all partial sums, modulo 65521. A byte
+    with ``k`` bytes from it to the end is in ``k`` partial sums.
+
+    Args:
+        borders: Indices at which the byte changes, ascending; the first run is of zeros.
+        size: Number of bytes; a last border at ``size`` ends a run of 255.
+    """
+    first, last = borders[0::2], borders[1::2]
+    counts = last - first
+    # Sum of size - i over the bytes i of each run of 255.
+    partial = counts * (2 * size - first - last + 1) // 2
+    low = (1 + INSIDE * int(counts.sum())) % _ADLER_MODULUS
+    high = (size + INSIDE * int(partial.sum())) % _ADLER_MODULUS
+    return high << 16 | low
 
 
 def _deflate_runs(lengths: NDArray[np.int64]) -> bytes:
     """Deflate alternate runs of 0 and 255, zeros first, as one block of fixed Huffman codes."""
+    inside = np.arange(len(lengths)) % 2
+    # Above and below the mask are long runs of zeros, between its rows short ones.
+    parts = [_HEADER, _long_run(int(lengths[0]), 0), _short_runs(lengths[1:-1], inside[1:-1])]
+    if len(lengths) > 1:
+        parts.append(_long_run(int(lengths[-1]), int(inside[-1])))
+    bits = np.concatenate([*parts, np.zeros(7, np.uint8)])
+    return np.packbits(bits, bitorder="little").tobytes()
+
+
+_HEADER = np.array([1, 1, 0], np.uint8)
+"""Bits of the last block, of fixed codes."""
+
+
+def _long_run(length: int, inside: int) -> NDArray[np.uint8]:
+    """Bits of one run: a literal, copies of the greatest length, and the rest."""
+    table, sizes = _tokens()
+    copies, rest = divmod(length - 1, _LONGEST)
+    ends = [_LITERAL + inside, _REST + inside * _LONGEST + rest]
+    literal, remainder = (table[row, : sizes[row]] for row in ends)
+    copy = table[_COPY, : sizes[_COPY]]
+    return np.concatenate([literal, np.tile(copy, copies), remainder])
+
+
+def _short_runs(lengths: NDArray[np.int64], inside: NDArray[np.int64]) -> NDArray[np.uint8]:
+    """Bits of several runs, of 255 where ``inside`` is 1."""
     table, sizes = _tokens()
     copies, rest = np.divmod(lengths - 1, _LONGEST)
-    inside = np.arange(len(lengths)) % 2
     first = np.cumsum(copies + 2) - (copies + 2)
-    # Per run: the literal, copies of the greatest length, and one token for the rest.
     rows = np.full(int((copies + 2).sum()), _COPY)
     rows[first] = _LITERAL + inside
     rows[first + 1 + copies] = _REST + inside * _LONGEST + rest
     present = np.arange(_TOKEN_BITS) < sizes[rows, None]
-    bits = np.concatenate([[1, 1, 0], table[rows][present], np.zeros(7, np.uint8)])
-    return np.packbits(bits.astype(np.uint8), bitorder="little").tobytes()
+    return table[rows][present]
 
 
 _COPY, _LITERAL, _REST = 0, 1, 3

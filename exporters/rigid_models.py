@@ -68,6 +68,11 @@ class Model:
     faces: NDArray[np.int32]
     info: Mapping[str, Any]
 
+    @property
+    def nbytes(self) -> int:
+        """Bytes of its arrays."""
+        return self.vertices.nbytes + self.faces.nbytes
+
 
 def rigid_pieces(scene: Scene) -> dict[int, tuple[Piece, ...]]:
     """Pieces of every instance with a body, by instance id; without robots, which bend."""

@@ -83,6 +83,31 @@ class AssetFolders(Strict):
     folders: tuple[str, ...] = Field((), description="Folders of OBJ, GLB, PLY, STL or URDF files.")
 
 
+class DatasetSettings(Strict):
+    """Publication of the data set: in its card, ``croissant.json`` and the exporter ``croissant``.
+
+    Attributes:
+        title: Name for readers; empty = the name of the configuration.
+        description: Its content and purpose in a few sentences.
+        license: An SPDX identifier such as ``CC-BY-4.0``, or a URL; empty = only the licences of
+            its assets are stated.
+        creators: Names of persons or organisations.
+        url: Its web page.
+        date_published: Date of publication, such as ``2026-11-22``.
+        cite_as: Citation, such as a BibTeX entry.
+        version: Version of the data.
+    """
+
+    title: str = ""
+    description: str = ""
+    license: str = ""
+    creators: tuple[str, ...] = ()
+    url: str = Field("", pattern=r"^(https?://\S+)?$")
+    date_published: str = Field("", pattern=r"^(\d{4}-\d{2}-\d{2})?$")
+    cite_as: str = ""
+    version: str = Field("1.0.0", pattern=r"^\d+\.\d+\.\d+$")
+
+
 class LabelSettings(Thresholds):
     """Thresholds for annotating an instance, and the label map of all exports."""
 
@@ -111,6 +136,7 @@ class GeneralSettings(Strict):
     labels: LabelSettings = LabelSettings()
     splits: Splits = Splits()
     assets: AssetFolders = AssetFolders()
+    dataset: DatasetSettings = DatasetSettings()
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ ALL = "all"
 EXTENDS_MAX = 8
 """Longest chain of configurations that extend one another."""
 
-SECTIONS = ("render", "physics", "labels", "splits", "assets", "shared")
+SECTIONS = ("render", "physics", "labels", "splits", "assets", "dataset", "shared")
 """Optional mappings of a configuration; a resolved document has them all."""
 
 NOWHERE = Position("(default)", 1, 1)

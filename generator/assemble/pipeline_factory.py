@@ -24,6 +24,7 @@ from gen_data.generator.core.interfaces import (
     DatasetInfo,
     Exporter,
     Modality,
+    Publication,
     Randomizer,
     Sensor,
     SensorInfo,
@@ -179,6 +180,7 @@ def dataset_info(config: Config, n: int, categories: tuple[str, ...]) -> Dataset
         depth_scale_m=config.general.depth_scale_m,
         steps_per_scene=config.general.steps_per_scene,
         step_s=config.general.step_s,
+        publication=Publication(**config.general.dataset.model_dump()),
     )
 
 

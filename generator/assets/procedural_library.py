@@ -22,7 +22,7 @@ from gen_data.generator.assets.procedural.family import (
     Family,
     TextureFamily,
 )
-from gen_data.generator.core.asset_types import Asset, Float32, TextureData
+from gen_data.generator.core.asset_types import Asset, Float32, Symmetry, TextureData
 from gen_data.generator.core.bounded_cache import Sized
 from gen_data.generator.core.errors import AssetError, ConfigError, did_you_mean
 from gen_data.generator.core.plugins import loaded, package_of, third_party
@@ -99,6 +99,7 @@ class ProceduralLibrary:
             stackable=isinstance(family, Family) and family.stackable,
             subcategory=facts.subcategory,
             attributes=tuple(sorted(facts.attributes.items())),
+            symmetries=_list_symmetries(asset_id, family),
         )
 
     def imported(self, asset_id: AssetId) -> ImportedMesh:
@@ -191,6 +192,12 @@ def _read_facts(asset_id: AssetId, family: AnyFamily) -> Facts:
     if not isinstance(family, Family) or family.facts is None:
         return Facts()
     return family.facts(**_merge_arguments(asset_id, family))
+
+
+def _list_symmetries(asset_id: AssetId, family: AnyFamily) -> tuple[Symmetry, ...]:
+    if not isinstance(family, Family) or family.symmetries is None:
+        return ()
+    return family.symmetries(**_merge_arguments(asset_id, family))
 
 
 def _kind(family: AnyFamily) -> Any:

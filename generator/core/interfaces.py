@@ -395,6 +395,31 @@ It fills in its own fields of the truth and leaves the rest as it is; it changes
 
 
 @dataclass(frozen=True, slots=True)
+class Publication:
+    """How a data set is published; empty = not stated.
+
+    Attributes:
+        title: Name for readers; empty = the name of the configuration.
+        description: Its content and purpose in a few sentences.
+        license: SPDX identifier or URL; empty = only the licences of its assets are stated.
+        creators: Names of persons or organisations.
+        url: Its web page.
+        date_published: Such as ``2026-11-22``.
+        cite_as: Citation, such as a BibTeX entry.
+        version: Version of the data, ``major.minor.patch``.
+    """
+
+    title: str = ""
+    description: str = ""
+    license: str = ""
+    creators: tuple[str, ...] = ()
+    url: str = ""
+    date_published: str = ""
+    cite_as: str = ""
+    version: str = "1.0.0"
+
+
+@dataclass(frozen=True, slots=True)
 class DatasetInfo:
     """Properties of the data set as a whole, for exporters.
 
@@ -404,6 +429,7 @@ class DatasetInfo:
         depth_scale_m: Metres per unit of the 16-bit depth images.
         steps_per_scene: Length of a sequence: instants per view.
         step_s: Time between them [s].
+        publication: Title, licence and creators.
     """
 
     name: str
@@ -415,6 +441,7 @@ class DatasetInfo:
     depth_scale_m: float = 0.0001
     steps_per_scene: int = 1
     step_s: float = 0.1
+    publication: Publication = Publication()
 
     @property
     def cameras(self) -> tuple[str, ...]:

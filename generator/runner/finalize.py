@@ -11,6 +11,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.runner.data_card import (
+    CARD_NAME,
+    CROISSANT_NAME,
+    DatasetFacts,
+    croissant_json,
+    data_card,
+)
 from gen_data.generator.runner.durable_files import (
     Inode,
     empty_folders,
@@ -69,10 +76,12 @@ def finalize(
             with explain_errors(f"exporter {name}, merging"), store.errors():
                 _merge(plan, store, pipeline, name, known)
         scratch = store.scratch_dir()
-        if licences is not None:
-            used = sorted({asset for record in records for asset in record.assets})
-            write_durably(store.root / LICENCES_NAME, licences(used).encode(), scratch)
-        entries = sorted(_entries(plan, store, records, names, known), key=_by_path)
+        documents = _documents(plan, store, pipeline, records, licences)
+        for name, data in documents.items():
+            write_durably(store.root / name, data, scratch)
+        entries = [_entry_of_bytes(name, data) for name, data in documents.items()]
+        entries += _entries(plan, store, records, names, known)
+        entries.sort(key=_by_path)
         sums = sums_text(entries)
         sealed_before.expect(entries)
         folders = [f"{n}/{inner}" for n in names for inner in empty_folders(store.root / n)]
@@ -119,6 +128,30 @@ def _merge(
     move_durably(staging, target)
 
 
+def _documents(
+    plan: Plan,
+    store: LocalStore,
+    pipeline: PipelineLike,
+    records: list[ShardRecord],
+    licences: LicencesOf | None,
+) -> dict[str, bytes]:
+    """Files for readers at the root of the data set: licences, card and metadata."""
+    used = sorted({asset for record in records for asset in record.assets})
+    table = None if licences is None else licences(used)
+    facts = DatasetFacts(
+        plan,
+        pipeline.info,
+        sum_counts(count for record in records for count in record.splits),
+        sum(record.scenes for record in records),
+        [name for name in pipeline.exporters if (store.root / name).is_dir()],
+        table,
+    )
+    texts = {CARD_NAME: data_card(facts), CROISSANT_NAME: croissant_json(facts)}
+    if table is not None:
+        texts[LICENCES_NAME] = table
+    return {name: text.encode() for name, text in texts.items()}
+
+
 def _entries(
     plan: Plan,
     store: LocalStore,
@@ -126,11 +159,8 @@ def _entries(
     exporters: list[str],
     known: Mapping[Inode, str],
 ) -> Iterator[Entry]:
-    """All files except the manifest and the sums, in no particular order."""
+    """Plan, records, files of shards and of exporters, in no particular order."""
     yield _entry_of_bytes(PLAN_NAME, plan_bytes(plan))
-    licences = store.root / LICENCES_NAME
-    if licences.exists():
-        yield _entry_of_bytes(LICENCES_NAME, licences.read_bytes())
     for record in records:
         folder = f"{SHARDS_NAME}/{store.shard_dir(record.shard).name}"
         yield _entry_of_bytes(f"{folder}.json", record.to_bytes())

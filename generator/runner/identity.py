@@ -13,6 +13,7 @@ from gen_data.generator.assets.library import open_library
 from gen_data.generator.assets.paths import packs_dir
 from gen_data.generator.core.asset_types import Asset
 from gen_data.generator.core.scene import Scene
+from gen_data.generator.runner.licence_table import licence_table
 from gen_data.generator.runner.plan import Plan
 
 BYTES_DEPEND_ON = {
@@ -68,17 +69,7 @@ def make_plan(factory: PipelineFactory) -> Plan:
 def format_licences(factory: PipelineFactory, used: Sequence[str]) -> str:
     """Markdown table of the assets with these ids, grouped by source."""
     library = open_library(factory.config.asset_folders)
-    groups: dict[tuple[str, str, str], list[str]] = {}
-    for asset in (library.get(asset_id) for asset_id in used):
-        family = asset.asset_id.partition("?")[0]
-        members = groups.setdefault((asset.source, asset.licence, asset.author), [])
-        if family not in members:
-            members.append(family)
-    lines = ["# Assets of this data set", "", "| source | licence | author | assets |"]
-    lines += ["|---|---|---|---|"]
-    for (source, licence, author), members in sorted(groups.items()):
-        lines.append(f"| {source} | {licence} | {author} | {', '.join(members)} |")
-    return "\n".join(lines) + "\n"
+    return licence_table(library.get(asset_id) for asset_id in used)
 
 
 def possible_assets(factory: PipelineFactory) -> tuple[Asset, ...]:

@@ -231,7 +231,16 @@ def rerender_plan(
 
 
 CHANGEABLE = frozenset(
-    {"sensors", "render", "annotations", "exporters", "labels", "randomizers", "shared"}
+    {
+        "annotations",
+        "dataset",
+        "exporters",
+        "labels",
+        "randomizers",
+        "render",
+        "sensors",
+        "shared",
+    }
 )
 """Sections in which a configuration may differ from that of the data set."""
 

@@ -4,6 +4,7 @@
     shards/000042/          files of one shard, renamed into place when all are on disk
     shards/000042.json      its record; from here on the shard is committed
     coco/ kitti/ ...        merged results of exporters
+    README.md               data card; croissant.json: its facts for programs
     SHA256SUMS              every file but run/ and itself, for ``sha256sum -c``
     manifest.json           written last: it marks the data set as finished
     run/                    lock, log, a copy of the plan, unfinished and quarantined files; no part

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import zlib
 
 import cv2
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from PIL import Image
 
-from gen_data.exporters.mask_png import encode_mask
+from gen_data.exporters.mask_png import adler32_of_runs, encode_mask
 from gen_data.generator.core.sample import MaskPx
 
 
@@ -63,3 +64,19 @@ def test_a_full_image_is_small() -> None:
 
     assert decoded(png).min() == 255
     assert len(png) < 8_000
+
+
+@given(
+    borders=st.lists(st.integers(1, 5000), unique=True, max_size=40).map(sorted),
+    after=st.integers(0, 9000),
+)
+@settings(max_examples=60, deadline=None)
+def test_checksum_of_runs_is_that_of_their_bytes(borders: list[int], after: int) -> None:
+    """Compared with zlib's, also where the last run is of 255."""
+    size = (borders[-1] if borders else 0) + max(after, 1)
+    data = np.zeros(size, np.uint8)
+    for border in borders:
+        data[border:] ^= 255
+    ends = [*borders, size] if len(borders) % 2 else borders
+
+    assert adler32_of_runs(np.array(ends, np.int64), size) == zlib.adler32(data.tobytes())

@@ -62,6 +62,8 @@ def test_a_finished_folder_holds_what_the_layout_says(tmp_path: Path) -> None:
         "shards",
         "lines",
         "LICENSES-ASSETS.md",
+        "README.md",
+        "croissant.json",
         "SHA256SUMS",
         "manifest.json",
         "run",

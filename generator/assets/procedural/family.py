@@ -15,6 +15,7 @@ from gen_data.generator.core.asset_types import (
     ConvexParts,
     Keypoint,
     MeshData,
+    Symmetry,
 )
 from gen_data.generator.core.errors import AssetError, did_you_mean
 
@@ -75,6 +76,7 @@ class Family:
         parameters: ``{name: default}`` of a parametric family.
         build: Pure function of its arguments.
         facts: Pure, quick function of the same arguments; None = no further facts.
+        symmetries: Likewise: turns that leave the object as it looks; None = there are none.
         stored: Whether the disk cache also keeps results that are not offered for selection;
             false where hardly any is used twice.
         origin: Source and licence, if not all is ours.
@@ -92,6 +94,7 @@ class Family:
     facts: Callable[..., Facts] | None = None
     stored: bool = True
     origin: Provenance = OURS
+    symmetries: Callable[..., tuple[Symmetry, ...]] | None = None
 
 
 @dataclass(frozen=True)
@@ -148,6 +151,29 @@ class ConstantFacts:
     def __call__(self, **_: Any) -> Facts:
         """The facts, whatever the arguments."""
         return Facts(self.subcategory)
+
+
+@dataclass(frozen=True)
+class ConstantSymmetries:
+    """Symmetries that are the same for every variant.
+
+    Attributes:
+        folds: Fold by axis ``x``, ``y`` or ``z``; see ``Symmetry``.
+    """
+
+    folds: Mapping[str, int]
+
+    def __call__(self, **_: Any) -> tuple[Symmetry, ...]:
+        """The symmetries, whatever the arguments."""
+        return axis_symmetries(**self.folds)
+
+
+def axis_symmetries(**folds: int) -> tuple[Symmetry, ...]:
+    """Symmetries about axes of the object's frame, by name: ``z=0`` is any turn about Z."""
+    return tuple(Symmetry(_AXES[name], fold) for name, fold in folds.items())
+
+
+_AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
 def choose_option(
@@ -222,4 +248,14 @@ def _arguments(package: str, row: Mapping[str, Any]) -> dict[str, Any]:
         "build": Lazy(f"{package}.{row['build']}"),
         "tags": tuple(sorted(row["tags"])),
         "parameters": parameters,
+        **_symmetries(package, row.get("symmetries")),
     }
+
+
+def _symmetries(package: str, given: str | Mapping[str, int] | None) -> dict[str, Any]:
+    """A function for ``module:function``, or for folds by axis; nothing for None."""
+    if given is None:
+        return {}
+    if isinstance(given, str):
+        return {"symmetries": Lazy(f"{package}.{given}")}
+    return {"symmetries": ConstantSymmetries(given)}

@@ -16,7 +16,7 @@ import numpy as np
 from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.data_tables import load_table
-from gen_data.generator.assets.procedural.family import Solid, check_option
+from gen_data.generator.assets.procedural.family import Solid, axis_symmetries, check_option
 from gen_data.generator.assets.procedural.material_presets import (
     ALUMINIUM,
     metal_material,
@@ -29,7 +29,7 @@ from gen_data.generator.assets.procedural.patches import (
     join_patches,
     make_solid_in_place,
 )
-from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.asset_types import Material, Symmetry
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.se3 import Vec3
 
@@ -169,6 +169,15 @@ def box_(size_m: Vec3 = (0.2, 0.2, 0.2), color: str = "grey") -> Solid:
     return make_solid_in_place([shapes.block(*corners, bevel)], (body,), [hulls.box(*corners)])
 
 
+def box_symmetries(size_m: Vec3 = (0.2, 0.2, 0.2), color: str = "grey") -> tuple[Symmetry, ...]:
+    """Turns of a cuboid about its centre: quarter turns about an axis between equal sides."""
+    del color
+    x, y, z = size_m
+    centre_m = (0.0, 0.0, 0.5 * z)
+    axes = (((1.0, 0.0, 0.0), y == z), ((0.0, 1.0, 0.0), x == z), ((0.0, 0.0, 1.0), x == y))
+    return tuple(Symmetry(axis, 4 if equal else 2, centre_m) for axis, equal in axes)
+
+
 def pedestal(size_m: Vec3 = (0.3, 0.3, 0.7)) -> Solid:
     """A plinth for a robot: steel column between two plates. Slots: body, plates."""
     x, y, z = check_size("pedestal", size_m, 0.05)
@@ -182,6 +191,11 @@ def pedestal(size_m: Vec3 = (0.3, 0.3, 0.7)) -> Solid:
     patches = [shapes.block(*body, 0.006), *(shapes.block(*p, 0.002, 1) for p in plates), *bolts]
     materials = (painted_material("#d7d9d8", 0.4), metal_material((0.45, 0.46, 0.48), 0.42))
     return make_solid_in_place(patches, materials, [hulls.box(*b) for b in (body, *plates)])
+
+
+def pedestal_symmetries(size_m: Vec3 = (0.3, 0.3, 0.7)) -> tuple[Symmetry, ...]:
+    """Half turns about its axis, quarter turns if it is square."""
+    return axis_symmetries(z=4 if size_m[0] == size_m[1] else 2)
 
 
 def gantry(size_m: Vec3 = (1.6, 1.0, 1.8)) -> Solid:

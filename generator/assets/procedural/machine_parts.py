@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.data_tables import load_table
-from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.family import Solid, axis_symmetries
 from gen_data.generator.assets.procedural.material_presets import (
     METALS,
     PALETTES,
@@ -33,7 +34,7 @@ from gen_data.generator.assets.procedural.surface_shapes import (
     sweep,
 )
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
-from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.asset_types import Material, Symmetry
 
 _SIZES = load_table(__package__, "metric_parts", tuple[tuple[float, ...], ...])
 
@@ -131,6 +132,13 @@ def pipe_elbow(seed: int) -> Solid:
     return make_centred_solid([wall, bore, first, second], (finish,), parts)
 
 
+def pipe_elbow_symmetries(seed: int) -> tuple[Symmetry, ...]:
+    """Half a turn about the bisector of its two legs exchanges them."""
+    del seed
+    half = math.sqrt(0.5)
+    return (Symmetry((-half, half, 0.0), 2),)
+
+
 def bracket(seed: int) -> Solid:
     """An angle bracket with screw holes. Slot: body."""
     rng = variant_rng("bracket", seed)
@@ -149,16 +157,15 @@ def bracket(seed: int) -> Solid:
 def gear(seed: int) -> Solid:
     """A spur gear with hub and bore. Slot: body."""
     rng = variant_rng("gear", seed)
-    teeth, module = rng.choose((14, 16, 18, 20, 24)), rng.choose((0.0015, 0.002, 0.0025))
-    thick, pitch = rng.between(0.006, 0.014), 0.5 * teeth * module
+    shape = _draw_gear(rng)
+    teeth, module, thick, hub = shape.teeth, shape.module_m, shape.thick_m, shape.hub_m
+    pitch, bore = 0.5 * teeth * module, shape.bore_m
     tip, root = pitch + module, pitch - 1.2 * module
-    bore = rng.between(0.25, 0.35) * pitch
     flank = ((-0.34, root), (-0.25, pitch), (-0.13, tip))
     tooth = (*flank, *((-share, r) for share, r in flank[::-1]))
     turns = [(2 * math.pi * (i + share) / teeth, r) for i in range(teeth) for share, r in tooth]
     outline = [(r * math.cos(turn), r * math.sin(turn)) for turn, r in turns]
     disc = extrude(np.array(outline), thick, 0.0004, [circle(bore, 28)])
-    hub = thick + rng.between(0.004, 0.01) if rng.chance(0.6) else 0.0
     patches, parts = [disc], [hulls.frustum((tip, 0.0), (tip, thick), 24)]
     if hub:
         outer = 0.5 * (bore + root)
@@ -167,11 +174,36 @@ def gear(seed: int) -> Solid:
     return make_centred_solid(patches, (_machined(rng, 0.3),), parts, crease_deg=30.0)
 
 
+def gear_symmetries(seed: int) -> tuple[Symmetry, ...]:
+    """A turn from tooth to tooth; without a hub, also half a turn that exchanges its faces."""
+    shape = _draw_gear(variant_rng("gear", seed))
+    return axis_symmetries(z=shape.teeth, **({} if shape.hub_m else {"x": 2}))
+
+
+@dataclass(frozen=True, slots=True)
+class _Gear:
+    """Measures of a gear [m]; a hub of 0 is none, else its height with the disc."""
+
+    teeth: int
+    module_m: float
+    thick_m: float
+    bore_m: float
+    hub_m: float
+
+
+def _draw_gear(rng: VariantRng) -> _Gear:
+    teeth, module = rng.choose((14, 16, 18, 20, 24)), rng.choose((0.0015, 0.002, 0.0025))
+    thick, pitch = rng.between(0.006, 0.014), 0.5 * teeth * module
+    bore = rng.between(0.25, 0.35) * pitch
+    hub = thick + rng.between(0.004, 0.01) if rng.chance(0.6) else 0.0
+    return _Gear(teeth, module, thick, bore, hub)
+
+
 def flange(seed: int) -> Solid:
     """A pipe flange with bolt holes and a neck. Slot: body."""
     rng = variant_rng("flange", seed)
-    radius, thick = rng.between(0.03, 0.045), rng.between(0.005, 0.009)
-    bore, count = 0.42 * radius, rng.choose((4, 4, 6, 8))
+    radius, thick, count = _draw_flange(rng)
+    bore = 0.42 * radius
     bolt, at = 0.1 * radius, 0.76 * radius
     holes = [circle(bore, 32)]
     for i in range(count):
@@ -188,11 +220,23 @@ def flange(seed: int) -> Solid:
     return make_centred_solid([disc, collar], (_worn_metal("machined", rng),), parts)
 
 
+def flange_symmetries(seed: int) -> tuple[Symmetry, ...]:
+    """A turn from bolt hole to bolt hole."""
+    _, _, count = _draw_flange(variant_rng("flange", seed))
+    return axis_symmetries(z=count)
+
+
+def _draw_flange(rng: VariantRng) -> tuple[float, float, int]:
+    """Radius and thickness [m] of the disc, and the number of its bolt holes."""
+    radius, thick = rng.between(0.03, 0.045), rng.between(0.005, 0.009)
+    return radius, thick, rng.choose((4, 4, 6, 8))
+
+
 def connector(seed: int) -> Solid:
     """A block with round ports on three to six sides. Slots: body, ports."""
     rng = variant_rng("connector", seed)
-    side = rng.between(0.022, 0.034)
-    port, reach = 0.32 * side, rng.between(0.2, 0.45) * side
+    side, reach, ports = _draw_connector(rng)
+    port = 0.32 * side
     body = rounded_box((side, side, side), 0.06 * side, 2)
     stub = _collar(0.7 * port, port, reach, 22).moved(z=0.5 * side)
     level = 0.5 * side + 0.3 * reach
@@ -201,13 +245,29 @@ def connector(seed: int) -> Solid:
     band = hulls.frustum((port, 0.5 * side), (port, 0.5 * side + reach), 16)
     quarter, half = 0.5 * math.pi, 0.5 * side
     turns = [("y", 0.0), ("y", quarter), ("y", -quarter), ("x", quarter), ("x", -quarter),
-             ("y", math.pi)][: rng.choose((3, 4, 5, 6))]  # fmt: skip
+             ("y", math.pi)][:ports]  # fmt: skip
     cube = hulls.box((-half, -half, -half), (half, half, half))
     parts = [cube, *(rotate(band, axis, turn) for axis, turn in turns)]
     block = _machined(rng, 0.5)
     finish = rng.choose((*(metal_material(*metal) for metal in METALS["ports"]), block))
     stubs = (pieces.rotated(axis, turn) for axis, turn in turns)
     return make_centred_solid([body, *stubs], (block, finish), parts)
+
+
+def connector_symmetries(seed: int) -> tuple[Symmetry, ...]:
+    """Turns of a cube that keep the sides with ports, which are +Z, +X, -X, -Y, +Y, -Z in turn."""
+    _, _, ports = _draw_connector(variant_rng("connector", seed))
+    if ports == 4:
+        half = math.sqrt(0.5)
+        return (Symmetry((0.0, -half, half), 2),)
+    return axis_symmetries(**{3: {"z": 2}, 5: {"z": 4}, 6: {"z": 4, "x": 4}}[ports])
+
+
+def _draw_connector(rng: VariantRng) -> tuple[float, float, int]:
+    """Side of the block and reach of the ports [m], and their number."""
+    side = rng.between(0.022, 0.034)
+    reach = rng.between(0.2, 0.45) * side
+    return side, reach, rng.choose((3, 4, 5, 6))
 
 
 def _worn_metal(kind: str, rng: VariantRng) -> Material:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural import material_presets as presets
 from gen_data.generator.assets.procedural import surface_shapes as shapes
-from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.family import Solid, axis_symmetries
 from gen_data.generator.assets.procedural.patches import (
     Array,
     Patch,
@@ -17,8 +18,8 @@ from gen_data.generator.assets.procedural.patches import (
     make_centred_solid,
     rotate,
 )
-from gen_data.generator.assets.procedural.variant_rng import variant_rng
-from gen_data.generator.core.asset_types import Material
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
+from gen_data.generator.core.asset_types import Material, Symmetry
 
 _LAID = 0.5 * math.pi
 
@@ -26,15 +27,15 @@ _LAID = 0.5 * math.pi
 def screwdriver(seed: int) -> Solid:
     """A screwdriver with a fluted handle, slotted or pointed tip. Slots: handle, steel, ring."""
     rng = variant_rng("screwdriver", seed)
-    radius, grip = rng.between(0.011, 0.016), rng.between(0.085, 0.115)
-    blade, shaft = rng.between(0.06, 0.15), rng.between(0.0025, 0.0038)
-    handle = _fluted_handle(radius, grip, rng.choose((0, 6, 6, 8)))
+    shape = _draw_screwdriver(rng)
+    radius, grip, blade, shaft = shape.radius_m, shape.grip_m, shape.blade_m, shape.shaft_m
+    handle = _fluted_handle(radius, grip, shape.flutes)
     end = grip + blade
     pieces = [
         handle,
         shapes.cone((shaft, grip - 0.01), (shaft, end - 0.012), 16, 1),
         shapes.cone((0.45 * radius, grip - 0.001), (0.42 * radius, grip + 0.004), 20, 2),
-        _flat_tip(shaft, end) if rng.chance(0.5) else _pointed_tip(shaft, end),
+        _flat_tip(shaft, end) if shape.flat else _pointed_tip(shaft, end),
     ]
     profile = [(0.55 * radius, 0.0), (0.97 * radius, 0.1 * grip), (0.97 * radius, 0.6 * grip),
                (0.7 * radius, 0.82 * grip), (0.6 * radius, grip)]  # fmt: skip
@@ -46,6 +47,32 @@ def screwdriver(seed: int) -> Solid:
     materials = (plastic, steel, presets.plastic_material(rng, ("#202124",)))
     laid = [piece.rotated("y", _LAID) for piece in pieces]
     return make_centred_solid(laid, materials, [rotate(part, "y", _LAID) for part in parts])
+
+
+def screwdriver_symmetries(seed: int) -> tuple[Symmetry, ...]:
+    """Half a turn of a flat blade, else the turns of the flutes; any turn without flutes."""
+    shape = _draw_screwdriver(variant_rng("screwdriver", seed))
+    return axis_symmetries(x=2 if shape.flat else shape.flutes)
+
+
+@dataclass(frozen=True, slots=True)
+class _Screwdriver:
+    """Measures of a screwdriver [m], number of its flutes, and whether its tip is flat."""
+
+    radius_m: float
+    grip_m: float
+    blade_m: float
+    shaft_m: float
+    flutes: int
+    flat: bool
+
+
+def _draw_screwdriver(rng: VariantRng) -> _Screwdriver:
+    radius, grip = rng.between(0.011, 0.016), rng.between(0.085, 0.115)
+    blade, shaft = rng.between(0.06, 0.15), rng.between(0.0025, 0.0038)
+    return _Screwdriver(
+        radius, grip, blade, shaft, flutes=rng.choose((0, 6, 6, 8)), flat=rng.chance(0.5)
+    )
 
 
 def hammer(seed: int) -> Solid:

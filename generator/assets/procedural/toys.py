@@ -9,7 +9,7 @@ from gen_data.generator.assets.procedural.patches import make_centred_solid, mak
 from gen_data.generator.assets.procedural.surface_shapes import ball as sphere
 from gen_data.generator.assets.procedural.surface_shapes import fillet, lathe, rounded_box, spline
 from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
-from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.asset_types import Material, Symmetry
 
 _SHAPES = ((0.04, 0.04, 0.04), (0.03, 0.06, 0.03), (0.03, 0.09, 0.03), (0.05, 0.05, 0.025),
            (0.06, 0.06, 0.03), (0.025, 0.075, 0.015))  # fmt: skip
@@ -54,6 +54,12 @@ def plain_sphere(diameter_m: float = 0.2) -> Solid:
     body = sphere(lambda d: radius * d, 48, 96).moved(0.0, 0.0, radius)
     surface = Material((0.5, 0.5, 0.5), 0.5)
     return make_solid_in_place([body], (surface,), [hulls.extreme(body.corners_m)])
+
+
+def plain_sphere_symmetries(diameter_m: float = 0.2) -> tuple[Symmetry, ...]:
+    """Any turn about two axes through its centre, and so about every axis."""
+    centre_m = (0.0, 0.0, 0.5 * diameter_m)
+    return tuple(Symmetry(axis, 0, centre_m) for axis in ((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
 
 
 def ball_kind(seed: int) -> str:

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
-from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural.family import Facts, Solid, axis_symmetries
 from gen_data.generator.assets.procedural.material_presets import (
     metal_material,
     painted_material,
@@ -23,7 +23,7 @@ from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block, cone, lathe, rounded_box
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import facing_rectangle, make_solid, post, tube
-from gen_data.generator.core.asset_types import Keypoint, Material
+from gen_data.generator.core.asset_types import Keypoint, Material, Symmetry
 from gen_data.generator.core.se3 import Vec3
 
 GALVANISED = metal_material((0.42, 0.43, 0.44), 0.55)
@@ -141,6 +141,11 @@ def bollard(seed: int) -> Solid:
 def bollard_facts(seed: int) -> Facts:
     """Its kind."""
     return Facts(_bollard_kind(seed))
+
+
+def bollard_symmetries(seed: int) -> tuple[Symmetry, ...]:
+    """Any turn about its axis; none for patterned stone."""
+    return () if _bollard_kind(seed) == "stone" else axis_symmetries(z=0)
 
 
 def traffic_cone(seed: int) -> Solid:

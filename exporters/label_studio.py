@@ -1,0 +1,266 @@
+"""Label Studio: tasks with annotations, and the configuration of their labelling interface.
+
+::
+
+    label_config.xml             interface: classes with colours, names of keypoints
+    <split>/tasks.json           a task per image; the file to import
+    <split>/images/000000012_color.png
+
+Every visible object is a brush mask, one polygon per part, or a box; its keypoints belong to its
+first region (``parentID``). Ids of regions begin with the instance id. Coordinates are percent of
+the image's width and height; polygons run along the edges of pixels, and one line leads to each
+hole and back. A brush mask is the run lengths of its image, all four channels of a pixel alike.
+
+Images are referred to as ``url_prefix`` with their path in the data set; the default is Label
+Studio's address of local files. Ignored objects are left out.
+
+Reference: https://labelstud.io/guide/tasks and https://labelstud.io/tags; for run lengths, the
+format of the package rle-pack of thi.ng/umbrella.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+from urllib.parse import quote
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.coco import image_name
+from gen_data.exporters.fragments import fragment_rows, write_fragment
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.label_colors import voc_palette
+from gen_data.exporters.mask_polygons import mask_polygons
+from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
+from gen_data.exporters.sequences import write_text
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.sample import MaskPx, ObjectTruth, Sample
+
+LOCAL_FILES = "/data/local-files/?d="
+"""Label Studio's address of a file in its folder of local files."""
+
+KEYPOINT_SIZE_PERCENT = 0.5
+
+CHANNELS = 4
+"""Values per pixel of a brush mask: red, green, blue and opacity."""
+
+_RUN_MAX = 1 << 16
+_RUN_BITS = 27
+"""Bits of a run: 1 for a run, 11 for the last of four sizes, 16 of the length, 8 of the value."""
+
+CONTROLS = {"mask": "BrushLabels", "polygon": "PolygonLabels", "box": "RectangleLabels"}
+"""Tags of the interface by shape."""
+
+Shape = Literal["mask", "polygon", "box"]
+
+
+class LabelStudio(ExporterBase):
+    """Label Studio: objects of all cameras with the rgb channel, as regions to be edited."""
+
+    type: Literal["label_studio"] = "label_studio"
+    shapes: Shape = "polygon"
+    """Shape of every object."""
+    kind: Literal["annotations", "predictions"] = "annotations"
+    """Whether regions are finished annotations, or predictions that an annotator starts from."""
+    url_prefix: str = LOCAL_FILES
+    """What comes before the path of an image."""
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Names of the annotators that it reads."""
+        return frozenset({"instance_masks"})
+
+    def check(self, info: DatasetInfo) -> None:
+        """Reject a data set without photographs.
+
+        Raises:
+            ConfigError: no sensor writes the rgb channel.
+        """
+        check_channels(info, (), self.type)
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write a JSON line per image with its regions.
+
+        Raises:
+            ConfigError: see ``check``.
+        """
+        self.check(info)
+        rows: dict[str, list[dict[str, Any]]] = {}
+        for sample in samples:
+            for sensor in rgb_cameras(info):
+                if sensor in sample.truth:
+                    row = self._image_row(info, sample, sensor)
+                    rows.setdefault(f"{sample.split}.images", []).append(row)
+        (shard_dir / self.type).mkdir(parents=True, exist_ok=True)
+        for stem, lines in rows.items():
+            write_fragment(shard_dir / self.type, stem, lines)
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Write the tasks of each split, link their images, and describe the interface."""
+        folders = [shard_dir / self.type for shard_dir in shard_dirs]
+        splits = sorted({p.name.split(".")[0] for f in folders for p in f.glob("*.images.jsonl")})
+        keypoints: set[str] = set()
+        for split in splits:
+            path = dataset_dir / split / "tasks.json"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with path.open("w", encoding="utf-8", newline="\n") as file:
+                separator = "[\n"
+                for shard_dir, row in fragment_rows(shard_dirs, self.type, f"{split}.images"):
+                    file.write(separator + row["task"])
+                    separator = ",\n"
+                    keypoints.update(row["keypoints"])
+                    source = media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
+                    link_or_copy(source, path.parent / "images" / row["file_name"])
+                file.write("\n]\n")
+        config = label_config(info.categories, self.shapes, sorted(keypoints))
+        write_text(dataset_dir / "label_config.xml", config)
+
+    def _image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
+        camera = sample.truth[sensor].camera.intrinsics
+        regions = [
+            region
+            for thing in sample.truth[sensor].objects
+            if thing.box is not None and not thing.ignored
+            for region in object_regions(thing, info, camera, self.shapes)
+        ]
+        name = image_name(sample.index, sensor)
+        path = f"{self.type}/{sample.split}/images/{name}"
+        data = {
+            "image": self.url_prefix + quote(path),
+            "sample": sample.index,
+            "sensor": sensor,
+            "split": sample.split,
+        }
+        facts: dict[str, Any] = {"result": regions}
+        if self.kind == "annotations":
+            facts["ground_truth"] = True
+        else:
+            facts.update(model_version="gen-data", score=1.0)
+        return {
+            "file_name": name,
+            "sensor": sensor,
+            "sample": sample.index,
+            "keypoints": sorted(_keypoint_names(regions)),
+            # As text, which merging copies: regions have thousands of numbers.
+            "task": json.dumps({"data": data, self.kind: [facts]}, separators=(",", ":")),
+        }
+
+
+def object_regions(
+    thing: ObjectTruth, info: DatasetInfo, camera: Intrinsics, shapes: Shape
+) -> Iterator[dict[str, Any]]:
+    """Regions of a visible object: its shapes, then its keypoints."""
+    instance = thing.instance
+    first = f"{instance.instance_id}"
+    label = info.categories[instance.category_id - 1]
+    for k, value in enumerate(_shape_values(thing, camera, shapes)):
+        name = first if k == 0 else f"{first}.{k}"
+        yield _region(name, first, CONTROLS[shapes], label, value, camera)
+    for point in thing.keypoints or ():
+        if point.visibility:
+            x_px, y_px = point.image_px
+            place = {
+                "x": _percent(x_px, camera.width_px),
+                "y": _percent(y_px, camera.height_px),
+                "width": KEYPOINT_SIZE_PERCENT,
+            }
+            name = f"{first}.{point.name}"
+            yield _region(name, first, "KeyPointLabels", point.name, place, camera)
+
+
+def _shape_values(
+    thing: ObjectTruth, camera: Intrinsics, shapes: Shape
+) -> Iterator[dict[str, Any]]:
+    """Coordinates of the shapes of an object."""
+    width, height, box = camera.width_px, camera.height_px, thing.box
+    assert box is not None, "invisible objects are not listed"
+    assert thing.mask is not None, "the annotation instance_masks is in `needs`"
+    if shapes == "box":
+        yield {
+            "x": _percent(box.x_min, width),
+            "y": _percent(box.y_min, height),
+            "width": _percent(box.width_px, width),
+            "height": _percent(box.height_px, height),
+            "rotation": 0,
+        }
+    elif shapes == "mask":
+        yield {"format": "rle", "rle": brush_rle(thing.mask, height, width)}
+    else:
+        for polygon in mask_polygons(thing.mask):
+            points = [[_percent(x, width), _percent(y, height)] for x, y in polygon.tolist()]
+            yield {"points": points, "closed": True}
+
+
+def _region(
+    name: str, first: str, control: str, label: str, value: Mapping[str, Any], camera: Intrinsics
+) -> dict[str, Any]:
+    kind = control.lower()
+    return {
+        "id": name,
+        "type": kind,
+        "from_name": kind,
+        "to_name": "image",
+        "original_width": camera.width_px,
+        "original_height": camera.height_px,
+        "image_rotation": 0,
+        "value": {**value, kind: [label]},
+        **({} if name == first else {"parentID": first}),
+    }
+
+
+def _percent(length_px: float, size_px: int) -> float:
+    return round(100.0 * length_px / size_px, 9)
+
+
+def brush_rle(mask: MaskPx, height_px: int, width_px: int) -> list[int]:
+    """Encode a mask in an image as bytes of rle-pack: 255 inside, row by row."""
+    height, width = mask.pixels.shape
+    lines: NDArray[np.int8] = np.zeros((height, width_px), np.int8)
+    lines[:, mask.x_px : mask.x_px + width] = mask.pixels
+    changes = np.flatnonzero(np.diff(lines.ravel(), prepend=0, append=0)) + mask.y_px * width_px
+    ends = np.append(changes, height_px * width_px) * CHANNELS
+    lengths = np.diff(ends, prepend=0)
+    values = 255 * (np.arange(len(lengths)) % 2)
+    lengths, values = lengths[lengths > 0], values[lengths > 0]
+    copies = -(-lengths // _RUN_MAX)
+    runs = np.repeat(values, copies)
+    parts = np.full(len(runs), _RUN_MAX)
+    parts[np.cumsum(copies) - 1] = lengths - (copies - 1) * _RUN_MAX
+    words = 0b111 << 24 | (parts - 1) << 8 | runs
+    bits = words[:, None] >> np.arange(_RUN_BITS - 1, -1, -1) & 1
+    return np.packbits(np.append(_rle_header(height_px * width_px), bits).astype(np.uint8)).tolist()
+
+
+def _rle_header(pixels: int) -> NDArray[np.int64]:
+    """Bits of the number of values, of their size, and of the four sizes of run lengths."""
+    fields = [(pixels * CHANNELS, 32), (8 - 1, 5), *((size - 1, 4) for size in (3, 4, 8, 16))]
+    text = "".join(f"{value:0{bits}b}" for value, bits in fields)
+    return np.array([int(bit) for bit in text], np.int64)
+
+
+def _keypoint_names(regions: Iterable[Mapping[str, Any]]) -> set[str]:
+    return {name for region in regions for name in region["value"].get("keypointlabels", ())}
+
+
+def label_config(categories: Sequence[str], shapes: Shape, keypoints: Sequence[str]) -> str:
+    """XML of the labelling interface."""
+    controls = [(CONTROLS[shapes], categories)]
+    if keypoints:
+        controls.append(("KeyPointLabels", keypoints))
+    lines = ["<View>", '  <Image name="image" value="$image" zoom="true"/>']
+    for control, names in controls:
+        lines.append(f'  <{control} name="{control.lower()}" toName="image">')
+        colors = voc_palette()[1 + np.arange(len(names)) % 255].tolist()
+        lines += [
+            f'    <Label value={quoteattr(name)} background="#{bytes(color).hex()}"/>'
+            for name, color in zip(names, colors, strict=True)
+        ]
+        lines.append(f"  </{control}>")
+    return "\n".join([*lines, "</View>", ""])
