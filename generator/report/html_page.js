@@ -10,6 +10,7 @@ const short = (value) =>
   value === 0 ? "0" : Math.abs(value) >= 1e5 || Math.abs(value) < 1e-3 ? value.toExponential(1)
     : String(Number(value.toPrecision(3)));
 const percent = (share) => `${number(100 * share, share < 0.1 ? 2 : 1)} %`;
+const size = (bytes) => (bytes < 1e9 ? `${short(bytes / 1e6)} MB` : `${number(bytes / 1e9, 1)} GB`);
 const sum = (values) => values.reduce((total, value) => total + value, 0);
 
 /** An HTML element with attributes, event listeners (functions) and children. */
@@ -178,7 +179,7 @@ function overview(set, k) {
     about ? tile(number(about.scenes), "scenes") : null,
     tile(number(set.counts.images), "images"),
     tile(number(set.counts.objects), "labelled objects"),
-    about ? tile(`${number(about.bytes / 1e6, 1)} MB`, "on disk") : null,
+    about ? tile(size(about.bytes), "on disk") : null,
     set.checks ? tile(number(findings), "contradictions of labels", findings ? "bad" : "good") : null,
     set.duplicates ? tile(number(set.duplicates.groups), "groups of near-duplicates",
       set.duplicates.groups ? "bad" : "good") : null,

@@ -407,7 +407,9 @@ def _plain_parameter(
 
 
 def _name(value: Any) -> str:
-    return {True: "true", False: "false"}[value] if isinstance(value, bool) else str(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _timings(folder: Path) -> Json:
