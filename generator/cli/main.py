@@ -50,7 +50,7 @@ class LazyCommands(click.Group):
         "preview": "Show samples in Rerun: live, in a browser, or as a .rrd file.",
         "contact-sheet": "Draw samples with their labels on one PNG.",
         "assets": "Install, list, show, verify and remove packs of assets.",
-        "report": "Statistics of a data set, compared with KITTI's.",
+        "report": "Statistics of a data set, and an HTML page with its samples.",
         "verify": "Check a data set against its manifest.",
         "describe": "Explain a plug-in, distribution, template or configuration.",
         "formats": "List the output formats.",

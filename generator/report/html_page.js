@@ -10,6 +10,7 @@ const short = (value) =>
   value === 0 ? "0" : Math.abs(value) >= 1e5 || Math.abs(value) < 1e-3 ? value.toExponential(1)
     : String(Number(value.toPrecision(3)));
 const percent = (share) => `${number(100 * share, share < 0.1 ? 2 : 1)} %`;
+const many = (count, noun) => `${number(count)} ${noun}${count === 1 ? "" : "s"}`;
 const size = (bytes) => (bytes < 1e9 ? `${short(bytes / 1e6)} MB` : `${number(bytes / 1e9, 1)} GB`);
 const sum = (values) => values.reduce((total, value) => total + value, 0);
 
@@ -190,7 +191,7 @@ function overview(set, k) {
   const splits = Object.entries(set.splits).map(([name, n]) => `${name} ${number(n)}`).join(", ");
   const facts = about ? [
     `${about.configuration}${about.template && about.template !== about.configuration ? `, template ${about.template}` : ""}, seed ${about.seed}`,
-    `${about.views_per_scene} views and ${about.steps_per_scene} steps per scene`,
+    `${many(about.views_per_scene, "view")} and ${many(about.steps_per_scene, "step")} per scene`,
     `images: ${splits}`, about.sensors.join("; "), `gen-data ${about.version}`,
     `id ${about.dataset_id.slice(0, 16)}`,
   ] : [`images: ${splits}`];
@@ -420,6 +421,8 @@ function licences() {
 const LAYERS = [["boxes", "2D boxes"], ["masks", "Masks"], ["keypoints", "Keypoints"],
   ["boxes3d", "3D boxes"], ["points", "LiDAR"], ["depth", "Depth"], ["names", "Names"]];
 
+const NAMED_PX = 26;
+
 /** A colour of a category that is far from those of the next ones. */
 function categoryColor(names, name, alpha = 1) {
   const hue = (names.indexOf(name) * 137.508 + 205) % 360;
@@ -556,6 +559,8 @@ function browser() {
       context.strokeRect(x0, y0, x1 - x0, y1 - y0);
     }
     if (state.layers.has("keypoints") && item.keypoints) {
+      const small = item.box ? Math.min(1, 0.3 + (item.box[3] - item.box[1]) / thin / 150) : 1;
+      context.lineWidth = small * 1.6 * thin;
       for (const [a, b] of item.bones) {
         const [one, other] = [item.keypoints[a], item.keypoints[b]];
         if (one[2] && other[2]) line([one[0], one[1], other[0], other[1]]);
@@ -563,12 +568,14 @@ function browser() {
       for (const [u, v, seen] of item.keypoints) {
         if (!seen) continue;
         context.beginPath();
-        context.arc(u, v, 2.6 * thin, 0, 7);
+        context.arc(u, v, small * 2.6 * thin, 0, 7);
         if (seen === 2) context.fill();
         else context.stroke();
       }
     }
-    if (item.box && (state.layers.has("names") || picked)) {
+    // Names of small objects would hide others; the list has them.
+    const side = item.box ? Math.max(item.box[2] - item.box[0], item.box[3] - item.box[1]) / thin : 0;
+    if (item.box && ((state.layers.has("names") && side >= NAMED_PX) || picked)) {
       const size = 11.5 * thin;
       context.font = `600 ${size}px system-ui, sans-serif`;
       const wide = context.measureText(item.category).width + 6 * thin;
@@ -675,7 +682,7 @@ function browser() {
     (value) => choose(known[Number(value)])) : null;
   const whole = el("div", {},
     el("div", { class: "bar" }, which, ...toggles),
-    el("div", { class: "bar" }, categories, limit("Size at least, px", "size", 0, 0),
+    el("div", { class: "bar filters" }, categories, limit("Size at least, px", "size", 0, 0),
       limit("Occlusion at most, %", "occlusion", 100, 100), limit("Distance at most, m", "distance", 0, Infinity)),
     el("div", { class: "bar" },
       el("button", { "aria-label": "Previous image", click: () => go(state.position - 1) }, "←"),
