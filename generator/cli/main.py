@@ -66,7 +66,7 @@ class LazyCommands(click.Group):
         "preview": "Show samples in Rerun: live, in a browser, or as a .rrd file.",
         "contact-sheet": "Draw samples with their labels on one PNG.",
         "assets": "Install, list, show, verify and remove packs of assets.",
-        "report": "Statistics of a data set, compared with KITTI's.",
+        "report": "Statistics of a data set, and an HTML page with its samples.",
         "verify": "Check a data set: sizes, checksums, labels, reproducibility.",
         "repair": "Restore damaged files of a data set, byte for byte.",
         "diff": "Name the first difference of two data sets.",

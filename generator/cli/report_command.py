@@ -1,56 +1,112 @@
-"""``gen-data report``: statistics of a data set."""
+"""``gen-data report``: statistics of a data set, as tables and as an HTML page."""
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.errors import ConfigError, StorageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+PAGE = Path("run/report/index.html")
+"""Default path of the page in the folder of a data set."""
 
 
 @click.command()
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option(
-    "--html", type=click.Path(path_type=Path), help="Also write a page with histograms here."
+    "--compare",
+    type=click.Path(path_type=Path),
+    metavar="FOLDER2",
+    help="Show a second data set beside it in the page.",
 )
-def report(folder: Path, html: Path | None) -> None:
-    """Print statistics of a data set, compared with published ones of KITTI.
+@click.option(
+    "--html",
+    type=click.Path(path_type=Path),
+    help=f"The page to write [default: FOLDER/{PAGE}]; a .json file with its figures is beside it.",
+)
+@click.option(
+    "--scenes",
+    type=int,
+    default=100,
+    show_default=True,
+    help="Scenes whose parameters are drawn again for the page; 0 = none.",
+)
+def report(folder: Path, compare: Path | None, html: Path | None, scenes: int) -> None:
+    """Print statistics of a data set, and write an HTML page with its samples.
 
-    FOLDER is a data set with an export as coco or kitti. Statistics by category: objects, box
-    sizes, occlusion, truncation, distances and keypoints; also laser points, if kitti has them.
+    FOLDER is a finished data set, or any folder with labels in the layout of the formats coco or
+    kitti. The page shows labelled samples, drawn parameters beside their distributions, checks of
+    labels, near-duplicates, costs and licences. It is one file that requests nothing.
     """
-    from rich import box
     from rich.console import Console
-    from rich.table import Table as RichTable
+    from threadpoolctl import threadpool_limits
 
-    from gen_data.generator.report.html_page import format_page
-    from gen_data.generator.report.label_files import read_records, read_scans
-    from gen_data.generator.report.label_statistics import collect_statistics
-    from gen_data.generator.report.report_tables import (
-        make_histograms,
-        make_scan_tables,
-        make_tables,
+    if scenes < 0:
+        raise ConfigError(f"--scenes: {scenes} is negative; expected 0 or more")
+    folders = [folder] if compare is None else [folder, compare]
+    page = folder / PAGE if html is None and (folder / "plan.json").is_file() else html
+    # Poses of scenes that are drawn again must have the last bits of the stored ones.
+    with threadpool_limits(limits=1):
+        sets = [_describe(one, scenes, len(folders), Console(stderr=True)) for one in folders]
+    console = Console()
+    for number, described in enumerate(sets):
+        if len(sets) > 1:
+            console.rule(str(folders[number]))
+        _print_tables(console, described["tables"])
+    if page is not None:
+        _write(page, sets)
+        click.echo(f"wrote {page}")
+
+
+def _describe(folder: Path, scenes: int, sets: int, console: Console) -> dict[str, Any]:
+    from gen_data.generator.report.report_data import (
+        BROWSER_BYTES_MAX,
+        describe_dataset,
+        describe_folder,
     )
 
-    found = collect_statistics(read_records(folder))
-    made = (*make_tables(found), *make_scan_tables(tuple(read_scans(folder))))
-    console = Console()
-    for table in made:
-        shown = RichTable(title=table.title, caption=table.note or None, box=box.SIMPLE_HEAD)
-        for number, name in enumerate(table.header):
+    if not (folder / "plan.json").is_file():
+        return describe_folder(folder)
+    with console.status("") as status:
+        return describe_dataset(
+            folder,
+            scenes_max=scenes,
+            browser_bytes_max=BROWSER_BYTES_MAX // sets,
+            progress=lambda step: status.update(f"{folder}: {step}"),
+        )
+
+
+def _print_tables(console: Console, tables: Iterable[Mapping[str, Any]]) -> None:
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    for table in tables:
+        shown = Table(title=table["title"], caption=table["note"] or None, box=box.SIMPLE_HEAD)
+        for number, name in enumerate(table["header"]):
             shown.add_column(name, justify="right" if number else "left")
-        for row in table.rows:
-            shown.add_row(*row)
+        for row in table["rows"]:
+            # Names are text: brackets in them are no markup.
+            shown.add_row(*map(Text, row))
         console.print(shown)
-    if html is not None:
-        try:
-            html.parent.mkdir(parents=True, exist_ok=True)
-            html.write_text(
-                format_page(folder.resolve().name, made, make_histograms(found)),
-                encoding="utf-8",
-                newline="\n",
-            )
-        except OSError as error:
-            raise StorageError(f"{html}: {error.strerror}") from error
-        click.echo(f"wrote {html}")
+
+
+def _write(page: Path, sets: list[dict[str, Any]]) -> None:
+    from gen_data.generator.report.html_page import format_page
+    from gen_data.generator.report.report_data import without_pictures
+
+    figures = [without_pictures(described) for described in sets]
+    text = json.dumps({"sets": figures}, ensure_ascii=False, indent=1) + "\n"
+    try:
+        page.parent.mkdir(parents=True, exist_ok=True)
+        for path, content in ((page, format_page(sets)), (page.with_suffix(".json"), text)):
+            path.write_text(content, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise StorageError(f"{page}: {error.strerror}; choose another place with --html") from error

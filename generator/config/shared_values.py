@@ -20,7 +20,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
-from gen_data.generator.config.distributions import FLAG, NAME, NUMBER, WHOLE_NUMBER
+from gen_data.generator.config.distributions import (
+    FLAG,
+    NAME,
+    NUMBER,
+    WHOLE_NUMBER,
+    Distribution,
+)
 from gen_data.generator.config.distributions.base import Kind, Malformed, read_distribution
 from gen_data.generator.config.problems import FieldPath, Position, refuse
 from gen_data.generator.config.yaml_scalars import quote_value, resolve_scalar
@@ -85,6 +91,15 @@ def draw_shared(section: Node, streams: Streams) -> dict[str, SharedValue]:
     return _evaluate(section, streams, {})
 
 
+def read_shared(section: Node, shared: Shared) -> dict[str, Distribution[Any]]:
+    """Distributions by name that drew the shared values of a scene.
+
+    Raises:
+        ConfigError: an entry is neither a value nor a distribution.
+    """
+    return {name: _read_entry(name, node, shared) for name, node in section.entries.items()}
+
+
 def probe_values(section: Node, seed: int) -> Iterator[dict[str, SharedValue]]:
     """Values that cover a configuration, for checks before a run.
 
@@ -118,14 +133,17 @@ def _evaluate(section: Node, streams: Streams, fixed: Shared) -> dict[str, Share
 
 
 def _draw(name: str, node: Node, shared: Shared, streams: Streams) -> SharedValue:
-    field = f"shared.{name}"
+    distribution = _read_entry(name, node, shared)
+    value: SharedValue = distribution.draw(streams.rng(f"shared.{name}"))
+    return value if isinstance(value, (str, int)) else float(value)
+
+
+def _read_entry(name: str, node: Node, shared: Shared) -> Distribution[Any]:
     entry = resolve_shared(node, shared, "shared", name)
     try:
-        distribution = read_distribution(entry.plain(), _infer_kind(entry))
+        return read_distribution(entry.plain(), _infer_kind(entry))
     except Malformed as error:
-        refuse(entry.position, field, error.fact)
-    value: SharedValue = distribution.draw(streams.rng(field))
-    return value if isinstance(value, (str, int)) else float(value)
+        refuse(entry.position, f"shared.{name}", error.fact)
 
 
 def _names_in(node: Node) -> set[str]:

@@ -64,17 +64,22 @@ def collect_statistics(records: Iterable[Picture | Label | Points]) -> Survey:
     """Collect the statistics of a report; nine numbers per object stay in memory."""
     found = Survey()
     for record in records:
-        if isinstance(record, Picture):
-            found.images[(record.split, record.name)] += 0
-        elif isinstance(record, Points):
-            counts = found.points.setdefault(record.category, [0, 0, 0])
-            for state, n in enumerate(record.counts):
-                counts[state] += n
-        else:
-            found.images[record.image] += 1
-            column = found.numbers.setdefault((record.category, record.kind), array("d"))
-            column.extend(_row(record))
+        add_record(found, record)
     return found
+
+
+def add_record(found: Survey, record: Picture | Label | Points) -> None:
+    """Add one record to the statistics."""
+    if isinstance(record, Picture):
+        found.images[(record.split, record.name)] += 0
+    elif isinstance(record, Points):
+        counts = found.points.setdefault(record.category, [0, 0, 0])
+        for state, n in enumerate(record.counts):
+            counts[state] += n
+    else:
+        found.images[record.image] += 1
+        column = found.numbers.setdefault((record.category, record.kind), array("d"))
+        column.extend(_row(record))
 
 
 def _row(label: Label) -> tuple[float, ...]:

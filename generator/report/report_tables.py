@@ -86,7 +86,7 @@ def make_tables(found: Survey) -> tuple[Table, ...]:
 
 
 def make_scan_tables(scans: Sequence[Scan]) -> tuple[Table, ...]:
-    """Tables of laser scans; none without scans."""
+    """Tables of laser scans; none without scans, and none of cars without cars."""
     if not scans:
         return ()
     points = np.array([scan.points for scan in scans], np.float64)
@@ -95,7 +95,8 @@ def make_scan_tables(scans: Sequence[Scan]) -> tuple[Table, ...]:
     header = ("scans", "points/scan", "KITTI", "KITTI odometry", "5 / 50 / 95 %", "reflectance 0")
     note = "KITTI: Geiger et al., IJRR 2013; odometry: Behley et al., ICCV 2019."
     rows = ((*row, _quantiles(points, 0), f"{100.0 * dark:.2f} %"),)
-    return (Table("Laser scans", header, rows, note), _car_points(scans))
+    cars = (_car_points(scans),) if any(scan.cars for scan in scans) else ()
+    return (Table("Laser scans", header, rows, note), *cars)
 
 
 def _car_points(scans: Sequence[Scan]) -> Table:
@@ -122,11 +123,11 @@ def make_histograms(found: Survey) -> tuple[Histogram, ...]:
     }
     shapes = {name: c["width_px"] / c["height_px"] for name, c in columns.items()}
     return (
-        _histogram("Objects per image", np.arange(0.0, most + 2.0), images),
-        _histogram("Height of the box [px]", np.array(heights, float), values["height_px"]),
-        _histogram("Aspect ratio of the box (width / height)", np.array(aspects), shapes),
-        _histogram("Distance [m]", _distance_edges(columns), values["distance_m"]),
-        _histogram("Visible fraction", np.linspace(0.0, 1.0, 11), values["visible_fraction"]),
+        count_values("Objects per image", np.arange(0.0, most + 2.0), images),
+        count_values("Height of the box [px]", np.array(heights, float), values["height_px"]),
+        count_values("Aspect ratio of the box (width / height)", np.array(aspects), shapes),
+        count_values("Distance [m]", _distance_edges(columns), values["distance_m"]),
+        count_values("Visible fraction", np.linspace(0.0, 1.0, 11), values["visible_fraction"]),
     )
 
 
@@ -150,7 +151,8 @@ def _distance_edges(columns: dict[str, dict[str, Column]]) -> Column:
     return np.asarray(np.arange(0.0, far_m + step_m, step_m))
 
 
-def _histogram(title: str, edges: Column, values: dict[str, Column]) -> Histogram:
+def count_values(title: str, edges: Column, values: dict[str, Column]) -> Histogram:
+    """Histogram of columns by name without their missing values (NaN); ends include the rest."""
     counted = {}
     for name, column in values.items():
         known = np.clip(_drop_missing(column), edges[0], edges[-1])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from click.testing import CliRunner
 
 from gen_data.generator.cli.report_command import report
 from gen_data.generator.core.errors import StorageError
-from gen_data.generator.report.html_page import format_page
 from gen_data.generator.report.label_files import (
     SCANS_MAX,
     Label,
@@ -26,7 +24,6 @@ from gen_data.generator.report.label_statistics import Survey, collect_statistic
 from gen_data.generator.report.report_tables import (
     DIFFICULTIES,
     TYPES,
-    Histogram,
     Table,
     counts_at,
     make_histograms,
@@ -220,21 +217,6 @@ def test_histograms_lose_nothing(street: Path) -> None:
         assert histogram.counts["car"].sum() == 4
         assert len(histogram.counts["car"]) == len(histogram.edges) - 1
     assert made[0].counts["images"].tolist()[:3] == [1, 0, 2]
-
-
-def test_the_page_is_well_formed_and_whole(street: Path) -> None:
-    """Names are escaped; every bar says its bin; nothing is fetched from elsewhere."""
-    bars = Histogram("Depth <m>", np.array([0.0, 1.0, 2.5]), {"a & b": np.array([3, 6])})
-    text = format_page("x < y", [Table("T", ("a", "b"), (("<i>", "2"),), "note")], [bars])
-
-    root = ElementTree.fromstring(text.partition("\n")[2].replace('<meta charset="utf-8">', ""))
-
-    rects = root.findall(".//rect")
-    assert [r.findtext("title") for r in rects] == ["0 to 1: 3", "1 to 2.5: 6"]
-    tall = [float(r.attrib["height"]) for r in rects]
-    assert tall[1] == pytest.approx(2 * tall[0])
-    assert [cell.text for cell in root.findall(".//td")] == ["<i>", "2"]
-    assert "http" not in text
 
 
 def test_the_command_prints_tables_and_writes_a_page(street: Path, tmp_path: Path) -> None:

@@ -1,0 +1,116 @@
+"""Small data sets written by hand, whose statistics can be counted on paper."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.core.boxes import BoxPx, OrientedBox
+from gen_data.generator.core.capture import Capture, Channel, SensorReading
+from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo, media_path
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.sample import ImageTruth, KeypointTruth, MaskPx, ObjectTruth, Sample
+from gen_data.generator.core.scene import Camera, Instance, Scene
+from gen_data.generator.core.se3 import IDENTITY, SE3
+from gen_data.generator.core.serialization import to_plain
+from gen_data.generator.runner.labels import labels_line
+from gen_data.generator.runner.plan import Plan, plan_bytes
+
+WIDTH_PX, HEIGHT_PX = 64, 48
+CAMERA = Camera("color", IDENTITY, Intrinsics.from_hfov(WIDTH_PX, HEIGHT_PX, math.radians(60)))
+HOSTILE = "</script><script>alert('x')</script><img src=x onerror=alert(1)>"
+
+
+def make_object(number: int, category: str, x_px: int = 20, side_px: int = 8) -> ObjectTruth:
+    """A cube 3 m ahead that is wholly visible; its +Z axis points to the camera.
+
+    Its 3D box projects to a square around the middle of the 2D box.
+    """
+    instance = Instance(number, f"it/{number}", category, 1, "cube", attributes=(("pose", "<b>"),))
+    box = BoxPx(x_px, 20, x_px + side_px, 20 + side_px)
+    lens = CAMERA.intrinsics
+    x_m = 3.0 * (x_px + 0.5 * side_px - lens.cx_px) / lens.fx_px
+    y_m = 3.0 * (20 + 0.5 * side_px - lens.cy_px) / lens.fy_px
+    side_m = 3.0 * (side_px + 2) / lens.fx_px
+    # Turned by pi about X, so that Z points back to the camera.
+    pose = SE3((x_m, y_m, 3.0), (0.0, 1.0, 0.0, 0.0))
+    return ObjectTruth(
+        instance,
+        visible_px=side_px * side_px,
+        box=box,
+        amodal_box=box,
+        box3d_camera=OrientedBox(pose, (side_m, side_m, side_m)),
+        mask=MaskPx(x_px, 20, np.ones((side_px, side_px), bool)),
+        visible_fraction=1.0,
+        occlusion=0.0,
+        truncation=0.0,
+        keypoints=(KeypointTruth("nose", (0.0, 0.0, 1.0), (30.0, 20.0), 2),),
+        lidar_points={"top": 7, "front": 4},
+    )
+
+
+def make_image(rng: np.random.Generator) -> NDArray[np.uint8]:
+    """An image of large random patches, uint8 [48, 64, 3]."""
+    patches = rng.integers(0, 256, (6, 8, 3), dtype=np.uint8)
+    image: NDArray[np.uint8] = np.repeat(np.repeat(patches, 8, axis=0), 8, axis=1)
+    return image
+
+
+def write_dataset(
+    folder: Path,
+    samples: Sequence[Sequence[ObjectTruth]],
+    categories: tuple[str, ...],
+    images: Sequence[NDArray[np.uint8]],
+    **changes: Any,
+) -> Path:
+    """A finished data set with one camera, in one shard; images are taken in turn.
+
+    Scene ``k`` is sample ``k``; every fourth sample is in the split ``val``.
+    """
+    n = len(samples)
+    sensors = (SensorInfo("color", Modality.CAMERA, channels=(Channel.RGB,)),)
+    info = replace(DatasetInfo("hand", 3, n, 1, categories, sensors), **changes)
+    shard = folder / "shards/000000"
+    media_path(shard, "color", Channel.RGB, 0).parent.mkdir(parents=True)
+    (folder / "plan.json").write_bytes(
+        plan_bytes(Plan({"template": "hand"}, "hand", 3, n, n, {"gen-data": "0"}, {}))
+    )
+    manifest = {
+        "info": to_plain(info),
+        "dataset_id": "ab" * 32,
+        "bytes": 5_000_000,
+        "rejections": 2,
+    }
+    (folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+    (folder / "LICENSES-ASSETS.md").write_text(
+        "# Assets of this data set\n\n| source | licence | author | assets |\n|---|---|---|---|\n"
+        f"| pack | CC0-1.0 | {HOSTILE} | cube, a | b |\n",
+        encoding="utf-8",
+    )
+    pngs = [cv2.imencode(".png", image)[1].tobytes() for image in images]
+    with (shard / "labels.jsonl").open("w", encoding="utf-8") as labels:
+        for index, objects in enumerate(samples):
+            labels.write(labels_line(_sample(index, objects)) + "\n")
+            media_path(shard, "color", Channel.RGB, index).write_bytes(pngs[index % len(pngs)])
+    return folder
+
+
+def _sample(index: int, objects: Sequence[ObjectTruth]) -> Sample:
+    scene = Scene("hand", instances=tuple(o.instance for o in objects), cameras=(CAMERA,))
+    return Sample(
+        index=index,
+        scene_index=index,
+        view_index=0,
+        split="train" if index % 4 else "val",
+        scene=scene,
+        capture=Capture({"color": SensorReading("color", CAMERA, {})}),
+        truth={"color": ImageTruth(CAMERA, tuple(objects))},
+    )
