@@ -32,7 +32,10 @@ SMALLER = {
     "my_own_objects": {"--n 2000": "--n 2", "--n 6 ": "--n 1 "},
     "my_own_template": {"--n 300": "--n 3", "--n 6 ": "--n 1 ", "[640, 480]": "[96, 72]"},
     "my_first_plugin": {"--n 20 ": "--n 1 ", "[320, 240]": "[96, 72]"},
-    "read_labels": {"--n 20 ": "--n 5 --set sensors.color.size_px=[96,72] --set 'splits={train: 1, val: 0, test: 0}' "},
+    "read_labels": {
+        "tabletop.yaml --n 20": "tabletop.yaml --n 5 --set sensors.color.size_px=[96,72] "
+        "--set 'splits={train: 1, val: 0, test: 0}'"
+    },
     "render_while_training": {"--n 200": "--n 2", "[320, 240]": "[96, 72]"},
     "street_rig": {
         "steps_per_scene: 20": "steps_per_scene: 3", "shard_size: 20": "shard_size: 3",
