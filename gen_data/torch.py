@@ -115,15 +115,25 @@ def to_tv_tensors(pair: tuple[torch.Tensor, dict[str, torch.Tensor]]) -> tuple[A
 
     Args:
         pair: Tensors of ``detection_target``, ``segmentation_target`` or ``keypoint_target``.
+
+    Returns:
+        ``Image`` and the target with ``BoundingBoxes``, ``Mask`` and ``KeyPoints`` [n, k, 2]
+        (torchvision 0.23); ``keypoint_visibility`` [n, k] has COCO's visibility of keypoints.
+        Mirroring keeps the names of left and right points.
     """
     from torchvision import tv_tensors
 
     image, target = pair
     height, width = image.shape[-2:]
+    canvas_size = int(height), int(width)
     wrapped: dict[str, Any] = dict(target)
     wrapped["boxes"] = tv_tensors.BoundingBoxes(
-        target["boxes"], format="XYXY", canvas_size=(height, width)
+        target["boxes"], format="XYXY", canvas_size=canvas_size
     )
     if "masks" in target:
         wrapped["masks"] = tv_tensors.Mask(target["masks"])
+    if "keypoints" in target:
+        points = target["keypoints"]
+        wrapped["keypoints"] = tv_tensors.KeyPoints(points[..., :2], canvas_size=canvas_size)
+        wrapped["keypoint_visibility"] = points[..., 2]
     return tv_tensors.Image(image), wrapped

@@ -13,7 +13,11 @@ from typing_extensions import Unpack
 
 from gen_data.exporters.label_map import LabelMap
 from gen_data.generator.annotations.annotate import Thresholds
-from gen_data.generator.assemble.documents import load_config_document, resolve_document
+from gen_data.generator.assemble.documents import (
+    load_config_document,
+    parse_config_document,
+    resolve_document,
+)
 from gen_data.generator.assemble.plugin_tables import (
     ANNOTATIONS,
     ELEMENTS,
@@ -33,7 +37,7 @@ from gen_data.generator.config.shared_values import (
     varying_place,
 )
 from gen_data.generator.config.validation import validate
-from gen_data.generator.config.yaml_tree import Node, parse_yaml
+from gen_data.generator.config.yaml_tree import Node
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import (
     AnyAnnotator,
@@ -290,7 +294,7 @@ def parse_config(text: str, file: str, name: str, **changes: Unpack[Changes]) ->
     Raises:
         ConfigError: the message lists all errors with their positions.
     """
-    return _make_config(parse_yaml(text, file), name, changes)
+    return _make_config(parse_config_document(text, file), name, changes)
 
 
 def _make_config(document: Node, name: str, changes: Changes) -> Config:

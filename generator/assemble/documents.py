@@ -17,7 +17,7 @@ from gen_data.generator.config.paths import find_path
 from gen_data.generator.config.problems import Position, Problems, refuse
 from gen_data.generator.config.renamed_keys import refuse_moved_keys, replace_old_words
 from gen_data.generator.config.yaml_scalars import quote_value
-from gen_data.generator.config.yaml_tree import Node, load_yaml, with_override
+from gen_data.generator.config.yaml_tree import Node, load_yaml, parse_yaml, with_override
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.sensors.lidar.datasheets import load_sheets
 
@@ -87,17 +87,26 @@ def load_config_document(name: str) -> Node:
     Raises:
         ConfigError: a file is missing or invalid, or extends itself.
     """
-    shipped = _shipped_files(configs)
-    return _load_extended(find_path(name, None, "", "configuration", shipped=shipped), shipped)
+    path = find_path(name, None, "", "configuration", shipped=_shipped_files(configs))
+    return _complete(load_yaml(path), (path,))
 
 
-def _load_extended(path: Path, shipped: Sequence[Path], extending: tuple[Path, ...] = ()) -> Node:
-    """Load a file with everything that it extends; each of ``extending`` extends the next."""
-    document = replace_old_words(load_yaml(path))
+def parse_config_document(text: str, file: str) -> Node:
+    """Parse the text of a configuration, and load everything that it extends.
+
+    Raises:
+        ConfigError: the text, or a file that it extends, is invalid; messages call it ``file``.
+    """
+    return _complete(parse_yaml(text, file), ())
+
+
+def _complete(document: Node, chain: tuple[Path, ...]) -> Node:
+    """Merge a document into everything that it extends; each file of ``chain`` extends the next."""
+    document = replace_old_words(document)
     base = document.get("extends")
     if base is None:
         return document
-    chain = (*extending, path)
+    shipped = _shipped_files(configs)
     if not isinstance(base.content, str):
         refuse(base.position, "extends", "expected a configuration")
     found = find_path(base.content, base.position, "extends", "configuration", shipped=shipped)
@@ -107,7 +116,7 @@ def _load_extended(path: Path, shipped: Sequence[Path], extending: tuple[Path, .
     if len(chain) > EXTENDS_MAX:
         fact = f"more than {EXTENDS_MAX} configurations extend one another"
         refuse(base.position, "extends", fact)
-    merged = _merge_into_base(_load_extended(found, shipped, chain), document)
+    merged = _merge_into_base(_complete(load_yaml(found), (*chain, found)), document)
     # Again, because overrides without a type have got one now.
     return replace_old_words(merged)
 

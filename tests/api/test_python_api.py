@@ -138,6 +138,22 @@ def test_a_dictionary_equals_the_file_with_its_content(tmp_path: Path) -> None:
     assert gen_data.Dataset(MINIMAL).config == gen_data.Dataset(file).config
 
 
+def test_a_dictionary_extends_a_file_as_a_file_does(tmp_path: Path) -> None:
+    """Also a shipped one, and leaves out what it inherits."""
+    own = {
+        "extends": "tabletop.yaml",
+        "without": {"exporters": "all"},
+        "sensors": [{"name": "color", "size_px": [64, 48]}],
+    }
+    file = tmp_path / "mine.yaml"
+    file.write_text(yaml.safe_dump(own))
+
+    assert gen_data.Dataset(own).config == gen_data.Dataset(file).config
+    assert gen_data.Dataset(own).config["sensors"][0]["size_px"] == [64, 48]
+    with pytest.raises(gen_data.ConfigError, match=r"<config>:1:\d+: extends: .*tabeltop"):
+        gen_data.Dataset({"extends": "tabeltop.yaml"})
+
+
 def test_typed_plug_ins_can_stand_in_a_dictionary() -> None:
     """An object of a plug-in's class means what its YAML means."""
     sensor = {"type": "rgb_camera", "name": "color", "size_px": [64, 48], "hfov_deg": 70.0}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -123,10 +125,71 @@ def test_laser_boxes_hold_their_points() -> None:
         assert int(near.sum()) >= int(count) > 0
 
 
+def stand_in_for_torchvision() -> tuple[ModuleType, ModuleType]:
+    """``torchvision.tv_tensors`` with its signatures: subclasses of Tensor, checked shapes."""
+    import torch
+
+    class BoundingBoxes(torch.Tensor):
+        def __new__(cls, data: Any, *, format: str, canvas_size: tuple[int, int]) -> Any:  # noqa: A002
+            assert data.ndim == 2 and data.shape[1] == 4
+            made = data.as_subclass(cls)
+            made.format, made.canvas_size = format, canvas_size
+            return made
+
+    class KeyPoints(torch.Tensor):
+        def __new__(cls, data: Any, *, canvas_size: tuple[int, int]) -> Any:
+            assert data.shape[-1] == 2
+            made = data.as_subclass(cls)
+            made.canvas_size = canvas_size
+            return made
+
+    class Image(torch.Tensor):
+        def __new__(cls, data: Any) -> Any:
+            return data.as_subclass(cls)
+
+    class Mask(Image):
+        pass
+
+    package, module = ModuleType("torchvision"), ModuleType("torchvision.tv_tensors")
+    for kind in (BoundingBoxes, KeyPoints, Image, Mask):
+        setattr(module, kind.__name__, kind)
+    package.tv_tensors = module  # type: ignore[attr-defined]
+    return package, module
+
+
+def test_targets_are_wrapped_for_torchvisions_transforms(
+    stored: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Kinds, format and canvas as torchvision defines them; the same numbers; labels stay."""
+    import torch
+
+    import gen_data.torch as gt
+    from gen_data.targets import segmentation_target
+
+    package, module = stand_in_for_torchvision()
+    monkeypatch.setitem(sys.modules, "torchvision", package)
+    monkeypatch.setitem(sys.modules, "torchvision.tv_tensors", module)
+    image, target = gt.to_tensors(segmentation_target(stored[4]))
+    target["keypoints"] = torch.tensor([[[3.5, 7.0, 2.0], [1.0, 0.5, 0.0]]])
+
+    picture, wrapped = gt.to_tv_tensors((image, target))
+
+    assert type(picture) is module.Image and torch.equal(picture, image)
+    assert type(wrapped["boxes"]) is module.BoundingBoxes
+    assert wrapped["boxes"].format == "XYXY"
+    assert wrapped["boxes"].canvas_size == wrapped["keypoints"].canvas_size == (72, 96)
+    assert torch.equal(wrapped["boxes"], target["boxes"]) and len(target["boxes"]) > 0
+    assert type(wrapped["masks"]) is module.Mask
+    assert wrapped["masks"].shape == (len(target["boxes"]), 72, 96)
+    assert wrapped["keypoints"].tolist() == [[[3.5, 7.0], [1.0, 0.5]]]
+    assert wrapped["keypoint_visibility"].tolist() == [[2.0, 0.0]]
+    assert type(wrapped["labels"]) is torch.Tensor
+    assert type(target["boxes"]) is torch.Tensor, "the target that was passed in is unchanged"
+
+
 def test_importing_the_package_does_not_import_torch() -> None:
     """Only ``gen_data.torch`` does."""
     import subprocess
-    import sys
 
     code = "import sys, gen_data, gen_data.targets; gen_data.Loader; print('torch' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
