@@ -260,6 +260,7 @@ def scale_depth(root: Path) -> None:
     edit(root / "train/000000/scene_camera.json", lambda v: v["0"].update(depth_scale=1.01))
 
 
+@pytest.mark.damage("bop")
 @pytest.mark.parametrize(
     "damage",
     [shift_principal_point, widen_box, swap_objects, transpose_rotation, metres, forget_a_target,

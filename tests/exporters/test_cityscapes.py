@@ -140,6 +140,7 @@ def _reverse_polygons(root: Path) -> None:
     path.write_text(json.dumps(truth))
 
 
+@pytest.mark.damage("cityscapes")
 @pytest.mark.parametrize(
     ("damage", "named"),
     [

@@ -142,6 +142,7 @@ def _remove_image(folder: Path) -> None:
     next((folder / "annotations/panoptic_train").iterdir()).unlink()
 
 
+@pytest.mark.damage("coco_panoptic")
 @pytest.mark.parametrize(
     ("damage", "named"),
     [

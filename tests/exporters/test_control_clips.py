@@ -106,6 +106,7 @@ def other_range(root: Path) -> None:
     path.write_text(json.dumps(clip))
 
 
+@pytest.mark.damage("control_clips")
 @pytest.mark.parametrize(
     "damage",
     [

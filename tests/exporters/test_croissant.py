@@ -155,6 +155,7 @@ def edit(path: Path, old: str, new: str) -> None:
     path.write_text(text.replace(old, new, 1))
 
 
+@pytest.mark.damage("croissant")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "damage",

@@ -103,6 +103,7 @@ def _change(pattern: str, new: Any) -> Callable[[Path], None]:
     return damage
 
 
+@pytest.mark.damage("cvat")
 @pytest.mark.parametrize(
     ("shapes", "damage", "named"),
     [

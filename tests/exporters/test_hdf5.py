@@ -133,6 +133,7 @@ def lost_instance(data: dict[str, Any]) -> None:
     data["instance_attribute_maps"] = np.array(json.dumps(rows).encode())
 
 
+@pytest.mark.damage("hdf5")
 @pytest.mark.parametrize(
     "damage",
     [half_a_pixel, blue_first, range_as_depth, camera_axes, opencv_normals, lost_instance],

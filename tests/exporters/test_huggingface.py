@@ -213,6 +213,7 @@ def first_column(table: Table, name: str, change: Callable[[Any], Any]) -> Table
     return table.set_column(k, column, pyarrow.array(values, column.type))
 
 
+@pytest.mark.damage("huggingface")
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "damage",

@@ -165,6 +165,7 @@ def change_rows(path: Path, change: Callable[[list[dict[str, Any]]], Any]) -> No
 EPISODE = "data/chunk-000/episode_000000.parquet"
 
 
+@pytest.mark.damage("lerobot")
 @pytest.mark.parametrize(
     "damage",
     [

@@ -234,6 +234,7 @@ def test_fields_of_points_cover_the_record() -> None:
     assert ends[-1] == POINT.itemsize
 
 
+@pytest.mark.damage("mcap")
 @pytest.mark.parametrize(
     "damage",
     [
@@ -254,6 +255,7 @@ def test_damaged_files_are_found(
     assert faults(path, samples[:4])
 
 
+@pytest.mark.damage("mcap")
 @pytest.mark.parametrize(
     "change",
     [

@@ -190,6 +190,7 @@ DAMAGES: dict[str, tuple[Callable[[Path], None], str]] = {
 }
 
 
+@pytest.mark.damage("nuscenes")
 @pytest.mark.parametrize("name", sorted(DAMAGES))
 def test_the_devkit_finds_damage(
     folder: Path, driven: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str

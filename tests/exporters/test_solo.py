@@ -216,6 +216,7 @@ def wrong_focal_length(capture: Any) -> None:
     capture["matrix"][0], capture["matrix"][4] = capture["matrix"][4], capture["matrix"][0]
 
 
+@pytest.mark.damage("solo")
 @pytest.mark.parametrize(
     "damage",
     [right_handed, scalar_first, length_first, inclusive_box, swapped_colors, wrong_focal_length],

@@ -143,6 +143,7 @@ def reframed(data: bytes, change: Callable[[bytes], bytes]) -> bytes:
     return frame_record(change(data[12 : 12 + size])) + data[16 + size :]
 
 
+@pytest.mark.damage("tfrecord")
 @pytest.mark.parametrize(
     "damage",
     [

@@ -121,6 +121,7 @@ def _shorten_set(root: Path) -> None:
     path.write_text("".join(path.read_text().splitlines(keepends=True)[1:]))
 
 
+@pytest.mark.damage("voc")
 @pytest.mark.parametrize(
     ("damage", "named"),
     [

@@ -141,6 +141,7 @@ def shifted_masks(members: Members) -> Members:
     return changed
 
 
+@pytest.mark.damage("webdataset")
 @pytest.mark.parametrize(
     "damage",
     [

@@ -128,6 +128,7 @@ def _remove_label(folder: Path) -> None:
     next((folder / "labels/train").iterdir()).unlink()
 
 
+@pytest.mark.damage("yolo")
 @pytest.mark.parametrize(
     ("damage", "named"),
     [

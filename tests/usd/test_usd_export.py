@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -93,6 +95,38 @@ def test_every_validator_of_openusd_accepts_it(sequence: Any) -> None:
     assert UsdGeom.GetStageUpAxis(sequence) == "Z"
     assert (sequence.GetStartTimeCode(), sequence.GetEndTimeCode()) == (0.0, STEPS - 1.0)
     assert sequence.GetTimeCodesPerSecond() == 10.0
+
+
+def _other_up_axis(stage: Any) -> None:
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+
+
+def _centimetres(stage: Any) -> None:
+    UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+
+
+def _asset_missing(stage: Any) -> None:
+    stage.GetPrimAtPath("/World/clutter_0").GetReferences().AddReference("./assets/nowhere.usdc")
+
+
+def _slower(stage: Any) -> None:
+    stage.SetTimeCodesPerSecond(24.0)
+
+
+@pytest.mark.damage("usd")
+@pytest.mark.parametrize("damage", [_other_up_axis, _centimetres, _asset_missing, _slower])
+def test_damage_is_found(sequence: Any, tmp_path: Path, damage: Callable[[Any], None]) -> None:
+    """The check above is able to fail."""
+    path = Path(sequence.GetRootLayer().realPath)
+    shutil.copytree(path.parent, tmp_path / "copy")
+    stage = Usd.Stage.Open(str(tmp_path / "copy" / path.name))
+    test_every_validator_of_openusd_accepts_it(stage)
+
+    damage(stage)
+    stage.Save()
+
+    with pytest.raises(AssertionError):
+        test_every_validator_of_openusd_accepts_it(stage)
 
 
 def test_lights_are_photometric(sequence: Any) -> None:
