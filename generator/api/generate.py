@@ -27,6 +27,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     repair: bool = False,
     allow_mixed_numerics: bool = False,
     force: bool = False,
+    shards: tuple[int, int] | None = None,
     on_progress: Callable[[RunProgress], None] | None = None,
     resume_command: str = "the same call of gen_data.generate",
 ) -> Summary:
@@ -45,6 +46,8 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
         allow_mixed_numerics: Go on on a machine that computes differently from the one that began
             the data set; ``run/numerics.json`` lists all of them.
         force: Start although the disk is probably too small.
+        shards: First shard and the one after the last, for a part of the data set in a folder of
+            its own; ``merge`` gathers the parts. None = all.
         on_progress: Called after each sample and shard.
         resume_command: Command that error messages give for resuming.
 
@@ -80,9 +83,10 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     warn_of_empty_splits(scenes, loaded.split_shares, general.splits.assign, general.seed)
     factory = PipelineFactory(loaded, n)
     factory.check()
+    plan = make_plan(factory)
     with threadpool_limits(limits=1):
         return run(
-            make_plan(factory),
+            plan,
             factory,
             Path(out) if out is not None else Path("out") / loaded.name,
             workers=processes,
@@ -93,9 +97,21 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
                 allow_mixed_numerics=allow_mixed_numerics,
                 sample_bytes=estimate_sample_bytes(loaded, factory.info),
                 is_forced=force,
+                shards=None if shards is None else check_shards(shards, plan.shard_count),
             ),
             progress=on_progress,
         )
+
+
+def check_shards(shards: tuple[int, int], count: int) -> range:
+    """The range of shards that exist. Raises ConfigError if there are none."""
+    first, end = shards
+    if not 0 <= first < min(end, count):
+        raise ConfigError(
+            f"shards: {first}:{end} are none of the {count} shards; expected FIRST:END with "
+            f"0 <= FIRST < {count} and END above FIRST"
+        )
+    return range(first, min(end, count))
 
 
 def _guess_folder(config: ConfigLike, out: str | PathLike[str] | None) -> Path:

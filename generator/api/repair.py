@@ -12,6 +12,7 @@ from gen_data.generator.api.config import count_workers
 from gen_data.generator.core.errors import StorageError
 
 if TYPE_CHECKING:
+    from gen_data.generator.runner.plan import Plan
     from gen_data.generator.runner.progress import RunProgress, Summary
 
 
@@ -43,12 +44,8 @@ def repair(
         ConfigError: ``source`` is missing or another data set.
         DeterminismError: the repaired data set differs from the sealed one; it stays unfinished.
     """
-    from threadpoolctl import threadpool_limits
-
     from gen_data.generator.runner.plan import parse_plan
-    from gen_data.generator.runner.regeneration import plan_regeneration, refuse_changes
     from gen_data.generator.runner.repair import read_declared_plan
-    from gen_data.generator.runner.run import Settings, run
     from gen_data.generator.runner.store import LocalStore
 
     path = Path(folder)
@@ -59,9 +56,36 @@ def repair(
             "  With the configuration of the data set, this command restores it:\n"
             f"    gen-data --config FILE --n N --out {shlex.quote(str(path))} --repair"
         )
-    plan = parse_plan(data, path)
-    made = plan_regeneration(path, plan, None if source is None else Path(source))
-    refuse_changes(path, made.changes, "repair it")
+    return restore(
+        parse_plan(data, path),
+        path,
+        source=None if source is None else Path(source),
+        workers=workers,
+        repair=True,
+        on_progress=on_progress,
+        resume_command=resume_command,
+    )
+
+
+def restore(  # noqa: PLR0913  (keywords of its callers)
+    plan: Plan,
+    path: Path,
+    *,
+    source: Path | None = None,
+    workers: int | None,
+    repair: bool = False,
+    allow_mixed_numerics: bool = False,
+    on_progress: Callable[[RunProgress], None] | None,
+    resume_command: str,
+) -> Summary:
+    """Finish the data set in ``path`` from its plan alone; see ``repair`` and ``generate``."""
+    from threadpoolctl import threadpool_limits
+
+    from gen_data.generator.runner.regeneration import plan_regeneration, refuse_changes
+    from gen_data.generator.runner.run import Settings, run
+
+    made = plan_regeneration(path, plan, source)
+    refuse_changes(path, made.changes, "repair it" if repair else "finish it")
     with threadpool_limits(limits=1):
         return run(
             plan,
@@ -70,6 +94,6 @@ def repair(
             workers=count_workers(workers),
             resume_command=resume_command,
             licences=made.licences,
-            settings=Settings(repair=True),
+            settings=Settings(repair=repair, allow_mixed_numerics=allow_mixed_numerics),
             progress=on_progress,
         )

@@ -32,6 +32,7 @@ def generate_with_progress(
     repair: bool = False,
     allow_mixed_numerics: bool = False,
     force: bool = False,
+    shards: tuple[int, int] | None = None,
 ) -> None:
     """Generate samples 0 to n - 1, or the missing ones, and print a summary.
 
@@ -51,6 +52,7 @@ def generate_with_progress(
             repair=repair,
             allow_mixed_numerics=allow_mixed_numerics,
             force=force,
+            shards=shards,
             on_progress=show,
             resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
         )

@@ -16,7 +16,7 @@ from typing import Any
 import click
 
 from gen_data.generator import __version__
-from gen_data.generator.cli.options import ConfigurationOptions, configuration_options
+from gen_data.generator.cli.options import SHARD_RANGE, ConfigurationOptions, configuration_options
 from gen_data.generator.cli.stop_signals import (
     handle_stop_signals,
     ignore_stop_signals,
@@ -48,6 +48,7 @@ class LazyCommands(click.Group):
         "assets": "gen_data.generator.cli.asset_commands:assets",
         "report": "gen_data.generator.cli.report_command:report",
         "verify": "gen_data.generator.cli.verification_commands:verify",
+        "merge": "gen_data.generator.cli.merge_command:merge",
         "repair": "gen_data.generator.cli.verification_commands:repair",
         "diff": "gen_data.generator.cli.verification_commands:diff",
         "repro": "gen_data.generator.cli.verification_commands:repro",
@@ -68,6 +69,7 @@ class LazyCommands(click.Group):
         "assets": "Install, list, show, verify and remove packs of assets.",
         "report": "Statistics of a data set, and an HTML page with its samples.",
         "verify": "Check a data set: sizes, checksums, labels, reproducibility.",
+        "merge": "Join parts that were generated with --shards.",
         "repair": "Restore damaged files of a data set, byte for byte.",
         "diff": "Name the first difference of two data sets.",
         "repro": "Generate one sample by itself and compare it with the stored one.",
@@ -128,6 +130,9 @@ An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configu
     help="Resume on a machine whose computations differ in the last bits.",
 )
 @click.option("--force", is_flag=True, help="Start although the disk is probably too small.")
+@click.option(
+    "--shards", type=SHARD_RANGE, metavar="A:B", help="Generate shards A to B - 1 only; see merge."
+)
 @configuration_options
 @click.pass_context
 def cli(
@@ -140,6 +145,7 @@ def cli(
     repair: bool,
     allow_mixed_numerics: bool,
     force: bool,
+    shards: tuple[int, int] | None,
     overrides: tuple[str, ...],
     without: tuple[str, ...],
 ) -> None:
@@ -167,6 +173,7 @@ def cli(
         repair=repair,
         allow_mixed_numerics=allow_mixed_numerics,
         force=force,
+        shards=shards,
     )
 
 

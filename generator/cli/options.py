@@ -38,6 +38,25 @@ class ConfigurationOptions:
         )
 
 
+class _ShardRange(click.ParamType):
+    """``A:B``, two whole numbers."""
+
+    name = "range"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        """Both numbers of the text."""
+        first, colon, end = str(value).partition(":")
+        if not (colon and first.isascii() and first.isdigit() and end.isascii() and end.isdigit()):
+            self.fail(f"'{value}' is not a range of shards; expected A:B, such as 0:50", param, ctx)
+        return int(first), int(end)
+
+
+SHARD_RANGE = _ShardRange()
+"""Type of the option ``--shards``."""
+
+
 def configuration_options(command: F) -> F:
     """Add ``--seed``, ``--set`` and ``--without`` to a command."""
     for option in (

@@ -9,13 +9,14 @@ from __future__ import annotations
 import json
 import os
 import platform
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from gen_data.generator.core.errors import NumericsError
 from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.runner.durable_files import sync_path
+from gen_data.generator.runner.durable_files import sync_path, write_durably
 from gen_data.generator.runner.shard import Job, PipelineLike
+from gen_data.generator.runner.store import RUN_NAME, LocalStore
 
 NUMERICS_NAME = "numerics.json"
 
@@ -43,6 +44,25 @@ def admit_numerics(job: Job, pipeline: PipelineLike) -> None:
             raise NumericsError(_describe(known[0], entry))
         with path.open("a", encoding="utf-8") as file:
             file.write(canonical_json(entry) + "\n")
+
+
+def gather_numerics(parts: Sequence[Path], store: LocalStore, allow_mixed: bool) -> None:
+    """Record the classes of machines of all parts of a data set.
+
+    Raises:
+        NumericsError: there is more than one class, and ``allow_mixed`` is not set.
+    """
+    classes: dict[str, dict[str, object]] = {}
+    for part in parts:
+        for entry in _read(part / RUN_NAME / NUMERICS_NAME):
+            classes.setdefault(canonical_json(entry.get("digests")), entry)
+    entries = list(classes.values())
+    if len(entries) > 1 and not allow_mixed:
+        raise NumericsError(_describe(entries[0], entries[1]))
+    lines = "".join(canonical_json(entry) + "\n" for entry in entries)
+    if lines:
+        with store.errors():
+            write_durably(store.run_dir / NUMERICS_NAME, lines.encode(), store.scratch_root)
 
 
 def processor_name() -> str:

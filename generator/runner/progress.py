@@ -61,6 +61,8 @@ class Summary:
         worker_deaths: Processes that ended unexpectedly.
         rss_bytes_max: Largest resident memory of a worker after a shard; 0 if unknown.
         folder: Path of the data set; empty in the log of the run.
+        shards_left: Missing shards that this run was not to generate. Above 0, the data set is
+            unfinished: ``dataset_id`` is empty, and ``samples`` counts the existing ones.
     """
 
     dataset_id: str
@@ -74,6 +76,7 @@ class Summary:
     rss_bytes_max: int = 0
     already_complete: bool = False
     folder: str = ""
+    shards_left: int = 0
 
     @property
     def samples_per_s(self) -> float:
@@ -90,11 +93,12 @@ class Summary:
                 ),
                 ("id", self.dataset_id[:16]),
             ]
+        mean_bytes = self.bytes / max(self.samples, 1)
         rows = [
             ("samples", _with_note(str(self.samples), self.samples - self.made, "from before")),
             ("time", f"{self.seconds:.1f} s, {self.samples_per_s:.2f} samples/s"),
             ("rejected layouts", str(self.rejections)),
-            ("size", f"{self.bytes / 1e6:.1f} MB, {self.bytes / self.samples / 1e3:.0f} kB/sample"),
+            ("size", f"{self.bytes / 1e6:.1f} MB, {mean_bytes / 1e3:.0f} kB/sample"),
         ]
         stages = ", ".join(f"{name} {seconds:.3f}" for name, seconds in self.cpu_s.items())
         if stages:
@@ -105,6 +109,8 @@ class Summary:
             rows.append(
                 ("worker deaths", f"{self.worker_deaths} (work repeated; see run/log.jsonl)")
             )
+        if self.shards_left:
+            return [*rows, ("unfinished", f"{self.shards_left} shards left to other runs")]
         return [*rows, ("id", self.dataset_id[:16])]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -51,6 +51,8 @@ class Settings:
         sample_bytes: Estimated size of a sample; 0 = unknown. A data set that will not fit on the
             disk is refused.
         is_forced: Generate it until the disk is full.
+        shards: Range of shards to generate; the data set stays unfinished while others are
+            missing. None = all.
         limits: Limits on silence, deaths and memory of workers.
         allow_mixed_numerics, write_media, write_records: See ``Job``; picklable.
     """
@@ -59,6 +61,7 @@ class Settings:
     allow_mixed_numerics: bool = False
     sample_bytes: float = 0.0
     is_forced: bool = False
+    shards: range | None = None
     limits: Limits = field(default_factory=Limits)
     write_media: MediaWriter = write_images
     write_records: RecordWriter = write_records
@@ -142,20 +145,24 @@ class _Run:
             with store.errors():
                 state = store.state(plan)
                 if state is FolderState.NEW:
-                    self._space.before_start(plan.n)
+                    self._space.before_start(self._count(range(plan.shard_count)))
                 finished = state is FolderState.FINISHED
                 if finished and self._is_intact():
                     return self._summarize_finished()
                 sealed_before = _read_seal(store, plan)
             store.prepare(plan)
             hashed = finished or self.settings.repair
-            scan = store.scan(plan, hashed)
+            whole = store.scan(plan, hashed)
+            scan = whole.within(self.settings.shards)
+        samples = self._count(scan.missing)
         if scan.samples == 0:
-            self._space.before_start(plan.n)
-        monitor = RunMonitor(store, scan, plan.n, self.progress, self._space)
+            self._space.before_start(samples)
+        monitor = RunMonitor(store, scan, scan.samples + samples, self.progress, self._space)
         monitor.show("samples")
         try:
             self._generate(scan, monitor)
+            if left := len(whole.missing) - len(scan.missing):
+                return replace(self._summarize("", scan, monitor), shards_left=left)
             if not hashed:
                 self._replace_damaged(scan, monitor)
             with self.interruption.immediate():
@@ -173,6 +180,15 @@ class _Run:
     @property
     def _space(self) -> SpaceCheck:
         return SpaceCheck(self.job.store, self.settings.sample_bytes, self.settings.is_forced)
+
+    def _count(self, shards: Sequence[int]) -> int:
+        """Number of samples of the shards that this run may generate."""
+        chosen = Scan(shards).within(self.settings.shards).missing
+        if not chosen:
+            return 0
+        last = self.job.plan.samples_of(chosen[-1])
+        # Only the last shard of a data set may be shorter than the others.
+        return (len(chosen) - 1) * self.job.plan.shard_size + len(last)
 
     def _generate(self, scan: Scan, monitor: RunMonitor) -> None:
         if not scan.missing:
@@ -243,7 +259,7 @@ class _Run:
     def _summarize(self, dataset_id: str, scan: Scan, monitor: RunMonitor) -> Summary:
         summary = Summary(
             dataset_id=dataset_id,
-            samples=self.job.plan.n,
+            samples=scan.samples + monitor.made if not dataset_id else self.job.plan.n,
             made=monitor.made,
             seconds=monitor.seconds,
             rejections=monitor.rejections,

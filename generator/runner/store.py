@@ -25,7 +25,7 @@ import socket
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
 
@@ -83,6 +83,14 @@ class Scan:
     samples: int = 0
     bytes: int = 0
     rejections: int = 0
+
+    def within(self, shards: range | None) -> Scan:
+        """The same result with those missing shards only that lie in a range; None = all."""
+        if shards is None:
+            return self
+        if isinstance(self.missing, range):
+            return replace(self, missing=self.missing[shards.start : shards.stop])
+        return replace(self, missing=[shard for shard in self.missing if shard in shards])
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,51 @@
+"""The command ``merge``."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("parts", nargs=-1, required=True, type=click.Path(path_type=Path, exists=True))
+@click.option("--out", "-o", required=True, type=click.Path(path_type=Path), help="Data set.")
+@click.option(
+    "--workers", "-w", type=int, help="Processes for missing shards [default: one per core]."
+)
+@click.option(
+    "--allow-mixed-numerics",
+    is_flag=True,
+    help="Accept parts of machines whose computations differ in the last bits.",
+)
+def merge(
+    parts: tuple[Path, ...], out: Path, workers: int | None, allow_mixed_numerics: bool
+) -> None:
+    r"""Join PARTS, folders that were generated with --shards, into one data set.
+
+    \b
+    gen-data --config street.yaml --n 10000 --shards 0:50 --out part-0     on one machine
+    gen-data --config street.yaml --n 10000 --shards 50:100 --out part-1   on another
+    gen-data merge part-0 part-1 --out out/street
+
+    The result has the same bytes as one run. Shards that no part has are generated; parts stay.
+    """
+    from rich.console import Console
+
+    from gen_data.generator.api.merge import merge as join
+    from gen_data.generator.cli.generate_command import print_summary, progress_bar
+    from gen_data.generator.runner.merge import common_plan
+
+    console = Console(stderr=True)
+    with progress_bar(console, common_plan(parts).n) as show:
+        summary = join(
+            parts,
+            out,
+            workers=workers,
+            allow_mixed_numerics=allow_mixed_numerics,
+            on_progress=show,
+            resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
+        )
+    print_summary(console, summary)
