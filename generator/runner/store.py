@@ -125,7 +125,7 @@ class LocalStore:
 
     def reproduce_command(self, index: int) -> str:
         """Command that generates one sample of this data set by itself."""
-        return f"gen-data contact-sheet {shlex.quote(str(self.root))} --first {index} --n 1"
+        return f"gen-data repro {shlex.quote(str(self.root))} --index {index}"
 
     def errors(self) -> AbstractContextManager[None]:
         """Context that turns OSErrors into StorageErrors with the resume command."""
