@@ -85,7 +85,7 @@ class Supervisor:
         shards: Shards to generate, in this order.
         samples_of: Sample indices of a shard.
         describe_sample: Command that generates one sample by itself, for messages.
-        error: The first error that ends the run, or None.
+        error: The first error that ends the run, or else that of the first abandoned shard.
         given_up: Abandoned shards, which killed too many workers.
         deaths: Processes that ended unexpectedly.
     """
@@ -230,8 +230,12 @@ class Supervisor:
         return [Note(f"a worker takes no work: {error}")]
 
     def _drain(self, error: GenDataError) -> list[Action]:
-        """Assign no more shards; those in progress are finished."""
-        self.error = self.error or error
+        """Assign no more shards; those in progress are finished.
+
+        The first error that ends the run precedes that of an abandoned shard, which does not.
+        """
+        if not self._draining:
+            self.error = error
         self._draining = True
         return []
 
@@ -272,7 +276,7 @@ class Supervisor:
         )
         self.error = self.error or lost
         if len(self.given_up) >= self.limits.lost_shards:
-            self._drain(lost)
+            self._drain(self.error)
         return [note]
 
     def _suspect(self, worker: _Worker) -> int:

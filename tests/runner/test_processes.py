@@ -103,7 +103,7 @@ def test_a_poisoned_sample_is_named_and_all_other_shards_are_made(tmp_path: Path
 
     assert "shard 1: its worker process died 3 times, at last in sample 6" in str(caught.value)
     assert "killed by signal 9 (SIGKILL)" in str(caught.value)
-    assert f"repro {tmp_path / 'out'} --index 6" in str(caught.value)
+    assert f"gen-data repro {tmp_path / 'out'} --index 6" in str(caught.value)
     records = sorted(path.name for path in (tmp_path / "out/shards").glob("*.json"))
     assert records == ["000000.json", "000002.json"]
 
@@ -166,7 +166,7 @@ def test_a_bug_is_one_message_with_place_trace_and_command(tmp_path: Path, worke
 
     assert str(caught.value).startswith("sample 6: ValueError: a wheel came off\n")
     assert "doubles.py" in str(caught.value)
-    assert "--first 6 --n 1" in str(caught.value)
+    assert "--index 6" in str(caught.value)
 
 
 def test_a_wrong_sample_is_named_with_the_command_that_makes_it(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -135,5 +136,8 @@ def test_a_worker_that_cannot_be_killed_does_not_keep_the_run(tmp_path: Path) ->
 
     message = finish(process)
 
+    # Nobody else ends the worker: it sleeps before it could tie itself to its parent.
+    (worker,) = processes_of_session(process.pid)
+    os.kill(worker, signal.SIGKILL)
     assert process.returncode == 130, message
     assert RESUME in message
