@@ -130,7 +130,7 @@ def find_deviations(folder: Path, full: bool = False) -> list[Finding]:
     try:
         plan = load_plan(folder)
     except StorageError as error:
-        return [Finding("inconsistent", PLAN_NAME, str(error))]
+        return [Finding("inconsistent", PLAN_NAME, str(error).partition("\n")[0])]
     return list(_Check(folder, plan).run(full))
 
 
