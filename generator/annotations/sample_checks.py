@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.annotations.instance_extents import crop
-from gen_data.generator.core.boxes import OrientedBox, tight_box
+from gen_data.generator.core.boxes import BoxPx, OrientedBox, tight_box
 from gen_data.generator.core.capture import Channel, Measurements, PointCloud, SensorReading
 from gen_data.generator.core.errors import SampleError
 from gen_data.generator.core.interfaces import DatasetInfo
@@ -205,10 +205,12 @@ def _visibility_faults(
         yield "visible_px", f"{item.visible_px}, but the image shows {pixels}"
     elif item.box is not None:
         visible = crop(reading.channels[Channel.INSTANCE], item.box) == number
-        if tight_box(visible, item.box.x_min, item.box.y_min) != item.box:
+        if item.mask is not None:
+            # The mask is compared with the box below.
+            if visible.shape != item.mask.pixels.shape or (visible != item.mask.pixels).any():
+                yield "mask", "is not its pixels in the image"
+        elif not _is_tight(visible) or np.count_nonzero(visible) != pixels:
             yield "box", f"{item.box} is not the tight box of its pixels in the image"
-        if item.mask is not None and not np.array_equal(item.mask.pixels, visible):
-            yield "mask", "is not its pixels in the image"
 
 
 def _object_faults(reading: SensorReading, truth: ImageTruth, item: ObjectTruth) -> Iterator[Fault]:
@@ -219,8 +221,8 @@ def _object_faults(reading: SensorReading, truth: ImageTruth, item: ObjectTruth)
     if item.box is not None and item.box.clipped(camera.width_px, camera.height_px) != item.box:
         yield "box", f"{item.box} is empty or not in {camera.width_px} x {camera.height_px} px"
     if item.mask is not None:
-        tight = tight_box(item.mask.pixels, item.mask.x_px, item.mask.y_px)
-        if tight != item.box:
+        if _mask_box(item.mask) != item.box or (item.box and not _is_tight(item.mask.pixels)):
+            tight = tight_box(item.mask.pixels, item.mask.x_px, item.mask.y_px)
             yield "box", f"{item.box}; the tight box of its mask is {tight}"
         if int(np.count_nonzero(item.mask.pixels)) != item.visible_px:
             yield "mask", f"does not have its {item.visible_px} visible pixels"
@@ -241,11 +243,28 @@ def _amodal_faults(item: ObjectTruth, width_px: int, height_px: int) -> Iterator
     mask = item.amodal_mask
     if mask is None or mask.pixels.size == 0:
         return
-    tight = tight_box(mask.pixels, mask.x_px, mask.y_px)
-    if tight is None or tight.clipped(width_px, height_px) != tight:
-        yield "amodal_mask", f"its tight box {tight} is not in the image"
+    filled = _mask_box(mask)
+    if filled is None or filled.clipped(width_px, height_px) != filled:
+        yield "amodal_mask", f"its box {filled} is not in the image"
+    elif not _is_tight(mask.pixels):
+        yield "amodal_mask", "is not stored tight"
     elif item.mask is not None and item.box is not None and not _contains(mask, item.mask):
         yield "amodal_mask", "does not contain the visible pixels"
+
+
+def _mask_box(mask: MaskPx) -> BoxPx | None:
+    """The box that a mask fills; None for a mask without pixels."""
+    height, width = mask.pixels.shape
+    if height == 0 or width == 0:
+        return None
+    return BoxPx(mask.x_px, mask.y_px, mask.x_px + width, mask.y_px + height)
+
+
+def _is_tight(mask: NDArray[np.bool_]) -> bool:
+    """Whether every side of a mask has a set pixel; [0, 0] has none."""
+    if mask.size == 0:
+        return False
+    return bool(mask[0].any() and mask[-1].any() and mask[:, 0].any() and mask[:, -1].any())
 
 
 def _contains(outer: MaskPx, inner: MaskPx) -> bool:

@@ -103,15 +103,23 @@ def tree_sizes(folder: Path, without: str = "") -> dict[str, int]:
     Anything but files and folders, such as a symbolic link, has the size IRREGULAR. The folder
     named ``without`` directly in ``folder`` is left out.
     """
+    return scan_tree(folder, without)[0]
+
+
+def scan_tree(folder: Path, without: str = "") -> tuple[dict[str, int], tuple[str, ...]]:
+    """``tree_sizes`` and ``empty_folders`` in one pass."""
     sizes: dict[str, int] = {}
+    empty: list[str] = []
     for inner, folders, names in _walk(folder, without):
+        if not folders and not names and inner != str(folder):
+            empty.append(_prefix(inner, folder).rstrip("/"))
         links = [name for name in folders if Path(inner, name).is_symlink()]
         prefix = _prefix(inner, folder)
         for name in (*names, *links):
             status = os.lstat(f"{inner}/{name}")
             regular = stat.S_ISREG(status.st_mode)
             sizes[prefix + name] = status.st_size if regular else IRREGULAR
-    return dict(sorted(sizes.items()))
+    return dict(sorted(sizes.items())), tuple(sorted(empty))
 
 
 def empty_folders(folder: Path, without: str = "") -> tuple[str, ...]:
@@ -119,13 +127,7 @@ def empty_folders(folder: Path, without: str = "") -> tuple[str, ...]:
 
     The folder named ``without`` directly in ``folder`` is left out.
     """
-    return tuple(
-        sorted(
-            _prefix(inner, folder).rstrip("/")
-            for inner, folders, names in _walk(folder, without)
-            if not folders and not names and inner != str(folder)
-        )
-    )
+    return scan_tree(folder, without)[1]
 
 
 def _walk(folder: Path, without: str) -> Iterator[tuple[str, list[str], list[str]]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import json
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
@@ -17,9 +17,14 @@ from gen_data.generator.core.errors import ConfigError, StorageError
 from gen_data.generator.runner.finalize import LicencesOf
 from gen_data.generator.runner.identity import format_licences, make_plan
 from gen_data.generator.runner.plan import PLAN_NAME, Plan, compare_plans
-from gen_data.generator.runner.rerender import RerenderFactory, rerender_plan
+from gen_data.generator.runner.rerender import rerender_plan
 from gen_data.generator.runner.sample_stages import Difference, SampleFiles, compare_samples
-from gen_data.generator.runner.shard import PipelineLike, write_images, write_records
+from gen_data.generator.runner.shard import (
+    EnteredPipeline,
+    PipelineLike,
+    write_images,
+    write_records,
+)
 from gen_data.generator.runner.store import LocalStore
 from gen_data.generator.runner.stored import StoredSamples
 
@@ -37,7 +42,7 @@ class Regeneration:
     """
 
     plan: Plan
-    make_pipeline: PipelineFactory | RerenderFactory
+    make_pipeline: Callable[[], EnteredPipeline]
     licences: LicencesOf
     changes: tuple[str, ...]
 

@@ -31,14 +31,13 @@ from pathlib import Path
 
 from gen_data.generator.core.errors import ConfigError, DeterminismError, StorageError
 from gen_data.generator.runner.durable_files import (
-    empty_folders,
     hash_file,
     make_folder,
     move_durably,
+    scan_tree,
     storage_errors,
     sync_path,
     sync_tree,
-    tree_sizes,
     write_durably,
 )
 from gen_data.generator.runner.plan import (
@@ -337,9 +336,8 @@ class LocalStore:
             return None
         if folder.is_symlink():
             return None
-        if tree_sizes(folder) != {file.path: file.bytes for file in record.files}:
-            return None
-        if empty_folders(folder) != record.empty_folders:
+        declared = {file.path: file.bytes for file in record.files}
+        if scan_tree(folder) != (declared, record.empty_folders):
             return None
         if full and any(hash_file(folder / f.path) != f.sha256 for f in record.files):
             return None

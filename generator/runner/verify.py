@@ -15,9 +15,9 @@ from gen_data.generator.core.errors import StorageError, VerificationError
 from gen_data.generator.runner.durable_files import (
     IRREGULAR,
     Inode,
-    empty_folders,
     get_inode,
     hash_file,
+    scan_tree,
     tree_sizes,
 )
 from gen_data.generator.runner.plan import PLAN_NAME, Plan, load_plan
@@ -130,7 +130,7 @@ def find_deviations(folder: Path, full: bool = False) -> list[Finding]:
     try:
         plan = load_plan(folder)
     except StorageError as error:
-        return [Finding("inconsistent", PLAN_NAME, str(error))]
+        return [Finding("inconsistent", PLAN_NAME, str(error).partition("\n")[0])]
     return list(_Check(folder, plan).run(full))
 
 
@@ -155,16 +155,15 @@ class _Check:
             return
         yield from self._read_sums(manifest, manifest_bytes)
         yield from self._read_sizes(manifest)
-        actual = _actual_sizes(self._folder)
+        actual, empty = scan_tree(self._folder, without=RUN_NAME)
         for path in sorted({*self._sums, *actual} - {SUMS_NAME}):
             yield from self._compare(path, actual.get(path), full)
         # Format version 1 does not say which folders are empty.
         if "empty_folders" in manifest:
-            yield from self._compare_folders(manifest["empty_folders"])
+            yield from self._compare_folders(manifest["empty_folders"], set(empty))
 
-    def _compare_folders(self, merged: Iterable[str]) -> Iterator[Finding]:
+    def _compare_folders(self, merged: Iterable[str], actual: set[str]) -> Iterator[Finding]:
         declared = {*self._empty_folders, *merged}
-        actual = set(empty_folders(self._folder, without=RUN_NAME))
         for path in sorted(declared ^ actual):
             finding = partial(Finding, path=path, samples=self._samples_of(path))
             if path in actual:

@@ -250,6 +250,9 @@ MUTATIONS: dict[str, Mutation] = {
     "amodal box inside": change_object(amodal_box=lambda o: replace(o.box, x_min=o.box.x_min + 5)),
     "amodal mask away": change_object(amodal_mask=lambda o: replace(o.amodal_mask, x_px=0, y_px=0)),
     "amodal mask outside": change_object(amodal_mask=lambda o: replace(o.amodal_mask, x_px=-9)),
+    "amodal mask loose": change_object(
+        amodal_mask=lambda o: replace(o.amodal_mask, pixels=np.pad(o.amodal_mask.pixels, (0, 1)))
+    ),
     "fraction above 1": change_object(visible_fraction=1.5),
     "fraction NaN": change_object(visible_fraction=NAN),
     "fraction 0": change_object(visible_fraction=0.0),

@@ -157,14 +157,20 @@ def test_licences_name_what_was_used_and_nothing_else(dataset: Path) -> None:
     assert listed == {asset.partition("#")[0].partition("?")[0] for asset in used}
 
 
-def test_a_flipped_bit_is_repaired_on_request(dataset: Path, tmp_path: Path) -> None:
-    """The same size, another byte: only hashing finds it; ``--repair`` makes the shard again."""
+def test_a_damaged_data_set_is_repaired_from_its_own_plan(dataset: Path, tmp_path: Path) -> None:
+    """An image with another byte, a damaged plan, and a foreign file."""
     shutil.copytree(dataset, tmp_path / "one")
     damaged = tmp_path / "one/shards/000001/color/rgb/000000007.png"
     damaged.write_bytes(damaged.read_bytes()[:-1] + b"\0")
 
-    done = gen_data(*MAIN_JOB, "--workers", "1", "--out", "one", "--repair", cwd=tmp_path)
+    (tmp_path / "one/plan.json").write_text("{")
+    (tmp_path / "one/notes.txt").write_text("mine")
+
+    done = gen_data("repair", "one", "--workers", "1", cwd=tmp_path)
 
     assert done.returncode == 0, done.stderr
     assert digest(tmp_path / "one") == digest(dataset)
-    assert (tmp_path / "one/run/quarantine/0-000001/color/rgb" / damaged.name).exists()
+    quarantine = tmp_path / "one/run/quarantine"
+    assert (quarantine / "0-000001/color/rgb" / damaged.name).exists()
+    assert (quarantine / "0-plan.json").read_text() == "{"
+    assert (quarantine / "0-notes.txt").exists()

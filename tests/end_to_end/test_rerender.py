@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import gen_data as package
+from gen_data.generator.api.repair import repair
+from gen_data.generator.core.errors import ConfigError
 from tests.end_to_end.running import digest, gen_data
 
 
@@ -23,10 +25,29 @@ def test_without_a_change_every_sample_has_the_same_bytes(dataset: Path, tmp_pat
     assert differing == {"plan.json", "manifest.json", "SHA256SUMS"}
 
 
-def test_other_light_changes_colours_and_nothing_else(dataset: Path, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def dark_dataset(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The scenes in other light."""
+    out = tmp_path_factory.mktemp("dark") / "dark"
+    package.rerender(dataset, out, overrides=["lamps.illuminance_lux=40"], workers=0)
+    return out
+
+
+def test_it_is_repaired_from_the_scenes_that_it_has(dataset: Path, dark_dataset: Path) -> None:
+    """Without the data set of the scenes it cannot be."""
+    before = digest(dark_dataset)
+    (dark_dataset / "shards/000002.json").unlink()
+
+    with pytest.raises(ConfigError, match=r"are those of another data set.*--source"):
+        repair(dark_dataset, workers=0)
+    repair(dark_dataset, source=dataset, workers=0)
+
+    assert digest(dark_dataset) == before
+
+
+def test_other_light_changes_colours_and_nothing_else(dataset: Path, dark_dataset: Path) -> None:
     """Ids, depth, boxes and poses are equal: a counterfactual pair."""
-    package.rerender(dataset, tmp_path / "dark", overrides=["lamps.illuminance_lux=40"], workers=0)
-    bright, dark = package.open(dataset), package.open(tmp_path / "dark")
+    bright, dark = package.open(dataset), package.open(dark_dataset)
 
     for one, other in zip(bright, dark, strict=True):
         a, b = one.cameras["color"], other.cameras["color"]

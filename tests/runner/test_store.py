@@ -372,6 +372,40 @@ def test_a_flipped_bit_of_a_finished_data_set_is_repaired(
     assert tree_digest(out) == reference_digest
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"occlusion": 1.5}, r"sample 5: truth\.color\.objects\[0\].*occlusion: 1\.5 is not in"),
+        ({"extra": {"mine": {"x": [float("nan")]}}}, r"sample 5: .*extra\.mine\.x\[0\]: is NaN"),
+    ],
+)
+def test_an_invalid_sample_is_never_written(
+    tmp_path: Path, change: dict[str, object], message: str
+) -> None:
+    """The run stops with exit code 6, sample and field; the shards before it stay."""
+
+    class Invalid(FakePipeline):
+        def sample(self, index: int) -> Sample:
+            sample = super().sample(index)
+            if index != 5:
+                return sample
+            image = sample.truth["color"]
+            objects = (replace(image.objects[0], **change),)  # type: ignore[arg-type]
+            return replace(sample, truth={"color": replace(image, objects=objects)})
+
+    with pytest.raises(SampleError, match=message) as caught:
+        run(
+            fake_plan(),
+            lambda: Invalid(10, Trouble()),
+            tmp_path / "out",
+            workers=0,
+            resume_command=RESUME,
+        )
+
+    assert caught.value.exit_code == 6
+    assert names_in(tmp_path / "out/shards") == {"000000", "000000.json"}
+
+
 def test_publishing_the_same_shard_twice_changes_nothing(tmp_path: Path) -> None:
     """A worker that died after its commit is repeated harmlessly."""
     store, plan = LocalStore(tmp_path / "out"), fake_plan()
