@@ -293,7 +293,8 @@ function viewpoints() {
 }
 
 function imageCharts() {
-  const titles = [...new Set(sets.flatMap((set) => (set.images || []).map((made) => made.title)))];
+  const titles = [...new Set(sets.flatMap((set) => (set.images || [])
+    .filter((made) => Object.keys(made.counts).length).map((made) => made.title)))];
   if (!titles.length) return null;
   return el("div", { class: "grid" }, ...titles.map((title) => compared(title, sets.map((set, k) => {
     const made = (set.images || []).find((item) => item.title === title);
