@@ -194,7 +194,7 @@ class _Replay:
 def _observe_randomizer(randomizer: Randomizer, log: list[Draw]) -> Randomizer:
     if not isinstance(randomizer, BaseModel):
         return randomizer
-    observed: Randomizer = _observe(randomizer, randomizer.name, log)  # type: ignore[assignment]
+    observed: Randomizer = _observe(randomizer, randomizer.name, log)
     return observed
 
 

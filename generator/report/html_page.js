@@ -72,8 +72,8 @@ function histogram({ label, edges, names, series, lines = [], unit = "objects" }
   image.append(svg("line", { class: "axis", x1: 0, x2: width, y1: height + 0.5, y2: height + 0.5 }));
   if (edges) {
     const every = Math.ceil(count / 7);
-    for (let k = 0; k <= count; k += every) {
-      if (count - k < every && k < count && count % every) continue;
+    const ticks = Array.from({ length: count }, (_, k) => k).filter((k) => k % every === 0 && count - k >= 0.8 * every);
+    for (const k of [...ticks, count]) {
       const anchor = k === 0 ? "start" : k === count ? "end" : "middle";
       image.append(svg("text", { x: k * step, y: height + 13, "text-anchor": anchor }, short(edges[k])));
     }
@@ -293,7 +293,8 @@ function viewpoints() {
 }
 
 function imageCharts() {
-  const titles = [...new Set(sets.flatMap((set) => (set.images || []).map((made) => made.title)))];
+  const titles = [...new Set(sets.flatMap((set) => (set.images || [])
+    .filter((made) => Object.keys(made.counts).length).map((made) => made.title)))];
   if (!titles.length) return null;
   return el("div", { class: "grid" }, ...titles.map((title) => compared(title, sets.map((set, k) => {
     const made = (set.images || []).find((item) => item.title === title);
@@ -304,6 +305,8 @@ function imageCharts() {
   }), "images")));
 }
 
+const CARDS = 12;
+
 function parameters() {
   const names = [...new Set(sets.flatMap((set) => (set.parameters || []).map((row) => row.name)))].sort();
   const notes = sets.filter((set) => set.parameters_note).map((set) =>
@@ -313,13 +316,21 @@ function parameters() {
     const found = sets.map((set, k) => ({ k, row: (set.parameters || []).find((row) => row.name === name) }))
       .filter(({ row }) => row);
     const stands = found.some(({ row }) => row.deviation > row.limit);
-    const charts = found.flatMap(({ k, row }) => [
-      histogram({ label: `${name}, ${sets[k].name}`, edges: row.edges, names: row.names, unit: "draws",
-        series: [{ key: keys[k], values: row.drawn, shares: shares(row.drawn) }],
-        lines: [{ key: keys[k], shares: row.expected }] }),
-      el("div", {}, ...Object.keys(row.declared).slice(0, 4).flatMap((text) => [el("code", {}, text), el("br")]),
-        el("span", { class: "quiet" }, `${number(row.draws)} draws, largest difference ${percent(row.deviation)} `),
-        row.deviation > row.limit ? el("span", { class: "flag" }, `stands out (over ${percent(row.limit)})`) : null),
+    const groups = [];
+    for (const one of found) {
+      const group = groups.find(([other]) => same(other.row.edges, one.row.edges)
+        && same(other.row.names, one.row.names) && same(Object.keys(other.row.declared), Object.keys(one.row.declared)));
+      if (group) group.push(one);
+      else groups.push([one]);
+    }
+    const charts = groups.flatMap((group) => [
+      histogram({ label: name, edges: group[0].row.edges, names: group[0].row.names, unit: "draws",
+        series: group.map(({ k, row }) => ({ key: keys[k], values: row.drawn, shares: shares(row.drawn) })),
+        lines: [{ shares: group[0].row.expected }] }),
+      el("div", {}, ...Object.keys(group[0].row.declared).slice(0, 4).flatMap((text) => [el("code", {}, text), el("br")]),
+        ...group.map(({ k, row }) => el("div", { class: "quiet" }, sets.length > 1 ? el("i", { class: `key ${keys[k]}` }) : null,
+          `${number(row.draws)} draws, largest difference ${percent(row.deviation)} `,
+          row.deviation > row.limit ? el("span", { class: "flag" }, `stands out (over ${percent(row.limit)})`) : null))),
     ]);
     const card = el("div", { class: "card parameter" }, el("h3", {}, name), ...charts);
     return { name, stands, card };
@@ -330,14 +341,25 @@ function parameters() {
     only.setAttribute("aria-pressed", String(only.getAttribute("aria-pressed") !== "true"));
     show();
   } }, "Only those that stand out");
+  const more = el("button", { click: () => {
+    more.remove();
+    show();
+  } }, `Show all ${cards.length}`);
   const show = () => {
-    for (const { name, stands, card } of cards) {
-      const kept = name.toLowerCase().includes(search.value.toLowerCase());
-      card.hidden = !kept || (only.getAttribute("aria-pressed") === "true" && !stands);
-    }
+    const unusual = only.getAttribute("aria-pressed") === "true";
+    const wanted = cards.filter(({ name, stands }) =>
+      name.toLowerCase().includes(search.value.toLowerCase()) && (stands || !unusual));
+    const whole = unusual || search.value || !more.parentElement;
+    more.hidden = Boolean(whole);
+    // Those that stand out come first among the few that are shown at once.
+    const first = whole ? wanted : [...wanted].sort((x, y) => y.stands - x.stands).slice(0, CARDS);
+    for (const item of cards) item.card.hidden = !first.includes(item);
   };
-  return el("div", {}, ...notes, el("div", { class: "bar" }, search, only),
-    el("div", { class: "grid" }, ...cards.map(({ card }) => card)));
+  const whole = el("div", {}, ...notes, el("div", { class: "bar" }, search, only),
+    el("div", { class: "grid" }, ...cards.map(({ card }) => card)), el("div", { class: "bar" }, more));
+  if (cards.length <= CARDS) more.remove();
+  show();
+  return whole;
 }
 
 function checks() {
@@ -410,10 +432,15 @@ function tables() {
 
 function licences() {
   const known = sets.filter((set) => set.licences && set.licences.length);
-  return known.length ? el("div", {}, ...known.map((set) => el("div", { class: "card" },
+  if (!known.length) return null;
+  return el("div", { class: "grid wide" }, ...known.map((set) => el("div", { class: "card" },
     sets.length > 1 ? el("h3", {}, set.name) : null,
-    table(["source", "licence", "author", "assets"],
-      set.licences.map((row) => [row.source, row.licence, row.author, row.assets]), { text: [1, 2, 3] })))) : null;
+    ...set.licences.map((row) => {
+      const assets = row.assets.split(", ");
+      return el("div", { class: "licence" }, el("strong", {}, row.licence), `: ${row.source}, ${row.author}`,
+        el("details", {}, el("summary", { class: "quiet" }, many(assets.length, "asset")),
+          el("code", {}, row.assets)));
+    }))));
 }
 
 // ---------------------------------------------------------------- sample browser

@@ -171,7 +171,7 @@ def _edges(box: OrientedBox, intrinsics: Intrinsics) -> list[list[int]]:
     """Polylines [x, y, x, y, ...] of the visible parts of a box's edges, in whole pixels."""
     corners_m = box.corners()
     share = np.linspace(0.0, 1.0, PIECES + 1)[:, None]
-    lines = []
+    lines: list[list[int]] = []
     for a, b in BOX_EDGES:
         places_m = corners_m[a] + (corners_m[b] - corners_m[a]) * share
         if intrinsics.straight:

@@ -1,4 +1,4 @@
-"""Small data sets written by hand, whose statistics can be counted on paper."""
+"""Small data sets written by hand, without a renderer, whose statistics can be counted on paper."""
 
 from __future__ import annotations
 
@@ -14,11 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.core.boxes import BoxPx, OrientedBox
-from gen_data.generator.core.capture import Capture, Channel, SensorReading
-from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo, media_path
+from gen_data.generator.core.capture import POINT, Capture, Channel, PointCloud, SensorReading
+from gen_data.generator.core.interfaces import (
+    DatasetInfo,
+    Modality,
+    SensorInfo,
+    cloud_path,
+    media_path,
+)
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.sample import ImageTruth, KeypointTruth, MaskPx, ObjectTruth, Sample
-from gen_data.generator.core.scene import Camera, Instance, Scene
+from gen_data.generator.core.scene import Camera, Instance, Lidar, Scene
 from gen_data.generator.core.se3 import IDENTITY, SE3
 from gen_data.generator.core.serialization import to_plain
 from gen_data.generator.runner.labels import labels_line
@@ -26,6 +32,8 @@ from gen_data.generator.runner.plan import Plan, plan_bytes
 
 WIDTH_PX, HEIGHT_PX = 64, 48
 CAMERA = Camera("color", IDENTITY, Intrinsics.from_hfov(WIDTH_PX, HEIGHT_PX, math.radians(60)))
+POINTS = np.zeros(3, POINT)
+POINTS["position_m"] = [(0, 0, 2), (0.1, 0.2, 4), (0, 0, -2)]
 HOSTILE = "</script><script>alert('x')</script><img src=x onerror=alert(1)>"
 
 
@@ -71,15 +79,24 @@ def write_dataset(
     images: Sequence[NDArray[np.uint8]],
     **changes: Any,
 ) -> Path:
-    """A finished data set with one camera, in one shard; images are taken in turn.
+    """A finished data set with a camera and a laser scanner, in one shard; images in turn.
 
-    Scene ``k`` is sample ``k``; every fourth sample is in the split ``val``.
+    Scene ``k`` is sample ``k``; every fourth sample is in the split ``val``. Depth is 2 m
+    everywhere; the scanner has three points, of which one is behind the camera.
     """
     n = len(samples)
-    sensors = (SensorInfo("color", Modality.CAMERA, channels=(Channel.RGB,)),)
+    sensors = (
+        SensorInfo("color", Modality.CAMERA, channels=(Channel.RGB, Channel.Z_DEPTH)),
+        SensorInfo("top", Modality.LIDAR),
+    )
     info = replace(DatasetInfo("hand", 3, n, 1, categories, sensors), **changes)
     shard = folder / "shards/000000"
-    media_path(shard, "color", Channel.RGB, 0).parent.mkdir(parents=True)
+    for path in (
+        media_path(shard, "color", Channel.RGB, 0),
+        media_path(shard, "color", Channel.Z_DEPTH, 0),
+        cloud_path(shard, "top", 0),
+    ):
+        path.parent.mkdir(parents=True)
     (folder / "plan.json").write_bytes(
         plan_bytes(Plan({"template": "hand"}, "hand", 3, n, n, {"gen-data": "0"}, {}))
     )
@@ -96,10 +113,14 @@ def write_dataset(
         encoding="utf-8",
     )
     pngs = [cv2.imencode(".png", image)[1].tobytes() for image in images]
+    depth = np.full((HEIGHT_PX, WIDTH_PX), 20_000, np.uint16)  # of 0.1 mm
+    depth_png = cv2.imencode(".png", depth)[1].tobytes()
     with (shard / "labels.jsonl").open("w", encoding="utf-8") as labels:
         for index, objects in enumerate(samples):
             labels.write(labels_line(_sample(index, objects)) + "\n")
             media_path(shard, "color", Channel.RGB, index).write_bytes(pngs[index % len(pngs)])
+            media_path(shard, "color", Channel.Z_DEPTH, index).write_bytes(depth_png)
+            np.save(cloud_path(shard, "top", index), POINTS)
     return folder
 
 
@@ -111,6 +132,9 @@ def _sample(index: int, objects: Sequence[ObjectTruth]) -> Sample:
         view_index=0,
         split="train" if index % 4 else "val",
         scene=scene,
-        capture=Capture({"color": SensorReading("color", CAMERA, {})}),
+        capture=Capture(
+            {"color": SensorReading("color", CAMERA, {})},
+            {"top": PointCloud("top", Lidar("top", "color"), POINTS)},
+        ),
         truth={"color": ImageTruth(CAMERA, tuple(objects))},
     )

@@ -108,6 +108,11 @@ def test_the_browser_has_every_image_of_a_small_data_set(described: Json) -> Non
     assert first["objects"][0]["box"] == [20, 20, 28, 28]
     assert len(first["objects"][0]["edges"]) == 12
     assert np.abs(np.reshape(first["objects"][0]["edges"], (-1, 2)).mean(axis=0) - 24).max() < 1
+    depth = base64.b64decode(first["pictures"]["depth"].partition(",")[2])
+    assert np.ptp(cv2.imdecode(np.frombuffer(depth, np.uint8), cv2.IMREAD_GRAYSCALE)) == 0
+    points = np.frombuffer(base64.b64decode(first["points"]), "<u2").reshape(-1, 3)
+    # The focal length is 32 px / tan(30 degrees); the point behind the camera is not shown.
+    assert points[:, :2].tolist() == [[32, 24], [32 + int(55.4 * 0.025), 24 + int(55.4 * 0.05)]]
     text = json.dumps(without_pictures(described))
     assert "base64" not in text and '"objects"' in text
 
@@ -291,13 +296,13 @@ def test_the_page_of_a_large_data_set_is_bounded(tmp_path: Path) -> None:
     """The browser has a limited number of images, and a limited size; figures count all images."""
     rng = np.random.default_rng(2)
     objects = [make_object(1, "car")]
-    small = write_dataset(tmp_path / "small", [objects] * 150, ("car",), [make_image(rng)])
+    small = write_dataset(tmp_path / "small", [objects] * 110, ("car",), [make_image(rng)])
     noise = [rng.integers(0, 256, (480, 640, 3), dtype=np.uint8)]  # compresses worst
-    large = write_dataset(tmp_path / "large", [objects] * 60, ("car",), noise)
+    large = write_dataset(tmp_path / "large", [objects] * 40, ("car",), noise)
 
     many, heavy = (describe_dataset(folder, scenes_max=0) for folder in (small, large))
 
-    assert len(many["browser"]) == 96 and many["counts"]["images"] == 150
-    assert many["duplicates"]["grouped"] == 150
-    assert len(heavy["browser"]) < 60
+    assert len(many["browser"]) == 96 and many["counts"]["images"] == 110
+    assert many["duplicates"]["grouped"] == 110
+    assert len(heavy["browser"]) < 40
     assert 8_000_000 < len(format_page([heavy])) < 15_000_000

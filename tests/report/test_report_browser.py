@@ -1,8 +1,7 @@
-"""The report of a generated data set: drawn parameters, and the page in a browser."""
+"""The page of a report in a browser: layers, filters, narrow windows, and its policy."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,52 +9,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from threadpoolctl import threadpool_limits
 
-from gen_data.generator.report.drawn_parameters import DrawnParameters, draw_parameters
 from gen_data.generator.report.html_page import format_page
 from gen_data.generator.report.report_data import describe_dataset
-from gen_data.generator.runner.stored import StoredSamples
 from tests.report.handmade import HOSTILE, make_image, make_object, write_dataset
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
+pytestmark = pytest.mark.slow
+
 CHROMIUM = ("/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome")
-
-
-@pytest.fixture(scope="module")
-def drawn(dataset: Path) -> DrawnParameters:
-    """All three scenes of the data set, drawn again."""
-    with threadpool_limits(limits=1):
-        return draw_parameters(StoredSamples(dataset), 3)
-
-
-def test_scenes_that_are_drawn_again_are_the_stored_ones(drawn: DrawnParameters) -> None:
-    """To the last bit."""
-    assert (drawn.scenes, drawn.different) == (3, 0)
-
-
-def test_drawn_values_are_those_of_the_stored_scenes(drawn: DrawnParameters, dataset: Path) -> None:
-    """Fields of view follow from stored focal lengths, and robots from stored shared values."""
-    values = {p.name: p.values for p in drawn.parameters}
-    scenes = [StoredSamples(dataset).kept_scene(index).scene for index in range(15)]
-
-    lenses = [scene.cameras[0].intrinsics for scene in scenes]
-    hfov_deg = [math.degrees(2 * math.atan(lens.width_px / 2 / lens.fx_px)) for lens in lenses]
-    assert np.abs(np.array(values["lens.hfov_deg"]) - hfov_deg).max() < 1e-4
-    lights = [sum(light.kind == "sphere" for light in scene.lights) for scene in scenes]
-    assert values["lamps.count"] == lights
-    assert values["shared.robot"] == [dict(scenes[k].shared)["robot"] for k in (0, 5, 10)]
-
-
-def test_declared_values_are_drawn_from_the_declared_distribution(drawn: DrawnParameters) -> None:
-    """The expected mean and limits of {uniform: [0.9, 1.5]}."""
-    (distance,) = (p for p in drawn.parameters if p.name == "orbit.distance_m")
-
-    assert list(distance.declared) == ["{uniform: [0.9, 1.5]}"]
-    assert distance.limits == (0.9, 1.5)
-    assert np.mean(distance.expected) == pytest.approx(1.2, abs=0.005)
 
 
 @dataclass
@@ -78,15 +42,22 @@ class Opened:
 
 
 @pytest.fixture(scope="module")
-def opened(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Opened]:
-    """The page of the data set beside itself, in headless Chromium."""
+def opened(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Opened]:
+    """The page of two data sets in headless Chromium."""
     playwright = pytest.importorskip("playwright.sync_api")
     program = next((path for path in CHROMIUM if Path(path).exists()), None)
     if program is None:
         pytest.skip("needs Chromium")
-    described = describe_dataset(dataset, scenes_max=0)
-    path = tmp_path_factory.mktemp("page") / "index.html"
-    path.write_text(format_page([described, described]), encoding="utf-8")
+    folder = tmp_path_factory.mktemp("sets")
+    rng = np.random.default_rng(5)
+    samples = [[make_object(1, "car"), make_object(2, "bus", 40, 16)]] * 14 + [[]]
+    sets = [
+        write_dataset(folder / name, samples, ("bus", "car"), [make_image(rng)])
+        for name in ("one", "two")
+    ]
+    path = folder / "index.html"
+    text = format_page([describe_dataset(one, scenes_max=0) for one in sets])
+    path.write_text(text, encoding="utf-8")
     flags = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
     with playwright.sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=program, args=flags)
@@ -100,18 +71,16 @@ def opened(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
         browser.close()
 
 
-@pytest.mark.slow
 def test_layers_and_filters_change_the_shown_image(opened: Opened) -> None:
     """By buttons and by keys; no message and no request but for the page itself."""
     page = opened.page
     assert opened.shown.startswith("1 of 15: sample 0, color")
-    for layer in ("boxes", "names", "masks", "boxes3d", "points", "depth"):
+    for layer in ("boxes", "boxes3d", "masks", "keypoints", "points", "depth"):
         before = opened.pixels()
         page.click(f"button[data-layer={layer}]")
         page.wait_for_function(
             "before => document.querySelector('.stage canvas').toDataURL() !== before", arg=before
         )
-    assert page.is_disabled("button[data-layer=keypoints]")
     page.keyboard.press("6")
     page.wait_for_function(
         "!document.querySelector('.stage canvas').dataset.layers.includes('depth')"
@@ -122,14 +91,13 @@ def test_layers_and_filters_change_the_shown_image(opened: Opened) -> None:
     page.wait_for_selector(".stage p:not([hidden])")
     assert opened.shown == "0 images"
     page.fill("input[data-filter=size]", "")
-    page.select_option("select[aria-label='Category of the objects']", "robot_arm")
-    page.wait_for_function("document.querySelector('#shown').textContent.includes('1 of ')")
-    assert " 1 of " in opened.shown
+    page.select_option("select[aria-label='Category of the objects']", "bus")
+    page.wait_for_function("document.querySelector('#shown').textContent.includes('1 of 14')")
+    assert opened.shown.endswith("1 of 2 objects")
     assert opened.messages == []
     assert [url.partition(":")[0] for url in opened.requests if url[:5] != "data:"] == ["file"]
 
 
-@pytest.mark.slow
 def test_the_page_fits_a_phone(opened: Opened) -> None:
     """It does not scroll sideways, in the light and in the dark."""
     page = opened.page
@@ -140,7 +108,6 @@ def test_the_page_fits_a_phone(opened: Opened) -> None:
     assert page.locator("#parameters, #viewpoints, #checks, #licences").count() == 4
 
 
-@pytest.mark.slow
 def test_the_policy_blocks_other_scripts_and_requests(opened: Opened, tmp_path: Path) -> None:
     """Names of a hostile data set are shown as text, and what is added to the file does not run."""
     image = make_image(np.random.default_rng(4))
@@ -152,16 +119,19 @@ def test_the_policy_blocks_other_scripts_and_requests(opened: Opened, tmp_path: 
     browser = opened.page.context.browser
     assert browser is not None
     page = browser.new_page()
-    requests: list[str] = []
+    answered: list[str] = []
+    failed: dict[str, str | None] = {}
     dialogs: list[str] = []
-    page.on("request", lambda request: requests.append(request.url))
+    page.on("requestfinished", lambda request: answered.append(request.url))
+    page.on("requestfailed", lambda request: failed.update({request.url: request.failure}))
     page.on("dialog", lambda dialog: (dialogs.append(dialog.message), dialog.dismiss()))
 
     page.goto(path.as_uri())
     page.wait_for_selector(".stage canvas[data-layers]")
 
     assert page.evaluate("window.added") is None
-    assert [url for url in requests if url[:5] != "data:"] == [path.as_uri()]
+    assert [url for url in answered if url[:5] != "data:"] == [path.as_uri()]
+    assert failed == {"http://127.0.0.1:9/x.png": "csp"}  # refused before any connection
     assert dialogs == []
     assert HOSTILE in page.inner_text("#balance")
     assert HOSTILE in page.inner_text("#licences")
