@@ -32,6 +32,7 @@ TABLE = PluginTable[Exporter](
         "motchallenge": "gen_data.exporters.motchallenge:MotChallenge",
         "nuscenes": "gen_data.exporters.nuscenes:NuScenes",
         "pointclouds": "gen_data.exporters.pointclouds:PointClouds",
+        "rerun": "gen_data.exporters.rerun:Rerun",
         "semantickitti": "gen_data.exporters.semantickitti:SemanticKitti",
         "solo": "gen_data.exporters.solo:Solo",
         "tables": "gen_data.exporters.measurement_tables:Tables",

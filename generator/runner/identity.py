@@ -35,6 +35,7 @@ BYTES_DEPEND_ON = {
     "pybullet": "pybullet",
     "pycocotools": "pycocotools",
     "pyoidn": "pyoidn",
+    "rerun": "rerun-sdk",
     "scipy": "scipy",
     "trimesh": "trimesh",
     "warp": "warp-lang",

@@ -18,7 +18,6 @@ BYTES_DO_NOT_DEPEND_ON = {
     "platformdirs": "names the folders of caches",
     "pydantic": "checks values; the checked configuration is part of the plan",
     "pydantic_core": "the same",
-    "rerun": "shows samples",
     "rerun_cli": "shows samples",
     "rich": "draws progress on the terminal",
     "threadpoolctl": "limits BLAS to one thread, as workers do",

@@ -1,0 +1,345 @@
+"""Rerun recordings: images, scans, poses and labels of a number of samples, to be played.
+
+::
+
+    <split>/000000.rrd           the first samples of a split (``samples_per_file``), and so on
+
+Timelines are ``sample``, the index of the sample, and for sequences ``time`` [s], with one sequence
+after the other. Entities:
+
+===================================  ==============================================================
+``world``                            right-handed, Z up; ``/`` has the names of the classes
+``world/boxes``                      3D boxes of all objects that some camera sees
+``world/rigs/<name>``                poses of rigs
+``world/cameras/<name>``             pose; ``image``: pinhole, if the lens is one
+``world/cameras/<name>/image/...``   ``rgb``, ``depth`` and ``measured_depth`` as PNG files,
+                                     ``category``, ``boxes``, and ``keypoints/<instance id>``
+``world/lidars/<name>``              pose, and points in its frame with classes
+===================================  ==============================================================
+
+Class ids are category ids, 0 is the background. Quaternions are x y z w, boxes have half sizes, and
+principal points have pixel centres at i + 0.5. Ignored objects have no boxes and keypoints. Other
+channels and devices are not in it; meshes are in what ``gen-data preview`` shows.
+
+Reference: https://rerun.io/docs/reference/types.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+from pydantic import Field
+
+from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.fragments import fragment_rows, write_fragment
+from gen_data.exporters.label_colors import voc_palette
+from gen_data.exporters.point_cloud_io import read_points
+from gen_data.exporters.rrd_container import write_recording
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.sample import ObjectTruth, Sample
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.skeletons import Skeleton, find_skeleton
+
+DEPTHS = (Channel.Z_DEPTH, Channel.MEASURED_DEPTH)
+Row = Mapping[str, Any]
+"""Facts about one sample, as ``_sample_row`` makes them, with the folder of its shard."""
+
+
+class Rerun(ExporterBase):
+    """Rerun recordings of all cameras and laser scanners.
+
+    Attributes:
+        samples_per_file: Samples of a recording, which a viewer loads as a whole.
+    """
+
+    type: Literal["rerun"] = "rerun"
+    samples_per_file: int = Field(100, ge=1, le=10_000)
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Names of the annotators that it reads."""
+        return frozenset({"boxes2d", "boxes3d"})
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write a JSON line per sample; images and points are read when files are merged."""
+        rows = [_sample_row(info, sample) for sample in samples]
+        folder = shard_dir / self.type
+        folder.mkdir(parents=True, exist_ok=True)
+        for split in sorted({row["split"] for row in rows}):
+            write_fragment(folder, f"{split}.samples", [r for r in rows if r["split"] == split])
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Write the recordings of every split, one after the other."""
+        folders = [shard_dir / self.type for shard_dir in shard_dirs]
+        splits = sorted({p.name.split(".")[0] for f in folders for p in f.glob("*.samples.jsonl")})
+        keypoints = _collect_keypoints(shard_dirs, self.type, splits)
+        for split in splits:
+            rows = fragment_rows(shard_dirs, self.type, f"{split}.samples")
+            (dataset_dir / split).mkdir(parents=True, exist_ok=True)
+            number = 0
+            while members := list(islice(rows, self.samples_per_file)):
+                path = dataset_dir / split / f"{number:06d}.rrd"
+                listed = [{**row, "shard": shard_dir} for shard_dir, row in members]
+                name = f"{info.name}-{info.seed}-{split}-{number:06d}"
+                write_recording(path, list(_chunks(info, listed, keypoints)), name)
+                number += 1
+
+
+def _sample_row(info: DatasetInfo, sample: Sample) -> dict[str, Any]:
+    begins_s = (sample.index - sample.step_index) * info.step_s
+    seen = {
+        item.instance.instance_id: item
+        for truth in sample.truth.values()
+        for item in truth.objects
+        if item.box3d_world is not None and not item.ignored
+    }
+    return {
+        "index": sample.index,
+        "split": sample.split,
+        "time_s": round(begins_s + sample.scene.time_s, 9),
+        "boxes": [_box_row(seen[number]) for number in sorted(seen)],
+        "rigs": {rig.name: _pose(sample.scene.rig_pose(rig.name)) for rig in sample.scene.rigs},
+        "cameras": {
+            name: {
+                "time_s": round(begins_s + sample.capture.readings[name].time_s, 9),
+                **_image_row(sample, name),
+            }
+            for name in info.cameras
+            if name in sample.truth
+        },
+        "lidars": {
+            name: {
+                "time_s": round(begins_s + cloud.time_s, 9),
+                "pose": _pose(cloud.lidar.T_world_lidar),
+            }
+            for name, cloud in sorted(sample.capture.clouds.items())
+        },
+    }
+
+
+def _box_row(item: ObjectTruth) -> dict[str, Any]:
+    assert item.box3d_world is not None, "chosen before"
+    return {
+        "class": item.instance.category_id,
+        "pose": _pose(item.box3d_world.T_frame_box),
+        "half": [0.5 * size for size in item.box3d_world.size_m],
+    }
+
+
+def _image_row(sample: Sample, name: str) -> dict[str, Any]:
+    truth = sample.truth[name]
+    camera = truth.camera.intrinsics
+    items = [item for item in truth.objects if item.box is not None and not item.ignored]
+    return {
+        "pose": _pose(truth.camera.T_world_camera),
+        "size": [camera.width_px, camera.height_px],
+        "K": camera.matrix().tolist() if camera.straight else None,
+        "boxes": [
+            [item.instance.category_id, b.x_min, b.y_min, b.width_px, b.height_px]
+            for item in items
+            if (b := item.box) is not None
+        ],
+        "keypoints": {
+            f"{item.instance.instance_id}": {
+                "class": item.instance.category_id,
+                "names": [point.name for point in points],
+                "places": [point.image_px for point in points],
+            }
+            for item in items
+            if (points := [p for p in item.keypoints or () if p.visibility])
+        },
+    }
+
+
+def _pose(pose: SE3) -> list[float]:
+    """Position [m], and quaternion x y z w."""
+    w, x, y, z = pose.quaternion_wxyz
+    return [*pose.translation_m, x, y, z, w]
+
+
+def _collect_keypoints(
+    shard_dirs: Sequence[Path], exporter: str, splits: Iterable[str]
+) -> dict[int, Skeleton]:
+    """Skeletons by category id, of all keypoints that occur in the data set."""
+    names: dict[int, dict[str, None]] = {}
+    for split in splits:
+        for _, row in fragment_rows(shard_dirs, exporter, f"{split}.samples"):
+            for image in row["cameras"].values():
+                for item in image["keypoints"].values():
+                    names.setdefault(item["class"], {}).update(dict.fromkeys(item["names"]))
+    return {number: find_skeleton(sorted(found)) for number, found in sorted(names.items())}
+
+
+def _chunks(
+    info: DatasetInfo, rows: Sequence[Row], skeletons: Mapping[int, Skeleton]
+) -> Iterator[Any]:
+    """Chunks of a recording: one per entity and archetype."""
+    import rerun as rr
+    from rerun.chunk import Chunk
+
+    axes = rr.ViewCoordinates.columns(xyz=[rr.components.ViewCoordinates([3, 5, 1])])
+    yield Chunk.from_columns("world", indexes=[], columns=axes)
+    (classes,) = rr.AnnotationContext(_describe_classes(info, skeletons)).as_component_batches()
+    context = rr.ComponentColumn(classes.component_descriptor(), classes, lengths=[1])
+    yield Chunk.from_columns("/", indexes=[], columns=[context])
+    counts = [len(row["boxes"]) for row in rows]
+    if any(counts):
+        boxes = [box for row in rows for box in row["boxes"]]
+        columns = rr.Boxes3D.columns(
+            half_sizes=[box["half"] for box in boxes],
+            centers=[box["pose"][:3] for box in boxes],
+            quaternions=[box["pose"][3:] for box in boxes],
+            class_ids=[box["class"] for box in boxes],
+        )
+        yield _chunk(info, "world/boxes", rows, columns.partition(counts))
+    for rig in sorted({name for row in rows for name in row["rigs"]}):
+        mine = [{**row, "pose": row["rigs"][rig]} for row in rows if rig in row["rigs"]]
+        yield _poses(info, f"world/rigs/{rig}", mine)
+    for name in info.cameras:
+        images = [{**row, **row["cameras"][name]} for row in rows if name in row["cameras"]]
+        if images:
+            yield from _camera_chunks(info, name, images, skeletons)
+    for name in info.lidars:
+        scans = [{**row, **row["lidars"][name]} for row in rows if name in row["lidars"]]
+        if scans:
+            yield from _lidar_chunks(info, name, scans)
+
+
+def _describe_classes(info: DatasetInfo, skeletons: Mapping[int, Skeleton]) -> list[Any]:
+    """Names, colours and skeletons of the categories."""
+    import rerun as rr
+
+    palette = voc_palette()
+    described = [rr.ClassDescription(info=rr.AnnotationInfo(id=0, label="background"))]
+    for number, name in enumerate(info.categories, 1):
+        color = palette[1 + (number - 1) % 255].tolist()
+        skeleton = skeletons.get(number, Skeleton(()))
+        described.append(
+            rr.ClassDescription(
+                info=rr.AnnotationInfo(id=number, label=name, color=color),
+                keypoint_annotations=[
+                    rr.AnnotationInfo(id=k, label=label, color=color)
+                    for k, label in enumerate(skeleton.names)
+                ],
+                keypoint_connections=skeleton.bones,
+            )
+        )
+    return described
+
+
+def _camera_chunks(
+    info: DatasetInfo, name: str, rows: Sequence[Row], skeletons: Mapping[int, Skeleton]
+) -> Iterator[Any]:
+    import rerun as rr
+
+    path = f"world/cameras/{name}"
+    yield _poses(info, path, rows)
+    if rows[0]["K"] is not None:
+        pinhole = rr.Pinhole.columns(
+            image_from_camera=[rr.components.PinholeProjection(row["K"]) for row in rows],
+            resolution=[row["size"] for row in rows],
+            camera_xyz=[rr.components.ViewCoordinates([3, 2, 5])] * len(rows),
+        )
+        yield _chunk(info, f"{path}/image", rows, pinhole)
+    for channel in info.media[name]:
+        columns = _channel_columns(info, name, channel, rows)
+        if columns is not None:
+            yield _chunk(info, f"{path}/image/{channel.value}", rows, columns)
+    counts = [len(row["boxes"]) for row in rows]
+    if any(counts):
+        numbers = np.array([box for row in rows for box in row["boxes"]], np.float64)
+        half = 0.5 * numbers[:, 3:]
+        boxes = rr.Boxes2D.columns(
+            half_sizes=half,
+            centers=numbers[:, 1:3] + half,
+            class_ids=numbers[:, 0].astype(np.uint16),
+        )
+        yield _chunk(info, f"{path}/image/boxes", rows, boxes.partition(counts))
+    for instance in sorted({key for row in rows for key in row["keypoints"]}, key=int):
+        columns = _keypoint_columns([row["keypoints"].get(instance) for row in rows], skeletons)
+        yield _chunk(info, f"{path}/image/keypoints/{instance}", rows, columns)
+
+
+def _channel_columns(
+    info: DatasetInfo, name: str, channel: Channel, rows: Sequence[Row]
+) -> Any | None:
+    """Columns of the images of a channel; None for those that are left out."""
+    import rerun as rr
+    from rerun.components import ImageFormat
+    from rerun.encodings import ChannelDatatype
+
+    paths = [media_path(row["shard"], name, channel, row["index"]) for row in rows]
+    types = ["image/png"] * len(paths)
+    if channel is Channel.RGB:
+        return rr.EncodedImage.columns(blob=_blobs(paths), media_type=types)
+    if channel in DEPTHS:
+        units_per_m = [1.0 / info.depth_scale_m] * len(paths)
+        return rr.EncodedDepthImage.columns(blob=_blobs(paths), media_type=types, meter=units_per_m)
+    if channel is Channel.CATEGORY:
+        images = [cv2.imread(str(path), cv2.IMREAD_UNCHANGED) for path in paths]
+        return rr.SegmentationImage.columns(
+            buffer=[np.frombuffer(image.tobytes(), np.uint8) for image in images],
+            format=[
+                ImageFormat(width=w, height=h, channel_datatype=ChannelDatatype.U16)
+                for w, h in (row["size"] for row in rows)
+            ],
+        )
+    return None
+
+
+def _blobs(paths: Iterable[Path]) -> list[np.ndarray]:
+    return [np.frombuffer(path.read_bytes(), np.uint8) for path in paths]
+
+
+def _keypoint_columns(items: Sequence[Row | None], skeletons: Mapping[int, Skeleton]) -> Any:
+    """Columns of the keypoints of one object; none where it is not seen, which clears them."""
+    import rerun as rr
+
+    known = [item for item in items if item is not None]
+    return rr.Points2D.columns(
+        positions=[place for item in known for place in item["places"]],
+        class_ids=[item["class"] for item in known for _ in item["names"]],
+        keypoint_ids=[
+            skeletons[item["class"]].names.index(name) for item in known for name in item["names"]
+        ],
+    ).partition([0 if item is None else len(item["names"]) for item in items])
+
+
+def _lidar_chunks(info: DatasetInfo, name: str, rows: Sequence[Row]) -> Iterator[Any]:
+    import rerun as rr
+
+    path = f"world/lidars/{name}"
+    yield _poses(info, path, rows)
+    points = [read_points(row["shard"], name, row["index"]) for row in rows]
+    joined = np.concatenate(points)
+    if len(joined):
+        columns = rr.Points3D.columns(
+            positions=joined["position_m"], class_ids=joined["category_id"]
+        )
+        yield _chunk(info, path, rows, columns.partition([len(scan) for scan in points]))
+
+
+def _poses(info: DatasetInfo, path: str, rows: Sequence[Row]) -> Any:
+    """Chunk of the poses of an entity."""
+    import rerun as rr
+
+    poses = np.array([row["pose"] for row in rows], np.float64)
+    columns = rr.Transform3D.columns(translation=poses[:, :3], quaternion=poses[:, 3:])
+    return _chunk(info, path, rows, columns)
+
+
+def _chunk(info: DatasetInfo, path: str, rows: Sequence[Row], columns: Any) -> Any:
+    """Chunk of an entity with a row per sample."""
+    import rerun as rr
+    from rerun.chunk import Chunk
+
+    indexes = [rr.TimeColumn("sample", sequence=[row["index"] for row in rows])]
+    if info.steps_per_scene > 1:
+        indexes.append(rr.TimeColumn("time", duration=[row["time_s"] for row in rows]))
+    return Chunk.from_columns(path, indexes=indexes, columns=columns)
