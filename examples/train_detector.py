@@ -36,6 +36,9 @@ from gen_data.targets import detection_target
 PEAK_RATE = 2e-3
 """Largest learning rate of AdamW."""
 
+KEPT_MAX = 4000
+"""Most samples of a data set that are kept in memory."""
+
 
 def open_source(args: argparse.Namespace) -> gen_data.SampleSequence:
     """The samples to train on, with the classes of their label map if they have one."""
@@ -56,28 +59,39 @@ def training_target(sample: gen_data.Sample) -> tuple[NDArray[np.uint8], dict[st
 def read_batches(
     samples: gen_data.SampleSequence, args: argparse.Namespace
 ) -> Iterator[list[tuple[NDArray[np.uint8], dict[str, Any]]]]:
-    """Batches of training samples, epoch after epoch without end."""
+    """Batches of training samples, epoch after epoch without end.
+
+    Small data sets are kept in memory after the first epoch: reading a sample takes longer than
+    a training step on it.
+    """
     epoch = {} if samples.is_bounded else {"epoch_size": args.epoch_size}
     loader = gen_data.Loader(
         samples, training_target, batch_size=args.batch, shuffle=True, seed=args.seed,
         workers=args.workers, **epoch,
     )  # fmt: skip
-    while True:
-        seen = 0
+    is_small = samples.is_bounded and len(samples) <= KEPT_MAX
+    rng, seen = np.random.default_rng(args.seed), []
+    while not (is_small and seen):
         for batch in loader:
-            kept = [pair for pair in batch if pair is not None]
-            seen += len(kept)
-            if kept:
-                yield kept
+            chosen = [pair for pair in batch if pair is not None]
+            seen += chosen if is_small else chosen[:1]
+            if chosen:
+                yield chosen
         if not seen:
             raise SystemExit(f"{args.source}: has no sample in the split 'train'")
+    while True:
+        order = rng.permutation(len(seen))
+        for numbers in np.split(order, range(args.batch, len(seen), args.batch)):
+            yield [seen[number] for number in numbers]
 
 
 def train(samples: gen_data.SampleSequence, args: argparse.Namespace) -> Detector:
     """Train for ``--minutes`` or ``--steps``, whichever ends first."""
     torch.manual_seed(args.seed)
     rng = np.random.default_rng(args.seed)
-    model = Detector(samples.categories, args.size).to(memory_format=torch.channels_last)
+    model = Detector(samples.categories, args.size, args.width).to(
+        memory_format=torch.channels_last
+    )
     optimizer = torch.optim.AdamW(model.parameters(), lr=PEAK_RATE, weight_decay=0.01)
     started_s = time.monotonic()
     for step, batch in enumerate(read_batches(samples, args)):
@@ -206,6 +220,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--minutes", type=float, default=15.0, help="longest time of training")
     parser.add_argument("--steps", type=float, default=float("inf"), help="most training steps")
     parser.add_argument("--size", type=int, default=256, help="longest side of its images [px]")
+    parser.add_argument("--width", type=int, default=16, help="channels of its finest features")
     parser.add_argument("--batch", type=int, default=8)
     parser.add_argument("--epoch-size", type=int, default=2000, help="samples, for configurations")
     parser.add_argument("--workers", type=int, default=1, help="processes that read or render")
