@@ -150,6 +150,24 @@ def find_images(folder: Path, annotations: Path, names: list[str]) -> list[Path]
     return images
 
 
+def detect_all(
+    model: Detector, truth: COCO, files: list[Path], ids: dict[str, int]
+) -> list[dict[str, Any]]:
+    """Detections in all images in COCO's format of results; ``ids`` are its categories by name."""
+    results = []
+    for entry, file in zip(truth.dataset["images"], files, strict=True):
+        image = cv2.imread(str(file))
+        if image is None:
+            raise SystemExit(f"{file}: cannot be read as an image")
+        for (x0, y0, x1, y1), score, label in zip(*detect(model, image[..., ::-1]), strict=True):
+            name = model.classes[label - 1]
+            if name in ids:
+                box = [float(v) for v in (x0, y0, x1 - x0, y1 - y0)]
+                result = {"image_id": entry["id"], "category_id": ids[name], "bbox": box}
+                results.append(result | {"score": float(score)})
+    return results
+
+
 def evaluate(model: Detector, args: argparse.Namespace) -> dict[str, Any]:
     """Print AP and AP50 with confidence intervals, and AP50 per class; return them."""
     path = find_annotations(args.eval, args.split)
@@ -158,17 +176,10 @@ def evaluate(model: Detector, args: argparse.Namespace) -> dict[str, Any]:
     ids = {c["name"]: c["id"] for c in truth.dataset["categories"] if c["name"] in model.classes}
     if not ids:
         raise SystemExit(f"{path}: has none of the classes {', '.join(model.classes)}")
-    results = []
-    entries = truth.dataset["images"]
-    files = find_images(args.eval, path, [entry["file_name"] for entry in entries])
-    for entry, file in zip(entries, files, strict=True):
-        image = cv2.imread(str(file))
-        for (x0, y0, x1, y1), score, label in zip(*detect(model, image[..., ::-1]), strict=True):
-            name = model.classes[label - 1]
-            if name in ids:
-                box = [float(v) for v in (x0, y0, x1 - x0, y1 - y0)]
-                result = {"image_id": entry["id"], "category_id": ids[name], "bbox": box}
-                results.append(result | {"score": float(score)})
+    names = [image["file_name"] for image in truth.dataset["images"]]
+    results = detect_all(model, truth, find_images(args.eval, path, names), ids)
+    if not results:
+        raise SystemExit(f"{path}: none of its classes was detected in the images")
     with contextlib.redirect_stdout(io.StringIO()):
         judged = COCOeval(truth, truth.loadRes(results), "bbox")
         judged.params.catIds = sorted(ids.values())
@@ -186,12 +197,11 @@ def evaluate(model: Detector, args: argparse.Namespace) -> dict[str, Any]:
         mean = float(np.nanmean(measured[row]))
         print(f"{name:<5} {mean:.3f}  (95 %: {low[row]:.3f} to {high[row]:.3f}; {count} images)")
         summary[name.lower()] = mean
-    names = {number: name for name, number in ids.items()}
-    classes = [names[number] for number in judged.params.catIds]
-    summary["ap50_by_class"] = dict(zip(classes, measured[1].tolist(), strict=True))
-    print(
-        "AP50 by class: " + ", ".join(f"{k} {v:.2f}" for k, v in summary["ap50_by_class"].items())
-    )
+    classes = sorted(ids, key=ids.__getitem__)
+    by_class = zip(classes, measured[1].tolist(), strict=True)
+    summary["ap50_by_class"] = {name: ap for name, ap in by_class if not np.isnan(ap)}
+    parts = [f"{name} {ap:.2f}" for name, ap in summary["ap50_by_class"].items()]
+    print(f"AP50 by class: {', '.join(parts)}")
     return summary
 
 
