@@ -36,6 +36,9 @@ from gen_data.targets import detection_target
 PEAK_RATE = 2e-3
 """Largest learning rate of AdamW."""
 
+KEPT_MAX = 4000
+"""Most samples of a data set that are kept in memory."""
+
 
 def open_source(args: argparse.Namespace) -> gen_data.SampleSequence:
     """The samples to train on, with the classes of their label map if they have one."""
@@ -56,28 +59,39 @@ def training_target(sample: gen_data.Sample) -> tuple[NDArray[np.uint8], dict[st
 def read_batches(
     samples: gen_data.SampleSequence, args: argparse.Namespace
 ) -> Iterator[list[tuple[NDArray[np.uint8], dict[str, Any]]]]:
-    """Batches of training samples, epoch after epoch without end."""
+    """Batches of training samples, epoch after epoch without end.
+
+    Small data sets are kept in memory after the first epoch: reading a sample takes longer than
+    a training step on it.
+    """
     epoch = {} if samples.is_bounded else {"epoch_size": args.epoch_size}
     loader = gen_data.Loader(
         samples, training_target, batch_size=args.batch, shuffle=True, seed=args.seed,
         workers=args.workers, **epoch,
     )  # fmt: skip
-    while True:
-        seen = 0
+    is_small = samples.is_bounded and len(samples) <= KEPT_MAX
+    rng, seen = np.random.default_rng(args.seed), []
+    while not (is_small and seen):
         for batch in loader:
-            kept = [pair for pair in batch if pair is not None]
-            seen += len(kept)
-            if kept:
-                yield kept
+            chosen = [pair for pair in batch if pair is not None]
+            seen += chosen if is_small else chosen[:1]
+            if chosen:
+                yield chosen
         if not seen:
             raise SystemExit(f"{args.source}: has no sample in the split 'train'")
+    while True:
+        order = rng.permutation(len(seen))
+        for numbers in np.split(order, range(args.batch, len(seen), args.batch)):
+            yield [seen[number] for number in numbers]
 
 
 def train(samples: gen_data.SampleSequence, args: argparse.Namespace) -> Detector:
     """Train for ``--minutes`` or ``--steps``, whichever ends first."""
     torch.manual_seed(args.seed)
     rng = np.random.default_rng(args.seed)
-    model = Detector(samples.categories, args.size).to(memory_format=torch.channels_last)
+    model = Detector(samples.categories, args.size, args.width).to(
+        memory_format=torch.channels_last
+    )
     optimizer = torch.optim.AdamW(model.parameters(), lr=PEAK_RATE, weight_decay=0.01)
     started_s = time.monotonic()
     for step, batch in enumerate(read_batches(samples, args)):
@@ -136,6 +150,24 @@ def find_images(folder: Path, annotations: Path, names: list[str]) -> list[Path]
     return images
 
 
+def detect_all(
+    model: Detector, truth: COCO, files: list[Path], ids: dict[str, int]
+) -> list[dict[str, Any]]:
+    """Detections in all images in COCO's format of results; ``ids`` are its categories by name."""
+    results = []
+    for entry, file in zip(truth.dataset["images"], files, strict=True):
+        image = cv2.imread(str(file))
+        if image is None:
+            raise SystemExit(f"{file}: cannot be read as an image")
+        for (x0, y0, x1, y1), score, label in zip(*detect(model, image[..., ::-1]), strict=True):
+            name = model.classes[label - 1]
+            if name in ids:
+                box = [float(v) for v in (x0, y0, x1 - x0, y1 - y0)]
+                result = {"image_id": entry["id"], "category_id": ids[name], "bbox": box}
+                results.append(result | {"score": float(score)})
+    return results
+
+
 def evaluate(model: Detector, args: argparse.Namespace) -> dict[str, Any]:
     """Print AP and AP50 with confidence intervals, and AP50 per class; return them."""
     path = find_annotations(args.eval, args.split)
@@ -144,17 +176,10 @@ def evaluate(model: Detector, args: argparse.Namespace) -> dict[str, Any]:
     ids = {c["name"]: c["id"] for c in truth.dataset["categories"] if c["name"] in model.classes}
     if not ids:
         raise SystemExit(f"{path}: has none of the classes {', '.join(model.classes)}")
-    results = []
-    entries = truth.dataset["images"]
-    files = find_images(args.eval, path, [entry["file_name"] for entry in entries])
-    for entry, file in zip(entries, files, strict=True):
-        image = cv2.imread(str(file))
-        for (x0, y0, x1, y1), score, label in zip(*detect(model, image[..., ::-1]), strict=True):
-            name = model.classes[label - 1]
-            if name in ids:
-                box = [float(v) for v in (x0, y0, x1 - x0, y1 - y0)]
-                result = {"image_id": entry["id"], "category_id": ids[name], "bbox": box}
-                results.append(result | {"score": float(score)})
+    names = [image["file_name"] for image in truth.dataset["images"]]
+    results = detect_all(model, truth, find_images(args.eval, path, names), ids)
+    if not results:
+        raise SystemExit(f"{path}: none of its classes was detected in the images")
     with contextlib.redirect_stdout(io.StringIO()):
         judged = COCOeval(truth, truth.loadRes(results), "bbox")
         judged.params.catIds = sorted(ids.values())
@@ -172,12 +197,11 @@ def evaluate(model: Detector, args: argparse.Namespace) -> dict[str, Any]:
         mean = float(np.nanmean(measured[row]))
         print(f"{name:<5} {mean:.3f}  (95 %: {low[row]:.3f} to {high[row]:.3f}; {count} images)")
         summary[name.lower()] = mean
-    names = {number: name for name, number in ids.items()}
-    classes = [names[number] for number in judged.params.catIds]
-    summary["ap50_by_class"] = dict(zip(classes, measured[1].tolist(), strict=True))
-    print(
-        "AP50 by class: " + ", ".join(f"{k} {v:.2f}" for k, v in summary["ap50_by_class"].items())
-    )
+    classes = sorted(ids, key=ids.__getitem__)
+    by_class = zip(classes, measured[1].tolist(), strict=True)
+    summary["ap50_by_class"] = {name: ap for name, ap in by_class if not np.isnan(ap)}
+    parts = [f"{name} {ap:.2f}" for name, ap in summary["ap50_by_class"].items()]
+    print(f"AP50 by class: {', '.join(parts)}")
     return summary
 
 
@@ -206,6 +230,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--minutes", type=float, default=15.0, help="longest time of training")
     parser.add_argument("--steps", type=float, default=float("inf"), help="most training steps")
     parser.add_argument("--size", type=int, default=256, help="longest side of its images [px]")
+    parser.add_argument("--width", type=int, default=16, help="channels of its finest features")
     parser.add_argument("--batch", type=int, default=8)
     parser.add_argument("--epoch-size", type=int, default=2000, help="samples, for configurations")
     parser.add_argument("--workers", type=int, default=1, help="processes that read or render")

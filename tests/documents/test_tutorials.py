@@ -38,8 +38,8 @@ SMALLER = {
     },
     "render_while_training": {"--n 200": "--n 2", "[320, 240]": "[96, 72]"},
     "street_rig": {
-        "steps_per_scene: 20": "steps_per_scene: 3", "shard_size: 20": "shard_size: 3",
-        "--n 200": "--n 3", "[960, 540]": "[192, 108]",
+        "steps_per_scene: 20": "steps_per_scene: 2", "shard_size: 20": "shard_size: 2",
+        "--n 200": "--n 2", "[960, 540]": "[192, 108]",
     },
     "train_a_detector": {
         "examples/detector.yaml": "examples/detector.yaml --set sensors.color.size_px=[96,72]",
