@@ -31,6 +31,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -39,7 +40,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.exporters.measurement_tables import write_table
-from gen_data.exporters.png import RowFilter, encode_png
+from gen_data.exporters.png import RowFilter, decode_png, encode_png
 from gen_data.exporters.point_cloud_io import write_cloud
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError, SampleError, StorageError
@@ -139,19 +140,34 @@ def read_image(path: Path, channel: Channel, depth_scale_m: float) -> NDArray[An
     Raises:
         StorageError: the file is missing or no PNG.
     """
-    pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    return _decode_pixels(channel, read_pixels(path), depth_scale_m)
+
+
+def read_pixels(path: Path) -> NDArray[Any]:
+    """Read the pixels of an image file, uint8 or uint16, [h, w] or RGB [h, w, 3].
+
+    Raises:
+        StorageError: the file is missing or no image.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError:
+        data = b""
+    pixels = decode_png(data)
+    if pixels is None and data:
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        if pixels is not None and pixels.ndim == 3:
+            pixels = cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB)
     if pixels is None:
         raise StorageError(f"{path}: missing or no PNG file; generate the data set again")
-    if pixels.ndim == 3:
-        pixels = np.ascontiguousarray(pixels[..., ::-1])
-    return _decode_pixels(channel, pixels, depth_scale_m)
+    return pixels
 
 
 def _decode_pixels(channel: Channel, pixels: NDArray[Any], depth_scale_m: float) -> NDArray[Any]:
     """Convert the pixels of a PNG to physical values."""
     match channel:
         case Channel.Z_DEPTH | Channel.RANGE | Channel.MEASURED_DEPTH:
-            return np.where(pixels > 0, pixels * depth_scale_m, np.inf).astype(np.float32)
+            return depths_of_units(depth_scale_m)[pixels]
         case Channel.DISPARITY | Channel.DISPARITY_VISIBLE:
             return np.asarray(pixels / 256.0, np.float32)
         case Channel.FLOW_FORWARD | Channel.FLOW_BACKWARD:
@@ -169,6 +185,15 @@ def _decode_pixels(channel: Channel, pixels: NDArray[Any], depth_scale_m: float)
             return np.asarray(pixels / 65_535.0, np.float32)
         case _:
             return pixels
+
+
+@cache
+def depths_of_units(depth_scale_m: float) -> NDArray[np.float32]:
+    """Depth [m] of every value of a 16-bit image, [65536]; inf for 0. Read-only."""
+    units = np.arange(DEPTH_UNITS_MAX + 1)
+    table = np.where(units > 0, units * depth_scale_m, np.inf).astype(np.float32)
+    table.flags.writeable = False
+    return table
 
 
 def _decode_signed(pixels: NDArray[Any], unit: float) -> NDArray[np.float32]:

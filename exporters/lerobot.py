@@ -33,12 +33,12 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any, Literal
 
-import cv2
 import numpy as np
 from pydantic import PrivateAttr
 
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.fragments import fragment_rows
+from gen_data.exporters.image_files import read_pixels
 from gen_data.exporters.parquet_tables import (
     GROUP_ROWS,
     IMAGE,
@@ -50,7 +50,7 @@ from gen_data.exporters.parquet_tables import (
 from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import FRAMES, Frame, frame_facts, write_frames, write_text
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, StorageError
+from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, media_path
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Articulation, Scene
@@ -200,14 +200,12 @@ def task_sentence(scene: Scene, arm: Articulation) -> str:
 
 def _image_sums(path: Path) -> dict[str, Any]:
     """Sums over every n-th pixel by channel, whole numbers from 0 to 255."""
-    bgr = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    if bgr is None:
-        raise StorageError(f"{path}: missing or no PNG file; generate the data set again")
-    height, width = bgr.shape[:2]
+    rgb = read_pixels(path)
+    height, width = rgb.shape[:2]
     longer = max(width, height)
     stride = max(1, longer // STATISTICS_PX) if longer >= WHOLE_PX else 1
     values = np.arange(256)
-    counts = [np.bincount(bgr[::stride, ::stride, k].ravel(), minlength=256) for k in (2, 1, 0)]
+    counts = [np.bincount(rgb[::stride, ::stride, k].ravel(), minlength=256) for k in range(3)]
     present = [np.flatnonzero(count) for count in counts]
     return {
         "size_px": [width, height],

@@ -37,13 +37,13 @@ import numpy as np
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.fragments import fragment_rows, write_fragment
-from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_files import link_or_copy, read_pixels
 from gen_data.exporters.label_colors import voc_palette
-from gen_data.exporters.png import UInt8, encode_palette_png
+from gen_data.exporters.label_png import UInt16, encode_label_png, number_masks
 from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
 from gen_data.exporters.sequences import write_bytes
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, StorageError
+from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo, media_path
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 
@@ -145,10 +145,10 @@ class Voc(ExporterBase):
         folder = shard_dir / self.type
         text = annotation_text(info, truth, listed, file_name)
         write_bytes(folder / f"{stem}.xml", text.encode())
-        classes, objects = label_images(truth, listed)
-        colors = voc_palette()
-        write_bytes(folder / f"{stem}.class.png", encode_palette_png(classes, colors, 2))
-        write_bytes(folder / f"{stem}.object.png", encode_palette_png(objects, colors, 2))
+        for suffix, image in zip(
+            (".class.png", ".object.png"), label_images(truth, listed), strict=True
+        ):
+            write_bytes(folder / f"{stem}{suffix}", image)
         if self.images == "jpeg":
             source = media_path(shard_dir, sensor, Channel.RGB, sample.index)
             write_bytes(folder / f"{stem}.jpg", encode_jpeg(source))
@@ -177,8 +177,8 @@ def annotation_text(
     )
 
 
-def label_images(truth: ImageTruth, listed: Sequence[ObjectTruth]) -> tuple[UInt8, UInt8]:
-    """Images of classes and of objects, uint8 [h, w].
+def label_images(truth: ImageTruth, listed: Sequence[ObjectTruth]) -> tuple[bytes, bytes]:
+    """PNG files of classes and of objects, indices of VOC's colours.
 
     Args:
         truth: Truth of the image.
@@ -186,16 +186,16 @@ def label_images(truth: ImageTruth, listed: Sequence[ObjectTruth]) -> tuple[UInt
             254th, are void.
     """
     camera = truth.camera.intrinsics
-    classes = np.zeros((camera.height_px, camera.width_px), np.uint8)
-    objects = np.zeros_like(classes)
-    for number, thing in enumerate(listed, 1):
-        assert thing.mask is not None, "the annotation instance_masks is in `needs`"
-        mask, void = thing.mask, thing.ignored or number > LABELS_MAX
-        height, width = mask.pixels.shape
-        crop = np.s_[mask.y_px : mask.y_px + height, mask.x_px : mask.x_px + width]
-        classes[crop][mask.pixels] = VOID if void else thing.instance.category_id
-        objects[crop][mask.pixels] = VOID if void else number
-    return classes, objects
+    numbers = number_masks(listed, camera.height_px, camera.width_px)
+    void = [thing.ignored or k > LABELS_MAX for k, thing in enumerate(listed, 1)]
+    classes = [VOID if v else t.instance.category_id for v, t in zip(void, listed, strict=True)]
+    objects = [VOID if v else k for k, v in enumerate(void, 1)]
+    return _indices_png(numbers, classes), _indices_png(numbers, objects)
+
+
+def _indices_png(numbers: UInt16, indices: Sequence[int]) -> bytes:
+    """PNG file of indices by number of object, from 1."""
+    return encode_label_png(numbers, np.array([0, *indices], np.uint8), voc_palette())
 
 
 def encode_jpeg(source: Path) -> bytes:
@@ -204,9 +204,7 @@ def encode_jpeg(source: Path) -> bytes:
     Raises:
         StorageError: the file is missing or no PNG.
     """
-    image = cv2.imread(str(source), cv2.IMREAD_COLOR)
-    if image is None:
-        raise StorageError(f"{source}: missing or no PNG")
+    image = cv2.cvtColor(read_pixels(source), cv2.COLOR_RGB2BGR)
     _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return data.tobytes()
 
