@@ -35,7 +35,7 @@ def measure(folder: Path, entry: dict[str, Any], n: int) -> tuple[float, float]:
         ConfigError: the data set cannot be exported in this format.
     """
     stored = StoredSamples(folder)
-    config = load_config(folder, overrides=[f"exporters={json.dumps([entry])}"])
+    config = load_config(str(folder), overrides=[f"exporters={json.dumps([entry])}"])
     exporters = ready_exporters(config, stored.info, open_library(config.asset_folders))
     ((name, exporter),) = exporters.items()
     pipeline = StoredPipeline(stored, exporters, config.asset_folders)

@@ -28,13 +28,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 from xml.sax.saxutils import escape
 
 import cv2
 import numpy as np
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy, read_pixels
@@ -44,7 +44,7 @@ from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
 from gen_data.exporters.sequences import write_bytes
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 
 YEAR = "VOCdevkit/VOC2012"
@@ -69,8 +69,11 @@ class Voc(ExporterBase):
     """Pascal VOC boxes and label images of all cameras with the rgb channel."""
 
     type: Literal["voc"] = "voc"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     images: Literal["jpeg", "png"] = "jpeg"
-    """JPEG files of quality 95, which all readers take, or links to the lossless PNG files."""
+    """JPEG files, which all readers take: of quality 95, or links if the camera writes JPEG; or
+    links to the files as they are."""
 
     @property
     def needs(self) -> frozenset[str]:
@@ -117,7 +120,9 @@ class Voc(ExporterBase):
                 for suffix, folder in FOLDERS.items():
                     source = shard_dir / self.type / f"{stem}{suffix}"
                     link_or_copy(source, root / folder / f"{stem}{source.suffix}")
-                link_or_copy(self._image(shard_dir, row), root / "JPEGImages" / row["file_name"])
+                link_or_copy(
+                    self._image(info, shard_dir, row), root / "JPEGImages" / row["file_name"]
+                )
                 for name, line in _list_lines(info, row):
                     if name not in files:
                         path = root / "ImageSets" / f"{name}.txt"
@@ -133,7 +138,7 @@ class Voc(ExporterBase):
         # VOC's files name objects by their order; ignored ones have no number in label images.
         listed.sort(key=lambda thing: thing.ignored)
         stem = Path(image_name(sample.index, sensor)).stem
-        file_name = f"{stem}.{'jpg' if self.images == 'jpeg' else 'png'}"
+        file_name = f"{stem}{self._suffix(info, sensor)}"
         row = {
             "stem": stem,
             "file_name": file_name,
@@ -149,15 +154,22 @@ class Voc(ExporterBase):
             (".class.png", ".object.png"), label_images(truth, listed), strict=True
         ):
             write_bytes(folder / f"{stem}{suffix}", image)
-        if self.images == "jpeg":
-            source = media_path(shard_dir, sensor, Channel.RGB, sample.index)
+        if self._encodes(info, sensor):
+            source = info.media_path(shard_dir, sensor, Channel.RGB, sample.index)
             write_bytes(folder / f"{stem}.jpg", encode_jpeg(source))
         return row
 
-    def _image(self, shard_dir: Path, row: dict[str, Any]) -> Path:
-        if self.images == "jpeg":
+    def _encodes(self, info: DatasetInfo, sensor: str) -> bool:
+        """Whether it makes JPEG files of other ones."""
+        return self.images == "jpeg" and info.encoding(sensor, Channel.RGB).format != "jpeg"
+
+    def _suffix(self, info: DatasetInfo, sensor: str) -> str:
+        return ".jpg" if self.images == "jpeg" else info.encoding(sensor, Channel.RGB).suffix
+
+    def _image(self, info: DatasetInfo, shard_dir: Path, row: dict[str, Any]) -> Path:
+        if self._encodes(info, row["sensor"]):
             return shard_dir / self.type / str(row["file_name"])
-        return media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
+        return info.media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
 
 
 def annotation_text(

@@ -17,9 +17,11 @@ from gen_data.generator.runner.progress import RunMonitor, RunProgress, Summary
 from gen_data.generator.runner.shard import (
     EnteredPipeline,
     Job,
+    LinkedDigests,
     MediaWriter,
     RecordWriter,
     make_shard,
+    no_digests,
     write_images,
     write_records,
 )
@@ -44,13 +46,14 @@ class Settings:
         full_check: On resumption, hash existing files instead of comparing sizes. This also
             repairs a damaged data set: damaged shards are generated again.
         limits: Limits on silence, deaths and memory of workers.
-        write_media, write_records: See ``Job``; picklable.
+        write_media, write_records, linked_digests: See ``Job``; picklable.
     """
 
     full_check: bool = False
     limits: Limits = field(default_factory=Limits)
     write_media: MediaWriter = write_images
     write_records: RecordWriter = write_records
+    linked_digests: LinkedDigests = no_digests
 
 
 def _silent(progress: RunProgress) -> None:
@@ -94,7 +97,14 @@ def run(  # noqa: PLR0913  (every argument is the choice of the caller)
         with interruption.immediate(), store.errors():
             store.state(plan)
         with store.locked():
-            job = Job(plan, store, make_pipeline, settings.write_media, settings.write_records)
+            job = Job(
+                plan,
+                store,
+                make_pipeline,
+                settings.write_media,
+                settings.write_records,
+                settings.linked_digests,
+            )
             run_ = _Run(job, workers, progress or _silent, settings, interruption)
             return replace(run_.execute(licences), folder=str(out))
 

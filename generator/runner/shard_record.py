@@ -7,12 +7,19 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene_assets import assets_in
 from gen_data.generator.core.serialization import canonical_json, from_plain
-from gen_data.generator.runner.durable_files import IRREGULAR, hash_file, tree_sizes
+from gen_data.generator.runner.durable_files import (
+    IRREGULAR,
+    Inode,
+    get_inode,
+    hash_file,
+    tree_sizes,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +81,15 @@ def parse_record(data: bytes) -> ShardRecord | None:
 
 
 def describe_shard(
-    shard: int, indices: range, samples: Iterable[Sample], folder: Path
+    shard: int,
+    indices: range,
+    samples: Iterable[Sample],
+    folder: Path,
+    known: Mapping[Inode, str] = MappingProxyType({}),
 ) -> ShardRecord:
-    """Make the record of a finished shard folder; hashes every file.
+    """Make the record of a finished shard folder; hashes every file of unknown digest.
+
+    ``known`` are digests by inode, of files that are linked from a committed shard.
 
     Raises:
         StorageError: the folder contains something other than regular files and folders.
@@ -96,7 +109,9 @@ def describe_shard(
         raise StorageError(
             f"shard {shard}: {irregular[0]} is not a regular file; exporters must write files"
         )
-    files = tuple(FileRecord(path, size, hash_file(folder / path)) for path, size in sizes.items())
+    files = tuple(
+        FileRecord(path, size, _digest(folder / path, known)) for path, size in sizes.items()
+    )
     return ShardRecord(
         shard,
         indices.start,
@@ -107,6 +122,11 @@ def describe_shard(
         tuple(sorted(assets)),
         files,
     )
+
+
+def _digest(path: Path, known: Mapping[Inode, str]) -> str:
+    digest = known.get(get_inode(path)) if known else None
+    return digest or hash_file(path)
 
 
 def sum_counts(counts: Iterable[SplitCount]) -> tuple[SplitCount, ...]:

@@ -21,7 +21,7 @@ import shlex
 import shutil
 import socket
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from enum import Enum
@@ -29,6 +29,7 @@ from pathlib import Path
 
 from gen_data.generator.core.errors import ConfigError, DeterminismError, StorageError
 from gen_data.generator.runner.durable_files import (
+    Inode,
     hash_file,
     make_folder,
     move_durably,
@@ -204,8 +205,10 @@ class LocalStore:
             return folder
         raise StorageError(f"{self.scratch_root}: {SCRATCH_FOLDERS_MAX} unfinished folders")
 
-    def commit(self, folder: Path, record: ShardRecord) -> None:
+    def commit(self, folder: Path, record: ShardRecord, synced: Container[Inode] = ()) -> None:
         """Publish a finished shard: files, then folder, then record, each synced before the next.
+
+        ``synced`` are the inodes of files that are already on the disk.
 
         Publishing the same bytes twice changes nothing.
 
@@ -216,7 +219,7 @@ class LocalStore:
         if committed is not None:
             self._expect_equal(committed, record, folder)
             return
-        sync_tree(folder)
+        sync_tree(folder, synced)
         # A kill between the two steps below leaves a folder without a record.
         self.quarantine(record.shard)
         move_durably(folder, self.shard_dir(record.shard))
