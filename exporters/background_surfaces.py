@@ -23,7 +23,7 @@ from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, media_path
 from gen_data.generator.core.rolling_shutter_projection import world_points
 from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Body, Camera
+from gen_data.generator.core.scene import Body, Camera, Scene
 from gen_data.generator.core.se3 import Array
 
 UInt8 = NDArray[np.uint8]
@@ -78,12 +78,33 @@ def read_surfaces(
     view, far = sample.truth[camera].camera, ~np.isfinite(depth_m)
     if sky_known:
         surfaces[free & far & _shows_sky(view)] = SKY
-    rows, columns = np.nonzero(free & ~far)
     if ground:
-        p_camera = view.intrinsics.unproject(depth_m)[rows, columns]
-        p_world = world_points(sample.scene_of(camera), view, p_camera, rows)
-        surfaces[rows, columns] = _look_up(ground, view, p_world)
+        places = np.flatnonzero(free & ~far)
+        points_m = _ground_points(sample.scene_of(camera), view, depth_m, places)
+        surfaces.ravel()[places] = _look_up(ground, view, points_m)
     return instances, surfaces
+
+
+def _ground_points(
+    scene: Scene, view: Camera, depth_m: NDArray[np.float32], places: NDArray[np.intp]
+) -> tuple[Array, Array]:
+    """World X and Y [m] of the points at some pixels, given by their places in the flat image."""
+    rows, columns = np.divmod(places, depth_m.shape[1])
+    if view.shutter.rolls or not view.intrinsics.straight:
+        p_camera = view.intrinsics.unproject(depth_m)[rows, columns]
+        p_world = world_points(scene, view, p_camera, rows)
+        return p_world[:, 0], p_world[:, 1]
+    # Without a rolling shutter, rays are sums of one term by column and one by row.
+    k, R = view.intrinsics, view.T_world_camera.rotation()
+    u = (np.arange(k.width_px) + 0.5 - k.cx_px) / k.fx_px
+    v = (np.arange(k.height_px) + 0.5 - k.cy_px) / k.fy_px
+    z = depth_m.ravel()[places].astype(np.float64)
+    x_m, y_m = (
+        ((R[axis, 0] * u)[columns] + (R[axis, 1] * v + R[axis, 2])[rows]) * z
+        + view.T_world_camera.translation_m[axis]
+        for axis in range(2)
+    )
+    return x_m, y_m
 
 
 def _shows_sky(view: Camera) -> NDArray[np.bool_]:
@@ -143,20 +164,23 @@ def _extent_m2(piece: _Piece) -> float:
     return float(round(size[0] * size[1] / 1e4))
 
 
-def _look_up(ground: tuple[_Piece, ...], view: Camera, p_world: Array) -> UInt8:
-    """Surfaces below points [n, 3]; 0 outside all maps."""
+def _look_up(ground: tuple[_Piece, ...], view: Camera, points_m: tuple[Array, Array]) -> UInt8:
+    """Surfaces below points of world X and Y, [n] each; 0 outside all maps."""
     x, y, _ = view.T_world_camera.translation_m
-    found = np.zeros(len(p_world), np.uint8)
-    left = np.ones(len(p_world), bool)
+    found = np.zeros(len(points_m[0]), np.uint8)
+    left = np.arange(len(found))
     for cell_m, reach_m, step_m in MAPS:
         middle = (step_m * round(x / step_m), step_m * round(y / step_m))
         count = 2 * round((reach_m + 0.5 * step_m) / cell_m)
-        cells = np.floor((p_world[:, :2] - middle) / cell_m + 0.5 * count)
-        inside = left & ((cells >= 0) & (cells < count)).all(axis=1)
+        column, row = (
+            np.floor((values[left] - middle[axis]) / cell_m + 0.5 * count)
+            for axis, values in enumerate(points_m)
+        )
+        inside = (column >= 0) & (column < count) & (row >= 0) & (row < count)
         if inside.any():
-            column, row = cells[inside].astype(np.intp).T
-            found[inside] = _draw_map(ground, middle, cell_m, count)[row, column]
-        left &= ~inside
+            cell = row[inside].astype(np.intp) * count + column[inside].astype(np.intp)
+            found[left[inside]] = _draw_map(ground, middle, cell_m, count).ravel()[cell]
+        left = left[~inside]
     return found
 
 

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-from typing import TypeVar
+from typing import ClassVar, TypeVar, get_args
 
 from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel, ImageFormat
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
+from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, Exporter
+
+PNG_ONLY = frozenset({"png"})
+ANY_FORMAT: frozenset[str] = frozenset(get_args(ImageFormat))
 
 E = TypeVar("E", bound="ExporterBase")
 
 
 class ExporterBase(Strict):
     """An exporter that needs no annotator and no geometry, and accepts any data set."""
+
+    image_formats: ClassVar[frozenset[str]] = PNG_ONLY
+    """Formats of photographs that it can hold; see ``check_image_formats``."""
 
     @property
     def needs(self) -> frozenset[str]:
@@ -37,6 +44,23 @@ class ExporterBase(Strict):
         """Return the exporter for writing; formats with geometry keep the library."""
         del assets
         return self
+
+
+def check_image_formats(exporter: Exporter, info: DatasetInfo) -> None:
+    """Reject photographs in files that a format cannot hold.
+
+    Raises:
+        ConfigError: the text names camera and remedy.
+    """
+    known: frozenset[str] = getattr(exporter, "image_formats", PNG_ONLY)
+    for camera in info.cameras:
+        used = info.encoding(camera, Channel.RGB).format
+        if Channel.RGB in info.media[camera] and used not in known:
+            raise ConfigError(
+                f"exporter '{exporter.type}': camera '{camera}' writes {used} files, but the "
+                f"exporter takes {', '.join(sorted(known))} only; change rgb_encoding of the "
+                "sensor, or export as coco, yolo, voc, webdataset, hdf5 or lerobot"
+            )
 
 
 def check_installed(exporter: str, **packages: str) -> None:

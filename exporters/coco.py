@@ -69,9 +69,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.mask_polygons import mask_polygons
@@ -80,7 +80,7 @@ from gen_data.exporters.sensor_selection import check_channels, instant_s, rgb_c
 from gen_data.exporters.sequences import sequence_number
 from gen_data.generator.core.boxes import BoxPx, OrientedBox
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.lens import COEFFICIENTS, Lens
 from gen_data.generator.core.motion import Twist
@@ -106,6 +106,8 @@ class Coco(ExporterBase):
     """COCO instances, one JSON file per split; images of all sensors with the rgb channel."""
 
     type: Literal["coco"] = "coco"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     segmentation: Literal["rle", "polygon", "none"] = "rle"
     """Visible masks as run lengths, as polygons along the edges of their pixels, or none."""
     amodal: bool = True
@@ -172,7 +174,7 @@ class Coco(ExporterBase):
                 header = dataset_header(info, [_keypoint_category(category_id, name, skeleton)])
                 write_dataset(path, header, images(), _keypoint_rows(lines, skeleton))
             for shard_dir, image in fragment_rows(shard_dirs, self.type, f"{split}.images"):
-                _link_images(image, split, shard_dir, dataset_dir)
+                _link_images(info, image, split, shard_dir, dataset_dir)
 
     def _annotation(
         self, info: DatasetInfo, sample: Sample, sensor: str, thing: ObjectTruth
@@ -273,21 +275,21 @@ def _image_keys(truth: ImageTruth, camera: Intrinsics) -> dict[str, Any]:
     return keys
 
 
-def image_name(index: int, sensor: str) -> str:
+def image_name(index: int, sensor: str, suffix: str = ".png") -> str:
     """File name of a camera's image of one sample."""
-    return f"{index:09d}_{sensor}.png"
+    return f"{index:09d}_{sensor}{suffix}"
 
 
 def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     camera = sample.truth[sensor].camera
-    file_name = image_name(sample.index, sensor)
+    name = image_name(sample.index, sensor)
     others = [c for c in info.media[sensor] if c is not Channel.RGB]
     row = {
         "id": sample.image_id(sensor),
-        "file_name": file_name,
+        "file_name": image_name(sample.index, sensor, info.encoding(sensor, Channel.RGB).suffix),
         "width": camera.intrinsics.width_px,
         "height": camera.intrinsics.height_px,
-        "files": {c.value: f"{c.value}/{sample.split}/{file_name}" for c in others},
+        "files": {c.value: f"{c.value}/{sample.split}/{name}" for c in others},
         "sample": sample.index,
         "scene": sample.scene_index,
         "view": sample.view_index,
@@ -420,10 +422,12 @@ def write_dataset(
         file.write("}\n")
 
 
-def _link_images(image: Mapping[str, Any], split: str, shard_dir: Path, dataset_dir: Path) -> None:
+def _link_images(
+    info: DatasetInfo, image: Mapping[str, Any], split: str, shard_dir: Path, dataset_dir: Path
+) -> None:
     targets = {Channel.RGB.value: f"{split}/{image['file_name']}", **image["files"]}
     for channel, target in targets.items():
-        source = media_path(shard_dir, image["sensor"], Channel(channel), image["sample"])
+        source = info.media_path(shard_dir, image["sensor"], Channel(channel), image["sample"])
         link_or_copy(source, dataset_dir / target)
 
 

@@ -34,16 +34,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
-from gen_data.exporters.background_surfaces import SURFACES, read_surfaces
+from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.coco import box_xywh, dataset_header, image_name, write_dataset
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.label_colors import voc_palette
-from gen_data.exporters.png import RowFilter, encode_png
+from gen_data.exporters.label_png import encode_label_png
+from gen_data.exporters.label_regions import find_regions
 from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
 from gen_data.exporters.sequences import write_bytes
-from gen_data.generator.core.boxes import tight_box
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, media_path
 from gen_data.generator.core.sample import Sample
@@ -136,16 +136,16 @@ def _write_segments(
     info: DatasetInfo, sample: Sample, sensor: str, shard_dir: Path, assets: AssetLibrary
 ) -> dict[str, Any]:
     """Write the id image of one camera, and return its line."""
-    segments, stuff = find_segments(info, sample, sensor, shard_dir, assets)
+    labels, ids, stuff = find_segments(info, sample, sensor, shard_dir, assets)
     name = image_name(sample.index, sensor)
     # The bytes of a little-endian id are red, green, blue and 0.
-    pixels = segments.astype("<u4", copy=False).view(np.uint8).reshape(*segments.shape, 4)[..., :3]
-    write_bytes(shard_dir / f"coco_panoptic/{name}", encode_png(pixels, RowFilter.UP, 2))
+    colors = ids.astype("<u4").view(np.uint8).reshape(-1, 4)[:, :3]
+    write_bytes(shard_dir / f"coco_panoptic/{name}", encode_label_png(labels, colors))
     return {
         "id": sample.image_id(sensor),
         "file_name": name,
-        "width": segments.shape[1],
-        "height": segments.shape[0],
+        "width": labels.shape[1],
+        "height": labels.shape[0],
         "sensor": sensor,
         "sample": sample.index,
         "things": [
@@ -159,18 +159,19 @@ def _write_segments(
             for thing in sample.truth[sensor].objects
             if thing.box is not None and not thing.ignored
         ],
-        "stuff": [_stuff_facts(segments, k, name) for k, name in enumerate(stuff, FIRST_STUFF)],
+        "stuff": _stuff_facts(labels, ids, stuff),
     }
 
 
 def find_segments(
     info: DatasetInfo, sample: Sample, sensor: str, shard_dir: Path, assets: AssetLibrary
-) -> tuple[UInt32, list[str]]:
+) -> tuple[UInt16, UInt32, list[str]]:
     """Find the segment of every pixel.
 
     Returns:
-        Ids of segments, uint32 [h, w]: ``segment_id`` of the instance ids of things, and of
-        ``FIRST_STUFF + k`` for the k-th name of stuff; 0 = void. Names of stuff, sorted.
+        Labels, uint16 [h, w]. The id of the segment of each label, uint32 [n]: ``segment_id`` of
+        the instance ids of things, and of ``FIRST_STUFF + k`` for the k-th name of stuff; 0 = void.
+        Names of stuff, sorted.
 
     Raises:
         StorageError: an image is missing.
@@ -187,20 +188,19 @@ def find_segments(
     ground = {k: STUFF_OF_SURFACE[SURFACES[k]] for k in seen.tolist() if k}
     known = sorted({*stuff_of.values(), *ground.values()} - set(info.categories))
     ids = {name: segment_id(FIRST_STUFF + k) for k, name in enumerate(known)}
-    of_instance = np.zeros(int(instances.max()) + 1, np.uint32)
+    # Labels are instance ids, then surfaces; a surface has no instance.
+    count = len(shown) and int(shown[-1]) + 1
+    of_label = np.zeros(count + len(SURFACES), np.uint32)
     for thing in sample.truth[sensor].objects:
         if thing.box is not None and not thing.ignored:
             number = thing.instance.instance_id
-            of_instance[number] = segment_id(number)
+            of_label[number] = segment_id(number)
     for number, name in stuff_of.items():
-        of_instance[number] = ids.get(name, 0)
-    of_surface = np.zeros(len(SURFACES), np.uint32)
+        of_label[number] = ids.get(name, 0)
     for k, name in ground.items():
-        of_surface[k] = ids.get(name, 0)
-    segments: UInt32 = of_instance[instances]
-    if ground:
-        segments = np.where(surfaces > 0, of_surface[surfaces], segments)
-    return segments, known
+        of_label[count + k] = ids.get(name, 0)
+    labels = np.where(surfaces > 0, surfaces + np.uint16(count), instances)
+    return labels, of_label, known
 
 
 def segment_id(number: int) -> int:
@@ -208,18 +208,21 @@ def segment_id(number: int) -> int:
     return number * _SCATTER & 0xFFFFFF
 
 
-def _stuff_facts(segments: UInt32, number: int, name: str) -> dict[str, Any]:
-    """Facts of a segment of stuff; its category has an id when all names are known."""
-    mask = segments == segment_id(number)
-    box = tight_box(mask)
-    assert box is not None, "names of stuff are those of pixels"
-    return {
-        "id": segment_id(number),
-        "category": name,
-        "area": int(np.count_nonzero(mask)),
-        "bbox": box_xywh(box),
-        "iscrowd": 0,
-    }
+def _stuff_facts(labels: UInt16, ids: UInt32, names: Sequence[str]) -> list[dict[str, Any]]:
+    """Facts of the segments of stuff; their categories have ids when all names are known."""
+    numbers = {segment_id(FIRST_STUFF + k): k + 1 for k in range(len(names))}
+    number_of = np.array([numbers.get(i, 0) for i in ids.tolist()], np.uint16)
+    regions = find_regions(number_of[labels])
+    return [
+        {
+            "id": segment_id(FIRST_STUFF + k),
+            "category": name,
+            "area": regions[k + 1].area_px,
+            "bbox": box_xywh(regions[k + 1].box),
+            "iscrowd": 0,
+        }
+        for k, name in enumerate(names)
+    ]
 
 
 def _categories(things: Sequence[str], stuff: Sequence[str]) -> list[dict[str, Any]]:

@@ -43,8 +43,9 @@ from pydantic import Field
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.captions import caption
 from gen_data.exporters.fragments import fragment_rows
-from gen_data.exporters.id_colors import paint_ids
-from gen_data.exporters.image_files import link_or_copy, read_image
+from gen_data.exporters.id_colors import id_colors
+from gen_data.exporters.image_files import depths_of_units, link_or_copy, read_pixels
+from gen_data.exporters.label_png import encode_label_png
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sensor_selection import rgb_camera
 from gen_data.exporters.sequences import (
@@ -71,6 +72,8 @@ COSMOS_NAMES = {"depth": "depth", "segmentation": "seg", "edges": "edge"}
 
 Range = tuple[float, float]
 """Nearest and farthest depth [m]."""
+NO_RANGE = (0.0, 0.0)
+"""Range of an image of nothing."""
 
 
 class ControlClips(ExporterBase):
@@ -147,21 +150,17 @@ class ControlClips(ExporterBase):
             if camera not in sample.truth:
                 continue
             read = {
-                channel: read_image(
-                    media_path(shard_dir, camera, channel, sample.index),
-                    channel,
-                    info.depth_scale_m,
-                )
+                channel: read_pixels(media_path(shard_dir, camera, channel, sample.index))
                 for channel in (Channel.RGB, Channel.Z_DEPTH, self._ids)
             }
-            depth, (near_m, far_m) = inverse_depth(read[Channel.Z_DEPTH], self._range())
-            images = {
-                "depth": depth,
-                "segmentation": paint_ids(read[self._ids]),
-                "edges": self._edges(read[Channel.RGB]),
+            depth, (near_m, far_m) = self._depth(read[Channel.Z_DEPTH], info.depth_scale_m)
+            edges = self._edges(read[Channel.RGB])
+            files = {
+                "depth": encode_png(depth, RowFilter.UP, 1),
+                "segmentation": encode_label_png(read[self._ids], id_colors()),
+                "edges": encode_label_png(edges, np.arange(256, dtype=np.uint8)),
             }
-            for kind, image in images.items():
-                png = encode_png(image, RowFilter.UP, 1)
+            for kind, png in files.items():
                 write_bytes(folder / kind / f"{sample.index:09d}.png", png)
             row = {
                 **frame_facts(info, sample),
@@ -196,6 +195,18 @@ class ControlClips(ExporterBase):
 
     def _range(self) -> Range | None:
         return None if self.near_m is None or self.far_m is None else (self.near_m, self.far_m)
+
+    def _depth(self, units: NDArray[np.uint16], scale_m: float) -> tuple[NDArray[np.uint8], Range]:
+        """Inverse depth of an image of depth units, and its range; see ``inverse_depth``."""
+        depths_m, span_m = depths_of_units(scale_m), self._range()
+        if span_m is None:
+            # The nearest and the farthest point suffice for the range.
+            present = depths_m[np.flatnonzero(np.bincount(units.ravel()))]
+            _, span_m = inverse_depth(present, None)
+            if span_m == NO_RANGE:
+                return np.zeros(units.shape, np.uint8), span_m
+        # Fewer depths than pixels are possible: an image is a look-up of its units.
+        return inverse_depth(depths_m, span_m)[0][units], span_m
 
     def _edges(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
         grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
@@ -257,16 +268,16 @@ def inverse_depth(
     """Normalise inverse depth to 255 = nearest, 0 = farthest or nothing.
 
     Args:
-        depth_m: z-depth [h, w]; inf = nothing.
+        depth_m: z-depth, of any shape; inf = nothing.
         span_m: Depths of white and black; None = nearest and farthest of the image.
 
     Returns:
-        The image, uint8 [h, w], and its range [m]; (0, 0) for an image of nothing.
+        The image, uint8 of that shape, and its range [m]; (0, 0) for an image of nothing.
     """
     known = np.isfinite(depth_m)
     if span_m is None:
         if not known.any():
-            return np.zeros(depth_m.shape, np.uint8), (0.0, 0.0)
+            return np.zeros(depth_m.shape, np.uint8), NO_RANGE
         seen = depth_m[known]
         span_m = (round(float(seen.min()), 6), round(float(seen.max()), 6))
     near_m, far_m = span_m

@@ -40,20 +40,20 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import deflate
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy, read_image
 from gen_data.exporters.npz import npz_bytes
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.serialization import canonical_json
@@ -88,6 +88,8 @@ class Hdf5(ExporterBase):
     """
 
     type: Literal["hdf5"] = "hdf5"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     container: Literal["hdf5", "npz"] = "hdf5"
 
     def check(self, info: DatasetInfo) -> None:
@@ -177,7 +179,7 @@ def _shuffled(array: NDArray[Any]) -> bytes:
 def _read(
     info: DatasetInfo, shard_dir: Path, camera: str, channel: Channel, index: int
 ) -> NDArray[Any]:
-    path = media_path(shard_dir, camera, channel, index)
+    path = info.media_path(shard_dir, camera, channel, index)
     pixels = read_image(path, channel, info.depth_scale_m)
     if channel is Channel.NORMALS:
         pixels = ((pixels * BLENDER_AXES + 1.0) * 0.5).astype(np.float32)

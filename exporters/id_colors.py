@@ -19,12 +19,8 @@ def id_color(number: int) -> tuple[int, int, int]:
     return (value >> 16, value >> 8 & 255, value & 255)
 
 
-def paint_ids(ids: NDArray[np.uint16]) -> NDArray[np.uint8]:
-    """Paint an image of ids [h, w] in their colours, uint8 [h, w, 3]."""
-    return _palette()[ids]
-
-
 @cache
-def _palette() -> NDArray[np.uint8]:
+def id_colors() -> NDArray[np.uint8]:
+    """Colours of all ids of 16 bits, RGB, uint8 [65536, 3]."""
     values = np.arange(_IDS, dtype=np.uint32) * np.uint32(COLOR_STEP)
     return np.stack([values >> 16, values >> 8, values], axis=1).astype(np.uint8)

@@ -3,7 +3,7 @@
 ====================  =====================  =====================================================
 channel               PNG                    value; value for "nothing"
 ====================  =====================  =====================================================
-rgb                   8-bit RGB              sRGB
+rgb                   8-bit RGB              sRGB; JPEG or WebP if the camera's encoding says so
 depth, range          16-bit grey            ``round(metres / depth_scale_m)``, half to even;
                                              0 = nothing, or farther than 65535 units
 instance, part,       16-bit grey            the id; 0
@@ -31,6 +31,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -39,11 +40,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.exporters.measurement_tables import write_table
-from gen_data.exporters.png import RowFilter, encode_png
+from gen_data.exporters.png import RowFilter, decode_png, encode_png
 from gen_data.exporters.point_cloud_io import write_cloud
-from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.capture import PNG, Channel, ImageEncoding
 from gen_data.generator.core.errors import ConfigError, SampleError, StorageError
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import Sample
 
 UInt16 = NDArray[np.uint16]
@@ -54,6 +55,8 @@ DEPTH_UNITS_MAX = 65_535
 FLOW_UNITS_PER_PX = 64
 SIGNED_ZERO = 32_768
 """Value of 0 in 16-bit images of signed quantities."""
+
+WEBP_LOSSLESS = 101
 
 NO_NORMAL = 128
 """Value of all three components in images of normals without a surface."""
@@ -95,9 +98,10 @@ def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
         if reading is None:
             continue
         for channel in info.media[sensor]:
-            path = media_path(shard_dir, sensor, channel, sample.index)
+            path = info.media_path(shard_dir, sensor, channel, sample.index)
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(encode_channel(channel, reading.channels[channel], info.depth_scale_m))
+            image, encoding = reading.channels[channel], info.encoding(sensor, channel)
+            path.write_bytes(encode_channel(channel, image, info.depth_scale_m, encoding))
     for lidar in info.lidars:
         if lidar in sample.capture.clouds:
             write_cloud(sample.capture.clouds[lidar], shard_dir, sample.index)
@@ -106,13 +110,19 @@ def write_media(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
             write_table(sample.capture.tables[device], shard_dir, sample.index)
 
 
-def encode_channel(channel: Channel, image: NDArray[Any], depth_scale_m: float) -> bytes:
-    """Encode one channel as PNG; see the table at the top of this module.
+def encode_channel(
+    channel: Channel,
+    image: NDArray[Any],
+    depth_scale_m: float,
+    encoding: ImageEncoding = PNG,
+) -> bytes:
+    """Encode one channel; see the table at the top of this module.
 
     Args:
         channel: Channel of the image.
         image: As listed at ``Channel``.
         depth_scale_m: Metres per unit of depth and range images.
+        encoding: Of the file; only photographs have others than PNG.
 
     Raises:
         ConfigError: the channel is no image.
@@ -121,15 +131,31 @@ def encode_channel(channel: Channel, image: NDArray[Any], depth_scale_m: float) 
     if channel not in ENCODING:
         known = ", ".join(c.value for c in ENCODING)
         raise ConfigError(f"channel '{channel.value}' cannot be written as an image; use {known}")
+    if encoding != PNG:
+        return _encode_photograph(image, encoding)
     row_filter, level = ENCODING[channel]
     return encode_png(_encode_pixels(channel, image, depth_scale_m), row_filter, level)
 
 
+def _encode_photograph(image: NDArray[np.uint8], encoding: ImageEncoding) -> bytes:
+    """Encode an image [h, w, 3] with OpenCV, whose bytes depend on its version only."""
+    quality = {
+        "jpeg": cv2.IMWRITE_JPEG_QUALITY,
+        "webp": cv2.IMWRITE_WEBP_QUALITY,
+        "webp_lossless": cv2.IMWRITE_WEBP_QUALITY,
+    }[encoding.format]
+    # Above 100, OpenCV's WebP has no loss.
+    value = WEBP_LOSSLESS if encoding.format == "webp_lossless" else encoding.quality
+    bgr = cv2.cvtColor(image, cv2.COLOR_RGB2BGR)
+    _, data = cv2.imencode(encoding.suffix, bgr, [quality, value])
+    return data.tobytes()
+
+
 def read_image(path: Path, channel: Channel, depth_scale_m: float) -> NDArray[Any]:
-    """Read one channel from its PNG (rounded): the inverse of ``encode_channel``.
+    """Read one channel from its file (rounded): the inverse of ``encode_channel``.
 
     Args:
-        path: PNG file.
+        path: Image file.
         channel: Channel of the image.
         depth_scale_m: Metres per unit of depth and range images.
 
@@ -137,21 +163,36 @@ def read_image(path: Path, channel: Channel, depth_scale_m: float) -> NDArray[An
         Array as listed at ``Channel``, including its values for "nothing".
 
     Raises:
-        StorageError: the file is missing or no PNG.
+        StorageError: the file is missing or no image.
     """
-    pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    return _decode_pixels(channel, read_pixels(path), depth_scale_m)
+
+
+def read_pixels(path: Path) -> NDArray[Any]:
+    """Read the pixels of an image file, uint8 or uint16, [h, w] or RGB [h, w, 3].
+
+    Raises:
+        StorageError: the file is missing or no image.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError:
+        data = b""
+    pixels = decode_png(data)
+    if pixels is None and data:
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+        if pixels is not None and pixels.ndim == 3:
+            pixels = cv2.cvtColor(pixels, cv2.COLOR_BGR2RGB)
     if pixels is None:
-        raise StorageError(f"{path}: missing or no PNG file; generate the data set again")
-    if pixels.ndim == 3:
-        pixels = np.ascontiguousarray(pixels[..., ::-1])
-    return _decode_pixels(channel, pixels, depth_scale_m)
+        raise StorageError(f"{path}: missing or no image file; generate the data set again")
+    return pixels
 
 
 def _decode_pixels(channel: Channel, pixels: NDArray[Any], depth_scale_m: float) -> NDArray[Any]:
     """Convert the pixels of a PNG to physical values."""
     match channel:
         case Channel.Z_DEPTH | Channel.RANGE | Channel.MEASURED_DEPTH:
-            return np.where(pixels > 0, pixels * depth_scale_m, np.inf).astype(np.float32)
+            return np.asarray(depths_of_units(depth_scale_m)[pixels])
         case Channel.DISPARITY | Channel.DISPARITY_VISIBLE:
             return np.asarray(pixels / 256.0, np.float32)
         case Channel.FLOW_FORWARD | Channel.FLOW_BACKWARD:
@@ -169,6 +210,15 @@ def _decode_pixels(channel: Channel, pixels: NDArray[Any], depth_scale_m: float)
             return np.asarray(pixels / 65_535.0, np.float32)
         case _:
             return pixels
+
+
+@cache
+def depths_of_units(depth_scale_m: float) -> NDArray[np.float32]:
+    """Depth [m] of every value of a 16-bit image, [65536]; inf for 0. Read-only."""
+    units = np.arange(DEPTH_UNITS_MAX + 1)
+    table = np.where(units > 0, units * depth_scale_m, np.inf).astype(np.float32)
+    table.flags.writeable = False
+    return table
 
 
 def _decode_signed(pixels: NDArray[Any], unit: float) -> NDArray[np.float32]:
@@ -221,9 +271,12 @@ def link_or_copy(source: Path, target: Path) -> None:
 
     Creates the target's folder; the target itself must not exist.
     """
-    target.parent.mkdir(parents=True, exist_ok=True)
     try:
-        os.link(source, target)
+        try:
+            os.link(source, target)
+        except FileNotFoundError:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            os.link(source, target)
     except (FileExistsError, FileNotFoundError):
         raise
     except OSError:  # another file system, one without links, or too many links to the file

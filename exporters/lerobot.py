@@ -31,14 +31,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
-import cv2
 import numpy as np
 from pydantic import PrivateAttr
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.fragments import fragment_rows
+from gen_data.exporters.image_files import read_pixels
 from gen_data.exporters.parquet_tables import (
     GROUP_ROWS,
     IMAGE,
@@ -50,8 +50,8 @@ from gen_data.exporters.parquet_tables import (
 from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import FRAMES, Frame, frame_facts, write_frames, write_text
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, media_path
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Articulation, Scene
 from gen_data.generator.core.serialization import canonical_json
@@ -80,6 +80,8 @@ class LeRobot(ExporterBase):
     """
 
     type: Literal["lerobot"] = "lerobot"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     arm: str = ""
     cameras: tuple[str, ...] = ()
 
@@ -148,7 +150,7 @@ class LeRobot(ExporterBase):
         time_s = sample.scene.time_s
         names = [joint.name for joint in self._assets.robot(arm.asset).movable]
         images = {
-            camera: _image_sums(media_path(shard_dir, camera, Channel.RGB, sample.index))
+            camera: _image_sums(info.media_path(shard_dir, camera, Channel.RGB, sample.index))
             for camera in self._cameras(info)
         }
         return frame_facts(info, sample) | {
@@ -200,14 +202,12 @@ def task_sentence(scene: Scene, arm: Articulation) -> str:
 
 def _image_sums(path: Path) -> dict[str, Any]:
     """Sums over every n-th pixel by channel, whole numbers from 0 to 255."""
-    bgr = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    if bgr is None:
-        raise StorageError(f"{path}: missing or no PNG file; generate the data set again")
-    height, width = bgr.shape[:2]
+    rgb = read_pixels(path)
+    height, width = rgb.shape[:2]
     longer = max(width, height)
     stride = max(1, longer // STATISTICS_PX) if longer >= WHOLE_PX else 1
     values = np.arange(256)
-    counts = [np.bincount(bgr[::stride, ::stride, k].ravel(), minlength=256) for k in (2, 1, 0)]
+    counts = [np.bincount(rgb[::stride, ::stride, k].ravel(), minlength=256) for k in range(3)]
     present = [np.flatnonzero(count) for count in counts]
     return {
         "size_px": [width, height],
@@ -257,7 +257,7 @@ class _RobotFiles:
         with open_parquet(path, schema) as writer:
             for start in range(0, len(frames), GROUP_ROWS):
                 group = range(start, min(start + GROUP_ROWS, len(frames)))
-                whole = [{**rows[k], **_embedded(frames[k], k)} for k in group]
+                whole = [{**rows[k], **_embedded(self.info, frames[k], k)} for k in group]
                 table = pyarrow.Table.from_pylist(whole, schema)
                 writer.write_table(table, row_group_size=len(whole))
 
@@ -345,15 +345,18 @@ def _image_key(camera: str) -> str:
     return f"observation.images.{camera}"
 
 
-def _embedded(frame: Frame, frame_index: int) -> dict[str, Any]:
+def _embedded(info: DatasetInfo, frame: Frame, frame_index: int) -> dict[str, Any]:
     """Images of a frame by feature."""
-    name = f"frame_{frame_index:06d}.png"
+    paths = {
+        camera: info.media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
+        for camera in frame.row["images"]
+    }
     return {
         _image_key(camera): {
-            "bytes": media_path(frame.shard_dir, camera, Channel.RGB, frame.index).read_bytes(),
-            "path": name,
+            "bytes": path.read_bytes(),
+            "path": f"frame_{frame_index:06d}{path.suffix}",
         }
-        for camera in frame.row["images"]
+        for camera, path in paths.items()
     }
 
 

@@ -8,9 +8,12 @@ Specification (Third Edition)", 2025, sections 5 (chunks) and 9 (filters).
 from __future__ import annotations
 
 import struct
+from collections.abc import Sequence
 from enum import IntEnum
+from itertools import pairwise
 from typing import Any
 
+import cv2
 import deflate
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +21,9 @@ from numpy.typing import NDArray
 UInt8 = NDArray[np.uint8]
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
-_GREY, _RGB, _PALETTE = 0, 2, 3
+GREY, RGB, _PALETTE = 0, 2, 3
+"""Colour types of PNG."""
+Chunk = Sequence[bytes | bytearray]
 
 
 class RowFilter(IntEnum):
@@ -45,18 +50,30 @@ def encode_png(pixels: NDArray[Any], row_filter: RowFilter, level: int) -> bytes
         raise ValueError(f"cannot write {pixels.dtype} pixels of shape {pixels.shape} as PNG")
     height, width = pixels.shape[:2]
     data = deflate.zlib_compress(_filter_rows(pixels, row_filter), level)
-    color = _RGB if pixels.ndim == 3 else _GREY
+    color = RGB if pixels.ndim == 3 else GREY
     return assemble_png(height, width, data, 8 * pixels.dtype.itemsize, color)
 
 
 def assemble_png(
-    height_px: int, width_px: int, data: bytes | bytearray, bit_depth: int = 8, color: int = _GREY
+    height_px: int, width_px: int, data: bytes | bytearray, bit_depth: int = 8, color: int = GREY
 ) -> bytes:
     """Put compressed rows into a PNG file; by default of an 8-bit grey image."""
-    header = struct.pack(">IIBBBBB", width_px, height_px, bit_depth, color, 0, 0, 0)
-    return b"".join(
-        [SIGNATURE, *_chunk(b"IHDR", header), *_chunk(b"IDAT", data), *_chunk(b"IEND", b"")]
-    )
+    return _assemble(width_px, height_px, bit_depth, color, data)
+
+
+def assemble_palette_png(
+    height_px: int, width_px: int, data: bytes | bytearray, colors: UInt8
+) -> bytes:
+    """Put compressed rows of indices into a PNG file with the colours [n, 3] that viewers show."""
+    return _assemble(width_px, height_px, 8, _PALETTE, data, _chunk(b"PLTE", colors.tobytes()))
+
+
+def _assemble(
+    width: int, height: int, bit_depth: int, color: int, data: bytes | bytearray, extra: Chunk = ()
+) -> bytes:
+    header = struct.pack(">IIBBBBB", width, height, bit_depth, color, 0, 0, 0)
+    chunks = [*_chunk(b"IHDR", header), *extra, *_chunk(b"IDAT", data), *_chunk(b"IEND", b"")]
+    return b"".join([SIGNATURE, *chunks])
 
 
 def _filter_rows(pixels: NDArray[Any], row_filter: RowFilter) -> UInt8:
@@ -80,20 +97,60 @@ def _chunk(kind: bytes, data: bytes | bytearray) -> list[bytes | bytearray]:
     return [struct.pack(">I", len(data)), kind, data, struct.pack(">I", check)]
 
 
-def encode_palette_png(pixels: UInt8, colors: UInt8, level: int) -> bytes:
-    """Encode an image of indices with the colours that viewers show.
+def decode_png(data: bytes) -> NDArray[Any] | None:
+    """Decode a file of ``encode_png``, several times as fast as general decoders.
 
-    Args:
-        pixels: Indices of colours, uint8 [h, w].
-        colors: RGB, uint8 [n, 3], n at most 256.
-        level: libdeflate's compression level, 1 (fastest) to 12.
+    Returns:
+        Pixels, uint8 or uint16, shape [h, w] or [h, w, 3]; None for a PNG of other writers, and
+        for a damaged one, whose error a general decoder reports.
     """
-    height, width = pixels.shape
-    header = struct.pack(">IIBBBBB", width, height, 8, _PALETTE, 0, 0, 0)
-    chunks = [
-        *_chunk(b"IHDR", header),
-        *_chunk(b"PLTE", colors.tobytes()),
-        *_chunk(b"IDAT", deflate.zlib_compress(_filter_rows(pixels, RowFilter.UP), level)),
-        *_chunk(b"IEND", b""),
-    ]
-    return b"".join([SIGNATURE, *chunks])
+    if len(data) < _PIXELS_START + 16 or data[:8] != SIGNATURE or data[37:41] != b"IDAT":
+        return None
+    width, height, bit_depth, color, *others = struct.unpack_from(">IIBBBBB", data, 16)
+    end = _PIXELS_START + int.from_bytes(data[33:37], "big")
+    ends_as_ours = len(data) == end + 16 and data[end + 8 : end + 12] == b"IEND"
+    is_known = bit_depth in (8, 16) and color in (GREY, RGB) and others == [0, 0, 0]
+    checks = deflate.crc32(data[12:29]) == int.from_bytes(data[29:33], "big")
+    if not (is_known and ends_as_ours and checks) or height * width == 0:
+        return None
+    packed = memoryview(data)[_PIXELS_START:end]
+    if deflate.crc32(data[37:end]) != int.from_bytes(data[end : end + 4], "big"):
+        return None
+    step = bit_depth // 8 * (3 if color == RGB else 1)
+    try:
+        rows = deflate.zlib_decompress(packed, height * (1 + width * step))
+    except deflate.DeflateError:
+        return None
+    if len(rows) != height * (1 + width * step):
+        return None
+    return _unfilter(np.frombuffer(rows, np.uint8).reshape(height, -1), step, bit_depth)
+
+
+_PIXELS_START = 41
+"""Position of the compressed rows: after the signature, IHDR, and the length and kind of IDAT."""
+
+
+def _unfilter(rows: UInt8, step: int, bit_depth: int) -> NDArray[Any] | None:
+    """Undo the filter of rows with ``step`` bytes per pixel; None if it is not the same for all."""
+    kind = int(rows[0, 0])
+    if kind not in tuple(RowFilter) or (rows[:, 0] != kind).any():
+        return None
+    height, width = rows.shape[0], (rows.shape[1] - 1) // step
+    if kind == RowFilter.UP:
+        values = _sum_lines(rows[:, 1:].copy())
+    else:
+        # Lines that are contiguous in memory add up at once, hence columns become rows.
+        columns = cv2.transpose(rows[:, 1:].reshape(height, width, step))
+        summed = _sum_lines(columns.reshape(width, -1))
+        values = cv2.transpose(summed.reshape(width, height, step))
+    shape = (height, width) if step == bit_depth // 8 else (height, width, 3)
+    if bit_depth == 16:
+        return np.ascontiguousarray(values).view(">u2").reshape(shape).astype(np.uint16)
+    return values.reshape(shape)
+
+
+def _sum_lines(lines: UInt8) -> UInt8:
+    """Add to each line the one before it, in place; several times as fast as ``accumulate``."""
+    for before, line in pairwise(lines):
+        np.add(before, line, out=line)
+    return lines

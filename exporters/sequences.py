@@ -175,14 +175,16 @@ def matrix_numbers(matrix: Array) -> str:
 
 def write_text(path: Path, text: str) -> None:
     """Write UTF-8 with Unix line ends; creates the folder."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8", newline="\n")
+    write_bytes(path, text.encode("utf-8"))
 
 
 def write_bytes(path: Path, data: bytes) -> None:
     """Write a file; creates the folder."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(data)
+    try:
+        path.write_bytes(data)
+    except FileNotFoundError:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(data)
 
 
 def _rig_pose(scene: Scene, rig: str) -> SE3:

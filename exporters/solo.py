@@ -32,13 +32,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.fragments import fragment_rows, write_fragment
-from gen_data.exporters.id_colors import id_color
+from gen_data.exporters.id_colors import id_color, id_colors
 from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.png import RowFilter, encode_png
+from gen_data.exporters.label_png import encode_label_png, number_masks
 from gen_data.exporters.sensor_selection import check_pinholes, instant_s, rgb_cameras
 from gen_data.exporters.sequences import frame_facts, write_bytes, write_text
 from gen_data.generator.core.capture import Channel
@@ -311,22 +310,17 @@ def _numbers(values: Vec3 | Iterable[float] | Array) -> list[float]:
 
 
 def _write_segmentation(folder: Path, sample: Sample, name: str) -> None:
-    """Paint the visible masks in the colours of instances, and of labels."""
+    """Write the visible masks in the colours of instances, and of labels."""
     truth = sample.truth[name]
-    size = (truth.camera.intrinsics.height_px, truth.camera.intrinsics.width_px, 3)
-    instances: NDArray[np.uint8] = np.zeros(size, np.uint8)
-    labels: NDArray[np.uint8] = np.zeros(size, np.uint8)
-    for thing in truth.objects:
-        if thing.box is None or thing.ignored:
-            continue
-        assert thing.mask is not None, "the annotation instance_masks is in `needs`"
-        x, y, pixels = thing.mask.x_px, thing.mask.y_px, thing.mask.pixels
-        crop = (slice(y, y + pixels.shape[0]), slice(x, x + pixels.shape[1]))
-        instances[crop][pixels] = id_color(thing.instance.instance_id)
-        labels[crop][pixels] = id_color(thing.instance.category_id)
-    for kind, image in ((INSTANCES, instances), (LABELS, labels)):
+    camera = truth.camera.intrinsics
+    seen = [thing for thing in truth.objects if thing.box is not None and not thing.ignored]
+    numbers = number_masks(seen, camera.height_px, camera.width_px)
+    for kind, ids in (
+        (INSTANCES, [0, *(thing.instance.instance_id for thing in seen)]),
+        (LABELS, [0, *(thing.instance.category_id for thing in seen)]),
+    ):
         path = folder / _shard_name(sample.index, name, kind)
-        write_bytes(path, encode_png(image, RowFilter.UP, 1))
+        write_bytes(path, encode_label_png(numbers, id_colors()[ids]))
 
 
 def _shard_name(index: int, sensor: str, kind: str) -> str:

@@ -28,23 +28,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 from xml.sax.saxutils import escape
 
 import cv2
 import numpy as np
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.fragments import fragment_rows, write_fragment
-from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_files import link_or_copy, read_pixels
 from gen_data.exporters.label_colors import voc_palette
-from gen_data.exporters.png import UInt8, encode_palette_png
+from gen_data.exporters.label_png import UInt16, encode_label_png, number_masks
 from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
 from gen_data.exporters.sequences import write_bytes
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 
 YEAR = "VOCdevkit/VOC2012"
@@ -69,8 +69,11 @@ class Voc(ExporterBase):
     """Pascal VOC boxes and label images of all cameras with the rgb channel."""
 
     type: Literal["voc"] = "voc"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     images: Literal["jpeg", "png"] = "jpeg"
-    """JPEG files of quality 95, which all readers take, or links to the lossless PNG files."""
+    """JPEG files, which all readers take: of quality 95, or links if the camera writes JPEG; or
+    links to the files as they are."""
 
     @property
     def needs(self) -> frozenset[str]:
@@ -117,7 +120,9 @@ class Voc(ExporterBase):
                 for suffix, folder in FOLDERS.items():
                     source = shard_dir / self.type / f"{stem}{suffix}"
                     link_or_copy(source, root / folder / f"{stem}{source.suffix}")
-                link_or_copy(self._image(shard_dir, row), root / "JPEGImages" / row["file_name"])
+                link_or_copy(
+                    self._image(info, shard_dir, row), root / "JPEGImages" / row["file_name"]
+                )
                 for name, line in _list_lines(info, row):
                     if name not in files:
                         path = root / "ImageSets" / f"{name}.txt"
@@ -133,7 +138,7 @@ class Voc(ExporterBase):
         # VOC's files name objects by their order; ignored ones have no number in label images.
         listed.sort(key=lambda thing: thing.ignored)
         stem = Path(image_name(sample.index, sensor)).stem
-        file_name = f"{stem}.{'jpg' if self.images == 'jpeg' else 'png'}"
+        file_name = f"{stem}{self._suffix(info, sensor)}"
         row = {
             "stem": stem,
             "file_name": file_name,
@@ -145,19 +150,26 @@ class Voc(ExporterBase):
         folder = shard_dir / self.type
         text = annotation_text(info, truth, listed, file_name)
         write_bytes(folder / f"{stem}.xml", text.encode())
-        classes, objects = label_images(truth, listed)
-        colors = voc_palette()
-        write_bytes(folder / f"{stem}.class.png", encode_palette_png(classes, colors, 2))
-        write_bytes(folder / f"{stem}.object.png", encode_palette_png(objects, colors, 2))
-        if self.images == "jpeg":
-            source = media_path(shard_dir, sensor, Channel.RGB, sample.index)
+        for suffix, image in zip(
+            (".class.png", ".object.png"), label_images(truth, listed), strict=True
+        ):
+            write_bytes(folder / f"{stem}{suffix}", image)
+        if self._encodes(info, sensor):
+            source = info.media_path(shard_dir, sensor, Channel.RGB, sample.index)
             write_bytes(folder / f"{stem}.jpg", encode_jpeg(source))
         return row
 
-    def _image(self, shard_dir: Path, row: dict[str, Any]) -> Path:
-        if self.images == "jpeg":
+    def _encodes(self, info: DatasetInfo, sensor: str) -> bool:
+        """Whether it makes JPEG files of other ones."""
+        return self.images == "jpeg" and info.encoding(sensor, Channel.RGB).format != "jpeg"
+
+    def _suffix(self, info: DatasetInfo, sensor: str) -> str:
+        return ".jpg" if self.images == "jpeg" else info.encoding(sensor, Channel.RGB).suffix
+
+    def _image(self, info: DatasetInfo, shard_dir: Path, row: dict[str, Any]) -> Path:
+        if self._encodes(info, row["sensor"]):
             return shard_dir / self.type / str(row["file_name"])
-        return media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
+        return info.media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
 
 
 def annotation_text(
@@ -177,8 +189,8 @@ def annotation_text(
     )
 
 
-def label_images(truth: ImageTruth, listed: Sequence[ObjectTruth]) -> tuple[UInt8, UInt8]:
-    """Images of classes and of objects, uint8 [h, w].
+def label_images(truth: ImageTruth, listed: Sequence[ObjectTruth]) -> tuple[bytes, bytes]:
+    """PNG files of classes and of objects, indices of VOC's colours.
 
     Args:
         truth: Truth of the image.
@@ -186,16 +198,16 @@ def label_images(truth: ImageTruth, listed: Sequence[ObjectTruth]) -> tuple[UInt
             254th, are void.
     """
     camera = truth.camera.intrinsics
-    classes = np.zeros((camera.height_px, camera.width_px), np.uint8)
-    objects = np.zeros_like(classes)
-    for number, thing in enumerate(listed, 1):
-        assert thing.mask is not None, "the annotation instance_masks is in `needs`"
-        mask, void = thing.mask, thing.ignored or number > LABELS_MAX
-        height, width = mask.pixels.shape
-        crop = np.s_[mask.y_px : mask.y_px + height, mask.x_px : mask.x_px + width]
-        classes[crop][mask.pixels] = VOID if void else thing.instance.category_id
-        objects[crop][mask.pixels] = VOID if void else number
-    return classes, objects
+    numbers = number_masks(listed, camera.height_px, camera.width_px)
+    void = [thing.ignored or k > LABELS_MAX for k, thing in enumerate(listed, 1)]
+    classes = [VOID if v else t.instance.category_id for v, t in zip(void, listed, strict=True)]
+    objects = [VOID if v else k for k, v in enumerate(void, 1)]
+    return _indices_png(numbers, classes), _indices_png(numbers, objects)
+
+
+def _indices_png(numbers: UInt16, indices: Sequence[int]) -> bytes:
+    """PNG file of indices by number of object, from 1."""
+    return encode_label_png(numbers, np.array([0, *indices], np.uint8), voc_palette())
 
 
 def encode_jpeg(source: Path) -> bytes:
@@ -204,9 +216,7 @@ def encode_jpeg(source: Path) -> bytes:
     Raises:
         StorageError: the file is missing or no PNG.
     """
-    image = cv2.imread(str(source), cv2.IMREAD_COLOR)
-    if image is None:
-        raise StorageError(f"{source}: missing or no PNG")
+    image = cv2.cvtColor(read_pixels(source), cv2.COLOR_RGB2BGR)
     _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return data.tobytes()
 

@@ -28,18 +28,18 @@ import io
 import tarfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_labels
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.point_cloud_io import scanner_at_sweep
 from gen_data.exporters.sensor_selection import has_scans
 from gen_data.exporters.sequences import sequence_number
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, cloud_path, media_path, table_path
+from gen_data.generator.core.interfaces import DatasetInfo, cloud_path, table_path
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.serialization import canonical_json
 
@@ -54,6 +54,8 @@ class WebDataset(ExporterBase):
     """
 
     type: Literal["webdataset"] = "webdataset"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     samples_per_tar: int = Field(500, ge=1)
 
     @property
@@ -127,7 +129,9 @@ def _fields(
     """Yield name and bytes of each field of a sample, sorted by name."""
     index = labels["index"]
     paths = {
-        f"{camera}.{channel.value}.png": media_path(shard_dir, camera, channel, index)
+        f"{camera}.{channel.value}{info.encoding(camera, channel).suffix}": info.media_path(
+            shard_dir, camera, channel, index
+        )
         for camera in labels["cameras"]
         for channel in info.media[camera]
     }

@@ -29,15 +29,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import cv2
 import numpy as np
 from pydantic import Field
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy
@@ -47,7 +47,7 @@ from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.boxes import BoxPx
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import KeypointTruth, ObjectTruth, Sample
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.skeletons import find_skeleton
@@ -62,6 +62,8 @@ class Yolo(ExporterBase):
     """YOLO data sets of all cameras with the rgb channel, one per task."""
 
     type: Literal["yolo"] = "yolo"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     tasks: tuple[Task, ...] = Field(("detect", "segment"), min_length=1)
     """Tasks to write: ``detect``, ``segment``, ``pose`` (keypoints) and ``obb`` (rotated boxes)."""
     pose_category: str = ""
@@ -99,7 +101,7 @@ class Yolo(ExporterBase):
             for sensor in rgb_cameras(info):
                 if sensor not in sample.truth:
                     continue
-                row = self._image_row(sample, sensor)
+                row = self._image_row(info, sample, sensor)
                 rows.setdefault(f"{sample.split}.images", []).append(row)
                 for thing in sample.truth[sensor].objects:
                     listed = names.setdefault(thing.instance.category_id, {})
@@ -118,7 +120,7 @@ class Yolo(ExporterBase):
         written = [s for s in SPLITS if any((f / f"{s}.images.jsonl").exists() for f in folders)]
         for split in written:
             for shard_dir, row in fragment_rows(shard_dirs, self.type, f"{split}.images"):
-                source = media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
+                source = info.media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
                 for task in tasks:
                     rows = pose.rows(row["pose"]) if task == "pose" and pose else row[task]
                     folder, name = dataset_dir / task, row["file_name"]
@@ -129,7 +131,7 @@ class Yolo(ExporterBase):
             text = data_text(info, task, written, pose if task == "pose" else None)
             write_text(dataset_dir / task / "data.yaml", text)
 
-    def _image_row(self, sample: Sample, sensor: str) -> dict[str, Any]:
+    def _image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         camera = sample.truth[sensor].camera.intrinsics
         size = np.array([camera.width_px, camera.height_px], np.float64)
         listed = [t for t in sample.truth[sensor].objects if t.box is not None and not t.ignored]
@@ -140,7 +142,9 @@ class Yolo(ExporterBase):
             "obb": partial(_obb_row, size),
         }
         return {
-            "file_name": image_name(sample.index, sensor),
+            "file_name": image_name(
+                sample.index, sensor, info.encoding(sensor, Channel.RGB).suffix
+            ),
             "sensor": sensor,
             "sample": sample.index,
             **{task: [form[task](thing) for thing in listed] for task in self.tasks},
@@ -257,7 +261,19 @@ def _detect_row(size: Array, thing: ObjectTruth) -> str:
 def _segment_row(size: Array, thing: ObjectTruth) -> str:
     assert thing.mask is not None, "the annotation instance_masks is in `needs`"
     polygon = join_polygons(mask_polygons(thing.mask))
-    return f"{thing.instance.category_id - 1} {_coordinates(polygon / size)}"
+    return f"{thing.instance.category_id - 1} {_vertices(polygon, int(size[0]), int(size[1]))}"
+
+
+def _vertices(polygon: Polygon, width_px: int, height_px: int) -> str:
+    """Whole-numbered vertices as fractions of the image, whose few values are formatted once."""
+    across, down = _fractions(width_px), _fractions(height_px)
+    return " ".join([f"{across[x]} {down[y]}" for x, y in polygon.tolist()])
+
+
+@lru_cache(8)
+def _fractions(length_px: int) -> list[str]:
+    """Texts of ``k / length_px``, for k from 0 to the length."""
+    return [f"{k / length_px:.7f}" for k in range(length_px + 1)]
 
 
 def _obb_row(size: Array, thing: ObjectTruth) -> str:

@@ -8,6 +8,7 @@ from functools import cached_property, lru_cache, partial
 
 import cv2
 
+from gen_data.exporters.base import check_image_formats
 from gen_data.exporters.label_map import MappedExporter
 from gen_data.generator.annotations.annotate import annotate_ego, annotate_reading
 from gen_data.generator.assemble.config import Config, SceneConfig
@@ -299,6 +300,7 @@ def ready_exporters(config: Config, info: DatasetInfo, library: Library) -> dict
         if exporter.type in exporters:
             raise ConfigError(f"exporters: '{exporter.type}' is listed twice")
         with located_errors(config.document):
+            check_image_formats(own, info)
             exporter.check(info)
         exporters[exporter.type] = exporter.with_assets(library)
     return exporters

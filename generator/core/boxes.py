@@ -7,6 +7,7 @@ directions across an edge of each (Gottschalk, Lin and Manocha, "OBBTree", SIGGR
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,6 +83,9 @@ def tight_box(mask: NDArray[np.bool_], x0: int = 0, y0: int = 0) -> BoxPx | None
     )
 
 
+_CORNER_SIGNS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+
+
 @dataclass(frozen=True, slots=True)
 class OrientedBox:
     """A box in space: its centre and axes are ``T_frame_box``, its full edge lengths ``size_m``."""
@@ -92,8 +96,7 @@ class OrientedBox:
     def corners(self) -> Array:
         """The eight corners in the outer frame [m], shape [8, 3]; x varies slowest."""
         half = 0.5 * np.asarray(self.size_m)
-        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
-        return self.T_frame_box.apply(signs * half)
+        return self.T_frame_box.apply(_CORNER_SIGNS * half)
 
     def seen_from(self, T_other_frame: SE3) -> OrientedBox:
         """The same box, expressed in another frame."""

@@ -5,12 +5,35 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.core.scene import Camera, Device, Lidar
+
+ImageFormat = Literal["png", "jpeg", "webp", "webp_lossless"]
+
+
+@dataclass(frozen=True, slots=True)
+class ImageEncoding:
+    """Encoding of image files.
+
+    Attributes:
+        format: Of the files.
+        quality: Of jpeg and webp, from 1 to 100; 0 for formats without loss.
+    """
+
+    format: ImageFormat = "png"
+    quality: int = 0
+
+    @property
+    def suffix(self) -> str:
+        """Ending of the files' names."""
+        return {"png": ".png", "jpeg": ".jpg"}.get(self.format, ".webp")
+
+
+PNG = ImageEncoding()
 
 
 class Channel(str, Enum):

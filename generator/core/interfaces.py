@@ -42,7 +42,9 @@ from gen_data.generator.core.asset_types import (
     TextureData,
 )
 from gen_data.generator.core.capture import (
+    PNG,
     Channel,
+    ImageEncoding,
     LidarHits,
     LidarRays,
     Measurements,
@@ -283,6 +285,7 @@ class SensorInfo:
         rate_hz: Readings per second; None = one per step. Cameras and laser scanners read at most
             once per step.
         time_offset_s: Delay of readings after the step's instant [s].
+        rgb_encoding: Cameras: encoding of the files of the rgb channel; others are PNG.
         needs_clear_view: Whether a position inside the body that carries it is refused.
     """
 
@@ -295,6 +298,7 @@ class SensorInfo:
     rate_hz: float | None = None
     time_offset_s: float = 0.0
     needs_clear_view: bool = False
+    rgb_encoding: ImageEncoding = PNG
 
 
 class Sensor(Protocol):
@@ -463,6 +467,15 @@ class DatasetInfo:
         """``{camera: channels written as images}``."""
         return {s.name: s.channels for s in self._with_modality(Modality.CAMERA)}
 
+    def encoding(self, camera: str, channel: Channel) -> ImageEncoding:
+        """Encoding of the files of one channel of a camera."""
+        return self.sensor(camera).rgb_encoding if channel is Channel.RGB else PNG
+
+    def media_path(self, shard_dir: Path, camera: str, channel: Channel, index: int) -> Path:
+        """Path of the image of one channel of one sample, in the camera's encoding."""
+        suffix = self.encoding(camera, channel).suffix
+        return media_path(shard_dir, camera, channel, index).with_suffix(suffix)
+
     def sensor(self, name: str) -> SensorInfo:
         """The sensor of that name. Raises KeyError if there is none."""
         for sensor in self.sensors:
@@ -522,15 +535,15 @@ class Exporter(Protocol):
 
 
 def media_path(shard_dir: Path, sensor: str, channel: Channel, index: int) -> Path:
-    """Path of the image of one channel of one sample."""
-    return shard_dir / sensor / channel.value / f"{index:09d}.png"
+    """Path of the image of one channel of one sample, if it is PNG; else ``info.media_path``."""
+    return shard_dir / f"{sensor}/{channel.value}/{index:09d}.png"
 
 
 def cloud_path(shard_dir: Path, sensor: str, index: int) -> Path:
     """Path of the points of one sweep: a NumPy file with an array of ``POINT`` records."""
-    return shard_dir / sensor / "points" / f"{index:09d}.npy"
+    return shard_dir / f"{sensor}/points/{index:09d}.npy"
 
 
 def table_path(shard_dir: Path, sensor: str, index: int) -> Path:
     """Path of the rows of one reading: a NumPy file of ``core.measurement_dtypes`` records."""
-    return shard_dir / sensor / "rows" / f"{index:09d}.npy"
+    return shard_dir / f"{sensor}/rows/{index:09d}.npy"

@@ -13,7 +13,7 @@ import math
 import operator
 import types
 import typing
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
 from functools import cache, partial
 from typing import Any, TypeVar
@@ -55,6 +55,16 @@ def from_plain(kind: type[T], plain: Any) -> T:
     """
     build: Callable[[Any], T] = _builder(typing.cast(Any, kind))
     return build(plain)
+
+
+def fields_from_plain(kind: type, plain: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of some fields of a dataclass by name: a part of ``from_plain``.
+
+    Raises:
+        TypeError, KeyError: if a value does not fit the type of its field.
+    """
+    builders = _field_builders(kind)
+    return {name: builders[name](item) for name, item in plain.items()}
 
 
 def canonical_json(value: Any) -> str:
@@ -114,26 +124,35 @@ def _builder(kind: Any) -> Callable[[Any], Any]:
 
 
 def _dataclass_builder(kind: type) -> Callable[[Any], Any]:
-    # Types may refer to themselves, so that fields are looked at when the first value comes.
-    @cache
-    def builders() -> dict[str, Callable[[Any], Any]]:
-        return {name: _builder(hint) for name, hint in typing.get_type_hints(kind).items()}
-
     def build(plain: Any) -> Any:
         if isinstance(plain, kind):
             return plain
-        by_name = builders()
-        return kind(**{name: by_name[name](item) for name, item in plain.items()})
+        return kind(**fields_from_plain(kind, plain))
 
     return build
+
+
+@cache
+def _field_builders(kind: type) -> dict[str, Callable[[Any], Any]]:
+    # Types may refer to themselves, so that fields are looked at when the first value comes.
+    return {name: _builder(hint) for name, hint in typing.get_type_hints(kind).items()}
 
 
 def _tuple_builder(arguments: tuple[Any, ...]) -> Callable[[Any], Any]:
     if len(arguments) == 2 and arguments[1] is Ellipsis:
         build = _builder(arguments[0])
-        return lambda plain: tuple(build(item) for item in plain)
+        return tuple if build is _itself else lambda plain: tuple(map(build, plain))
     builders = [_builder(argument) for argument in arguments]
+    if set(builders) == {float}:
+        return partial(_floats, len(builders))
     return lambda plain: tuple(b(item) for b, item in zip(builders, plain, strict=True))
+
+
+def _floats(count: int, plain: Sequence[float]) -> tuple[float, ...]:
+    """Vectors are the most frequent values: they are worth a faster loop."""
+    if len(plain) != count:
+        raise ValueError(f"{plain!r} has not {count} numbers")
+    return tuple(map(float, plain))
 
 
 def _mapping_builder(key: Any, value: Any) -> Callable[[Any], Any]:

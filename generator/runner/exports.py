@@ -11,25 +11,26 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gen_data.exporters.image_files import link_or_copy
-from gen_data.generator.assemble.config import Config
-from gen_data.generator.assets.library import open_library
 from gen_data.generator.core.interfaces import (
     DatasetInfo,
     Exporter,
     cloud_path,
-    media_path,
     table_path,
 )
 from gen_data.generator.core.sample import Sample
-from gen_data.generator.pipeline.finalize_scene import Timeline
+from gen_data.generator.runner.durable_files import Inode, get_inode
 from gen_data.generator.runner.labels import LABELS_NAME
 from gen_data.generator.runner.progress import RunProgress, Summary
 from gen_data.generator.runner.provenance import SCENES_NAME
 from gen_data.generator.runner.run import Settings, run
-from gen_data.generator.runner.store import LICENCES_NAME
+from gen_data.generator.runner.store import LICENCES_NAME, LocalStore
 from gen_data.generator.runner.stored import StoredSamples
+
+if TYPE_CHECKING:
+    from gen_data.generator.assemble.config import Config
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,10 @@ class StoredPipeline:
             return sample
         # Sensors with an offset see the scene of another instant, which files do not hold.
         ids = {name: number for number, name in enumerate(self.info.categories, 1)}
+        # Loads all kinds of assets, which most exports do without.
+        from gen_data.generator.assets.library import open_library
+        from gen_data.generator.pipeline.finalize_scene import Timeline
+
         timeline = Timeline(sample.scene, open_library(self.asset_folders), ids)
         return replace(sample, instants={name: timeline.at(t) for name, t in apart.items()})
 
@@ -87,7 +92,10 @@ class LinkedFiles:
         index, capture = sample.index, sample.capture
         source_dir = self._source_dir(index)
         pairs = [
-            (media_path(source_dir, name, c, index), media_path(shard_dir, name, c, index))
+            (
+                info.media_path(source_dir, name, c, index),
+                info.media_path(shard_dir, name, c, index),
+            )
             for name in capture.readings
             for c in info.media[name]
         ]
@@ -102,6 +110,16 @@ class LinkedFiles:
         if not (shard_dir / SCENES_NAME).exists():
             for name in (SCENES_NAME, LABELS_NAME):
                 link_or_copy(self._source_dir(sample.index) / name, shard_dir / name)
+
+    def digests(self, shard: int) -> Mapping[Inode, str]:
+        """Digests of the files of a shard by inode, as its record states them.
+
+        A file that changed since keeps its old digest, with which a full check finds it.
+        """
+        record = LocalStore(self.stored.folder).record(shard)
+        folder = self.stored.shard_dir(shard)
+        files = () if record is None else record.files
+        return {get_inode(folder / file.path): file.sha256 for file in files}
 
     def _source_dir(self, index: int) -> Path:
         return self.stored.shard_dir(index // self.stored.plan.shard_size)
@@ -143,5 +161,9 @@ def export(
         resume_command=resume_command,
         progress=progress,
         licences=None if text is None else lambda _: text,
-        settings=Settings(write_media=files.link_media, write_records=files.link_records),
+        settings=Settings(
+            write_media=files.link_media,
+            write_records=files.link_records,
+            linked_digests=files.digests,
+        ),
     )

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.serialization import canonical_json, from_plain
+from gen_data.generator.core.serialization import canonical_json, fields_from_plain, from_plain
 
 SCENES_NAME = "scenes.jsonl"
 
@@ -57,20 +57,22 @@ def scene_line(sample: Sample, base: Sample | None) -> str:
     )
 
 
-def parse_scene(line: bytes | str, read_line: Callable[[int], bytes]) -> KeptScene:
+def parse_scene(line: bytes | str, scene_of: Callable[[int], Scene]) -> KeptScene:
     """The inverse of ``scene_line``.
 
     Args:
         line: Line of the sample.
-        read_line: Returns the line of another sample of the shard, by its index.
+        scene_of: Returns the scene of another sample of the shard, by its index.
 
     Raises:
         ValueError, KeyError, TypeError: a line is damaged.
     """
     row = json.loads(line)
     base, own = row.pop("base"), row.pop("scene")
-    shared = {} if base is None else json.loads(read_line(base))["scene"]
-    return KeptScene(**row, scene=from_plain(Scene, {**shared, **own}))
+    if base is None:
+        return KeptScene(**row, scene=from_plain(Scene, own))
+    scene = dataclasses.replace(scene_of(base), **fields_from_plain(Scene, own))
+    return KeptScene(**row, scene=scene)
 
 
 def _same(one: object, other: object) -> bool:

@@ -21,9 +21,11 @@ from gen_data.generator.runner.seal import SealedBefore, read_or_empty, read_sea
 from gen_data.generator.runner.shard import (
     EnteredPipeline,
     Job,
+    LinkedDigests,
     MediaWriter,
     RecordWriter,
     make_shard,
+    no_digests,
     write_images,
     write_records,
 )
@@ -54,7 +56,7 @@ class Settings:
         shards: Range of shards to generate; the data set stays unfinished while others are
             missing. None = all.
         limits: Limits on silence, deaths and memory of workers.
-        allow_mixed_numerics, write_media, write_records: See ``Job``; picklable.
+        allow_mixed_numerics, write_media, write_records, linked_digests: See ``Job``; picklable.
     """
 
     repair: bool = False
@@ -65,6 +67,7 @@ class Settings:
     limits: Limits = field(default_factory=Limits)
     write_media: MediaWriter = write_images
     write_records: RecordWriter = write_records
+    linked_digests: LinkedDigests = no_digests
 
 
 def _silent(progress: RunProgress) -> None:
@@ -117,6 +120,7 @@ def run(  # noqa: PLR0913  (every argument is the choice of the caller)
                 make_pipeline,
                 settings.write_media,
                 settings.write_records,
+                settings.linked_digests,
                 # Bytes that must equal those sealed before need no other guard.
                 settings.allow_mixed_numerics or bool(_read_seal(store, plan).ids),
             )

@@ -14,6 +14,7 @@ from gen_data.generator.core.errors import SampleError
 from gen_data.generator.core.interfaces import DatasetInfo, Exporter
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.serialization import find_not_finite, to_plain
+from gen_data.generator.runner.durable_files import Inode
 from gen_data.generator.runner.error_context import explain_errors
 from gen_data.generator.runner.labels import LABELS_NAME, labels_line
 from gen_data.generator.runner.plan import Plan
@@ -26,6 +27,9 @@ MediaWriter = Callable[[DatasetInfo, Sample, Path], object]
 
 RecordWriter = Callable[[Sample, Sample | None, Path], object]
 """Adds scene and labels of a sample to a shard folder; the second is the scene's first sample."""
+
+LinkedDigests = Callable[[int], Mapping[Inode, str]]
+"""Digests by inode of the files that a shard shares with another data set, by shard."""
 
 
 class PipelineLike(Protocol):
@@ -60,6 +64,12 @@ class EnteredPipeline(PipelineLike, Protocol):
     def __exit__(self, *exception: Any) -> bool | None:
         """Stop the engines."""
         ...
+
+
+def no_digests(shard: int) -> Mapping[Inode, str]:
+    """No file is shared with another data set."""
+    del shard
+    return {}
 
 
 def write_images(info: DatasetInfo, sample: Sample, shard_dir: Path) -> None:
@@ -104,6 +114,7 @@ class Job:
         make_pipeline: Makes the same pipeline in any process.
         write_media: Writes the images of one sample.
         write_records: Adds scene and labels of one sample.
+        linked_digests: Digests of files on disk that the two link into a shard, by inode.
         allow_mixed_numerics: Accept machines that compute differently; see ``admit_numerics``.
     """
 
@@ -112,6 +123,7 @@ class Job:
     make_pipeline: Callable[[], EnteredPipeline]
     write_media: MediaWriter = write_images
     write_records: RecordWriter = write_records
+    linked_digests: LinkedDigests = no_digests
     allow_mixed_numerics: bool = False
 
 
@@ -147,8 +159,9 @@ def make_shard(
             with explain_errors(f"shard {shard}, exporter {name}"), job.store.errors():
                 pipeline.exporters[name].write_shard(pipeline.info, samples, folder)
         with job.store.errors():
-            record = describe_shard(shard, indices, samples, folder)
-            job.store.commit(folder, record)
+            linked = job.linked_digests(shard)
+            record = describe_shard(shard, indices, samples, folder, linked)
+            job.store.commit(folder, record, synced=linked)
         write_s = time.process_time() - started_s
     finally:
         # Frees the space after a failure; after a commit, the folder no longer exists.

@@ -12,6 +12,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.sample import Sample
@@ -19,7 +20,9 @@ from gen_data.generator.core.scene_assets import assets_in
 from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
 from gen_data.generator.runner.durable_files import (
     IRREGULAR,
+    Inode,
     empty_folders,
+    get_inode,
     hash_file,
     tree_sizes,
 )
@@ -102,9 +105,15 @@ def parse_unchecked_record(data: bytes) -> ShardRecord | None:
 
 
 def describe_shard(
-    shard: int, indices: range, samples: Iterable[Sample], folder: Path
+    shard: int,
+    indices: range,
+    samples: Iterable[Sample],
+    folder: Path,
+    known: Mapping[Inode, str] = MappingProxyType({}),
 ) -> ShardRecord:
-    """Make the record of a finished shard folder; hashes every file.
+    """Make the record of a finished shard folder; hashes every file of unknown digest.
+
+    ``known`` are digests by inode, of files that are linked from a committed shard.
 
     Raises:
         StorageError: the folder contains something other than regular files and folders.
@@ -124,7 +133,9 @@ def describe_shard(
         raise StorageError(
             f"shard {shard}: {irregular[0]} is not a regular file; exporters must write files"
         )
-    files = tuple(FileRecord(path, size, hash_file(folder / path)) for path, size in sizes.items())
+    files = tuple(
+        FileRecord(path, size, _digest(folder / path, known)) for path, size in sizes.items()
+    )
     return ShardRecord(
         shard,
         indices.start,
@@ -136,6 +147,11 @@ def describe_shard(
         files,
         empty_folders(folder),
     )
+
+
+def _digest(path: Path, known: Mapping[Inode, str]) -> str:
+    digest = known.get(get_inode(path)) if known else None
+    return digest or hash_file(path)
 
 
 def sum_counts(counts: Iterable[SplitCount]) -> tuple[SplitCount, ...]:

@@ -23,7 +23,7 @@ import shlex
 import shutil
 import socket
 from array import array
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -31,6 +31,7 @@ from pathlib import Path
 
 from gen_data.generator.core.errors import ConfigError, DeterminismError, StorageError
 from gen_data.generator.runner.durable_files import (
+    Inode,
     hash_file,
     make_folder,
     move_durably,
@@ -254,8 +255,10 @@ class LocalStore:
             return folder
         raise StorageError(f"{self.scratch_root}: {SCRATCH_FOLDERS_MAX} unfinished folders")
 
-    def commit(self, folder: Path, record: ShardRecord) -> None:
+    def commit(self, folder: Path, record: ShardRecord, synced: Container[Inode] = ()) -> None:
         """Publish a finished shard: files, then folder, then record, each synced before the next.
+
+        ``synced`` are the inodes of files that are already on the disk.
 
         Publishing the same bytes twice changes nothing.
 
@@ -266,7 +269,7 @@ class LocalStore:
         if committed is not None:
             self._expect_equal(committed, record, folder)
             return
-        sync_tree(folder)
+        sync_tree(folder, synced)
         # A kill between the two steps below leaves a folder without a record.
         self.quarantine(record.shard)
         move_durably(folder, self.shard_dir(record.shard))

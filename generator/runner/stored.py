@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property, lru_cache, partial
+from functools import cached_property, lru_cache
 from os import PathLike
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -22,7 +22,7 @@ from gen_data.generator.core.capture import (
     SensorReading,
 )
 from gen_data.generator.core.errors import StorageError
-from gen_data.generator.core.interfaces import DatasetInfo, cloud_path, media_path, table_path
+from gen_data.generator.core.interfaces import DatasetInfo, cloud_path, table_path
 from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import from_plain
@@ -35,6 +35,9 @@ T = TypeVar("T")
 
 SHARDS_KEPT = 16
 """Number of shards whose line positions stay in memory; lines and images are read on access."""
+
+BASE_SCENES_KEPT = 2
+"""Number of scenes that stay in memory for their further views."""
 
 
 class JsonLines:
@@ -73,6 +76,8 @@ class StoredSamples:
         self.info: DatasetInfo = manifest[0]
         self.dataset_id: str = manifest[1]
         self._lines = lru_cache(2 * SHARDS_KEPT)(JsonLines)
+        # Views of one scene follow each other, and share most of it.
+        self._base_scene = lru_cache(BASE_SCENES_KEPT)(self._read_base_scene)
 
     @property
     def n(self) -> int:
@@ -130,12 +135,15 @@ class StoredSamples:
             StorageError: it is missing or damaged.
         """
         with self._damage(self._folder_of(index)):
-            line = self._line(SCENES_NAME, index)
-            return parse_scene(line, partial(self._line, SCENES_NAME))
+            return parse_scene(self._line(SCENES_NAME, index), self._base_scene)
+
+    def _read_base_scene(self, index: int) -> Scene:
+        return self.kept_scene(index).scene
 
     def close(self) -> None:
         """Forget the positions of lines."""
         self._lines.cache_clear()
+        self._base_scene.cache_clear()
 
     def _line(self, name: str, index: int) -> bytes:
         lines = self._lines(self._folder_of(index) / name)
@@ -161,7 +169,7 @@ class StoredSamples:
             name: SensorReading(
                 name,
                 labels.truth[name].camera,
-                ImageFiles(folder, name, index, self.info.media[name], self.info.depth_scale_m),
+                ImageFiles(self.info, folder, name, index),
                 time_s=image.time_s,
                 ev100=image.ev100,
             )
@@ -273,16 +281,11 @@ class ReadOnAccess(Mapping[str, T], Generic[T]):
 class ImageFiles(Mapping[Channel, NDArray[Any]]):
     """Images of one reading by channel, decoded at each access."""
 
-    def __init__(
-        self,
-        folder: Path,
-        sensor: str,
-        index: int,
-        channels: tuple[Channel, ...],
-        depth_scale_m: float,
-    ) -> None:
-        self._paths = {c: media_path(folder, sensor, c, index) for c in channels}
-        self._depth_scale_m = depth_scale_m
+    def __init__(self, info: DatasetInfo, folder: Path, sensor: str, index: int) -> None:
+        self._paths = {
+            c: info.media_path(folder, sensor, c, index) for c in info.sensor(sensor).channels
+        }
+        self._depth_scale_m = info.depth_scale_m
 
     def __getitem__(self, channel: Channel) -> NDArray[Any]:
         """Decode one image."""

@@ -15,7 +15,7 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from gen_data.exporters.id_colors import id_color, paint_ids
+from gen_data.exporters.id_colors import id_color, id_colors
 from gen_data.exporters.solo import Solo
 from gen_data.generator.core.errors import ConfigError
 
@@ -303,7 +303,7 @@ def test_colors_differ() -> None:
     assert len(set(colors)) == 65_536
     assert colors[0] == (0, 0, 0)
     ids = np.arange(65_536, dtype=np.uint16).reshape(256, 256)
-    np.testing.assert_array_equal(paint_ids(ids).reshape(-1, 3), colors)
+    np.testing.assert_array_equal(id_colors()[ids].reshape(-1, 3), colors)
 
 
 def test_sequences_of_different_lengths_are_refused(world: Any) -> None:

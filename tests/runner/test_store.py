@@ -151,7 +151,8 @@ def test_views_keep_what_differs_and_read_back_complete(tmp_path: Path) -> None:
     lines = {4: scene_line(first, None).encode(), 5: scene_line(second, first).encode()}
 
     assert set(json.loads(lines[5])["scene"]) == {"cameras"}
-    kept = [parse_scene(lines[index], lines.__getitem__) for index in (4, 5)]
+    whole = parse_scene(lines[4], {}.__getitem__)
+    kept = [whole, parse_scene(lines[5], {4: whole.scene}.__getitem__)]
     assert [one.scene for one in kept] == [first.scene, second.scene]
     assert [(one.index, one.view_index) for one in kept] == [(4, 0), (5, 1)]
 
@@ -557,7 +558,7 @@ def plain_write(path: Path, data: bytes, scratch: Path) -> None:
 @pytest.mark.parametrize(
     ("place", "mutant"),
     [
-        ("store.sync_tree", lambda folder: None),
+        ("store.sync_tree", lambda folder, synced: None),
         ("finalize.sync_tree", lambda folder, synced: None),
         ("store.write_durably", plain_write),
         ("finalize.write_durably", plain_write),

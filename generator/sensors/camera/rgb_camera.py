@@ -23,6 +23,7 @@ from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.camera.exposure import ExposureTime, RollingShutter, make_shutter
 from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 from gen_data.generator.sensors.camera.lens_models import CalibratedLens, LensConfig, Pinhole
+from gen_data.generator.sensors.camera.rgb_encoding import RgbEncoding
 from gen_data.generator.sensors.mounting import Mounted, check_rig
 
 Image = Literal[
@@ -63,6 +64,7 @@ class RgbCamera(Mounted):
             image, including keypoints, refer to the instant of their row, labels in space to that
             of the middle row, which is the instant of the step.
         image_pipeline: From radiance to photographs: lens, exposure, sensor, tone, JPEG.
+        rgb_encoding: Files of the rgb channel: lossless PNG, or smaller JPEG or WebP.
         stereo_with: For the channels ``disparity`` and ``disparity_visible``: name of the camera
             to its right that forms a rectified pair with it.
     """
@@ -79,6 +81,7 @@ class RgbCamera(Mounted):
     exposure: ExposureTime | None = None
     rolling_shutter: RollingShutter | None = None
     image_pipeline: ImagePipeline = ImagePipeline()
+    rgb_encoding: RgbEncoding = RgbEncoding()
     stereo_with: str = ""
 
     @model_validator(mode="after")
@@ -124,7 +127,10 @@ class RgbCamera(Mounted):
     def describe(self) -> SensorInfo:
         """Describe a camera with the channels that it writes."""
         lens = self.intrinsics().lens.model
-        return self._info(self.name, Modality.CAMERA, channels=self.media, lens=lens)
+        encoding = self.rgb_encoding.described()
+        return self._info(
+            self.name, Modality.CAMERA, channels=self.media, lens=lens, rgb_encoding=encoding
+        )
 
     def mount(self, scene: Scene) -> Scene:
         """Add this camera, on its rig or looking at the scene's focus, unless it exists."""
