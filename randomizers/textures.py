@@ -29,7 +29,7 @@ class Textures(SurfaceRandomizer):
     """
 
     type: Literal["textures"] = "textures"
-    textures: tuple[str, ...] = Field(min_length=1)
+    textures: tuple[str, ...] = Field(min_length=1, examples=[["wood", "marble"]])
     probability: dist.Chance = dist.Probability(1.0)
     scale_m: dist.Positive = dist.Uniform(0.15, 0.6)
     slots: tuple[int, ...] = ()

@@ -26,7 +26,7 @@ class Crosswalk(Element):
     """
 
     type: Literal["crosswalk"] = "crosswalk"
-    road: str
+    road: str = Field(examples=["main"])
     station_m: float = Field(40.0, ge=0)
     width_m: float = Field(4.0, ge=1.5, le=20)
 

@@ -30,7 +30,7 @@ class LaneObjects(Element):
 
     type: Literal["lane_objects"] = "lane_objects"
     lanes: tuple[LaneKind, ...] = Field(min_length=1)
-    assets: AssetChoice
+    assets: AssetChoice = Field(examples=[{"tags": ["car"]}])
     count: int = Field(0, ge=0, le=2000)
     facing: Literal["along", "left"] = "along"
     annotate: bool = True

@@ -104,9 +104,9 @@ class Objects(Element):
     """
 
     type: Literal["objects"] = "objects"
-    on: str
+    on: str = Field(examples=["table"])
     count: int = Field(8, ge=0, le=500)
-    assets: AssetChoice
+    assets: AssetChoice = Field(examples=[{"tags": ["household"]}])
     placement: Placement = "drop"
     annotate: bool = True
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
@@ -27,7 +27,7 @@ class Prop(PlacedElement):
     """
 
     type: Literal["prop"] = "prop"
-    asset: str
+    asset: str = Field(examples=["mug?seed=0"])
     annotate: bool = False
     hollow: bool = False
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
+from pydantic import Field
 
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
@@ -24,7 +25,7 @@ class RoadNetwork(PlacedElement):
     """
 
     type: Literal["road_network"] = "road_network"
-    asset: str
+    asset: str = Field(examples=["user/town"])
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the roads as background, with lanes named ``<name>/<road>.<section>.<lane>``."""

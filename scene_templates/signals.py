@@ -30,7 +30,7 @@ class Signals(Element):
     """
 
     type: Literal["signals"] = "signals"
-    junction: str
+    junction: str = Field(examples=["cross"])
     mount: Literal["pole", "mast_arm"] = "pole"
     beside_m: float = Field(0.0, ge=0, le=20)
     seed: int = Field(0, ge=0, le=1_000_000)

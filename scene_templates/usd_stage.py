@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Literal
 
+from pydantic import Field
+
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Instance, Light, Rig, Scene, StageModel, StagePiece
 from gen_data.generator.core.scene_time import RIG_AXES
@@ -26,7 +28,7 @@ class UsdStage(PlacedElement):
     """
 
     type: Literal["usd_stage"] = "usd_stage"
-    asset: str
+    asset: str = Field(examples=["user/kitchen"])
     annotate: bool = False
     lights: bool = True
     cameras: bool = False

@@ -6,8 +6,8 @@ import json
 import math
 import re
 import textwrap
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
@@ -26,6 +26,22 @@ _EXAMPLES = {"integer": 1, "number": 1, "string": "example", "boolean": True}
 _HEADINGS = ("field", "type", "default")
 
 
+class FieldRow(NamedTuple):
+    """A field of a plug-in, in words.
+
+    Attributes:
+        name: Its key in YAML.
+        words: Its type and range.
+        default: As YAML, or ``required``.
+        text: Its description; empty if there is none.
+    """
+
+    name: str
+    words: str
+    default: str
+    text: str
+
+
 def describe(model: type) -> str:
     """Summary of a plug-in, a table of its fields, and an example in YAML.
 
@@ -33,16 +49,7 @@ def describe(model: type) -> str:
     """
     if not issubclass(model, BaseModel):
         return docstring_summary(model) + "\n"
-    attributes, schema = documented_attributes(model), FieldSchema.of(model)
-    rows = [
-        (
-            name,
-            re.sub(r"^an? ", "", schema.child(name).words()),
-            "required" if info.is_required() else to_flow_yaml(plain_default(info)),
-            " ".join((info.description or attributes.get(name, "")).split()),
-        )
-        for name, info in model.model_fields.items()
-    ]
+    rows = describe_fields(model)
     parts = [docstring_summary(model)]
     if rows:
         parts.append("\n".join(_table(rows)))
@@ -50,6 +57,20 @@ def describe(model: type) -> str:
     if example:
         parts.append(f"Example:\n{textwrap.indent(_block(example), '  ')}")
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def describe_fields(model: type[BaseModel]) -> tuple[FieldRow, ...]:
+    """Fields of a model in their order, with the descriptions of its docstrings."""
+    attributes, schema = documented_attributes(model), FieldSchema.of(model)
+    return tuple(
+        FieldRow(
+            name,
+            re.sub(r"^an? ", "", schema.child(name).words()),
+            "required" if info.is_required() else to_flow_yaml(plain_default(info)),
+            " ".join((info.description or attributes.get(name, "")).split()),
+        )
+        for name, info in model.model_fields.items()
+    )
 
 
 def make_example(model: type[BaseModel]) -> dict[str, Any] | None:
@@ -73,7 +94,7 @@ def plain_default(info: FieldInfo) -> Any:
     return to_plain_yaml(info.get_default(call_default_factory=True, validated_data={}))
 
 
-def _table(rows: list[tuple[str, str, str, str]]) -> Iterator[str]:
+def _table(rows: Sequence[FieldRow]) -> Iterator[str]:
     widths = [max(len(row[i]) for row in (*rows, _HEADINGS)) for i in range(3)]
     yield "  ".join(h.ljust(width) for h, width in zip(_HEADINGS, widths, strict=True)).rstrip()
     yield "  ".join("-" * width for width in widths)

@@ -1,0 +1,138 @@
+"""The documentation site: the generated reference is complete, and every picture is there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import click
+import pytest
+from PIL import Image
+
+from docs import pictures
+from docs.hooks.command_reference import command_page
+from docs.hooks.plugin_reference import (
+    KINDS,
+    distribution_page,
+    field_range,
+    field_unit,
+    plugin_page,
+    template_page,
+)
+from gen_data import configs, scene_templates
+from gen_data.generator.assemble.plugin_tables import TABLES
+from gen_data.generator.cli.main import cli
+from gen_data.generator.config.distributions import DISTRIBUTIONS
+from gen_data.generator.config.yaml_tree import parse_yaml
+from gen_data.randomizers.lighting import Lighting
+
+PICTURES_MAX_MB = 4.0
+ROOT = Path(__file__).parents[2]
+
+
+def sections(page: str) -> dict[str, str]:
+    """Texts of a page by the headings of the second level."""
+    parts = re.split(r"^## (.*)$", page, flags=re.MULTILINE)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+@pytest.mark.parametrize("kind", list(TABLES))
+def test_every_plugin_is_there_with_every_field_and_a_valid_example(kind: str) -> None:
+    """Headings are the names of the table, rows the fields; the example is read back."""
+    table, texts = TABLES[kind], sections(plugin_page(kind, TABLES[kind]))
+
+    assert set(texts) - {"Mappings in fields"} == set(table.entries)
+    for name in table.entries:
+        model: Any = table.load(name)
+        rows = re.findall(r"^\| `(\w+)` \|", texts[name], re.MULTILINE)
+        assert rows == list(model.model_fields)
+        block = re.findall(r"^```yaml\n(.*?)^```$", texts[name], re.MULTILINE | re.DOTALL)[0]
+        example: Any = parse_yaml(block, name).plain()
+        entry = example[KINDS[kind][1]]
+        entry = entry if isinstance(entry, dict) else entry[0]
+        plain = {table.tag: entry} if isinstance(entry, str) else entry
+        assert plain[table.tag] == name
+        model.model_validate(plain, strict=False)
+
+
+@pytest.mark.parametrize("kind", list(TABLES))
+def test_headings_are_unique_and_links_lead_to_them(kind: str) -> None:
+    """A second heading of the same name would get another anchor."""
+    page = plugin_page(kind, TABLES[kind])
+    anchors = [h.lower().replace(" ", "-") for h in re.findall(r"^##+ (.*)$", page, re.MULTILINE)]
+
+    assert len(set(anchors)) == len(anchors)
+    assert set(re.findall(r"\]\(#([^)]+)\)", page)) <= set(anchors)
+
+
+def test_ranges_and_units_are_those_of_the_fields() -> None:
+    """Hand-picked fields of a light."""
+    assert field_range(Lighting, "temperature_k") == "[1667, 25000]"
+    assert field_range(Lighting, "illuminance_lux") == ">= 0"
+    assert field_range(Lighting, "kind") == ""
+    assert field_unit("illuminance_lux") == "lx"
+    assert field_unit("luminance_cd_m2") == "cd/m²"
+    assert field_unit("speed_m_s") == "m/s"
+    assert field_unit("name") == ""
+
+
+def test_distributions_templates_and_commands_are_complete() -> None:
+    """The other generated pages list everything that the program knows."""
+    assert set(sections(distribution_page())) == set(DISTRIBUTIONS.entries)
+    templates = {path.stem for path in Path(scene_templates.__path__[0]).glob("*.yaml")}
+    assert set(sections(template_page())) == templates
+    commands = sections(command_page())
+    for name in cli.list_commands(click.Context(cli)):
+        assert f"gen-data {name}" in commands
+        command = cli.get_command(click.Context(cli), name)
+        assert command is not None
+        for option in command.params:
+            assert all(word in commands[f"gen-data {name}"] for word in option.opts[:1]) or (
+                isinstance(option, click.Argument)
+            )
+
+
+def test_every_plugin_with_an_effect_in_images_has_pictures_or_a_reason() -> None:
+    """All randomizers, sensors, renderers and distributions are in docs/pictures.yaml."""
+    listed = {(row.kind, row.name) for row in pictures.read_rows()}
+    tables = [TABLES[kind] for kind in ("randomizer", "sensor", "renderer")] + [DISTRIBUTIONS]
+    assert listed == {(table.kind, name) for table in tables for name in table.entries}
+
+
+def test_every_configuration_has_a_picture_and_a_section_of_the_gallery() -> None:
+    """Sheets and headings are the names of the shipped files."""
+    shipped = {path.stem for path in Path(configs.__path__[0]).glob("*.yaml")}
+    gallery = sections((ROOT / "docs/gallery.md").read_text("utf-8"))
+
+    assert set(pictures.read_sheets()) == shipped
+    for name in shipped:
+        assert f"(pictures/configuration/{name}.webp)" in gallery[name]
+
+
+def test_pictures_are_drawn_and_small() -> None:
+    """One file per entry and no other; each has as many columns as its strip."""
+    jobs = list(pictures.find_jobs())
+    paths = [job.path for job in jobs]
+
+    assert len(set(paths)) == len(paths)
+    assert set(paths) == set(pictures.FOLDER.rglob("*.webp"))
+    assert sum(path.stat().st_size for path in paths) < PICTURES_MAX_MB * 1e6
+    for job in jobs:
+        if isinstance(job.entry, pictures.Strip):
+            columns = len(job.entry.values)
+            width = columns * (pictures.WIDTH_PX + pictures.GAP_PX) - pictures.GAP_PX
+            with Image.open(job.path) as picture:
+                assert picture.width == width, job.path
+
+
+@pytest.mark.parametrize(
+    "job",
+    [job for job in pictures.find_jobs() if job.kind in ("sensor", "renderer")][::6],
+    ids=lambda job: job.path.stem,
+)
+def test_configurations_of_strips_are_valid(job: pictures.Job) -> None:
+    """Fields and values exist; the others are checked when they are drawn."""
+    strip = job.entry
+    assert isinstance(strip, pictures.Strip)
+    assert len(pictures.strip_configurations(strip)) == len(strip.values)
