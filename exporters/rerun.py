@@ -31,12 +31,12 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Literal
 
-import cv2
 import numpy as np
 from pydantic import Field
 
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.fragments import fragment_rows, write_fragment
+from gen_data.exporters.image_files import read_pixels
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.rrd_container import write_recording
@@ -282,7 +282,7 @@ def _channel_columns(
         units_per_m = [1.0 / info.depth_scale_m] * len(paths)
         return rr.EncodedDepthImage.columns(blob=_blobs(paths), media_type=types, meter=units_per_m)
     if channel is Channel.CATEGORY:
-        images = [cv2.imread(str(path), cv2.IMREAD_UNCHANGED) for path in paths]
+        images = [read_pixels(path) for path in paths]
         return rr.SegmentationImage.columns(
             buffer=[np.frombuffer(image.tobytes(), np.uint8) for image in images],
             format=[

@@ -16,7 +16,11 @@ from typing import Any
 import click
 
 from gen_data.generator import __version__
-from gen_data.generator.cli.options import SHARD_RANGE, ConfigurationOptions, configuration_options
+from gen_data.generator.cli.options import (
+    ConfigurationOptions,
+    configuration_options,
+    parse_shards,
+)
 from gen_data.generator.cli.stop_signals import (
     handle_stop_signals,
     ignore_stop_signals,
@@ -131,7 +135,10 @@ An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configu
 )
 @click.option("--force", is_flag=True, help="Start although the disk is probably too small.")
 @click.option(
-    "--shards", type=SHARD_RANGE, metavar="A:B", help="Generate shards A to B - 1 only; see merge."
+    "--shards",
+    callback=parse_shards,
+    metavar="A:B",
+    help="Generate shards A to B - 1 only; see merge.",
 )
 @configuration_options
 @click.pass_context

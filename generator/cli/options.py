@@ -38,23 +38,18 @@ class ConfigurationOptions:
         )
 
 
-class _ShardRange(click.ParamType):
-    """``A:B``, two whole numbers."""
-
-    name = "range"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[int, int]:
-        """Both numbers of the text."""
-        first, colon, end = str(value).partition(":")
-        if not (colon and first.isascii() and first.isdigit() and end.isascii() and end.isdigit()):
-            self.fail(f"'{value}' is not a range of shards; expected A:B, such as 0:50", param, ctx)
-        return int(first), int(end)
-
-
-SHARD_RANGE = _ShardRange()
-"""Type of the option ``--shards``."""
+def parse_shards(
+    context: click.Context, parameter: click.Parameter, text: str | None
+) -> tuple[int, int] | None:
+    """Both numbers of the option ``--shards A:B``; a click callback."""
+    if text is None:
+        return None
+    first, _, end = text.partition(":")
+    if not all(number.isascii() and number.isdigit() for number in (first, end)):
+        raise click.BadParameter(
+            f"'{text}' is not a range of shards; expected A:B, such as 0:50", context, parameter
+        )
+    return int(first), int(end)
 
 
 def configuration_options(command: F) -> F:
