@@ -11,11 +11,14 @@ import os
 import platform
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gen_data.generator.core.errors import NumericsError
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.runner.durable_files import sync_path
-from gen_data.generator.runner.shard import Job, PipelineLike
+
+if TYPE_CHECKING:
+    from gen_data.generator.runner.shard import Job, PipelineLike
 
 NUMERICS_NAME = "numerics.json"
 

@@ -166,7 +166,7 @@ def test_a_bug_is_one_message_with_place_trace_and_command(tmp_path: Path, worke
 
     assert str(caught.value).startswith("sample 6: ValueError: a wheel came off\n")
     assert "doubles.py" in str(caught.value)
-    assert "--first 6 --n 1" in str(caught.value)
+    assert "--index 6" in str(caught.value)
 
 
 def test_a_wrong_sample_is_named_with_the_command_that_makes_it(tmp_path: Path) -> None:
