@@ -11,12 +11,15 @@ import os
 import platform
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gen_data.generator.core.errors import NumericsError
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.runner.durable_files import sync_path, write_durably
-from gen_data.generator.runner.shard import Job, PipelineLike
-from gen_data.generator.runner.store import RUN_NAME, LocalStore
+
+if TYPE_CHECKING:
+    from gen_data.generator.runner.shard import Job, PipelineLike
+    from gen_data.generator.runner.store import LocalStore
 
 NUMERICS_NAME = "numerics.json"
 
@@ -54,7 +57,7 @@ def gather_numerics(parts: Sequence[Path], store: LocalStore, allow_mixed: bool)
     """
     classes: dict[str, dict[str, object]] = {}
     for part in parts:
-        for entry in _read(part / RUN_NAME / NUMERICS_NAME):
+        for entry in _read(part / "run" / NUMERICS_NAME):
             classes.setdefault(canonical_json(entry.get("digests")), entry)
     entries = list(classes.values())
     if len(entries) > 1 and not allow_mixed:
