@@ -45,7 +45,7 @@ def gather_shards(
         store.state(plan)
     with store.locked():
         store.prepare(plan)
-        gather_numerics(parts, store, allow_mixed_numerics)
+        gather_numerics([LocalStore(part).run_dir for part in parts], store, allow_mixed_numerics)
         for part in parts:
             _gather(plan, LocalStore(part.absolute()), store)
 

@@ -49,15 +49,15 @@ def admit_numerics(job: Job, pipeline: PipelineLike) -> None:
             file.write(canonical_json(entry) + "\n")
 
 
-def gather_numerics(parts: Sequence[Path], store: LocalStore, allow_mixed: bool) -> None:
-    """Record the classes of machines of all parts of a data set.
+def gather_numerics(run_dirs: Sequence[Path], store: LocalStore, allow_mixed: bool) -> None:
+    """Record the classes of machines of all parts of a data set, given their ``run`` folders.
 
     Raises:
         NumericsError: there is more than one class, and ``allow_mixed`` is not set.
     """
     classes: dict[str, dict[str, object]] = {}
-    for part in parts:
-        for entry in _read(part / "run" / NUMERICS_NAME):
+    for folder in run_dirs:
+        for entry in _read(folder / NUMERICS_NAME):
             classes.setdefault(canonical_json(entry.get("digests")), entry)
     entries = list(classes.values())
     if len(entries) > 1 and not allow_mixed:
