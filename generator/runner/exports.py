@@ -23,6 +23,7 @@ from gen_data.generator.core.interfaces import (
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.runner.durable_files import Inode, get_inode
 from gen_data.generator.runner.labels import LABELS_NAME
+from gen_data.generator.runner.plan import FORMAT_VERSION
 from gen_data.generator.runner.progress import RunProgress, Summary
 from gen_data.generator.runner.provenance import SCENES_NAME
 from gen_data.generator.runner.run import Settings, run
@@ -154,7 +155,7 @@ def export(
     text = licences.read_text("utf-8") if licences.exists() else None
     files = LinkedFiles(stored)
     return run(
-        replace(stored.plan, config=config.resolved),
+        replace(stored.plan, config=config.resolved, format_version=FORMAT_VERSION),
         StoredPipeline(stored, exporters, config.asset_folders),
         out,
         workers=workers,
