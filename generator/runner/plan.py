@@ -16,6 +16,8 @@ FORMAT_VERSION = 1
 """Version of the folder layout, the shard records and the manifest."""
 
 PLAN_NAME = "plan.json"
+DAMAGE = (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError)
+"""What reading a damaged JSON file into typed values may raise."""
 
 
 @dataclass(frozen=True)
@@ -79,10 +81,13 @@ def load_plan(folder: Path) -> Plan:
     """
     path = folder / PLAN_NAME
     try:
-        return from_plain(Plan, json.loads(path.read_bytes()))
-    except FileNotFoundError:
+        plan = from_plain(Plan, json.loads(path.read_bytes()))
+        if plan.format_version != FORMAT_VERSION:
+            raise ValueError(f"format version {plan.format_version}; expected {FORMAT_VERSION}")
+        return plan
+    except (FileNotFoundError, NotADirectoryError):
         raise StorageError(f"{path}: missing; {folder} is not a gen-data data set") from None
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
+    except DAMAGE as error:
         raise StorageError(
             f"{path}: damaged, or written by another version of gen-data ({error}); nothing was "
             "changed. Restore the file from a copy, or choose another folder with --out"

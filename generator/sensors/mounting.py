@@ -77,7 +77,7 @@ class Instrument(Mounted):
     """
 
     kind: ClassVar[str]
-    name: str = Field("instrument", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("instrument", max_length=100, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     rig: str = "ego"
 
     @property

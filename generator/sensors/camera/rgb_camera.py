@@ -67,7 +67,7 @@ class RgbCamera(Mounted):
     """
 
     type: Literal["rgb_camera"] = "rgb_camera"
-    name: str = Field("color", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("color", max_length=100, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     size_px: tuple[SidePx, SidePx] = (640, 480)
     hfov_deg: float = Field(60.0, ge=1, le=360)
     lens: LensConfig = Pinhole()

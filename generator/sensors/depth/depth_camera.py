@@ -94,7 +94,7 @@ class DepthCamera(Mounted):
     """
 
     type: Literal["depth_camera"] = "depth_camera"
-    name: str = Field("depth_camera", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("depth_camera", max_length=100, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     model: str | DepthModel = "kinect_v2"
     size_px: tuple[SidePx, SidePx] | None = None
     hfov_deg: float | None = Field(None, ge=1, le=150)

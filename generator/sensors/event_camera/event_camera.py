@@ -214,7 +214,7 @@ class EventCamera(Mounted):
     """
 
     type: Literal["event_camera"] = "event_camera"
-    name: str = Field("events", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("events", max_length=100, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     camera: str = "color"
     size_px: tuple[SidePx, SidePx] = (346, 260)
     hfov_deg: float = Field(60.0, ge=1, le=170)

@@ -65,7 +65,7 @@ class EventDetector(Instrument):
 
     kind: ClassVar[str] = "watcher"
     type: Literal["watcher"] = "watcher"
-    name: str = Field("watcher", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("watcher", max_length=100, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     events: tuple[Occurrence, ...] = Field(EVERYTHING, min_length=1)
     obstacle_m: float = Field(20.0, gt=0, le=500)
     light_m: float = Field(50.0, gt=0, le=500)

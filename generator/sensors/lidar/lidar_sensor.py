@@ -88,7 +88,7 @@ class LidarSensor(Mounted):
     """
 
     type: Literal["lidar"] = "lidar"
-    name: str = Field("lidar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("lidar", max_length=100, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     model: str | LidarModel = "HDL-64E"
     beams: Annotated[tuple[Beam, ...], WithJsonSchema(BEAMS_SCHEMA)] = Field((), max_length=4096)
     rotation_hz: float | None = Field(None, gt=0, le=100)

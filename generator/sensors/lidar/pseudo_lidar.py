@@ -45,7 +45,7 @@ class PseudoLidar(Mounted):
     """
 
     type: Literal["pseudo_lidar"] = "pseudo_lidar"
-    name: str = Field("pseudo_lidar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("pseudo_lidar", max_length=100, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     camera: str = "color"
     offset_m: Vec3 = (0.0, 0.0, 0.3)
     stride_px: int = Field(8, ge=1, le=256)

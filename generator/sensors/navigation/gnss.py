@@ -102,7 +102,7 @@ class Gnss(Instrument):
 
     kind: ClassVar[str] = "gnss"
     type: Literal["gnss"] = "gnss"
-    name: str = Field("gnss", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("gnss", max_length=100, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     model: Annotated[str, AfterValidator(lambda name: check_preset(PRESETS, name))] = "standalone"
     origin_deg: tuple[Annotated[float, Field(ge=-89, le=89)], Degrees] = (49.0114, 8.4244)
     origin_altitude_m: float = Field(115.0, ge=-1000, le=20_000)

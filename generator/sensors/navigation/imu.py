@@ -76,7 +76,7 @@ class Imu(Instrument):
 
     kind: ClassVar[str] = "imu"
     type: Literal["imu"] = "imu"
-    name: str = Field("imu", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("imu", max_length=100, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     model: Annotated[str, AfterValidator(lambda name: check_preset(PRESETS, name))] = "RT3003"
     rate_hz: float | None = Field(100.0, gt=0, le=10_000)
     noise: float = Field(1.0, ge=0)

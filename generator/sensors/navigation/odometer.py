@@ -53,7 +53,7 @@ class Odometer(Instrument):
 
     kind: ClassVar[str] = "odometer"
     type: Literal["odometer"] = "odometer"
-    name: str = Field("odometer", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("odometer", max_length=100, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     wheelbase_m: float = Field(2.7, gt=0, le=20)
     track_m: float = Field(1.55, gt=0, le=10)
     scale_error: float = Field(0.005, ge=0, le=0.5)

@@ -89,7 +89,7 @@ class Radar(Instrument):
 
     kind: ClassVar[str] = "radar"
     type: Literal["radar"] = "radar"
-    name: str = Field("radar", pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
+    name: str = Field("radar", max_length=100, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     model: Annotated[str, AfterValidator(lambda name: check_preset(PRESETS, name))] = "ARS408-21"
     false_alarms: float = Field(1.0, ge=0, le=1000)
     noise: float = Field(1.0, ge=0)
