@@ -118,9 +118,10 @@ class KittiStereo(ExporterBase):
         matched = [name for name in known if Channel.DISPARITY in info.media[name]]
         left = self.left or (matched[0] if matched else "")
         if left not in matched:
+            camera = f"camera '{left}' does not write" if left else "no camera writes"
             raise ConfigError(
-                f"exporter '{self.type}': camera '{left}' does not write the channels rgb and "
-                "disparity; add both to its channels and name its partner with stereo_with"
+                f"exporter '{self.type}': {camera} the channels rgb and disparity; add both to its "
+                "channels and name its partner with stereo_with"
             )
         others = [name for name in known if name != left]
         right = self.right or (others[0] if len(others) == 1 else "")

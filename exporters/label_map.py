@@ -24,6 +24,7 @@ from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, Export
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.generator.core.scene import Instance, Scene
 
+CLASS_NAME_MAX = 60
 Sources = tuple[str, ...]
 """Categories of the data set."""
 
@@ -73,6 +74,11 @@ class LabelMap(Strict):
     def _has_each_category_once(self) -> LabelMap:
         seen: dict[str, str] = {}
         for name, categories in self.classes_of.items():
+            if not name.strip() or not name.isprintable() or len(name) > CLASS_NAME_MAX:
+                raise ValueError(
+                    f"class {name[:CLASS_NAME_MAX]!r}: expected a name of 1 to {CLASS_NAME_MAX} "
+                    "printable characters"
+                )
             for category in categories:
                 if category in seen:
                     raise ValueError(

@@ -35,6 +35,7 @@ from gen_data.exporters.sequences import (
     write_text,
 )
 from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo, media_path
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.generator.core.scene import Instance
@@ -85,9 +86,15 @@ class MotChallenge(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: the camera is missing, or there are too many sequences.
+            ConfigError: the camera is missing, there are too many sequences, or no category has a
+                class in this format.
         """
         rgb_camera(info, self.camera, self.type)
+        if not any(_class_of(category) for category in info.categories):
+            raise ConfigError(
+                f"exporter '{self.type}': no category of the data set has a class in this format; "
+                f"expected at least one of: {', '.join(CLASSES)}. Use coco for other categories"
+            )
         check_sequence_count(info, SEQUENCES_MAX, self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
@@ -151,9 +158,13 @@ def gt_columns(thing: ObjectTruth, boxes: Literal["visible", "whole"]) -> str:
     return f"{thing.instance.instance_id},{corner},{flag},{number},{visibility}"
 
 
+def _class_of(category: str) -> int:
+    return CLASSES.get("_".join(category.lower().split()), 0)
+
+
 def mot_class(instance: Instance) -> int:
     """MOT16's class number of an object; 0 = none."""
-    number = CLASSES.get("_".join(instance.category.lower().split()), 0)
+    number = _class_of(instance.category)
     facts = dict(instance.attributes)
     if number == PEDESTRIAN and facts.get("pose") in STATIC_POSES:
         return STATIC_PERSON

@@ -50,7 +50,7 @@ from gen_data.exporters.sequences import (
     write_text,
 )
 from gen_data.generator.core.asset_types import SURFACES
-from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Scene
@@ -134,10 +134,14 @@ class SemanticKitti(ExporterBase):
             ("lidar", self.lidar, info.lidars),
             ("camera", self.camera, info.cameras),
         ):
-            if not known or (name and name not in known):
+            if not known:
                 raise ConfigError(
-                    f"exporter 'semantickitti': there is no {field} '{name}'; "
-                    f"sensors of that kind: {', '.join(known) or 'none'}"
+                    f"exporter '{self.type}': there is no {field}; add a sensor of that type"
+                )
+            if name and name not in known:
+                raise ConfigError(
+                    f"exporter '{self.type}': there is no {field} '{name}'; expected one of: "
+                    f"{', '.join(known)}{did_you_mean(name, known)}"
                 )
         check_pinholes(info, [self.camera or info.cameras[0]], self.type)
 

@@ -27,6 +27,11 @@ def rgb_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:
         return known[0]
     if wanted in known:
         return wanted
+    if not wanted:
+        raise ConfigError(
+            f"exporter '{exporter}': no sensor of {_join_names(info.cameras)} writes the rgb "
+            "channel; add an rgb_camera"
+        )
     raise ConfigError(
         f"exporter '{exporter}': camera '{wanted}' does not write the rgb channel; "
         f"expected one of: {_join_names(known)}{did_you_mean(wanted, known)}"
@@ -39,11 +44,7 @@ def check_channels(info: DatasetInfo, channels: Iterable[Channel], exporter: str
     Raises:
         ConfigError: a channel is missing.
     """
-    if not rgb_cameras(info):
-        raise ConfigError(
-            f"exporter '{exporter}': no sensor of {_join_names(info.cameras)} writes the rgb "
-            "channel; add an rgb_camera"
-        )
+    rgb_camera(info, "", exporter)
     for camera in rgb_cameras(info):
         missing = [c.value for c in channels if c not in info.media[camera]]
         if missing:

@@ -30,7 +30,7 @@ from gen_data.generator.core.interfaces import (
     Sensor,
     SensorInfo,
 )
-from gen_data.generator.core.scene import Scene, SharedValue
+from gen_data.generator.core.scene import LABEL_IDS_MAX, Scene, SharedValue
 from gen_data.generator.physics import open_engine
 from gen_data.generator.pipeline import Pipeline
 from gen_data.generator.pipeline.pipeline import PipelineConfig, SceneSource
@@ -148,6 +148,11 @@ def pipeline_config(
         ConfigError: parts do not fit together, such as an exporter without images of a sensor.
     """
     _check_durations(config)
+    if len(categories) > LABEL_IDS_MAX:
+        raise ConfigError(
+            f"{len(categories)} categories, but label images have room for {LABEL_IDS_MAX}; "
+            "give the assets fewer categories"
+        )
     annotators = annotators_of(config)
     info = dataset_info(config, n, categories)
     return PipelineConfig(

@@ -30,6 +30,10 @@ LaneKind = Literal[
 ]
 
 
+LABEL_IDS_MAX = 65_535
+"""Largest instance id and category id: label images have 16 bits."""
+
+
 @dataclass(frozen=True, slots=True)
 class Instance:
     """One labelled object.

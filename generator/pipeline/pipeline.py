@@ -19,7 +19,7 @@ from gen_data.generator.core.capture import (
     PointCloud,
     SensorReading,
 )
-from gen_data.generator.core.errors import LayoutRejected, Rejection, SceneRejected
+from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, SceneRejected
 from gen_data.generator.core.interfaces import (
     AssetLibrary,
     DatasetInfo,
@@ -31,7 +31,7 @@ from gen_data.generator.core.interfaces import (
     Stage,
 )
 from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
-from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.scene import LABEL_IDS_MAX, Scene
 from gen_data.generator.core.scene_time import place_sensors
 from gen_data.generator.core.streams import Streams
 from gen_data.generator.pipeline.finalize_scene import Timeline, finalize_scene
@@ -313,10 +313,16 @@ class Pipeline:
     def _randomize(
         self, scene: Scene, randomizers: Sequence[Randomizer], stage: Stage, streams: Streams
     ) -> Scene:
+        """Apply the randomizers of a stage; ConfigError if there are too many instances."""
         for randomizer in randomizers:
             if randomizer.stage == stage:
                 rng = streams.rng(f"randomizer/{randomizer.name}")
                 scene = randomizer(scene, self.assets, rng)
+        if len(scene.instances) > LABEL_IDS_MAX:
+            raise ConfigError(
+                f"scene {streams.scene}: {len(scene.instances)} instances, but label images have "
+                f"room for {LABEL_IDS_MAX}; place fewer objects"
+            )
         return scene
 
 

@@ -18,8 +18,11 @@ FORMAT_VERSION = 2
 
 Since version 2, records have checksums, and records and manifest list empty folders.
 """
+READABLE_VERSIONS = (1, FORMAT_VERSION)
 
 PLAN_NAME = "plan.json"
+DAMAGE = (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError)
+"""What reading a damaged JSON file into typed values may raise."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,7 @@ def load_plan(folder: Path) -> Plan:
     path = folder / PLAN_NAME
     try:
         data = path.read_bytes()
-    except FileNotFoundError:
+    except (FileNotFoundError, NotADirectoryError):
         raise StorageError(f"{path}: missing; {folder} is not a gen-data data set") from None
     except OSError as error:
         raise StorageError(f"{path}: cannot be read ({error.strerror})") from None
@@ -98,8 +101,11 @@ def parse_plan(data: bytes, folder: Path) -> Plan:
         StorageError: they are damaged.
     """
     try:
-        return from_plain(Plan, json.loads(data))
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        plan = from_plain(Plan, json.loads(data))
+        if plan.format_version not in READABLE_VERSIONS:
+            raise ValueError(f"format version {plan.format_version}; expected {FORMAT_VERSION}")
+        return plan
+    except DAMAGE as error:
         raise StorageError(
             f"{folder / PLAN_NAME}: damaged, or written by another version of gen-data ({error}); "
             "nothing was changed.\n  This command restores it:\n"

@@ -27,7 +27,7 @@ from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import from_plain
 from gen_data.generator.runner.labels import LABELS_NAME, Labels, parse_labels
-from gen_data.generator.runner.plan import load_plan
+from gen_data.generator.runner.plan import DAMAGE, load_plan
 from gen_data.generator.runner.provenance import SCENES_NAME, KeptScene, parse_scene
 from gen_data.generator.runner.store import MANIFEST_NAME, SHARDS_NAME
 
@@ -55,7 +55,7 @@ class JsonLines:
             ValueError: the file ends before.
         """
         if number >= len(self._ends):
-            raise ValueError(f"{self._path}: has {len(self._ends)} lines, expected more")
+            raise ValueError(f"it has {len(self._ends)} lines, expected more")
         start = int(self._ends[number - 1]) if number else 0
         with self._path.open("rb") as file:
             file.seek(start)
@@ -102,7 +102,7 @@ class StoredSamples:
             StorageError: a file of the sample's shard is missing or damaged.
         """
         folder = self._folder_of(index)
-        with self._damage(folder):
+        with self._damage(folder / LABELS_NAME):
             labels = parse_labels(self._line(LABELS_NAME, index))
         return LabelledImages(self, labels, self._capture(folder, labels))
 
@@ -134,7 +134,7 @@ class StoredSamples:
         Raises:
             StorageError: it is missing or damaged.
         """
-        with self._damage(self._folder_of(index)):
+        with self._damage(self._folder_of(index) / SCENES_NAME):
             return parse_scene(self._line(SCENES_NAME, index), self._base_scene)
 
     def _read_base_scene(self, index: int) -> Scene:
@@ -153,13 +153,14 @@ class StoredSamples:
         return self.shard_dir(index // self.plan.shard_size)
 
     @contextmanager
-    def _damage(self, folder: Path) -> Iterator[None]:
-        """Turn errors of damaged files into a StorageError with a remedy."""
+    def _damage(self, path: Path) -> Iterator[None]:
+        """Turn errors of a damaged file into a StorageError with a remedy."""
         try:
             yield
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except DAMAGE as error:
+            fact = error.strerror if isinstance(error, OSError) else error
             raise StorageError(
-                f"{folder}: its scenes or labels cannot be read ({error}); check the data set with:"
+                f"{path}: cannot be read ({fact}); check the data set with:"
                 f"\n    gen-data verify {self.folder} --full"
             ) from error
 
@@ -203,8 +204,11 @@ class StoredSamples:
             raise StorageError(
                 f"{path}: missing; the data set is unfinished: run the command that began it again"
             ) from None
-        except (ValueError, KeyError, TypeError) as error:
-            raise StorageError(f"{path}: damaged ({error})") from None
+        except DAMAGE as error:
+            raise StorageError(
+                f"{path}: damaged ({error}); restore the file from a copy, or remove it and run "
+                "the command that made the data set again"
+            ) from None
 
     def __getstate__(self) -> dict[str, Any]:
         """Pickle only the folder."""

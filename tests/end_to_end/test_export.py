@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 from pathlib import Path
@@ -10,6 +11,8 @@ from pathlib import Path
 import pytest
 
 import gen_data as package
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.runner.stored import StoredSamples
 from tests.end_to_end.running import digest, gen_data
 
 
@@ -86,7 +89,58 @@ def test_a_foreign_or_damaged_folder_is_named(dataset: Path, tmp_path: Path) -> 
 
     assert foreign.returncode == broken.returncode == 4
     assert "is not a gen-data data set" in foreign.stderr
-    assert "000001: its scenes or labels cannot be read" in broken.stderr
+    assert "000001/labels.jsonl: cannot be read" in broken.stderr
+
+
+DEEP = "[" * 100_000
+S = "shards/000000"
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("plan.json", None),
+        ("plan.json", ""),
+        ("plan.json", "[]"),
+        ("plan.json", DEEP),
+        ("plan.json", "a folder"),
+        ("plan.json", '"format_version":99'),
+        ("manifest.json", None),
+        ("manifest.json", "{}"),
+        ("manifest.json", '{"info": [], "dataset_id": ""}'),
+        ("manifest.json", DEEP),
+        ("manifest.json", "a folder"),
+        (f"{S}/labels.jsonl", None),
+        (f"{S}/labels.jsonl", ""),
+        (f"{S}/labels.jsonl", "null\n"),
+        (f"{S}/labels.jsonl", "{}\n"),
+        (f"{S}/labels.jsonl", DEEP + "\n"),
+        (f"{S}/scenes.jsonl", None),
+        (f"{S}/scenes.jsonl", "{}\n"),
+        (f"{S}/scenes.jsonl", "NaN\n"),
+    ],
+    ids=lambda value: str(value)[:30],
+)
+def test_each_damaged_file_is_named(
+    dataset: Path, tmp_path: Path, name: str, text: str | None
+) -> None:
+    """By one typed error, whatever is in the file; None removes it."""
+    folder = tmp_path / "copy"
+    shutil.copytree(dataset, folder, copy_function=os.link)
+    path = folder / name
+    whole = path.read_text("utf-8")
+    path.unlink()
+    if text == "a folder":
+        path.mkdir()
+    elif text is not None and "format_version" in text:
+        path.write_text(whole.replace('"format_version":1', text), "utf-8")
+    elif text is not None:
+        path.write_text(text, "utf-8")
+
+    with pytest.raises(StorageError) as error:
+        StoredSamples(folder).sample(0)
+
+    assert str(error.value).startswith(f"{path}: ")
 
 
 @pytest.mark.slow

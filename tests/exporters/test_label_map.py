@@ -143,6 +143,13 @@ def test_public_lists_have_the_published_classes() -> None:
     assert len(public_classes("kitti")) == 8
 
 
+@pytest.mark.parametrize("name", ["", " ", "a\nb", "\0", "x" * 61])
+def test_class_names_are_printable(name: str) -> None:
+    """Formats write them into lines of text."""
+    with pytest.raises(ValidationError, match="expected a name of 1 to 60 printable characters"):
+        LabelMap(classes={name: ("mug",)})
+
+
 def test_a_category_in_two_places_is_refused() -> None:
     """Two classes, or a class and the ignored ones."""
     with pytest.raises(ValidationError, match="'mug' belongs to the classes 'a' and 'b'"):

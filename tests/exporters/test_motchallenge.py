@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import configparser
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from gen_data.exporters.motchallenge import MotChallenge, mot_class
+from gen_data.generator.core.errors import ConfigError
 from tests.exporters.drives import stems
 
 
@@ -48,6 +50,12 @@ def test_mot_sequences_describe_themselves(exported: Any) -> None:
     assert (folder / "seqmaps/street-val.txt").read_text() == "name\nstreet-0001\n"
 
 
+def test_categories_without_a_class_are_refused(world: Any) -> None:
+    """A table has nothing that the benchmark tracks."""
+    with pytest.raises(ConfigError, match=r"no category .* has a class.*pedestrian"):
+        MotChallenge().check(replace(world.info(8, steps_per_scene=4), categories=("bowl", "mug")))
+
+
 @pytest.mark.parametrize(
     ("category", "facts", "number"),
     [
@@ -65,3 +73,67 @@ def test_mot_classes(category: str, facts: Any, number: int, world: Any) -> None
     thing = replace(world.instance(1, "car", 0.0, 0.0, 0.0), category=category, attributes=facts)
 
     assert mot_class(thing) == number
+
+
+def trackeval_scores(dataset: Any, sequence: str, name: str) -> dict[str, float]:
+    """HOTA, MOTA and IDF1 of one class over all sequences."""
+    import trackeval
+
+    quiet = {"PRINT_CONFIG": False}
+    evaluator = trackeval.Evaluator(
+        {
+            **dict.fromkeys(("PRINT_RESULTS", "PRINT_CONFIG", "TIME_PROGRESS"), False),
+            **dict.fromkeys(("OUTPUT_SUMMARY", "OUTPUT_DETAILED", "PLOT_CURVES"), False),
+            "USE_PARALLEL": False,
+            "BREAK_ON_ERROR": True,
+            "LOG_ON_ERROR": None,
+        }
+    )
+    metrics = trackeval.metrics
+    judges = [metrics.HOTA(quiet), metrics.CLEAR(quiet), metrics.Identity(quiet)]
+    results, _ = evaluator.evaluate([dataset], judges)
+    (tracked,) = results.values()
+    row = tracked["truth"][sequence][name]
+    return {
+        "HOTA": float(row["HOTA"]["HOTA"].mean()),
+        "MOTA": float(row["CLEAR"]["MOTA"]),
+        "IDF1": float(row["Identity"]["IDF1"]),
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("split", ["train", "val"])
+def test_trackeval_scores_the_ground_truth_as_perfect(
+    exported: Any, tmp_path: Path, split: str
+) -> None:
+    """And tracks that exchange their identities half way as worse."""
+    import trackeval
+
+    folder = exported(MotChallenge()) / f"street-{split}"
+    (sequence,) = (path.name for path in folder.iterdir())
+    rows = [line.split(",") for line in (folder / sequence / "gt/gt.txt").read_text().splitlines()]
+    people = [row for row in rows if row[6:8] == ["1", "1"]]
+    assert len(people) >= 3
+
+    def scores(ids: dict[str, str]) -> dict[str, float]:
+        lines = [
+            f"{row[0]},{ids.get(row[0], row[1])},{','.join(row[2:6])},1,-1,-1,-1" for row in people
+        ]
+        data = tmp_path / "trackers/truth/data"
+        data.mkdir(parents=True, exist_ok=True)
+        (data / f"{sequence}.txt").write_text("\n".join(lines))
+        dataset = trackeval.datasets.MotChallenge2DBox(
+            {
+                "GT_FOLDER": str(folder),
+                "TRACKERS_FOLDER": str(tmp_path / "trackers"),
+                "OUTPUT_FOLDER": str(tmp_path / "results"),
+                "SKIP_SPLIT_FOL": True,
+                "SEQ_INFO": {sequence: 4},
+                "PRINT_CONFIG": False,
+            }
+        )
+        return trackeval_scores(dataset, sequence, "pedestrian")
+
+    assert scores({}) == pytest.approx({"HOTA": 1.0, "MOTA": 1.0, "IDF1": 1.0}, abs=1e-9)
+    assert scores({"3": "77", "4": "77"})["IDF1"] < 0.9

@@ -294,6 +294,17 @@ def test_sensors_that_are_not_there_are_refused(exporter: Any, message: str, wor
         exporter.check(world.info(7, lidars=("top",)))
 
 
+def test_a_data_set_without_sensors_is_refused_with_the_remedy(world: Any) -> None:
+    """Each kind by its name, and not by an empty one."""
+    cameras = world.info(1)
+    with pytest.raises(ConfigError, match="there is no lidar; add a sensor"):
+        SemanticKitti().check(cameras)
+    with pytest.raises(ConfigError, match="there is no camera; add a sensor"):
+        SemanticKitti().check(world.info(1, (), ("top",)))
+    with pytest.raises(ConfigError, match="no sensor of none writes the rgb channel; add an rgb"):
+        Kitti().check(world.info(1, (), ("top",)))
+
+
 def test_point_formats_need_a_scanner(world: Any) -> None:
     """The message says what to add."""
     with pytest.raises(ConfigError, match="add a sensor of that type"):

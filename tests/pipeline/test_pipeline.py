@@ -12,7 +12,7 @@ import pytest
 
 from gen_data.generator.core.asset_types import Asset, Keypoint, MeshData
 from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.errors import LayoutRejected, Rejection, SceneRejected
+from gen_data.generator.core.errors import ConfigError, LayoutRejected, Rejection, SceneRejected
 from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled, Stage
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.sample import ImageTruth
@@ -197,6 +197,24 @@ def test_refused_draw_is_tried_again_with_other_streams(stage: Stage) -> None:
             attempts.add(made.sample(0).attempts)
 
     assert max(attempts) > 1 or stage is Stage.VIEW
+
+
+def test_more_instances_than_label_images_hold_are_refused() -> None:
+    """Before physics and rendering: 65535 ids and 0 fill 16 bits."""
+
+    @dataclass(frozen=True)
+    class Crowd:
+        name: str = "crowd"
+        stage: Stage = Stage.BUILD
+        count: int = 65_536
+
+        def __call__(self, scene: Scene, assets: Any, rng: Any) -> Scene:
+            """Many instances."""
+            return replace(scene, instances=(Instance(1, "it", "it", 1, "it"),) * self.count)
+
+    text = r"scene 0: 65536 instances.*room for 65535; place fewer"
+    with pipeline(Crowd()) as made, pytest.raises(ConfigError, match=text):
+        made.sample(0)
 
 
 def test_splits_have_their_shares_and_do_not_cut_scenes() -> None:
