@@ -107,7 +107,8 @@ def _short_runs(lengths: NDArray[np.int64], inside: NDArray[np.int64]) -> NDArra
     rows[first] = _LITERAL + inside
     rows[first + 1 + copies] = _REST + inside * _LONGEST + rest
     present = np.arange(_TOKEN_BITS) < sizes[rows, None]
-    return table[rows][present]
+    bits: NDArray[np.uint8] = table[rows][present]
+    return bits
 
 
 _COPY, _LITERAL, _REST = 0, 1, 3
