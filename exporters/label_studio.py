@@ -236,8 +236,8 @@ def brush_rle(mask: MaskPx, height_px: int, width_px: int) -> list[int]:
     words = 0b111 << 24 | (parts - 1) << 8 | runs
     bits = words[:, None] >> np.arange(_RUN_BITS - 1, -1, -1) & 1
     stream = np.append(_rle_header(height_px * width_px), bits).astype(np.uint8)
-    encoded: list[int] = np.packbits(stream).tolist()
-    return encoded
+    data: list[int] = np.packbits(stream).tolist()
+    return data
 
 
 def _rle_header(pixels: int) -> NDArray[np.int64]:

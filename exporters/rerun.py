@@ -31,16 +31,18 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Literal
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.fragments import fragment_rows, write_fragment
-from gen_data.exporters.image_files import read_pixels
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.rrd_container import write_recording
 from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.interfaces import DatasetInfo, media_path
 from gen_data.generator.core.sample import ObjectTruth, Sample
 from gen_data.generator.core.se3 import SE3
@@ -282,15 +284,22 @@ def _channel_columns(
         units_per_m = [1.0 / info.depth_scale_m] * len(paths)
         return rr.EncodedDepthImage.columns(blob=_blobs(paths), media_type=types, meter=units_per_m)
     if channel is Channel.CATEGORY:
-        images = [read_pixels(path) for path in paths]
         return rr.SegmentationImage.columns(
-            buffer=[np.frombuffer(image.tobytes(), np.uint8) for image in images],
+            buffer=[np.frombuffer(_read_ids(path).tobytes(), np.uint8) for path in paths],
             format=[
                 ImageFormat(width=w, height=h, channel_datatype=ChannelDatatype.U16)
                 for w, h in (row["size"] for row in rows)
             ],
         )
     return None
+
+
+def _read_ids(path: Path) -> NDArray[np.uint16]:
+    """Category ids, uint16 [h, w]."""
+    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise StorageError(f"{path}: missing or no PNG file; generate the data set again")
+    return np.asarray(image, np.uint16)
 
 
 def _blobs(paths: Iterable[Path]) -> list[np.ndarray]:

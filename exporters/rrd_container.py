@@ -178,10 +178,10 @@ def xxh32(data: bytes, seed: int = 0) -> int:
         value = seed + p5
     value = (value + len(data)) & _MASK
     rest = data[16 * blocks :]
-    count = len(rest) // 4
-    for (word,) in struct.iter_unpack("<I", rest[: 4 * count]):
+    end = len(rest) // 4 * 4
+    for (word,) in struct.iter_unpack("<I", rest[:end]):
         value = _rotate((value + word * p3) & _MASK, 17) * p4 & _MASK
-    for byte in rest[4 * count :]:
+    for byte in rest[end:]:
         value = _rotate((value + byte * p5) & _MASK, 11) * p1 & _MASK
     for shift, prime in ((15, p2), (13, p3), (16, 1)):
         value = (value ^ value >> shift) * prime & _MASK

@@ -22,7 +22,7 @@ def test_without_a_change_every_sample_has_the_same_bytes(dataset: Path, tmp_pat
     first, again = digest(dataset), digest(tmp_path / "again")
     assert first.keys() == again.keys()
     differing = {path for path in first if first[path] != again[path]}
-    assert differing == {"plan.json", "manifest.json", "SHA256SUMS"}
+    assert differing == {"plan.json", "manifest.json", "SHA256SUMS", "croissant.json"}
 
 
 @pytest.fixture(scope="module")

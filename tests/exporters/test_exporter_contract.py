@@ -11,7 +11,7 @@ from gen_data.exporters import TABLE
 from gen_data.generator import annotations
 from tests.exporters.drives import drive_info
 
-PACKED = {"huggingface", "tfrecord", "webdataset"}
+PACKED = {"huggingface", "tfrecord", "webdataset", "rerun"}
 """Formats with several samples in a file."""
 
 
