@@ -169,8 +169,8 @@ def read_rows() -> tuple[Row, ...]:
 
 @cache
 def read_sheets() -> Mapping[str, Sheet]:
-    """Contact sheets by name of the configuration."""
-    listed = _table()[CONFIGURATION]
+    """Contact sheets by name of the configuration; those without one are left out."""
+    listed = {k: v for k, v in _table()[CONFIGURATION].items() if not isinstance(v, str)}
     return {name: Sheet.model_validate_json(json.dumps(entry)) for name, entry in listed.items()}
 
 

@@ -165,7 +165,8 @@ def _index() -> str:
     )
     links = ", ".join(f"[{stem}](template.md#{stem})" for stem in stems)
     lines.append(f"| [Templates](template.md) | {links} |")
-    names = ", ".join(f"[{name}](../gallery.md#{name})" for name in pictures.read_sheets())
+    shipped = sorted(path.stem for path in Path(str(files("gen_data.configs"))).glob("*.yaml"))
+    names = ", ".join(f"[{name}](../gallery.md#{name})" for name in shipped)
     lines.append(f"| [Configurations](../gallery.md) | {names} |")
     head, table_lines = lines[:2], lines[2:]
     return "\n\n".join([*head, "\n".join(table_lines)]) + "\n"

@@ -40,7 +40,7 @@ SOURCE = "source"
 LANGUAGES = {".py": "python", ".yaml": "yaml", ".toml": "toml", ".ipynb": "json", ".md": "markdown"}
 LINK = re.compile(r"(\]\()([^)\s]+)(\))")
 CODE = re.compile(r"^(?:```|~~~).*?^(?:```|~~~)$", re.MULTILINE | re.DOTALL)
-SHEET = re.compile(r"^!\[[^\]]*\]\(pictures/configuration/(\w+)\.webp\)$", re.MULTILINE)
+SECTION = re.compile(r"^## (\w+)$\n(.*?)(?=^## |\Z)", re.MULTILINE | re.DOTALL)
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
@@ -84,7 +84,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     blocks = [*CODE.findall(markdown), ""]
     texts = [LINK.sub(lambda m: m[1] + _rewrite(m[2], origin, uri) + m[3], t) for t in parts]
     text = "".join(t + block for t, block in zip(texts, blocks, strict=True))
-    return SHEET.sub(_with_configuration, text) if uri == "gallery.md" else text
+    return SECTION.sub(_with_configuration, text) if uri == "gallery.md" else text
 
 
 def _is_document(file: File) -> bool:
@@ -152,8 +152,12 @@ def _block(file: Path) -> str:
     return f"````{LANGUAGES.get(file.suffix, 'text')}\n{file.read_text('utf-8').rstrip()}\n````"
 
 
-def _with_configuration(match: re.Match[str]) -> str:
-    """A picture of the gallery, and below it the file of its configuration."""
-    text = (ROOT / "configs" / f"{match[1]}.yaml").read_text("utf-8")
+def _with_configuration(section: re.Match[str]) -> str:
+    """A section of the gallery, and below its picture the file of its configuration."""
+    file = ROOT / "configs" / f"{section[1]}.yaml"
+    if not file.is_file():
+        return section[0]
+    text = file.read_text("utf-8")
     block = "\n".join(f"    {line}".rstrip() for line in yaml_block(text).splitlines())
-    return f'{first_comment(text)}\n\n{match[0]}\n\n??? note "configs/{match[1]}.yaml"\n\n{block}'
+    about = first_comment(text)
+    return f'## {section[1]}\n\n{about}\n{section[2]}??? note "{file.name}"\n\n{block}\n\n'
