@@ -72,7 +72,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
-from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
+from gen_data.exporters.fragments import fragment_lines, fragment_rows, image_splits, write_fragment
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.mask_polygons import mask_polygons
 from gen_data.exporters.rle import encode_rle
@@ -158,7 +158,7 @@ class Coco(ExporterBase):
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Join the lines of all shards, given in index order, and link the images."""
         fragments = [shard_dir / self.type for shard_dir in shard_dirs]
-        splits = sorted({p.name.split(".")[0] for f in fragments for p in f.glob("*.images.jsonl")})
+        splits = image_splits(fragments)
         skeletons = _skeletons(fragments)
         folder = dataset_dir / "annotations"
         folder.mkdir(parents=True, exist_ok=True)

@@ -37,7 +37,7 @@ from pydantic import PrivateAttr
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.coco import box_xywh, dataset_header, image_name, write_dataset
-from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
+from gen_data.exporters.fragments import fragment_lines, fragment_rows, image_splits, write_fragment
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.label_png import encode_label_png
@@ -114,7 +114,7 @@ class CocoPanoptic(ExporterBase):
         names = {json.loads(line)["name"] for line in fragment_lines(folders, "stuff")}
         categories = _categories(info.categories, sorted(names))
         ids = {category["name"]: category["id"] for category in categories}
-        splits = sorted({p.name.split(".")[0] for f in folders for p in f.glob("*.images.jsonl")})
+        splits = image_splits(folders)
         (dataset_dir / "annotations").mkdir(parents=True, exist_ok=True)
         for split in splits:
             stem = f"{split}.images"

@@ -19,6 +19,7 @@ Reference: https://docs.cvat.ai, "CVAT for images 1.1".
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 from xml.sax.saxutils import escape, quoteattr
@@ -27,11 +28,11 @@ import numpy as np
 
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.coco import image_name
-from gen_data.exporters.fragments import fragment_rows, write_fragment
+from gen_data.exporters.fragments import fragment_rows, image_splits, write_image_rows
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.mask_polygons import mask_polygons
-from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
+from gen_data.exporters.sensor_selection import check_channels
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo, media_path
 from gen_data.generator.core.sample import MaskPx, ObjectTruth, Sample
@@ -67,20 +68,12 @@ class Cvat(ExporterBase):
             ConfigError: see ``check``.
         """
         self.check(info)
-        rows: dict[str, list[dict[str, Any]]] = {}
-        for sample in samples:
-            for sensor in rgb_cameras(info):
-                if sensor in sample.truth:
-                    row = self._image_row(info, sample, sensor)
-                    rows.setdefault(f"{sample.split}.images", []).append(row)
-        (shard_dir / self.type).mkdir(parents=True, exist_ok=True)
-        for stem, lines in rows.items():
-            write_fragment(shard_dir / self.type, stem, lines)
+        write_image_rows(info, samples, shard_dir / self.type, partial(self._image_row, info))
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Number the images of each split, join their shapes, and link the images."""
         folders = [shard_dir / self.type for shard_dir in shard_dirs]
-        splits = sorted({p.name.split(".")[0] for f in folders for p in f.glob("*.images.jsonl")})
+        splits = image_splits(folders)
         for split in splits:
             path = dataset_dir / split / "annotations.xml"
             path.parent.mkdir(parents=True, exist_ok=True)

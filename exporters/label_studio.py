@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 from urllib.parse import quote
@@ -32,11 +33,11 @@ from numpy.typing import NDArray
 
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.coco import image_name
-from gen_data.exporters.fragments import fragment_rows, write_fragment
+from gen_data.exporters.fragments import fragment_rows, image_splits, write_image_rows
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.mask_polygons import mask_polygons
-from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
+from gen_data.exporters.sensor_selection import check_channels
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo, media_path
@@ -92,20 +93,12 @@ class LabelStudio(ExporterBase):
             ConfigError: see ``check``.
         """
         self.check(info)
-        rows: dict[str, list[dict[str, Any]]] = {}
-        for sample in samples:
-            for sensor in rgb_cameras(info):
-                if sensor in sample.truth:
-                    row = self._image_row(info, sample, sensor)
-                    rows.setdefault(f"{sample.split}.images", []).append(row)
-        (shard_dir / self.type).mkdir(parents=True, exist_ok=True)
-        for stem, lines in rows.items():
-            write_fragment(shard_dir / self.type, stem, lines)
+        write_image_rows(info, samples, shard_dir / self.type, partial(self._image_row, info))
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the tasks of each split, link their images, and describe the interface."""
         folders = [shard_dir / self.type for shard_dir in shard_dirs]
-        splits = sorted({p.name.split(".")[0] for f in folders for p in f.glob("*.images.jsonl")})
+        splits = image_splits(folders)
         keypoints: set[str] = set()
         for split in splits:
             path = dataset_dir / split / "tasks.json"

@@ -12,6 +12,8 @@ from gen_data.generator.api.config import ConfigLike, count_workers, load_config
 from gen_data.generator.core.errors import ConfigError
 
 if TYPE_CHECKING:
+    from gen_data.generator.assemble.config import Config
+    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
     from gen_data.generator.runner.progress import RunProgress, Summary
 
 
@@ -68,21 +70,16 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
         raise ConfigError(f"n: {n} samples cannot be made; expected at least 1")
     processes = count_workers(workers)
     LocalStore(_guess_folder(config, out)).check_unlocked()
+    # Before the imports below, so that errors of a configuration come at once.
+    loaded = load_config(config, seed=seed, overrides=overrides, without=without)
 
     from threadpoolctl import threadpool_limits
 
-    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
     from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
-    from gen_data.generator.pipeline.splits import warn_of_empty_splits
     from gen_data.generator.runner.identity import format_licences, make_plan
     from gen_data.generator.runner.run import Settings, run
 
-    loaded = load_config(config, seed=seed, overrides=overrides, without=without)
-    general = loaded.general
-    scenes = -(-n // (general.views_per_scene * general.steps_per_scene))
-    warn_of_empty_splits(scenes, loaded.split_shares, general.splits.assign, general.seed)
-    factory = PipelineFactory(loaded, n)
-    factory.check()
+    factory = _make_factory(loaded, n)
     plan = make_plan(factory)
     with threadpool_limits(limits=1):
         return run(
@@ -101,6 +98,19 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
             ),
             progress=on_progress,
         )
+
+
+def _make_factory(loaded: Config, n: int) -> PipelineFactory:
+    """A checked factory of pipelines; warns of splits that stay empty."""
+    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+    from gen_data.generator.pipeline.splits import warn_of_empty_splits
+
+    general = loaded.general
+    scenes = -(-n // (general.views_per_scene * general.steps_per_scene))
+    warn_of_empty_splits(scenes, loaded.split_shares, general.splits.assign, general.seed)
+    factory = PipelineFactory(loaded, n)
+    factory.check()
+    return factory
 
 
 def check_shards(shards: tuple[int, int], count: int) -> range:

@@ -37,8 +37,10 @@ MEMORY_BYTES, MEMORY_PER_BYTE = 1 << 30, 40
 A mesh of 100 MB thus has 210 s and 5 GB; the largest packs need a tenth of that.
 """
 _START = (
-    "import sys; sys.path[:] = sys.argv[2:]; "
-    "from gen_data.generator.assets.sandbox_process import main; main()"
+    "import os, sys; sys.path[:] = sys.argv[3:]; "
+    f"os.environ.update(dict.fromkeys({(*SINGLE_THREADED, 'PXR_WORK_THREAD_LIMIT')!r}, '1')); "
+    "from gen_data.generator.assets.sandbox_process import main; "
+    "main(int(sys.argv[1]), sys.argv[2])"
 )
 """Modules are found as in this process, whatever the working directory holds."""
 _WALL_PER_CPU = 12.0
@@ -124,17 +126,13 @@ class Sandbox:
         if self._child is not None and self._child.poll() is not None:
             self._reap()
         if self._child is None:
+            # Resolved: a worker's folder is a link that only the worker itself can follow.
+            folder = os.path.realpath(tempfile.gettempdir())
             self._child = subprocess.Popen(
-                [sys.executable, "-c", _START, str(os.getpid()), *sys.path],
+                [sys.executable, "-c", _START, str(os.getpid()), folder, *sys.path],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
-                env={
-                    **os.environ,
-                    **dict.fromkeys((*SINGLE_THREADED, "PXR_WORK_THREAD_LIMIT"), "1"),
-                    # Resolved: a worker's folder is a link that only the worker itself can follow.
-                    "TMPDIR": os.path.realpath(tempfile.gettempdir()),
-                },
             )
             self._owner = os.getpid()
         return self._child

@@ -10,6 +10,7 @@ import resource
 import select
 import signal
 import sys
+import tempfile
 import traceback
 from contextlib import suppress
 from pathlib import Path
@@ -26,9 +27,10 @@ _FILES_MAX = 256
 _CLONE_NEWUSER, _CLONE_NEWNET = 0x10000000, 0x40000000  # <linux/sched.h>
 
 
-def main() -> None:
+def main(parent_pid: int, temporary_folder: str) -> None:
     """Serve requests from standard input until it ends or stays silent."""
-    end_with_parent(int(sys.argv[1]))
+    end_with_parent(parent_pid)
+    tempfile.tempdir = temporary_folder
     # An interrupt from the terminal reaches the whole group; the parent decides.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     replies = os.dup(1)
@@ -106,7 +108,3 @@ def _write(descriptor: int, data: bytes) -> None:
     view = memoryview(data)
     while view:
         view = view[os.write(descriptor, view) :]
-
-
-if __name__ == "__main__":
-    main()

@@ -134,7 +134,7 @@ def test_each_damaged_file_is_named(
     if text == "a folder":
         path.mkdir()
     elif text is not None and "format_version" in text:
-        path.write_text(whole.replace('"format_version":1', text), "utf-8")
+        path.write_text(re.sub(r'"format_version":\d+', text, whole), "utf-8")
     elif text is not None:
         path.write_text(text, "utf-8")
 

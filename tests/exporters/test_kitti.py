@@ -331,7 +331,7 @@ def test_without_a_scanner_there_are_no_points(world: Any, tmp_path: Path) -> No
             {},
             "camera 'colour'.*expected one of: color.*did you mean 'color'",
         ),
-        (Kitti(), {"media": {"color": (Channel.Z_DEPTH,)}}, "expected one of: none"),
+        (Kitti(), {"media": {"color": (Channel.Z_DEPTH,)}}, "no sensor .* writes the rgb channel"),
         (Kitti(), {"n": 1_000_001}, "six digits"),
         (
             Kitti(),

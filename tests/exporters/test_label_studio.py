@@ -163,6 +163,7 @@ def _empty_masks(path: Path) -> None:
     path.write_text(json.dumps(tasks))
 
 
+@pytest.mark.damage("label_studio")
 @pytest.mark.parametrize(
     ("shapes", "damage", "named"),
     [

@@ -235,6 +235,7 @@ def without_objects(sample: Any) -> Any:
     return replace(sample, truth={**sample.truth, "color": truth})
 
 
+@pytest.mark.damage("rerun")
 @pytest.mark.parametrize(
     ("change", "named"),
     [
