@@ -43,10 +43,8 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
         seed: Replaces the configuration's seed.
         overrides: ``KEY=VALUE`` texts, as for ``gen-data --set``.
         without: Names of randomizers to leave out.
-        repair: Hash all existing files first, generate damaged shards again, restore a damaged
-            ``plan.json``, and move files that do not belong to the data set out of it.
-        allow_mixed_numerics: Go on on a machine that computes differently from the one that began
-            the data set; ``run/numerics.json`` lists all of them.
+        repair: Hash all existing files first, and restore what is damaged.
+        allow_mixed_numerics: Go on on a machine that computes differently from the first one.
         force: Start although the disk is probably too small.
         shards: First shard and the one after the last, for a part of the data set in a folder of
             its own; ``merge`` gathers the parts. None = all.
@@ -54,7 +52,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
         resume_command: Command that error messages give for resuming.
 
     Returns:
-        Summary of the run, with the identity of the data set; its folder is ``summary.folder``.
+        Summary of the run, with identity and folder of the data set.
 
     Raises:
         ConfigError: the configuration or an argument is wrong.
