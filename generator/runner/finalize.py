@@ -26,7 +26,6 @@ from gen_data.generator.runner.durable_files import (
     move_durably,
     sync_tree,
     tree_sizes,
-    write_durably,
 )
 from gen_data.generator.runner.error_context import explain_errors
 from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
@@ -78,7 +77,7 @@ def finalize(
         scratch = store.scratch_dir()
         documents = _documents(plan, store, pipeline, records, licences)
         for name, data in documents.items():
-            write_durably(store.root / name, data, scratch)
+            store.replace_file(name, data, scratch)
         entries = [_entry_of_bytes(name, data) for name, data in documents.items()]
         entries += _entries(plan, store, records, names, known)
         entries.sort(key=_by_path)
@@ -88,8 +87,8 @@ def finalize(
         manifest = _manifest(plan, pipeline.info, records, entries, folders)
         sealed = [*entries, _entry_of_bytes(MANIFEST_NAME, manifest)]
         lines = sums_text(sorted(sealed, key=_by_path))
-        write_durably(store.root / SUMS_NAME, lines.encode(), scratch)
-        write_durably(store.manifest_path, manifest, scratch)
+        store.replace_file(SUMS_NAME, lines.encode(), scratch)
+        store.replace_file(MANIFEST_NAME, manifest, scratch)
     return dataset_id(sums)
 
 

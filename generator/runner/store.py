@@ -320,6 +320,13 @@ class LocalStore:
             if os.path.lexists(path):
                 self.set_aside(path)
 
+    def replace_file(self, name: str, data: bytes, scratch: Path) -> None:
+        """Write a file of the data set as a whole; a folder in its place is set aside."""
+        path = self.root / name
+        if path.is_dir() and not path.is_symlink():
+            self.set_aside(path)
+        write_durably(path, data, scratch)
+
     def set_aside(self, path: Path) -> Path:
         """Move a file or folder to ``run/quarantine``; returns its new path."""
         folder = self.run_dir / "quarantine"

@@ -134,6 +134,15 @@ def find_deviations(folder: Path, full: bool = False) -> list[Finding]:
     return list(_Check(folder, plan).run(full))
 
 
+def _is_manifest(value: Mapping[str, Any]) -> bool:
+    """Whether an object has a manifest's parts; that of another file may lie in its place."""
+    return (
+        isinstance(value.get("shards"), list)
+        and isinstance(value.get("files"), dict)
+        and isinstance(value.get("empty_folders", []), list)
+    )
+
+
 class _Check:
     """Comparison of the declared with the existing files of a data set."""
 
@@ -150,7 +159,7 @@ class _Check:
         """Yield all deviations."""
         manifest_bytes = read_or_empty(self._folder / MANIFEST_NAME)
         manifest = parse_object(manifest_bytes)
-        if manifest is None:
+        if manifest is None or not _is_manifest(manifest):
             yield Finding("inconsistent", MANIFEST_NAME, "is not a manifest")
             return
         yield from self._read_sums(manifest, manifest_bytes)

@@ -55,8 +55,8 @@ def test_both_loaders_give_the_same_batches(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_the_detector_learns_what_it_has_seen(tmp_path: Path) -> None:
-    """Eighty steps on twenty images: boxes of one class are found again on the same images."""
+def test_the_detector_learns_and_is_stored(tmp_path: Path) -> None:
+    """Eighty steps on twenty images: the loss falls, and a stored detector gives equal results."""
     options = (
         "--n", "20", "--workers", "1", "--seed", "4", "--out", "set",
         "--set", "sensors.color.size_px=[160, 120]", "--set", "splits={train: 1, val: 0, test: 0}",
@@ -74,7 +74,9 @@ def test_the_detector_learns_what_it_has_seen(tmp_path: Path) -> None:
     assert again == lines[-3:]
     low, high = (float(v) for v in re.findall(r"\d\.\d+", lines[-2])[1:3])
     assert low <= json.loads((tmp_path / "ap.json").read_text())["ap50"] <= high
-    assert json.loads((tmp_path / "ap.json").read_text())["ap50"] > 0.2
+    losses = [float(line.split()[-1]) for line in lines if ": loss " in line]
+    assert len(losses) == 4
+    assert losses[-1] < 0.5 * losses[0]
 
 
 NOTEBOOK = {"[320, 240]": "[96, 72]", "N = 20": "N = 5", "MOST_STEPS = 20": "MOST_STEPS = 2"}
