@@ -555,13 +555,17 @@ def plain_write(path: Path, data: bytes, scratch: Path) -> None:
     path.write_bytes(data)
 
 
+def plain_replace(store: LocalStore, name: str, data: bytes, scratch: Path) -> None:
+    plain_write(store.root / name, data, scratch)
+
+
 @pytest.mark.parametrize(
     ("place", "mutant"),
     [
         ("store.sync_tree", lambda folder, synced: None),
         ("finalize.sync_tree", lambda folder, synced: None),
         ("store.write_durably", plain_write),
-        ("finalize.write_durably", plain_write),
+        ("store.LocalStore.replace_file", plain_replace),
         ("durable_files.sync_path", lambda path: None),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
