@@ -77,7 +77,7 @@ class Sandbox:
         """
         cpu_s = CPU_S + CPU_S_PER_BYTE * input_bytes
         memory_bytes = MEMORY_BYTES + MEMORY_PER_BYTE * input_bytes
-        request = pickle.dumps((function, arguments, cpu_s, memory_bytes))
+        request = pickle.dumps((function, arguments, place, cpu_s, memory_bytes))
         with self._lock:
             return _decode_reply(self._call(request, cpu_s, place))
 

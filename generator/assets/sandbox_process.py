@@ -61,14 +61,14 @@ def _give_up_rights() -> None:
 
 def _serve(request: bytes) -> bytes:
     """Encoded result, or error, of a request."""
-    function, arguments, cpu_s, memory_bytes = pickle.loads(request)
+    function, arguments, place, cpu_s, memory_bytes = pickle.loads(request)
     try:
         _limit(cpu_s, memory_bytes)
         return encode_arrays("", function(*arguments))
     except AssetError as error:
         return _encode_error(str(error), expected=True)
     except MemoryError:
-        message = f"{arguments[0]}: a file needs more than {memory_bytes / 1e9:.1f} GB; simplify it"
+        message = f"{place}: needs more than {memory_bytes / 1e9:.1f} GB; simplify it"
         return _encode_error(message, expected=True)
     except Exception:
         return _encode_error(traceback.format_exc(), expected=False)

@@ -60,8 +60,8 @@ def test_mistakes_of_ours_are_not_called_errors_of_the_file(shared: Sandbox) -> 
 
 def test_memory_is_limited(shared: Sandbox) -> None:
     """An allocation beyond the limit is one error, and the process goes on."""
-    with pytest.raises(AssetError, match=r"more than 1\.1 GB"):
-        shared.run(bytes, 3 << 30, place="x", input_bytes=0)
+    with pytest.raises(AssetError, match=r"^a\.obj: needs more than 1\.1 GB"):
+        shared.run(bytes, 3 << 30, place="a.obj", input_bytes=0)
 
 
 def test_processor_time_is_limited(shared: Sandbox, monkeypatch: pytest.MonkeyPatch) -> None:
