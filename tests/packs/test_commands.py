@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.end_to_end import running
 
 
 def gen_data(*arguments: str, home: Path) -> subprocess.CompletedProcess[str]:
     """The program in a process of its own, with an asset folder of its own."""
-    environment = {**os.environ, "GEN_DATA_ASSETS": str(home), "PYTHONPATH": str(ROOT)}
-    return subprocess.run(
-        [sys.executable, "-m", "gen_data.generator.cli", *arguments],
-        capture_output=True, text=True, env=environment, cwd=home, check=False,
-    )  # fmt: skip
+    return running.gen_data(*arguments, cwd=home, GEN_DATA_ASSETS=str(home))
 
 
 def test_list_names_every_pack_and_the_folder(tmp_path: Path) -> None:
@@ -73,5 +68,7 @@ def test_help_imports_nothing_heavy(tmp_path: Path) -> None:
         "cli.main(['--help'], standalone_mode=False);"
         "sys.exit(any(name in sys.modules for name in ('numpy', 'pydantic', 'yaml')))"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=running.ROOT, capture_output=True, check=False
+    )
     assert done.returncode == 0
