@@ -12,8 +12,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
-import yaml
-
+from gen_data.generator.config.data_files import load_data
 from gen_data.generator.config.merging import merge_nodes
 from gen_data.generator.config.paths import PLAN
 from gen_data.generator.config.problems import (
@@ -47,7 +46,7 @@ class Renames:
     values: Mapping[str, Words] = field(default_factory=dict)
 
 
-_TABLES = yaml.safe_load(Path(__file__).with_suffix(".yaml").read_text(encoding="utf-8"))
+_TABLES = load_data(__package__, "renamed_keys")
 SELECTIONS: Words = _TABLES["selections"]
 TYPES: Mapping[str, Words] = _TABLES["types"]
 RANDOMIZERS: Words = _TABLES["randomizers"]

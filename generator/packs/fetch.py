@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
-import yaml
-
+from gen_data.generator.config.data_files import load_data
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.processes import tie
 from gen_data.generator.packs.pack_table import ClientName, Pack
@@ -35,7 +34,7 @@ class Client:
     remedy: str
 
 
-_TABLE = yaml.safe_load(Path(__file__).with_name("clients.yaml").read_text(encoding="utf-8"))
+_TABLE = load_data(__package__, "clients")
 CLIENTS: dict[ClientName, Client] = {k: Client(**row) for k, row in _TABLE["clients"].items()}
 
 

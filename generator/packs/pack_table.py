@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-import yaml
-
+from gen_data.generator.config.data_files import load_data
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 
 ClientName = Literal["pip", "apt", "npm"]
@@ -54,8 +53,7 @@ class Pack:
 
 
 PACKS = tuple(
-    Pack(**{**entry, "wanted": tuple(entry["wanted"])})
-    for entry in yaml.safe_load(Path(__file__).with_name("packs.yaml").read_text(encoding="utf-8"))
+    Pack(**{**entry, "wanted": tuple(entry["wanted"])}) for entry in load_data(__package__, "packs")
 )
 
 

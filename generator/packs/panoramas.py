@@ -12,20 +12,18 @@ import re
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from gen_data.generator.assets.folder_index import FolderIndex, ImageEntry
 from gen_data.generator.assets.image_decoding import read_exr
 from gen_data.generator.assets.installed_packs import TAG, write_index
+from gen_data.generator.config.data_files import load_data
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.errors import AssetError
 
 _DATA_URL = re.compile(rb"base64,([A-Za-z0-9+/=]+)")
 _SUFFIX = ".exr.js"
 
-TAGS: dict[str, list[str]] = yaml.safe_load(
-    Path(__file__).with_name("panoramas.yaml").read_text(encoding="utf-8")
-)
+TAGS: dict[str, list[str]] = load_data(__package__, "panoramas")
 
 
 def convert(source: Path, target: Path) -> None:

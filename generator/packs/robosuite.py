@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-import yaml
-
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.folder_index import Finish, FolderIndex, GripperEntry, RobotEntry
 from gen_data.generator.assets.installed_packs import TAG, write_index
+from gen_data.generator.config.data_files import load_data
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.packs.mjcf import add_bodies, read_mjcf
 
@@ -44,12 +43,7 @@ class Arm:
     touching: tuple[tuple[str, str], ...] = ()
 
 
-ARMS = tuple(
-    Arm(**arm)
-    for arm in yaml.safe_load(
-        Path(__file__).with_name("robosuite.yaml").read_text(encoding="utf-8")
-    )
-)
+ARMS = tuple(Arm(**arm) for arm in load_data(__package__, "robosuite"))
 
 
 def convert(source: Path, target: Path) -> None:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
+from gen_data.generator.config.data_files import load_data
 from gen_data.generator.report.label_files import Scan
 from gen_data.generator.report.label_statistics import Column, Survey
 
@@ -37,9 +36,7 @@ class Difficulty:
     truncation: float
 
 
-_KITTI = yaml.safe_load(
-    Path(__file__).with_name("kitti_statistics.yaml").read_text(encoding="utf-8")
-)
+_KITTI = load_data(__package__, "kitti_statistics")
 KITTI_IMAGES: int = _KITTI["images"]
 POINTS_PER_SCAN: tuple[int, int] = tuple(_KITTI["points_per_scan"])
 """Points per scan of the raw recordings, and of the odometry sequences."""

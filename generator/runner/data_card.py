@@ -11,10 +11,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from typing import Any
-
-import yaml
 
 from gen_data.exporters.croissant_metadata import (
     croissant_document,
@@ -25,6 +22,7 @@ from gen_data.exporters.croissant_metadata import (
     record_set,
     title_of,
 )
+from gen_data.generator.config.data_files import load_data
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo
 from gen_data.generator.runner.labels import LABELS_NAME
@@ -211,8 +209,7 @@ def _meaning(info: DatasetInfo, key: str) -> str:
 
 @cache
 def _meanings() -> Mapping[str, Any]:
-    text = (files("gen_data.generator.runner") / "data_card.yaml").read_text("utf-8")
-    loaded: Mapping[str, Any] = yaml.safe_load(text)
+    loaded: Mapping[str, Any] = load_data(__package__, "data_card")
     return loaded
 
 

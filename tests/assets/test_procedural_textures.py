@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -31,10 +33,16 @@ RELIEF = (
 TILING = sorted(set(TEXTURES) - PRINTED - FOOD)
 
 
+@cache
+def texture(name: str, seed: int) -> TextureData:
+    """A variant of a family, built once for all tests."""
+    return TEXTURES[name].build(seed)
+
+
 @pytest.fixture(params=sorted(TEXTURES), scope="module")
 def made(request: pytest.FixtureRequest) -> tuple[str, TextureData]:
     """The first variant of a family."""
-    return request.param, TEXTURES[request.param].build(0)
+    return request.param, texture(request.param, 0)
 
 
 def test_images_are_8_bit_and_of_one_size(made: tuple[str, TextureData]) -> None:
@@ -59,7 +67,7 @@ def test_images_show_something(made: tuple[str, TextureData]) -> None:
 @pytest.mark.parametrize("name", RELIEF)
 def test_normals_point_out_of_the_surface(name: str) -> None:
     """Unit vectors within 8 bits, blue side up, level on average."""
-    image = TEXTURES[name].build(0).normal
+    image = texture(name, 0).normal
     assert image is not None
     normal = image.astype(np.float64) / 127.5 - 1.0
 
@@ -69,11 +77,11 @@ def test_normals_point_out_of_the_surface(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TILING)
-@pytest.mark.parametrize("seed", [0, 3])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_surfaces_tile_without_a_seam(name: str, seed: int) -> None:
     """The step across the image's border is hardly larger than the largest steps inside."""
-    texture = TEXTURES[name].build(seed)
-    images = [texture.albedo, texture.normal if texture.normal is not None else texture.albedo]
+    made = texture(name, seed)
+    images = [made.albedo, made.normal if made.normal is not None else made.albedo]
     for image in images:
         for axis in (0, 1):
             values = np.moveaxis(image.astype(np.float64), axis, 0)
@@ -84,9 +92,9 @@ def test_surfaces_tile_without_a_seam(name: str, seed: int) -> None:
 @pytest.mark.parametrize("name", sorted(TEXTURES))
 def test_equal_seeds_make_equal_images_and_others_differ(name: str) -> None:
     """A texture is a pure function of its seed."""
-    build = TEXTURES[name].build
+    again = TEXTURES[name].build(0)
+    images = [made.albedo.tobytes() for made in (again, *(texture(name, s) for s in range(3)))]
 
-    images = [build(seed).albedo.tobytes() for seed in (2, 2, 0, 1)]
     assert images[0] == images[1]
     assert len(set(images)) == 3
 
@@ -95,7 +103,7 @@ def test_equal_seeds_make_equal_images_and_others_differ(name: str) -> None:
 def test_labels_are_rich_in_edges_and_colours(name: str) -> None:
     """What makes a label for a detector: letters, bars, and at least three colours."""
     for seed in range(3):
-        albedo = TEXTURES[name].build(seed).albedo.astype(np.int64)
+        albedo = texture(name, seed).albedo.astype(np.int64)
         colors, counts = np.unique(albedo.reshape(-1, 3) // 24, axis=0, return_counts=True)
         steps = np.abs(np.diff(albedo.sum(axis=2), axis=1)) > 90
 
@@ -107,7 +115,7 @@ def test_labels_are_rich_in_edges_and_colours(name: str) -> None:
 def test_brand_of_a_can_is_on_its_upper_front() -> None:
     """Letters are in the upper middle of the image: v up, the front at u = 1/2."""
     for seed in range(3):
-        albedo = TEXTURES["can_label"].build(seed).albedo.astype(np.int64).sum(axis=2)
+        albedo = texture("can_label", seed).albedo.astype(np.int64).sum(axis=2)
         strokes = np.abs(np.diff(albedo, axis=1)) > 90
         brand, gap = strokes[30:110, 180:332], strokes[30:110, 138:146]
         assert brand.mean() > 0.01 > gap.mean()

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib.resources import files
 from typing import TypeVar
 
-import yaml
-
+from gen_data.generator.config.data_files import load_data
 from gen_data.generator.core.serialization import from_plain
 
 T = TypeVar("T")
@@ -24,5 +22,5 @@ def load_table(package: str, name: str, kind: type[T]) -> Mapping[str, T]:
     Raises:
         KeyError, TypeError: if a row has other fields than the type.
     """
-    rows = yaml.safe_load((files(package) / f"{name}.yaml").read_text(encoding="utf-8"))
+    rows = load_data(package, name)
     return {key: from_plain(kind, row) for key, row in rows.items()}

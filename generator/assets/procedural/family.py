@@ -5,12 +5,10 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.resources import files
 from typing import Any, NamedTuple
 
-import yaml
-
 from gen_data.generator.assets.procedural.variant_rng import in_turn
+from gen_data.generator.config.data_files import load_data
 from gen_data.generator.core.asset_types import (
     ConvexParts,
     Keypoint,
@@ -209,8 +207,7 @@ class FamilyTables(NamedTuple):
 
 def load_families(package: str) -> FamilyTables:
     """The tables in ``families.yaml`` of a package; the file's own header explains its keys."""
-    text = (files(package) / "families.yaml").read_text(encoding="utf-8")
-    plain = yaml.safe_load(text)
+    plain = load_data(package, "families")
 
     def table(section: str, make: Callable[..., Any]) -> Mapping[str, Any]:
         rows = plain.get(section, {})
