@@ -42,7 +42,6 @@ from typing import Any, Literal
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
@@ -225,32 +224,39 @@ def polygons_of(instances: UInt16) -> Iterator[dict[str, Any]]:
     Regions in holes of others are smaller than these, so that they are drawn later.
     """
     classes = list(city_classes().by_name.values())
-    outlines: list[tuple[float, str, NDArray[np.int32]]] = []
+    outlines: list[tuple[float, str, list[list[int]]]] = []
     for code, region in find_regions(instances).items():
         kind = classes[code // PER_CLASS if code >= PER_CLASS else code]
         name = kind.name + ("group" if kind.counted and code < PER_CLASS else "")
-        for points in _outlines(instances, code, region.box):
-            outlines.append((cv2.contourArea(points), name, points))
+        for area, points in _outlines(instances, code, region.box):
+            outlines.append((area, name, points))
     for _, name, points in sorted(outlines, key=lambda item: -item[0]):
-        yield {"label": name, "polygon": points.tolist()}
+        yield {"label": name, "polygon": points}
 
 
-def _outlines(instances: UInt16, code: int, box: BoxPx) -> Iterator[NDArray[np.int32]]:
-    """Yield the outlines [n, 2] of the parts of a code in its box, at least three points each.
+def _outlines(instances: UInt16, code: int, box: BoxPx) -> Iterator[tuple[float, list[list[int]]]]:
+    """Yield the outlines of the parts of a code in its box, at least three points each.
 
-    Pixels of one part have common edges: what a part surrounds, also by pixels that only touch at
-    corners, then consists of other parts.
+    Each comes with its area [px]. Pixels of one part have common edges: what a part surrounds, also
+    by pixels that only touch at corners, then consists of other parts.
     """
     inside = instances[box.y_min : box.y_max, box.x_min : box.x_max]
     crop = (inside == code).view(np.uint8)
-    count, parts, facts, _ = cv2.connectedComponentsWithStats(crop, connectivity=4)
-    for part in range(1, count):
-        x, y, width, height, _ = facts[part].tolist()
-        piece = (parts[y : y + height, x : x + width] == part).astype(np.uint8)
-        (contour,), _ = cv2.findContours(piece, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-        points = contour[:, 0] + np.array([box.x_min + x, box.y_min + y], np.int32)
-        # Drawing needs three points, also for single pixels and lines.
-        yield np.concatenate([points, points[[-1] * max(0, 3 - len(points))]])
+    _, parts, facts, _ = cv2.connectedComponentsWithStats(crop, connectivity=4)
+    for part, (x, y, width, height, _) in enumerate(facts.tolist()):
+        first = [box.x_min + x, box.y_min + y]
+        if part == 0:
+            continue
+        if width == 1 or height == 1:
+            # Most parts are single pixels or lines. Drawing needs three points.
+            last = [first[0] + width - 1, first[1] + height - 1]
+            yield 0.0, [first, last, last]
+            continue
+        piece = (parts[y : y + height, x : x + width] == part).view(np.uint8)
+        (contour,), _ = cv2.findContours(
+            piece, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE, offset=first
+        )
+        yield cv2.contourArea(contour), contour[:, 0].tolist()
 
 
 def camera_facts(scene: Scene, camera: str, right: str) -> dict[str, Any]:
