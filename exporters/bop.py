@@ -40,14 +40,14 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.mask_png import encode_mask
@@ -96,6 +96,8 @@ class Bop(ExporterBase):
     """
 
     type: Literal["bop"] = "bop"
+
+    image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
     camera: str = ""
     folders: Literal["scene", "thousand"] = "scene"
 
@@ -202,8 +204,8 @@ class Bop(ExporterBase):
         channels = {"rgb": Channel.RGB, "depth": Channel.Z_DEPTH}
         for kind, channel in channels.items():
             if channel in info.media[camera]:
-                source = media_path(shard_dir, camera, channel, image["index"])
-                link_or_copy(source, folder / kind / f"{name}.png")
+                source = info.media_path(shard_dir, camera, channel, image["index"])
+                link_or_copy(source, folder / kind / f"{name}{source.suffix}")
         for kind in MASKS:
             for k in range(len(image["gt"])):
                 source = shard_dir / self.type / kind / f"{image['index']:09d}_{k:06d}.png"

@@ -9,7 +9,7 @@ topic                           message (Protobuf schema ``foxglove.*``)
 ==============================  =================================================================
 /tf                             FrameTransform: ``world`` -> rigs, cameras and scanners without
                                 a rig; rigs -> their cameras and scanners
-/camera/<name>/<channel>        CompressedImage: the shards' PNG files
+/camera/<name>/<channel>        CompressedImage: the shards' files
 /camera/<name>/calibration      CameraCalibration; none for equirectangular lenses
 /camera/<name>/annotations      ImageAnnotations: boxes of the visible pixels, with categories
 /lidar/<name>/points            PointCloud with all fields of ``POINT``
@@ -37,18 +37,18 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from gen_data.exporters.base import ExporterBase, check_installed
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.sequences import FRAMES, Frame, frame_facts, write_frames
 from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.capture import POINT, Channel
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.sample import ImageTruth, Sample
 from gen_data.generator.core.scene import Camera, Instance, Lidar
@@ -71,6 +71,8 @@ DISTORTION = {
     "kannala_brandt": "kannala_brandt",
 }
 """Foxglove's distortion models, whose coefficients are in OpenCV's order, by ours."""
+FORMATS = {"png": "png", "jpeg": "jpeg", "webp": "webp", "webp_lossless": "webp"}
+"""Foxglove's names of image formats, by ours."""
 BOX_COLOR = {"r": 0.2, "g": 0.9, "b": 0.4, "a": 0.35}
 LINE_COLOR = {"r": 0.2, "g": 0.9, "b": 0.4, "a": 1.0}
 LINE_PX = 2.0
@@ -81,6 +83,8 @@ class Mcap(ExporterBase):
     """MCAP files of sequences: images, calibrations, scans, transforms and boxes."""
 
     type: Literal["mcap"] = "mcap"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
 
     @property
     def needs(self) -> frozenset[str]:
@@ -357,8 +361,10 @@ def _camera_messages(info: DatasetInfo, event: _Event) -> Iterator[tuple[str, Me
             ),
         )
     for channel in info.media[name]:
-        data = media_path(frame.shard_dir, name, channel, frame.index).read_bytes()
-        image = CompressedImage(**common, data=data, format="png")
+        path = info.media_path(frame.shard_dir, name, channel, frame.index)
+        image = CompressedImage(
+            **common, data=path.read_bytes(), format=FORMATS[info.encoding(name, channel).format]
+        )
         yield f"/camera/{name}/{channel.value}", image
     if Channel.RGB in info.media[name]:
         yield f"/camera/{name}/annotations", _annotations_message(row["boxes"], event.time_ns)
