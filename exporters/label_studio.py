@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 from urllib.parse import quote
@@ -190,7 +190,8 @@ def _shape_values(
         yield {"format": "rle", "rle": brush_rle(thing.mask, height, width)}
     else:
         for polygon in mask_polygons(thing.mask):
-            points = [[_percent(x, width), _percent(y, height)] for x, y in polygon.tolist()]
+            x_of, y_of = _percents(width), _percents(height)
+            points = [[x_of[x], y_of[y]] for x, y in polygon.tolist()]
             yield {"points": points, "closed": True}
 
 
@@ -213,6 +214,12 @@ def _region(
 
 def _percent(length_px: float, size_px: int) -> float:
     return round(100.0 * length_px / size_px, 9)
+
+
+@lru_cache(maxsize=16)
+def _percents(size_px: int) -> list[float]:
+    """Percentages of all borders of pixels along a side, from 0."""
+    return [_percent(k, size_px) for k in range(size_px + 1)]
 
 
 def brush_rle(mask: MaskPx, height_px: int, width_px: int) -> list[int]:
