@@ -31,18 +31,17 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
 from gen_data.exporters.fragments import fragment_rows, write_fragment
+from gen_data.exporters.image_files import read_pixels
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.rrd_container import write_recording
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import ObjectTruth, Sample
 from gen_data.generator.core.se3 import SE3
@@ -298,10 +297,7 @@ def _channel_columns(
 
 def _read_ids(path: Path) -> NDArray[np.uint16]:
     """Category ids, uint16 [h, w]."""
-    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise StorageError(f"{path}: missing or no PNG file; generate the data set again")
-    return np.asarray(image, np.uint16)
+    return np.asarray(read_pixels(path), np.uint16)
 
 
 def _blobs(paths: Iterable[Path]) -> list[np.ndarray]:
