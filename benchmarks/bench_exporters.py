@@ -38,6 +38,9 @@ def measure(folder: Path, entry: dict[str, Any], n: int) -> tuple[float, float]:
     config = load_config(str(folder), overrides=[f"exporters={json.dumps([entry])}"])
     exporters = ready_exporters(config, stored.info, open_library(config.asset_folders))
     ((name, exporter),) = exporters.items()
+    missing = exporter.needs - frozenset(config.annotations)
+    if missing:
+        raise ConfigError(f"the data set lacks annotations: {', '.join(sorted(missing))}")
     pipeline = StoredPipeline(stored, exporters, config.asset_folders)
     files = LinkedFiles(stored)
     with tempfile.TemporaryDirectory(dir=folder.parent) as scratch:

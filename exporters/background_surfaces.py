@@ -38,6 +38,11 @@ MAPS = ((0.01, 12.0, 4.0), (0.05, 64.0, 32.0), (0.25, 320.0, 128.0))
 """Side of a cell, reach and step [m] of each map, the finest first. Maps are centred on multiples
 of the step, so that the cameras of a rig and many views of a scene share them."""
 _SUBPIXEL_BITS = 4
+_BLOCK_BITS = 5
+_BLOCK = 1 << _BLOCK_BITS
+"""Cells along a side of the blocks that are drawn at once."""
+_MARGIN = 2
+"""Cells around a triangle that its drawing may touch."""
 
 
 def read_surfaces(
@@ -109,8 +114,15 @@ def _ground_points(
 
 def _shows_sky(view: Camera) -> NDArray[np.bool_]:
     """Pixels that look forwards and above the horizon, [h, w]."""
-    rays = view.intrinsics.pixel_rays()
     up = view.T_world_camera.inverse().rotate(np.array([0.0, 0.0, 1.0]))
+    k = view.intrinsics
+    if k.straight:
+        # Rays are sums of one term by column and one by row, whatever their length.
+        u = (np.arange(k.width_px) + 0.5 - k.cx_px) / k.fx_px
+        v = (np.arange(k.height_px) + 0.5 - k.cy_px) / k.fy_px
+        above: NDArray[np.bool_] = u * up[0] + (v * up[1] + up[2])[:, None] > 0.0
+        return above
+    rays = k.pixel_rays()
     rises = rays[..., 0] * up[0] + rays[..., 1] * up[1] + rays[..., 2] * up[2]
     shown: NDArray[np.bool_] = (rays[..., 2] > 0.0) & (rises > 0.0)
     return shown
@@ -178,24 +190,103 @@ def _look_up(ground: tuple[_Piece, ...], view: Camera, points_m: tuple[Array, Ar
         )
         inside = (column >= 0) & (column < count) & (row >= 0) & (row < count)
         if inside.any():
-            cell = row[inside].astype(np.intp) * count + column[inside].astype(np.intp)
-            found[left[inside]] = _draw_map(ground, middle, cell_m, count).ravel()[cell]
+            ground_map = _map_of(ground, middle, cell_m, count)
+            rows, columns = row[inside].astype(np.intp), column[inside].astype(np.intp)
+            found[left[inside]] = ground_map.look_up(rows, columns)
         left = left[~inside]
     return found
 
 
 @lru_cache(maxsize=6)
-def _draw_map(
+def _map_of(
     ground: tuple[_Piece, ...], middle_m: tuple[float, float], cell_m: float, count: int
-) -> UInt8:
-    """Surface of each cell of a square map, [count, count]; rows along Y, columns along X."""
-    drawn = np.zeros((count, count), np.uint8)
-    scale = 1 << _SUBPIXEL_BITS
-    for piece in ground:
+) -> _GroundMap:
+    return _GroundMap(_triangles_of(ground), middle_m, cell_m, count)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Triangles:
+    """All triangles of the ground, in the order in which they are drawn.
+
+    Attributes:
+        corners_m: World X and Y, [n, 3, 2].
+        numbers: Indices of ``SURFACES``, [n].
+        low_m: Least X and Y of each, [n, 2].
+        high_m: Largest X and Y of each, [n, 2].
+    """
+
+    corners_m: Array
+    numbers: NDArray[np.intp]
+    low_m: Array
+    high_m: Array
+
+
+@lru_cache(maxsize=2)
+def _triangles_of(ground: tuple[_Piece, ...]) -> _Triangles:
+    corners_m = np.concatenate([piece.corners_m for piece in ground])
+    numbers = np.repeat([p.number for p in ground], [len(p.corners_m) for p in ground])
+    return _Triangles(corners_m, numbers, corners_m.min(axis=1), corners_m.max(axis=1))
+
+
+class _GroundMap:
+    """Surface of each cell of a square map; rows along Y, columns along X.
+
+    Cameras see a small part of it, so that blocks of cells are drawn when they are looked up.
+    """
+
+    def __init__(
+        self, triangles: _Triangles, middle_m: tuple[float, float], cell_m: float, count: int
+    ) -> None:
+        self._triangles, self._middle_m, self._cell_m = triangles, middle_m, cell_m
+        self._blocks = -(-count // _BLOCK)
+        self._count, self._offset = count, 0.5 * count
+        self._cells = np.zeros((0, 0), np.uint8)
+        self._known = np.zeros((self._blocks, self._blocks), np.bool_)
+
+    def look_up(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> UInt8:
+        """Surfaces of some cells, [n] each."""
+        needed = np.zeros(self._known.size, np.bool_)
+        needed[(rows >> _BLOCK_BITS) * self._blocks + (columns >> _BLOCK_BITS)] = True
+        missing = needed.reshape(self._known.shape) & ~self._known
+        if missing.any():
+            drawn = self._draw(missing)
+            if self._known.any():
+                for row, column in np.argwhere(missing) * _BLOCK:
+                    block = np.s_[row : row + _BLOCK, column : column + _BLOCK]
+                    self._cells[block] = drawn[block]
+            else:
+                self._cells = drawn
+            self._known |= missing
+        found: UInt8 = self._cells.ravel()[rows * self._count + columns]
+        return found
+
+    def _draw(self, blocks: NDArray[np.bool_]) -> UInt8:
+        """Draw all triangles that may reach some blocks; others are incomplete."""
+        drawn = np.zeros((self._count, self._count), np.uint8)
+        reached = self._reached(blocks)
         # OpenCV has the centres of pixels at whole numbers.
-        cells = (piece.corners_m - middle_m) / cell_m + 0.5 * count - 0.5
-        near = (cells.max(axis=1) > -1).all(axis=1) & (cells.min(axis=1) < count).all(axis=1)
+        cells = (self._triangles.corners_m[reached] - self._middle_m) / self._cell_m
+        cells += self._offset - 0.5
         # Corners of large triangles stay far below the limit of 2^31 sixteenths of a cell.
-        for corners in np.rint(cells[near] * scale).astype(np.int32):
-            cv2.fillConvexPoly(drawn, corners, piece.number, cv2.LINE_8, _SUBPIXEL_BITS)
-    return drawn
+        corners = np.rint(cells * (1 << _SUBPIXEL_BITS)).astype(np.int32)
+        numbers = self._triangles.numbers[reached].tolist()
+        for points, number in zip(corners, numbers, strict=True):
+            cv2.fillConvexPoly(drawn, points, number, cv2.LINE_8, _SUBPIXEL_BITS)
+        return drawn
+
+    def _reached(self, blocks: NDArray[np.bool_]) -> NDArray[np.intp]:
+        """Numbers of the triangles whose rectangles meet some of the blocks, with a margin."""
+        sums = np.zeros((self._blocks + 1, self._blocks + 1), np.intp)
+        sums[1:, 1:] = blocks.cumsum(axis=0).cumsum(axis=1)
+        size_m = _BLOCK * self._cell_m
+        low, high = (
+            np.floor((corner_m - self._middle_m) / size_m + self._offset / _BLOCK + margin)
+            for corner_m, margin in (
+                (self._triangles.low_m, -_MARGIN / _BLOCK),
+                (self._triangles.high_m, 1.0 + _MARGIN / _BLOCK),
+            )
+        )
+        x0, y0 = np.clip(low, 0, self._blocks).astype(np.intp).T
+        x1, y1 = np.clip(high, 0, self._blocks).astype(np.intp).T
+        met = sums[y1, x1] - sums[y0, x1] - sums[y1, x0] + sums[y0, x0]
+        return np.flatnonzero(met > 0)

@@ -11,6 +11,7 @@ from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, Exporter
 
 PNG_ONLY = frozenset({"png"})
+PNG_OR_JPEG = frozenset({"png", "jpeg"})
 ANY_FORMAT: frozenset[str] = frozenset(get_args(ImageFormat))
 
 E = TypeVar("E", bound="ExporterBase")
@@ -59,7 +60,7 @@ def check_image_formats(exporter: Exporter, info: DatasetInfo) -> None:
             raise ConfigError(
                 f"exporter '{exporter.type}': camera '{camera}' writes {used} files, but the "
                 f"exporter takes {', '.join(sorted(known))} only; change rgb_encoding of the "
-                "sensor, or export as coco, yolo, voc, webdataset, hdf5 or lerobot"
+                "sensor, or export in a format that takes them, such as coco, yolo or huggingface"
             )
 
 

@@ -40,16 +40,15 @@ import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
-from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_files import link_or_copy, read_pixels
 from gen_data.exporters.mask_png import encode_mask
 from gen_data.exporters.rigid_models import (
     MM_PER_M,
@@ -66,10 +65,9 @@ from gen_data.exporters.sequences import check_frame_names, write_bytes, write_t
 from gen_data.generator.core.bounded_cache import ByteCache
 from gen_data.generator.core.boxes import BoxPx
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, media_path
 from gen_data.generator.core.intrinsics import Intrinsics
-from gen_data.generator.core.sample import ObjectTruth, Sample
+from gen_data.generator.core.sample import MaskPx, ObjectTruth, Sample
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.serialization import canonical_json
 
@@ -96,6 +94,8 @@ class Bop(ExporterBase):
     """
 
     type: Literal["bop"] = "bop"
+
+    image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
     camera: str = ""
     folders: Literal["scene", "thousand"] = "scene"
 
@@ -202,8 +202,8 @@ class Bop(ExporterBase):
         channels = {"rgb": Channel.RGB, "depth": Channel.Z_DEPTH}
         for kind, channel in channels.items():
             if channel in info.media[camera]:
-                source = media_path(shard_dir, camera, channel, image["index"])
-                link_or_copy(source, folder / kind / f"{name}.png")
+                source = info.media_path(shard_dir, camera, channel, image["index"])
+                link_or_copy(source, folder / kind / f"{name}{source.suffix}")
         for kind in MASKS:
             for k in range(len(image["gt"])):
                 source = shard_dir / self.type / kind / f"{image['index']:09d}_{k:06d}.png"
@@ -301,10 +301,7 @@ def _read_depth(
     if Channel.Z_DEPTH not in info.media[camera]:
         return None
     path = media_path(shard_dir, camera, Channel.Z_DEPTH, index)
-    depth = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if depth is None:
-        raise StorageError(f"{path}: missing or no PNG file; generate the data set again")
-    return np.asarray(depth, np.uint16)
+    return np.asarray(read_pixels(path), np.uint16)
 
 
 def _gt_info(thing: ObjectTruth, depth: NDArray[np.uint16] | None) -> dict[str, Any]:
@@ -355,9 +352,19 @@ def _write_masks(folder: Path, sample: Sample, camera: str, things: Sequence[Obj
         (folder / kind).mkdir(parents=True, exist_ok=True)
     for k, thing in enumerate(things):
         name = f"{sample.index:09d}_{k:06d}.png"
-        for kind, mask in zip(MASKS, (thing.amodal_mask, thing.mask), strict=True):
-            png = encode_mask(mask, size.height_px, size.width_px)
+        whole = encode_mask(thing.amodal_mask, size.height_px, size.width_px)
+        # Both masks of an object that nothing hides are the same.
+        same = _are_equal(thing.amodal_mask, thing.mask)
+        visible = whole if same else encode_mask(thing.mask, size.height_px, size.width_px)
+        for kind, png in zip(MASKS, (whole, visible), strict=True):
             (folder / kind / name).write_bytes(png)
+
+
+def _are_equal(one: MaskPx | None, other: MaskPx | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    same_place = (one.x_px, one.y_px) == (other.x_px, other.y_px)
+    return same_place and np.array_equal(one.pixels, other.pixels)
 
 
 def _write_models(folders: Sequence[Path], dataset_dir: Path) -> dict[str, int]:

@@ -37,6 +37,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -47,11 +48,11 @@ from pydantic import PrivateAttr
 
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
 from gen_data.exporters.base import ExporterBase
-from gen_data.exporters.cityscapes_classes import UInt8, city_classes
+from gen_data.exporters.cityscapes_classes import city_classes
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.label_png import encode_label_png
-from gen_data.exporters.label_regions import find_regions
+from gen_data.exporters.label_regions import find_parts
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sensor_selection import pinhole_camera, rgb_cameras
 from gen_data.exporters.sequences import (
@@ -135,18 +136,13 @@ class Cityscapes(ExporterBase):
         for sample in samples:
             if camera not in sample.truth or (self.right and self.right not in sample.truth):
                 continue
-            labels, instances = find_labels(info, sample, camera, shard_dir, self._assets)
+            instances = find_instances(info, sample, camera, shard_dir, self._assets)
             stem = shard_dir / self.type / f"{sample.index:09d}"
-            files = {
-                "labelIds": encode_png(labels, RowFilter.UP, 2),
-                "instanceIds": encode_png(instances, RowFilter.UP, 2),
-                "color": encode_label_png(labels, city_classes().colors),
-            }
-            for name, data in files.items():
-                write_bytes(_beside(stem, f"{name}.png"), data)
+            for name, values in _values_of_codes().items():
+                write_bytes(_beside(stem, f"{name}.png"), encode_label_png(instances, values))
             polygons = {
-                "imgHeight": labels.shape[0],
-                "imgWidth": labels.shape[1],
+                "imgHeight": instances.shape[0],
+                "imgWidth": instances.shape[1],
                 "objects": list(polygons_of(instances)),
             }
             # Thousands of plain numbers: converting them costs more than all images.
@@ -182,13 +178,21 @@ class Cityscapes(ExporterBase):
                 link_or_copy(source, folder / f"{name}_{suffix}")
 
 
-def find_labels(
-    info: DatasetInfo, sample: Sample, camera: str, shard_dir: Path, assets: AssetLibrary
-) -> tuple[UInt8, UInt16]:
-    """Find class and instance of every pixel.
+@cache
+def _values_of_codes() -> dict[str, NDArray[Any]]:
+    """Values of each image of labels by code of ``instanceIds``, [34000] or [34000, 3]."""
+    classes = city_classes()
+    codes = np.arange(PER_CLASS * len(classes.by_name))
+    numbers = np.where(codes < PER_CLASS, codes, codes // PER_CLASS)
+    numbers[len(classes.by_name) : PER_CLASS] = 0
+    values = (numbers.astype(np.uint8), codes.astype(np.uint16), classes.colors[numbers])
+    return dict(zip(IMAGES, values, strict=True))
 
-    Returns:
-        ``labelIds`` [h, w] and ``instanceIds`` [h, w].
+
+def find_instances(
+    info: DatasetInfo, sample: Sample, camera: str, shard_dir: Path, assets: AssetLibrary
+) -> UInt16:
+    """Find the code of every pixel: ``instanceIds``, [h, w].
 
     Raises:
         StorageError: an image is missing.
@@ -196,7 +200,9 @@ def find_labels(
     ids, surfaces = read_surfaces(info, sample, camera, shard_dir, assets)
     classes, scene = city_classes(), sample.scene_of(camera)
     size = 1 + max(int(ids.max()), max((i.instance_id for i in scene.instances), default=0))
-    label_of, code_of = np.zeros(size, np.uint8), np.zeros(size, np.uint16)
+    of_surface = [classes.of_surface(name).number for name in SURFACES]
+    # Codes of instances, then of surfaces.
+    code_of = np.array([0] * size + of_surface, np.uint16)
     truth = {thing.instance.instance_id: thing for thing in sample.truth[camera].objects}
     ego, counts = _carrier(scene, camera), dict.fromkeys(classes.by_name, 0)
     for instance in sorted(scene.instances, key=lambda i: i.instance_id):
@@ -207,16 +213,12 @@ def find_labels(
             kind = classes.by_name[EGO_VEHICLE]
         elif thing is not None and thing.ignored:
             kind = classes.by_name[UNLABELED]
-        label_of[number] = code_of[number] = kind.number
+        code_of[number] = kind.number
         shown = thing is not None and thing.box is not None
         if kind.counted and shown and counts[kind.name] < PER_CLASS:
             code_of[number] = PER_CLASS * kind.number + counts[kind.name]
             counts[kind.name] += 1
-    of_surface = np.array([classes.of_surface(name).number for name in SURFACES], np.uint8)
-    background = of_surface[surfaces]
-    labels: UInt8 = np.where(ids > 0, label_of[ids], background)
-    instances: UInt16 = np.where(ids > 0, code_of[ids], background)
-    return labels, instances
+    return code_of[np.where(ids > 0, ids, surfaces + np.uint16(size))]
 
 
 def polygons_of(instances: UInt16) -> Iterator[dict[str, Any]]:
@@ -225,32 +227,30 @@ def polygons_of(instances: UInt16) -> Iterator[dict[str, Any]]:
     Regions in holes of others are smaller than these, so that they are drawn later.
     """
     classes = list(city_classes().by_name.values())
-    outlines: list[tuple[float, str, NDArray[np.int32]]] = []
-    for code, region in find_regions(instances).items():
+    outlines: list[tuple[float, str, list[list[int]]]] = []
+    # Pixels of one part have common edges: what a part surrounds, also by pixels that only touch at
+    # corners, then consists of other parts.
+    parts, found = find_parts(instances)
+    for part, (code, box) in enumerate(found):
         kind = classes[code // PER_CLASS if code >= PER_CLASS else code]
         name = kind.name + ("group" if kind.counted and code < PER_CLASS else "")
-        for points in _outlines(instances, code, region.box):
-            outlines.append((cv2.contourArea(points), name, points))
+        area, points = _outline(parts, part, box)
+        outlines.append((area, name, points))
     for _, name, points in sorted(outlines, key=lambda item: -item[0]):
-        yield {"label": name, "polygon": points.tolist()}
+        yield {"label": name, "polygon": points}
 
 
-def _outlines(instances: UInt16, code: int, box: BoxPx) -> Iterator[NDArray[np.int32]]:
-    """Yield the outlines [n, 2] of the parts of a code in its box, at least three points each.
-
-    Pixels of one part have common edges: what a part surrounds, also by pixels that only touch at
-    corners, then consists of other parts.
-    """
-    inside = instances[box.y_min : box.y_max, box.x_min : box.x_max]
-    crop = (inside == code).view(np.uint8)
-    count, parts, facts, _ = cv2.connectedComponentsWithStats(crop, connectivity=4)
-    for part in range(1, count):
-        x, y, width, height, _ = facts[part].tolist()
-        piece = (parts[y : y + height, x : x + width] == part).astype(np.uint8)
-        (contour,), _ = cv2.findContours(piece, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-        points = contour[:, 0] + np.array([box.x_min + x, box.y_min + y], np.int32)
-        # Drawing needs three points, also for single pixels and lines.
-        yield np.concatenate([points, points[[-1] * max(0, 3 - len(points))]])
+def _outline(parts: NDArray[np.int32], part: int, box: BoxPx) -> tuple[float, list[list[int]]]:
+    """Area [px] and outline of a part, at least three points."""
+    first, last = [box.x_min, box.y_min], [box.x_max - 1, box.y_max - 1]
+    if box.width_px == 1 or box.height_px == 1:
+        # Most parts are single pixels or lines. Drawing needs three points.
+        return 0.0, [first, last, last]
+    piece = (parts[box.y_min : box.y_max, box.x_min : box.x_max] == part).view(np.uint8)
+    (contour,), _ = cv2.findContours(
+        piece, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE, offset=first
+    )
+    return cv2.contourArea(contour), contour[:, 0].tolist()
 
 
 def camera_facts(scene: Scene, camera: str, right: str) -> dict[str, Any]:

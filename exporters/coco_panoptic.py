@@ -28,14 +28,14 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
 from gen_data.exporters.background_surfaces import SURFACES, UInt16, read_surfaces
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import box_xywh, dataset_header, image_name, write_dataset
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, image_splits, write_fragment
 from gen_data.exporters.image_files import link_or_copy
@@ -45,7 +45,7 @@ from gen_data.exporters.label_regions import find_regions
 from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
 from gen_data.exporters.sequences import write_bytes
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, media_path
+from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.serialization import canonical_json
 
@@ -70,6 +70,8 @@ class CocoPanoptic(ExporterBase):
     """COCO panoptic segmentation of all cameras with the channels rgb and instance."""
 
     type: Literal["coco_panoptic"] = "coco_panoptic"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     _assets: AssetLibrary | None = PrivateAttr(None)
 
     def check(self, info: DatasetInfo) -> None:
@@ -128,8 +130,8 @@ class CocoPanoptic(ExporterBase):
             for shard_dir, row in fragment_rows(shard_dirs, self.type, stem):
                 name, sensor, index = row["file_name"], row["sensor"], row["sample"]
                 link_or_copy(shard_dir / self.type / name, path.with_suffix("") / name)
-                source = media_path(shard_dir, sensor, Channel.RGB, index)
-                link_or_copy(source, dataset_dir / split / name)
+                source = info.media_path(shard_dir, sensor, Channel.RGB, index)
+                link_or_copy(source, dataset_dir / split / row["photograph"])
 
 
 def _write_segments(
@@ -144,6 +146,7 @@ def _write_segments(
     return {
         "id": sample.image_id(sensor),
         "file_name": name,
+        "photograph": image_name(sample.index, sensor, info.encoding(sensor, Channel.RGB).suffix),
         "width": labels.shape[1],
         "height": labels.shape[0],
         "sensor": sensor,
@@ -241,7 +244,8 @@ def _categories(things: Sequence[str], stuff: Sequence[str]) -> list[dict[str, A
 
 def _image_line(line: str) -> str:
     row = json.loads(line)
-    return canonical_json({key: row[key] for key in ("id", "file_name", "width", "height")})
+    facts = {key: row[key] for key in ("id", "width", "height")}
+    return canonical_json({**facts, "file_name": row["photograph"]})
 
 
 def _annotation_lines(lines: Iterable[str], ids: Mapping[str, int]) -> Iterator[str]:

@@ -33,14 +33,14 @@ import json
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.captions import caption
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.id_colors import id_colors
@@ -60,7 +60,7 @@ from gen_data.exporters.sequences import (
 )
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.serialization import canonical_json
 
@@ -93,6 +93,8 @@ class ControlClips(ExporterBase):
     """
 
     type: Literal["control_clips"] = "control_clips"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     camera: str = ""
     segmentation: Literal["instance", "category"] = "instance"
     near_m: float | None = Field(None, gt=0)
@@ -150,7 +152,7 @@ class ControlClips(ExporterBase):
             if camera not in sample.truth:
                 continue
             read = {
-                channel: read_pixels(media_path(shard_dir, camera, channel, sample.index))
+                channel: read_pixels(info.media_path(shard_dir, camera, channel, sample.index))
                 for channel in (Channel.RGB, Channel.Z_DEPTH, self._ids)
             }
             depth, (near_m, far_m) = self._depth(read[Channel.Z_DEPTH], info.depth_scale_m)
@@ -183,9 +185,11 @@ class ControlClips(ExporterBase):
             folder = split / f"{number:06d}"
             for k, frame in enumerate(frames):
                 for kind in IMAGES:
-                    link_or_copy(self._source(frame, kind, camera), folder / kind / f"{k:06d}.png")
+                    source = self._source(info, frame, kind, camera)
+                    link_or_copy(source, folder / kind / f"{k:06d}{source.suffix}")
             with (split / "metadata.jsonl").open("a", encoding="utf-8", newline="\n") as file:
-                file.writelines(_metadata_lines(folder.name, frames))
+                suffix = info.encoding(camera, Channel.RGB).suffix
+                file.writelines(_metadata_lines(folder.name, frames, suffix))
             self._describe(info, camera, folder, frames)
 
     @property
@@ -212,10 +216,10 @@ class ControlClips(ExporterBase):
         grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
         return np.asarray(cv2.Canny(grey, self.canny_low, self.canny_high), np.uint8)
 
-    def _source(self, frame: Frame, kind: str, camera: str) -> Path:
+    def _source(self, info: DatasetInfo, frame: Frame, kind: str, camera: str) -> Path:
         """File of one image in its shard."""
         if kind == "rgb":
-            return media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
+            return info.media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
         return frame.shard_dir / self.type / kind / f"{frame.index:09d}.png"
 
     def _describe(
@@ -242,7 +246,8 @@ class ControlClips(ExporterBase):
         write_text(folder / "clip.json", canonical_json(facts) + "\n")
         if self.video:
             for kind in IMAGES:
-                images = [folder / kind / f"{k:06d}.png" for k in range(len(frames))]
+                suffix = info.encoding(camera, Channel.RGB).suffix if kind == "rgb" else ".png"
+                images = [folder / kind / f"{k:06d}{suffix}" for k in range(len(frames))]
                 write_video(folder / f"{kind}.mp4", images, rate_hz)
             parameters = self._cosmos_parameters(f"{info.name}_{folder.name}", text)
             text = json.dumps(parameters, indent=2, ensure_ascii=False)
@@ -309,13 +314,13 @@ def write_video(path: Path, images: Sequence[Path], rate_hz: float) -> None:
         writer.release()
 
 
-def _metadata_lines(clip: str, frames: Sequence[Frame]) -> Iterator[str]:
+def _metadata_lines(clip: str, frames: Sequence[Frame], suffix: str) -> Iterator[str]:
     """Lines of ``metadata.jsonl``: names of images relative to it, and the caption."""
     for k, frame in enumerate(frames):
         files = {f"{kind}_file_name": f"{clip}/{kind}/{k:06d}.png" for kind in CONTROLS}
         row = {
             # Beside other columns of images, a plain ``file_name`` becomes the first of them.
-            "image_file_name": f"{clip}/rgb/{k:06d}.png",
+            "image_file_name": f"{clip}/rgb/{k:06d}{suffix}",
             **files,
             "text": frame.row["text"],
             "clip": clip,

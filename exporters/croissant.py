@@ -24,11 +24,12 @@ import io
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from pydantic import PrivateAttr
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.coco import image_name
 from gen_data.exporters.croissant_metadata import (
     croissant_document,
     extract,
@@ -42,11 +43,13 @@ from gen_data.exporters.sensor_selection import rgb_cameras
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, media_path
+from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene_assets import assets_in
 
 IMAGES, ASSETS = "images", "assets"
+MIME_TYPES = {".png": "image/png", ".jpg": "image/jpeg", ".webp": "image/webp"}
+"""Media types of photographs by ending."""
 IMAGE_COLUMNS = {
     "image_id": "sc:Integer",
     "file_name": "sc:Text",
@@ -87,6 +90,8 @@ class Croissant(ExporterBase):
 
     type: Literal["croissant"] = "croissant"
 
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+
     _assets: AssetLibrary | None = PrivateAttr(None)
 
     def with_assets(self, assets: AssetLibrary) -> Croissant:
@@ -99,11 +104,17 @@ class Croissant(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: no sensor writes the rgb channel.
+            ConfigError: no sensor writes the rgb channel, or cameras differ in their image files.
         """
         if not rgb_cameras(info):
             raise ConfigError(
                 f"exporter '{self.type}': no sensor writes the rgb channel; add an rgb_camera"
+            )
+        suffixes = {info.encoding(name, Channel.RGB).suffix for name in rgb_cameras(info)}
+        if len(suffixes) > 1:
+            raise ConfigError(
+                f"exporter '{self.type}': cameras write {' and '.join(sorted(suffixes))} files; "
+                "expected one format, so change rgb_encoding of a sensor"
             )
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
@@ -112,7 +123,7 @@ class Croissant(ExporterBase):
         rows, assets = [], set()
         for sample in samples:
             assets |= assets_in(sample.scene)
-            rows += [_row(sample, s) for s in rgb_cameras(info) if s in sample.truth]
+            rows += [_row(info, sample, s) for s in rgb_cameras(info) if s in sample.truth]
         folder = shard_dir / self.type
         write_fragment(folder, IMAGES, rows)
         write_fragment(folder, ASSETS, ({"asset": asset} for asset in sorted(assets)))
@@ -131,12 +142,13 @@ class Croissant(ExporterBase):
                 image = row["image"]
                 images.write(image)
                 objects.write_all(row["objects"])
-                source = media_path(shard_dir, image["sensor"], Channel.RGB, image["sample"])
+                sensor, index = image["sensor"], image["sample"]
+                source = info.media_path(shard_dir, sensor, Channel.RGB, index)
                 target = dataset_dir / "images" / image["split"] / image["file_name"]
                 link_or_copy(source, target)
         tables = [table.described() for table in (images, objects, categories)]
         document = croissant_document(
-            info, self._asset_licences(shard_dirs), [*tables, _IMAGE_FILES], _record_sets()
+            info, self._asset_licences(shard_dirs), [*tables, _image_files(info)], _record_sets()
         )
         text = json.dumps(document, indent=2, ensure_ascii=False) + "\n"
         write_text(dataset_dir / "croissant.json", text)
@@ -185,13 +197,13 @@ class _CsvFile:
         return file_object(self._path.name, self._bytes, self._sha256.hexdigest(), "text/csv")
 
 
-def _row(sample: Sample, sensor: str) -> dict[str, Any]:
+def _row(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     """Lines of both tables for one image."""
     camera = sample.truth[sensor].camera.intrinsics
     image_id = sample.image_id(sensor)
     image = {
         "image_id": image_id,
-        "file_name": f"{sample.index:09d}_{sensor}.png",
+        "file_name": image_name(sample.index, sensor, info.encoding(sensor, Channel.RGB).suffix),
         "split": sample.split,
         "width": camera.width_px,
         "height": camera.height_px,
@@ -224,7 +236,12 @@ def _row(sample: Sample, sensor: str) -> dict[str, Any]:
     return {"image": image, "objects": objects}
 
 
-_IMAGE_FILES = file_set("image-files", "Photographs, 8-bit sRGB.", "image/png", "images/*/*.png")
+def _image_files(info: DatasetInfo) -> dict[str, Any]:
+    """All photographs; ``check`` makes sure that they have one ending."""
+    suffix = info.encoding(rgb_cameras(info)[0], Channel.RGB).suffix
+    return file_set(
+        "image-files", "Photographs, 8-bit sRGB.", MIME_TYPES[suffix], f"images/*/*{suffix}"
+    )
 
 
 def _record_sets() -> list[dict[str, Any]]:

@@ -21,12 +21,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.fragments import fragment_rows, image_splits, write_image_rows
 from gen_data.exporters.image_files import link_or_copy
@@ -34,7 +34,7 @@ from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.mask_polygons import mask_polygons
 from gen_data.exporters.sensor_selection import check_channels
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import MaskPx, ObjectTruth, Sample
 
 OCCLUDED = 0.05
@@ -45,6 +45,8 @@ class Cvat(ExporterBase):
     """CVAT for images: objects of all cameras with the rgb channel, as shapes to be edited."""
 
     type: Literal["cvat"] = "cvat"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     shapes: Literal["mask", "polygon", "box"] = "mask"
     """Shape of every object."""
 
@@ -87,12 +89,14 @@ class Cvat(ExporterBase):
                         f'width="{row["width"]}" height="{row["height"]}">\n'
                         f"{row['shapes']}  </image>\n"
                     )
-                    source = media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
+                    sensor, index = row["sensor"], row["sample"]
+                    source = info.media_path(shard_dir, sensor, Channel.RGB, index)
                     link_or_copy(source, path.parent / "images" / name)
                 file.write("</annotations>\n")
 
     def _image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         camera = sample.truth[sensor].camera.intrinsics
+        suffix = info.encoding(sensor, Channel.RGB).suffix
         elements = [
             line
             for thing in sample.truth[sensor].objects
@@ -100,7 +104,7 @@ class Cvat(ExporterBase):
             for line in shape_elements(thing, info, self.shapes)
         ]
         return {
-            "file_name": image_name(sample.index, sensor),
+            "file_name": image_name(sample.index, sensor, suffix),
             "sensor": sensor,
             "sample": sample.index,
             "width": camera.width_px,

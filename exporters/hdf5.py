@@ -75,7 +75,7 @@ BLENDER_AXES = np.array([1.0, -1.0, -1.0])
 """Signs of our camera axes along those of Blender: Y up, Z backwards."""
 
 LEVEL = 1
-"""Compression level."""
+"""Level of gzip."""
 
 FILES = "files"
 
@@ -85,12 +85,15 @@ class Hdf5(ExporterBase):
 
     Attributes:
         container: ``hdf5``, or ``npz`` for NumPy alone.
+        compression: Of images: ``gzip`` as BlenderProc has it, or ``none`` for larger files that
+            are written faster.
     """
 
     type: Literal["hdf5"] = "hdf5"
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     container: Literal["hdf5", "npz"] = "hdf5"
+    compression: Literal["gzip", "none"] = "gzip"
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set without images, or a machine without h5py.
@@ -142,18 +145,18 @@ class Hdf5(ExporterBase):
     def _write(self, path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         if self.container == "npz":
-            path.write_bytes(npz_bytes(arrays, LEVEL))
+            path.write_bytes(npz_bytes(arrays, LEVEL if self.compression == "gzip" else 0))
         else:
-            write_hdf5(path, arrays)
+            write_hdf5(path, arrays, compressed=self.compression == "gzip")
 
 
-def write_hdf5(path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write arrays by name as an HDF5 file; images are one compressed chunk each."""
+def write_hdf5(path: Path, arrays: Mapping[str, NDArray[Any]], *, compressed: bool = True) -> None:
+    """Write arrays by name as an HDF5 file; compressed images are one chunk each."""
     import h5py
 
     with h5py.File(path, "w", libver="earliest") as file:
         for name, array in arrays.items():
-            if array.size <= 16:
+            if array.size <= 16 or not compressed:
                 file.create_dataset(name, data=array)
                 continue
             dataset = file.create_dataset(

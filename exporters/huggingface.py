@@ -15,9 +15,9 @@ size is height x width), ``visible_fraction``, ``occlusion``, ``truncation``, an
 (camera frame: centre [m], full size [m], quaternion w x y z). Annotations that are disabled are
 null.
 
-Images keep the bytes of the shards' PNG files. Channels of three 16-bit components (flow, object
-coordinates) are binary columns of PNG files, since Pillow would reduce them to 8 bits. An image
-that a camera does not write is null.
+Images keep the bytes of the shards' files: photographs may be JPEG or WebP. Channels of three
+16-bit components (flow, object coordinates) are binary columns of PNG files, since Pillow would
+reduce them to 8 bits. An image that a camera does not write is null.
 
 Ids, pixels and box values equal those of the exporter ``coco``. Bytes of Parquet files depend on
 the release of pyarrow, which writes its name into them; plans name that release.
@@ -33,12 +33,12 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import yaml
 from pydantic import Field
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
 from gen_data.exporters.parquet_tables import (
     GROUP_ROWS,
@@ -54,7 +54,7 @@ from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import ObjectTruth, Sample
 
 if TYPE_CHECKING:
@@ -85,6 +85,8 @@ class HuggingFace(ExporterBase):
     """
 
     type: Literal["huggingface"] = "huggingface"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     rows_per_file: int = Field(1000, ge=1, le=1_000_000)
     license: str = Field("other", pattern=r"^[a-z0-9.-]+$")
 
@@ -321,9 +323,9 @@ def _images(info: DatasetInfo, shard_dir: Path, row: Mapping[str, Any]) -> dict[
     """Image columns of a row; a channel that the camera does not write has none."""
     columns: dict[str, Any] = {}
     for channel in info.media[row["sensor"]]:
-        path = media_path(shard_dir, row["sensor"], channel, row["sample"])
+        path = info.media_path(shard_dir, row["sensor"], channel, row["sample"])
         name = "image" if channel is Channel.RGB else channel.value
-        file_name = f"{path.stem}_{row['sensor']}.png"
+        file_name = f"{path.stem}_{row['sensor']}{path.suffix}"
         data = path.read_bytes()
         columns[name] = data if channel in WIDE else {"bytes": data, "path": file_name}
     return columns

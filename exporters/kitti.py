@@ -299,7 +299,8 @@ def point_members(
     p_camera = np.stack([a * x + b * y + c * z + d for a, b, c, d in T_camera_velo], axis=1)
     ids = points["instance_id"].astype(np.int64)
     members = members_in_box(ids, p_camera, boxes)
-    return members, frozenset(labelled) - frozenset(np.unique(ids[members == ids]).tolist())
+    hit = np.flatnonzero(np.bincount(ids[members == ids]))
+    return members, frozenset(labelled) - frozenset(hit.tolist())
 
 
 def point_labels(

@@ -98,11 +98,14 @@ def _find_runs(labels: NDArray[Any], values: UInt8) -> _Runs:
     flat = labels.ravel()
     literals = values[flat[place]]
     literals[width:] -= values[flat[changed - width]]
-    place, literals = place[literals.any(axis=1)], literals[literals.any(axis=1)]
+    # Column by column: NumPy is slow along short axes.
+    shown = np.flatnonzero(np.logical_or.reduce([column > 0 for column in literals.T]))
+    place, literals = place[shown], literals[shown]
     row, column = np.divmod(place, width)
-    same = (place[1:] == place[:-1] + 1) & (column[1:] > 0)
-    same &= (literals[1:] == literals[:-1]).all(axis=1)
-    first = np.flatnonzero(np.concatenate([[True], ~same])[: len(place)])
+    differs = (place[1:] != place[:-1] + 1) | (column[1:] == 0)
+    for values_of_byte in literals.T:
+        differs |= values_of_byte[1:] != values_of_byte[:-1]
+    first = np.flatnonzero(np.concatenate([[True], differs])[: len(place)])
     pixels = np.diff(first, append=len(place))
     begin = row[first] * (1 + width * step) + 1 + column[first] * step
     return _Runs(begin, pixels, literals[first])

@@ -22,16 +22,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 from urllib.parse import quote
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.fragments import fragment_rows, image_splits, write_image_rows
 from gen_data.exporters.image_files import link_or_copy
@@ -40,7 +40,7 @@ from gen_data.exporters.mask_polygons import mask_polygons
 from gen_data.exporters.sensor_selection import check_channels
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.sample import MaskPx, ObjectTruth, Sample
 
@@ -66,6 +66,8 @@ class LabelStudio(ExporterBase):
     """Label Studio: objects of all cameras with the rgb channel, as regions to be edited."""
 
     type: Literal["label_studio"] = "label_studio"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     shapes: Shape = "polygon"
     """Shape of every object."""
     kind: Literal["annotations", "predictions"] = "annotations"
@@ -109,7 +111,8 @@ class LabelStudio(ExporterBase):
                     file.write(separator + row["task"])
                     separator = ",\n"
                     keypoints.update(row["keypoints"])
-                    source = media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
+                    sensor, index = row["sensor"], row["sample"]
+                    source = info.media_path(shard_dir, sensor, Channel.RGB, index)
                     link_or_copy(source, path.parent / "images" / row["file_name"])
                 file.write("\n]\n")
         config = label_config(info.categories, self.shapes, sorted(keypoints))
@@ -123,7 +126,7 @@ class LabelStudio(ExporterBase):
             if thing.box is not None and not thing.ignored
             for region in object_regions(thing, info, camera, self.shapes)
         ]
-        name = image_name(sample.index, sensor)
+        name = image_name(sample.index, sensor, info.encoding(sensor, Channel.RGB).suffix)
         path = f"{self.type}/{sample.split}/images/{name}"
         data = {
             "image": self.url_prefix + quote(path),
@@ -187,7 +190,8 @@ def _shape_values(
         yield {"format": "rle", "rle": brush_rle(thing.mask, height, width)}
     else:
         for polygon in mask_polygons(thing.mask):
-            points = [[_percent(x, width), _percent(y, height)] for x, y in polygon.tolist()]
+            x_of, y_of = _percents(width), _percents(height)
+            points = [[x_of[x], y_of[y]] for x, y in polygon.tolist()]
             yield {"points": points, "closed": True}
 
 
@@ -210,6 +214,12 @@ def _region(
 
 def _percent(length_px: float, size_px: int) -> float:
     return round(100.0 * length_px / size_px, 9)
+
+
+@lru_cache(maxsize=16)
+def _percents(size_px: int) -> list[float]:
+    """Percentages of all borders of pixels along a side, from 0."""
+    return [_percent(k, size_px) for k in range(size_px + 1)]
 
 
 def brush_rle(mask: MaskPx, height_px: int, width_px: int) -> list[int]:

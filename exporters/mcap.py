@@ -9,7 +9,7 @@ topic                           message (Protobuf schema ``foxglove.*``)
 ==============================  =================================================================
 /tf                             FrameTransform: ``world`` -> rigs, cameras and scanners without
                                 a rig; rigs -> their cameras and scanners
-/camera/<name>/<channel>        CompressedImage: the shards' PNG files
+/camera/<name>/<channel>        CompressedImage: the shards' files
 /camera/<name>/calibration      CameraCalibration; none for equirectangular lenses
 /camera/<name>/annotations      ImageAnnotations: boxes of the visible pixels, with categories
 /lidar/<name>/points            PointCloud with all fields of ``POINT``
@@ -25,8 +25,9 @@ Y left, Z up).
 Calibrations follow ROS and OpenCV, where the centre of the first pixel is (0, 0): the principal
 point is ours minus 0.5. Annotations are in Foxglove's image coordinates, which are ours.
 
-Files are not compressed, because images are already; sums guard every chunk. Bytes depend on the
-release of the Foxglove schemas, which are part of each file.
+Chunks are not compressed unless ``compression: zstd`` says so, because images already are; sums
+guard every chunk. Bytes depend on the release of the Foxglove schemas, which are part of each file,
+and of zstandard.
 
 References: https://mcap.dev/spec; https://docs.foxglove.dev/docs/sdk/schemas.
 """
@@ -37,18 +38,18 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from gen_data.exporters.base import ExporterBase, check_installed
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.sequences import FRAMES, Frame, frame_facts, write_frames
 from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.capture import POINT, Channel
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.sample import ImageTruth, Sample
 from gen_data.generator.core.scene import Camera, Instance, Lidar
@@ -71,6 +72,8 @@ DISTORTION = {
     "kannala_brandt": "kannala_brandt",
 }
 """Foxglove's distortion models, whose coefficients are in OpenCV's order, by ours."""
+FORMATS = {"png": "png", "jpeg": "jpeg", "webp": "webp", "webp_lossless": "webp"}
+"""Foxglove's names of image formats, by ours."""
 BOX_COLOR = {"r": 0.2, "g": 0.9, "b": 0.4, "a": 0.35}
 LINE_COLOR = {"r": 0.2, "g": 0.9, "b": 0.4, "a": 1.0}
 LINE_PX = 2.0
@@ -78,9 +81,16 @@ TEXT_PX = 12.0
 
 
 class Mcap(ExporterBase):
-    """MCAP files of sequences: images, calibrations, scans, transforms and boxes."""
+    """MCAP files of sequences: images, calibrations, scans, transforms and boxes.
+
+    Attributes:
+        compression: Of the files' chunks: ``zstd`` for smaller files, mostly because of points.
+    """
 
     type: Literal["mcap"] = "mcap"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    compression: Literal["none", "zstd"] = "none"
 
     @property
     def needs(self) -> frozenset[str]:
@@ -119,7 +129,7 @@ class Mcap(ExporterBase):
             sequence = list(group)
             path = dataset_dir / sequence[0].row["split"] / f"{stem}-{number:06d}.mcap"
             path.parent.mkdir(parents=True, exist_ok=True)
-            _write_file(info, path, sequence)
+            _write_file(info, path, sequence, self.compression)
 
 
 def _frame_row(sample: Sample) -> dict[str, Any]:
@@ -262,14 +272,14 @@ def _events(frame: Frame) -> Iterator[_Event]:
     yield _Event(row["time_ns"], frame, "objects", None)
 
 
-def _write_file(info: DatasetInfo, path: Path, sequence: Sequence[Frame]) -> None:
+def _write_file(info: DatasetInfo, path: Path, sequence: Sequence[Frame], compression: str) -> None:
     """Write all messages of a sequence in order of time."""
     from mcap.writer import CompressionType, Writer
 
     # Sorting is stable: transforms stay before the messages that need them.
     events = sorted((e for f in sequence for e in _events(f)), key=lambda e: e.time_ns)
     with path.open("wb") as file:
-        writer = Writer(file, compression=CompressionType.NONE)
+        writer = Writer(file, compression=CompressionType[compression.upper()])
         writer.start(profile="", library="gen-data")
         facts = {"name": info.name, "seed": str(info.seed)}
         facts["categories"] = canonical_json(info.categories)
@@ -357,8 +367,10 @@ def _camera_messages(info: DatasetInfo, event: _Event) -> Iterator[tuple[str, Me
             ),
         )
     for channel in info.media[name]:
-        data = media_path(frame.shard_dir, name, channel, frame.index).read_bytes()
-        image = CompressedImage(**common, data=data, format="png")
+        path = info.media_path(frame.shard_dir, name, channel, frame.index)
+        image = CompressedImage(
+            **common, data=path.read_bytes(), format=FORMATS[info.encoding(name, channel).format]
+        )
         yield f"/camera/{name}/{channel.value}", image
     if Channel.RGB in info.media[name]:
         yield f"/camera/{name}/annotations", _annotations_message(row["boxes"], event.time_ns)

@@ -20,9 +20,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.sensor_selection import rgb_camera
 from gen_data.exporters.sequences import (
@@ -36,7 +36,7 @@ from gen_data.exporters.sequences import (
 )
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.generator.core.scene import Instance
 
@@ -66,6 +66,8 @@ class MotChallenge(ExporterBase):
     """MOTChallenge: images and tracks of every sequence of one camera."""
 
     type: Literal["motchallenge"] = "motchallenge"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     camera: str = ""
     """Sensor of the images; empty = the first one, by name, with the rgb channel."""
     boxes: Literal["visible", "whole"] = "visible"
@@ -134,15 +136,16 @@ class MotChallenge(ExporterBase):
         width_px, height_px = frames[0].row["size_px"]
         lines = [f"{k},{row}\n" for k, frame in enumerate(frames, 1) for row in frame.row["gt"]]
         write_text(folder / "gt/gt.txt", "".join(lines))
+        suffix = info.encoding(camera, Channel.RGB).suffix
         write_text(
             folder / "seqinfo.ini",
             f"[Sequence]\nname={folder.name}\nimDir=img1\n"
             f"frameRate={frame_rate_hz(info, frames):g}\nseqLength={len(frames)}\n"
-            f"imWidth={width_px}\nimHeight={height_px}\nimExt=.png\n",
+            f"imWidth={width_px}\nimHeight={height_px}\nimExt={suffix}\n",
         )
         for k, frame in enumerate(frames, 1):
-            source = media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
-            link_or_copy(source, folder / f"img1/{k:06d}.png")
+            source = info.media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
+            link_or_copy(source, folder / f"img1/{k:06d}{suffix}")
 
 
 def gt_columns(thing: ObjectTruth, boxes: Literal["visible", "whole"]) -> str:

@@ -24,7 +24,7 @@ def npz_bytes(arrays: Mapping[str, NDArray[Any]], level: int) -> bytes:
 
     Args:
         arrays: At most 65535 arrays of less than 4 GiB; no objects.
-        level: libdeflate's compression level, 1 (fastest) to 12.
+        level: libdeflate's compression level, 0 (none), 1 (fastest) to 12.
     """
     parts: list[bytes] = []
     directory: list[bytes] = []

@@ -36,11 +36,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.nuscenes_frames import Channel
@@ -66,6 +66,8 @@ class NuScenes(ExporterBase):
     """nuScenes with lidarseg and panoptic labels: all cameras, laser scanners and radars."""
 
     type: Literal["nuscenes"] = "nuscenes"
+
+    image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
     version: str = Field("v1.0-mini", pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]*$")
     """Folder of the tables."""
     lidar: str = ""
@@ -127,7 +129,7 @@ class NuScenes(ExporterBase):
                     self._add_world(tables, token, first, dataset_dir)
                 for table, row in recording.rows():
                     tables.add(table, row)
-                self._link_files(recording, dataset_dir)
+                self._link_files(info, recording, dataset_dir)
                 names["all"].append(recording.name)
                 names.setdefault(f"gen_{split}", []).append(recording.name)
         write_splits(dataset_dir / self.version, names)
@@ -186,11 +188,12 @@ class NuScenes(ExporterBase):
         for table, row in world_rows(token, frame, file):
             tables.add(table, row)
 
-    def _link_files(self, recording: Recording, dataset_dir: Path) -> None:
+    def _link_files(self, info: DatasetInfo, recording: Recording, dataset_dir: Path) -> None:
         for frame, channel, target in recording.files():
             reading = frame.row["readings"][channel]
             one = Channel(reading["sensor"], channel, reading["modality"])
-            link_or_copy(reading_path(frame.shard_dir, one, frame.index), dataset_dir / target)
+            source = reading_path(info, frame.shard_dir, one, frame.index)
+            link_or_copy(source, dataset_dir / target)
         for frame, table, target in recording.point_label_files():
             source = label_path(frame.shard_dir, table, frame.index)
             link_or_copy(source, dataset_dir / target)

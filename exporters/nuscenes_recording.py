@@ -11,8 +11,8 @@ from gen_data.exporters.nuscenes_tables import Row, Tokens
 from gen_data.exporters.sequences import Frame
 
 LIDAR_TOP = "LIDAR_TOP"
-SUFFIXES = {"camera": ".png", "lidar": ".pcd.bin", "radar": ".pcd"}
-FILE_FORMATS = {"camera": "png", "lidar": "pcd", "radar": "pcd"}
+FILE_FORMATS = {".png": "png", ".jpg": "jpg", ".pcd.bin": "pcd", ".pcd": "pcd"}
+"""Values of ``fileformat`` by ending of the file."""
 START_US = 1_577_836_800_000_000
 """Before the first sequence: the beginning of ``nuscenes_tables.DAY``, UTC."""
 PAUSE_US = 10_000_000
@@ -133,7 +133,7 @@ class Recording:
                     "ego_pose_token": ego_pose["token"],
                     "calibrated_sensor_token": calibrated["token"],
                     "timestamp": time_us,
-                    "fileformat": FILE_FORMATS[reading["modality"]],
+                    "fileformat": FILE_FORMATS[reading["suffix"]],
                     "is_key_frame": is_key,
                     "width": reading["size_px"][0],
                     "height": reading["size_px"][1],
@@ -204,7 +204,7 @@ def reading_file(frame: Frame, channel: str, reading: Row, *, is_key: bool) -> s
     """Path of a reading in the data set; images have the same stem as in COCO."""
     folder = "samples" if is_key else "sweeps"
     stem = f"{frame.index:09d}_{reading['sensor']}"
-    return f"{folder}/{channel}/{stem}{SUFFIXES[reading['modality']]}"
+    return f"{folder}/{channel}/{stem}{reading['suffix']}"
 
 
 def key_frames(frames: Sequence[Frame], period_s: float) -> list[int]:

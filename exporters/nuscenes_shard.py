@@ -32,13 +32,13 @@ from gen_data.exporters.nuscenes_frames import (
     reading_time_s,
     views_by_instance,
 )
-from gen_data.exporters.nuscenes_recording import LIDAR_TOP, SUFFIXES
+from gen_data.exporters.nuscenes_recording import LIDAR_TOP
 from gen_data.exporters.point_cloud_io import read_points, scanner_at_sweep
 from gen_data.exporters.sensor_selection import has_scans, instant_s
 from gen_data.exporters.sequences import Mount, frame_facts, relative_pose, write_bytes
 from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.capture import Channel as ImageChannel
-from gen_data.generator.core.interfaces import DatasetInfo, media_path, table_path
+from gen_data.generator.core.interfaces import DatasetInfo, table_path
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.se3 import SE3
 
@@ -46,12 +46,19 @@ FOLDER = "nuscenes"
 _LABEL_SUFFIXES = {"lidarseg": ".bin", "panoptic": ".npz"}
 
 
-def reading_path(shard_dir: Path, channel: Channel, index: int) -> Path:
+def reading_path(info: DatasetInfo, shard_dir: Path, channel: Channel, index: int) -> Path:
     """File of a reading in a shard; images are those that all formats share."""
     if channel.modality == "camera":
-        return media_path(shard_dir, channel.sensor, ImageChannel.RGB, index)
-    suffix = SUFFIXES[channel.modality]
+        return info.media_path(shard_dir, channel.sensor, ImageChannel.RGB, index)
+    suffix = reading_suffix(info, channel)
     return shard_dir / FOLDER / channel.name / f"{index:09d}{suffix}"
+
+
+def reading_suffix(info: DatasetInfo, channel: Channel) -> str:
+    """Ending of the files of a channel."""
+    if channel.modality == "camera":
+        return info.encoding(channel.sensor, ImageChannel.RGB).suffix
+    return {"lidar": ".pcd.bin", "radar": ".pcd"}[channel.modality]
 
 
 def label_path(shard_dir: Path, table: str, index: int) -> Path:
@@ -92,7 +99,7 @@ class ShardWriter:
                 offset_s = self.info.sensor(channel.sensor).time_offset_s
                 time_s = reading_time_s(sample, channel, offset_s)
                 row = reading_row(sample, channel, ego, time_s, T_global_world)
-                readings[channel.name] = row
+                readings[channel.name] = row | {"suffix": reading_suffix(self.info, channel)}
                 if channel.modality == "radar":
                     self._write_radar(sample, channel, detections)
                 elif channel.modality == "lidar":
@@ -128,7 +135,9 @@ class ShardWriter:
         """Write a radar's detections, and add them to the number of each instance."""
         path = table_path(self.shard_dir, channel.sensor, sample.index)
         rows = read_rows(path, self.info.sensor(channel.sensor))
-        write_bytes(reading_path(self.shard_dir, channel, sample.index), radar_bytes(rows))
+        write_bytes(
+            reading_path(self.info, self.shard_dir, channel, sample.index), radar_bytes(rows)
+        )
         for instance_id in rows["instance_id"].tolist():
             detections[instance_id] = detections.get(instance_id, 0) + 1
 
@@ -136,7 +145,7 @@ class ShardWriter:
         points = read_points(self.shard_dir, channel.sensor, sample.index)
         mount = channel_mount(sample.scene, channel)
         turns = quarter_turns(relative_pose(sample.scene, Mount(ego, SE3()), mount))
-        path = reading_path(self.shard_dir, channel, sample.index)
+        path = reading_path(self.info, self.shard_dir, channel, sample.index)
         write_bytes(path, lidar_bytes(points, turns))
 
     def _write_labels(

@@ -29,21 +29,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
 from gen_data.exporters.fragments import fragment_rows, write_fragment
+from gen_data.exporters.image_files import read_pixels
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.point_cloud_io import read_points
 from gen_data.exporters.rrd_container import write_recording
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import StorageError
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import ObjectTruth, Sample
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.skeletons import Skeleton, find_skeleton
@@ -61,6 +60,8 @@ class Rerun(ExporterBase):
     """
 
     type: Literal["rerun"] = "rerun"
+
+    image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
     samples_per_file: int = Field(100, ge=1, le=10_000)
 
     @property
@@ -276,8 +277,8 @@ def _channel_columns(
     from rerun.components import ImageFormat
     from rerun.encodings import ChannelDatatype
 
-    paths = [media_path(row["shard"], name, channel, row["index"]) for row in rows]
-    types = ["image/png"] * len(paths)
+    paths = [info.media_path(row["shard"], name, channel, row["index"]) for row in rows]
+    types = [f"image/{info.encoding(name, channel).format}"] * len(paths)
     if channel is Channel.RGB:
         return rr.EncodedImage.columns(blob=_blobs(paths), media_type=types)
     if channel in DEPTHS:
@@ -296,10 +297,7 @@ def _channel_columns(
 
 def _read_ids(path: Path) -> NDArray[np.uint16]:
     """Category ids, uint16 [h, w]."""
-    image = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise StorageError(f"{path}: missing or no PNG file; generate the data set again")
-    return np.asarray(image, np.uint16)
+    return np.asarray(read_pixels(path), np.uint16)
 
 
 def _blobs(paths: Iterable[Path]) -> list[np.ndarray]:

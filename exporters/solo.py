@@ -29,11 +29,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.id_colors import id_color, id_colors
 from gen_data.exporters.image_files import link_or_copy
@@ -42,7 +42,7 @@ from gen_data.exporters.sensor_selection import check_pinholes, instant_s, rgb_c
 from gen_data.exporters.sequences import frame_facts, write_bytes, write_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.motion import STILL, Twist
 from gen_data.generator.core.sample import ObjectTruth, Sample
@@ -55,6 +55,8 @@ FORMAT_VERSION = "1.0.0-preview.1"
 """Version of Unity's Perception package whose schema the files follow."""
 
 PREFIX = "type.unity.com/unity.solo."
+IMAGE_FORMATS = {"png": "Png", "jpeg": "Jpg"}
+"""Unity's names of image formats, by ours."""
 BOX2D, BOX3D = "bounding box", "bounding box 3D"
 INSTANCES, LABELS = "instance segmentation", "semantic segmentation"
 TYPES = {
@@ -84,6 +86,8 @@ class Solo(ExporterBase):
     """Unity SOLO: images of all cameras with boxes and segmentation, one data set per split."""
 
     type: Literal["solo"] = "solo"
+
+    image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
 
     @property
     def needs(self) -> frozenset[str]:
@@ -123,7 +127,7 @@ class Solo(ExporterBase):
             for name in cameras:
                 _write_segmentation(folder, sample, name)
             if cameras:
-                captures = [_capture(sample, name) for name in cameras]
+                captures = [_capture(info, sample, name) for name in cameras]
                 time_s = round(instant_s(sample, cameras[0]), 9)
                 rows.append({**frame_facts(info, sample), "time_s": time_s, "captures": captures})
         write_fragment(folder, FRAMES, rows)
@@ -136,7 +140,7 @@ class Solo(ExporterBase):
             counter.advance(row["sequence"])
             folder = dataset_dir / row["split"] / f"sequence.{counter.sequence}"
             stem = f"step{counter.step}"
-            captures = [_numbered(capture, stem) for capture in row["captures"]]
+            captures = [_numbered(info, capture, stem) for capture in row["captures"]]
             frame = {
                 "frame": counter.frames,
                 "sequence": counter.sequence,
@@ -147,7 +151,7 @@ class Solo(ExporterBase):
             }
             write_text(folder / f"{stem}.frame_data.json", canonical_json(frame) + "\n")
             for capture in captures:
-                _link_images(shard_dir / self.type, capture["id"], row["index"], folder, stem)
+                _link_images(info, shard_dir, capture, row["index"], folder)
         for split, counter in counts.items():
             _write_definitions(info, dataset_dir / split, counter)
 
@@ -175,7 +179,7 @@ class _Counter:
             self.sequence += 1
 
 
-def _capture(sample: Sample, name: str) -> dict[str, Any]:
+def _capture(info: DatasetInfo, sample: Sample, name: str) -> dict[str, Any]:
     """Facts of one image, without file names."""
     truth = sample.truth[name]
     camera = truth.camera
@@ -192,7 +196,7 @@ def _capture(sample: Sample, name: str) -> dict[str, Any]:
         "rotation": _quaternion_xyzw(rotation),
         "velocity": _numbers(UNITY_WORLD @ twist.velocity_m_s),
         "acceleration": _numbers(UNITY_WORLD @ twist.acceleration_m_s2),
-        "imageFormat": "Png",
+        "imageFormat": IMAGE_FORMATS[info.encoding(name, Channel.RGB).format],
         "dimension": size,
         "projection": "Perspective",
         "matrix": _projection(camera.intrinsics),
@@ -327,21 +331,27 @@ def _shard_name(index: int, sensor: str, kind: str) -> str:
     return f"{index:09d}.{sensor}.{kind}.png"
 
 
-def _numbered(capture: Mapping[str, Any], stem: str) -> dict[str, Any]:
+def _numbered(info: DatasetInfo, capture: Mapping[str, Any], stem: str) -> dict[str, Any]:
     """The capture with the names of its files."""
     annotations = [
         {**a, "filename": f"{stem}.{capture['id']}.{a['id']}.png"} if "instances" in a else a
         for a in capture["annotations"]
     ]
-    return {**capture, "filename": f"{stem}.{capture['id']}.png", "annotations": annotations}
+    suffix = info.encoding(capture["id"], Channel.RGB).suffix
+    name = f"{stem}.{capture['id']}{suffix}"
+    return {**capture, "filename": name, "annotations": annotations}
 
 
-def _link_images(shard: Path, sensor: str, index: int, folder: Path, stem: str) -> None:
-    rgb = media_path(shard.parent, sensor, Channel.RGB, index)
-    link_or_copy(rgb, folder / f"{stem}.{sensor}.png")
-    for kind in (INSTANCES, LABELS):
-        source = shard / _shard_name(index, sensor, kind)
-        link_or_copy(source, folder / f"{stem}.{sensor}.{kind}.png")
+def _link_images(
+    info: DatasetInfo, shard_dir: Path, capture: Mapping[str, Any], index: int, folder: Path
+) -> None:
+    sensor = capture["id"]
+    rgb = info.media_path(shard_dir, sensor, Channel.RGB, index)
+    link_or_copy(rgb, folder / capture["filename"])
+    for annotation in capture["annotations"]:
+        if "filename" in annotation:
+            source = shard_dir / "solo" / _shard_name(index, sensor, annotation["id"])
+            link_or_copy(source, folder / annotation["filename"])
 
 
 def _write_definitions(info: DatasetInfo, folder: Path, counter: _Counter) -> None:

@@ -5,8 +5,9 @@
     train-00000-of-00002.tfrecord     one record per image of every camera
     label_map.pbtxt                   ids and names of the categories, from 1
 
-Keys of the API: ``image/encoded`` (PNG), ``image/format``, ``image/height``, ``image/width``,
-``image/filename``, ``image/source_id`` (COCO's image id), ``image/key/sha256``, and by object
+Keys of the API: ``image/encoded`` (PNG or JPEG), ``image/format``, ``image/height``,
+``image/width``, ``image/filename``, ``image/source_id`` (COCO's image id), ``image/key/sha256``,
+and by object
 ``image/object/bbox/{xmin,xmax,ymin,ymax}`` (fractions of width and height),
 ``image/object/class/{text,label}``, ``image/object/area`` (visible pixels),
 ``image/object/is_crowd``, ``image/object/{difficult,truncated}``. With ``masks: png``,
@@ -33,19 +34,19 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
-from gen_data.exporters.base import ExporterBase, check_installed
+from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase, check_installed
 from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sensor_selection import rgb_cameras
 from gen_data.exporters.sequences import write_bytes, write_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import DatasetInfo, media_path
+from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 
 IMAGES = "images"
@@ -86,6 +87,8 @@ class TfRecord(ExporterBase):
     """
 
     type: Literal["tfrecord"] = "tfrecord"
+
+    image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
     rows_per_file: int = Field(1000, ge=1)
     masks: Literal["png", "none"] = "none"
 
@@ -116,7 +119,7 @@ class TfRecord(ExporterBase):
             for sensor in rgb_cameras(info):
                 if sensor not in sample.truth:
                     continue
-                labels = encode_features(self._labels(sample, sensor))
+                labels = encode_features(self._labels(info, sample, sensor))
                 where = {"split": sample.split, "sample": sample.index, "sensor": sensor}
                 rows.append(where | {"offset": offset, "size": len(labels)})
                 parts.append(labels)
@@ -142,11 +145,11 @@ class TfRecord(ExporterBase):
             written[split] += 1
         write_text(dataset_dir / "label_map.pbtxt", label_map(info.categories))
 
-    def _labels(self, sample: Sample, sensor: str) -> dict[str, Feature]:
+    def _labels(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Feature]:
         """Labels of one image by key, without its pixels."""
         truth = sample.truth[sensor]
         things = [thing for thing in truth.objects if thing.box is not None]
-        labels = _image_labels(sample, sensor) | _object_labels(truth, things)
+        labels = _image_labels(info, sample, sensor) | _object_labels(truth, things)
         if self.masks == "png":
             labels["image/object/mask"] = [_mask_png(truth, thing) for thing in things]
         return labels
@@ -157,12 +160,12 @@ class TfRecord(ExporterBase):
             return file.read(row["size"])
 
 
-def _image_labels(sample: Sample, sensor: str) -> dict[str, Feature]:
-    camera = sample.truth[sensor].camera
+def _image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Feature]:
+    camera, encoding = sample.truth[sensor].camera, info.encoding(sensor, Channel.RGB)
     return {
-        "image/filename": [f"{sample.index:09d}_{sensor}.png".encode()],
+        "image/filename": [f"{sample.index:09d}_{sensor}{encoding.suffix}".encode()],
         "image/source_id": [str(sample.image_id(sensor)).encode()],
-        "image/format": [b"png"],
+        "image/format": [encoding.format.encode()],
         "image/height": [camera.intrinsics.height_px],
         "image/width": [camera.intrinsics.width_px],
         "image/sensor": [sensor.encode()],
@@ -208,10 +211,10 @@ def _mask_png(truth: ImageTruth, thing: ObjectTruth) -> bytes:
 
 
 def _images(info: DatasetInfo, shard_dir: Path, sensor: str, index: int) -> dict[str, Feature]:
-    """PNG files of a camera by key."""
+    """Image files of a camera by key."""
     images: dict[str, Feature] = {}
     for channel in info.media[sensor]:
-        data = media_path(shard_dir, sensor, channel, index).read_bytes()
+        data = info.media_path(shard_dir, sensor, channel, index).read_bytes()
         if channel is Channel.RGB:
             images["image/encoded"] = [data]
             images["image/key/sha256"] = [sha256(data).hexdigest().encode()]

@@ -98,6 +98,23 @@ def test_containers_hold_the_street(dataset: Path, world: Any) -> None:
         assert list(problems(path, sample)) == []
 
 
+@pytest.mark.parametrize("container", CONTAINERS)
+def test_files_without_compression_hold_the_same(
+    container: str, world: Any, tmp_path: Path
+) -> None:
+    """They are larger."""
+    sizes = {}
+    for compression in ("gzip", "none"):
+        exporter = Hdf5(container=container, compression=compression)
+        folder = world.export(exporter, world.info(1), world.samples[:1], tmp_path / compression)
+        (path,) = folder.rglob("0*")
+        sizes[compression] = path.stat().st_size
+        data = load(path)
+        rgb = world.samples[0].capture.readings["color"].channels[Channel.RGB]
+        np.testing.assert_array_equal(data["colors"], rgb)
+    assert sizes["none"] > 3 * sizes["gzip"]
+
+
 def rewrite(path: Path, arrays: dict[str, Any]) -> None:
     path.unlink()
     if path.suffix == ".npz":

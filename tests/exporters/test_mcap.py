@@ -167,6 +167,18 @@ def test_messages_agree_with_the_samples(dataset: Path, samples: Any) -> None:
     assert len([p for p in dataset.rglob("*") if p.is_file()]) == 2
 
 
+def test_compressed_files_hold_the_same(dataset: Path, exported: Any) -> None:
+    """Chunks of zstd; every message is equal."""
+    path = Path("train/street-000000.mcap")
+    plain, compressed = dataset / path, exported(Mcap(compression="zstd")) / path
+    assert compressed.stat().st_size < plain.stat().st_size
+    with compressed.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    assert {chunk.compression for chunk in summary.chunk_indexes} == {"zstd"}
+    assert str(messages(compressed)) == str(messages(plain))
+
+
 def test_schemas_are_foxgloves(dataset: Path) -> None:
     """And the summary counts all messages."""
     path = dataset / "train/street-000000.mcap"

@@ -6,6 +6,7 @@ import io
 import shutil
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from tfrecord.reader import tfrecord_iterator
 
 from gen_data.exporters import base, tfrecord
 from gen_data.exporters.tfrecord import TfRecord, encode_features, frame_record, label_map
+from gen_data.generator.core.capture import Channel, ImageEncoding
 from gen_data.generator.core.errors import ConfigError
 
 
@@ -193,3 +195,19 @@ def test_a_data_set_without_photographs_is_refused(world: Any) -> None:
     """Every record has an image."""
     with pytest.raises(ConfigError, match="no sensor writes the rgb channel"):
         TfRecord().check(world.info(7, media={"color": ()}))
+
+
+def test_jpeg_files_are_embedded(world: Any, tmp_path: Path) -> None:
+    """Under their names, with the format by which the API decodes them."""
+    info = world.info(1)
+    jpeg = ImageEncoding("jpeg", 92)
+    info = replace(info, sensors=tuple(replace(s, rgb_encoding=jpeg) for s in info.sensors))
+    folder = world.export(TfRecord(), info, world.samples[:1], tmp_path)
+    (record,) = tfrecord_iterator(str(folder / "train-00000-of-00001.tfrecord"))
+    values = {key: found for key, (_, found) in features(bytes(record)).items()}
+    assert values["image/format"] == [b"jpeg"]
+    assert values["image/filename"] == [b"000000000_color.jpg"]
+    image = Image.open(io.BytesIO(values["image/encoded"][0]))
+    assert image.format == "JPEG"
+    rendered = world.samples[0].capture.readings["color"].channels[Channel.RGB]
+    assert np.abs(np.asarray(image, int) - rendered).mean() < 4
