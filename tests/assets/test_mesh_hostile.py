@@ -249,6 +249,7 @@ def refused(tmp_path: Path, file: str, ask: Callable[[Any], object]) -> str:
     return message
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize("name", MESHES)
 def test_hostile_meshes_are_refused(tmp_path: Path, name: str) -> None:
     """An AssetError within seconds, and nothing is cached."""
@@ -263,6 +264,7 @@ def test_hostile_meshes_are_refused(tmp_path: Path, name: str) -> None:
     refused(tmp_path, file, lambda library: library.mesh("user/a"))
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize("name", URDFS)
 def test_hostile_urdfs_are_refused(tmp_path: Path, name: str) -> None:
     """Entities are never expanded, references never leave the folder, trees are trees."""
@@ -300,6 +302,7 @@ IMAGES: dict[str, tuple[bytes, str]] = {
 }
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize("name", IMAGES)
 def test_hostile_images_are_refused(tmp_path: Path, name: str) -> None:
     """Sizes are read from the header, before any pixel is decoded."""
@@ -341,6 +344,7 @@ def test_a_missing_texture_is_told(tmp_path: Path) -> None:
         library.texture(library.materials("user/a")[0].texture)
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize("reference", ["../secret.mtl", "/etc/passwd", "C:\\x.png", "http://a/b"])
 def test_a_texture_outside_the_folder_is_refused(tmp_path: Path, reference: str) -> None:
     """The mesh is refused, not only its picture."""
@@ -351,6 +355,7 @@ def test_a_texture_outside_the_folder_is_refused(tmp_path: Path, reference: str)
     refused(tmp_path, "a.mtl", lambda library: library.mesh("user/a"))
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize("kind", ["fifo", "directory", "link outside", "link loop", "device link"])
 def test_only_regular_files_inside_the_folder_are_read(tmp_path: Path, kind: str) -> None:
     """Reading a FIFO blocks for ever, a device never ends."""
@@ -372,6 +377,7 @@ def test_only_regular_files_inside_the_folder_are_read(tmp_path: Path, kind: str
         Folder(folder).read("a.obj")
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize("name", ["a\0b", "x" * 5000, "../" * 30 + "etc/passwd", "/etc/passwd"])
 def test_strange_names_are_refused(tmp_path: Path, name: str) -> None:
     """No index entry leads outside the folder."""

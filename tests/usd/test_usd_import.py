@@ -259,6 +259,7 @@ def broken(folder: Path, kind: str) -> None:
             archive.writestr("bad.usda", "#usda 1.0\n" * 100)
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize(
     "fault",
     [
@@ -323,6 +324,7 @@ def test_what_a_stage_refers_to_belongs_to_its_content(tmp_path: Path) -> None:
     assert opened_library(tmp_path, tmp_path / "props").get("user/one").sha256 != before
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize(
     ("attribute", "value", "said"),
     [
