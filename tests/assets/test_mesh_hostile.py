@@ -124,6 +124,11 @@ MESHES: dict[str, tuple[str, bytes | str]] = {
     "truncated ply": (
         "a.ply", ply(f"element vertex 30\n{VERTICES}element face 9\n{FACES}", b"x" * 60)),
     "no header end ply": ("a.ply", b"ply\n" + b"comment x\n" * 20_000),
+    "no element ply": ("a.ply", b"ply\nformat ascii 1.0\nproperty float x\nend_header\n0\n"),
+    "unknown type ply": (
+        "a.ply", ply(f"element vertex 3\nproperty quux x\nelement face 1\n{FACES}", b"x" * 99)),
+    "short property ply": (
+        "a.ply", ply(f"element vertex 3\nproperty float\nelement face 1\n{FACES}", b"x" * 99)),
     "empty glb": ("a.glb", b""),
     "magic only glb": ("a.glb", b"glTF"),
     "truncated glb": ("a.glb", struct.pack("<4sIIII", b"glTF", 2, 4000, 3000, 0x4E4F534A) + b"{}"),
@@ -262,6 +267,25 @@ def test_hostile_meshes_are_refused(tmp_path: Path, name: str) -> None:
         f"assets: [{{id: a, file: {file}, category: x}}]\n"
     )
     refused(tmp_path, file, lambda library: library.mesh("user/a"))
+
+
+@pytest.mark.parametrize(
+    ("name", "cause"),
+    [
+        ("truncated ply", "unexpected length"),
+        ("no element ply", "before any element"),
+        ("unknown type ply", "unknown type or property 'quux'"),
+        ("short property ply", "an incomplete line in its header"),
+    ],
+)
+def test_a_malformed_ply_is_explained(tmp_path: Path, name: str, cause: str) -> None:
+    """Different faults have different messages."""
+    file, content = MESHES[name]
+    assert isinstance(content, bytes)
+    (tmp_path / file).write_bytes(content)
+
+    with pytest.raises(AssetError, match=rf"a\.ply: malformed PLY \(.*{cause}"):
+        read_mesh(Folder(tmp_path), file)
 
 
 @pytest.mark.hostile
