@@ -6,6 +6,7 @@ Reference: https://docs.mlcommons.org/croissant/docs/croissant-spec.html.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib.resources import files
 from typing import Any
 
@@ -124,7 +125,8 @@ def extract(
     return {**source, "transform": [dict(t) for t in transforms]} if transforms else source
 
 
-def _read_context() -> dict[str, Any]:
+@cache
+def _read_context() -> Mapping[str, Any]:
     """Read the terms of Croissant, the JSON-LD context."""
     text = (files("gen_data.exporters") / "croissant_context.yaml").read_text("utf-8")
     context: dict[str, Any] = yaml.safe_load(text)

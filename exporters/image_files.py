@@ -280,6 +280,7 @@ def link_or_copy(source: Path, target: Path) -> None:
     except (FileExistsError, FileNotFoundError):
         raise
     except OSError:  # another file system, one without links, or too many links to the file
+        target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, target)
 
 

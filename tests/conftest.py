@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import atexit
 import os
+import resource
 import shutil
 import tempfile
+import time
 from collections.abc import Generator
 from typing import Any
 
@@ -37,6 +39,25 @@ def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.Tes
 def pytest_make_collect_report() -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
     """Turn skips of whole modules into failures."""
     return _skips_fail((yield))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
+    """Limit what a hostile file may take: 10 s of processor time, and 1 GB in this process.
+
+    The process that parses files has limits of its own (``generator/assets/sandbox.py``).
+    """
+    if item.get_closest_marker("hostile") is None:
+        yield
+        return
+    before_s, before_kb = time.process_time(), _peak_kb()
+    yield
+    assert time.process_time() - before_s < 10.0, "the file takes too long"
+    assert _peak_kb() - before_kb < 1_000_000, "the file takes too much memory"
+
+
+def _peak_kb() -> int:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def _skips_fail(report: pytest.TestReport | pytest.CollectReport) -> Any:

@@ -27,6 +27,7 @@ def export(
     *,
     label_map: str | PathLike[str] | None = None,
     workers: int | None = None,
+    force: bool = False,
     on_progress: Callable[[RunProgress], None] | None = None,
     resume_command: str = "the same call of gen_data.export",
 ) -> Summary:
@@ -41,6 +42,7 @@ def export(
         out: Folder of the result.
         label_map: YAML file with a label map, which replaces that of the data set.
         workers: Processes; None = one per core, 0 = this process.
+        force: Start although the disk is probably too small.
         on_progress: Called after each sample and shard.
         resume_command: Command that error messages give for resuming.
 
@@ -79,6 +81,7 @@ def export(
         workers=count_workers(workers),
         resume_command=resume_command,
         progress=on_progress,
+        force=force,
     )
 
 

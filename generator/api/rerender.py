@@ -24,6 +24,7 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
     overrides: Sequence[str] = (),
     redraw: Sequence[str] = (),
     workers: int | None = None,
+    force: bool = False,
     on_progress: Callable[[RunProgress], None] | None = None,
     resume_command: str = "the same call of gen_data.rerender",
 ) -> Summary:
@@ -41,6 +42,7 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
             a randomizer: ``weather.preset=WetNight``.
         redraw: Names of further randomizers to draw again, because they depend on a changed one.
         workers: Processes; None = one per core, 0 = this process.
+        force: Start although the disk is probably too small.
         on_progress: Called after each sample and shard.
         resume_command: Command that error messages give for resuming.
 
@@ -75,6 +77,7 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
             workers=count_workers(workers),
             resume_command=resume_command,
             progress=on_progress,
+            force=force,
         )
 
 

@@ -175,7 +175,7 @@ def _drop_items(
     kept = {**section.entries, **{node_name(item): item for item in section.items}}
     for name in names:
         if str(name.content) not in kept:
-            fact = f"nothing inherited is named {quote_value(name.content)}; expected one of "
+            fact = f"nothing inherited is named {quote_value(name.plain())}; expected one of "
             fact += ", ".join(kept) + did_you_mean(str(name.content), kept)
             problems.add(name.position, field, fact)
         kept.pop(str(name.content), None)

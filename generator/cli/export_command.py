@@ -36,12 +36,14 @@ gen-data export out/tabletop --format yolo --format voc --out out/tabletop-yolo
 )
 @click.option("--label-map", type=click.Path(path_type=Path), help="YAML file with a label map.")
 @click.option("--workers", "-w", type=int, help="Worker processes [default: one per core].")
+@click.option("--force", is_flag=True, help="Start although the disk is probably too small.")
 def export(
     folder: Path,
     formats: tuple[str, ...],
     out: Path,
     label_map: Path | None,
     workers: int | None,
+    force: bool,
 ) -> None:
     """Export a finished data set."""
     from rich.console import Console
@@ -58,6 +60,7 @@ def export(
             out,
             label_map=label_map,
             workers=workers,
+            force=force,
             on_progress=show,
             resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
         )

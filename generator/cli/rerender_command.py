@@ -41,6 +41,7 @@ gen-data rerender out/tabletop --out out/tabletop-pt --tier pathtraced
     "--redraw", multiple=True, metavar="NAME", help="Draw a further randomizer again. Repeatable."
 )
 @click.option("--workers", "-w", type=int, help="Worker processes [default: one per core].")
+@click.option("--force", is_flag=True, help="Start although the disk is probably too small.")
 def rerender(
     folder: Path,
     out: Path,
@@ -49,6 +50,7 @@ def rerender(
     overrides: tuple[str, ...],
     redraw: tuple[str, ...],
     workers: int | None,
+    force: bool,
 ) -> None:
     """Render a finished data set again."""
     from rich.console import Console
@@ -66,6 +68,7 @@ def rerender(
             overrides=(*overrides, *([f"render.tier={tier}"] if tier else [])),
             redraw=redraw,
             workers=workers,
+            force=force,
             on_progress=show,
             resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
         )

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from gen_data.generator.config.problems import Position, Problem
+from gen_data.generator.config.yaml_scalars import abbreviate
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 
 PLAN = "plan.json"
@@ -39,16 +41,25 @@ def find_path(
     Raises:
         ConfigError: there is none; the message gives the path.
     """
-    path = _base_folder(position) / Path(name).expanduser()
-    if path.is_dir() if is_folder else path.is_file() and not _is_document(path, position):
-        return path
+    try:
+        path = _base_folder(position) / Path(name).expanduser()
+        if path.is_dir() if is_folder else path.is_file() and not _is_document(path, position):
+            return path
+    except (OSError, RuntimeError) as error:
+        # A name that is too long, a folder that may not be read, or the home of an unknown user.
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        _refuse(position, field, f"'{abbreviate(name)}' is no {kind} ({reason})")
     by_name = {file.name: file for file in shipped}
     for known in (name, f"{name}.yaml"):
         if known in by_name and not _is_document(by_name[known], position):
             return by_name[known]
-    fact = f"there is no {kind} '{name}'; looked for '{path}'"
+    fact = f"there is no {kind} '{abbreviate(name)}'; looked for '{abbreviate(str(path), 300)}'"
     if by_name:
         fact += f"; shipped are {', '.join(by_name)}{did_you_mean(name, by_name)}"
+    _refuse(position, field, fact)
+
+
+def _refuse(position: Position | None, field: str, fact: str) -> NoReturn:
     raise ConfigError(str(Problem(position, field, fact)) if position else fact)
 
 

@@ -126,7 +126,28 @@ class LinkedFiles:
         return self.stored.shard_dir(index // self.stored.plan.shard_size)
 
 
-def export(
+def _linked_sample_bytes(stored: StoredSamples) -> float:
+    """Mean size of the files of a sample that exports link, in the first shard."""
+    record = LocalStore(stored.folder).record(0)
+    if record is None:
+        return 0.0
+    sensors = {sensor.name for sensor in stored.info.sensors}
+    sizes = [
+        file.bytes
+        for file in record.files
+        if file.path in (SCENES_NAME, LABELS_NAME) or file.path.partition("/")[0] in sensors
+    ]
+    return sum(sizes) / (record.end - record.first)
+
+
+def _is_same_disk(one: Path, other: Path) -> bool:
+    """Whether hard links from one folder to another, which may not exist yet, are possible."""
+    while not other.exists():
+        other = other.parent
+    return one.stat().st_dev == other.stat().st_dev
+
+
+def export(  # noqa: PLR0913  (keywords of one front door)
     stored: StoredSamples,
     config: Config,
     exporters: Mapping[str, Exporter],
@@ -135,6 +156,7 @@ def export(
     workers: int,
     resume_command: str,
     progress: Callable[[RunProgress], None] | None = None,
+    force: bool = False,
 ) -> Summary:
     """Write a finished data set in other formats, as a data set of its own.
 
@@ -147,6 +169,7 @@ def export(
         workers: See ``run``.
         resume_command: See ``run``.
         progress: See ``run``.
+        force: Start although the disk is probably too small.
 
     Raises:
         GenDataError: see ``run``.
@@ -154,6 +177,8 @@ def export(
     licences = stored.folder / LICENCES_NAME
     text = licences.read_text("utf-8") if licences.exists() else None
     files = LinkedFiles(stored)
+    linked_bytes = _linked_sample_bytes(stored)
+    linked = _is_same_disk(stored.folder, out.absolute())
     return run(
         replace(stored.plan, config=config.resolved, format_version=FORMAT_VERSION),
         StoredPipeline(stored, exporters, config.asset_folders),
@@ -166,5 +191,9 @@ def export(
             write_media=files.link_media,
             write_records=files.link_records,
             linked_digests=files.digests,
+            # The size of the new files follows from the first shard.
+            sample_bytes=0.0 if linked else linked_bytes,
+            linked_bytes=linked_bytes if linked else 0.0,
+            is_forced=force,
         ),
     )

@@ -23,11 +23,13 @@ class SpaceCheck:
     Attributes:
         estimate_bytes: Size of a sample, estimated from the configuration; 0 = unknown.
         is_forced: Whether only a full disk stops the run.
+        linked_bytes: Of a sample, the size of files that are hard links and take no space.
     """
 
     store: LocalStore
     estimate_bytes: float = 0.0
     is_forced: bool = False
+    linked_bytes: float = 0.0
 
     def before_start(self, samples: int) -> None:
         """Refuse a data set of this many samples that will not fit.
@@ -49,13 +51,14 @@ class SpaceCheck:
 
     def after_shard(self, sample_bytes: float, samples: int) -> StorageError | None:
         """Error if the other samples will not fit, with the measured size of a sample."""
-        need = 0.0 if self.is_forced else MARGIN * sample_bytes * samples
+        new_bytes = max(0.0, sample_bytes - self.linked_bytes) * samples
+        need = 0.0 if self.is_forced else MARGIN * new_bytes
         free = self._free_bytes()
         if free >= need + RESERVE_BYTES or samples == 0:
             return None
         return StorageError(
             f"{self.store.root}: the other {samples} samples need about "
-            f"{format_bytes(sample_bytes * samples)} and {format_bytes(free)} are free; stopped "
+            f"{format_bytes(new_bytes)} and {format_bytes(free)} are free; stopped "
             "before the disk is full.\n  After making room, resume with:\n"
             f"    {self.store.resume_command}"
         )

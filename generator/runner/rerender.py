@@ -13,6 +13,7 @@ from pathlib import Path
 
 from gen_data.generator.assemble.config import Config
 from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import DatasetInfo, Exporter, Randomizer, Sensor, Stage
 from gen_data.generator.core.sample import Sample
@@ -25,7 +26,7 @@ from gen_data.generator.pipeline.pipeline import DrawnView
 from gen_data.generator.runner.identity import format_licences, make_plan
 from gen_data.generator.runner.plan import Plan
 from gen_data.generator.runner.progress import RunProgress, Summary
-from gen_data.generator.runner.run import run
+from gen_data.generator.runner.run import Settings, run
 from gen_data.generator.runner.stored import StoredSamples
 
 
@@ -182,6 +183,7 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
     workers: int,
     resume_command: str,
     progress: Callable[[RunProgress], None] | None = None,
+    force: bool = False,
 ) -> Summary:
     """Render the scenes of a finished data set again, as a data set of its own.
 
@@ -194,6 +196,7 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
         workers: See ``run``.
         resume_command: See ``run``.
         progress: See ``run``.
+        force: Start although the disk is probably too small.
 
     Raises:
         ConfigError: the change is none of sensors, rendering, annotations, exporters, labels or
@@ -209,6 +212,9 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
         resume_command=resume_command,
         progress=progress,
         licences=lambda used: format_licences(maker.factory, used),
+        settings=Settings(
+            sample_bytes=estimate_sample_bytes(now, maker.factory.info), is_forced=force
+        ),
     )
 
 

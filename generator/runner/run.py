@@ -53,6 +53,7 @@ class Settings:
         sample_bytes: Estimated size of a sample; 0 = unknown. A data set that will not fit on the
             disk is refused.
         is_forced: Generate it until the disk is full.
+        linked_bytes: Size of the files of a sample that are hard links and take no space.
         shards: Range of shards to generate; the data set stays unfinished while others are
             missing. None = all.
         limits: Limits on silence, deaths and memory of workers.
@@ -63,6 +64,7 @@ class Settings:
     allow_mixed_numerics: bool = False
     sample_bytes: float = 0.0
     is_forced: bool = False
+    linked_bytes: float = 0.0
     shards: range | None = None
     limits: Limits = field(default_factory=Limits)
     write_media: MediaWriter = write_images
@@ -183,7 +185,10 @@ class _Run:
 
     @property
     def _space(self) -> SpaceCheck:
-        return SpaceCheck(self.job.store, self.settings.sample_bytes, self.settings.is_forced)
+        chosen = self.settings
+        return SpaceCheck(
+            self.job.store, chosen.sample_bytes, chosen.is_forced, chosen.linked_bytes
+        )
 
     def _count(self, shards: Sequence[int]) -> int:
         """Number of samples of the shards that this run may generate."""

@@ -6,6 +6,7 @@ subdivision scheme; invisible prims, guides and proxies are skipped.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -69,9 +70,10 @@ class OpenStage:
         try:
             with _collect_warnings():
                 self._stage = Usd.Stage.Open(str(path))
-        except Tf.ErrorException:
+        except Tf.ErrorException as error:
             raise AssetError(
-                f"{place}: unreadable USD, or it refers to a layer that is; export it again"
+                f"{place}: unreadable USD, or it refers to a layer that is"
+                f"{_reason(error)}; export it again"
             ) from None
         metres = float(UsdGeom.GetStageMetersPerUnit(self._stage))
         y_up = UsdGeom.GetStageUpAxis(self._stage) == UsdGeom.Tokens.y
@@ -180,6 +182,16 @@ def _collect_warnings() -> Iterator[None]:
         yield
     finally:
         delegate.TakeUncoalescedDiagnostics()
+
+
+def _reason(error: Exception) -> str:
+    """The cause in brackets, as far as the library's first error tells it; else nothing."""
+    text = str(getattr(error.args[0], "commentary", "")) if error.args else ""
+    place = re.search(r":(\d+):(\d+): parse error", text)
+    if place:
+        return f" (syntax error at line {place[1]}, column {place[2]})"
+    causes = {"truncated": "damaged or cut off", "is not a valid": "its content is no USD"}
+    return next((f" ({cause})" for sign, cause in causes.items() if sign in text), "")
 
 
 def _flat_name(prim: Any) -> str:

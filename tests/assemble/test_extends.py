@@ -149,6 +149,10 @@ def test_a_chain_has_an_end(folder: Path) -> None:
         ("extends: [base.yaml]\n", "1:10: extends: expected a configuration"),
         ("extends: bass.yaml\n", "1:10: extends: there is no configuration 'bass.yaml'; looked"),
         (
+            "extends: base.yaml\nwithout: {randomizers: [{a: 1}]}\n",
+            "2:25: without.randomizers: nothing inherited is named {a: 1}; ",
+        ),
+        (
             "extends: base.yaml\nwithout: {randomizers: [colour]}\n",
             "2:25: without.randomizers: nothing inherited is named 'colour'; "
             "expected one of clutter, colors (did you mean 'colors'?)",

@@ -124,6 +124,11 @@ MESHES: dict[str, tuple[str, bytes | str]] = {
     "truncated ply": (
         "a.ply", ply(f"element vertex 30\n{VERTICES}element face 9\n{FACES}", b"x" * 60)),
     "no header end ply": ("a.ply", b"ply\n" + b"comment x\n" * 20_000),
+    "no element ply": ("a.ply", b"ply\nformat ascii 1.0\nproperty float x\nend_header\n0\n"),
+    "unknown type ply": (
+        "a.ply", ply(f"element vertex 3\nproperty quux x\nelement face 1\n{FACES}", b"x" * 99)),
+    "short property ply": (
+        "a.ply", ply(f"element vertex 3\nproperty float\nelement face 1\n{FACES}", b"x" * 99)),
     "empty glb": ("a.glb", b""),
     "magic only glb": ("a.glb", b"glTF"),
     "truncated glb": ("a.glb", struct.pack("<4sIIII", b"glTF", 2, 4000, 3000, 0x4E4F534A) + b"{}"),
@@ -249,6 +254,7 @@ def refused(tmp_path: Path, file: str, ask: Callable[[Any], object]) -> str:
     return message
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize("name", MESHES)
 def test_hostile_meshes_are_refused(tmp_path: Path, name: str) -> None:
     """An AssetError within seconds, and nothing is cached."""
@@ -263,6 +269,26 @@ def test_hostile_meshes_are_refused(tmp_path: Path, name: str) -> None:
     refused(tmp_path, file, lambda library: library.mesh("user/a"))
 
 
+@pytest.mark.parametrize(
+    ("name", "cause"),
+    [
+        ("truncated ply", "unexpected length"),
+        ("no element ply", "before any element"),
+        ("unknown type ply", "unknown type or property 'quux'"),
+        ("short property ply", "an incomplete line in its header"),
+    ],
+)
+def test_a_malformed_ply_is_explained(tmp_path: Path, name: str, cause: str) -> None:
+    """Different faults have different messages."""
+    file, content = MESHES[name]
+    assert isinstance(content, bytes)
+    (tmp_path / file).write_bytes(content)
+
+    with pytest.raises(AssetError, match=rf"a\.ply: malformed PLY \(.*{cause}"):
+        read_mesh(Folder(tmp_path), file)
+
+
+@pytest.mark.hostile
 @pytest.mark.parametrize("name", URDFS)
 def test_hostile_urdfs_are_refused(tmp_path: Path, name: str) -> None:
     """Entities are never expanded, references never leave the folder, trees are trees."""
@@ -300,6 +326,7 @@ IMAGES: dict[str, tuple[bytes, str]] = {
 }
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize("name", IMAGES)
 def test_hostile_images_are_refused(tmp_path: Path, name: str) -> None:
     """Sizes are read from the header, before any pixel is decoded."""
@@ -341,6 +368,7 @@ def test_a_missing_texture_is_told(tmp_path: Path) -> None:
         library.texture(library.materials("user/a")[0].texture)
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize("reference", ["../secret.mtl", "/etc/passwd", "C:\\x.png", "http://a/b"])
 def test_a_texture_outside_the_folder_is_refused(tmp_path: Path, reference: str) -> None:
     """The mesh is refused, not only its picture."""
@@ -351,6 +379,7 @@ def test_a_texture_outside_the_folder_is_refused(tmp_path: Path, reference: str)
     refused(tmp_path, "a.mtl", lambda library: library.mesh("user/a"))
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize("kind", ["fifo", "directory", "link outside", "link loop", "device link"])
 def test_only_regular_files_inside_the_folder_are_read(tmp_path: Path, kind: str) -> None:
     """Reading a FIFO blocks for ever, a device never ends."""
@@ -372,6 +401,7 @@ def test_only_regular_files_inside_the_folder_are_read(tmp_path: Path, kind: str
         Folder(folder).read("a.obj")
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize("name", ["a\0b", "x" * 5000, "../" * 30 + "etc/passwd", "/etc/passwd"])
 def test_strange_names_are_refused(tmp_path: Path, name: str) -> None:
     """No index entry leads outside the folder."""

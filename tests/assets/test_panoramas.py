@@ -58,6 +58,7 @@ def test_a_little_ringing_below_zero_is_dark() -> None:
     assert decode_radiance(exr_file(rgb), "sky")[5, 3, 1] == 0.0
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize(
     ("make", "said"),
     [
@@ -95,6 +96,7 @@ def test_what_is_no_panorama_is_refused_and_nothing_is_kept(
     assert not [path for path in cache.rglob("*") if path.is_file()]
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize(
     "data",
     [b"", b"\x89PNG\r\n\x1a\n" + bytes(64), b"not an image at all", b"\xff\xd8\xff" + bytes(90)],

@@ -117,3 +117,18 @@ def test_a_missing_asset_folder_is_told_with_its_place(tmp_path: Path) -> None:
         f"{source}:2:20: assets.folders[0]: there is no folder 'mehses'; "
         f"looked for '{tmp_path / 'mehses'}'"
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [("n" * 300, "too long"), ("~nobody-here/x", "home directory"), ("a\nb", r"'a\\nb'; looked")],
+)
+def test_a_name_that_no_file_can_have_is_refused_on_one_line(
+    tmp_path: Path, name: str, reason: str
+) -> None:
+    """With its place, whatever the operating system says of it."""
+    with pytest.raises(ConfigError, match=reason) as caught:
+        find_path(name, at(tmp_path / "mine.yaml"), "template", "template")
+
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith(f"{tmp_path}/mine.yaml:2:5: template: ")

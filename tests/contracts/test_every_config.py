@@ -5,6 +5,7 @@ Images, sweeps and sequences are reduced: the paths through the program stay the
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from gen_data import configs
 from gen_data.generator.assemble.config import load_config
 from gen_data.generator.core.interfaces import Modality, Sensor
 from gen_data.generator.runner.verify import verify
+from tests.contracts.stage_digests import find_change
 from tests.end_to_end.running import gen_data
 
 CONFIGS = sorted(path.stem for path in Path(configs.__path__[0]).glob("*.yaml"))
@@ -38,12 +40,20 @@ def smaller(sensor: Sensor) -> list[str]:
     return [f"size_px=[{width_px}, {height_px}]"]
 
 
+def generate_reduced(name: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    """Generate one reduced sample of a configuration in ``folder / "out"``."""
+    options = ("--n", "1", "--workers", "1", "--out", "out", *reduced(name))
+    return gen_data("--config", name, *options, cwd=folder)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CONFIGS)
 def test_one_sample_is_rendered_exported_and_verified(name: str, tmp_path: Path) -> None:
-    """Every exporter writes files, and all files agree with the manifest."""
-    options = ("--n", "1", "--workers", "1", "--out", "out", *reduced(name))
-    made = gen_data("--config", name, *options, cwd=tmp_path)
+    """Every exporter writes files, and all files agree with the manifest.
+
+    The stages of the sample are the stored ones (``tests/contracts/stage_digests.py``).
+    """
+    made = generate_reduced(name, tmp_path)
     assert made.returncode == 0, made.stdout + made.stderr
     spec = load_config(name)
 
@@ -57,3 +67,5 @@ def test_one_sample_is_rendered_exported_and_verified(name: str, tmp_path: Path)
         for channel in channels:
             pattern = f"shards/*/{sensor.name}/{channel}/000000000.*"
             assert list((tmp_path / "out").glob(pattern)), pattern
+    changed = find_change(name, tmp_path / "out")
+    assert not changed, f"{name}: the first stage with other contents is: {changed}"

@@ -12,6 +12,7 @@ import pytest
 
 import gen_data as package
 from gen_data.generator.core.errors import StorageError
+from gen_data.generator.runner import exports, free_space
 from gen_data.generator.runner.stored import StoredSamples
 from tests.end_to_end.running import digest, gen_data
 
@@ -160,3 +161,21 @@ def test_sensors_at_other_instants_export_the_same_bytes(tmp_path: Path) -> None
 
     assert done.returncode == 0, done.stderr
     assert digest(tmp_path / "again") == digest(tmp_path / "made")
+
+
+def test_exports_and_rerenderings_that_will_not_fit_are_refused(
+    dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Copies of images on another disk and new images need space; hard links do not."""
+    monkeypatch.setattr(free_space, "free_bytes", lambda path: 200_000)
+
+    assert package.export(dataset, ["coco"], tmp_path / "linked", workers=0).made == 15
+
+    with pytest.raises(StorageError, match=r"(?s)15 samples need about .* with --force"):
+        package.rerender(dataset, tmp_path / "night", overrides=["render.shadows=hard"], workers=0)
+    monkeypatch.setattr(exports, "_is_same_disk", lambda one, other: False)
+    with pytest.raises(StorageError, match=r"(?s)15 samples need about .* with --force"):
+        package.export(dataset, ["coco"], tmp_path / "copied", workers=0)
+    assert not (tmp_path / "night/shards").exists()
+    assert not (tmp_path / "copied/shards").exists()
+    assert package.export(dataset, ["coco"], tmp_path / "copied", workers=0, force=True).made == 15

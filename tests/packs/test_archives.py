@@ -79,6 +79,7 @@ def test_members_of_an_archive_inside_an_archive_follow_its_path(tmp_path: Path)
     assert files_in(tmp_path / "out") == {"usr/share/cars.sh3f/car/car.obj": b"v 0 0 0"}
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize("make", [zipped, tarred])
 @pytest.mark.parametrize("name", ["../evil.txt", "data/../../evil.txt", "/evil.txt", "a\\evil.txt"])
 def test_a_member_outside_its_folder_is_refused(make: Maker, name: str, tmp_path: Path) -> None:
@@ -92,6 +93,7 @@ def test_a_member_outside_its_folder_is_refused(make: Maker, name: str, tmp_path
     assert not (inside / "evil.txt").exists()
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize("kind", [tarfile.SYMTYPE, tarfile.LNKTYPE, tarfile.CHRTYPE])
 def test_links_and_devices_are_refused(kind: bytes, tmp_path: Path) -> None:
     """A wanted name must be a plain file."""
@@ -115,6 +117,7 @@ def test_a_symbolic_link_in_a_zip_is_refused(tmp_path: Path) -> None:
         extract(path, ("data/*",), tmp_path / "out")
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize("make", [zipped, tarred])
 @pytest.mark.parametrize("wanted", ["data/*", "other/*"])
 def test_a_bomb_is_refused_before_it_fills_the_disk(
@@ -153,6 +156,7 @@ def test_a_name_that_occurs_twice_is_refused(tmp_path: Path) -> None:
         extract(path, ("data/*",), tmp_path / "out")
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize("data", [b"", b"PK\x03\x04 no zip at all", b"!<arch>\nno", b"\x00" * 600])
 def test_what_is_no_archive_is_an_error_in_words(data: bytes, tmp_path: Path) -> None:
     """Empty, cut off, or something else."""

@@ -62,6 +62,7 @@ def test_a_file_in_a_user_folder_is_an_asset_with_lanes(tmp_path: Path) -> None:
         RoadNetwork(name="town", asset="road").add(Scene("t"), library)
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

@@ -69,3 +69,12 @@ def test_a_run_ends_before_the_last_byte_of_the_disk(
 
     assert "65.5 kB are free; stopped before the disk is full" in str(check.after_shard(100.0, 5))
     assert check.after_shard(100.0, 0) is None
+
+
+def test_hard_links_need_no_space(tmp_path: Path) -> None:
+    """Of 3 MB in a sample, 2.9 MB are links: 50 samples need 5 MB of the 8."""
+    linked = SpaceCheck(LocalStore(tmp_path, "again"), linked_bytes=2.9e6)
+    copied = SpaceCheck(LocalStore(tmp_path, "again"))
+
+    assert linked.after_shard(3e6, 50) is None
+    assert "the other 50 samples need about 150.0 MB" in str(copied.after_shard(3e6, 50))

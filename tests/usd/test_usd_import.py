@@ -259,6 +259,7 @@ def broken(folder: Path, kind: str) -> None:
             archive.writestr("bad.usda", "#usda 1.0\n" * 100)
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize(
     "fault",
     [
@@ -302,9 +303,16 @@ def test_bytes_that_are_no_crate_file_are_refused(tmp_path: Path) -> None:
     (tmp_path / "props").mkdir()
     (tmp_path / "props/half.usdc").write_bytes(data[: len(data) // 2])
     (tmp_path / "props/noise.usdc").write_bytes(data[:8] + bytes(range(256)) * 4)
+    (tmp_path / "props/word.usda").write_text("hello")
+    (tmp_path / "props/open.usda").write_text('#usda 1.0\ndef Mesh "a" {\n  {{\n')
     library = opened_library(tmp_path, tmp_path / "props")
-    for name in ("half", "noise"):
-        with pytest.raises(AssetError, match="unreadable USD"):
+    for name, cause in (
+        ("half", "damaged or cut off"),
+        ("noise", "damaged or cut off"),
+        ("word", "its content is no USD"),
+        ("open", "syntax error at line 2"),
+    ):
+        with pytest.raises(AssetError, match=rf"unreadable USD.* \({cause}"):
             library.mesh(f"user/{name}")
 
 
@@ -323,6 +331,7 @@ def test_what_a_stage_refers_to_belongs_to_its_content(tmp_path: Path) -> None:
     assert opened_library(tmp_path, tmp_path / "props").get("user/one").sha256 != before
 
 
+@pytest.mark.hostile
 @pytest.mark.parametrize(
     ("attribute", "value", "said"),
     [

@@ -11,6 +11,7 @@ import numpy as np
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.readers.mesh_source import MeshSource
 from gen_data.generator.assets.triangle_soup import TriangleSoup
+from gen_data.generator.config.yaml_scalars import abbreviate
 from gen_data.generator.core.errors import AssetError
 
 _MAX_HEADER_BYTES = 65536
@@ -45,11 +46,18 @@ def _parse_triangles(data: bytes, path: str) -> np.ndarray[tuple[int, ...], np.d
             vertices = np.asarray(mesh.vertices, dtype=np.float64)
             faces = np.asarray(mesh.faces, dtype=np.int64)
     except Exception as error:
-        raise AssetError(
-            f"{path}: malformed PLY ({type(error).__name__}); export it again"
-        ) from None
+        raise AssetError(f"{path}: malformed PLY ({_reason(error)}); export it again") from None
     if faces.ndim != 2 or len(faces) == 0:
         raise AssetError(f"{path}: holds no triangles; export it again with its faces")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise AssetError(f"{path}: a face with a vertex index out of range; export it again")
     return vertices[faces]
+
+
+def _reason(error: Exception) -> str:
+    """The parser's own words, where they are about the file."""
+    if isinstance(error, KeyError):
+        return f"unknown type or property {abbreviate(str(error))}"
+    if isinstance(error, ValueError):
+        return abbreviate(str(error), 80).rstrip("!. ")
+    return "an incomplete line in its header"

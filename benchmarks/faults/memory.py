@@ -1,0 +1,111 @@
+"""The kernel kills a worker that exceeds its memory; the run goes on, or says so."""
+
+from __future__ import annotations
+
+import os
+import time
+from contextlib import suppress
+from pathlib import Path
+
+from benchmarks.faults.results import Result, Scale
+from gen_data.generator.core.errors import WorkerLost
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.runner.run import Settings, run
+from tests.runner.doubles import (
+    RESUME,
+    FakeFactory,
+    FakePipeline,
+    Trouble,
+    fake_plan,
+    make,
+    tree_digest,
+    write_raw_images,
+)
+
+CGROUP = Path("/sys/fs/cgroup/memory")
+LIMIT_BYTES = 400 << 20
+GREEDY_BYTES = 1 << 30
+
+
+class GreedyPipeline(FakePipeline):
+    """Takes more memory than the limit for one sample."""
+
+    def sample(self, index: int) -> Sample:
+        """Sample number ``index``; number 5 exceeds the limit."""
+        if index == 5:
+            greedy = bytearray(os.urandom(1 << 20) * (GREEDY_BYTES >> 20))
+            time.sleep(0.01 * (greedy[0] > 255))
+        return super().sample(index)
+
+
+class GreedyFactory(FakeFactory):
+    """Makes the greedy pipeline."""
+
+    def __call__(self) -> FakePipeline:
+        """The pipeline."""
+        return GreedyPipeline(self.n, self.trouble)
+
+
+def out_of_memory(scale: Scale, folder: Path) -> Result:
+    """A run with one worker in a memory cgroup, whose sample 5 needs more than the limit."""
+    del scale
+    result = Result()
+    group = CGROUP / f"gen-data-faults-{os.getpid()}"
+    try:
+        group.mkdir()
+        (group / "memory.limit_in_bytes").write_text(str(LIMIT_BYTES))
+    except OSError as error:
+        result.skip("all", f"no writable memory cgroup (version 1) at {CGROUP}: {error.strerror}")
+        return result
+    try:
+        code, message = _run_in(group, folder)
+    finally:
+        _remove(group)
+    facts = ("sample 5", "out of memory", "gen-data repro")
+    result.add(
+        code == WorkerLost.exit_code and all(fact in message for fact in facts),
+        f"exit code {code}: {message}",
+    )
+    shards = {path.stem for path in (folder / "out/shards").glob("*.json")}
+    result.add(shards == {"000000", "000002"}, f"finished shards: {sorted(shards)}")
+    make(folder / "out")
+    make(folder / "reference")
+    equal = tree_digest(folder / "out") == tree_digest(folder / "reference")
+    result.add(equal, "with enough memory, the resumed data set has other bytes")
+    result.notes.append("message, other shards, resumption")
+    return result
+
+
+def _run_in(group: Path, folder: Path) -> tuple[int, str]:
+    """Exit code and message of a run whose processes are in a cgroup."""
+    message = folder / "message"
+    pid = os.fork()
+    if not pid:
+        code = 99
+        try:
+            (group / "cgroup.procs").write_text(str(os.getpid()))
+            run(
+                fake_plan(),
+                GreedyFactory(10, Trouble()),
+                folder / "out",
+                workers=1,
+                resume_command=RESUME,
+                settings=Settings(write_media=write_raw_images),
+            )
+            code = 0
+        except BaseException as error:
+            message.write_text(f"{type(error).__name__}: {error}", "utf-8")
+            code = getattr(error, "exit_code", 99)
+        finally:
+            os._exit(code)
+    _, status = os.waitpid(pid, 0)
+    return os.waitstatus_to_exitcode(status), message.read_text() if message.exists() else ""
+
+
+def _remove(group: Path) -> None:
+    """Remove a cgroup as soon as its last process has ended."""
+    for _ in range(100):
+        with suppress(OSError):
+            group.rmdir()
+            return
+        time.sleep(0.05)
