@@ -38,10 +38,9 @@ from gen_data.exporters.croissant_metadata import (
 )
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.sensor_selection import rgb_cameras
+from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, media_path
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene_assets import assets_in
@@ -101,10 +100,7 @@ class Croissant(ExporterBase):
         Raises:
             ConfigError: no sensor writes the rgb channel.
         """
-        if not rgb_cameras(info):
-            raise ConfigError(
-                f"exporter '{self.type}': no sensor writes the rgb channel; add an rgb_camera"
-            )
+        rgb_camera(info, "", self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write a JSON line per image, and one per asset."""
