@@ -9,6 +9,7 @@ from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.capture import Channel, ImageFormat
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, Exporter
+from gen_data.generator.core.scene import Scene
 
 PNG_ONLY = frozenset({"png"})
 PNG_OR_JPEG = frozenset({"png", "jpeg"})
@@ -40,6 +41,14 @@ class ExporterBase(Strict):
             ConfigError: the text names the missing sensor or channel.
         """
         del info
+
+    def check_scene(self, scene: Scene) -> None:
+        """Reject a data set by one of its scenes, before anything is generated or written.
+
+        Raises:
+            ConfigError: the text names the missing element.
+        """
+        del scene
 
     def with_assets(self: E, assets: AssetLibrary) -> E:
         """Return the exporter for writing; formats with geometry keep the library."""

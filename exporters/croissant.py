@@ -39,7 +39,7 @@ from gen_data.exporters.croissant_metadata import (
 )
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.sensor_selection import rgb_cameras
+from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
@@ -106,10 +106,7 @@ class Croissant(ExporterBase):
         Raises:
             ConfigError: no sensor writes the rgb channel, or cameras differ in their image files.
         """
-        if not rgb_cameras(info):
-            raise ConfigError(
-                f"exporter '{self.type}': no sensor writes the rgb channel; add an rgb_camera"
-            )
+        rgb_camera(info, "", self.type)
         suffixes = {info.encoding(name, Channel.RGB).suffix for name in rgb_cameras(info)}
         if len(suffixes) > 1:
             raise ConfigError(

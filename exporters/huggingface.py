@@ -49,11 +49,10 @@ from gen_data.exporters.parquet_tables import (
     value_feature,
 )
 from gen_data.exporters.rle import encode_rle
-from gen_data.exporters.sensor_selection import instant_s, rgb_cameras
+from gen_data.exporters.sensor_selection import instant_s, rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import ObjectTruth, Sample
 
@@ -101,10 +100,7 @@ class HuggingFace(ExporterBase):
         Raises:
             ConfigError: no sensor writes the rgb channel.
         """
-        if not rgb_cameras(info):
-            raise ConfigError(
-                f"exporter '{self.type}': no sensor writes the rgb channel; add an rgb_camera"
-            )
+        rgb_camera(info, "", self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write one JSON line per image."""

@@ -113,6 +113,14 @@ class LeRobot(ExporterBase):
                     "cameras in the exporter's cameras"
                 )
 
+    def check_scene(self, scene: Scene) -> None:
+        """Reject scenes without the arm.
+
+        Raises:
+            ConfigError: the scene has no such arm.
+        """
+        self._find_arm(scene)
+
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write a line per frame: joints, task and statistics of images.
 

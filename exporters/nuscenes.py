@@ -43,6 +43,7 @@ from pydantic import Field
 from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.nuscenes_classes import detectable_categories
 from gen_data.exporters.nuscenes_frames import Channel
 from gen_data.exporters.nuscenes_recording import LIDAR_TOP, Recording, key_frames
 from gen_data.exporters.nuscenes_shard import ShardWriter, label_path, map_file, reading_path
@@ -94,10 +95,16 @@ class NuScenes(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: there is no laser scanner, a camera is no pinhole, or two sensors have the
-                same channel.
+            ConfigError: there is no laser scanner, a camera is no pinhole, two sensors have the
+                same channel, or no category has a class in this format.
         """
         self._channels(info)
+        known = detectable_categories()
+        if not set(known) & set(info.categories):
+            raise ConfigError(
+                f"exporter '{self.type}': no category of the data set has a class in this format; "
+                f"expected at least one of: {', '.join(known)}. Use coco for other categories"
+            )
         check_pinholes(info, rgb_cameras(info), self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:

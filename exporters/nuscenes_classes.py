@@ -64,6 +64,12 @@ def category_of(instance: Instance) -> str:
     return things.get(finer, things.get(instance.category, OTHER_THING))
 
 
+def detectable_categories() -> tuple[str, ...]:
+    """Our categories that become moving or movable things, which nuScenes annotates with boxes."""
+    named = classes().things.items()
+    return tuple(ours for ours, theirs in named if "/" not in ours and theirs[:7] != "static.")
+
+
 def attribute_of(category: str, instance: Instance, body: Body | None, scene: Scene) -> str:
     """Attribute of an object; empty if its category has none.
 

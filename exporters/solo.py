@@ -38,7 +38,7 @@ from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.id_colors import id_color, id_colors
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.label_png import encode_label_png, number_masks
-from gen_data.exporters.sensor_selection import check_pinholes, instant_s, rgb_cameras
+from gen_data.exporters.sensor_selection import check_pinholes, instant_s, rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import frame_facts, write_bytes, write_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
@@ -101,12 +101,8 @@ class Solo(ExporterBase):
             ConfigError: no camera writes the rgb channel, one of them is no pinhole, or the last
                 sequence is incomplete.
         """
-        cameras = rgb_cameras(info)
-        if not cameras:
-            raise ConfigError(
-                f"exporter '{self.type}': no camera writes the rgb channel; add an rgb_camera"
-            )
-        check_pinholes(info, cameras, self.type)
+        rgb_camera(info, "", self.type)
+        check_pinholes(info, rgb_cameras(info), self.type)
         if info.n % info.steps_per_scene:
             raise ConfigError(
                 f"exporter '{self.type}': all sequences must have the same length; expected a "

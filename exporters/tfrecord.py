@@ -42,10 +42,9 @@ from pydantic import Field
 from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase, check_installed
 from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
 from gen_data.exporters.png import RowFilter, encode_png
-from gen_data.exporters.sensor_selection import rgb_cameras
+from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import write_bytes, write_text
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 
@@ -104,10 +103,7 @@ class TfRecord(ExporterBase):
             ConfigError: no sensor writes the rgb channel, or the CRC library is missing.
         """
         check_installed(self.type, google_crc32c="google-crc32c")
-        if not rgb_cameras(info):
-            raise ConfigError(
-                f"exporter '{self.type}': no sensor writes the rgb channel; add an rgb_camera"
-            )
+        rgb_camera(info, "", self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write the encoded labels of all images to one file, and a JSON line per image."""

@@ -57,7 +57,7 @@ def export(
     LocalStore(Path(out)).check_unlocked()
 
     from gen_data.generator.assemble.config import load_config
-    from gen_data.generator.assemble.pipeline_factory import ready_exporters
+    from gen_data.generator.assemble.pipeline_factory import check_scene, ready_exporters
     from gen_data.generator.assets.library import open_library
     from gen_data.generator.runner.exports import export as write_exports
     from gen_data.generator.runner.stored import StoredSamples
@@ -73,6 +73,7 @@ def export(
     config = load_config(source, overrides=overrides)
     _check_annotations(load_config(source), config)
     exporters = ready_exporters(config, stored.info, open_library(config.asset_folders))
+    check_scene(config, stored.sample(0).scene)
     return write_exports(
         stored,
         config,

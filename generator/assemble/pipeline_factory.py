@@ -8,7 +8,7 @@ from functools import cached_property, lru_cache, partial
 
 import cv2
 
-from gen_data.exporters.base import check_image_formats
+from gen_data.exporters.base import ExporterBase, check_image_formats
 from gen_data.exporters.label_map import MappedExporter
 from gen_data.generator.annotations.annotate import annotate_ego, annotate_reading
 from gen_data.generator.assemble.config import Config, SceneConfig
@@ -91,6 +91,8 @@ class PipelineFactory:
         """
         _check_durations(self.config)
         ready_exporters(self.config, self.info, open_library(self.config.asset_folders))
+        for scene in self.nominal:
+            check_scene(self.config, scene)
 
     @property
     def info(self) -> DatasetInfo:
@@ -290,6 +292,18 @@ def annotators_of(config: Config) -> Sequence[AnyAnnotator]:
         for name in sorted(needs - annotators.keys()):
             annotators[name] = default_plugin(ANNOTATIONS, name)
     return list(annotators.values())
+
+
+def check_scene(config: Config, scene: Scene) -> None:
+    """Refuse a scene that a format cannot hold.
+
+    Raises:
+        ConfigError: the text names exporter and remedy.
+    """
+    for exporter in config.exporters:
+        if isinstance(exporter, ExporterBase):
+            with located_errors(config.document):
+                exporter.check_scene(scene)
 
 
 def ready_exporters(config: Config, info: DatasetInfo, library: Library) -> dict[str, Exporter]:

@@ -18,6 +18,8 @@ from PIL import Image
 
 from gen_data.exporters import lerobot
 from gen_data.exporters.lerobot import LeRobot, task_sentence
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import PipelineFactory
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.scene import ArmGoal
 from tests.exporters.drives import drive_info
@@ -205,6 +207,14 @@ def test_tasks_are_sentences(reach: Any) -> None:
     assert task_sentence(replace(scene, tracks=()), arm) == "Pick up an object, then put it down."
     assert task_sentence(scene, reaching) == "Reach a pose, then move to a posture."
     assert task_sentence(scene, replace(arm, task=())) == "Stay in place."
+
+
+def test_a_configuration_without_arm_is_refused_before_rendering() -> None:
+    """The nominal scene decides, so that no shard is lost."""
+    config = load_config("kitti_stereo.yaml", overrides=['exporters=[{"type": "lerobot"}]'])
+
+    with pytest.raises(ConfigError, match="exporter 'lerobot': the scene has no arm; add an elem"):
+        PipelineFactory(config, n=20).check()
 
 
 def test_data_sets_without_sequences_or_arms_are_refused(

@@ -402,6 +402,13 @@ def test_attributes_tell_how_objects_stand(world: Any) -> None:
     assert category_of(child) == "human.pedestrian.child"
 
 
+def test_a_data_set_without_things_of_traffic_is_refused(world: Any) -> None:
+    """The devkit's evaluations refuse tables without a box of their classes."""
+    info = replace(world.info(8, ("left",), ("top",)), categories=("bench", "mug"))
+    with pytest.raises(ConfigError, match="no category of the data set has a class .* car, van"):
+        NuScenes().check(info)
+
+
 def test_a_data_set_without_a_scanner_is_refused(world: Any) -> None:
     """The message shows the sensor to add; two sensors cannot share a channel."""
     with pytest.raises(ConfigError, match=r"there is no lidar; add .*LIDAR_TOP"):

@@ -82,6 +82,72 @@ def test_radar_detections_are_counted_and_read(folder: Path, driven: Any) -> Non
         assert np.abs(points[:2].T - car.center[:2]).max(initial=0.0) < 1e-3
 
 
+def test_the_tracking_evaluation_scores_the_boxes_as_perfect(folder: Path, tmp_path: Path) -> None:
+    """AMOTA 1 for each class; AMOTA falls if a track changes its id at every key frame."""
+    from nuscenes.eval.common.config import config_factory
+    from nuscenes.eval.tracking.evaluate import TrackingEval
+
+    devkit = open_devkit(folder)
+    owner = {row["token"]: row["instance_token"] for row in devkit.sample_annotation}
+
+    def amota(name_track: Callable[[str, str], str], name: str) -> dict[str, float]:
+        results: dict[str, list[dict[str, Any]]] = {row["token"]: [] for row in devkit.sample}
+        for token, boxes in checks.predictions(devkit).items():
+            annotated = devkit.get("sample", token)["anns"]
+            at = {tuple(devkit.get("sample_annotation", k)["translation"]): k for k in annotated}
+            for box in boxes:
+                track = name_track(token, owner[at[tuple(box["translation"])]])
+                kept = ("sample_token", "translation", "size", "rotation", "velocity")
+                results[token].append(
+                    {key: box[key] for key in kept}
+                    | {"tracking_id": track, "tracking_name": box["detection_name"]}
+                    | {"tracking_score": 0.9}
+                )
+        path = tmp_path / f"{name}.json"
+        path.write_text(json.dumps({"meta": checks.META, "results": results}))
+        evaluation = TrackingEval(
+            config_factory("tracking_nips_2019"),
+            str(path), "all", str(tmp_path / name), V, str(folder), verbose=False,
+        )  # fmt: skip
+        metrics, _ = evaluation.evaluate()
+        return {k: v for k, v in metrics.label_metrics["amota"].items() if not np.isnan(v)}
+
+    perfect = amota(lambda _, instance: instance, "perfect")
+    assert perfect["car"] == perfect["pedestrian"] == pytest.approx(1.0, abs=1e-6)
+    # The devkit's recall levels pass over tracks without a match to their own id.
+    broken = amota(lambda token, instance: f"{token[:8]}{instance}", "broken")
+    assert broken["car"] < 0.9
+
+
+def test_the_lidarseg_evaluation_scores_the_labels_as_perfect(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """IoU 1 for each class that is there, and less where a third of the points has another one."""
+    from nuscenes.eval.lidarseg import utils
+    from nuscenes.eval.lidarseg.evaluate import LidarSegEval
+
+    devkit = open_devkit(folder)
+    names = [row["name"] for row in devkit.scene]
+    monkeypatch.setattr(utils, "create_splits_scenes", lambda verbose: {"val": names})
+
+    def score(change: Callable[[Any], Any], name: str) -> list[float]:
+        target = tmp_path / name / "lidarseg/val"
+        target.mkdir(parents=True)
+        mapper = utils.LidarsegClassMapper(devkit)
+        for row in devkit.lidarseg:
+            labels = np.fromfile(folder / row["filename"], np.uint8)
+            # 0 is ignored as truth and forbidden in predictions.
+            guess = np.maximum(change(mapper.convert_label(labels)), 1).astype(np.uint8)
+            guess.tofile(target / f"{row['sample_data_token']}_lidarseg.bin")
+        ious = LidarSegEval(devkit, str(tmp_path / name), "val").evaluate()["iou_per_class"]
+        return [float(iou) for iou in ious.values() if not np.isnan(iou)]
+
+    perfect = score(lambda labels: labels, "perfect")
+    assert perfect == [1.0] * len(perfect) and len(perfect) > 1
+    other = score(lambda labels: np.where(np.arange(len(labels)) % 3, labels, 1), "other")
+    assert min(other) < 0.7
+
+
 def edit(name: str, change: Callable[[list[dict[str, Any]]], object]) -> Callable[[Path], None]:
     """Damage that changes the rows of a table."""
 
