@@ -44,7 +44,12 @@ from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.captions import caption
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.id_colors import id_colors
-from gen_data.exporters.image_files import depths_of_units, link_or_copy, read_pixels
+from gen_data.exporters.image_files import (
+    DEPTH_UNITS_MAX,
+    depths_of_units,
+    link_or_copy,
+    read_pixels,
+)
 from gen_data.exporters.label_png import encode_label_png
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sensor_selection import rgb_camera
@@ -160,7 +165,8 @@ class ControlClips(ExporterBase):
             files = {
                 "depth": encode_png(depth, RowFilter.UP, 1),
                 "segmentation": encode_label_png(read[self._ids], id_colors()),
-                "edges": encode_label_png(edges, np.arange(256, dtype=np.uint8)),
+                # Edges are mostly borders, which the encoder of labels is slow for.
+                "edges": encode_png(edges, RowFilter.UP, 1),
             }
             for kind, png in files.items():
                 write_bytes(folder / kind / f"{sample.index:09d}.png", png)
@@ -202,15 +208,12 @@ class ControlClips(ExporterBase):
 
     def _depth(self, units: NDArray[np.uint16], scale_m: float) -> tuple[NDArray[np.uint8], Range]:
         """Inverse depth of an image of depth units, and its range; see ``inverse_depth``."""
-        depths_m, span_m = depths_of_units(scale_m), self._range()
-        if span_m is None:
-            # The nearest and the farthest point suffice for the range.
-            present = depths_m[np.flatnonzero(np.bincount(units.ravel()))]
-            _, span_m = inverse_depth(present, None)
-            if span_m == NO_RANGE:
-                return np.zeros(units.shape, np.uint8), span_m
         # Fewer depths than pixels are possible: an image is a look-up of its units.
-        return inverse_depth(depths_m, span_m)[0][units], span_m
+        present = np.flatnonzero(np.bincount(units.ravel()))
+        values, span_m = inverse_depth(depths_of_units(scale_m)[present], self._range())
+        table = np.zeros(DEPTH_UNITS_MAX + 1, np.uint8)
+        table[present] = values
+        return table[units], span_m
 
     def _edges(self, rgb: NDArray[np.uint8]) -> NDArray[np.uint8]:
         grey = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY)
