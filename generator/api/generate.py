@@ -74,16 +74,18 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     from threadpoolctl import threadpool_limits
 
     from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
+    from gen_data.generator.config.paths import write_locations
     from gen_data.generator.runner.identity import format_licences, make_plan
     from gen_data.generator.runner.run import Settings, run
 
     factory = _make_factory(loaded, n)
     plan = make_plan(factory)
+    folder = Path(out) if out is not None else Path("out") / loaded.name
     with threadpool_limits(limits=1):
-        return run(
+        summary = run(
             plan,
             factory,
-            Path(out) if out is not None else Path("out") / loaded.name,
+            folder,
             workers=processes,
             resume_command=resume_command,
             licences=partial(format_licences, factory),
@@ -96,6 +98,10 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
             ),
             progress=on_progress,
         )
+    store = LocalStore(folder)
+    with store.errors():
+        write_locations(store.run_dir, loaded.asset_locations)
+    return summary
 
 
 def _make_factory(loaded: Config, n: int) -> PipelineFactory:

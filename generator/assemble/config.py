@@ -251,6 +251,13 @@ class Config:
         )
 
     @property
+    def asset_locations(self) -> dict[str, Path]:
+        """Folders of the user's assets by their names in the configuration."""
+        listed = self.document.get("assets", "folders")
+        names = [node.text for node in listed.items] if listed else []
+        return dict(zip(names, self.asset_folders, strict=True))
+
+    @property
     def split_shares(self) -> dict[str, float]:
         """Shares of the splits that are above 0, in order."""
         shares = self.general.splits.model_dump(exclude={"assign"})

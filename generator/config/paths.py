@@ -2,12 +2,14 @@
 
 A relative path starts from the folder of the file that contains it; on the command line, from the
 current folder. ``~`` is the home folder. If nothing exists there, a shipped file of that name is
-used.
+used. A finished data set remembers where its folders were (``LOCATIONS``), so that it can be read
+from anywhere.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
@@ -17,6 +19,9 @@ from gen_data.generator.core.errors import ConfigError, did_you_mean
 
 PLAN = "plan.json"
 """Record of a data set; its paths are those of its configuration, which lies elsewhere."""
+
+LOCATIONS = "locations.json"
+"""Beside the log of a data set: ``{folder as written: where it was}``; no part of its identity."""
 
 
 def find_path(
@@ -53,6 +58,8 @@ def find_path(
     for known in (name, f"{name}.yaml"):
         if known in by_name and not _is_document(by_name[known], position):
             return by_name[known]
+    if is_folder and (remembered := _remembered_folder(name, position)) is not None:
+        return remembered
     fact = f"there is no {kind} '{abbreviate(name)}'; looked for '{abbreviate(str(path), 300)}'"
     if by_name:
         fact += f"; shipped are {', '.join(by_name)}{did_you_mean(name, by_name)}"
@@ -69,6 +76,25 @@ def _base_folder(position: Position | None) -> Path:
         return Path()
     file = Path(position.file)
     return Path() if file.name == PLAN else file.parent
+
+
+def write_locations(run_dir: Path, folders: Mapping[str, Path]) -> None:
+    """Remember where the folders of a data set are, by their names in its configuration."""
+    if folders:
+        places = {name: str(path.resolve()) for name, path in sorted(folders.items())}
+        (run_dir / LOCATIONS).write_text(json.dumps(places, ensure_ascii=False) + "\n", "utf-8")
+
+
+def _remembered_folder(name: str, position: Position | None) -> Path | None:
+    """Folder of that name when the data set of a plan was generated; None if it is unknown."""
+    if position is None or Path(position.file).name != PLAN:
+        return None
+    try:
+        places = json.loads((Path(position.file).parent / "run" / LOCATIONS).read_bytes())
+        folder = Path(places[name])
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return folder if folder.is_dir() else None
 
 
 def _is_document(candidate: Path, position: Position | None) -> bool:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
 from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.errors import UnknownAsset
+from gen_data.generator.config.paths import write_locations
+from gen_data.generator.core.errors import ConfigError, UnknownAsset
 
 
 @pytest.mark.parametrize("wrong", ["../../../etc/passwd", "pybullet/teddie", "muug?seed=3"])
@@ -43,3 +45,29 @@ def test_a_file_of_a_user_that_is_missing_is_told_with_what_there_is(tmp_path: P
         open_pipeline(load_config(str(path))),
     ):
         pass
+
+
+def test_a_data_set_finds_its_folders_from_anywhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its plan keeps ``props`` as written; the run remembers where that was."""
+    folder, props = tmp_path / "set", tmp_path / "project/props"
+    (folder / "run").mkdir(parents=True)
+    props.mkdir(parents=True)
+    (tmp_path / "project/mine.yaml").write_text(
+        "template: tabletop\nassets: {folders: [props]}\n"
+        "sensors: [{type: rgb_camera, name: color}]\n"
+    )
+    made = load_config(str(tmp_path / "project/mine.yaml"))
+    plan = {"config": made.document.plain(), "name": "mine"}
+    (folder / "plan.json").write_text(json.dumps(plan))
+    monkeypatch.chdir(folder)
+    with pytest.raises(ConfigError, match="there is no folder 'props'"):
+        load_config(str(folder))
+
+    write_locations(folder / "run", made.asset_locations)
+
+    assert load_config(str(folder)).asset_folders == (props,)
+    props.rmdir()
+    with pytest.raises(ConfigError, match="there is no folder 'props'"):
+        load_config(str(folder))

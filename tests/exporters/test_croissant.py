@@ -99,7 +99,7 @@ def test_licences_are_those_of_assets_or_of_the_publisher(world: Any, tmp_path: 
 
 def test_a_data_set_without_photographs_is_refused(world: Any) -> None:
     """Every row of the table has an image."""
-    with pytest.raises(ConfigError, match="no sensor of .* writes the rgb channel"):
+    with pytest.raises(ConfigError, match=r"no sensor of .* writes the rgb channel"):
         Croissant().check(world.info(7, media={"color": ()}))
 
 

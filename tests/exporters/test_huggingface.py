@@ -155,7 +155,7 @@ def test_a_data_set_without_photographs_is_refused(world: Any) -> None:
     """Every row has an image."""
     info = world.info(7, media={"color": ()})
 
-    with pytest.raises(ConfigError, match="no sensor of .* writes the rgb channel"):
+    with pytest.raises(ConfigError, match=r"no sensor of .* writes the rgb channel"):
         HuggingFace().check(info)
 
 

@@ -405,7 +405,7 @@ def test_attributes_tell_how_objects_stand(world: Any) -> None:
 def test_a_data_set_without_things_of_traffic_is_refused(world: Any) -> None:
     """The devkit's evaluations refuse tables without a box of their classes."""
     info = replace(world.info(8, ("left",), ("top",)), categories=("bench", "mug"))
-    with pytest.raises(ConfigError, match="no category of the data set has a class .* car, van"):
+    with pytest.raises(ConfigError, match=r"no category of the data set has a class .* car, van"):
         NuScenes().check(info)
 
 

@@ -193,7 +193,7 @@ def test_a_missing_package_is_named(world: Any, monkeypatch: pytest.MonkeyPatch)
 
 def test_a_data_set_without_photographs_is_refused(world: Any) -> None:
     """Every record has an image."""
-    with pytest.raises(ConfigError, match="no sensor of .* writes the rgb channel"):
+    with pytest.raises(ConfigError, match=r"no sensor of .* writes the rgb channel"):
         TfRecord().check(world.info(7, media={"color": ()}))
 
 
