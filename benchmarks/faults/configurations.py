@@ -237,7 +237,8 @@ TOKENS = (
     b"{", b"}", b"[", b"]", b":", b": ", b"- ", b"\n", b"\n  ", b"\t", b"&a ", b"*a", b"!!", b"!x ",
     b"---\n", b"%YAML 9.9\n", b"...\n", b"<<: ", b"? ", b"| ", b"> ", b"'", b'"', b"#", b",", b"\\",
     b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\xed\xa0\x80", b"\x85", b"\xe2\x80\xa8", b"1e999",
-    b".nan", b"-.inf", b"0x_", b"1_000", b"9" * 400, b"null", b"~", b"[" * 40, b"{a: " * 40, b"&a [*a]",
+    b".nan", b"-.inf", b"0x_", b"1_000", b"9" * 400, b"null", b"~",
+    b"[" * 40, b"{a: " * 40, b"&a [*a]",
     b"\r",
 )  # fmt: skip
 """Syntax of YAML in wrong places."""
