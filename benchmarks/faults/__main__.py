@@ -62,11 +62,13 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="of drawn faults")
     parser.add_argument("--json", type=Path, help="write the results to this file")
     parser.add_argument("--scratch", type=Path, help="folder for temporary files, such as /dev/shm")
+    parser.add_argument("--minutes", type=float, default=float("inf"), help="limit per campaign")
     given = parser.parse_args()
     results = {}
     for name in given.only or CAMPAIGNS:
         print(f"{name} ...", file=sys.stderr, flush=True)
-        results[name] = run_campaign(name, Scale(given.full, given.seed), given.scratch)
+        scale = Scale(given.full, given.seed, time.monotonic() + 60.0 * given.minutes)
+        results[name] = run_campaign(name, scale, given.scratch)
         if given.json is not None:
             facts = {"machine": platform.platform(), "campaigns": to_plain(results)}
             given.json.write_text(json.dumps(facts, indent=1) + "\n", "utf-8")

@@ -21,7 +21,7 @@ def bit_flips(scale: Scale, folder: Path) -> Result:
     record().make(out)
     files = sorted(p for p in out.rglob("*") if p.is_file() and "run" not in p.parts)
     files = [path for path in files if path.stat().st_size]
-    for _ in range(scale.pick(1_000, 20)):
+    for _ in result.until_end(scale, range(scale.pick(1_000, 20))):
         path = rng.choice(files)
         data = bytearray(path.read_bytes())
         bit = rng.randrange(8 * len(data))

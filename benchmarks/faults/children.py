@@ -23,10 +23,24 @@ U = TypeVar("U")
 UNEXPECTED = 99
 """Exit code of a child with an error that is not a GenDataError."""
 
-WRITING_CALLS = (
-    "mkdir openat write pwrite64 fsync fdatasync rename renameat renameat2 link linkat "
-    "unlink unlinkat rmdir ftruncate close"
-).split()
+WRITING_CALLS = [
+    "mkdir",
+    "openat",
+    "write",
+    "pwrite64",
+    "fsync",
+    "fdatasync",
+    "rename",
+    "renameat",
+    "renameat2",
+    "link",
+    "linkat",
+    "unlink",
+    "unlinkat",
+    "rmdir",
+    "ftruncate",
+    "close",
+]
 
 
 @dataclass(frozen=True)

@@ -106,9 +106,9 @@ def _try_all(scale: Scale, folder: Path, mutate: Callable[[random.Random], bytes
     ends: Counter[str] = Counter()
     slowest_s, largest_mb = 0.0, 0
     seeds = range(scale.seed, scale.seed + count)
-    for seed, (end, problem, seconds, megabytes) in zip(
-        seeds, spread(partial(_try, folder, mutate), seeds), strict=True
-    ):
+    outcomes = spread(partial(_try, folder, mutate), seeds)
+    for seed in result.until_end(scale, seeds):
+        end, problem, seconds, megabytes = next(outcomes)
         ends[end] += 1
         slowest_s, largest_mb = max(slowest_s, seconds), max(largest_mb, megabytes)
         result.add(not problem, f"seed {seed}: {problem}")
@@ -200,7 +200,7 @@ def _misspell(text: str, rng: random.Random) -> str:
 
 
 def _other_value_of(tree: Any, rng: random.Random) -> Any:
-    """A value from elsewhere, as after a wrong indentation; copied, since aliases are another case."""
+    """A copy of a value from elsewhere, as after a wrong indentation."""
     node = tree
     while isinstance(node, (dict, list)) and node and rng.random() < 0.7:
         node = node[rng.choice(list(node) if isinstance(node, dict) else range(len(node)))]
@@ -235,9 +235,10 @@ def _mutate_bytes(rng: random.Random) -> bytes:
 
 TOKENS = (
     b"{", b"}", b"[", b"]", b":", b": ", b"- ", b"\n", b"\n  ", b"\t", b"&a ", b"*a", b"!!", b"!x ",
-    b"%YAML 9.9\n", b"---\n", b"...\n", b"<<: ", b"? ", b"| ", b"> ", b"'", b'"', b"#", b",", b"\\",
-    b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\xed\xa0\x80", b"\x85", b"\xe2\x80\xa8", b"1e999", b".nan",
-    b"-.inf", b"0x_", b"1_000", b"9" * 400, b"null", b"~", b"[" * 40, b"{a: " * 40, b"&a [*a]", b"\r",
+    b"---\n", b"%YAML 9.9\n", b"...\n", b"<<: ", b"? ", b"| ", b"> ", b"'", b'"', b"#", b",", b"\\",
+    b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\xed\xa0\x80", b"\x85", b"\xe2\x80\xa8", b"1e999",
+    b".nan", b"-.inf", b"0x_", b"1_000", b"9" * 400, b"null", b"~",
+    b"[" * 40, b"{a: " * 40, b"&a [*a]",
+    b"\r",
 )  # fmt: skip
 """Syntax of YAML in wrong places."""
-

@@ -8,6 +8,7 @@ import random
 import shutil
 import signal
 import time
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -20,7 +21,6 @@ from benchmarks.faults.children import (
     fork_run,
     spread,
     trace,
-    wait,
     writing_calls,
 )
 from benchmarks.faults.recorded_run import (
@@ -62,9 +62,9 @@ def kills_at_calls(scale: Scale, folder: Path) -> Result:
     calls = writing_calls(folder)
     chosen = calls if scale.is_full else calls[:: max(1, len(calls) // 12)]
     result.notes.append(f"{len(calls)} writing system calls in a run of 3 shards")
-    for call, problem in zip(
-        chosen, spread(partial(_kill_at, folder, digest), chosen), strict=True
-    ):
+    problems = spread(partial(_kill_at, folder, digest), chosen)
+    for call in result.until_end(scale, chosen):
+        problem = next(problems)
         result.add(not problem, f"{call}: {problem}")
     return result
 
@@ -88,7 +88,9 @@ def errnos_at_calls(scale: Scale, folder: Path) -> Result:
     calls = [call for call in writing_calls(folder) if call.name != "close"]
     tasks = [(call, ERRNOS[k % len(ERRNOS)]) for k, call in enumerate(calls)]
     chosen = tasks if scale.is_full else tasks[:: max(1, len(tasks) // 12)]
-    for task, problem in zip(chosen, spread(partial(_fail_at, folder, digest), chosen), strict=True):
+    problems = spread(partial(_fail_at, folder, digest), chosen)
+    for task in result.until_end(scale, chosen):
+        problem = next(problems)
         result.add(not problem, f"{task}: {problem}")
     return result
 
@@ -122,7 +124,9 @@ def errnos_for_ever(scale: Scale, folder: Path) -> Result:
     chosen = tasks if scale.is_full else tasks[:: max(1, len(tasks) // 30)]
     result = Result(notes=[f"{count} operations, {len(ERRNOS)} errors"])
     result.skip("EINTR, short writes", "Python repeats these calls itself")
-    for task, problem in zip(chosen, spread(partial(_break_at, folder, digest), chosen), strict=True):
+    problems = spread(partial(_break_at, folder, digest), chosen)
+    for task in result.until_end(scale, chosen):
+        problem = next(problems)
         result.add(not problem, f"{task}: {problem}")
     return result
 
@@ -162,9 +166,9 @@ def crash_states(scale: Scale, folder: Path) -> Result:
     tasks = [(k % (count + 1), scale.seed + k) for k in range(states)]
     result = Result()
     kinds = set()
-    for task, (state, problem) in zip(
-        tasks, spread(partial(_cut_power_at, folder, digest), tasks), strict=True
-    ):
+    problems = spread(partial(_cut_power_at, folder, digest), tasks)
+    for task in result.until_end(scale, tasks):
+        state, problem = next(problems)
         kinds.add(state)
         result.add(not problem, f"operation {task[0]}, seed {task[1]}: {problem}")
     result.notes.append(f"{len(kinds)} different states at {count + 1} instants")
@@ -188,10 +192,8 @@ def _cut_power_at(folder: Path, digest: str, task: tuple[int, int]) -> tuple[str
     disk = FragileDisk(out, attic, fail_at=k)
     with pytest.MonkeyPatch.context() as patch:
         disk.install(patch)
-        try:
+        with suppress(Killed):
             record().make(out)
-        except Killed:
-            pass
         disk.cut_power(seed)
     state = tree_digest(out) if out.exists() else ""
     if not (out / "manifest.json").exists():
@@ -212,8 +214,9 @@ def kills_at_instants(scale: Scale, folder: Path) -> Result:
     plans = [[rng.uniform(0.0, 2.0)] for _ in range(early)]
     plans += [[rng.uniform(0.0, RUN_S), rng.uniform(0.0, RUN_S)] for _ in range(twice)]
     plans += [[rng.uniform(0.0, RUN_S)] for _ in range(late)]
+    rng.shuffle(plans)
     kills = 0
-    for number, instants_s in enumerate(plans):
+    for number, instants_s in enumerate(result.until_end(scale, plans)):
         out = folder / f"instants-{number}"
         problem = ""
         for instant_s in instants_s:
@@ -225,8 +228,8 @@ def kills_at_instants(scale: Scale, folder: Path) -> Result:
         result.add(not problem, f"{number}, {instants_s} s: {problem}")
         shutil.rmtree(out, ignore_errors=True)
     result.notes.append(
-        f"{kills} kills in {len(plans)} runs: {early} in the first 2 s, {twice} runs killed again "
-        "while they resumed"
+        f"{kills} kills; planned are {early} in the first 2 s, {twice} runs that are killed again "
+        f"while they resume, and {late} more"
     )
     result.skip("runs on Ray", "the tests of the Ray backend kill its nodes")
     return result

@@ -108,7 +108,7 @@ def environments(scale: Scale, folder: Path) -> Result:
     own = _generate(Environment(), folder / "own")
     digest = tree_digest(folder / "own/out")
     result.add(not own, f"own: {own}")
-    for number, name in enumerate(names):
+    for number, name in enumerate(result.until_end(scale, names)):
         environment = ENVIRONMENTS[name]
         if environment.needs and shutil.which(environment.needs) is None:
             result.skip(name, f"{environment.needs} is not installed")

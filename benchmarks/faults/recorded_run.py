@@ -1,6 +1,7 @@
 """A run of three shards that takes milliseconds: its samples are rendered once and replayed.
 
-Everything after the samples is the program's own: checks, images, labels, COCO files, commit, resumption, merging, seal.
+Everything after the samples is the program's own: checks, images, labels, COCO files, commit,
+resumption, merging, seal.
 """
 
 from __future__ import annotations
@@ -8,10 +9,9 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -100,7 +100,9 @@ class Slow:
 
     def __call__(self) -> Replay:
         """The pipeline."""
-        return _SlowReplay(self.replay.info, self.replay.exporters, self.replay.samples, self.delay_s)
+        return _SlowReplay(
+            self.replay.info, self.replay.exporters, self.replay.samples, self.delay_s
+        )
 
 
 @dataclass(frozen=True)
@@ -129,10 +131,7 @@ def record(n: int = N) -> Recording:
 
 def open_factory(n: int) -> PipelineFactory:
     """What makes pipelines of the tiny configuration."""
-    with warnings.catch_warnings():
-        # Its only split is not empty; others are.
-        warnings.simplefilter("ignore")
-        return PipelineFactory(load_config(CONFIG), n)
+    return PipelineFactory(load_config(CONFIG), n)
 
 
 def tree_digest(folder: Path) -> str:
@@ -164,6 +163,3 @@ def resumes_to(out: Path, digest: str) -> str:
     except GenDataError as error:
         return f"resuming failed: {error}"
     return "" if tree_digest(out) == digest else "the resumed data set has other bytes"
-
-
-__all__ = ["N", "Recording", "Replay", "record", "reference_digest", "replace", "resumes_to"]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from typing import TypeVar
 
 from rich.console import Console
 from rich.table import Table
 
+T = TypeVar("T")
 FAILURES_MAX = 10
 """Number of failures that a result keeps."""
 
@@ -19,10 +22,13 @@ class Scale:
     Attributes:
         is_full: Whether to make all attempts, instead of a sample of them.
         seed: Of drawn faults.
+        end_s: Instant of the monotonic clock at which a campaign stops, with the attempts that it
+            has made.
     """
 
     is_full: bool
     seed: int = 0
+    end_s: float = float("inf")
 
     def pick(self, full: int, quick: int) -> int:
         """Number of attempts."""
@@ -55,6 +61,14 @@ class Result:
         self.held += holds
         if not holds and len(self.failures) < FAILURES_MAX:
             self.failures.append(failure)
+
+    def until_end(self, scale: Scale, tasks: Sequence[T]) -> Iterator[T]:
+        """The tasks, until the time of the campaign is up; the others are stated as left out."""
+        for number, task in enumerate(tasks):
+            if time.monotonic() > scale.end_s:
+                self.skip(f"{len(tasks) - number} of {len(tasks)} attempts", "the time was up")
+                return
+            yield task
 
     def skip(self, what: str, reason: str) -> None:
         """State what is left out."""

@@ -20,7 +20,7 @@ Format = str | Mapping[str, Any]
 """Name of an exporter, or its entry of a configuration: ``{"type": "coco", "amodal": False}``."""
 
 
-def export(
+def export(  # noqa: PLR0913  (keywords of one front door)
     folder: str | PathLike[str],
     formats: Sequence[Format],
     out: str | PathLike[str],

@@ -285,7 +285,7 @@ def load_config(source: str, **changes: Unpack[Changes]) -> Config:
         ConfigError: the message lists all errors with their positions.
     """
     plan = Path(source) / PLAN
-    if not plan.is_file():
+    if not _is_file(plan):
         return _make_config(load_config_document(source), Path(source).stem, changes)
     try:
         kept = json.loads(plan.read_bytes())
@@ -293,6 +293,14 @@ def load_config(source: str, **changes: Unpack[Changes]) -> Config:
     except (ValueError, KeyError, TypeError, OSError) as error:
         raise ConfigError(f"{plan}: is not the plan of a data set: {error}") from error
     return parse_config(text, str(plan), name, **changes)
+
+
+def _is_file(path: Path) -> bool:
+    """Whether a path is a file; False for names that no file can have."""
+    try:
+        return path.is_file()
+    except OSError:
+        return False
 
 
 def parse_config(text: str, file: str, name: str, **changes: Unpack[Changes]) -> Config:

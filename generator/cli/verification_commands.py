@@ -61,15 +61,21 @@ def verify(
 ) -> None:
     """Check a data set."""
     from gen_data.generator.runner.deep_verify import choose_samples
-    from gen_data.generator.runner.verify import describe_findings, find_deviations, summarize
+    from gen_data.generator.runner.verify import (
+        describe_findings,
+        find_deviations,
+        scan_finished,
+        summarize,
+    )
 
     if semantic and regenerate is None:
         raise ConfigError("--semantic: needs --regenerate K, whose comparison it changes")
     found: list[Finding] = []
     notes: list[str] = []
     try:
-        report = summarize(folder, full or deep)
-        found = find_deviations(folder, full or deep)
+        contents = scan_finished(folder)
+        report = summarize(folder, full or deep, contents)
+        found = find_deviations(folder, full or deep, contents)
         # Damaged files would be reported once more by every further check.
         if not found and deep:
             found += _find_invalid(folder)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NoReturn
 
 from gen_data.generator.config.problems import Position, Problem
 from gen_data.generator.config.yaml_scalars import abbreviate
@@ -53,7 +52,7 @@ def find_path(
     except (OSError, RuntimeError) as error:
         # A name that is too long, a folder that may not be read, or the home of an unknown user.
         reason = error.strerror if isinstance(error, OSError) else str(error)
-        _refuse(position, field, f"'{abbreviate(name)}' is no {kind} ({reason})")
+        raise _error(position, field, f"'{abbreviate(name)}' is no {kind} ({reason})") from None
     by_name = {file.name: file for file in shipped}
     for known in (name, f"{name}.yaml"):
         if known in by_name and not _is_document(by_name[known], position):
@@ -63,11 +62,11 @@ def find_path(
     fact = f"there is no {kind} '{abbreviate(name)}'; looked for '{abbreviate(str(path), 300)}'"
     if by_name:
         fact += f"; shipped are {', '.join(by_name)}{did_you_mean(name, by_name)}"
-    _refuse(position, field, fact)
+    raise _error(position, field, fact)
 
 
-def _refuse(position: Position | None, field: str, fact: str) -> NoReturn:
-    raise ConfigError(str(Problem(position, field, fact)) if position else fact)
+def _error(position: Position | None, field: str, fact: str) -> ConfigError:
+    return ConfigError(str(Problem(position, field, fact)) if position else fact)
 
 
 def _base_folder(position: Position | None) -> Path:

@@ -97,6 +97,10 @@ def make_folder(path: Path) -> None:
         sync_path(folder.parent)
 
 
+Contents = tuple[dict[str, int], tuple[str, ...]]
+"""Sizes of files by path, and empty folders; see ``scan_tree``."""
+
+
 def tree_sizes(folder: Path, without: str = "") -> dict[str, int]:
     """``{path relative to folder: bytes}`` of its contents, sorted; empty if it does not exist.
 
@@ -106,19 +110,29 @@ def tree_sizes(folder: Path, without: str = "") -> dict[str, int]:
     return scan_tree(folder, without)[0]
 
 
-def scan_tree(folder: Path, without: str = "") -> tuple[dict[str, int], tuple[str, ...]]:
-    """``tree_sizes`` and ``empty_folders`` in one pass."""
+def scan_tree(folder: Path, without: str = "") -> Contents:
+    """``tree_sizes`` and ``empty_folders`` in one pass; nothing is said of unreadable folders."""
     sizes: dict[str, int] = {}
     empty: list[str] = []
-    for inner, folders, names in _walk(folder, without):
-        if not folders and not names and inner != str(folder):
-            empty.append(_prefix(inner, folder).rstrip("/"))
-        links = [name for name in folders if Path(inner, name).is_symlink()]
-        prefix = _prefix(inner, folder)
-        for name in (*names, *links):
-            status = os.lstat(f"{inner}/{name}")
-            regular = stat.S_ISREG(status.st_mode)
-            sizes[prefix + name] = status.st_size if regular else IRREGULAR
+    unread = [""]
+    while unread:
+        prefix = unread.pop()
+        try:
+            with os.scandir(f"{folder}/{prefix}") as listed:
+                entries = list(listed)
+        except OSError:
+            continue
+        for entry in entries:
+            if not prefix and entry.name == without and entry.is_dir():
+                continue
+            if entry.is_dir(follow_symlinks=False):
+                unread.append(f"{prefix}{entry.name}/")
+            else:
+                status = entry.stat(follow_symlinks=False)
+                regular = stat.S_ISREG(status.st_mode)
+                sizes[prefix + entry.name] = status.st_size if regular else IRREGULAR
+        if prefix and not entries:
+            empty.append(prefix.rstrip("/"))
     return dict(sorted(sizes.items())), tuple(sorted(empty))
 
 
@@ -128,18 +142,6 @@ def empty_folders(folder: Path, without: str = "") -> tuple[str, ...]:
     The folder named ``without`` directly in ``folder`` is left out.
     """
     return scan_tree(folder, without)[1]
-
-
-def _walk(folder: Path, without: str) -> Iterator[tuple[str, list[str], list[str]]]:
-    for inner, folders, names in os.walk(folder):
-        if without in folders and inner == str(folder):
-            folders.remove(without)
-        yield inner, folders, names
-
-
-def _prefix(inner: str, folder: Path) -> str:
-    """``inner`` relative to ``folder``, as the beginning of the paths of its entries."""
-    return "" if inner == str(folder) else inner[len(str(folder)) :].lstrip("/") + "/"
 
 
 def format_bytes(size: float) -> str:

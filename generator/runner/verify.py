@@ -14,11 +14,11 @@ from typing import Any
 from gen_data.generator.core.errors import StorageError, VerificationError
 from gen_data.generator.runner.durable_files import (
     IRREGULAR,
+    Contents,
     Inode,
     get_inode,
     hash_file,
     scan_tree,
-    tree_sizes,
 )
 from gen_data.generator.runner.plan import PLAN_NAME, Plan, load_plan
 from gen_data.generator.runner.seal import parse_object, read_or_empty, read_sums
@@ -92,15 +92,16 @@ def verify(folder: Path, full: bool = False) -> Report:
     Raises:
         VerificationError: the folder has no finished data set, or deviations, which it lists.
     """
-    report = summarize(folder, full)
-    found = find_deviations(folder, full)
+    contents = scan_finished(folder)
+    report = summarize(folder, full, contents)
+    found = find_deviations(folder, full, contents)
     if found:
         raise VerificationError(describe_findings(folder, found))
     return report
 
 
-def summarize(folder: Path, full: bool = False) -> Report:
-    """Sizes of a data set, with ``full`` as in ``verify``.
+def scan_finished(folder: Path) -> Contents:
+    """Files and empty folders of a data set, without ``run``.
 
     Raises:
         VerificationError: the folder has no finished data set.
@@ -110,7 +111,16 @@ def summarize(folder: Path, full: bool = False) -> Report:
             f"{folder}: not a finished data set: {MANIFEST_NAME} is missing. "
             "The command that started it finishes it."
         )
-    sizes = _actual_sizes(folder)
+    return scan_tree(folder, without=RUN_NAME)
+
+
+def summarize(folder: Path, full: bool = False, contents: Contents | None = None) -> Report:
+    """Sizes of a data set, with ``full`` as in ``verify``; ``contents`` saves a scan.
+
+    Raises:
+        VerificationError: the folder has no finished data set.
+    """
+    sizes, _ = contents or scan_finished(folder)
     manifest = parse_object(read_or_empty(folder / MANIFEST_NAME)) or {}
     identity, n = str(manifest.get("dataset_id", "")), manifest.get("n", 0)
     return Report(identity, n, len(sizes), sum(sizes.values()), full)
@@ -125,13 +135,15 @@ def describe_findings(folder: Path, found: Sequence[Finding]) -> str:
     return f"{folder}: {len(found)} deviation(s):\n{listed}{more}{remedy}"
 
 
-def find_deviations(folder: Path, full: bool = False) -> list[Finding]:
-    """Find all deviations, in order of discovery."""
+def find_deviations(
+    folder: Path, full: bool = False, contents: Contents | None = None
+) -> list[Finding]:
+    """Find all deviations, in order of discovery; ``contents`` saves a scan."""
     try:
         plan = load_plan(folder)
     except StorageError as error:
         return [Finding("inconsistent", PLAN_NAME, str(error).partition("\n")[0])]
-    return list(_Check(folder, plan).run(full))
+    return list(_Check(folder, plan, contents).run(full))
 
 
 def _is_manifest(value: Mapping[str, Any]) -> bool:
@@ -146,7 +158,8 @@ def _is_manifest(value: Mapping[str, Any]) -> bool:
 class _Check:
     """Comparison of the declared with the existing files of a data set."""
 
-    def __init__(self, folder: Path, plan: Plan) -> None:
+    def __init__(self, folder: Path, plan: Plan, contents: Contents | None) -> None:
+        self._contents = contents
         self._folder = folder
         self._plan = plan
         self._store = LocalStore(folder)
@@ -164,7 +177,7 @@ class _Check:
             return
         yield from self._read_sums(manifest, manifest_bytes)
         yield from self._read_sizes(manifest)
-        actual, empty = scan_tree(self._folder, without=RUN_NAME)
+        actual, empty = self._contents or scan_tree(self._folder, without=RUN_NAME)
         for path in sorted({*self._sums, *actual} - {SUMS_NAME}):
             yield from self._compare(path, actual.get(path), full)
         # Format version 1 does not say which folders are empty.
@@ -199,8 +212,9 @@ class _Check:
         if len(digests) != self._plan.shard_count:
             yield Finding("inconsistent", MANIFEST_NAME, "number of shards is not the plan's")
         for shard, digest in enumerate(digests[: self._plan.shard_count]):
-            path = self._relative(self._store.record_path(shard))
-            data = read_or_empty(self._store.record_path(shard))
+            place = self._store.record_path(shard)
+            path = f"{SHARDS_NAME}/{place.name}"
+            data = read_or_empty(place)
             record = parse_unchecked_record(data)
             if record is None or hashlib.sha256(data).hexdigest() != digest:
                 text = "its sha256 is not the one in the manifest" if data else "is missing"
@@ -215,7 +229,7 @@ class _Check:
                 self._sizes.setdefault(path, size)
 
     def _compare_record(self, shard: int, record: ShardRecord) -> Iterator[Finding]:
-        folder = self._relative(self._store.shard_dir(shard))
+        folder = f"{SHARDS_NAME}/{self._store.shard_dir(shard).name}"
         self._empty_folders.update(f"{folder}/{inner}" for inner in record.empty_folders)
         for file in record.files:
             path = f"{folder}/{file.path}"
@@ -253,10 +267,3 @@ class _Check:
             indices = self._plan.samples_of(int(shard[1]))
             return f"samples {indices.start} to {indices.stop - 1}"
         return ""
-
-    def _relative(self, path: Path) -> str:
-        return path.relative_to(self._folder).as_posix()
-
-
-def _actual_sizes(folder: Path) -> dict[str, int]:
-    return tree_sizes(folder, without=RUN_NAME)

@@ -310,7 +310,7 @@ def test_bytes_that_are_no_crate_file_are_refused(tmp_path: Path) -> None:
         ("half", "damaged or cut off"),
         ("noise", "damaged or cut off"),
         ("word", "its content is no USD"),
-        ("open", "syntax error at line 2"),
+        ("open", "syntax error at line 3"),
     ):
         with pytest.raises(AssetError, match=rf"unreadable USD.* \({cause}"):
             library.mesh(f"user/{name}")
