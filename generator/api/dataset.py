@@ -18,11 +18,12 @@ from gen_data.generator.api.config import ConfigLike, load_config
 from gen_data.generator.api.relabelling import LabelMapLike, RelabelledSamples, load_label_map
 from gen_data.generator.api.sample import Sample, SampleRecord
 from gen_data.generator.core.errors import ConfigError, SampleIndexError, did_you_mean
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.generator.runner.stored_objects import open_stored
 
 if TYPE_CHECKING:
     from gen_data.generator.core.capture import Channel
     from gen_data.generator.pipeline import Pipeline
+    from gen_data.generator.runner.stored import StoredSamples
 
 Self = TypeVar("Self", bound="SampleSequence")
 
@@ -277,7 +278,7 @@ class StoredDataset(SampleSequence):
     """Samples of a finished data set on disk."""
 
     def __init__(self, folder: str | PathLike[str]) -> None:
-        stored = StoredSamples(folder)
+        stored = open_stored(folder)
         super().__init__(ReadSamples(stored), range(stored.n))
         self.folder = stored.folder
 
@@ -287,9 +288,10 @@ class StoredDataset(SampleSequence):
 
 
 def open_dataset(folder: str | PathLike[str]) -> StoredDataset:
-    """Open a finished data set; its samples equal the generated ones.
+    """Open a finished data set in a folder or at a URL; its samples equal the generated ones.
 
     Colours, ids and labels are exact; other quantities have the resolution of their files.
+    Shards at a URL are copied to a cache in the user's cache folder when their samples are read.
 
     Raises:
         StorageError: the folder holds no finished data set.

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
-from os import PathLike
+from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gen_data.generator.api.config import ConfigLike, count_workers, load_config
 from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.urls import is_url
 
 if TYPE_CHECKING:
     from gen_data.generator.assemble.config import Config
     from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+    from gen_data.generator.runner.processes import Pool
     from gen_data.generator.runner.progress import RunProgress, Summary
+    from gen_data.generator.runner.ray_cluster import RayCluster
+    from gen_data.generator.runner.shard import Job
 
 
 def generate(  # noqa: PLR0913  (keywords of one front door)
@@ -30,6 +35,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     allow_mixed_numerics: bool = False,
     force: bool = False,
     shards: tuple[int, int] | None = None,
+    cluster: RayCluster | None = None,
     on_progress: Callable[[RunProgress], None] | None = None,
     resume_command: str = "the same call of gen_data.generate",
 ) -> Summary:
@@ -38,8 +44,9 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     Args:
         config: See ``Dataset``.
         n: Number of samples, at least 1.
-        out: Folder; None = ``out/<name of the configuration>``.
+        out: Folder, or URL such as ``s3://bucket/set``; None = ``out/<name of configuration>``.
         workers: Processes; None = one per core, 0 = this process. The bytes do not depend on it.
+            On a cluster, None = as many as its machines can hold when the run starts.
         seed: Replaces the configuration's seed.
         overrides: ``KEY=VALUE`` texts, as for ``gen-data --set``.
         without: Names of randomizers to leave out.
@@ -48,6 +55,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
         force: Start although the disk is probably too small.
         shards: First shard and the one after the last, for a part of the data set in a folder of
             its own; ``merge`` gathers the parts. None = all.
+        cluster: Ray cluster that generates the shards; None = processes of this machine.
         on_progress: Called after each sample and shard.
         resume_command: Command that error messages give for resuming.
 
@@ -62,31 +70,26 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     Warns:
         ConfigWarning: ``n`` is so small that a split of the configuration stays empty.
     """
-    from gen_data.generator.runner.store import LocalStore
-
-    if n < 1:
-        raise ConfigError(f"n: {n} samples cannot be made; expected at least 1")
+    _check_arguments(config, n, out, repair)
     processes = count_workers(workers)
-    LocalStore(_guess_folder(config, out)).check_unlocked()
     # Before the imports below, so that errors of a configuration come at once.
     loaded = load_config(config, seed=seed, overrides=overrides, without=without)
-
-    from threadpoolctl import threadpool_limits
 
     from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
     from gen_data.generator.config.paths import write_locations
     from gen_data.generator.runner.identity import format_licences, make_plan
     from gen_data.generator.runner.run import Settings, run
+    from gen_data.generator.runner.store import LocalStore
 
     factory = _make_factory(loaded, n)
     plan = make_plan(factory)
-    folder = Path(out) if out is not None else Path("out") / loaded.name
-    with threadpool_limits(limits=1):
+    folder = fspath(out) if out is not None else Path("out") / loaded.name
+    with _opened(cluster, workers, processes) as (open_pool, count):
         summary = run(
             plan,
             factory,
             folder,
-            workers=processes,
+            workers=count,
             resume_command=resume_command,
             licences=partial(format_licences, factory),
             settings=Settings(
@@ -94,14 +97,51 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
                 allow_mixed_numerics=allow_mixed_numerics,
                 sample_bytes=estimate_sample_bytes(loaded, factory.info),
                 is_forced=force,
+                open_pool=open_pool,
                 shards=None if shards is None else check_shards(shards, plan.shard_count),
             ),
             progress=on_progress,
         )
-    store = LocalStore(folder)
-    with store.errors():
-        write_locations(store.run_dir, loaded.asset_locations)
+    if not is_url(folder):
+        store = LocalStore(Path(folder))
+        with store.errors():
+            write_locations(store.run_dir, loaded.asset_locations)
     return summary
+
+
+@contextmanager
+def _opened(
+    cluster: RayCluster | None, workers: int | None, processes: int
+) -> Iterator[tuple[Callable[[Job], Pool], int]]:
+    """Opener of the pool of workers, and their number; ``processes`` are those of this machine."""
+    from threadpoolctl import threadpool_limits
+
+    from gen_data.generator.runner.processes import open_worker_pool
+
+    if cluster is not None and workers == 0:
+        raise ConfigError("workers: 0 on a cluster; expected at least 1, or no number")
+    with threadpool_limits(limits=1):
+        if cluster is None:
+            yield open_worker_pool, processes
+            return
+        with cluster.connected():
+            yield cluster.open_pool, workers or cluster.worker_count()
+
+
+def _check_arguments(
+    config: ConfigLike, n: int, out: str | PathLike[str] | None, repair: bool
+) -> None:
+    """Refuse a wrong number, repair at a URL, and a folder in which another run writes."""
+    from gen_data.generator.runner.object_store import open_store
+
+    if n < 1:
+        raise ConfigError(f"n: {n} samples cannot be made; expected at least 1")
+    if repair and out is not None and is_url(out):
+        raise ConfigError(
+            f"out: {fspath(out)} cannot be repaired in place; expected a folder: run the command "
+            "without repair, which replaces damaged shards, or repair a copy"
+        )
+    open_store(_guess_folder(config, out)).check_unlocked()
 
 
 def _make_factory(loaded: Config, n: int) -> PipelineFactory:
@@ -128,8 +168,8 @@ def check_shards(shards: tuple[int, int], count: int) -> range:
     return range(first, min(end, count))
 
 
-def _guess_folder(config: ConfigLike, out: str | PathLike[str] | None) -> Path:
+def _guess_folder(config: ConfigLike, out: str | PathLike[str] | None) -> str | PathLike[str]:
     """Folder of the data set, as far as it is known before the configuration is read."""
     if out is not None:
-        return Path(out)
+        return out
     return Path("out") / ("config" if isinstance(config, Mapping) else Path(config).stem)

@@ -6,7 +6,7 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import (
@@ -22,17 +22,21 @@ from gen_data.generator.api.generate import generate
 from gen_data.generator.cli.options import ConfigurationOptions
 from gen_data.generator.runner.run import RunProgress, Summary
 
+if TYPE_CHECKING:
+    from gen_data.generator.runner.ray_cluster import RayCluster
+
 
 def generate_with_progress(
     choice: ConfigurationOptions,
     n: int,
     *,
-    out: Path | None,
+    out: str | None,
     workers: int | None,
     repair: bool = False,
     allow_mixed_numerics: bool = False,
     force: bool = False,
     shards: tuple[int, int] | None = None,
+    cluster: RayCluster | None = None,
 ) -> None:
     """Generate samples 0 to n - 1, or the missing ones, and print a summary.
 
@@ -53,6 +57,7 @@ def generate_with_progress(
             allow_mixed_numerics=allow_mixed_numerics,
             force=force,
             shards=shards,
+            cluster=cluster,
             on_progress=show,
             resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
         )

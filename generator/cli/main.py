@@ -10,7 +10,6 @@ import sys
 import warnings
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import click
@@ -18,6 +17,8 @@ import click
 from gen_data.generator import __version__
 from gen_data.generator.cli.options import (
     ConfigurationOptions,
+    choose_cluster,
+    cluster_options,
     configuration_options,
     parse_shards,
 )
@@ -36,6 +37,12 @@ from gen_data.generator.core.errors import (
     is_out_of_memory,
 )
 from gen_data.generator.core.processes import SINGLE_THREADED
+from gen_data.generator.core.urls import is_url, needs_folder
+
+FOLDERS_ONLY = frozenset(
+    "contact-sheet diff export merge preview repair report repro rerender sample".split()  # noqa: SIM905
+)
+"""Commands that read no data set at a URL."""
 
 
 class LazyCommands(click.Group):
@@ -100,6 +107,20 @@ class LazyCommands(click.Group):
         command: click.Command = getattr(importlib.import_module(module), attribute)
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command; refuses URLs in the place of folders.
+
+        Raises:
+            ConfigError: the command reads or writes folders only.
+        """
+        name, command, rest = super().resolve_command(ctx, args)
+        urls = [argument for argument in rest if is_url(argument)]
+        if urls and name in FOLDERS_ONLY:
+            raise ConfigError(needs_folder(urls[0]))
+        return name, command, rest
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of commands without importing them."""
         del ctx
@@ -124,7 +145,7 @@ An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configu
 @click.option("--config", "-c", metavar="FILE", help="Configuration: a path, or a shipped name.")
 @click.option("--n", "-n", type=int, help="Number of samples.")
 @click.option(
-    "--out", "-o", type=click.Path(path_type=Path), help="Folder [default: out/<config>]."
+    "--out", "-o", metavar="FOLDER", help="Folder, or URL such as s3://... [default: out/<config>]."
 )
 @click.option("--workers", "-w", type=int, help="Worker processes [default: one per core].")
 @click.option("--repair", is_flag=True, help="Hash existing files first; restore damaged ones.")
@@ -140,19 +161,24 @@ An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configu
     metavar="A:B",
     help="Generate shards A to B - 1 only; see merge.",
 )
+@cluster_options
 @configuration_options
 @click.pass_context
 def cli(
     context: click.Context,
     config: str | None,
     n: int | None,
-    out: Path | None,
+    out: str | None,
     seed: int | None,
     workers: int | None,
     repair: bool,
     allow_mixed_numerics: bool,
     force: bool,
     shards: tuple[int, int] | None,
+    runner: str,
+    address: str | None,
+    cpus: float | None,
+    gpus: float | None,
     overrides: tuple[str, ...],
     without: tuple[str, ...],
 ) -> None:
@@ -181,6 +207,7 @@ def cli(
         allow_mixed_numerics=allow_mixed_numerics,
         force=force,
         shards=shards,
+        cluster=choose_cluster(runner, address, cpus, gpus),
     )
 
 
@@ -188,6 +215,8 @@ def main() -> None:
     """Run the command line and exit with its code."""
     for name in SINGLE_THREADED:
         os.environ[name] = "1"
+    # A cluster that a run starts reports nothing to anybody.
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     warnings.showwarning = partial(_show_warning, warnings.showwarning)
     code = _exit_code()
     if code == Interrupted.exit_code:

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from gen_data.generator.core.errors import ConfigError
+
 if TYPE_CHECKING:
     from gen_data.generator.assemble.config import Config
+    from gen_data.generator.runner.ray_cluster import RayCluster
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -63,3 +66,43 @@ def configuration_options(command: F) -> F:
     ):
         command = option(command)
     return command
+
+
+def cluster_options(command: F) -> F:
+    """Add ``--runner`` and the options of a Ray cluster to a command."""
+    for option in (
+        click.option("--gpus", type=float, help="GPUs per worker, such as 0.25 [default: 0]."),
+        click.option("--cpus", type=float, help="CPU cores per worker [default: 1]."),
+        click.option(
+            "--address",
+            metavar="ADDRESS",
+            help="Ray cluster: auto, or HOST:PORT [default: start one on this machine].",
+        ),
+        click.option(
+            "--runner",
+            type=click.Choice(["local", "ray"]),
+            default="local",
+            help="Processes of this machine, or workers on a Ray cluster.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def choose_cluster(
+    runner: str, address: str | None, cpus: float | None, gpus: float | None
+) -> RayCluster | None:
+    """The cluster that the options of ``cluster_options`` name; None = this machine.
+
+    Raises:
+        ConfigError: an option of a cluster without one, or one with a wrong value.
+    """
+    given = {"--address": address, "--cpus": cpus, "--gpus": gpus}
+    if runner != "ray":
+        extra = [name for name, value in given.items() if value is not None]
+        if extra:
+            raise ConfigError(f"{extra[0]} belongs to a cluster; expected --runner ray with it")
+        return None
+    from gen_data.generator.runner.ray_cluster import RayCluster
+
+    return RayCluster(address or "", 1.0 if cpus is None else cpus, gpus or 0.0)

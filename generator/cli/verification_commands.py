@@ -17,6 +17,7 @@ from gen_data.generator.core.errors import (
     GenDataError,
     VerificationError,
 )
+from gen_data.generator.core.urls import is_url
 
 if TYPE_CHECKING:
     from gen_data.generator.runner.verify import Finding
@@ -32,7 +33,7 @@ gen-data verify out/street --regenerate 20  20 random samples generated again
 
 
 @click.command(help=VERIFY_HELP)
-@click.argument("folder", type=click.Path(path_type=Path))
+@click.argument("place", metavar="FOLDER")
 @click.option("--full", is_flag=True, help="Hash every file, not only sizes.")
 @click.option("--deep", is_flag=True, help="Also decode every sample and check its labels.")
 @click.option(
@@ -51,7 +52,7 @@ gen-data verify out/street --regenerate 20  20 random samples generated again
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 def verify(
-    folder: Path,
+    place: str,
     full: bool,
     deep: bool,
     regenerate: int | None,
@@ -60,6 +61,39 @@ def verify(
     as_json: bool,
 ) -> None:
     """Check a data set."""
+    if not is_url(place):
+        _verify(Path(place), full, deep, regenerate, semantic, source, as_json)
+        return
+    from gen_data.generator.core.temporary_folders import temporary_folder
+    from gen_data.generator.runner.object_store import ObjectFolder, copy_outline
+
+    objects = ObjectFolder(place.rstrip("/"))
+    with temporary_folder("verify") as folder:
+        if full or deep or regenerate is not None:
+            objects.download({name: folder / name for name in objects.tree()})
+        else:
+            copy_outline(objects, folder)
+        try:
+            _verify(folder, full, deep, regenerate, semantic, source, as_json, place)
+        except VerificationError as error:
+            listed = str(error).partition("\n  Repair: ")[0].replace(str(folder), place)
+            raise VerificationError(
+                f"{listed}\n  The command that made the data set replaces damaged shards."
+            ) from None
+
+
+def _verify(
+    folder: Path,
+    full: bool,
+    deep: bool,
+    regenerate: int | None,
+    semantic: bool,
+    source: Path | None,
+    as_json: bool,
+    place: str = "",
+) -> None:
+    """Check a data set in a folder; ``place`` is its name in the result, empty = the folder."""
+    place = place or str(folder)
     from gen_data.generator.runner.deep_verify import choose_samples
     from gen_data.generator.runner.verify import (
         describe_findings,
@@ -90,15 +124,15 @@ def verify(
             raise VerificationError(describe_findings(folder, found))
     except GenDataError as error:
         if as_json:
-            _print_json({"folder": str(folder), "ok": False, "error": str(error)}, found)
+            _print_json({"folder": place, "ok": False, "error": str(error)}, found)
         raise
     if as_json:
         facts = {
             name: getattr(report, name) for name in ("dataset_id", "samples", "files", "bytes")
         }
-        _print_json({"folder": str(folder), "ok": True, **facts, "checks": notes}, found)
+        _print_json({"folder": place, "ok": True, **facts, "checks": notes}, found)
     else:
-        click.echo(f"{folder}: {'; '.join([str(report), *notes])}")
+        click.echo(f"{place}: {'; '.join([str(report), *notes])}")
 
 
 def _find_invalid(folder: Path) -> list[Finding]:

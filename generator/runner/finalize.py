@@ -69,8 +69,9 @@ def finalize(
     """
     with store.errors():
         records = _all_records(plan, store)
-        known = _inodes(store, records)
         names = sorted(pipeline.exporters)
+        # Only exporters link files of shards; without any, the files may be elsewhere.
+        known = _inodes(store, records) if names else {}
         for name in names:
             with explain_errors(f"exporter {name}, merging"), store.errors():
                 _merge(plan, store, pipeline, name, known)

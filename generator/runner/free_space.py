@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from gen_data.generator.core.errors import StorageError
-from gen_data.generator.runner.durable_files import format_bytes, free_bytes
+from gen_data.generator.runner.durable_files import format_bytes
 
 if TYPE_CHECKING:
     from gen_data.generator.runner.store import LocalStore
@@ -65,4 +65,4 @@ class SpaceCheck:
 
     def _free_bytes(self) -> int:
         with self.store.errors():
-            return free_bytes(self.store.root)
+            return self.store.free_bytes()

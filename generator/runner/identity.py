@@ -67,6 +67,16 @@ def make_plan(factory: PipelineFactory) -> Plan:
     )
 
 
+def installation_differences(plan: Plan) -> list[str]:
+    """Packages whose release here is not that of the plan, one line each; none if all are equal."""
+    here = {"gen-data": __version__, **{name: _release(name) for name in BYTES_DEPEND_ON.values()}}
+    return [
+        f"{name}: {wanted} expected, {here[name]} here"
+        for name, wanted in plan.versions.items()
+        if name in here and here[name] != wanted
+    ]
+
+
 def format_licences(factory: PipelineFactory, used: Sequence[str]) -> str:
     """Markdown table of the assets with these ids, grouped by source."""
     library = open_library(factory.config.asset_folders)

@@ -7,7 +7,6 @@ the data set: its identity is what was generated, not where.
 from __future__ import annotations
 
 import json
-import os
 import platform
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,7 +14,8 @@ from typing import TYPE_CHECKING
 
 from gen_data.generator.core.errors import NumericsError
 from gen_data.generator.core.serialization import canonical_json
-from gen_data.generator.runner.durable_files import sync_path, write_durably
+from gen_data.generator.runner.durable_files import write_durably
+from gen_data.generator.runner.seal import read_or_empty
 
 if TYPE_CHECKING:
     from gen_data.generator.runner.shard import Job, PipelineLike
@@ -37,16 +37,15 @@ def admit_numerics(job: Job, pipeline: PipelineLike) -> None:
         return
     digests: Mapping[str, str] = compute()
     entry = {"digests": dict(digests), "machine": platform.machine(), "processor": processor_name()}
-    path = job.store.run_dir / NUMERICS_NAME
+    line = (canonical_json(entry) + "\n").encode()
     with job.store.errors():
-        _record_first(path, entry, job.store.scratch_dir())
-        known = _read(path)
+        job.store.create_run_file(NUMERICS_NAME, line)
+        known = _parse(job.store.read_run_file(NUMERICS_NAME))
         if not known or any(dict(digests) == one.get("digests") for one in known):
             return
         if not job.allow_mixed_numerics:
             raise NumericsError(_describe(known[0], entry))
-        with path.open("a", encoding="utf-8") as file:
-            file.write(canonical_json(entry) + "\n")
+        job.store.append_run_file(NUMERICS_NAME, line)
 
 
 def gather_numerics(run_dirs: Sequence[Path], store: LocalStore, allow_mixed: bool) -> None:
@@ -57,7 +56,7 @@ def gather_numerics(run_dirs: Sequence[Path], store: LocalStore, allow_mixed: bo
     """
     classes: dict[str, dict[str, object]] = {}
     for folder in run_dirs:
-        for entry in _read(folder / NUMERICS_NAME):
+        for entry in _parse(read_or_empty(folder / NUMERICS_NAME)):
             classes.setdefault(canonical_json(entry.get("digests")), entry)
     entries = list(classes.values())
     if len(entries) > 1 and not allow_mixed:
@@ -77,25 +76,11 @@ def processor_name() -> str:
     return next((line.partition(": ")[2] for line in lines if line.startswith("model name")), "")
 
 
-def _record_first(path: Path, entry: Mapping[str, object], scratch: Path) -> None:
-    """Write the entry, unless there is one: of several workers, the first one wins."""
-    if path.exists():
-        return
-    unfinished = scratch / path.name
-    unfinished.write_text(canonical_json(entry) + "\n", encoding="utf-8")
-    sync_path(unfinished)
-    try:
-        os.link(unfinished, path)
-    except FileExistsError:
-        return
-    sync_path(path.parent)
-
-
-def _read(path: Path) -> list[dict[str, object]]:
+def _parse(data: bytes) -> list[dict[str, object]]:
     """Entries of the file; none if it is damaged, as it guards nothing then."""
     try:
-        rows = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-    except (OSError, ValueError):
+        rows = [json.loads(line) for line in data.decode().splitlines()]
+    except ValueError:
         return []
     return [row for row in rows if isinstance(row, dict)]
 

@@ -21,6 +21,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
+from typing import Protocol
 
 from gen_data.generator.core.errors import GenDataError
 from gen_data.generator.core.processes import SINGLE_THREADED, interrupts_blocked
@@ -69,6 +70,26 @@ class _Child:
                 yield self.connection.recv()
         except (EOFError, OSError):
             self.connected = False
+
+
+class Pool(Protocol):
+    """Workers of one run. A context manager: leaves no worker behind."""
+
+    def __enter__(self) -> Pool:
+        """Start without workers."""
+        ...
+
+    def __exit__(self, *exception: object) -> None:
+        """End the remaining workers."""
+        ...
+
+    def execute(self, action: Action) -> None:
+        """Execute one action; actions on a worker that has ended do nothing."""
+        ...
+
+    def events(self, wake_fd: int, timeout_s: float) -> Iterator[Event]:
+        """Wait for an event, ``wake_fd`` or the timeout; yield all events since the last call."""
+        ...
 
 
 class WorkerPool:
@@ -154,14 +175,20 @@ class WorkerPool:
         return Exited(number, exit_code, out_of_memory)
 
 
+def open_worker_pool(job: Job) -> Pool:
+    """Open a pool of processes on this machine."""
+    return WorkerPool(job, job.store.run_dir)
+
+
 def run_supervisor(
     job: Job,
+    open_pool: Callable[[Job], Pool],
     supervisor: Supervisor,
     interruption: Interruption,
     observe: Callable[[Event | Action], GenDataError | None],
     clock: Callable[[], float] = time.monotonic,
 ) -> None:
-    """Run the supervisor with real processes until it is finished.
+    """Run the supervisor with real workers until it is finished.
 
     ``observe`` receives every event and action; an error that it returns aborts the run. Returns
     ``JOIN_S`` after an interruption at the latest, even if a process cannot be killed.
@@ -177,7 +204,7 @@ def run_supervisor(
             with job.store.errors():
                 pool.execute(action)
 
-    with WorkerPool(job, job.store.run_dir) as pool:
+    with open_pool(job) as pool:
         execute(supervisor.start(clock()))
         while not supervisor.finished and clock() < deadline_s:
             for event in pool.events(interruption.wake_fd, TICK_S):

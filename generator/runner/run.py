@@ -13,8 +13,9 @@ from gen_data.generator.core.sample import Sample
 from gen_data.generator.runner.finalize import LicencesOf, finalize
 from gen_data.generator.runner.free_space import SpaceCheck
 from gen_data.generator.runner.numerics_guard import admit_numerics
+from gen_data.generator.runner.object_store import open_store
 from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
-from gen_data.generator.runner.processes import run_supervisor
+from gen_data.generator.runner.processes import Pool, open_worker_pool, run_supervisor
 from gen_data.generator.runner.progress import RunMonitor, RunProgress, Summary
 from gen_data.generator.runner.repair import quarantine_extra, restore_plan
 from gen_data.generator.runner.seal import SealedBefore, read_or_empty, read_seal
@@ -32,7 +33,6 @@ from gen_data.generator.runner.shard import (
 from gen_data.generator.runner.store import FolderState, LocalStore, Scan
 from gen_data.generator.runner.supervisor import Limits, Supervisor
 from gen_data.generator.runner.termination_signals import Interruption
-from gen_data.generator.runner.verify import find_deviations
 from gen_data.generator.runner.worker import done_event
 from gen_data.generator.runner.worker_events import SampleDone
 
@@ -57,6 +57,7 @@ class Settings:
         shards: Range of shards to generate; the data set stays unfinished while others are
             missing. None = all.
         limits: Limits on silence, deaths and memory of workers.
+        open_pool: Opens the pool of workers: processes of this machine, or a cluster.
         allow_mixed_numerics, write_media, write_records, linked_digests: See ``Job``; picklable.
     """
 
@@ -67,6 +68,7 @@ class Settings:
     linked_bytes: float = 0.0
     shards: range | None = None
     limits: Limits = field(default_factory=Limits)
+    open_pool: Callable[[Job], Pool] = open_worker_pool
     write_media: MediaWriter = write_images
     write_records: RecordWriter = write_records
     linked_digests: LinkedDigests = no_digests
@@ -79,7 +81,7 @@ def _silent(progress: RunProgress) -> None:
 def run(  # noqa: PLR0913  (every argument is the choice of the caller)
     plan: Plan,
     make_pipeline: Callable[[], EnteredPipeline],
-    out: Path,
+    out: Path | str,
     *,
     workers: int,
     resume_command: str,
@@ -91,7 +93,7 @@ def run(  # noqa: PLR0913  (every argument is the choice of the caller)
 
     Args:
         plan: The identity of the data set.
-        out: Its folder: absent, empty, or started with an equal plan.
+        out: Its folder, or a URL of object storage: absent, empty, or started with an equal plan.
         make_pipeline: Makes the same pipeline in any process; picklable unless ``workers`` is 0.
         workers: Processes that generate shards; 0 generates them in this process, for debugging.
         resume_command: Command that error messages give for resuming.
@@ -108,7 +110,7 @@ def run(  # noqa: PLR0913  (every argument is the choice of the caller)
         Interrupted: Ctrl-C or SIGTERM; committed shards stay.
     """
     settings = settings or Settings()
-    store = LocalStore(Path(out).absolute(), resume_command)
+    store = open_store(out, resume_command)
     message = f"finished shards are kept; resume with:\n    {resume_command}"
     with Interruption(message) as interruption:
         with interruption.immediate(), store.errors():
@@ -153,7 +155,7 @@ class _Run:
                 if state is FolderState.NEW:
                     self._space.before_start(self._count(range(plan.shard_count)))
                 finished = state is FolderState.FINISHED
-                if finished and self._is_intact():
+                if finished and store.is_intact(extra_matters=self.settings.repair):
                     return self._summarize_finished()
                 sealed_before = _read_seal(store, plan)
             store.prepare(plan)
@@ -174,7 +176,9 @@ class _Run:
             with self.interruption.immediate():
                 monitor.show("merging")
                 pipeline = self.job.make_pipeline()
+                store.fetch_shards(plan, with_files=bool(pipeline.exporters))
                 dataset_id = finalize(plan, store, pipeline, licences, sealed_before)
+                store.publish()
                 if self.settings.repair:
                     quarantine_extra(store)
         finally:
@@ -213,7 +217,8 @@ class _Run:
             describe_sample=self.job.store.reproduce_command,
             limits=self.settings.limits,
         )
-        run_supervisor(self.job, supervisor, self.interruption, monitor.observe)
+        open_pool = self.settings.open_pool
+        run_supervisor(self.job, open_pool, supervisor, self.interruption, monitor.observe)
         monitor.worker_deaths = supervisor.deaths
         if supervisor.error is not None:
             raise supervisor.error
@@ -246,15 +251,8 @@ class _Run:
                 if objection is not None:
                     raise objection
 
-    def _is_intact(self) -> bool:
-        """Whether a finished data set is undamaged; additional files matter to repair only."""
-        found = find_deviations(self.job.store.root, full=True)
-        return not found or (
-            not self.settings.repair and all(finding.kind == "extra" for finding in found)
-        )
-
     def _summarize_finished(self) -> Summary:
-        manifest = json.loads(self.job.store.manifest_path.read_bytes())
+        manifest = json.loads(self.job.store.read_manifest())
         return Summary(
             dataset_id=manifest["dataset_id"],
             samples=self.job.plan.n,

@@ -32,6 +32,7 @@ from pathlib import Path
 from gen_data.generator.core.errors import ConfigError, DeterminismError, StorageError
 from gen_data.generator.runner.durable_files import (
     Inode,
+    free_bytes,
     hash_file,
     make_folder,
     move_durably,
@@ -135,6 +136,58 @@ class LocalStore:
     def record_path(self, shard: int) -> Path:
         """Path of the record of a committed shard."""
         return self._shards_dir / f"{shard:06d}.json"
+
+    @property
+    def place(self) -> str:
+        """The data set's place in messages."""
+        return str(self.root)
+
+    def free_bytes(self) -> int:
+        """Free space for shards."""
+        return free_bytes(self.root)
+
+    def fetch_shards(self, plan: Plan, with_files: bool) -> None:
+        """Make records, and files if wanted, of all shards available in ``root``: they are."""
+
+    def publish(self) -> None:
+        """Put the merged and sealed data set in its place: it is there."""
+
+    def is_intact(self, extra_matters: bool) -> bool:
+        """Whether a finished data set is undamaged, with or without additional files."""
+        from gen_data.generator.runner.verify import find_deviations
+
+        found = find_deviations(self.root, full=True)
+        return not found or (
+            not extra_matters and all(finding.kind == "extra" for finding in found)
+        )
+
+    def read_manifest(self) -> bytes:
+        """The bytes of the manifest of a finished data set."""
+        return self.manifest_path.read_bytes()
+
+    def read_run_file(self, name: str) -> bytes:
+        """The bytes of a file about the run; none if it does not exist."""
+        path = self.run_dir / name
+        return path.read_bytes() if path.is_file() else b""
+
+    def create_run_file(self, name: str, data: bytes) -> None:
+        """Write a file about the run, unless there is one: of several workers, the first wins."""
+        path = self.run_dir / name
+        if path.exists():
+            return
+        unfinished = self.scratch_dir() / name
+        unfinished.write_bytes(data)
+        sync_path(unfinished)
+        try:
+            os.link(unfinished, path)
+        except FileExistsError:
+            return
+        sync_path(path.parent)
+
+    def append_run_file(self, name: str, data: bytes) -> None:
+        """Append to a file about the run."""
+        with (self.run_dir / name).open("ab") as file:
+            file.write(data)
 
     def has_shards(self) -> bool:
         """Whether the folder of shards exists."""
@@ -376,25 +429,29 @@ class LocalStore:
             if path.exists() and not path.is_dir():
                 raise StorageError(f"{path}: is not a folder; {REMEDY}")
 
+    def _stored_plan(self) -> Plan:
+        """The plan of the data set in its place."""
+        return load_plan(self.root)
+
     def _check_plan(self, plan: Plan) -> bool:
         """Compare with the plan of the folder; return whether this one only has more samples.
 
         A data set may grow, as its samples do not depend on their number.
         """
-        old = load_plan(self.root)
+        old = self._stored_plan()
         differences = compare_plans(old, plan)
         if len(differences) == 1 and plan.n != old.n:
             if plan.n > old.n:
                 return True
             raise StorageError(
-                f"{self.root}: holds {old.n} samples; nothing was changed. Expected --n {old.n} or "
-                "more, which extends the data set; or choose another folder with --out."
+                f"{self.place}: holds {old.n} samples; nothing was changed. Expected --n "
+                f"{old.n} or more, which extends the data set; or choose another folder with --out."
             )
         if differences:
             listed = "\n".join(f"  {line}" for line in differences[:20])
             more = f"\n  and {len(differences) - 20} more" if len(differences) > 20 else ""
             raise StorageError(
-                f"{self.root}: holds a data set of another plan; nothing was changed:\n"
+                f"{self.place}: holds a data set of another plan; nothing was changed:\n"
                 f"{listed}{more}\n"
                 "  Choose another folder with --out, or use the old configuration."
             )

@@ -26,6 +26,7 @@ from gen_data.generator.core.interfaces import DatasetInfo, cloud_path, table_pa
 from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import from_plain
+from gen_data.generator.core.urls import is_url, needs_folder
 from gen_data.generator.runner.labels import LABELS_NAME, Labels, parse_labels
 from gen_data.generator.runner.plan import DAMAGE, load_plan
 from gen_data.generator.runner.provenance import SCENES_NAME, KeptScene, parse_scene
@@ -70,6 +71,8 @@ class StoredSamples:
     """
 
     def __init__(self, folder: str | PathLike[str]) -> None:
+        if is_url(folder):
+            raise StorageError(needs_folder(folder))
         self.folder = Path(folder)
         self.plan = load_plan(self.folder)
         manifest = self._read_manifest()

@@ -29,6 +29,7 @@ from gen_data.generator.runner.worker_events import (
     Failed,
     Kill,
     Note,
+    Queued,
     SampleDone,
     ShardDone,
     Spawn,
@@ -45,6 +46,7 @@ class Limits:
         start_s: The same for the start of its engines, in which kernels may be compiled.
         farewell_s: Time that a dismissed worker has to exit.
         shard_attempts: Deaths on one shard until it is abandoned.
+        machine_losses: Machines lost while they worked on one shard until it is abandoned.
         lost_shards: Abandoned shards until the run is abandoned.
         failed_starts: Consecutive deaths during start until the run is abandoned.
         rss_bytes: Memory at which a worker is replaced after its shard; None = never.
@@ -54,6 +56,7 @@ class Limits:
     start_s: float = 300.0
     farewell_s: float = 10.0
     shard_attempts: int = 3
+    machine_losses: int = 10
     lost_shards: int = 3
     failed_starts: int = 3
     rss_bytes: int | None = None
@@ -108,6 +111,7 @@ class Supervisor:
         self._cursor = 0
         self._again: deque[int] = deque()
         self._deaths: dict[int, int] = {}
+        self._losses: dict[int, int] = {}
         self._failed_starts = 0
         self._draining = False
 
@@ -127,6 +131,10 @@ class Supervisor:
 
     def handle(self, event: Event, now_s: float) -> list[Action]:
         """Return the actions for an event; events of processes that have ended are ignored."""
+        if isinstance(event, (SampleDone, Queued)):
+            # The most frequent events, which change no state: a thousand workers send many.
+            self._hear(event, now_s)
+            return []
         actions = self._react(event, now_s)
         return actions + self._dispatch(now_s)
 
@@ -143,14 +151,19 @@ class Supervisor:
             return self._on_exit(event, self._alive.pop(event.worker))
         if isinstance(event, Failed):
             return self._report(event.error, worker)
-        if isinstance(event, SampleDone):
-            worker.done += 1
-        elif worker.state is not State.LEAVING:
+        if worker.state is not State.LEAVING:
             worker.state = State.LEAVING if worker.killed else State.IDLE
             self._failed_starts = 0
         if isinstance(event, ShardDone):
             return self._recycle(event, worker)
         return []
+
+    def _hear(self, event: SampleDone | Queued, now_s: float) -> None:
+        """Note a sign of life."""
+        worker = self._alive.get(event.worker)
+        if worker is not None:
+            worker.heard_s = now_s
+            worker.done += isinstance(event, SampleDone)
 
     def _dispatch(self, now_s: float) -> list[Action]:
         """Assign shards to idle workers, start missing workers, dismiss superfluous ones."""
@@ -248,8 +261,8 @@ class Supervisor:
             self.workers -= 1
             cause += f"; continuing with {self.workers} worker(s)"
         if worker.state is State.BUSY:
-            return self._on_shard_death(event.worker, worker, cause)
-        if worker.state is State.STARTING:
+            return self._on_shard_death(event, worker, cause)
+        if worker.state is State.STARTING and not event.machine_lost:
             self._failed_starts += 1
             if self._failed_starts >= self.limits.failed_starts:
                 self._drain(
@@ -260,17 +273,19 @@ class Supervisor:
                 )
         return [Note(f"worker {event.worker} {cause} while {worker.state.value}")]
 
-    def _on_shard_death(self, number: int, worker: _Worker, cause: str) -> list[Action]:
+    def _on_shard_death(self, event: Exited, worker: _Worker, cause: str) -> list[Action]:
         shard = worker.shard
-        self._deaths[shard] = self._deaths.get(shard, 0) + 1
+        counts = self._losses if event.machine_lost else self._deaths
+        most = self.limits.machine_losses if event.machine_lost else self.limits.shard_attempts
+        counts[shard] = counts.get(shard, 0) + 1
         place = self._in_flight(worker)
-        note = Note(f"worker {number} {cause}; shard {shard}, {place}")
-        if self._deaths[shard] < self.limits.shard_attempts:
+        note = Note(f"worker {event.worker} {cause}; shard {shard}, {place}")
+        if counts[shard] < most:
             self._again.append(shard)
             return [note]
         self.given_up.append(shard)
         lost = WorkerLost(
-            f"shard {shard}: its worker process died {self._deaths[shard]} times, "
+            f"shard {shard}: its worker process died {counts[shard]} times, "
             f"at last in {place}: {cause}.\n"
             f"  Reproduce: {self.describe_sample(self._suspect(worker))}"
         )
@@ -299,6 +314,8 @@ class Supervisor:
 
 def describe_exit(event: Exited) -> str:
     """Describe the end of a process."""
+    if event.cause:
+        return event.cause
     if event.exit_code >= 0:
         return f"exited with status {event.exit_code}"
     number = -event.exit_code

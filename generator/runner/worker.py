@@ -115,7 +115,7 @@ def _make_shards(number: int, connection: Connection, job: Job) -> None:
         connection.send(Ready(number, tuple(notices)))
         while (shard := connection.recv()) is not None:
             _make_shard(number, connection, job, pipeline, shard)
-            _release_memory()
+            release_memory()
 
 
 def _show_warning(
@@ -168,7 +168,7 @@ def resident_bytes() -> int:
     return pages * resource.getpagesize()
 
 
-def _release_memory() -> None:
+def release_memory() -> None:
     """Return freed memory to the system; glibc keeps the gaps between cached arrays otherwise."""
     gc.collect()
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)

@@ -10,6 +10,13 @@ from gen_data.generator.core.errors import GenDataError
 
 
 @dataclass(frozen=True, slots=True)
+class Queued:
+    """A worker waits for a machine, as on a cluster that is full or still growing."""
+
+    worker: int
+
+
+@dataclass(frozen=True, slots=True)
 class Ready:
     """The engines of a worker have started; it waits for a shard.
 
@@ -65,11 +72,15 @@ class Exited:
     Attributes:
         exit_code: As of ``subprocess``: negative = killed by that signal.
         out_of_memory: The kernel killed some process for lack of memory at that time.
+        cause: Description of its end where there is no exit code, as on another machine.
+        machine_lost: Its machine is gone, so that its shard is not to blame.
     """
 
     worker: int
     exit_code: int
     out_of_memory: bool = False
+    cause: str = ""
+    machine_lost: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +95,7 @@ class Abort:
     error: GenDataError
 
 
-Event: TypeAlias = Ready | SampleDone | ShardDone | Failed | Exited | Tick | Abort
+Event: TypeAlias = Queued | Ready | SampleDone | ShardDone | Failed | Exited | Tick | Abort
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,9 +15,11 @@ from tests.architecture.test_rules import OURS, ROOT, python_files
 
 BYTES_DO_NOT_DEPEND_ON = {
     "click": "parses the command line",
+    "fsspec": "copies finished files",
     "platformdirs": "names the folders of caches",
     "pydantic": "checks values; the checked configuration is part of the plan",
     "pydantic_core": "the same",
+    "ray": "starts workers on other machines, which run the same code",
     "rerun_cli": "shows samples",
     "rich": "draws progress on the terminal",
     "threadpoolctl": "limits BLAS to one thread, as workers do",

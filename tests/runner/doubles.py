@@ -209,7 +209,7 @@ def fake_plan(n: int = 10, shard_size: int = 4, **changes: object) -> Plan:
 
 
 def make(
-    out: Path,
+    out: Path | str,
     n: int = 10,
     shard_size: int = 4,
     *,

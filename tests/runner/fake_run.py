@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import os
 import sys
-from pathlib import Path
 
 from gen_data.generator.core.errors import GenDataError
 from tests.runner.doubles import Trouble, make
@@ -20,7 +19,7 @@ DELAY_S = 0.04
 
 def main() -> int:
     """Run, and report like the command line does."""
-    out, workers, delay_s = Path(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
+    out, workers, delay_s = sys.argv[1], int(sys.argv[2]), float(sys.argv[3])
     # Random bytes do not compress: the job is at least as large as they are.
     ballast = os.urandom(int(sys.argv[4])) if len(sys.argv) > 4 else b""
     trouble = Trouble(delay_s=delay_s, ballast=ballast)

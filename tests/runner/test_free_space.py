@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gen_data.generator.core.errors import StorageError
-from gen_data.generator.runner import free_space
+from gen_data.generator.runner import store
 from gen_data.generator.runner.free_space import RESERVE_BYTES, SpaceCheck
 from gen_data.generator.runner.run import Settings
 from gen_data.generator.runner.store import LocalStore
@@ -19,7 +19,7 @@ FREE_BYTES = 8_000_000
 
 @pytest.fixture(autouse=True)
 def _disk(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(free_space, "free_bytes", lambda path: FREE_BYTES)
+    monkeypatch.setattr(store, "free_bytes", lambda path: FREE_BYTES)
 
 
 def estimated(sample_bytes: float, *, force: bool = False) -> Settings:
@@ -64,7 +64,7 @@ def test_a_run_ends_before_the_last_byte_of_the_disk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Even with --force: the log of the run needs space."""
-    monkeypatch.setattr(free_space, "free_bytes", lambda path: RESERVE_BYTES - 1)
+    monkeypatch.setattr(store, "free_bytes", lambda path: RESERVE_BYTES - 1)
     check = SpaceCheck(LocalStore(tmp_path, "again"), 1.0, is_forced=True)
 
     assert "65.5 kB are free; stopped before the disk is full" in str(check.after_shard(100.0, 5))

@@ -619,7 +619,7 @@ def test_a_run_that_will_not_fit_stops_after_its_first_shard(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """6 of 10 samples to go at about 1.2 kB each: 2 kB free are not enough, the shard stays."""
-    monkeypatch.setattr("gen_data.generator.runner.free_space.free_bytes", lambda path: 2_000)
+    monkeypatch.setattr("gen_data.generator.runner.store.free_bytes", lambda path: 2_000)
 
     with pytest.raises(StorageError, match="other 6 samples need about") as caught:
         make(tmp_path / "out")

@@ -1,0 +1,452 @@
+"""Storage of a data set at a URL: S3, Google Cloud Storage, Azure Blob Storage, by ``fsspec``.
+
+The layout is that of a folder. An object appears as a whole or not at all, so that a shard is
+committed by single PUTs of its files and then of its record; the manifest comes last. Shards and
+merged files are staged in a local folder, from which they vanish once they are stored.
+
+Runs on several machines may write to one URL at the same time: a shard that two of them make has
+the same bytes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from collections.abc import Container, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+from gen_data.generator.core.errors import ConfigError, GenDataError, StorageError
+from gen_data.generator.core.urls import is_url
+from gen_data.generator.runner.durable_files import (
+    Inode,
+    format_bytes,
+    free_bytes,
+    get_inode,
+    hash_file,
+    make_folder,
+    tree_sizes,
+)
+from gen_data.generator.runner.plan import PLAN_NAME, Plan, parse_plan, plan_bytes
+from gen_data.generator.runner.seal import parse_object
+from gen_data.generator.runner.shard_record import ShardRecord, parse_record
+from gen_data.generator.runner.store import (
+    MANIFEST_NAME,
+    RUN_NAME,
+    SHARDS_NAME,
+    SUMS_NAME,
+    FolderState,
+    LocalStore,
+    Scan,
+)
+
+BATCH = 1000
+"""Number of objects that one request to ``fsspec`` reads or writes."""
+
+
+def open_store(out: str | PathLike[str], resume_command: str = "") -> LocalStore:
+    """Open the storage of a data set: a folder, or a URL."""
+    if not is_url(out):
+        return LocalStore(Path(out).absolute(), resume_command)
+    import platformdirs
+
+    url = fspath(out).rstrip("/")
+    name = hashlib.sha256(url.encode()).hexdigest()[:16]
+    root = Path(platformdirs.user_cache_path("gen-data")) / "staging" / name
+    return ObjectStore(root, resume_command, ObjectFolder(url))
+
+
+@dataclass(frozen=True)
+class ObjectFolder:
+    """Objects whose names begin with the path of a URL; picklable.
+
+    Attributes:
+        url: Without a slash at its end.
+    """
+
+    url: str
+
+    @cached_property
+    def _opened(self) -> tuple[Any, str]:
+        """The file system of ``fsspec``, and the path of the folder in it."""
+        try:
+            from fsspec.core import url_to_fs
+
+            opened: tuple[Any, str] = url_to_fs(self.url)
+        except (ImportError, ValueError) as error:
+            raise ConfigError(
+                f"{self.url}: cannot be opened ({error}); expected s3://, gs://, az:// or another "
+                "URL of fsspec, and its library: pip install 'gen-data[cloud]' for s3://, "
+                "gcsfs for gs://, adlfs for az://"
+            ) from None
+        return opened
+
+    def __getstate__(self) -> dict[str, str]:
+        """Pickle the URL: connections belong to a process."""
+        return {"url": self.url}
+
+    def path(self, name: str) -> str:
+        """Path of an object in the file system."""
+        return f"{self._opened[1]}/{name}"
+
+    @contextmanager
+    def errors(self, advice: str = "") -> Iterator[Any]:
+        """The file system; any error of its library becomes a StorageError.
+
+        The libraries of providers have error classes without a common base.
+        """
+        try:
+            yield self._opened[0]
+        except GenDataError:
+            raise
+        except Exception as error:
+            fact = " ".join(str(error).split()) or type(error).__name__
+            raise StorageError(f"{self.url}: {fact} ({type(error).__name__}){advice}") from error
+
+    def names(self, inner: str = "") -> dict[str, int]:
+        """``{name: bytes}`` of the entries directly in a folder; -1 for folders."""
+        with self.errors() as system:
+            system.invalidate_cache()
+            try:
+                listed = system.ls(self.path(inner).rstrip("/"), detail=True)
+            except FileNotFoundError:
+                return {}
+        return {
+            entry["name"].rstrip("/").rpartition("/")[2]: -1
+            if entry["type"] == "directory"
+            else int(entry["size"])
+            for entry in listed
+        }
+
+    def tree(self, inner: str = "") -> dict[str, int]:
+        """``{path relative to the folder: bytes}`` of all objects in it, sorted."""
+        start = len(self.path(""))
+        with self.errors() as system:
+            system.invalidate_cache()
+            found = system.find(self.path(inner).rstrip("/"), detail=True)
+        return {path[start:]: int(entry["size"]) for path, entry in sorted(found.items())}
+
+    def read(self, names: Iterable[str]) -> dict[str, bytes]:
+        """``{name: bytes}`` of the objects that exist."""
+        found: dict[str, bytes] = {}
+        for batch in _batches(list(names)):
+            paths = [self.path(name) for name in batch]
+            with self.errors() as system:
+                contents = system.cat(paths, on_error="return")
+                for name, path in zip(batch, paths, strict=True):
+                    value = contents[path]
+                    if isinstance(value, bytes):
+                        found[name] = value
+                    elif not isinstance(value, FileNotFoundError):
+                        raise value
+        return found
+
+    def put(self, name: str, data: bytes) -> None:
+        """Write one object."""
+        with self.errors() as system:
+            system.pipe_file(self.path(name), data)
+
+    def create(self, name: str, data: bytes) -> None:
+        """Write one object unless it exists."""
+        with self.errors() as system:
+            try:
+                system.pipe_file(self.path(name), data, mode="create")
+            except FileExistsError:
+                return
+
+    def upload(self, files: dict[str, Path]) -> None:
+        """Write ``{name: file}``."""
+        for batch in _batches(sorted(files)):
+            with self.errors() as system:
+                system.put([str(files[name]) for name in batch], [self.path(n) for n in batch])
+
+    def download(self, files: dict[str, Path]) -> None:
+        """Read ``{name: file}``."""
+        for path in files.values():
+            path.parent.mkdir(parents=True, exist_ok=True)
+        for batch in _batches(sorted(files)):
+            with self.errors() as system:
+                system.get([self.path(n) for n in batch], [str(files[name]) for name in batch])
+
+    def copy(self, names: dict[str, str]) -> None:
+        """Copy ``{new name: name}`` within the storage."""
+        with self.errors() as system:
+            for new, name in sorted(names.items()):
+                system.cp_file(self.path(name), self.path(new))
+
+    def remove(self, names: Iterable[str]) -> None:
+        """Remove objects."""
+        with self.errors() as system:
+            for name in names:
+                system.rm_file(self.path(name))
+
+
+@dataclass(frozen=True)
+class ObjectStore(LocalStore):
+    """The objects of a data set at a URL; ``root`` is the folder in which they are staged.
+
+    A damaged shard is generated again over its objects: there is no quarantine at a URL. Records
+    are read when a run begins; the storage itself guards the bytes of objects.
+
+    Attributes:
+        objects: At the URL.
+    """
+
+    objects: ObjectFolder = field(default_factory=lambda: ObjectFolder(""))
+
+    @property
+    def place(self) -> str:
+        """The URL."""
+        return self.objects.url
+
+    def free_bytes(self) -> int:
+        """Object storage is never full; the staging folder needs room for shards in progress."""
+        return 1 << 62
+
+    def state(self, plan: Plan) -> FolderState:
+        """Determine the state of the URL; changes nothing."""
+        names = self.objects.names()
+        if PLAN_NAME in names:
+            grows = self._check_plan(plan)
+            is_finished = MANIFEST_NAME in names and not grows
+            return FolderState.FINISHED if is_finished else FolderState.STARTED
+        if {*names} - {RUN_NAME, ""}:
+            raise StorageError(
+                f"{self.place}: not empty and not a gen-data data set; nothing was changed. "
+                "Choose another URL with --out, or empty this one."
+            )
+        return FolderState.NEW
+
+    def _stored_plan(self) -> Plan:
+        data = self.objects.read([PLAN_NAME])[PLAN_NAME]
+        return parse_plan(data, Path(self.place))
+
+    def prepare(self, plan: Plan) -> None:
+        """Empty the staging folder, remove an existing manifest, and write the plan."""
+        make_folder(self.root)
+        self._clear_staging()
+        super().prepare(plan)
+        names = self.objects.names()
+        self.objects.remove(name for name in (MANIFEST_NAME, SUMS_NAME) if name in names)
+        self.objects.put(PLAN_NAME, plan_bytes(plan))
+
+    def _clear_staging(self) -> None:
+        with self.errors():
+            for entry in self.root.iterdir():
+                if entry.name == RUN_NAME:
+                    continue
+                if entry.is_dir():
+                    shutil.rmtree(entry)
+                else:
+                    entry.unlink()
+
+    def scan(self, plan: Plan, full: bool = False) -> Scan:
+        """Read every record; with ``full``, also compare the sizes of all objects.
+
+        Shards that differ from their records count as missing.
+        """
+        sizes = self.objects.tree(SHARDS_NAME) if full else None
+        missing, samples, size, rejections = [], 0, 0, 0
+        records = self._pull_records(plan)
+        for shard in range(plan.shard_count):
+            record = records.get(shard)
+            if record is not None and sizes is not None and not _has_sizes(record, sizes):
+                # Without its record, the shard is not committed.
+                self.objects.remove([_record_name(shard)])
+                self.record_path(shard).unlink()
+                record = None
+            if record is None:
+                missing.append(shard)
+                continue
+            samples += record.end - record.first
+            size += record.size_bytes
+            rejections += record.rejections
+        whole = range(plan.shard_count)
+        return Scan(whole if len(missing) == len(whole) else missing, samples, size, rejections)
+
+    def _pull_records(self, plan: Plan) -> dict[int, ShardRecord]:
+        """Copy the records that are not staged; returns all that belong to the plan."""
+        listed = {name for name in self.objects.names(SHARDS_NAME) if name.endswith(".json")}
+        wanted = [
+            shard
+            for shard in range(plan.shard_count)
+            if f"{shard:06d}.json" in listed and not self.record_path(shard).exists()
+        ]
+        for batch in _batches(wanted):
+            found = self.objects.read(_record_name(shard) for shard in batch)
+            with self.errors():
+                for shard in batch:
+                    data = found.get(_record_name(shard), b"")
+                    record, indices = parse_record(data), plan.samples_of(shard)
+                    if record and (record.shard, record.first, record.end) == (
+                        shard,
+                        indices.start,
+                        indices.stop,
+                    ):
+                        self.record_path(shard).write_bytes(data)
+        every = ((shard, self.record(shard)) for shard in range(plan.shard_count))
+        return {shard: record for shard, record in every if record is not None}
+
+    def commit(self, folder: Path, record: ShardRecord, synced: Container[Inode] = ()) -> None:
+        """Store the files of a shard, then its record.
+
+        Raises:
+            DeterminismError: the shard was committed before, with other bytes.
+        """
+        del synced
+        name = _record_name(record.shard)
+        committed = parse_record(self.objects.read([name]).get(name, b""))
+        # The last shard may hold fewer samples than in a data set that grows.
+        if committed is not None and committed.end == record.end:
+            self._expect_equal(committed, record, folder)
+        else:
+            prefix = f"{SHARDS_NAME}/{record.shard:06d}"
+            self.objects.upload({f"{prefix}/{f.path}": folder / f.path for f in record.files})
+            self.objects.put(name, record.to_bytes())
+
+    def quarantine_damaged(self, plan: Plan, shards: Iterable[int]) -> list[int]:
+        """Nothing: the storage guards its bytes, and files that are merged are hashed then."""
+        del plan, shards
+        return []
+
+    def fetch_shards(self, plan: Plan, with_files: bool) -> None:
+        """Copy the records of all shards, and their files if wanted, to the staging folder.
+
+        Raises:
+            StorageError: the disk is too small for the files, or an object is damaged.
+        """
+        records = self._pull_records(plan)
+        if not with_files:
+            return
+        need, free = sum(r.size_bytes for r in records.values()), free_bytes(self.root)
+        if free < need:
+            raise StorageError(
+                f"{self.root}: exporters merge all shards here, which need {format_bytes(need)}, "
+                f"and {format_bytes(free)} are free.\n  Make room and repeat the command; or leave "
+                "out all exporters, and export parts of the finished data set"
+            )
+        for shard, record in records.items():
+            fetch_shard(self.objects, record, self.shard_dir(shard))
+
+    def publish(self) -> None:
+        """Store the merged files, then the manifest; empties the staging folder."""
+        with self.errors():
+            names = [n for n in tree_sizes(self.root, without=RUN_NAME) if not _is_shard(n)]
+            linked = {
+                get_inode(path): path.relative_to(self.root).as_posix()
+                for path in (self.root / SHARDS_NAME).rglob("*")
+                if path.is_file()
+            }
+            copies = {n: linked.get(get_inode(self.root / n), "") for n in names}
+        self.objects.copy({name: source for name, source in copies.items() if source})
+        others = (n for n, source in copies.items() if not source and n != MANIFEST_NAME)
+        self.objects.upload({name: self.root / name for name in others})
+        stale = {n for n in self.objects.tree() if not _is_shard(n)} - {*names}
+        self.objects.remove(sorted(n for n in stale if not n.startswith(f"{RUN_NAME}/")))
+        self.objects.put(MANIFEST_NAME, self.manifest_path.read_bytes())
+        self._clear_staging()
+
+    def is_intact(self, extra_matters: bool) -> bool:
+        """Whether documents and sizes of all objects agree."""
+        from gen_data.generator.runner.verify import find_deviations
+
+        make_folder(self.scratch_root)
+        folder = self.scratch_dir()
+        try:
+            copy_outline(self.objects, folder)
+            found = find_deviations(folder, full=False)
+        finally:
+            shutil.rmtree(folder)
+        return not found or (not extra_matters and all(f.kind == "extra" for f in found))
+
+    def read_manifest(self) -> bytes:
+        """The bytes of the manifest of a finished data set."""
+        return self.objects.read([MANIFEST_NAME])[MANIFEST_NAME]
+
+    def read_run_file(self, name: str) -> bytes:
+        """The bytes of an object about the run, which all machines share."""
+        path = f"{RUN_NAME}/{name}"
+        return self.objects.read([path]).get(path, b"")
+
+    def create_run_file(self, name: str, data: bytes) -> None:
+        """Write an object about the run unless it exists."""
+        self.objects.create(f"{RUN_NAME}/{name}", data)
+
+    def append_run_file(self, name: str, data: bytes) -> None:
+        """Append to an object about the run."""
+        self.objects.put(f"{RUN_NAME}/{name}", self.read_run_file(name) + data)
+
+    def reproduce_command(self, index: int) -> str:
+        """Command that generates one sample by itself."""
+        return f"the command of this run with --workers 0, for sample {index}"
+
+
+def fetch_shard(objects: ObjectFolder, record: ShardRecord, folder: Path) -> None:
+    """Copy the files of a shard to a folder, and hash them.
+
+    Raises:
+        StorageError: an object does not have the digest of its record.
+    """
+    prefix = f"{SHARDS_NAME}/{record.shard:06d}"
+    paths = {f"{prefix}/{file.path}": folder / file.path for file in record.files}
+    for inner in record.empty_folders:
+        (folder / inner).mkdir(parents=True, exist_ok=True)
+    objects.download(paths)
+    for file in record.files:
+        if hash_file(folder / file.path) != file.sha256:
+            raise StorageError(
+                f"{objects.url}/{prefix}/{file.path}: its sha256 is not that of the shard's "
+                "record; remove the record "
+                f"{prefix}.json, and run the command that made the data set again"
+            )
+
+
+def copy_outline(objects: ObjectFolder, folder: Path) -> None:
+    """Make a folder that looks like a data set at a URL, with the contents of its documents only.
+
+    Plan, sums, manifest and records are copied; all other files have the right size and no
+    contents (they are sparse). ``verify`` without ``full`` reads nothing else.
+    """
+    sizes = {n: s for n, s in objects.tree().items() if not n.startswith(f"{RUN_NAME}/")}
+    read = {n for n in sizes if n in (PLAN_NAME, MANIFEST_NAME, SUMS_NAME) or _is_record(n)}
+    found = objects.read(sorted(read))
+    for name, size in sizes.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with path.open("wb") as file:
+            file.write(found.get(name, b""))
+            file.truncate(size)
+    for name in sorted(filter(_is_record, read)):
+        record = parse_record(found[name])
+        if record is not None:
+            for inner in record.empty_folders:
+                (folder / name.removesuffix(".json") / inner).mkdir(parents=True)
+    manifest = parse_object(found.get(MANIFEST_NAME, b"")) or {}
+    for inner in manifest.get("empty_folders", []):
+        (folder / inner).mkdir(parents=True, exist_ok=True)
+
+
+def _has_sizes(record: ShardRecord, sizes: dict[str, int]) -> bool:
+    prefix = f"{SHARDS_NAME}/{record.shard:06d}"
+    return all(sizes.get(f"{prefix}/{file.path}") == file.bytes for file in record.files)
+
+
+def _record_name(shard: int) -> str:
+    return f"{SHARDS_NAME}/{shard:06d}.json"
+
+
+def _is_shard(name: str) -> bool:
+    return name.startswith(f"{SHARDS_NAME}/")
+
+
+def _is_record(name: str) -> bool:
+    return _is_shard(name) and name.count("/") == 1 and name.endswith(".json")
+
+
+def _batches(items: list[Any]) -> Iterator[list[Any]]:
+    for start in range(0, len(items), BATCH):
+        yield items[start : start + BATCH]

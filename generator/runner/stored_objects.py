@@ -1,0 +1,88 @@
+"""Samples of a finished data set at a URL; shards are copied to a cache when they are read."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import Any
+
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.urls import is_url
+from gen_data.generator.runner.object_store import ObjectFolder, fetch_shard
+from gen_data.generator.runner.plan import PLAN_NAME
+from gen_data.generator.runner.seal import parse_object
+from gen_data.generator.runner.shard_record import parse_unchecked_record
+from gen_data.generator.runner.store import MANIFEST_NAME, SHARDS_NAME
+from gen_data.generator.runner.stored import StoredSamples
+
+
+def open_stored(place: str | os.PathLike[str]) -> StoredSamples:
+    """Open a finished data set in a folder or at a URL."""
+    return StoredObjects(os.fspath(place)) if is_url(place) else StoredSamples(place)
+
+
+class StoredObjects(StoredSamples):
+    """Samples of a data set at a URL.
+
+    The cache has one folder per data set, named by its id, which many processes may fill.
+
+    Raises:
+        StorageError: the URL holds no finished data set, or cannot be read.
+    """
+
+    def __init__(self, url: str) -> None:
+        import platformdirs
+
+        self.url = url.rstrip("/")
+        self._objects = ObjectFolder(self.url)
+        documents = self._objects.read([PLAN_NAME, MANIFEST_NAME])
+        manifest = parse_object(documents.get(MANIFEST_NAME, b"")) or {}
+        if PLAN_NAME not in documents or "dataset_id" not in manifest:
+            raise StorageError(
+                f"{self.url}: no finished data set: {PLAN_NAME} or {MANIFEST_NAME} is missing; "
+                "run the command that began it again"
+            )
+        self._record_digests: list[str] = manifest.get("shards", [])
+        cache = Path(platformdirs.user_cache_path("gen-data")) / "data-sets"
+        folder = cache / str(manifest["dataset_id"])
+        (folder / SHARDS_NAME).mkdir(parents=True, exist_ok=True)
+        for name, data in documents.items():
+            unfinished = Path(mkdtemp(dir=cache)) / name
+            unfinished.write_bytes(data)
+            unfinished.replace(folder / name)
+            unfinished.parent.rmdir()
+        super().__init__(folder)
+
+    def shard_dir(self, shard: int) -> Path:
+        """Folder of the files of a shard, copied there at the first call."""
+        folder = super().shard_dir(shard)
+        if not folder.is_dir():
+            self._fetch(shard, folder)
+        return folder
+
+    def _fetch(self, shard: int, folder: Path) -> None:
+        name = f"{SHARDS_NAME}/{shard:06d}.json"
+        data = self._objects.read([name]).get(name, b"")
+        record = parse_unchecked_record(data)
+        if record is None or hashlib.sha256(data).hexdigest() != self._record_digests[shard]:
+            raise StorageError(
+                f"{self.url}/{name}: missing, or its sha256 is not the one in the manifest; check "
+                f"the data set with:\n    gen-data verify {self.url}"
+            )
+        unfinished = Path(mkdtemp(dir=self.folder))
+        try:
+            fetch_shard(self._objects, record, unfinished / "shard")
+            (unfinished / "shard").rename(folder)
+        except OSError:
+            # Another process may have been faster.
+            if not folder.is_dir():
+                raise
+        finally:
+            shutil.rmtree(unfinished, ignore_errors=True)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Pickle only the URL."""
+        return {"folder": self.url}

@@ -1,0 +1,201 @@
+"""Data sets at URLs: a real S3 server in a process of its own, and storage in memory."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import fsspec
+import pytest
+
+from gen_data.generator.core.errors import ConfigError, DeterminismError, StorageError
+from gen_data.generator.runner.object_store import ObjectFolder, copy_outline, open_store
+from gen_data.generator.runner.run import Settings, Summary, run
+from gen_data.generator.runner.verify import find_deviations
+from tests.runner.doubles import (
+    FakeFactory,
+    fake_plan,
+    make,
+    tree_digest,
+    write_raw_images,
+)
+from tests.runner.fake_run import SHARD_SIZE, N
+from tests.runner.test_processes import ROOT, wait_for
+
+
+@pytest.fixture(autouse=True)
+def staging(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The staging folder of this test alone."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+@pytest.fixture
+def memory() -> Iterator[str]:
+    """A URL of storage in this process."""
+    system = fsspec.filesystem("memory")
+    yield "memory://bucket/set"
+    system.store.clear()
+    system.pseudo_dirs[:] = [""]
+
+
+def make_at(url: str, n: int = 10, **changes: object) -> Summary:
+    """A fake data set at a URL, made in this process."""
+    return run(
+        replace(fake_plan(n), **changes),
+        FakeFactory(n),
+        url,
+        workers=0,
+        resume_command="again",
+        licences=lambda assets: f"# Assets\n\n{', '.join(assets)}\n",
+        settings=Settings(write_media=write_raw_images),
+    )
+
+
+def download(url: str, folder: Path) -> Path:
+    """A data set at a URL as a folder."""
+    objects = ObjectFolder(url)
+    objects.download({name: folder / name for name in objects.tree()})
+    return folder
+
+
+def test_a_url_holds_the_bytes_of_a_folder(tmp_path: Path, memory: str) -> None:
+    make(tmp_path / "here")
+
+    summary = make_at(memory)
+
+    assert tree_digest(download(memory, tmp_path / "copy")) == tree_digest(tmp_path / "here")
+    assert summary.made == 10
+    again = make_at(memory)
+    assert again.already_complete and again.dataset_id == summary.dataset_id
+    # Nothing stays in the staging folder.
+    assert not list((tmp_path / "cache").rglob("*.png"))
+
+
+def test_a_larger_number_extends_a_data_set(tmp_path: Path, memory: str) -> None:
+    make(tmp_path / "here", 22)
+    make_at(memory, 10)
+
+    assert make_at(memory, 22).made == 14  # The last shard of the first run was shorter.
+
+    assert tree_digest(download(memory, tmp_path / "copy")) == tree_digest(tmp_path / "here")
+
+
+def test_a_failure_of_any_put_is_repaired_by_resumption(
+    tmp_path: Path, memory: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make(tmp_path / "here")
+    wanted = tree_digest(tmp_path / "here")
+    system = fsspec.filesystem("memory")
+    calls = []
+
+    def failing(name: str, fails_at: int) -> Any:
+        operation = getattr(type(system), name)
+
+        def operate(self: Any, *arguments: Any, **options: Any) -> Any:
+            calls.append(name)
+            if len(calls) == fails_at:
+                raise ConnectionResetError("reset by peer")
+            return operation(self, *arguments, **options)
+
+        return operate
+
+    def make_with_failure(fails_at: int) -> int:
+        """Number of PUTs of a run whose k-th one fails."""
+        calls.clear()
+        system.store.clear()
+        system.pseudo_dirs[:] = [""]
+        with monkeypatch.context() as patched:
+            for name in ("pipe_file", "put_file", "cp_file"):
+                patched.setattr(type(system), name, failing(name, fails_at))
+            if fails_at == 0:
+                make_at(memory)
+                return len(calls)
+            with pytest.raises(StorageError, match="reset by peer"):
+                make_at(memory)
+        return len(calls)
+
+    puts = make_with_failure(0)
+    assert puts > 20
+    for fails_at in range(1, puts + 1):
+        assert make_with_failure(fails_at) == fails_at
+        assert not system.exists(f"{memory}/manifest.json")
+        make_at(memory)
+        assert tree_digest(download(memory, tmp_path / f"copy-{fails_at}")) == wanted
+
+
+def test_other_bytes_of_a_shard_are_refused(memory: str) -> None:
+    make_at(memory)
+    plan, system = fake_plan(), fsspec.filesystem("memory")
+    store = open_store(memory)
+    store.prepare(plan)
+    store.scan(plan)
+    record = store.record(1)
+    assert record is not None
+    other = replace(record, rejections=record.rejections + 1)
+    system.pipe_file(f"{memory}/shards/000001.json", other.to_bytes())
+
+    with pytest.raises(DeterminismError, match="shard 1 came out differently"):
+        store.commit(store.scratch_dir(), record)
+
+
+def test_damage_at_a_url_is_found_and_made_again(tmp_path: Path, memory: str) -> None:
+    make(tmp_path / "here")
+    make_at(memory)
+    system = fsspec.filesystem("memory")
+    system.pipe_file(f"{memory}/shards/000001/color/rgb/000000005.png", b"short")
+
+    copy_outline(ObjectFolder(memory), tmp_path / "outline")
+    [finding] = find_deviations(tmp_path / "outline")
+    assert finding.path == "shards/000001/color/rgb/000000005.png"
+    assert finding.samples == "sample 5"
+
+    assert not make_at(memory).already_complete
+    assert tree_digest(download(memory, tmp_path / "copy")) == tree_digest(tmp_path / "here")
+
+
+def test_foreign_places_and_unknown_schemes_are_refused(memory: str) -> None:
+    fsspec.filesystem("memory").pipe_file(f"{memory}/notes.txt", b"mine")
+    with pytest.raises(StorageError, match="not empty and not a gen-data data set"):
+        make_at(memory)
+    with pytest.raises(ConfigError, match="pip install 'gen-data\\[cloud\\]'"):
+        make_at("nosuch://bucket/set")
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("default")  # those of the server
+def test_a_killed_run_on_s3_is_resumed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from moto.server import ThreadedMotoServer
+
+    make(tmp_path / "here", N, SHARD_SIZE)
+    server = ThreadedMotoServer(port=0, verbose=False)
+    server.start()
+    host, port = server.get_host_and_port()
+    monkeypatch.setenv("AWS_ENDPOINT_URL", f"http://{host}:{port}")
+    for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_DEFAULT_REGION"):
+        monkeypatch.setenv(name, "us-east-1")
+    try:
+        fsspec.filesystem("s3").mkdir("bucket")
+        url = "s3://bucket/set"
+        objects = ObjectFolder(url)
+        command = [sys.executable, "-m", "tests.runner.fake_run", url, "2", "0.04"]
+        killed = subprocess.Popen(command, cwd=ROOT, start_new_session=True)
+        wait_for(lambda: sum(n.endswith(".json") for n in objects.names("shards")) >= 3)
+        os.killpg(killed.pid, signal.SIGKILL)
+        killed.wait()
+        assert "manifest.json" not in objects.names()
+
+        subprocess.run(command, cwd=ROOT, check=True, timeout=120)
+
+        assert tree_digest(download(url, tmp_path / "copy")) == tree_digest(tmp_path / "here")
+        objects.create("run/once", b"first")
+        objects.create("run/once", b"second")
+        assert objects.read(["run/once"]) == {"run/once": b"first"}
+    finally:
+        server.stop()
