@@ -32,11 +32,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sequences import write_text
@@ -61,6 +61,8 @@ class Birdseye(ExporterBase):
 
     type: Literal["birdseye"] = "birdseye"
 
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+
     @property
     def needs(self) -> frozenset[str]:
         """Names of the annotators that it reads."""
@@ -84,7 +86,7 @@ class Birdseye(ExporterBase):
                 path.write_bytes(encode_png(mask * np.uint8(255), RowFilter.UP, 2))
             frames.append(canonical_json(_frame(sample, truth, truth.birdseye)) + "\n")
             for sensor in (s for s in info.cameras if s in sample.truth):
-                images[sensor].append(canonical_json(_image(sample, sensor)) + "\n")
+                images[sensor].append(canonical_json(_image(info, sample, sensor)) + "\n")
         write_text(folder / FRAMES, "".join(frames))
         for sensor, lines in images.items():
             write_text(folder / LANES / f"{sensor}.jsonl", "".join(lines))
@@ -153,13 +155,14 @@ def _boxes(sample: Sample, truth: EgoTruth) -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def _image(sample: Sample, sensor: str) -> dict[str, Any]:
+def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     truth = sample.truth[sensor]
+    suffix = info.encoding(sensor, Channel.RGB).suffix
     rows = list(range(0, truth.camera.intrinsics.height_px, ROWS_PX))
     borders = truth.borders or ()
     return {
         "index": sample.index,
-        "raw_file": f"{sensor}/{Channel.RGB.value}/{sample.index:09d}.png",
+        "raw_file": f"{sensor}/{Channel.RGB.value}/{sample.index:09d}{suffix}",
         "h_samples": rows,
         "lanes": [columns_at(border, rows) for border in borders],
         "borders": [

@@ -18,12 +18,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Measurements
 from gen_data.generator.core.errors import ConfigError, StorageError
@@ -43,6 +43,8 @@ class Tables(ExporterBase):
     """
 
     type: Literal["tables"] = "tables"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     format: Literal["csv", "npy"] = "csv"
 
     def check(self, info: DatasetInfo) -> None:

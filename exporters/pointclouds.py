@@ -16,12 +16,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.point_cloud_io import read_points, scanner_at_sweep
 from gen_data.exporters.sensor_selection import has_scans
@@ -56,6 +56,8 @@ class PointClouds(ExporterBase):
     """PLY or PCD files of every laser scan."""
 
     type: Literal["pointclouds"] = "pointclouds"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     format: Literal["ply", "pcd"] = "ply"
 
     @property

@@ -28,12 +28,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.kitti import calib_matrices, matrix_lines
 from gen_data.exporters.point_cloud_io import read_points, xyzi_bytes
@@ -116,6 +116,8 @@ class SemanticKitti(ExporterBase):
     """SemanticKITTI: the scans of one laser scanner with a label per point."""
 
     type: Literal["semantickitti"] = "semantickitti"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     lidar: str = ""
     """Sensor of the scans; empty = the first one by name."""
     camera: str = ""

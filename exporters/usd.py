@@ -21,14 +21,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import astuple
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
-from gen_data.exporters.base import ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sequences import write_bytes, write_text
@@ -51,6 +51,8 @@ class Usd(ExporterBase):
     """
 
     type: Literal["usd"] = "usd"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     format: Literal["usdc", "usda"] = "usdc"
 
     _assets: AssetLibrary | None = PrivateAttr(None)

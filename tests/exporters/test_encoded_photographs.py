@@ -20,6 +20,7 @@ import pytest
 from PIL import Image
 
 from gen_data.exporters.base import check_image_formats
+from gen_data.exporters.birdseye import Birdseye
 from gen_data.exporters.bop import Bop
 from gen_data.exporters.coco_panoptic import CocoPanoptic
 from gen_data.exporters.control_clips import ControlClips
@@ -28,10 +29,14 @@ from gen_data.exporters.cvat import Cvat
 from gen_data.exporters.huggingface import HuggingFace
 from gen_data.exporters.label_studio import LabelStudio
 from gen_data.exporters.mcap import Mcap
+from gen_data.exporters.measurement_tables import Tables
 from gen_data.exporters.motchallenge import MotChallenge
 from gen_data.exporters.nuscenes import NuScenes
+from gen_data.exporters.pointclouds import PointClouds
 from gen_data.exporters.rerun import Rerun
+from gen_data.exporters.semantickitti import SemanticKitti
 from gen_data.exporters.solo import Solo
+from gen_data.exporters.usd import Usd
 from gen_data.generator.core.capture import Channel, ImageEncoding
 from gen_data.generator.core.errors import ConfigError
 from tests.exporters.drives import drive_info
@@ -165,6 +170,13 @@ def test_readers_find_the_photographs(name: str, world: Any, tmp_path: Path) -> 
 def is_near(image: Image.Image, expected: Any) -> bool:
     """Whether an image is the rendered one but for the loss of its encoding."""
     return bool(np.abs(np.asarray(image, int) - expected).mean() < ERROR_MAX)
+
+
+def test_formats_without_photographs_take_every_camera(world: Any) -> None:
+    """They neither link nor embed its files."""
+    info = encoded(world.info(7), WEBP)
+    for exporter in (Birdseye(), PointClouds(), SemanticKitti(), Tables(), Usd()):
+        check_image_formats(exporter, info)
 
 
 def test_croissant_states_the_type(world: Any, tmp_path: Path) -> None:

@@ -179,7 +179,8 @@ def test_the_official_converter_makes_coco_of_it(dataset: Path, world: Any, tmp_
         for sample in of_split(world, "train")
         for t in sample.truth["color"].objects
     ]
-    assert [row["bbox"] for row in rows] == boxes
+    # The converter appends frames as its processes finish them.
+    assert sorted(row["bbox"] for row in rows) == sorted(boxes)
 
 
 def edit(root: Path, change: Callable[[Any], None]) -> None:
