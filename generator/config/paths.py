@@ -12,6 +12,7 @@ from pathlib import Path
 
 from gen_data.generator.config.problems import Position, Problem
 from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.urls import is_url
 
 PLAN = "plan.json"
 """Record of a data set; its paths are those of its configuration, which lies elsewhere."""
@@ -47,7 +48,12 @@ def find_path(
         if known in by_name and not _is_document(by_name[known], position):
             return by_name[known]
     fact = f"there is no {kind} '{name}'; looked for '{path}'"
-    if by_name:
+    if is_url(name):
+        fact = (
+            f"'{name}' is a URL; expected a {kind} on this machine: copy it first, as with "
+            "'aws s3 cp --recursive'"
+        )
+    elif by_name:
         fact += f"; shipped are {', '.join(by_name)}{did_you_mean(name, by_name)}"
     raise ConfigError(str(Problem(position, field, fact)) if position else fact)
 
