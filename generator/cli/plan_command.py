@@ -16,6 +16,7 @@ from gen_data.generator.core.errors import ConfigError
 
 if TYPE_CHECKING:
     from gen_data.generator.assemble.config import Config
+    from gen_data.generator.runner.progress import RunProgress
 
 
 @click.command("plan")
@@ -112,6 +113,10 @@ def _measure(choice: ConfigurationOptions, count: int) -> Probe:
     from gen_data.generator.renderers.warp.device import open_device
 
     done_s: dict[int, float] = {}
+
+    def note(progress: RunProgress) -> None:
+        done_s.setdefault(progress.done, time.monotonic())
+
     with temporary_folder("plan") as folder:
         summary = generate(
             choice.source,
@@ -121,7 +126,7 @@ def _measure(choice: ConfigurationOptions, count: int) -> Probe:
             seed=choice.seed,
             overrides=(*choice.overrides, "splits={train: 1, val: 0, test: 0}"),
             without=choice.without,
-            on_progress=lambda progress: done_s.setdefault(progress.done, time.monotonic()),
+            on_progress=note,
         )
         files = [p for p in (folder / "probe").rglob("*") if p.is_file() and "run" not in p.parts]
         # Hard links of exports take no space.
