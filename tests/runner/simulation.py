@@ -122,6 +122,7 @@ class Run:
     """
 
     seed: int
+    supervisor_type: type[Supervisor] = Supervisor
     size: tuple[int, int] | None = None
     chosen_faults: Faults | None = None
     sample_s: float = 2.0
@@ -130,7 +131,6 @@ class Run:
     busy_s: float = 0.0
     handling_s: float = 0.0
     events: int = 0
-    supervisor_type: type[Supervisor] = Supervisor
     committed: Counter[int] = field(default_factory=Counter)
     attempts: Counter[int] = field(default_factory=Counter)
     spawned: int = 0
@@ -174,7 +174,9 @@ class Run:
         self._expect(not living, f"processes {living} are left")
         most = self.limits.shard_attempts + self.limits.machine_losses - 1
         most = most if self.faults.loses_machine else self.limits.shard_attempts
-        self._expect(max(self.attempts.values(), default=0) <= most, "a shard has more attempts")
+        self._expect(
+            max(self.attempts.values(), default=0) <= most, f"more attempts of a shard than {most}"
+        )
         self._expect(not missing or error is not None, f"shards {missing} are missing silently")
         if isinstance(error, WorkerLost) and len(given_up) < 3 and "they start" not in str(error):
             self._expect(missing <= given_up, f"shards {missing} are missing, not only {given_up}")
@@ -345,7 +347,7 @@ def simulate_cluster(workers: int, shards: int, loss: float) -> str:
     """Simulate a run on so many machines, with a minute per shard; returns its figures in words."""
     faults = Faults(loses_machine=loss, dies_at_start=loss, dies_after_commit=loss)
     limits = replace(LIMITS, silence_s=300.0)
-    made = Run(0, (shards, workers), faults, sample_s=40.0, late_s=0.1, limits=limits)
+    made = Run(0, Supervisor, (shards, workers), faults, sample_s=40.0, late_s=0.1, limits=limits)
     error = made.execute()
     end = "complete" if error is None else f"{type(error).__name__}: {error}"
     return (
