@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import os
+import time
 from collections import Counter
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import click
 
+from gen_data.generator.cli.cost_estimate import Prices, Probe, estimate_rows
 from gen_data.generator.cli.options import ConfigurationOptions, configuration_options
+from gen_data.generator.core.errors import ConfigError
 
 if TYPE_CHECKING:
     from gen_data.generator.assemble.config import Config
+    from gen_data.generator.runner.progress import RunProgress
 
 
 @click.command("plan")
@@ -20,20 +25,30 @@ if TYPE_CHECKING:
 @click.option(
     "--probe", type=click.IntRange(min=1), help="Generate so many samples to measure time and size."
 )
+@click.option("--price-per-cpu-hour", type=float, help="Price of a core; needs --probe.")
+@click.option("--price-per-gpu-hour", type=float, help="Price of a GPU; needs --probe.")
+@click.option("--price-per-gb-month", type=float, help="Price of storage; needs --probe.")
 @configuration_options
 def plan(
     source: str,
     n: int,
     probe: int | None,
+    price_per_cpu_hour: float | None,
+    price_per_gpu_hour: float | None,
+    price_per_gb_month: float | None,
     seed: int | None,
     overrides: tuple[str, ...],
     without: tuple[str, ...],
 ) -> None:
     """Print shards, size, categories and exports of a data set, without rendering it.
 
-    With --probe, a few samples are generated in a temporary folder and removed again; without it
-    sizes are estimates from the sizes of images, and no time is printed.
+    With --probe, a few samples are generated in a temporary folder and removed again, and hours
+    and files are extrapolated from them; without it sizes are estimates from the sizes of images,
+    and no time is printed. Costs are hours times the prices that you give.
     """
+    prices = Prices(price_per_cpu_hour, price_per_gpu_hour, price_per_gb_month)
+    if probe is None and prices != Prices():
+        raise ConfigError("--price-per-...: needs measured hours; expected --probe K with it")
     from rich.console import Console
     from rich.table import Table
 
@@ -43,9 +58,8 @@ def plan(
     for name, value in _rows(config, n):
         table.add_row(name, value)
     if probe is not None:
-        for name, value in _measured(
-            ConfigurationOptions(source, seed, overrides, without), n, probe
-        ):
+        cores = len(os.sched_getaffinity(0))
+        for name, value in estimate_rows(_measure(choice, probe), n, cores, prices):
             table.add_row(name, value)
     console = Console()
     Console(width=None if console.is_terminal else 120).print(table)
@@ -92,31 +106,36 @@ def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
     yield "size, estimated", f"{estimate_image_bytes(config, info) * n / 1e9:.2f} GB of images"
 
 
-def _measured(choice: ConfigurationOptions, n: int, probe: int) -> Iterator[tuple[str, str]]:
-    """Time and size of a run, from a few samples in a temporary folder."""
-    import os
-
+def _measure(choice: ConfigurationOptions, count: int) -> Probe:
+    """Generate ``count`` samples in a temporary folder, in this process."""
     from gen_data.generator.api.generate import generate
     from gen_data.generator.core.temporary_folders import temporary_folder
+    from gen_data.generator.renderers.warp.device import open_device
+
+    done_s: dict[int, float] = {}
+
+    def note(progress: RunProgress) -> None:
+        done_s.setdefault(progress.done, time.monotonic())
 
     with temporary_folder("plan") as folder:
         summary = generate(
             choice.source,
-            probe,
+            count,
             out=folder / "probe",
             workers=0,
             seed=choice.seed,
             overrides=(*choice.overrides, "splits={train: 1, val: 0, test: 0}"),
             without=choice.without,
+            on_progress=note,
         )
         files = [p for p in (folder / "probe").rglob("*") if p.is_file() and "run" not in p.parts]
         # Hard links of exports take no space.
         size = sum({p.stat().st_ino: p.stat().st_size for p in files}.values())
-    cores = len(os.sched_getaffinity(0))
-    cpu_s = sum(summary.cpu_s.values()) if summary.cpu_s else 0.0
-    yield (
-        "size, measured",
-        f"{size / probe * n / 1e9:.2f} GB ({size / probe / 1e3:.0f} kB per sample)",
+    return Probe(
+        summary.cpu_s,
+        # The first sample includes the start of the engines.
+        (done_s[count] - done_s[1]) / max(1, count - 1),
+        size / count,
+        len(files) / count,
+        open_device("auto").is_cuda,
     )
-    yield "CPU, measured", f"{cpu_s * n / 3600:.2f} h ({cpu_s:.2f} s per sample)"
-    yield f"time on {cores} cores", f"{cpu_s * n / 3600 / cores:.2f} h"

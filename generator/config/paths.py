@@ -15,6 +15,7 @@ from pathlib import Path
 from gen_data.generator.config.problems import Position, Problem
 from gen_data.generator.config.yaml_scalars import abbreviate
 from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.urls import is_url
 
 PLAN = "plan.json"
 """Record of a data set; its paths are those of its configuration, which lies elsewhere."""
@@ -60,7 +61,12 @@ def find_path(
     if is_folder and (remembered := _remembered_folder(name, position)) is not None:
         return remembered
     fact = f"there is no {kind} '{abbreviate(name)}'; looked for '{abbreviate(str(path), 300)}'"
-    if by_name:
+    if is_url(name):
+        fact = (
+            f"'{abbreviate(name)}' is a URL; expected a {kind} on this machine: copy it first, as "
+            "with 'aws s3 cp --recursive'"
+        )
+    elif by_name:
         fact += f"; shipped are {', '.join(by_name)}{did_you_mean(name, by_name)}"
     raise _error(position, field, fact)
 

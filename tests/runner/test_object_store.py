@@ -14,9 +14,18 @@ from typing import Any
 import fsspec
 import pytest
 
-from gen_data.generator.core.errors import ConfigError, DeterminismError, StorageError
+from gen_data.generator.api.generate import generate
+from gen_data.generator.cli.main import cli
+from gen_data.generator.core.errors import (
+    ConfigError,
+    DeterminismError,
+    StorageError,
+    VerificationError,
+)
 from gen_data.generator.runner.object_store import ObjectFolder, copy_outline, open_store
 from gen_data.generator.runner.run import Settings, Summary, run
+from gen_data.generator.runner.stored import StoredSamples
+from gen_data.generator.runner.stored_objects import open_stored
 from gen_data.generator.runner.verify import find_deviations
 from tests.runner.doubles import (
     FakeFactory,
@@ -199,3 +208,36 @@ def test_a_killed_run_on_s3_is_resumed(tmp_path: Path, monkeypatch: pytest.Monke
         assert objects.read(["run/once"]) == {"run/once": b"first"}
     finally:
         server.stop()
+
+
+def test_samples_are_read_from_a_url(tmp_path: Path, memory: str, staging: Path) -> None:
+    make(tmp_path / "here")
+    make_at(memory)
+    here, there = StoredSamples(tmp_path / "here"), open_stored(memory)
+
+    assert there.dataset_id == here.dataset_id and there.n == 10
+    assert there.kept_scene(5) == here.kept_scene(5)
+    # The shard of sample 5 alone was copied.
+    copied = (staging / "gen-data" / "data-sets" / here.dataset_id / "shards").iterdir()
+    assert [path.name for path in copied] == ["000001"]
+    with pytest.raises(StorageError, match="expected a folder: copy the data set first"):
+        StoredSamples(memory)
+    with pytest.raises(StorageError, match="no finished data set"):
+        open_stored("memory://bucket/other")
+
+
+def test_the_command_line_verifies_urls_and_names_them(
+    tmp_path: Path, memory: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    make_at(memory)
+    cli.main(["verify", memory, "--full"], standalone_mode=False)
+    assert f"{memory}: 10 samples" in capsys.readouterr().out
+
+    fsspec.filesystem("memory").rm_file(f"{memory}/shards/000001/labels.jsonl")
+    with pytest.raises(VerificationError, match=f"{memory}: 1 deviation") as caught:
+        cli.main(["verify", memory], standalone_mode=False)
+    assert "labels.jsonl (samples 4 to 7): is missing" in str(caught.value)
+    with pytest.raises(ConfigError, match="expected a folder: copy the data set first"):
+        cli.main(["report", memory], standalone_mode=False)
+    with pytest.raises(ConfigError, match="cannot be repaired in place"):
+        generate("tabletop.yaml", 10, out=memory, repair=True)
