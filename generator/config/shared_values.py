@@ -207,6 +207,7 @@ def _scalar(key: str) -> SharedValue:
 
 def _look_up(name: str, shared: Shared, position: Position, path: FieldPath) -> SharedValue:
     if name not in shared:
-        fact = f"there is no shared value '{abbreviate(name)}'; expected one of {', '.join(shared) or 'none'}"
+        known = ", ".join(shared) or "none"
+        fact = f"there is no shared value '{abbreviate(name)}'; expected one of {known}"
         refuse(position, path, fact + did_you_mean(name, shared))
     return shared[name]
