@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import re
 import signal
 import subprocess
@@ -10,9 +11,8 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from multiprocessing import get_context
 from pathlib import Path
-from typing import TypeVar
+from typing import BinaryIO, TypeVar
 
 from benchmarks.faults.recorded_run import record
 from gen_data.generator.core.errors import GenDataError
@@ -138,6 +138,36 @@ def _parse_log(text: str, out: str) -> Iterator[Call]:
 
 
 def spread(function: Callable[[T], U], tasks: Sequence[T]) -> Iterator[U]:
-    """Results of a function for all tasks, in order, from one forked process per core."""
-    with get_context("fork").Pool(len(os.sched_getaffinity(0))) as pool:
-        yield from pool.imap(function, tasks, chunksize=max(1, min(50, len(tasks) // 8)))
+    """Results of a function for all tasks, in order, from one forked process per core.
+
+    Processes are killed at the end, as runs that they are in the middle of would ignore SIGTERM.
+    """
+    count = len(os.sched_getaffinity(0))
+    workers = [_fork_worker(function, tasks[first::count]) for first in range(count)]
+    try:
+        for number in range(len(tasks)):
+            yield pickle.load(workers[number % count][1])
+    finally:
+        for pid, results in workers:
+            os.kill(pid, signal.SIGKILL)
+            os.waitpid(pid, 0)
+            results.close()
+
+
+def _fork_worker(function: Callable[[T], U], tasks: Sequence[T]) -> tuple[int, BinaryIO]:
+    """Process id of a child that does the tasks, and the pickled results."""
+    reader, writer = os.pipe()
+    pid = os.fork()
+    if pid:
+        os.close(writer)
+        return pid, os.fdopen(reader, "rb")
+    try:
+        os.close(reader)
+        with os.fdopen(writer, "wb") as file:
+            for task in tasks:
+                pickle.dump(function(task), file)
+                file.flush()
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        os._exit(0)

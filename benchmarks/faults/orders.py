@@ -61,6 +61,9 @@ def orders(scale: Scale, folder: Path) -> Result:
     for shard in range(N // 2):
         one, other = (folder / name / f"shards/{shard:06d}" for name in ("prefix", "reference"))
         result.add(tree_digest(one) == tree_digest(other), f"shard {shard} of a prefix")
+    result.notes.append(
+        "1, 2, 3 and 8 workers; reversed and random order; a prefix" if scale.is_full else ""
+    )
     return result
 
 

@@ -198,7 +198,7 @@ def _override_elements(elements: Node, overrides: Node) -> Node:
             # New elements come after those of the template.
             by_name[name] = node
         else:
-            fact = f"the template has no element '{name}'; expected one of "
+            fact = f"the template has no element {quote_value(name)}; expected one of "
             fact += ", ".join(by_name) + did_you_mean(name, by_name)
             problems.add(overrides.key_position(name), f"elements.{name}", fact)
     problems.raise_if_any()

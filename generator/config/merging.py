@@ -48,15 +48,17 @@ def merge_named(base: Node, override: Node) -> Node:
     new: list[str] = []
     for item in override.content:
         name = node_name(item)
-        if name in items:
+        if name in order:
             # An item without a name keeps that of the inherited one, which it may replace.
             named = item if item.get("name") else with_entry(item, "name", items[name].get("name"))
             items[name] = merge_nodes(items[name], named)
             at = order.index(name)
             order[at:at], new = new, []
         else:
-            items[name] = item
-            new.append(name)
+            # A new item that is listed twice is kept twice, and refused later.
+            key = name if name not in items else str(item.position)
+            items[key] = item
+            new.append(key)
     return Node(override.position, tuple(items[name] for name in (*order, *new)))
 
 

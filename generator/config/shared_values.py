@@ -29,7 +29,7 @@ from gen_data.generator.config.distributions import (
 )
 from gen_data.generator.config.distributions.base import Kind, Malformed, read_distribution
 from gen_data.generator.config.problems import FieldPath, Position, refuse
-from gen_data.generator.config.yaml_scalars import quote_value, resolve_scalar
+from gen_data.generator.config.yaml_scalars import abbreviate, quote_value, resolve_scalar
 from gen_data.generator.config.yaml_tree import Node, is_distribution
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.scene import SharedValue
@@ -207,6 +207,7 @@ def _scalar(key: str) -> SharedValue:
 
 def _look_up(name: str, shared: Shared, position: Position, path: FieldPath) -> SharedValue:
     if name not in shared:
-        fact = f"there is no shared value '{name}'; expected one of {', '.join(shared) or 'none'}"
+        known = ", ".join(shared) or "none"
+        fact = f"there is no shared value '{abbreviate(name)}'; expected one of {known}"
         refuse(position, path, fact + did_you_mean(name, shared))
     return shared[name]

@@ -55,7 +55,7 @@ class PluginTable(Generic[P]):
         if name not in self:
             known = self.names()
             raise ConfigError(
-                f"unknown {self.kind} '{name}'; expected one of {', '.join(known)}"
+                f"unknown {self.kind} {name[:60]!r}; expected one of {', '.join(known)}"
                 f"{did_you_mean(name, known)}"
             )
         path = self.entries.get(name) or third_party(self.kind)[name].value

@@ -152,3 +152,10 @@ def test_items_without_a_name_are_told_apart_by_their_type() -> None:
 def test_an_item_of_another_type_takes_the_place_of_one_of_its_name() -> None:
     """It inherits the place, and no field."""
     assert listed("[{type: u, name: a}]")[0] == {"type": "u", "name": "a"}
+
+
+def test_a_new_item_that_is_listed_twice_is_kept_twice() -> None:
+    """So that it is refused with its place, as in a list that inherits nothing."""
+    names = [item["name"] for item in listed("[{name: c}, {name: c}, {name: d}]")]  # type: ignore[index]
+
+    assert names == ["a", "b", "c", "c", "d"]
