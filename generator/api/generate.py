@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import partial
 from os import PathLike
 from pathlib import Path
@@ -74,15 +75,13 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     from threadpoolctl import threadpool_limits
 
     from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
-    from gen_data.generator.config.paths import write_locations
     from gen_data.generator.runner.identity import format_licences, make_plan
     from gen_data.generator.runner.run import Settings, run
 
     factory = _make_factory(loaded, n)
     plan = make_plan(factory)
-    folder = Path(out) if out is not None else Path("out") / loaded.name
-    with threadpool_limits(limits=1):
-        summary = run(
+    with threadpool_limits(limits=1), _output_folder(loaded, out) as folder:
+        return run(
             plan,
             factory,
             folder,
@@ -98,10 +97,19 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
             ),
             progress=on_progress,
         )
+
+
+@contextmanager
+def _output_folder(loaded: Config, out: str | PathLike[str] | None) -> Iterator[Path]:
+    """Folder of the data set; a finished run remembers its asset folders there, for exports."""
+    from gen_data.generator.config.paths import write_locations
+    from gen_data.generator.runner.store import LocalStore
+
+    folder = Path(out) if out is not None else Path("out") / loaded.name
+    yield folder
     store = LocalStore(folder)
     with store.errors():
         write_locations(store.run_dir, loaded.asset_locations)
-    return summary
 
 
 def _make_factory(loaded: Config, n: int) -> PipelineFactory:
