@@ -137,7 +137,11 @@ def find_annotations(folder: Path, split: str) -> Path:
 
 
 def find_images(folder: Path, annotations: Path, names: list[str]) -> list[Path]:
-    """Images by their names in an annotation file; in ``<split>/`` if several are named so."""
+    """Images by their names in an annotation file.
+
+    Of several with one name, those in ``<split>/`` win, then those in the fewest folders: an export
+    holds depth and label images of the same names in folders of their own.
+    """
     known: dict[str, list[Path]] = {}
     for path in sorted(folder.rglob("*.*")):
         known.setdefault(path.name, []).append(path)
@@ -146,7 +150,7 @@ def find_images(folder: Path, annotations: Path, names: list[str]) -> list[Path]
         found = [p for p in known.get(name.name, []) if p.parts[-len(name.parts) :] == name.parts]
         if not found:
             raise SystemExit(f"{annotations}: there is no image {name} in {folder}")
-        images.append(max(found, key=lambda path: path.parent.name in annotations.stem))
+        images.append(max(found, key=lambda p: (p.parent.name in annotations.stem, -len(p.parts))))
     return images
 
 

@@ -76,16 +76,16 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     loaded = load_config(config, seed=seed, overrides=overrides, without=without)
 
     from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
-    from gen_data.generator.config.paths import write_locations
     from gen_data.generator.runner.identity import format_licences, make_plan
     from gen_data.generator.runner.run import Settings, run
-    from gen_data.generator.runner.store import LocalStore
 
     factory = _make_factory(loaded, n)
     plan = make_plan(factory)
-    folder = fspath(out) if out is not None else Path("out") / loaded.name
-    with _opened(cluster, workers, processes) as (open_pool, count):
-        summary = run(
+    with (
+        _opened(cluster, workers, processes) as (open_pool, count),
+        _output_folder(loaded, out) as folder,
+    ):
+        return run(
             plan,
             factory,
             folder,
@@ -102,11 +102,20 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
             ),
             progress=on_progress,
         )
+
+
+@contextmanager
+def _output_folder(loaded: Config, out: str | PathLike[str] | None) -> Iterator[Path | str]:
+    """Folder or URL of the data set; a finished run remembers its asset folders in a folder."""
+    from gen_data.generator.config.paths import write_locations
+    from gen_data.generator.runner.store import LocalStore
+
+    folder = fspath(out) if out is not None else Path("out") / loaded.name
+    yield folder
     if not is_url(folder):
         store = LocalStore(Path(folder))
         with store.errors():
             write_locations(store.run_dir, loaded.asset_locations)
-    return summary
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth
 from gen_data.generator.core.scene import Camera, Instance
 from gen_data.generator.core.se3 import IDENTITY, SE3
+from tests.exporters import kitti_evaluation
 
 Array = NDArray[np.float64]
 CAMERA = Camera("color", IDENTITY, Intrinsics(200, 100, 150.0, 150.0, 100.0, 50.0))
@@ -73,6 +75,28 @@ def dataset(world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Seven frames of a street; the images are so small that everything is labelled."""
     folder = tmp_path_factory.mktemp("kitti")
     return world.export(Kitti(low_px=2), world.info(7), world.samples, folder)
+
+
+def test_the_evaluation_scores_the_labels_as_perfect(dataset: Path) -> None:
+    """AP 1 at 40 recalls for each class; less for boxes moved by two fifths of their width."""
+    level = kitti_evaluation.Difficulty(0.0, 2, 0.5)
+    files = sorted((dataset / "training/label_2").iterdir())
+    truth = [
+        [kitti_evaluation.Row.parse(line) for line in path.read_text().splitlines()]
+        for path in files
+    ]
+
+    def moved(row: kitti_evaluation.Row, share: float) -> kitti_evaluation.Row:
+        shift = share * (row.box[2] - row.box[0])
+        return replace(row, box=row.box + np.array([shift, 0.0, shift, 0.0]))
+
+    def score(kind: str, share: float) -> float:
+        found = [[moved(row, share) for row in rows] for rows in truth]
+        return kitti_evaluation.average_precision(list(zip(truth, found, strict=True)), kind, level)
+
+    for kind in ("Car", "Pedestrian"):
+        assert score(kind, 0.0) == 1.0
+        assert score(kind, 0.4) < 0.5
 
 
 unit = st.floats(-1, 1)
