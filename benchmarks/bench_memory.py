@@ -3,12 +3,16 @@
 Images are small unless ``--full-size`` is given: growth comes from assets and caches, which small
 images draw as often. One line per interval, then the slope [MB per 1,000 samples]: the median of
 the slopes between all pairs of readings (Theil-Sen) in the second half of the run.
+
+``python -m benchmarks.bench_memory assets`` passes all assets of the library through the caches of
+a renderer, ``--passes`` times in another order: the memory of a worker that has seen everything.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import random
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -20,7 +24,11 @@ import numpy as np
 from benchmarks.runs import format_summary, machine
 from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.runner.identity import format_licences, make_plan
+from gen_data.generator.runner.resident_memory import release_memory
 from gen_data.generator.runner.run import RunProgress, run
 
 SMALL_PX = {"tabletop": (96, 72), "street": (124, 38)}
@@ -85,16 +93,43 @@ class Recorder:
         return theil_sen(made, [reading[name] for _, reading in steady])
 
 
+def pass_all_assets(passes: int) -> None:
+    """Print the memory of this process after each pass over all assets."""
+    library = open_library()
+    cache = DeviceCache(library, open_device("cpu"))
+    kinds = ("object", "texture", "environment")
+    found = {kind: [one.asset_id for one in library.find((), kind)] for kind in kinds}
+    pairs = [(kind, asset_id) for kind in kinds for asset_id in found[kind]]
+    print(f"{machine()}, {', '.join(f'{len(ids)} {kind}s' for kind, ids in found.items())}")
+    upload = {"object": cache.mesh, "texture": cache.texture, "environment": cache.environment}
+    for number in range(passes):
+        random.Random(number).shuffle(pairs)
+        for count, (kind, asset_id) in enumerate(pairs):
+            upload[kind](asset_id)
+            if kind == "object":
+                library.materials(asset_id)
+                library.convex_parts(asset_id)
+            if count % 100 == 0:
+                release_memory()
+        release_memory(file_bytes_kept=0)
+        listed = "  ".join(f"{k} {v:6.1f}" for k, v in read_rollup(os.getpid()).items())
+        print(f"pass {number}: {listed}", flush=True)
+
+
 def main() -> None:
     """Print the readings and the figures of docs/performance.md."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("scene", choices=sorted(SMALL_PX))
+    parser.add_argument("scene", choices=[*sorted(SMALL_PX), "assets"])
     parser.add_argument("--n", type=int, default=20000)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--every", type=int, default=0, help="samples between readings")
     parser.add_argument("--full-size", action="store_true", help="the configured image size")
     parser.add_argument("--set", action="append", default=[], help="as of gen-data")
+    parser.add_argument("--passes", type=int, default=4, help="of all assets")
     arguments = parser.parse_args()
+    if arguments.scene == "assets":
+        pass_all_assets(arguments.passes)
+        return
 
     width, height = SMALL_PX[arguments.scene]
     size = () if arguments.full_size else (f"sensors.color.size_px=[{width}, {height}]",)
