@@ -6,6 +6,9 @@ share a folder. Unreadable entries are computed again; an unwritable folder only
 A file holds its CRC-32 (of all bytes that follow) and the length of its header, four bytes each,
 little-endian; the header, JSON: key and, per array, name, dtype and shape; the arrays' bytes, each
 padded to a multiple of 64. This is much faster to read than ``.npz``; a scene reads hundreds.
+
+Arrays of large files are views of the mapped file: processes share its pages, and only those that
+are read occupy memory. Entries are replaced or removed, never changed in place.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import mmap
 import os
 import struct
 import tempfile
@@ -21,7 +25,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +43,9 @@ FORMAT = 2
 _MEMORY_BYTES = 24 * 1024 * 1024
 _PREFIX = struct.Struct("<II")
 _ALIGNMENT = 64
+# A mapping occupies whole pages, and a process may have 65,530 mappings.
+_MAPPED_BYTES_MIN = 64 * 1024
+_CHUNK_BYTES = 256 * 1024
 
 
 def content_key(description: Mapping[str, Any]) -> str:
@@ -57,7 +64,7 @@ class DiskCache:
     folder: Path
 
     def arrays(self, key: str, compute: Callable[[], Arrays]) -> Arrays:
-        """Load the arrays of a content key; compute and store them if missing."""
+        """Load the arrays of a content key, read-only; compute and store them if missing."""
         path = self.folder / key[:2] / f"{key}.arrays"
         stored = _load(path, key)
         if stored is not None:
@@ -66,6 +73,8 @@ class DiskCache:
         # A full disk or a read-only home only makes a run slower.
         with contextlib.suppress(OSError):
             _store(path, key, arrays)
+            if sum(array.nbytes for array in arrays.values()) >= _MAPPED_BYTES_MIN:
+                return _load(path, key) or arrays
         return arrays
 
     def load_json(self, name: str) -> dict[str, Any]:
@@ -149,18 +158,27 @@ def decode_arrays(data: bytes, key: str) -> Arrays | None:
 
     Arrays hold numbers only, so that data of any origin can be decoded.
     """
+    if len(data) < _PREFIX.size or not _matches_checksum(memoryview(data)[4:], data[:4]):
+        return None
+    return _decode_checked(data, key)
+
+
+def _matches_checksum(body: memoryview, checksum: bytes) -> bool:
+    return zlib.crc32(body) == int.from_bytes(checksum, "little")
+
+
+def _decode_checked(data: bytes | mmap.mmap, key: str) -> Arrays | None:
+    """Decode the arrays of a file whose checksum is right; None if they have another key."""
+    _, size = _PREFIX.unpack_from(data)
     try:
-        check, size = _PREFIX.unpack_from(data)
-        if zlib.crc32(memoryview(data)[4:]) != check:
-            return None
         head = json.loads(data[_PREFIX.size : _PREFIX.size + size])
-    except (ValueError, struct.error):
+    except ValueError:
         return None
     if head["key"] != key:
         return None
     arrays, start = {}, _PREFIX.size + size
     for name, kind, shape in head["arrays"]:
-        # Views of bytes are read-only.
+        # Views of bytes, and of a file mapped for reading, are read-only.
         arrays[name] = np.frombuffer(data, kind, math.prod(shape), start).reshape(shape)
         start += arrays[name].nbytes + _padding(arrays[name].nbytes)
     return arrays
@@ -169,9 +187,26 @@ def decode_arrays(data: bytes, key: str) -> Arrays | None:
 def _load(path: Path, key: str) -> Arrays | None:
     """Load the arrays of a file; None if it is missing, damaged, or has another key."""
     try:
-        return decode_arrays(path.read_bytes(), key)
+        with path.open("rb") as file:
+            if os.fstat(file.fileno()).st_size < _MAPPED_BYTES_MIN:
+                return decode_arrays(file.read(), key)
+            if not _is_intact(file):
+                return None
+            return _decode_checked(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), key)
     except OSError:
         return None
+
+
+def _is_intact(file: BinaryIO) -> bool:
+    """Whether the checksum of a cache file is right; read through a buffer, not through a map.
+
+    Pages that are read through a map would count as memory of this process.
+    """
+    expected = int.from_bytes(file.read(4), "little")
+    actual, buffer = 0, bytearray(_CHUNK_BYTES)
+    while size := file.readinto(buffer):  # type: ignore[attr-defined]
+        actual = zlib.crc32(memoryview(buffer)[:size], actual)
+    return actual == expected
 
 
 def _store(path: Path, key: str, arrays: Arrays) -> None:

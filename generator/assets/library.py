@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from gen_data.generator.assets.asset_cache import DiskCache, Store
+from gen_data.generator.assets.asset_cache import Arrays, DiskCache, Store, content_key
 from gen_data.generator.assets.asset_ids import parse_asset_id
 from gen_data.generator.assets.file_library import FileLibrary
 from gen_data.generator.assets.importer import ImportedMesh
@@ -22,9 +22,14 @@ from gen_data.generator.core.asset_types import (
     RobotModel,
     TextureData,
 )
+from gen_data.generator.core.bounded_cache import CountCache
 from gen_data.generator.core.errors import AssetError, UnknownAsset, did_you_mean
 from gen_data.generator.core.scene import Lane, StageModel
 from gen_data.generator.core.se3 import Vec3
+
+_ENTRIES = 16_384
+_SUMMARIES = 4096
+"""Kept in memory: about 1 and 5 kB each."""
 
 
 def open_library(
@@ -56,26 +61,29 @@ class Library:
     """Implementation of ``AssetLibrary``; one per process.
 
     Entries, bounds, materials and keypoints are used hundreds of times per scene and stay in
-    memory: an asset whose files change while a process runs keeps the content read first.
+    memory, as many as scenes are drawn from; ids with free parameters are without number. An asset
+    whose files change while a process runs keeps the content read first.
     """
 
     def __init__(self, user_roots: tuple[Path, ...], cache_dir: Path, packs: Path) -> None:
         disk = DiskCache(cache_dir)
         store = Store(disk)
+        self._disk = disk
         self._generated = ProceduralLibrary(store)
         self._files = FileLibrary(packs, user_roots, disk, store)
-        self._entries: dict[str, Asset] = {}
+        self._entries: CountCache[Asset] = CountCache(_ENTRIES)
         self._found: dict[tuple[frozenset[str], str], tuple[Asset, ...]] = {}
-        self._summaries: dict[str, _MeshSummary] = {}
+        self._summaries: CountCache[_MeshSummary] = CountCache(_SUMMARIES)
 
     def get(self, asset_id: str) -> Asset:
         """Description of an asset. Raises UnknownAsset if there is none."""
-        if asset_id not in self._entries:
+
+        def read() -> Asset:
             if self._is_generated(asset_id):
-                self._entries[asset_id] = self._generated.get(parse_asset_id(asset_id))
-            else:
-                self._entries[asset_id] = self._files.get(asset_id)
-        return self._entries[asset_id]
+                return self._generated.get(parse_asset_id(asset_id))
+            return self._files.get(asset_id)
+
+        return self._entries.get(asset_id, read)
 
     def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:
         """All assets of a kind that have every tag, sorted by id; may be empty."""
@@ -147,13 +155,26 @@ class Library:
             return self._generated.environment(parse_asset_id(environment_id))
         return self._files.environment(environment_id)
 
+    def derived(self, asset_id: str, name: str, compute: Callable[[], Arrays]) -> Arrays:
+        """Arrays computed from an asset alone; see ``DerivedArrays``.
+
+        Those of assets that are not on disk themselves are not stored: their number is unlimited.
+        """
+        owner = asset_id.partition("#")[0]
+        if self._is_generated(owner) and not self._generated.is_stored(parse_asset_id(owner)):
+            return compute()
+        content = {"asset": self.get(owner).sha256, "id": asset_id, "derived": name}
+        return self._disk.arrays(content_key(content), compute)
+
     def _summarize(self, asset_id: str) -> _MeshSummary:
         """Bounds, materials and keypoints. Raises AssetError if there is no mesh."""
-        if asset_id not in self._summaries:
+
+        def read() -> _MeshSummary:
             mesh = self.mesh(asset_id)
             keypoints = self._imported(asset_id).keypoints
-            self._summaries[asset_id] = _MeshSummary(mesh.bounds_m(), mesh.materials, keypoints)
-        return self._summaries[asset_id]
+            return _MeshSummary(mesh.bounds_m(), mesh.materials, keypoints)
+
+        return self._summaries.get(asset_id, read)
 
     def _imported(self, asset_id: str) -> ImportedMesh:
         if self._is_generated(asset_id):

@@ -127,6 +127,12 @@ class ProceduralLibrary:
         pack, unpack = (lambda image: {"radiance": image}), (lambda arrays: arrays["radiance"])
         return self._result(asset_id, family, compute, pack, unpack)
 
+    def is_stored(self, asset_id: AssetId) -> bool:
+        """Whether the asset is kept on disk: others are too many, or quick to compute."""
+        family = self._families[asset_id.name]
+        is_offered = family.variants > 0 and set(asset_id.parameters) <= {"seed"}
+        return is_offered or family.stored
+
     def _find(self, asset_id: AssetId, kind: type[F], expected: str) -> F:
         """The id's family. Raises AssetError if it is of another kind."""
         family = self._families[asset_id.name]
@@ -143,9 +149,8 @@ class ProceduralLibrary:
         unpack: Callable[[Arrays], S],
     ) -> S:
         key = self._key(asset_id, family)
-        offered = family.variants > 0 and set(asset_id.parameters) <= {"seed"}
         try:
-            if not (offered or family.stored):
+            if not self.is_stored(asset_id):
                 return self._store.computed(key, compute)
             return self._store.get(key, lambda: pack(compute()), unpack)
         except ValueError as error:

@@ -46,6 +46,32 @@ class ByteCache(Generic[S]):
         return len(self._values)
 
 
+class CountCache(Generic[V]):
+    """Values by name, up to a number of them; the least recently used go first."""
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
+        self._values: OrderedDict[str, V] = OrderedDict()
+
+    def get(self, name: str, make: Callable[[], V]) -> V:
+        """The value of that name, made if it is not there."""
+        if name in self._values:
+            self._values.move_to_end(name)
+            return self._values[name]
+        value = self._values[name] = make()
+        if len(self._values) > self._limit:
+            self._values.popitem(last=False)
+        return value
+
+    def __contains__(self, name: str) -> bool:
+        """Whether the value of that name is held."""
+        return name in self._values
+
+    def __len__(self) -> int:
+        """How many values are held."""
+        return len(self._values)
+
+
 class ObjectCache(Generic[V]):
     """Values made of objects that never change, for the latest of these objects.
 

@@ -24,12 +24,14 @@ exporters process one shard at a time and compute ids instead of counting.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from types import TracebackType
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
+
+from numpy.typing import NDArray
 
 from gen_data.generator.core.asset_types import (
     Asset,
@@ -129,6 +131,26 @@ class AssetLibrary(AssetIndex, Protocol):
 
         Row 0 is the zenith; column 0 is the direction -X, the centre column is +X, and columns
         grow clockwise seen from above (towards -Y).
+        """
+        ...
+
+
+@runtime_checkable
+class DerivedArrays(Protocol):
+    """An AssetLibrary that also stores arrays computed from its assets.
+
+    All processes share them, and memory is needed only for the parts that are read.
+    """
+
+    def derived(
+        self, asset_id: str, name: str, compute: Callable[[], dict[str, NDArray[Any]]]
+    ) -> dict[str, NDArray[Any]]:
+        """Arrays computed from an asset, read-only; computed if they are not stored.
+
+        Args:
+            asset_id: Also ``<asset>#<image>``.
+            name: Of the computation and everything else that the result depends on.
+            compute: Computes them; its result depends on the asset and the name alone.
         """
         ...
 

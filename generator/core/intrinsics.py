@@ -8,11 +8,11 @@ their exporters subtract 0.5 from ``cx_px`` and ``cy_px``.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.generator.core.bounded_cache import ByteCache
 from gen_data.generator.core.lens import PINHOLE, Lens
 from gen_data.generator.core.se3 import Array
 
@@ -121,8 +121,15 @@ class Intrinsics:
         return bool(dark) and self.lens.folds
 
 
-@lru_cache(maxsize=4)
+_RAY_FIELDS: ByteCache[Array] = ByteCache(32 << 20)
+"""Rays of cameras that do not change; cameras whose lens is drawn displace one another."""
+
+
 def _pixel_rays(intrinsics: Intrinsics) -> Array:
+    return _RAY_FIELDS.get(repr(intrinsics), lambda: _compute_pixel_rays(intrinsics))
+
+
+def _compute_pixel_rays(intrinsics: Intrinsics) -> Array:
     rays = np.zeros((intrinsics.height_px, intrinsics.width_px, 3))
     u = np.arange(intrinsics.width_px) + 0.5
     for first in range(0, intrinsics.height_px, _ROWS_AT_ONCE):

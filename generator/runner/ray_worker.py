@@ -24,8 +24,9 @@ from gen_data.generator.core.sample import Sample
 from gen_data.generator.runner.durable_files import make_folder
 from gen_data.generator.runner.identity import installation_differences
 from gen_data.generator.runner.numerics_guard import admit_numerics
+from gen_data.generator.runner.resident_memory import release_memory
 from gen_data.generator.runner.shard import Job, PipelineLike, make_shard
-from gen_data.generator.runner.worker import done_event, make_sendable, release_memory
+from gen_data.generator.runner.worker import done_event, make_sendable
 from gen_data.generator.runner.worker_events import Event, Failed, Ready, SampleDone
 
 BATCH_S = 1.0

@@ -49,7 +49,9 @@ class Limits:
         machine_losses: Machines lost while they worked on one shard until it is abandoned.
         lost_shards: Abandoned shards until the run is abandoned.
         failed_starts: Consecutive deaths during start until the run is abandoned.
-        rss_bytes: Memory at which a worker is replaced after its shard; None = never.
+        rss_bytes: Resident memory above which a worker is replaced after its shard; None = never.
+        rss_growth: It is replaced only if it has grown to this multiple of its memory after its
+            first shard: otherwise a new one would soon be as large.
     """
 
     silence_s: float = 300.0
@@ -59,7 +61,8 @@ class Limits:
     machine_losses: int = 10
     lost_shards: int = 3
     failed_starts: int = 3
-    rss_bytes: int | None = None
+    rss_bytes: int | None = 3 * 1024**3
+    rss_growth: float = 1.5
 
 
 class State(Enum):
@@ -78,6 +81,7 @@ class _Worker:
     shard: int = -1
     done: int = 0
     killed: str = ""
+    first_rss_bytes: int | None = None
 
 
 @dataclass
@@ -304,8 +308,12 @@ class Supervisor:
         return "writing its files"
 
     def _recycle(self, event: ShardDone, worker: _Worker) -> list[Action]:
-        cap = self.limits.rss_bytes
-        if cap is None or event.rss_bytes <= cap or worker.state is State.LEAVING:
+        cap, first = self.limits.rss_bytes, worker.first_rss_bytes
+        if first is None:
+            worker.first_rss_bytes = first = event.rss_bytes
+        if cap is None or worker.state is State.LEAVING:
+            return []
+        if event.rss_bytes <= max(cap, self.limits.rss_growth * first):
             return []
         worker.state = State.LEAVING
         text = f"worker {event.worker} holds {event.rss_bytes / 1e6:.0f} MB and is replaced"

@@ -7,7 +7,6 @@ because their sums depend on the number of threads.
 
 from __future__ import annotations
 
-import ctypes
 import faulthandler
 import gc
 import os
@@ -27,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 from gen_data.generator.core.errors import CacheWarning, ConfigWarning, GenDataError
 from gen_data.generator.core.processes import end_with_parent, ignore_interrupts
 from gen_data.generator.runner.error_context import unexpected_error
+from gen_data.generator.runner.resident_memory import release_memory, resident_bytes
 from gen_data.generator.runner.worker_events import Failed, Ready, SampleDone, ShardDone
 
 if TYPE_CHECKING:
@@ -108,6 +108,7 @@ def _make_shards(number: int, connection: Connection, job: Job) -> None:
         gc.collect()
         gc.freeze()
         gc.disable()
+        release_memory()
         # Imports numpy, therefore only after ``end_with_parent``.
         from gen_data.generator.runner.numerics_guard import admit_numerics
 
@@ -157,20 +158,3 @@ def done_event(number: int, made: MadeShard) -> ShardDone:
         resident_bytes(),
         made.timings_s,
     )
-
-
-def resident_bytes() -> int:
-    """Resident memory of this process; 0 without Linux's procfs."""
-    try:
-        pages = int(Path("/proc/self/statm").read_text().split()[1])
-    except OSError:
-        return 0
-    return pages * resource.getpagesize()
-
-
-def release_memory() -> None:
-    """Return freed memory to the system; glibc keeps the gaps between cached arrays otherwise."""
-    gc.collect()
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if trim is not None:
-        trim(0)

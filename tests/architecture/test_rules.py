@@ -36,6 +36,55 @@ def lines_of_code(path: Path, function: ast.FunctionDef | ast.AsyncFunctionDef) 
     return sum(bool(line.strip()) and not line.lstrip().startswith("#") for line in lines)
 
 
+UNBOUNDED_CACHES = {
+    # By type, of which the code has a fixed number.
+    "schema.py: model_schema",
+    "serialization.py: _builder",
+    "serialization.py: _field_builders",
+    "serialization.py: _fields_of",
+    "struct_dtypes.py: struct_dtype",
+    # By a name in a table of the code or of a plug-in.
+    "base.py: distribution",
+    "base.py: distribution_names",
+    "device_presets.py: load_preset",
+    "device_presets.py: preset_names",
+    "image_pipeline.py: _preset",
+    "label_map.py: public_classes",
+    "nuscenes_classes.py: _index",
+    "plugins.py: third_party",
+    # By a setting of the run.
+    "device.py: compile_kernels",
+    "image_files.py: depths_of_units",
+}
+"""Caches without a bound, whose number of values does not depend on the number of samples."""
+
+
+def test_every_cache_is_bounded() -> None:
+    """``functools.cache`` of a function with arguments keeps a value for each of them."""
+    unbounded = {
+        f"{path.name}: {node.name}"
+        for path in python_files(*OURS)
+        if "cache\n" in (source := path.read_text()) or "maxsize=None" in source
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.FunctionDef)
+        and any(has_no_bound(decorator) for decorator in node.decorator_list)
+        and (node.args.args or node.args.kwonlyargs or node.args.vararg)
+    }
+    assert unbounded == UNBOUNDED_CACHES
+
+
+def has_no_bound(decorator: ast.expr) -> bool:
+    """Whether a decorator is ``cache``, or ``lru_cache`` with ``maxsize=None``."""
+    name = decorator.func if isinstance(decorator, ast.Call) else decorator
+    word = name.attr if isinstance(name, ast.Attribute) else getattr(name, "id", "")
+    if not isinstance(decorator, ast.Call):
+        return word == "cache"
+    values = [*decorator.args, *(keyword.value for keyword in decorator.keywords)]
+    return word == "lru_cache" and any(
+        isinstance(value, ast.Constant) and value.value is None for value in values
+    )
+
+
 def test_only_the_command_line_prints_and_reads_the_environment() -> None:
     """Library code has no hidden inputs and no output of its own; packs say where they are."""
     offenders = [

@@ -66,6 +66,55 @@ def test_a_damaged_entry_is_made_anew(tmp_path: Path, damage: str) -> None:
     assert_same(open_library(cache_dir=tmp_path).mesh(ASSET), good)
 
 
+def large_arrays() -> dict[str, np.ndarray]:
+    return {"x": np.arange(50_000, dtype=np.float32).reshape(-1, 2), "y": np.arange(7)}
+
+
+def test_large_entries_are_mapped_and_read_only(tmp_path: Path) -> None:
+    """Computed or loaded, their arrays are views of the file, with the computed values."""
+    disk, key = DiskCache(tmp_path), content_key({"name": "large"})
+    for arrays in (disk.arrays(key, large_arrays), disk.arrays(key, dict)):
+        for name, expected in large_arrays().items():
+            np.testing.assert_array_equal(arrays[name], expected)
+            assert not arrays[name].flags.writeable
+        assert str(entries(tmp_path)[0]) in Path("/proc/self/maps").read_text()
+
+
+@pytest.mark.parametrize("damage", ["truncated", "bit flip"])
+def test_a_damaged_large_entry_is_made_anew(tmp_path: Path, damage: str) -> None:
+    """The checksum is compared before the file is mapped."""
+    disk, key = DiskCache(tmp_path), content_key({"name": "large"})
+    disk.arrays(key, large_arrays)
+    (path,) = entries(tmp_path)
+    data = bytearray(path.read_bytes())
+    data[150_000] ^= 0x10
+    path.unlink()
+    path.write_bytes(data[:180_000] if damage == "truncated" else data)
+
+    arrays = disk.arrays(key, large_arrays)
+
+    np.testing.assert_array_equal(arrays["x"], large_arrays()["x"])
+    assert path.read_bytes() != data
+
+
+def test_derived_arrays_are_stored_by_asset_and_name(tmp_path: Path) -> None:
+    """Another process loads them; another name, or another asset, computes anew."""
+    computed: list[int] = []
+
+    def compute() -> dict[str, np.ndarray]:
+        computed.append(len(computed))
+        return {"k": np.array(computed)}
+
+    def derive(asset: str, name: str) -> list[int]:
+        library = open_library(cache_dir=tmp_path)
+        return library.derived(asset, name, compute)["k"].tolist()
+
+    assert derive("mug?seed=0", "tree 1") == [0]
+    assert derive("mug?seed=0", "tree 1") == [0]
+    assert derive("mug?seed=0", "tree 2") == [0, 1]
+    assert derive("mug?seed=1", "tree 1") == [0, 1, 2]
+
+
 def test_a_cache_that_cannot_be_written_only_costs_time(tmp_path: Path) -> None:
     """A file stands where the cache folder should be."""
     blocked = tmp_path / "cache"

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from gen_data.generator.runner.run import Limits, Settings
 from gen_data.generator.runner.verify import verify
-from tests.runner.doubles import make, tree_digest
+from tests.runner.doubles import make, notes_of, tree_digest, write_raw_images
 from tests.runner.fake_run import DELAY_S, SHARD_SIZE, N
 from tests.runner.test_processes import start_fake_run
 
@@ -33,6 +34,18 @@ def test_the_number_of_workers_does_not_matter(
     make(tmp_path / "out", N, SHARD_SIZE, workers=workers)
 
     assert tree_digest(tmp_path / "out") == reference_digest
+
+
+def test_workers_replaced_for_their_memory_change_nothing(tmp_path: Path) -> None:
+    """With a limit of one byte, every worker leaves after its shard."""
+    settings = Settings(limits=Limits(rss_bytes=1, rss_growth=0.0), write_media=write_raw_images)
+    make(tmp_path / "kept", 8, 4)
+
+    summary = make(tmp_path / "replaced", 8, 4, workers=1, settings=settings)
+
+    assert tree_digest(tmp_path / "replaced") == tree_digest(tmp_path / "kept")
+    assert summary.worker_deaths == 0
+    assert [note for note in notes_of(tmp_path / "replaced") if "MB and is replaced" in note]
 
 
 def test_exporters_that_must_copy_give_the_bytes_of_those_that_link(

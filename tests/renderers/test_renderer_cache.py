@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -91,3 +92,35 @@ def test_textures_of_several_bodies_find_their_places() -> None:
 
     assert record.surfaces.numpy()["texture"].tolist() == [-1, 1, 0, -1, 1]
     assert len(record.textures.numpy()) == 2
+
+
+class StoringLibrary(FakeLibrary):
+    """Stores derived arrays, read-only; refuses to compute them again."""
+
+    def __init__(self) -> None:
+        super().__init__({"box": box_mesh(), "floor": plane_mesh(20.0)}, {"brick": CHECKER})
+        self.stored: dict[tuple[str, str], dict[str, np.ndarray]] = {}
+
+    def derived(
+        self, asset_id: str, name: str, compute: Callable[[], dict[str, np.ndarray]]
+    ) -> dict[str, np.ndarray]:
+        """Arrays computed at the first request."""
+        if (asset_id, name) not in self.stored:
+            arrays = compute()
+            for array in arrays.values():
+                array.flags.writeable = False
+            self.stored[asset_id, name] = arrays
+        return self.stored[asset_id, name]
+
+
+def test_stored_hierarchies_and_mip_levels_give_the_same_image() -> None:
+    """Computed, stored, or loaded by another renderer."""
+    floor, box = SCENE.bodies
+    scene = replace(SCENE, bodies=(floor, replace(box, materials=(Material(texture="brick"),))))
+    library = StoringLibrary()
+    expected = WarpRenderer(LIBRARY, "cpu").render(scene, EYES[0], CHANNELS)
+    for _ in range(2):
+        seen = WarpRenderer(library, "cpu").render(scene, EYES[0], CHANNELS)
+        for channel in CHANNELS:
+            np.testing.assert_array_equal(seen.channels[channel], expected.channels[channel])
+    assert {asset for asset, _ in library.stored} == {"box", "floor", "brick"}

@@ -182,11 +182,23 @@ def test_a_worker_that_grew_too_large_is_replaced_between_shards() -> None:
     supervisor = make_supervisor(shards=9, workers=1, rss_bytes=1000)
     supervisor.start(0.0)
     supervisor.handle(Ready(0), 1.0)
+    assert supervisor.handle(ShardDone(0, 0, 4, 100, 0, rss_bytes=600), 2.0) == [Assign(0, 1)]
 
-    actions = supervisor.handle(ShardDone(0, 0, 4, 100, 0, rss_bytes=1001), 2.0)
+    actions = supervisor.handle(ShardDone(0, 1, 4, 100, 0, rss_bytes=1001), 2.0)
 
     assert Dismiss(0) in actions
     assert Spawn(1) in actions
+
+
+def test_a_worker_that_was_as_large_from_the_start_is_kept() -> None:
+    """Its scenes need the memory: a new worker would need it again."""
+    supervisor = make_supervisor(shards=9, workers=1, rss_bytes=1000)
+    supervisor.start(0.0)
+    supervisor.handle(Ready(0), 1.0)
+
+    for shard, rss_bytes in enumerate((1200, 1790)):
+        event = ShardDone(0, shard, 4, 100, 0, rss_bytes=rss_bytes)
+        assert supervisor.handle(event, 2.0) == [Assign(0, shard + 1)]
 
 
 def test_an_abort_kills_every_process() -> None:

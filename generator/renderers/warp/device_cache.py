@@ -12,12 +12,16 @@ from numpy.typing import NDArray
 
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.bounded_cache import ByteCache, ObjectCache
-from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.interfaces import AssetLibrary, DerivedArrays
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.renderers.warp.scene.brdf_albedo_lut import lobe_albedo
 from gen_data.generator.renderers.warp.scene.device_assets import (
+    Arrays,
     DeviceMesh,
     DeviceTexture,
+    code_digest,
+    prepare_mesh,
+    prepare_texture,
     upload_mesh,
     upload_texture,
 )
@@ -67,9 +71,15 @@ class DeviceCache:
 
     def mesh(self, asset_id: str) -> DeviceMesh:
         """Geometry of an asset on the device."""
-        return self._meshes.get(
-            asset_id, lambda: upload_mesh(self.assets.mesh(asset_id), self.device)
-        )
+
+        def make() -> DeviceMesh:
+            data = self.assets.mesh(asset_id)
+            with_tree = self.device.is_cpu
+            name = f"device mesh {'with' if with_tree else 'without'} tree"
+            prepared = self._derived(asset_id, name, lambda: prepare_mesh(data, with_tree))
+            return upload_mesh(data, prepared, self.device)
+
+        return self._meshes.get(asset_id, make)
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
         """An asset's own materials, one per slot."""
@@ -77,9 +87,22 @@ class DeviceCache:
 
     def texture(self, texture_id: str) -> DeviceTexture:
         """A texture on the device."""
-        return self._textures.get(
-            texture_id, lambda: upload_texture(self.assets.texture(texture_id), self.device)
-        )
+
+        def make() -> DeviceTexture:
+            prepared = self._derived(
+                texture_id,
+                "device texture",
+                lambda: prepare_texture(self.assets.texture(texture_id)),
+            )
+            return upload_texture(prepared, self.device)
+
+        return self._textures.get(texture_id, make)
+
+    def _derived(self, asset_id: str, name: str, compute: Callable[[], Arrays]) -> Arrays:
+        """Arrays computed from an asset by the present code; stored if the library can do so."""
+        if not isinstance(self.assets, DerivedArrays):
+            return compute()
+        return self.assets.derived(asset_id, f"{name} {code_digest()}", compute)
 
     def environment(self, environment_id: str) -> DeviceEnvironment:
         """Light of an environment, as an image."""

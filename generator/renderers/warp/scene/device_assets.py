@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -12,12 +14,17 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from gen_data.generator.core import colorimetry
 from gen_data.generator.core.asset_types import Material, MeshData, TextureData, UInt8
 from gen_data.generator.core.colorimetry import srgb_decode
 from gen_data.generator.core.se3 import Array
+from gen_data.generator.renderers.warp.scene import bvh
 from gen_data.generator.renderers.warp.scene.bvh import face_boxes, mesh_tree
+from gen_data.generator.renderers.warp.scene.kernels import bvh_build
 from gen_data.generator.renderers.warp.scene.kernels.records import Geometry, TextureRecord
 from gen_data.generator.renderers.warp.scene.struct_dtypes import to_record
+
+Arrays = dict[str, NDArray[Any]]
 
 # Cells along the longest side of the grid that groups faces into boxes.
 _CELLS = 6
@@ -26,6 +33,15 @@ _LARGE_FACES_MAX = 256
 
 # Above this number of faces, the quadratic test costs more than it saves.
 _CONVEXITY_FACES_MAX = 2000
+
+
+@cache
+def code_digest() -> str:
+    """Digest of everything but the asset that prepared arrays depend on: code and libraries."""
+    digest = sha256(f"{cv2.__version__} {np.__version__} {wp.__version__}".encode())
+    for module in (__file__, bvh.__file__, bvh_build.__file__, colorimetry.__file__):
+        digest.update(Path(module).read_bytes())
+    return digest.hexdigest()[:16]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -47,18 +63,35 @@ class DeviceMesh:
     nbytes: int
 
 
-def upload_mesh(data: MeshData, device: wp.Device) -> DeviceMesh:
-    """Upload a mesh and build its hierarchy."""
-    vertices = wp.array(data.vertices_m, dtype=wp.vec3, device=device)
-    normals = wp.array(data.normals, dtype=wp.vec3, device=device)
-    uvs = wp.array(data.uvs, dtype=wp.vec2, device=device)
-    faces = wp.array(data.faces.reshape(-1), dtype=wp.int32, device=device)
-    slots = wp.array(data.face_slots, dtype=wp.int32, device=device)
+def prepare_mesh(data: MeshData, with_tree: bool) -> Arrays:
+    """Compute what rendering a mesh takes beside its own arrays.
+
+    Returns:
+        ``box_lows_m`` and ``box_highs_m`` [n, 3] of ``boxes_around``; ``convex`` [1], 0 or 1; with
+        a tree, ``tree``: that of ``mesh_tree``.
+    """
     face_lows, face_highs = face_boxes(data.vertices_m, data.faces)
-    lows, highs = (
-        wp.array(bounds, dtype=wp.vec3, device=device)
-        for bounds in boxes_around(face_lows, face_highs)
-    )
+    lows, highs = boxes_around(face_lows, face_highs)
+    is_convex = is_convex_solid(data.vertices_m, data.faces)
+    arrays: Arrays = {"box_lows_m": lows, "box_highs_m": highs, "convex": np.array([is_convex])}
+    if with_tree:
+        arrays["tree"] = mesh_tree(data.vertices_m, data.faces, face_lows, face_highs)
+    return arrays
+
+
+def upload_mesh(data: MeshData, prepared: Arrays, device: wp.Device) -> DeviceMesh:
+    """Upload a mesh with its hierarchy.
+
+    Args:
+        data: The mesh.
+        prepared: Arrays of ``prepare_mesh``; on the CPU, with a tree.
+        device: On the CPU, arrays are not copied: they must not change.
+    """
+    vertices, normals = (_upload(v, wp.vec3, device) for v in (data.vertices_m, data.normals))
+    uvs = _upload(data.uvs, wp.vec2, device)
+    faces = _upload(data.faces.reshape(-1), wp.int32, device)
+    slots = _upload(data.face_slots, wp.int32, device)
+    lows, highs = (_upload(prepared[k], wp.vec3, device) for k in ("box_lows_m", "box_highs_m"))
     low, high = (np.asarray(bound, dtype=np.float64) for bound in data.bounds_m())
     record = Geometry()
     if device.is_cuda:
@@ -67,19 +100,23 @@ def upload_mesh(data: MeshData, device: wp.Device) -> DeviceMesh:
         # Warp's hierarchy has two 16-byte nodes per triangle, built from 24-byte boxes.
         hierarchy_nbytes = (64 + 24) * len(data.faces)
     else:
-        tree = mesh_tree(data.vertices_m, data.faces, face_lows, face_highs)
-        hierarchy = record.tree = wp.array(tree, dtype=wp.float32, device=device)
-        hierarchy_nbytes = tree.nbytes
+        hierarchy = record.tree = _upload(prepared["tree"], wp.float32, device)
+        hierarchy_nbytes = prepared["tree"].nbytes
     record.vertices_m, record.normals, record.uvs = vertices, normals, uvs
     record.faces, record.face_slots = faces, slots
     record.box_lows_m, record.box_highs_m = lows, highs
     record.low_m, record.high_m = wp.vec3(*low), wp.vec3(*high)
-    record.convex = int(is_convex_solid(data.vertices_m, data.faces))
+    record.convex = int(prepared["convex"][0])
     nbytes = 32 * len(data.vertices_m) + 16 * len(data.faces) + hierarchy_nbytes
     keep = (vertices, normals, uvs, faces, slots, lows, highs, hierarchy)
     return DeviceMesh(
         to_record(record, Geometry), keep, low, high, len(data.vertices_m), data.materials, nbytes
     )
+
+
+def _upload(values: NDArray[Any], dtype: Any, device: wp.Device) -> wp.array:
+    """An array on the device; on the CPU, the array itself, which stays alive as long."""
+    return wp.array(values, dtype=dtype, device=device, copy=False)
 
 
 def boxes_around(
@@ -126,6 +163,7 @@ def _behind_faces(vertices_m: NDArray[np.float32], faces: NDArray[np.int32]) -> 
 Pixels = NDArray[Any]
 
 _NO_TEXELS = np.zeros(1, np.uint32)
+_NO_HOLE = np.full(1, 255, np.uint8)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -148,28 +186,52 @@ class DeviceTexture:
     has_cutouts: bool
 
 
-def upload_texture(data: TextureData, device: wp.Device) -> DeviceTexture:
-    """Upload a texture and its mip levels."""
+_IMAGES = ("texels", "bumps", "shares", "glow")
+
+
+def prepare_texture(data: TextureData) -> Arrays:
+    """Compute a texture's mip levels.
+
+    Returns:
+        ``texels``, ``bumps``, ``shares``, ``glow``: four bytes per texel as uint32, all levels one
+        after another, the coarsest last; maps that the texture does not have are missing.
+        ``cover``: uint8 [h * w], missing if there are no holes. ``size`` [3]: height, width,
+        levels. ``offsets`` int32 [levels]: the first texel of each level.
+    """
     height, width = data.albedo.shape[:2]
     white = np.full((height, width), 255, np.uint8)
     albedo = data.albedo if data.alpha is None else remove_fringe(data.albedo, data.alpha)
     sizes, texels = _texels(albedo, white if data.roughness is None else data.roughness)
-    record = TextureRecord()
-    record.height, record.width, record.levels = height, width, len(sizes)
-    images = [texels, _NO_TEXELS, _NO_TEXELS, _NO_TEXELS]
+    arrays: Arrays = {
+        "size": np.array([height, width, len(sizes)], np.int32),
+        "offsets": np.cumsum([0, *sizes[:-1]]).astype(np.int32),
+        "texels": texels,
+    }
     if data.normal is not None:
-        record.has_bumps, images[1] = 1, _mean_levels(_append_channel(data.normal, white))
+        arrays["bumps"] = _mean_levels(_append_channel(data.normal, white))
     if data.metallic is not None or data.occlusion is not None:
         shares = [white if share is None else share for share in (data.metallic, data.occlusion)]
-        record.has_shares, images[2] = 1, _mean_levels(cv2.merge([*shares, white, white]))
+        arrays["shares"] = _mean_levels(cv2.merge([*shares, white, white]))
     if data.emission is not None:
-        record.has_glow, images[3] = 1, _texels(data.emission, white)[1]
-    cover = white[:1, 0] if data.alpha is None else data.alpha.reshape(-1)
-    record.has_cover = int(data.alpha is not None)
-    on_device = [wp.array(values, dtype=wp.uint32, device=device) for values in images]
+        arrays["glow"] = _texels(data.emission, white)[1]
+    if data.alpha is not None:
+        arrays["cover"] = data.alpha.reshape(-1)
+    return arrays
+
+
+def upload_texture(prepared: Arrays, device: wp.Device) -> DeviceTexture:
+    """Upload the arrays of ``prepare_texture``; on the CPU, they are not copied."""
+    record = TextureRecord()
+    record.height, record.width, record.levels = (int(value) for value in prepared["size"])
+    record.has_bumps, record.has_shares, record.has_glow, record.has_cover = (
+        int(name in prepared) for name in ("bumps", "shares", "glow", "cover")
+    )
+    images = [prepared.get(name, _NO_TEXELS) for name in _IMAGES]
+    cover = prepared.get("cover", _NO_HOLE)
+    on_device = [_upload(values, wp.uint32, device) for values in images]
     record.texels, record.bumps, record.shares, record.glow = on_device
-    record.cover = wp.array(cover, dtype=wp.uint8, device=device)
-    record.offsets = wp.array(np.cumsum([0, *sizes[:-1]]), dtype=wp.int32, device=device)
+    record.cover = _upload(cover, wp.uint8, device)
+    record.offsets = _upload(prepared["offsets"], wp.int32, device)
     return DeviceTexture(
         to_record(record, TextureRecord),
         (*on_device, record.cover, record.offsets),

@@ -1,0 +1,46 @@
+"""Caches never exceed their bounds, and the least recently used values go first."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gen_data.generator.core.bounded_cache import ByteCache, CountCache
+
+
+def test_bytes_are_bounded_whatever_the_sizes() -> None:
+    """A thousand arrays of up to 400 bytes, at most 1,000 bytes of them at a time."""
+    cache: ByteCache[np.ndarray] = ByteCache(1000)
+    for k in range(1000):
+        size = 8 * (k % 50 + 1)
+        assert cache.get(str(k), lambda size=size: np.zeros(size, np.uint8)).nbytes == size
+        held = [cache.get(name, lambda: np.zeros(1)).nbytes for name in list(cache._values)]
+        assert sum(held) <= 1000
+
+
+def test_a_value_larger_than_the_bound_displaces_all_others() -> None:
+    """It is in use anyway."""
+    cache: ByteCache[np.ndarray] = ByteCache(1000)
+    cache.get("small", lambda: np.zeros(100, np.uint8))
+    cache.get("large", lambda: np.zeros(5000, np.uint8))
+
+    assert len(cache) == 1
+
+
+def test_values_are_bounded_by_number_and_the_oldest_go() -> None:
+    """Three fit; the one requested again stays."""
+    cache: CountCache[int] = CountCache(3)
+    made: list[str] = []
+
+    def get(name: str) -> int:
+        def make() -> int:
+            made.append(name)
+            return len(made)
+
+        return cache.get(name, make)
+
+    values = [get(name) for name in "abcad"]
+
+    assert values == [1, 2, 3, 1, 4]
+    assert [name in cache for name in "abcd"] == [True, False, True, True]
+    assert get("b") == 5
+    assert len(cache) == 3
