@@ -11,7 +11,6 @@ import faulthandler
 import gc
 import os
 import pickle
-import resource
 import sys
 import tempfile
 import traceback
