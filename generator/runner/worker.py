@@ -11,6 +11,7 @@ import faulthandler
 import gc
 import os
 import pickle
+import resource
 import sys
 import tempfile
 import traceback
