@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import argparse
 import os
-import random
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -103,7 +103,7 @@ def pass_all_assets(passes: int) -> None:
     print(f"{machine()}, {', '.join(f'{len(ids)} {kind}s' for kind, ids in found.items())}")
     upload = {"object": cache.mesh, "texture": cache.texture, "environment": cache.environment}
     for number in range(passes):
-        random.Random(number).shuffle(pairs)
+        pairs.sort(key=lambda pair: sha256(f"{number} {pair[1]}".encode()).digest())
         for count, (kind, asset_id) in enumerate(pairs):
             upload[kind](asset_id)
             if kind == "object":
