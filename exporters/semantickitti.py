@@ -16,7 +16,7 @@ Scans are numbered without gaps in the order of samples; ``scans.txt`` names the
 * **Views of one instant** form one sequence per split, one sweep apart: train is 00, val 08, test
   11, each from the official split. Views of one scene share a world, and objects keep their
   instance ids from scan to scan; the next scene is elsewhere and has its own instance ids.
-  Such a sequence is no drive: poses are exact, but views of a street are a hundred metres apart.
+  Such a sequence is no drive: views of a street are a hundred metres apart.
   Train on single scans; a method that joins scans needs views of several instants.
 
 Reference: Behley et al., "SemanticKITTI", ICCV 2019, and semantic-kitti-api, which define classes
