@@ -70,8 +70,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     Warns:
         ConfigWarning: ``n`` is so small that a split of the configuration stays empty.
     """
-    _check_arguments(config, n, out, repair)
-    processes = count_workers(workers)
+    _check_arguments(config, n, out, workers, repair)
     # Before the imports below, so that errors of a configuration come at once.
     loaded = load_config(config, seed=seed, overrides=overrides, without=without)
 
@@ -81,10 +80,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
 
     factory = _make_factory(loaded, n)
     plan = make_plan(factory)
-    with (
-        _opened(cluster, workers, processes) as (open_pool, count),
-        _output_folder(loaded, out) as folder,
-    ):
+    with _opened(cluster, workers) as (open_pool, count), _output_folder(loaded, out) as folder:
         return run(
             plan,
             factory,
@@ -120,9 +116,9 @@ def _output_folder(loaded: Config, out: str | PathLike[str] | None) -> Iterator[
 
 @contextmanager
 def _opened(
-    cluster: RayCluster | None, workers: int | None, processes: int
+    cluster: RayCluster | None, workers: int | None
 ) -> Iterator[tuple[Callable[[Job], Pool], int]]:
-    """Opener of the pool of workers, and their number; ``processes`` are those of this machine."""
+    """Opener of the pool of workers, and their number."""
     from threadpoolctl import threadpool_limits
 
     from gen_data.generator.runner.processes import open_worker_pool
@@ -131,20 +127,25 @@ def _opened(
         raise ConfigError("workers: 0 on a cluster; expected at least 1, or no number")
     with threadpool_limits(limits=1):
         if cluster is None:
-            yield open_worker_pool, processes
+            yield open_worker_pool, count_workers(workers)
             return
         with cluster.connected():
             yield cluster.open_pool, workers or cluster.worker_count()
 
 
 def _check_arguments(
-    config: ConfigLike, n: int, out: str | PathLike[str] | None, repair: bool
+    config: ConfigLike,
+    n: int,
+    out: str | PathLike[str] | None,
+    workers: int | None,
+    repair: bool,
 ) -> None:
-    """Refuse a wrong number, repair at a URL, and a folder in which another run writes."""
+    """Refuse wrong numbers, repair at a URL, and a folder in which another run writes."""
     from gen_data.generator.runner.object_store import open_store
 
     if n < 1:
         raise ConfigError(f"n: {n} samples cannot be made; expected at least 1")
+    count_workers(workers)
     if repair and out is not None and is_url(out):
         raise ConfigError(
             f"out: {fspath(out)} cannot be repaired in place; expected a folder: run the command "

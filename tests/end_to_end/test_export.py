@@ -12,7 +12,7 @@ import pytest
 
 import gen_data as package
 from gen_data.generator.core.errors import StorageError
-from gen_data.generator.runner import exports, free_space
+from gen_data.generator.runner import exports
 from gen_data.generator.runner.stored import StoredSamples
 from tests.end_to_end.running import digest, gen_data
 
@@ -167,7 +167,7 @@ def test_exports_and_rerenderings_that_will_not_fit_are_refused(
     dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Copies of images on another disk and new images need space; hard links do not."""
-    monkeypatch.setattr(free_space, "free_bytes", lambda path: 200_000)
+    monkeypatch.setattr(store, "free_bytes", lambda path: 200_000)
 
     assert package.export(dataset, ["coco"], tmp_path / "linked", workers=0).made == 15
 
