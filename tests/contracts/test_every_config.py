@@ -42,7 +42,7 @@ def smaller(sensor: Sensor) -> list[str]:
 
 def generate_reduced(name: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Generate one reduced sample of a configuration in ``folder / "out"``."""
-    options = ("--n", "1", "--workers", "1", "--out", "out", *reduced(name))
+    options = ("--n", "1", "--workers", "0", "--out", "out", *reduced(name))
     return gen_data("--config", name, *options, cwd=folder)
 
 

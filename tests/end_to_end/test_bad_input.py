@@ -8,7 +8,7 @@ import pytest
 
 from tests.end_to_end.running import SMALL, digest, gen_data
 
-JOB = ("--n", "2", *SMALL)
+JOB = ("--n", "2", "--workers", "0", *SMALL)
 COUNT = "randomizers.clutter.count"
 
 
