@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import sys
 import time
 from contextlib import suppress
+from multiprocessing import get_context
 from pathlib import Path
 
 from benchmarks.faults.results import Result, Scale
-from gen_data.generator.core.errors import WorkerLost
+from gen_data.generator.core.errors import GenDataError, WorkerLost
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.runner.run import Settings, run
 from tests.runner.doubles import (
@@ -76,30 +78,33 @@ def out_of_memory(scale: Scale, folder: Path) -> Result:
     return result
 
 
-def _run_in(group: Path, folder: Path) -> tuple[int, str]:
-    """Exit code and message of a run whose processes are in a cgroup."""
+def _run_in(group: Path, folder: Path) -> tuple[int | None, str]:
+    """Exit code and message of a run whose processes are in a cgroup.
+
+    It starts as a new process: a fork of this one may be larger than the worker, and the system
+    kills the largest.
+    """
     message = folder / "message"
-    pid = os.fork()
-    if not pid:
-        code = 99
-        try:
-            (group / "cgroup.procs").write_text(str(os.getpid()))
-            run(
-                fake_plan(),
-                GreedyFactory(10, Trouble()),
-                folder / "out",
-                workers=1,
-                resume_command=RESUME,
-                settings=Settings(write_media=write_raw_images),
-            )
-            code = 0
-        except BaseException as error:
-            message.write_text(f"{type(error).__name__}: {error}", "utf-8")
-            code = getattr(error, "exit_code", 99)
-        finally:
-            os._exit(code)
-    _, status = os.waitpid(pid, 0)
-    return os.waitstatus_to_exitcode(status), message.read_text() if message.exists() else ""
+    process = get_context("spawn").Process(target=_enter_and_run, args=(group, folder, message))
+    process.start()
+    process.join()
+    return process.exitcode, message.read_text() if message.exists() else ""
+
+
+def _enter_and_run(group: Path, folder: Path, message: Path) -> None:
+    (group / "cgroup.procs").write_text(str(os.getpid()))
+    try:
+        run(
+            fake_plan(),
+            GreedyFactory(10, Trouble()),
+            folder / "out",
+            workers=1,
+            resume_command=RESUME,
+            settings=Settings(write_media=write_raw_images),
+        )
+    except GenDataError as error:
+        message.write_text(f"{type(error).__name__}: {error}", "utf-8")
+        sys.exit(error.exit_code)
 
 
 def _remove(group: Path) -> None:

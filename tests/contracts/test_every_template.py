@@ -153,7 +153,7 @@ def test_nominal_scene_is_the_same_every_time(name: str) -> None:
 
 @pytest.mark.parametrize("name", CONFIGS)
 def test_randomizers_draw_valid_scenes(name: str) -> None:
-    """Three scenes: names and ids unique, cameras and lamps in the room; few attempts are refused."""
+    """Three scenes: unique names and ids, cameras and lamps in the room, few refused attempts."""
     attempts = 0
     for scene_index in range(3):
         scene = None

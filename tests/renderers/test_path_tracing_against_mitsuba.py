@@ -324,11 +324,11 @@ def both(picture: Picture, samples: int, count: int) -> tuple[np.ndarray, np.nda
 @pytest.mark.slow
 @pytest.mark.parametrize("name", PICTURES)
 def test_converged_images_are_those_of_mitsuba(name: str) -> None:
-    """At 640 samples: mean radiance within 1 %, FLIP below 0.05, no pixel off beyond chance."""
+    """At 1,024 samples: mean radiance within 1 %, FLIP below 0.05, no pixel off beyond chance."""
     pytest.importorskip("mitsuba")
     picture = PICTURES[name]()
 
-    own, theirs = both(picture, 40, 16)
+    own, theirs = both(picture, 64, 16)
 
     reference, image = theirs.mean(axis=0), own.mean(axis=0)
     assert abs(image.mean() / reference.mean() - 1.0) < 0.01
