@@ -19,7 +19,7 @@ DENOISED = RenderSettings(tier="pathtraced", samples=4, denoise=True)
 
 
 def test_a_denoised_image_is_closer_to_the_converged_one() -> None:
-    """Four samples, with and without denoising, against 512."""
+    """Four samples, with and without denoising, against 256."""
     pytest.importorskip("pyoidn")
     library = FakeLibrary({"room": room_mesh((2, 2, 2), (MATTE,)), "box": box_mesh()})
     bodies = (Body("room", "room"), Body("box", "box", SE3((0.3, 0.4, 0.3)), scale=0.6))
@@ -32,7 +32,7 @@ def test_a_denoised_image_is_closer_to_the_converged_one() -> None:
         reading = renderer.render(scene, camera, frozenset({Channel.RADIANCE}))
         return reading.channels[Channel.RADIANCE].astype(np.float64)
 
-    truth = radiance(RenderSettings(tier="pathtraced", samples=512))
+    truth = radiance(RenderSettings(tier="pathtraced", samples=256))
     noisy = radiance(RenderSettings(tier="pathtraced", samples=4))
     clean = radiance(DENOISED)
 

@@ -34,7 +34,7 @@ from tests.renderers.fake_library import (
 from tests.renderers.mitsuba_scene import mitsuba, mitsuba_images, mitsuba_scene
 from tests.renderers.paths import replicates_of
 
-SIZE_PX = (64, 64)
+SIZE_PX = (48, 48)
 FAMILY_LEVEL = 0.01
 """Probability that equal renderers fail one test of a picture."""
 RGB = tuple[float, float, float]
