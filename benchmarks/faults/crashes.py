@@ -8,9 +8,11 @@ import random
 import shutil
 import signal
 import time
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import pytest
 
@@ -33,6 +35,8 @@ from benchmarks.faults.recorded_run import (
 from benchmarks.faults.results import Result, Scale
 from gen_data.generator.core.errors import GenDataError, StorageError
 from tests.runner.fragile_disk import FragileDisk, Killed
+
+T = TypeVar("T")
 
 ERRNOS = ("ENOSPC", "EDQUOT", "EIO", "EROFS", "EACCES", "EMFILE")
 PLANTED_BUGS = {
@@ -62,11 +66,16 @@ def kills_at_calls(scale: Scale, folder: Path) -> Result:
     calls = writing_calls(folder)
     chosen = calls if scale.is_full else calls[:: max(1, len(calls) // 12)]
     result.notes.append(f"{len(calls)} writing system calls in a run of 3 shards")
-    problems = spread(partial(_kill_at, folder, digest), chosen)
-    for call in result.until_end(scale, chosen):
-        problem = next(problems)
-        result.add(not problem, f"{call}: {problem}")
+    _judge_all(result, scale, partial(_kill_at, folder, digest), chosen)
     return result
+
+
+def _judge_all(result: Result, scale: Scale, judge: Callable[[T], str], tasks: Sequence[T]) -> None:
+    """Count tasks, judged in forked processes: an empty text is a promise that held."""
+    problems = spread(judge, tasks)
+    for task in result.until_end(scale, tasks):
+        problem = next(problems)
+        result.add(not problem, f"{task}: {problem}")
 
 
 def _kill_at(folder: Path, digest: str, call: Call) -> str:
@@ -88,10 +97,7 @@ def errnos_at_calls(scale: Scale, folder: Path) -> Result:
     calls = [call for call in writing_calls(folder) if call.name != "close"]
     tasks = [(call, ERRNOS[k % len(ERRNOS)]) for k, call in enumerate(calls)]
     chosen = tasks if scale.is_full else tasks[:: max(1, len(tasks) // 12)]
-    problems = spread(partial(_fail_at, folder, digest), chosen)
-    for task in result.until_end(scale, chosen):
-        problem = next(problems)
-        result.add(not problem, f"{task}: {problem}")
+    _judge_all(result, scale, partial(_fail_at, folder, digest), chosen)
     return result
 
 
@@ -124,10 +130,7 @@ def errnos_for_ever(scale: Scale, folder: Path) -> Result:
     chosen = tasks if scale.is_full else tasks[:: max(1, len(tasks) // 30)]
     result = Result(notes=[f"{count} operations, {len(ERRNOS)} errors"])
     result.skip("EINTR, short writes", "Python repeats these calls itself")
-    problems = spread(partial(_break_at, folder, digest), chosen)
-    for task in result.until_end(scale, chosen):
-        problem = next(problems)
-        result.add(not problem, f"{task}: {problem}")
+    _judge_all(result, scale, partial(_break_at, folder, digest), chosen)
     return result
 
 
