@@ -19,6 +19,9 @@ Real = TypeVar("Real", bound=np.floating[Any])
 REC709_LUMINANCE: Array = np.array([0.2126, 0.7152, 0.0722])
 """Luminances of the primaries, in units of white's."""
 
+MIDDLE_GREY = 0.18
+"""Reflectance of a grey card, to which cameras meter, relative to the white that saturates."""
+
 XYZ_FROM_REC709: Array = np.array(
     [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
 )

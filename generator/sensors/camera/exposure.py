@@ -11,11 +11,10 @@ from pydantic import Field, model_validator
 
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.colorimetry import luminance
+from gen_data.generator.core.colorimetry import MIDDLE_GREY, luminance
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.shutter import Shutter
 
-_MIDDLE_GREY = 0.18
 # From 1/30 s at f/1.4 and ISO 3200 to sunlit snow. Automatic exposure stops there, so that night
 # scenes stay dark.
 _EV100_RANGE = (1.0, 17.0)
@@ -84,7 +83,7 @@ def meter_ev100(radiance: Float32) -> float:
     counted = levels > 1e-4 * bright
     logs = np.log2(levels[counted])
     average = float((logs * weights[counted]).sum() / weights[counted].sum())
-    ev100 = average - math.log2(1.2 * _MIDDLE_GREY)
+    ev100 = average - math.log2(1.2 * MIDDLE_GREY)
     # On a grid, as the last bit of a logarithm differs between processors.
     return round(min(max(ev100, _EV100_RANGE[0]), _EV100_RANGE[1]) * 256.0) / 256.0
 

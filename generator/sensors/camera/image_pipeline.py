@@ -25,6 +25,7 @@ from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.interfaces import Renderer
 from gen_data.generator.core.scene import Camera, Scene, Weather
+from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.camera import isp, optics
 from gen_data.generator.sensors.camera.exposure import (
@@ -35,12 +36,14 @@ from gen_data.generator.sensors.camera.exposure import (
     saturation_cd_m2,
 )
 from gen_data.generator.sensors.camera.image_sensor import ImageSensor, expose, filter_at, mosaic
-from gen_data.generator.sensors.camera.isp import Tone, display_values, to_bytes, tone_to_bytes
+from gen_data.generator.sensors.camera.isp import Tone, to_bytes, tone_to_bytes, tone_to_display
 from gen_data.generator.sensors.camera.lens_drops import lens_drops, refract_in_drops
 from gen_data.generator.sensors.camera.optics import add_flare, add_glare
 from gen_data.generator.sensors.device_presets import check_preset, preset_path
 
 NONE = Constant(0.0)
+_CONTRASTS = 16
+"""Steps of contrast per unit."""
 PRESETS = "gen_data.generator.sensors.camera.presets"
 Row = tuple[float, float, float]
 
@@ -60,6 +63,8 @@ class Focus(Strict):
 class ImagePipeline(Strict):
     """Stages from radiance to a photograph; a stage that is left out has no effect.
 
+    Distributions are drawn once per view: all images of a sequence have the same values.
+
     Attributes:
         preset: A camera of ``generator/sensors/camera/presets``, which provides defaults for all
             other keys; ``ideal`` has an exposure and a tone curve, and no errors.
@@ -67,6 +72,9 @@ class ImagePipeline(Strict):
         flare: Share of the light far beyond white that returns as ghosts.
         glare: Share of all light that the lens scatters around its source; 0.02 suits a clean
             lens, 0.1 a dirty one.
+        blur_px: Standard deviation of the lens's point spread function, with that of the filter
+            before the sensor: 0.4 to 0.7 for most cameras. Without it, thin lines are coloured by
+            demosaicing.
         chromatic_aberration_px: Shift of red and blue against green at the corners.
         natural_vignetting: Whether illumination falls with the angle to the axis: with the fourth
             power of its cosine, for fisheyes as ``fisheye_pupil`` defines.
@@ -82,6 +90,8 @@ class ImagePipeline(Strict):
         warmth_ev: Error of the white balance: red over blue, in stops.
         demosaic: Method of demosaicing.
         saturation: Factor on saturation.
+        contrast: Slope of the tone at middle grey on logarithmic axes: 1 adds none, 1.3 suits
+            most cameras.
         tone: Tone curve, see ``generator/sensors/camera/isp.py``; ``log`` is for sensors with
             several exposures.
         sharpening: Amount of unsharp masking.
@@ -93,6 +103,7 @@ class ImagePipeline(Strict):
     focus: Focus | None = None
     flare: UnitInterval = NONE
     glare: UnitInterval = NONE
+    blur_px: Annotated[Scalar, Bounds(0, 20)] = NONE
     chromatic_aberration_px: Scalar = NONE
     natural_vignetting: bool = False
     fisheye_pupil: float = Field(0.0, ge=0, le=1)
@@ -106,6 +117,7 @@ class ImagePipeline(Strict):
     warmth_ev: Annotated[Scalar, Bounds(-3, 3)] = NONE
     demosaic: isp.Demosaic = "edge_aware"
     saturation: NonNegative = Constant(1.0)
+    contrast: Annotated[Scalar, Bounds(0.25, 4)] = Constant(1.0)
     tone: Tone = "filmic"
     sharpening: NonNegative = NONE
     sharpening_px: float = Field(1.0, gt=0, le=10)
@@ -148,7 +160,8 @@ class Shot:
         depth_m: [h, w], along the optical axis for pinholes, else along the ray; inf = nothing.
             None if no stage needs it.
         exposure: As set or metered.
-        rng: Draws parameters and noise.
+        rng: Draws parameters, which are the same at all steps of a sequence.
+        noise_rng: Draws the noise of the sensor.
     """
 
     pipeline: ImagePipeline
@@ -158,6 +171,7 @@ class Shot:
     depth_m: NDArray[np.floating] | None
     exposure: ExposureSettings
     rng: Rng
+    noise_rng: Rng
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -222,13 +236,14 @@ def develop(
 
     Arguments are as in ``Shot``; the depth is needed only by a pipeline with a focus.
     """
+    noise_rng, rng = rng, rng.of_sequence()
     ev100 = meter_ev100(radiance) if camera.ev100 is None else camera.ev100
     wanted = ev100 - pipeline.exposure_compensation_ev.draw(rng)
     wanted -= pipeline.exposure_error_ev.draw(rng)
     exposure = ExposureSettings(0.0, 1.0, wanted)
     if pipeline.image_sensor is not None:
         exposure = exposure_settings(wanted, pipeline.exposure_control)
-    shot = Shot(pipeline, camera, radiance, weather, depth_m, exposure, rng)
+    shot = Shot(pipeline, camera, radiance, weather, depth_m, exposure, rng, noise_rng)
     light = Light(radiance, saturation_cd_m2(exposure.ev100))
     for stage in STAGES:
         light = stage(light, shot)
@@ -286,16 +301,16 @@ def _image_sensor(light: Light, shot: Shot) -> Light:
     if sensor is None:
         return _white_balance(light, shot)
     camera_from_srgb, srgb_from_camera = _color_matrices(pipeline)
-    image = light.values * np.float32(1.0 / light.white) @ camera_from_srgb.T
+    image = isp.transform_colors(light.values, camera_from_srgb / light.white)
     received = np.maximum(mosaic(image, sensor.pattern), 0.0)
-    raw = expose(received, shot.exposure.gain, shot.exposure.time_s, sensor, shot.rng)
+    raw = expose(received, shot.exposure.gain, shot.exposure.time_s, sensor, shot.noise_rng)
     share, warmth_ev = pipeline.white_balance.draw(shot.rng), pipeline.warmth_ev.draw(shot.rng)
     if sensor.pattern != "mono":
         gains = isp.white_balance_gains(image, share, warmth_ev)
         raw = raw * gains[filter_at(sensor.pattern, *raw.shape)]
     white = 2.0 * pipeline.headroom
     image = isp.demosaic(raw, sensor.pattern, pipeline.demosaic, white)
-    return Light(image @ srgb_from_camera.T, 1.0)
+    return Light(isp.transform_colors(image, srgb_from_camera), 1.0)
 
 
 def _white_balance(light: Light, shot: Shot) -> Light:
@@ -305,9 +320,9 @@ def _white_balance(light: Light, shot: Shot) -> Light:
     if share == 0.0 and warmth_ev == 0.0:
         return light
     camera_from_srgb, srgb_from_camera = _color_matrices(pipeline)
-    image = light.values * np.float32(1.0 / light.white) @ camera_from_srgb.T
+    image = isp.transform_colors(light.values, camera_from_srgb / light.white)
     gains = isp.white_balance_gains(image, share, warmth_ev)
-    return Light(image * gains @ srgb_from_camera.T, 1.0)
+    return Light(isp.transform_colors(image, srgb_from_camera * gains), 1.0)
 
 
 Stage = Callable[[Light, Shot], Light]
@@ -329,6 +344,7 @@ STAGES: tuple[Stage, ...] = (
     _defocus,
     _flare,
     _effect("glare", 0.0, add_glare),
+    _effect("blur_px", 0.0, optics.apply_blur),
     _effect("chromatic_aberration_px", 0.0, optics.apply_chromatic_aberration),
     _vignetting,
     _image_circle,
@@ -341,10 +357,13 @@ STAGES: tuple[Stage, ...] = (
 def _tone(light: Light, shot: Shot) -> NDArray[np.uint8]:
     """Apply sharpening, on display values, and the tone curve."""
     pipeline, scale = shot.pipeline, 1.0 / light.white
+    # On a grid, so that tables of bytes are used again.
+    contrast = round(pipeline.contrast.draw(shot.rng) * _CONTRASTS) / _CONTRASTS
+    curve = pipeline.tone, pipeline.headroom, contrast
     amount = pipeline.sharpening.draw(shot.rng)
     if amount <= 0.0:
-        return tone_to_bytes(light.values, scale, pipeline.tone, pipeline.headroom)
-    display = display_values(light.values * np.float32(scale), pipeline.tone, pipeline.headroom)
+        return tone_to_bytes(light.values, scale, *curve)
+    display = tone_to_display(light.values, scale, *curve)
     return to_bytes(isp.sharpen(display, amount, pipeline.sharpening_px))
 
 
@@ -353,12 +372,10 @@ def _compress(image: NDArray[np.uint8], shot: Shot) -> NDArray[np.uint8]:
     return image if quality is None else isp.compress_jpeg(image, round(quality.draw(shot.rng)))
 
 
-def _color_matrices(pipeline: ImagePipeline) -> tuple[Float32, Float32]:
-    """Matrices from linear sRGB to camera colours and back, float32 [3, 3] each."""
-    if pipeline.color_matrix is None:
-        return np.eye(3, dtype=np.float32), np.eye(3, dtype=np.float32)
-    back = np.array(pipeline.color_matrix)
-    return np.linalg.inv(back).astype(np.float32), back.astype(np.float32)
+def _color_matrices(pipeline: ImagePipeline) -> tuple[Array, Array]:
+    """Matrices from linear sRGB to camera colours and back, [3, 3] each."""
+    back = np.eye(3) if pipeline.color_matrix is None else np.array(pipeline.color_matrix)
+    return np.linalg.inv(back), back
 
 
 def _centre_m(depth_m: NDArray[np.floating]) -> float:

@@ -24,6 +24,8 @@ Pattern = Literal["rggb", "bggr", "grbg", "gbrg", "mono"]
 
 _FILTERS = {"rggb": (0, 1, 1, 2), "bggr": (2, 1, 1, 0), "grbg": (1, 0, 2, 1), "gbrg": (1, 2, 0, 1)}
 
+_NORMAL_FROM_E = 64.0
+
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
@@ -105,13 +107,28 @@ def _expose_once(
     well_e = sensor.full_well_e / gain
     response, offset_e, dark = _fixed_pattern(light.shape, sensor)
     dark_e = sensor.dark_current_e_s.draw(rng) * time_s
-    # Beyond eight full wells all pixels saturate: the bound keeps the Poisson draw cheap.
-    mean_e = np.clip(light, 0.0, 8.0) * response * well_e + dark_e * dark
-    electrons = rng.poisson(mean_e).astype(np.float32)
+    # Beyond eight full wells all pixels saturate: the bound keeps the draw in its range.
+    mean_e = np.clip(light, 0.0, 8.0) * response * np.float32(well_e) + np.float32(dark_e) * dark
+    electrons = _draw_electrons(mean_e, rng)
     noise = rng.standard_normal(light.shape, dtype=np.float32)
-    level = electrons + sensor.read_noise_e.draw(rng) * noise + offset_e - dark_e
+    level = electrons + np.float32(sensor.read_noise_e.draw(rng)) * noise
+    level += offset_e - np.float32(dark_e)
     steps = np.float32((1 << sensor.bits) - 1)
     return np.asarray(np.clip(np.rint(level / well_e * steps), 0, steps) / steps, np.float32)
+
+
+def _draw_electrons(mean_e: Float32, rng: Rng) -> Float32:
+    """Poisson numbers of these means; normal ones of the same variance for large means.
+
+    From ``_NORMAL_FROM_E`` on, their distribution functions differ by less than 0.01 (the
+    skewness over six times the square root of two pi), and drawing takes a tenth of the time.
+    """
+    electrons = rng.standard_normal(mean_e.shape, dtype=np.float32)
+    electrons *= np.sqrt(mean_e)
+    electrons += mean_e
+    few = mean_e < _NORMAL_FROM_E
+    electrons[few] = rng.poisson(mean_e[few])
+    return electrons
 
 
 @lru_cache(maxsize=8)

@@ -14,7 +14,10 @@ srgb       clipped at 1
 linear     clipped at 1 and written without sRGB's transfer function
 =========  ==============================================================================
 
-All but ``linear`` are followed by the transfer function of sRGB (IEC 61966-2-1).
+All but ``linear`` are followed by the transfer function of sRGB (IEC 61966-2-1). Contrast comes
+before the curve: a power of the value over middle grey, which it keeps (the slope, or gamma, of a
+film; the contrast of ACES looks has the same pivot). Pictures of cameras are more contrasty than
+their scenes, with powers of 1.1 to 1.6 (Poynton, "Digital Video and HD", 2012, chapter 11).
 """
 
 from __future__ import annotations
@@ -28,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.colorimetry import luminance, srgb_encode
+from gen_data.generator.core.colorimetry import MIDDLE_GREY, REC709_LUMINANCE, srgb_encode
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.sensors.camera.image_sensor import Pattern
 
@@ -81,8 +84,12 @@ def white_balance_gains(image: Float32, share: float, warmth_ev: float) -> Float
 
 def scale_saturation(image: Float32, factor: float) -> Float32:
     """Scale the difference of colours from grey of the same luminance."""
-    grey = luminance(image)[..., None]
-    return np.asarray(grey + np.float32(factor) * (image - grey))
+    return transform_colors(image, factor * np.eye(3) + (1.0 - factor) * REC709_LUMINANCE)
+
+
+def transform_colors(image: Float32, matrix: Array) -> Float32:
+    """Multiply all colours of an image [h, w, 3] by a matrix [3, 3]."""
+    return np.asarray(cv2.transform(image, matrix), np.float32)
 
 
 def sharpen(display: Float32, amount: float, radius_px: float) -> Float32:
@@ -135,12 +142,16 @@ def log(value: NDArray[Real], white: float) -> NDArray[Real]:
     return np.asarray(np.log1p(_LOG_SLOPE * value) / math.log1p(_LOG_SLOPE * white))
 
 
-def display_values(value: NDArray[Real], tone: Tone, white: float = 1.0) -> NDArray[Real]:
+def display_values(
+    value: NDArray[Real], tone: Tone, white: float = 1.0, contrast: float = 1.0
+) -> NDArray[Real]:
     """Display values [0, 1] of linear ones, of the same shape and type.
 
-    1 saturates for all curves but ``log``, which maps ``white`` to 1.
+    1 saturates for all curves but ``log``, which maps ``white`` to 1. ``contrast`` is a power.
     """
     value = np.maximum(value, 0.0)
+    if contrast != 1.0:
+        value = np.asarray(MIDDLE_GREY * (value / MIDDLE_GREY) ** contrast, value.dtype)
     if tone == "filmic":
         value = filmic(value)
     elif tone == "knee":
@@ -157,15 +168,27 @@ def to_bytes(display: NDArray[np.floating]) -> NDArray[np.uint8]:
 
 
 def tone_to_bytes(
-    image: Float32, scale: float, tone: Tone, white: float = 1.0
+    image: Float32, scale: float, tone: Tone, white: float = 1.0, contrast: float = 1.0
 ) -> NDArray[np.uint8]:
     """Bytes of linear values times ``scale``, uint8 of the same shape [h, w, 3], by a lookup table.
 
     Equals ``to_bytes(display_values(...))`` of values rounded to ten bits of mantissa: an error of
     at most a tenth of a byte before rounding.
     """
-    table, factor = _byte_table(tone, white), np.float32(scale)
-    out = np.zeros(image.shape, np.uint8)
+    return _look_up(_byte_table(tone, white, contrast), image, scale)
+
+
+def tone_to_display(
+    image: Float32, scale: float, tone: Tone, white: float = 1.0, contrast: float = 1.0
+) -> Float32:
+    """Display values of linear values times ``scale``, rounded as by ``tone_to_bytes``."""
+    return _look_up(_display_table(tone, white, contrast), image, scale)
+
+
+def _look_up(table: NDArray[Any], image: Float32, scale: float) -> NDArray[Any]:
+    """Entries of a table for all positive float32, for an image times ``scale``."""
+    factor = np.float32(scale)
+    out = np.zeros(image.shape, table.dtype)
     # In bands that fit into the processor's cache.
     for top in range(0, len(image), _ROWS_AT_ONCE):
         rows = slice(top, top + _ROWS_AT_ONCE)
@@ -175,10 +198,20 @@ def tone_to_bytes(
     return out
 
 
-@lru_cache(maxsize=8)
-def _byte_table(tone: Tone, white: float) -> NDArray[np.uint8]:
+@lru_cache(maxsize=32)
+def _byte_table(tone: Tone, white: float, contrast: float) -> NDArray[np.uint8]:
     """Bytes of all positive float32, indexed by their leading bits."""
+    return np.append(to_bytes(_displayed(tone, white, contrast)), np.uint8(255))
+
+
+@lru_cache(maxsize=8)
+def _display_table(tone: Tone, white: float, contrast: float) -> Float32:
+    """Display values of all positive float32, indexed by their leading bits."""
+    return np.append(_displayed(tone, white, contrast), 1.0).astype(np.float32)
+
+
+def _displayed(tone: Tone, white: float, contrast: float) -> Array:
     infinity = int(np.float32(np.inf).view(np.int32)) >> _DROPPED_BITS
     middle = (np.arange(infinity, dtype=np.int32) << _DROPPED_BITS) + (1 << (_DROPPED_BITS - 1))
     values: Array = middle.view(np.float32).astype(np.float64)
-    return np.append(to_bytes(display_values(values, tone, white)), np.uint8(255))
+    return display_values(values, tone, white, contrast)

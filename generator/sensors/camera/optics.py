@@ -116,6 +116,11 @@ def _fisheye_gain(cosine: Array, coefficients: Sequence[float]) -> Array:
     return np.asarray(np.sinc(theta / np.pi) / (ratio * slope))
 
 
+def apply_blur(image: Float32, stddev_px: float) -> Float32:
+    """Spread the light of a point over a Gaussian, as lenses and filters before the sensor do."""
+    return np.asarray(cv2.GaussianBlur(image, (0, 0), stddev_px), np.float32)
+
+
 def apply_chromatic_aberration(image: Float32, corner_px: float) -> Float32:
     """Scale red up and blue down by ``corner_px`` at the corners: lateral chromatic aberration."""
     height, width = image.shape[:2]

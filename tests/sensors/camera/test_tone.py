@@ -56,6 +56,17 @@ def test_knee_is_straight_and_then_an_exponential(value: float, expected: float)
     assert float(knee(np.array(value))) == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.parametrize("contrast", [0.5, 1.0, 1.3, 2.0])
+def test_contrast_is_the_slope_at_middle_grey(contrast: float) -> None:
+    """A stop above middle grey is ``contrast`` stops above it; without a curve, up to white."""
+    stops = np.linspace(-2.0, 1.0, 7)
+    shown = display_values(0.18 * 2.0**stops, "linear", contrast=contrast)
+
+    lit = 0.18 * 2.0 ** (contrast * stops) <= 1.0
+    assert np.log2(shown[lit] / 0.18) == pytest.approx(contrast * stops[lit], abs=1e-12)
+    assert shown[~lit] == pytest.approx(1.0)
+
+
 @pytest.mark.parametrize("white", [1.0, 16.0, 256.0])
 def test_log_is_the_mu_law(white: float) -> None:
     """Kalantari and Ramamoorthi 2017: log(1 + mu x) / log(1 + mu), x = value / white."""

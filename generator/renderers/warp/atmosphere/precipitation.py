@@ -18,7 +18,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.core.colorimetry import luminance
+from gen_data.generator.core.colorimetry import MIDDLE_GREY, luminance
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.scene import Camera, Weather
 from gen_data.generator.core.se3 import SE3, Array
@@ -31,8 +31,6 @@ _NEAREST_M = 0.35
 _APERTURE_M = 0.002
 _EXPOSURE_S = (1.0 / 500.0, 1.0 / 40.0)
 _F_NUMBER = 2.0
-# White is 1.2 * 2^EV100 cd/m^2 (ISO 12232); metering places the mean at this share of it.
-_MIDDLE_GREY = 0.18
 _METERED_EVERY = 61
 _COUNT_MAX = 60_000
 _SPHERE_MAX = 480_000
@@ -87,7 +85,8 @@ def light_level_ev100(radiance: wp.array, fixed_ev100: float | None) -> float:
     lit = levels[levels > 0.0]
     median_cd_m2 = float(np.median(lit)) if len(lit) else 0.0
     # Rounded, so that the last bit of a logarithm has no effect.
-    return round(math.log2(max(median_cd_m2, 1e-6) / (1.2 * _MIDDLE_GREY)) * 16.0) / 16.0
+    # White is 1.2 * 2^EV100 cd/m^2 (ISO 12232); metering places the mean at middle grey.
+    return round(math.log2(max(median_cd_m2, 1e-6) / (1.2 * MIDDLE_GREY)) * 16.0) / 16.0
 
 
 def usual_exposure_s(ev100: float) -> float:
