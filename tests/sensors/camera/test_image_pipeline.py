@@ -62,7 +62,7 @@ class Rendering:
 def test_the_chain_has_the_order_of_a_camera() -> None:
     """Glass first, from its front to its barrel, then the sensor, then colours."""
     assert [stage.__name__.strip("_") for stage in STAGES] == [
-        "lens_drops", "defocus", "flare", "glare", "chromatic_aberration", "vignetting",
+        "lens_drops", "defocus", "flare", "glare", "blur", "chromatic_aberration", "vignetting",
         "image_circle", "image_sensor", "saturation",
     ]  # fmt: skip
 
@@ -71,10 +71,11 @@ def test_every_stage_of_a_camera_with_all_errors_changes_its_picture() -> None:
     """Drops, blur, ghosts, veil, fringes, dark corners, noise, colours, tone and JPEG."""
     everything: dict[str, Any] = {
         "focus": {"distance_m": 0.2, "pixel_um": 100}, "exposure_control": {"f_number": 0.7},
-        "flare": 0.5, "glare": 0.3, "chromatic_aberration_px": 3,
+        "flare": 0.5, "glare": 0.3, "blur_px": 2, "chromatic_aberration_px": 3,
         "vignetting": 0.5, "natural_vignetting": True, "exposure_compensation_ev": 1,
         "image_sensor": {"full_well_e": 500}, "color_matrix": [[2, -1, 0], [0, 1, 0], [0, 0, 1]],
-        "saturation": 0.3, "white_balance": 1, "tone": "knee", "sharpening": 1, "jpeg_quality": 40,
+        "saturation": 0.3, "white_balance": 1, "contrast": 0.7, "tone": "knee", "sharpening": 1,
+        "jpeg_quality": 40,
     }  # fmt: skip
 
     def picture(given: dict[str, Any], weather: Weather) -> Any:

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from scipy import stats
 
 from gen_data.generator.config.distributions import Constant
 from gen_data.generator.core.intrinsics import Intrinsics
@@ -66,6 +67,49 @@ def test_variance_is_that_of_photons_and_reading(level: float, gain: float) -> N
     n = light.size
     assert float(raw.mean()) == pytest.approx(level, abs=5.0 * math.sqrt(expected / n))
     assert float(raw.var()) == pytest.approx(expected, rel=6.0 * math.sqrt(2.0 / n))
+
+
+@pytest.mark.parametrize("mean_e", [0.5, 20.0, 63.0, 65.0, 400.0])
+def test_electrons_are_poisson(mean_e: float) -> None:
+    """Largest distance of distribution functions from Poisson's: 1 % of steps beyond chance."""
+    sensor = ImageSensor(
+        pattern="mono", full_well_e=1000.0, read_noise_e=Constant(0.0),
+        dark_current_e_s=Constant(0.0), prnu=0.0, dsnu_e=0.0, bits=16,
+    )  # fmt: skip
+    light = np.full((200, 200), mean_e / 1000.0, np.float32)
+    electrons = np.rint(expose(light, 1.0, 0.01, sensor, rng()) * 1000.0).ravel()
+
+    values = np.arange(int(mean_e + 6.0 * math.sqrt(mean_e)) + 2)
+    measured = np.searchsorted(np.sort(electrons), values, side="right") / electrons.size
+    assert np.abs(measured - stats.poisson.cdf(values, mean_e)).max() < 0.01 + 1.63 / 200.0
+
+
+def test_a_lens_spreads_a_point_over_a_gaussian() -> None:
+    """All light arrives, with the variance of the point spread function along both axes."""
+    point = np.zeros((41, 41, 3), np.float32)
+    point[20, 20] = 100.0
+    seen = optics.apply_blur(point, 1.5)[..., 1]
+
+    places = np.arange(41.0) - 20.0
+    assert seen.sum() == pytest.approx(100.0, rel=1e-4)
+    for axis in (0, 1):
+        assert (seen.sum(axis=axis) * places**2).sum() / 100.0 == pytest.approx(2.25, rel=0.02)
+
+
+def test_settings_hold_for_a_sequence_and_noise_does_not() -> None:
+    """Two steps of one sequence: the same contrast, balance and exposure; other photons."""
+    radiance = flat(90.0, 60.0, 30.0)
+    drawn = {"uniform": [0.5, 2.0]}
+    settings = {"contrast": drawn, "warmth_ev": drawn, "exposure_error_ev": drawn}
+    steps = [Streams(seed=3, scene=1, step=step).rng("camera") for step in (0, 1)]
+    other = Streams(seed=3, scene=2).rng("camera")
+
+    first, second = (photograph(radiance, made(**settings), step) for step in steps)
+    assert (first == second).all()
+    assert (first != photograph(radiance, made(**settings), other)).any()
+    noisy = made(**settings, image_sensor={"pattern": "mono", "full_well_e": 100.0})
+    first, second = (photograph(radiance, noisy, step) for step in steps)
+    assert (first != second).any()
 
 
 def test_dark_current_adds_noise_and_no_light() -> None:
