@@ -302,7 +302,7 @@ class MountMotion:
         return pose, motion[0], motion[1]
 
     def _central_differences(self, time_s: float, h: float) -> Array:
-        """Acceleration and angular velocity in the device's axes, [2, 3], with poses ``h`` apart."""
+        """Acceleration and angular velocity in the device's axes, [2, 3], of poses ``h`` apart."""
         before, here, after = (self.pose(time_s + k * h) for k in (-1, 0, 1))
         a, b, c = (np.asarray(place.translation_m) for place in (before, here, after))
         turn = rotation_vector(after @ before.inverse()) / (2.0 * h)
