@@ -86,6 +86,9 @@ class Street:
         """Materials of the mesh, one per slot."""
         return self.mesh(asset_id).materials
 
+    def body_bounds_m(self, asset_id: str) -> None:
+        """None: there are no mirrors."""
+
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
         """Bounds of the mesh."""
         return self.mesh(asset_id).bounds_m()

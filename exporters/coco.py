@@ -21,7 +21,9 @@ the attributes of its asset. Images have ``attributes`` too, the shared values o
 the values of ``weather`` other than zero. Annotators that are enabled add these keys:
 
 ``amodal_bbox``, ``amodal_segmentation``
-    The whole silhouette. The box may leave the image, the mask is clipped to it.
+    The whole silhouette. The box may leave the image, the mask is clipped to it. With
+    ``bbox: amodal``, the key ``bbox`` is that box too, clipped to the image; ``segmentation`` and
+    ``area`` remain those of the visible pixels, as in data sets of amodal detection.
 ``visible_fraction``, ``occlusion``, ``truncation``
     Fractions in [0, 1]: visible pixels of the silhouette; hidden pixels of its part inside the
     image; silhouette pixels outside the image.
@@ -110,13 +112,16 @@ class Coco(ExporterBase):
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     segmentation: Literal["rle", "polygon", "none"] = "rle"
     """Visible masks as run lengths, as polygons along the edges of their pixels, or none."""
+    bbox: Literal["visible", "amodal"] = "visible"
+    """Boxes around the visible pixels, or around the whole silhouette within the image."""
     amodal: bool = True
     """Also write the box of the silhouette and, with the annotation amodal_masks, its mask."""
 
     @property
     def needs(self) -> frozenset[str]:
         """Names of the annotators that it requires."""
-        return frozenset({"instance_masks", "boxes2d"} if self.amodal else {"instance_masks"})
+        silhouettes = self.amodal or self.bbox == "amodal"
+        return frozenset({"instance_masks", "boxes2d"} if silhouettes else {"instance_masks"})
 
     def check(self, info: DatasetInfo) -> None:
         """Reject a data set that this format cannot represent.
@@ -186,7 +191,7 @@ class Coco(ExporterBase):
             "id": sample.annotation_id(sensor, instance.instance_id),
             "image_id": sample.image_id(sensor),
             "category_id": instance.category_id,
-            "bbox": box_xywh(thing.box),
+            "bbox": box_xywh(self._box(thing, camera) or thing.box),
             "area": thing.visible_px,
             "iscrowd": int(thing.ignored),
             "segmentation": [],
@@ -209,6 +214,12 @@ class Coco(ExporterBase):
             mask = thing.amodal_mask
             row["amodal_segmentation"] = encode_rle(mask, camera.height_px, camera.width_px)
         return row | _optional_keys(thing)
+
+    def _box(self, thing: ObjectTruth, camera: Intrinsics) -> BoxPx | None:
+        """Content of ``bbox``; None if its silhouette is unknown."""
+        if self.bbox == "visible" or thing.amodal_box is None:
+            return thing.box
+        return thing.amodal_box.clipped(camera.width_px, camera.height_px)
 
 
 def image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:

@@ -21,7 +21,12 @@ Where KITTI's conventions differ from ours (https://www.cvlibs.net/datasets/kitt
 * **Distant objects** are not labelled, as KITTI's annotators worked on laser scans. They become
   ``DontCare`` regions; so do objects without laser points, in rain or behind others.
 * **Truncation** is the fraction of that projection outside the image; for tight boxes, of the
-  silhouette.
+  silhouette. KITTI computed its own "via backprojecting a car/pedestrian model into the image
+  plane" (readme of its object devkit).
+* **Occlusion** is a judgement of KITTI's annotators (the same readme), who had no numbers: 0 fully
+  visible, 1 partly, 2 largely occluded, 3 unknown. Here it follows from the hidden share of the
+  silhouette inside the image, with limits of our own; nothing is unknown, so that 3 is not used.
+  COCO's key ``occlusion`` has the share itself.
 * **Points** are those of the data set's laser scanner, or of its ``pseudo_lidar``; without either
   there is no velodyne folder, which some readers require.
 * **Point labels** are an extension. They follow KITTI's rule that an object is the content of its
@@ -87,9 +92,13 @@ NEAR_M = 0.05
 """Boxes with a corner nearer than this depth are not projected."""
 
 PARTLY_OCCLUDED = 0.1
-"""Hidden fraction of the silhouette above which ``occluded`` is 1."""
+"""Hidden fraction of the silhouette above which ``occluded`` is 1; assumed, see below."""
 LARGELY_OCCLUDED = 0.5
-"""Hidden fraction of the silhouette above which ``occluded`` is 2."""
+"""Hidden fraction of the silhouette above which ``occluded`` is 2; assumed.
+
+KITTI publishes no limit. Annotators overlook a tenth, and "largely" is taken as more than half;
+limits of 0.05 to 0.2 and of 0.4 to 0.6 would be as plausible.
+"""
 
 
 class Kitti(ExporterBase):

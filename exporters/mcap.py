@@ -40,8 +40,6 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-import numpy as np
-
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.point_cloud_io import read_points
@@ -191,14 +189,7 @@ def world_boxes(sample: Sample) -> list[tuple[Instance, OrientedBox]]:
         }
         return [(i, box) for _, (i, box) in sorted(boxes.items()) if box is not None]
     things = sorted(sample.scene.instances, key=lambda thing: thing.instance_id)
-    return [(thing, _instance_box(thing)) for thing in things if thing.annotated]
-
-
-def _instance_box(thing: Instance) -> OrientedBox:
-    low, high = np.asarray(thing.box_min_m), np.asarray(thing.box_max_m)
-    x, y, z = (float(v) for v in 0.5 * (low + high))
-    length, width, height = (float(v) for v in high - low)
-    return OrientedBox(thing.T_world_instance @ SE3((x, y, z)), (length, width, height))
+    return [(thing, thing.box3d) for thing in things if thing.annotated]
 
 
 def _camera_row(truth: ImageTruth, time_s: float) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -127,13 +127,11 @@ class Thing:
 
     def box(self, time_s: float | None, margin_m: float) -> OrientedBox:
         """Its box in the world at an instant (None = the sample's), with a margin on all sides."""
-        low, high = np.array(self.instance.box_min_m), np.array(self.instance.box_max_m)
-        x, y, z = (float(v) for v in 0.5 * (low + high))
-        length, width, height = (float(v) + 2.0 * margin_m for v in high - low)
-        pose = self.instance.T_world_instance
+        instance = self.instance
         if self.track is not None and time_s is not None:
-            pose = self.track.pose(time_s)
-        return OrientedBox(pose @ SE3((x, y, z)), (length, width, height))
+            instance = replace(instance, T_world_instance=self.track.pose(time_s))
+        length, width, height = (side + 2.0 * margin_m for side in instance.box3d.size_m)
+        return OrientedBox(instance.box3d.T_frame_box, (length, width, height))
 
 
 def annotated_things(sample: Sample) -> dict[int, Thing]:

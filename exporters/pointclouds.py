@@ -30,7 +30,6 @@ from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Instance
-from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.serialization import canonical_json
 
 FILE_POINT = np.dtype(
@@ -154,14 +153,7 @@ def lidar_boxes(sample: Sample, lidar: str) -> list[tuple[Instance, OrientedBox]
     scene = sample.scene_of(lidar)
     T_lidar_world = scanner_at_sweep(sample, lidar).T_world_lidar.inverse()
     things = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
-    boxes = []
-    for thing in things:
-        low, high = np.asarray(thing.box_min_m), np.asarray(thing.box_max_m)
-        x, y, z = (float(v) for v in 0.5 * (low + high))
-        length, width, height = (float(v) for v in high - low)
-        box = OrientedBox(thing.T_world_instance @ SE3((x, y, z)), (length, width, height))
-        boxes.append((thing, box.seen_from(T_lidar_world)))
-    return boxes
+    return [(thing, thing.box3d.seen_from(T_lidar_world)) for thing in things]
 
 
 def _pose(sample: Sample, lidar: str) -> dict[str, Any]:

@@ -8,10 +8,13 @@
     stages.jsonl        one line per stage: file, first sample, scene, view, split, steps
 
 See ``gen_data.generator.usd.stage_writer`` for the layout of a stage. Metres, Z up; ``time code =
-step``. Labels are ``UsdSemantics.LabelsAPI`` with the taxonomies ``category``, ``subcategory``
-(annotated instances) and ``instance_id`` (all, as in the masks). Cameras reproduce the intrinsics
-of pinholes to float precision; lights are photometric, in UsdLux's units. Triplanar mapping becomes
-a projection along each face's dominant axis; weather and lens distortion have no counterpart.
+step``. A camera with ``time_offset_s`` has its delay in ``genData:timeOffset``; the stage also has
+the poses of these instants, which are other time codes. Labels are ``UsdSemantics.LabelsAPI`` with
+the taxonomies ``category``, ``subcategory`` (annotated instances) and ``instance_id`` (all, as in
+the masks). Cameras reproduce the intrinsics of pinholes to float precision; lights are photometric,
+in UsdLux's units. Triplanar mapping becomes a projection along each face's dominant axis; weather
+has no counterpart. Lenses other than pinholes have none either: their cameras are pinholes of the
+same focal length, with the model and its coefficients in ``genData:lens:*``.
 """
 
 from __future__ import annotations
@@ -73,9 +76,15 @@ class Usd(ExporterBase):
             if sample.step_index:
                 continue
             count = min(info.steps_per_scene, info.n - sample.index)
-            steps = [scene_at(sample.scene, round(k * info.step_s, 9)) for k in range(count)]
+            offsets_s = {s.name: s.time_offset_s for s in info.sensors if s.name in info.cameras}
+            times_s = {
+                round(k * info.step_s + offset_s, 9)
+                for k in range(count)
+                for offset_s in (0.0, *offsets_s.values())
+            }
+            instants = [scene_at(sample.scene, time_s) for time_s in sorted(times_s)]
             path = folder / f"{sample.index:09d}.{self.format}"
-            write_stage(path, steps, info.step_s, shared.files())
+            write_stage(path, instants, info.step_s, shared.files(), offsets_s)
             rows.append(_row(sample, path.name, count))
         write_text(folder / STAGES, "".join(canonical_json(row) + "\n" for row in rows))
 

@@ -17,10 +17,18 @@ from gen_data.generator.core.se3 import SE3, look_at
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, pick_by_weight
 from gen_data.randomizers.daylight import is_dark
-from gen_data.randomizers.free_space import Footprint, Ground, is_clear, make_ground
+from gen_data.randomizers.free_space import (
+    Footprint,
+    Ground,
+    hidden_share,
+    is_clear,
+    make_ground,
+)
 from gen_data.randomizers.vehicle_lights import dipped_beam
 
 TRIES = 64
+HIDDEN_MAX = 0.1
+"""Largest share of an image that near bodies may hide."""
 
 
 class CameraOnLane(RandomizerBase):
@@ -39,6 +47,8 @@ class CameraOnLane(RandomizerBase):
         free_m: Length and width of free ground around the camera, for the vehicle that carries
             it; the camera is at 30 % of the length from the front.
         clearance_m: Smallest distance to any body.
+        near_m: Distance within which bodies may hide a tenth of the image at most, tested with
+            their bounding boxes: no view out of a tree; 0 = not tested.
         beam_cd: Luminous intensity of each of the carrier's two dipped beams, lit in the dark; 0 =
             no beams.
     """
@@ -58,6 +68,7 @@ class CameraOnLane(RandomizerBase):
     ahead_m: float = Field(40.0, ge=0)
     free_m: tuple[float, float] = (4.6, 1.9)
     clearance_m: float = Field(0.3, ge=0)
+    near_m: float = Field(0.0, ge=0)
     beam_cd: dist.NonNegative = dist.Constant(0.0)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
@@ -82,7 +93,7 @@ class CameraOnLane(RandomizerBase):
                 cameras = tuple(c if c.rig else _move_camera(c, pose[1]) for c in scene.cameras)
                 lit = replace(scene, cameras=cameras)
                 return self._add_beams(lit, pose[0], self.beam_cd.draw(rng))
-        remedy = "other lanes, a smaller free_m, or less traffic"
+        remedy = "other lanes, a smaller free_m or near_m, or less traffic"
         raise self.reject("no free place for a camera on a lane", remedy)
 
     def _draw_pose(
@@ -114,7 +125,12 @@ class CameraOnLane(RandomizerBase):
             return None
         ahead = (math.cos(pitch), 0.0, height_m + math.sin(pitch))
         target = (T_world_turned @ SE3(ahead)).translation_m
-        return T_world_rig, look_at(eye, target, roll)
+        T_world_camera = look_at(eye, target, roll)
+        if self.near_m > 0.0:
+            placed = (_move_camera(c, T_world_camera) for c in scene.cameras if not c.rig)
+            if any(hidden_share(c, scene, assets, self.near_m) > HIDDEN_MAX for c in placed):
+                return None
+        return T_world_rig, T_world_camera
 
     def _add_beams(self, scene: Scene, T_world_rig: SE3, beam_cd: float) -> Scene:
         """Return the scene with the carrier's headlights on if it is dark."""

@@ -10,8 +10,13 @@ import numpy as np
 
 from gen_data.generator.core.boxes import rectangles_overlap
 from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.scene import Body, Camera, Scene
 from gen_data.generator.core.se3 import SE3, Array, Vec3
+
+_GRID = (16, 9)
+"""Columns and rows of the rays that test a view."""
+_PARALLEL = 1e-9
+"""Smallest component of a direction, instead of 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,16 +101,41 @@ def is_in_the_open(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: fl
     return is_inside(point_m, *scene.interior_m) and is_clear(point_m, scene, assets, margin_m)
 
 
+def hidden_share(camera: Camera, scene: Scene, assets: AssetIndex, near_m: float) -> float:
+    """Share of a camera's image, in [0, 1], that bodies nearer than ``near_m`` may hide.
+
+    Rays through the middles of a grid of cells are tested with the bounding boxes of the bodies
+    that ``is_clear`` tests; parts of the image without a ray show nothing.
+    """
+    k = camera.intrinsics
+    u, v = (np.arange(count) + 0.5 for count in _GRID)
+    cells = np.stack(np.meshgrid(u / _GRID[0] * k.width_px, v / _GRID[1] * k.height_px), axis=-1)
+    rays = k.rays(cells.reshape(-1, 2))
+    rays = camera.T_world_camera.rotate(rays[np.isfinite(rays).all(axis=1)])
+    eye_m = camera.T_world_camera.translation_m
+    hidden = np.zeros(len(rays), np.bool_)
+    for body in _solid_bodies(scene):
+        low, high = (body.scale * np.array(edge) for edge in assets.bounds_m(body.asset))
+        T_body_world = body.T_world_body.inverse()
+        start = np.array((T_body_world @ SE3(eye_m)).translation_m)
+        if (np.maximum(low - start, start - high) > near_m).any():
+            continue
+        # Distances at which rays cross the planes of the faces (Kay and Kajiya 1986).
+        along = T_body_world.rotate(rays)
+        along = np.where(np.abs(along) < _PARALLEL, _PARALLEL, along)
+        one, other = (low - start) / along, (high - start) / along
+        enter, leave = np.minimum(one, other).max(axis=1), np.maximum(one, other).min(axis=1)
+        hidden |= (enter <= np.minimum(leave, near_m)) & (leave >= 0.0)
+    return float(hidden.mean()) if len(hidden) else 0.0
+
+
 def is_clear(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: float) -> bool:
     """Whether a point is no nearer than ``margin_m`` to a body.
 
     Bodies are tested by their bounding boxes. The background (the room itself) is ignored, except
     for the fixtures of lights.
     """
-    fixtures = {light.body for light in scene.lights}
-    for body in scene.bodies:
-        if body.instance_id == 0 and body.name not in fixtures:
-            continue
+    for body in _solid_bodies(scene):
         local = (body.T_world_body.inverse() @ SE3(point_m)).translation_m
         low, high = assets.bounds_m(body.asset)
         grown_low = tuple(body.scale * v - margin_m for v in low)
@@ -113,3 +143,11 @@ def is_clear(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: float) -
         if all(a <= p <= b for p, a, b in zip(local, grown_low, grown_high, strict=True)):
             return False
     return True
+
+
+def _solid_bodies(scene: Scene) -> Iterator[Body]:
+    """Yield all bodies but the background; fixtures of lights are no background."""
+    fixtures = {light.body for light in scene.lights}
+    for body in scene.bodies:
+        if body.instance_id or body.name in fixtures:
+            yield body

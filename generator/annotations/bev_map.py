@@ -18,7 +18,6 @@ from gen_data.generator.annotations.bev_raster import (
     ribbon,
     strips,
 )
-from gen_data.generator.annotations.boxes3d import oriented_box
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
@@ -122,7 +121,7 @@ def _floors(instances: list[Instance]) -> Array:
     """Bottom faces of boxes, as triangles [n, 3, 3]."""
     parts = [np.zeros((0, 3, 3))]
     for instance in instances:
-        corners = oriented_box(instance).corners()
+        corners = instance.box3d.corners()
         # Corners 0, 2, 4, 6 are the lower ones: (x-, y-), (x-, y+), (x+, y-), (x+, y+).
         parts.append(np.stack([corners[[0, 4, 6]], corners[[0, 6, 2]]]))
     return np.concatenate(parts)

@@ -11,19 +11,22 @@ from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.interfaces import AssetLibrary
 from gen_data.generator.core.sample import EgoTruth, ObjectTruth
-from gen_data.generator.core.scene import Instance, Scene
+from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import SE3
 
 
 class Boxes3d(Strict):
-    """Tight boxes of instances along their own axes, in the world and in sensors' frames."""
+    """Tight boxes of instances along their own axes, in the world and in sensors' frames.
+
+    By default they leave out the exterior mirrors of vehicles; see ``labels.box3d``.
+    """
 
     channels: ClassVar[frozenset[Channel]] = frozenset({Channel.INSTANCE})
     type: Literal["boxes3d"] = "boxes3d"
 
     def annotate(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> ObjectTruth:
         """Fill in ``box3d_world`` and ``box3d_camera``."""
-        box_world = oriented_box(truth.instance)
+        box_world = truth.instance.box3d
         T_camera_world = reading.camera.T_world_camera.inverse()
         return replace(
             truth, box3d_world=box_world, box3d_camera=box_world.seen_from(T_camera_world)
@@ -44,11 +47,4 @@ def annotate_boxes(scene: Scene, T_world_frame: SE3) -> dict[int, OrientedBox]:
     """The boxes of all annotated instances in a frame, by instance id."""
     T_frame_world = T_world_frame.inverse()
     instances = sorted((i for i in scene.instances if i.annotated), key=lambda i: i.instance_id)
-    return {i.instance_id: oriented_box(i).seen_from(T_frame_world) for i in instances}
-
-
-def oriented_box(instance: Instance) -> OrientedBox:
-    """The box of an instance in the world, along the instance's axes, its origin in the centre."""
-    (x0, y0, z0), (x1, y1, z1) = instance.box_min_m, instance.box_max_m
-    T_instance_box = SE3((0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1)))
-    return OrientedBox(instance.T_world_instance @ T_instance_box, (x1 - x0, y1 - y0, z1 - z0))
+    return {i.instance_id: i.box3d.seen_from(T_frame_world) for i in instances}

@@ -48,7 +48,7 @@ from gen_data.generator.core.interfaces import (
     Sensor,
 )
 from gen_data.generator.core.plugins import PluginTable
-from gen_data.generator.core.scene import SharedValue
+from gen_data.generator.core.scene import Box3dExtent, SharedValue
 from gen_data.generator.core.streams import Streams
 from gen_data.generator.physics import PhysicsConfig
 from gen_data.generator.pipeline.splits import Assignment
@@ -113,8 +113,13 @@ class DatasetSettings(Strict):
 
 
 class LabelSettings(Thresholds):
-    """Thresholds for annotating an instance, and the label map of all exports."""
+    """Thresholds for annotating an instance, extent of boxes, and the label map of all exports."""
 
+    box3d: Box3dExtent = Field(
+        "body",
+        description="3D boxes of vehicles: body, without exterior mirrors, as annotators draw "
+        "them; or all of the geometry.",
+    )
     map: LabelMap = LabelMap()
 
 

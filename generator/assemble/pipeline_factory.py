@@ -246,7 +246,12 @@ def nominal_scene(config: Config, scene_config: SceneConfig, assets: AssetIndex)
         if place is None:
             raise
         raise UnknownAsset(f"{place[0]}: {place[1]}: {error}", error.asset_id) from None
-    scene = replace(scene, shared=scene_config.shared, step_s=config.general.step_s)
+    scene = replace(
+        scene,
+        shared=scene_config.shared,
+        step_s=config.general.step_s,
+        box3d=config.general.labels.box3d,
+    )
     with located_errors(config.document):
         for sensor in scene_config.sensors:
             scene = sensor.mount(scene)

@@ -17,6 +17,7 @@ from gen_data.generator.core.asset_types import (
     TextureData,
     UInt8,
 )
+from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.serialization import canonical_json, from_plain
 
 _MESH_ARRAYS = ("vertices_m", "faces", "normals", "uvs", "face_slots")
@@ -35,6 +36,8 @@ def pack_imported(imported: ImportedMesh) -> Arrays:
         arrays["parts_m"] = np.concatenate(parts) if parts else np.zeros((0, 3))
     if imported.keypoints:
         arrays["keypoints"] = encode_text(canonical_json(imported.keypoints))
+    if imported.body_bounds_m is not None:
+        arrays["body_bounds_m"] = np.array(imported.body_bounds_m, dtype=np.float64)
     return arrays
 
 
@@ -60,7 +63,10 @@ def unpack_imported(arrays: Arrays) -> ImportedMesh:
     keypoints: tuple[Keypoint, ...] = ()
     if "keypoints" in arrays:
         keypoints = from_plain(tuple[Keypoint, ...], json.loads(arrays["keypoints"].tobytes()))
-    return ImportedMesh(mesh, collision, images, keypoints)
+    bounds_m = None
+    if "body_bounds_m" in arrays:
+        bounds_m = from_plain(tuple[Vec3, Vec3], arrays["body_bounds_m"].tolist())
+    return ImportedMesh(mesh, collision, images, keypoints, bounds_m)
 
 
 _OPTIONAL_IMAGES = ("roughness", "normal", "metallic", "occlusion", "emission", "alpha")

@@ -8,6 +8,7 @@ Mesh and collision parts always share one frame.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
@@ -42,11 +43,13 @@ from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.roads.opendrive import Network, read_opendrive
 from gen_data.generator.roads.opendrive_lanes import network_lanes
 
-VERSION = 5
+VERSION = 6
 """Increased whenever the same files are imported as different geometry."""
 SIZE_TOLERANCE = 0.05
 """Largest deviation of a mesh's edges from the stated ones, as a share of the longest edge."""
 _DEFAULT_FRONT = {"x": "-z", "y": "x", "z": "x"}
+_PROTRUSION = re.compile("mirror|antenna|aerial", re.IGNORECASE)
+"""Names of parts that 3D boxes of vehicles leave out."""
 _MAX_ALBEDO = 0.85
 """Upper bound on diffuse albedo, that of fresh snow; files often use 1 for white."""
 
@@ -62,12 +65,14 @@ class ImportedMesh:
             channels. A material's texture ``<asset id>#<name>`` refers to one of these, to a file
             of the folder, or to several images (``gen_data.generator.assets.texture_maps``).
         keypoints: Named points in the asset's frame.
+        body_bounds_m: Bounds of the mesh without a vehicle's exterior mirrors; None if it has none.
     """
 
     mesh: MeshData | None
     collision: ConvexParts | None
     images: Mapping[str, UInt8]
     keypoints: tuple[Keypoint, ...] = ()
+    body_bounds_m: tuple[Vec3, Vec3] | None = None
 
     @property
     def nbytes(self) -> int:
@@ -121,7 +126,23 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
         solid = decimate(solid, entry.max_faces) if len(solid) > entry.max_faces else solid
     collision = convex_parts(solid, place, entry.parts)
     keypoints = tuple(Keypoint(p.name, p.position_m, p.radius_m) for p in entry.keypoints)
-    return ImportedMesh(mesh, collision, decoded, keypoints)
+    return ImportedMesh(mesh, collision, decoded, keypoints, _bounds_without_mirrors(soup, mesh))
+
+
+def _bounds_without_mirrors(soup: TriangleSoup, mesh: MeshData) -> tuple[Vec3, Vec3] | None:
+    """Bounds of all groups but those named like mirrors or antennas, within those of the mesh.
+
+    None if no group, or every one, has such a name.
+    """
+    named = [k for k, name in enumerate(soup.group_names) if _PROTRUSION.search(name)]
+    kept = ~np.isin(soup.face_groups, named)
+    if kept.all() or not kept.any():
+        return None
+    points = soup.corners[kept].reshape(-1, 3)
+    # Decimation may have moved vertices of the mesh inwards.
+    low_m, high_m = (np.clip(edge, *mesh.bounds_m()) for edge in (points.min(0), points.max(0)))
+    (x0, y0, z0), (x1, y1, z1) = low_m.tolist(), high_m.tolist()
+    return (x0, y0, z0), (x1, y1, z1)
 
 
 def import_link(

@@ -27,6 +27,10 @@ from gen_data.generator.core.errors import AssetError, UnknownAsset, did_you_mea
 from gen_data.generator.core.scene import Lane, StageModel
 from gen_data.generator.core.se3 import Vec3
 
+VEHICLES = frozenset(
+    {"bus", "car", "caravan", "minibus", "motorcycle", "suv", "trailer", "tram", "truck", "van"}
+)
+"""Categories whose parts named like mirrors or antennas are outside 3D boxes."""
 _ENTRIES = 8192
 _SUMMARIES = 4096
 """Kept in memory: about 1 and 5 kB each."""
@@ -53,6 +57,7 @@ class _MeshSummary:
     """Small properties of an asset with a mesh, kept in memory."""
 
     bounds_m: tuple[Vec3, Vec3]
+    body_bounds_m: tuple[Vec3, Vec3] | None
     materials: tuple[Material, ...]
     keypoints: tuple[Keypoint, ...]
 
@@ -100,6 +105,16 @@ class Library:
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
         """Smallest and largest coordinates of the asset's mesh in its own frame [m]."""
         return self._summarize(asset_id).bounds_m
+
+    def body_bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3] | None:
+        """The same without a vehicle's exterior mirrors; None if it has none.
+
+        Vehicles have the tag ``vehicle`` or a category of ``VEHICLES``.
+        """
+        asset = self.get(asset_id)
+        if "vehicle" not in asset.tags and asset.category not in VEHICLES:
+            return None
+        return self._summarize(asset_id).body_bounds_m
 
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
         """Named points of the asset, in its own frame; empty if it has none."""
@@ -170,9 +185,10 @@ class Library:
         """Bounds, materials and keypoints. Raises AssetError if there is no mesh."""
 
         def read() -> _MeshSummary:
-            mesh = self.mesh(asset_id)
-            keypoints = self._imported(asset_id).keypoints
-            return _MeshSummary(mesh.bounds_m(), mesh.materials, keypoints)
+            mesh, imported = self.mesh(asset_id), self._imported(asset_id)
+            return _MeshSummary(
+                mesh.bounds_m(), imported.body_bounds_m, mesh.materials, imported.keypoints
+            )
 
         return self._summaries.get(asset_id, read)
 

@@ -108,7 +108,9 @@ class ProceduralLibrary:
 
         def compute() -> ImportedMesh:
             solid = family.build(**_merge_arguments(asset_id, family))
-            return ImportedMesh(solid.mesh, solid.collision, {}, solid.keypoints)
+            return ImportedMesh(
+                solid.mesh, solid.collision, {}, solid.keypoints, solid.body_bounds_m
+            )
 
         return self._result(asset_id, family, compute, pack_imported, unpack_imported)
 

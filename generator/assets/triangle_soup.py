@@ -52,6 +52,8 @@ class TriangleSoup:
         face_slots: int64 [m].
         face_groups: int64 [m]: number of the named object in the file.
         slots: One per value of ``face_slots``.
+        group_names: Names of the groups in the file, by number; the names of further groups are
+            not known.
     """
 
     corners: Float64
@@ -60,6 +62,7 @@ class TriangleSoup:
     face_slots: Int64
     face_groups: Int64
     slots: tuple[MaterialSlot, ...]
+    group_names: tuple[str, ...] = ()
 
     @classmethod
     def of(cls, corners: Float64, slot: MaterialSlot | None = None) -> TriangleSoup:
@@ -120,12 +123,14 @@ def join_soups(soups: list[TriangleSoup]) -> TriangleSoup:
     """
     if len(soups) == 1:
         return soups[0]
-    slots, groups, first_slot, first_group = [], [], 0, 0
+    slots, groups, names, first_slot, first_group = [], [], list[str](), 0, 0
     for s in soups:
         slots.append(s.face_slots + first_slot)
         groups.append(s.face_groups + first_group)
         first_slot += len(s.slots)
-        first_group += int(s.face_groups.max(initial=-1)) + 1
+        count = int(s.face_groups.max(initial=-1)) + 1
+        names += [*s.group_names, *[""] * count][:count]
+        first_group += count
     has_uvs = any(s.uvs is not None for s in soups)
     uvs = [np.zeros((len(s), 3, 2)) if s.uvs is None else s.uvs for s in soups]
     normals = [s.normals for s in soups if s.normals is not None]
@@ -136,6 +141,7 @@ def join_soups(soups: list[TriangleSoup]) -> TriangleSoup:
         face_slots=np.concatenate(slots),
         face_groups=np.concatenate(groups),
         slots=tuple(slot for s in soups for slot in s.slots),
+        group_names=tuple(names) if any(names) else (),
     )
 
 

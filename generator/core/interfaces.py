@@ -90,6 +90,10 @@ class AssetIndex(Protocol):
         """Smallest and largest coordinates of the asset's mesh in its own frame [m]."""
         ...
 
+    def body_bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3] | None:
+        """The same without a vehicle's exterior mirrors; None if it has none."""
+        ...
+
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
         """Named points of the asset, in its own frame; empty if it has none."""
         ...

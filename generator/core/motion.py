@@ -49,6 +49,8 @@ class Twist:
 
 
 STILL = Twist()
+_SLOPE_WEIGHTS = ((-1.5, 2.0, -0.5), (-0.5, 0.0, 0.5), (0.5, -2.0, 1.5))
+"""Weights of three places for the slope of their parabola at each of them, per step."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,8 +58,11 @@ class Trajectory:
     """Trajectory of one body: poses at equal time steps, interpolated.
 
     Positions follow cubic Hermite curves with the slopes of Catmull and Rom (1974), so that
-    velocity is continuous; rotations are interpolated linearly and normalised. Before the first and
-    after the last knot the body is at rest.
+    velocity is continuous; slopes at both ends are those of the parabola through three knots, so
+    that even acceleration is exact. Rotations are interpolated linearly and normalised. The second
+    derivative of such curves jumps at knots, and so does the rate of such rotations: acceleration
+    and angular velocity are interpolated between central differences over a step instead, and
+    extrapolated to both ends. Before the first and after the last knot the body is at rest.
 
     Attributes:
         body: Name of the body.
@@ -117,12 +122,38 @@ class Trajectory:
             6.0 * f * (1.0 - f),
             f * (3 * f - 2),
         )
-        bend = (12.0 * f - 6.0, 6.0 * f - 4.0, 6.0 - 12.0 * f, 6.0 * f - 2.0)
         return Twist(
             self._combine(k, tuple(w / h for w in slope)),
-            self._combine(k, tuple(w / (h * h) for w in bend)),
-            _angular_velocity(self.knots[k], self.knots[k + 1], h),
+            self._acceleration(k + f),
+            self._angular_velocity(k + f),
         )
+
+    def _acceleration(self, steps: float) -> Vec3:
+        """Acceleration [m/s^2] after a number of steps, from second differences at knots."""
+        inner = len(self.knots) - 2
+        if inner < 1:
+            return (0.0, 0.0, 0.0)
+        # Second difference k is that at knot k + 1.
+        k = min(max(math.floor(steps) - 1, 0), max(inner - 2, 0))
+        one = self._second_difference(k)
+        if inner == 1:
+            return one
+        return _extrapolate(one, self._second_difference(k + 1), steps - 1.0 - k)
+
+    def _second_difference(self, k: int) -> Vec3:
+        a, b, c = (self.knots[k + i].translation_m for i in range(3))
+        x, y, z = ((a[i] - 2.0 * b[i] + c[i]) / (self.step_s * self.step_s) for i in range(3))
+        return (x, y, z)
+
+    def _angular_velocity(self, steps: float) -> Vec3:
+        """Angular velocity [rad/s], outer axes: means over steps, at their middles, and between."""
+        count = len(self.knots) - 1
+        k = min(max(math.floor(steps - 0.5), 0), max(count - 2, 0))
+        one = _mean_angular_velocity(self.knots[k], self.knots[k + 1], self.step_s)
+        if count == 1:
+            return one
+        other = _mean_angular_velocity(self.knots[k + 1], self.knots[k + 2], self.step_s)
+        return _extrapolate(one, other, steps - 0.5 - k)
 
     def _place(self, time_s: float) -> tuple[int, float]:
         """Index of the knot before an instant, and the elapsed share of the step in [0, 1]."""
@@ -143,11 +174,16 @@ class Trajectory:
         return (x, y, z)
 
     def _slope(self, k: int) -> Vec3:
-        """Displacement per step at a knot; one-sided at the ends."""
-        before, after = max(k - 1, 0), min(k + 1, len(self.knots) - 1)
-        a, b = self.knots[before].translation_m, self.knots[after].translation_m
-        span = after - before
-        return ((b[0] - a[0]) / span, (b[1] - a[1]) / span, (b[2] - a[2]) / span)
+        """Displacement per step at a knot: that of the parabola through the nearest knots."""
+        last = len(self.knots) - 1
+        if last == 1:
+            (x0, y0, z0), (x1, y1, z1) = (knot.translation_m for knot in self.knots)
+            return (x1 - x0, y1 - y0, z1 - z0)
+        first = min(max(k - 1, 0), last - 2)
+        weights = _SLOPE_WEIGHTS[k - first]
+        near = [self.knots[first + i].translation_m for i in range(3)]
+        x, y, z = (sum(w * p[i] for w, p in zip(weights, near, strict=True)) for i in range(3))
+        return (x, y, z)
 
     def _interpolate_rotation(self, k: int, f: float) -> tuple[float, float, float, float]:
         a, b = self.knots[k].quaternion_wxyz, self.knots[k + 1].quaternion_wxyz
@@ -191,6 +227,11 @@ def _between(ways: Sequence[tuple[SE3, ...]], steps: Array) -> tuple[Array, Arra
     i = np.arange(end + 1 - first)
     before, after = np.maximum(i - 1, 0), np.minimum(i + 1, end - first)
     slopes = (places[:, after] - places[:, before]) / (after - before)[:, None]
+    if end - first > 1:
+        # Ends of the trajectory, as in ``Trajectory._slope``; at other ends slopes are not used.
+        for k_end, three in ((0, places[:, :3]), (2, places[:, -3:])):
+            weights = np.array(_SLOPE_WEIGHTS[k_end])[:, None]
+            slopes[:, 0 if k_end == 0 else -1] = (three * weights).sum(axis=1)
     k -= first
     g = 1.0 - f
     translations = (
@@ -251,7 +292,13 @@ class StateChange:
     attributes: tuple[tuple[str, str], ...] = ()
 
 
-def _angular_velocity(one: SE3, other: SE3, step_s: float) -> Vec3:
+def _extrapolate(one: Vec3, other: Vec3, share: float) -> Vec3:
+    """The value at a share of the way from one to the other, or beyond them."""
+    x, y, z = ((1.0 - share) * a + share * b for a, b in zip(one, other, strict=True))
+    return (x, y, z)
+
+
+def _mean_angular_velocity(one: SE3, other: SE3, step_s: float) -> Vec3:
     """Mean angular velocity between two poses, in the outer frame's axes."""
     w, x, y, z = one.quaternion_wxyz
     dw, dx, dy, dz = multiply_quaternions(other.quaternion_wxyz, (w, -x, -y, -z))

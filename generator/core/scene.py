@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol, TypeVar, get_args
 
 from gen_data.generator.core.asset_types import Keypoint, Material
+from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.motion import STILL, JointTrajectory, StateChange, Trajectory, Twist
 from gen_data.generator.core.se3 import IDENTITY, SE3, Vec3
@@ -30,6 +31,9 @@ LaneKind = Literal[
 ]
 
 
+Box3dExtent = Literal["body", "all"]
+"""What 3D boxes enclose: the body of a vehicle, without exterior mirrors, or all of it."""
+
 LABEL_IDS_MAX = 65_535
 """Largest instance id and category id: label images have 16 bits."""
 
@@ -46,6 +50,8 @@ class Instance:
         parts: Names of its parts; part id ``k`` is ``parts[k - 1]``. Robots: their links.
         T_world_instance: Pose of the instance frame (a body's own frame; a robot's base).
         box_min_m, box_max_m: Tight bounds of the visual geometry in the instance frame [m].
+        body_bounds_m: Bounds of the part that its 3D box encloses, smallest and largest
+            coordinates in the instance frame [m]; None = all of the visual geometry.
         subcategory: A finer name than the category; may be empty.
         attributes: Further attributes in labels, ``(name, value)``, sorted by name.
         keypoints: Named points in the instance frame, in the order of their skeleton.
@@ -66,6 +72,15 @@ class Instance:
     attributes: tuple[tuple[str, str], ...] = ()
     keypoints: tuple[Keypoint, ...] = ()
     twist: Twist = STILL
+    body_bounds_m: tuple[Vec3, Vec3] | None = None
+
+    @property
+    def box3d(self) -> OrientedBox:
+        """Its annotated box in the world, along the axes of its frame."""
+        low_m, high_m = self.body_bounds_m or (self.box_min_m, self.box_max_m)
+        (x0, y0, z0), (x1, y1, z1) = low_m, high_m
+        T_instance_box = SE3((0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (z0 + z1)))
+        return OrientedBox(self.T_world_instance @ T_instance_box, (x1 - x0, y1 - y0, z1 - z0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -446,6 +461,7 @@ class Scene:
         shared: Shared values, ``(name, value)``, sorted by name.
         time_s: The scene's instant; 0 = as built.
         step_s: Time between the instants of its sequence.
+        box3d: What the 3D boxes of its instances enclose.
         tracks: Trajectories of bodies; at most one per body.
         changes: Changes of state, in order of time.
     """
@@ -471,6 +487,7 @@ class Scene:
     step_s: float = 0.1
     tracks: tuple[Trajectory, ...] = ()
     changes: tuple[StateChange, ...] = ()
+    box3d: Box3dExtent = "all"
 
     def body(self, name: str) -> Body:
         """The body of that name; KeyError if there is none."""

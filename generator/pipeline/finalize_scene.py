@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.scene import Body, Instance, Scene
+from gen_data.generator.core.scene import Body, Box3dExtent, Instance, Scene
 from gen_data.generator.core.scene_time import add_twists, scene_at
 from gen_data.generator.core.se3 import SE3, Array, Vec3
 
@@ -44,7 +44,8 @@ def finalize_scene(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str
     """Fill in category id, attributes, frame, keypoints and tight box of every instance.
 
     An instance of one body has that body's frame. An instance of several bodies (a robot) has
-    the frame of its articulation's base, and the box around all its bodies' vertices.
+    the frame of its articulation's base, and the box around all its bodies' vertices. Bounds
+    without mirrors are those of the single body's asset, if ``scene.box3d`` is ``body``.
     """
     members: dict[int, list[Body]] = {}
     for body in scene.bodies:
@@ -56,6 +57,7 @@ def finalize_scene(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str
             members.get(instance.instance_id, []),
             bases.get(instance.instance_id),
             assets,
+            scene.box3d,
         )
         for instance in scene.instances
     )
@@ -77,7 +79,11 @@ def _describe(
 
 
 def _measure(
-    instance: Instance, bodies: list[Body], T_world_base: SE3 | None, assets: AssetLibrary
+    instance: Instance,
+    bodies: list[Body],
+    T_world_base: SE3 | None,
+    assets: AssetLibrary,
+    box3d: Box3dExtent,
 ) -> Instance:
     if not bodies:
         return instance
@@ -89,6 +95,7 @@ def _measure(
             T_world_instance=body.T_world_body,
             box_min_m=_scale(low, body.scale),
             box_max_m=_scale(high, body.scale),
+            body_bounds_m=_body_bounds(body, assets) if box3d == "body" else None,
             keypoints=tuple(
                 replace(
                     point,
@@ -112,6 +119,15 @@ def _measure(
         box_min_m=_round_to_micrometre(np.min(lows, axis=0)),
         box_max_m=_round_to_micrometre(np.max(highs, axis=0)),
     )
+
+
+def _body_bounds(body: Body, assets: AssetLibrary) -> tuple[Vec3, Vec3] | None:
+    """Bounds of a body without exterior mirrors; None if its asset states none."""
+    bounds_m = assets.body_bounds_m(body.asset)
+    if bounds_m is None:
+        return None
+    low, high = bounds_m
+    return _scale(low, body.scale), _scale(high, body.scale)
 
 
 def _scale(corner_m: Vec3, scale: float) -> Vec3:

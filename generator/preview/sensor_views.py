@@ -95,13 +95,7 @@ def outline_things(image: Image, scene: Scene, T_world_sensor: SE3) -> None:
     T_sensor_world = T_world_sensor.inverse()
     for thing in scene.instances:
         if thing.annotated:
-            low, high = np.asarray(thing.box_min_m), np.asarray(thing.box_max_m)
-            x, y, z = (float(v) for v in 0.5 * (low + high))
-            length, width, height = (float(v) for v in high - low)
-            box = OrientedBox(
-                T_sensor_world @ thing.T_world_instance @ SE3((x, y, z)), (length, width, height)
-            )
-            _outline(image, box, id_color(thing.category_id))
+            _outline(image, thing.box3d.seen_from(T_sensor_world), id_color(thing.category_id))
 
 
 def range_view(cloud: PointCloud) -> Image:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from gen_data.generator.core.boxes import OrientedBox, tight_box
 from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.scene import Instance
+from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.serialization import from_plain
 from gen_data.generator.report.stored_labels import ImageLabels, decode_mask
 
@@ -167,7 +169,7 @@ def _box_in_space(image: ImageLabels, item: Item) -> Iterator[str | None]:
         return
     if camera["intrinsics"]["lens"]["model"] != "pinhole":
         return
-    corners_m = from_plain(OrientedBox, plain).corners()
+    corners_m = _box_of_all(image, item).corners()
     if corners_m[:, 2].min() <= 0.0:
         return
     corners_px = from_plain(Intrinsics, camera["intrinsics"]).project(corners_m)
@@ -177,6 +179,14 @@ def _box_in_space(image: ImageLabels, item: Item) -> Iterator[str | None]:
     )
     excess = float(beyond.max())
     yield None if excess <= BOX_MARGIN_PX else f"box {_corners(box)} exceeds it by {excess:.1f} px"
+
+
+def _box_of_all(image: ImageLabels, item: Item) -> OrientedBox:
+    """The 3D box in the camera's frame, around the mirrors too where labels leave them out."""
+    if item["instance"].get("body_bounds_m") is None:
+        return from_plain(OrientedBox, item["box3d_camera"])
+    whole = replace(from_plain(Instance, item["instance"]), body_bounds_m=None)
+    return whole.box3d.seen_from(from_plain(SE3, image.truth["camera"]["T_world_camera"]).inverse())
 
 
 def _corners(box: Item) -> tuple[int, int, int, int]:

@@ -22,7 +22,9 @@ from gen_data.exporters.croissant_metadata import (
     record_set,
     title_of,
 )
+from gen_data.generator.annotations.annotate import Thresholds
 from gen_data.generator.config.data_files import load_data
+from gen_data.generator.config.yaml_scalars import to_flow_yaml
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo
 from gen_data.generator.runner.labels import LABELS_NAME
@@ -157,12 +159,38 @@ def data_card(facts: DatasetFacts) -> str:
         formats="\n".join(f"- [`{name}/`]({name}/)" for name in sorted(facts.formats))
         or "- none besides the shards",
         settings=_table(_settings(plan)),
+        thresholds="\n".join(f"- {fact}" for fact in _label_limits(plan)),
         versions=", ".join(f"{name} {release}" for name, release in sorted(plan.versions.items())),
         seed=plan.seed,
         n=plan.n,
         licence=_licence_text(facts),
         citation=_citation(info),
     )
+
+
+def _label_limits(plan: Plan) -> Iterator[str]:
+    """Sentences on what the configuration leaves without annotation, and on its 3D boxes."""
+    given: Mapping[str, Any] = plan.config.get("labels") or {}
+    own = {name: given[name] for name in Thresholds.model_fields if name in given}
+    limits = Thresholds.model_validate(own)
+    if limits.include_invisible:
+        yield "All objects are annotated in every image, hidden ones too."
+    else:
+        share = f"{limits.min_visible_fraction:g} of the silhouette"
+        yield (
+            f"An object is annotated in an image if at least {limits.min_visible_px} pixels"
+            + (f" and {share}" if limits.min_visible_fraction > 0.0 else "")
+            + f" are visible, in a box of at least {limits.min_box_px} pixels a side"
+            " (`labels.min_visible_px`, `min_visible_fraction`, `min_box_px`); smaller ones are"
+            " in the images of instance ids only."
+        )
+    if given.get("map"):
+        listed = ", ".join(f"{key}: {to_flow_yaml(value)}" for key, value in given["map"].items())
+        yield f"Formats also follow the label map `{listed}`."
+    if given.get("box3d", "body") == "body":
+        yield "3D boxes of vehicles leave out exterior mirrors (`labels.box3d: body`)."
+    else:
+        yield "3D boxes enclose all of an object, with the mirrors of vehicles."
 
 
 def _steps(info: DatasetInfo) -> str:
@@ -314,6 +342,7 @@ generated. The same configuration, seed and versions give the same bytes.
 
 - Labels come from the geometry of the scene: the ray through a pixel's centre decides its labels.
 - Boxes are tight around the visible pixels of an object; pixel i covers [i, i + 1).
+{thresholds}
 - Cameras have X right, Y down, Z forward; the world has Z up; units are metres, seconds, radians.
 - Ids of instances are the same in all views of a scene. Splits are drawn per scene.
 - The images are synthetic. Distributions of objects, light and viewpoints are those of the

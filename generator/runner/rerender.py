@@ -22,6 +22,7 @@ from gen_data.generator.core.scene_time import place_sensors
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.core.streams import Streams
 from gen_data.generator.pipeline import Pipeline
+from gen_data.generator.pipeline.finalize_scene import finalize_scene
 from gen_data.generator.pipeline.pipeline import DrawnView
 from gen_data.generator.runner.identity import format_licences, make_plan
 from gen_data.generator.runner.plan import Plan
@@ -104,6 +105,10 @@ class RerenderedScenes:
             index=first.scene_index * self.info.views_per_scene + first.view_index,
         )
         scene = self._redraw(scene, randomizers, {Stage.BUILD: streams, Stage.VIEW: view_streams})
+        if scene.box3d != nominal.box3d:
+            ids = {name: number for number, name in enumerate(self.info.categories, 1)}
+            scene = replace(scene, box3d=nominal.box3d)
+            scene = finalize_scene(scene, self.pipeline.assets, ids)
         view = DrawnView(view_streams.index, place_sensors(scene), view_streams)
         return replace(
             self.pipeline.read_sensors(view, sensors, step_index),

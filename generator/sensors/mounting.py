@@ -280,8 +280,9 @@ class MountMotion:
         """Pose, acceleration and angular velocity of the device at an instant.
 
         Acceleration and angular velocity are central differences over one step of the trajectory,
-        which is the bandwidth of an interpolated trajectory. Within two steps of its ends, where
-        neighbours are missing, they keep the values of two steps from the end, device axes.
+        which is the bandwidth of an interpolated trajectory. Within a step of its ends, where
+        neighbours are missing, they are extrapolated along the device's axes from one and two
+        steps from the end; trajectories of fewer than three steps keep one value there.
 
         Returns:
             ``T_world_device``; acceleration [m/s^2] and angular velocity [rad/s] in the device's
@@ -291,18 +292,22 @@ class MountMotion:
         pose = self.pose(time_s)
         if track is None or not track.start_s <= time_s <= track.end_s:
             return pose, np.zeros(3), np.zeros(3)
-        half_s = 0.5 * (track.end_s - track.start_s)
-        h, margin_s = min(track.step_s, half_s), min(2.0 * track.step_s, half_s)
-        middle_s = min(max(time_s, track.start_s + margin_s), track.end_s - margin_s)
-        before, here, after = (self.pose(middle_s + k * h) for k in (-1, 0, 1))
+        h = min(track.step_s, 0.5 * (track.end_s - track.start_s))
+        middle_s = min(max(time_s, track.start_s + h), track.end_s - h)
+        motion = self._central_differences(middle_s, h)
+        if time_s != middle_s and len(track.knots) > 3:
+            inward = math.copysign(h, middle_s - time_s)
+            further = self._central_differences(middle_s + inward, h)
+            motion = motion + (motion - further) * ((middle_s - time_s) / inward)
+        return pose, motion[0], motion[1]
+
+    def _central_differences(self, time_s: float, h: float) -> Array:
+        """Acceleration and angular velocity in the device's axes, [2, 3], of poses ``h`` apart."""
+        before, here, after = (self.pose(time_s + k * h) for k in (-1, 0, 1))
         a, b, c = (np.asarray(place.translation_m) for place in (before, here, after))
+        turn = rotation_vector(after @ before.inverse()) / (2.0 * h)
         axes = here.inverse()
-        acceleration = axes.rotate((a - 2.0 * b + c) / (h * h))
-        return (
-            pose,
-            acceleration,
-            axes.rotate(rotation_vector(after @ before.inverse())) / (2.0 * h),
-        )
+        return np.stack([axes.rotate((a - 2.0 * b + c) / (h * h)), axes.rotate(turn)])
 
 
 def mount_motion(scene: Scene, device: str) -> MountMotion:

@@ -1,7 +1,8 @@
 """Import and export of cameras.
 
 USD's camera is a pinhole; lens distortion is written as additional attributes
-(``genData:lens:model``, ``genData:lens:coefficients``, ``genData:lens:halfField`` in radians).
+(``genData:lens:model``, ``genData:lens:coefficients``, ``genData:lens:halfField`` in radians), the
+delay of a camera's images after their steps as ``genData:timeOffset`` in time codes.
 """
 
 from __future__ import annotations
@@ -19,8 +20,13 @@ micrometres. A power of two, so that apertures of whole pixels are exact."""
 CLIPPING_M = (0.01, 100_000.0)
 
 
-def define_camera(stage: Any, path: str, steps: Sequence[Camera]) -> None:
-    """Define a camera from its intrinsics, with a pose per time code."""
+def define_camera(
+    stage: Any, path: str, steps: Sequence[Camera], codes: Sequence[float], offset: float = 0.0
+) -> None:
+    """Define a camera from its intrinsics, with a pose per time code.
+
+    ``offset`` is the delay of its images after their steps, in time codes.
+    """
     from pxr import Gf, Sdf, UsdGeom
 
     k = steps[0].intrinsics
@@ -37,9 +43,11 @@ def define_camera(stage: Any, path: str, steps: Sequence[Camera]) -> None:
     size.Set(Gf.Vec2i(k.width_px, k.height_px))
     if not k.straight:
         _define_lens(prim.GetPrim(), steps[0])
-    set_transforms(
-        prim.GetPrim(), [(step.T_world_camera @ T_CAMERA_USD).matrix() for step in steps]
-    )
+    if offset:
+        delay = prim.GetPrim().CreateAttribute("genData:timeOffset", Sdf.ValueTypeNames.Double)
+        delay.Set(offset)
+    poses = [(step.T_world_camera @ T_CAMERA_USD).matrix() for step in steps]
+    set_transforms(prim.GetPrim(), poses, codes)
 
 
 def read_camera_pose(T_stage_usd: Array) -> SE3:
@@ -50,13 +58,14 @@ def read_camera_pose(T_stage_usd: Array) -> SE3:
 
 
 def _define_lens(prim: Any, camera: Camera) -> None:
-    from pxr import Sdf
+    from pxr import Sdf, Vt
 
     lens = camera.intrinsics.lens
     kinds = Sdf.ValueTypeNames
     for name, kind, value in (
         ("model", kinds.Token, lens.model),
-        ("coefficients", kinds.DoubleArray, lens.coefficients),
+        # A tuple of four numbers would become a vector.
+        ("coefficients", kinds.DoubleArray, Vt.DoubleArray(lens.coefficients)),
         ("halfField", kinds.Double, lens.half_field_rad),
     ):
         prim.CreateAttribute(f"genData:lens:{name}", kind).Set(value)

@@ -26,7 +26,9 @@ T_WORLD_DOME = SE3((0.0, 0.0, 0.0), (0.5, 0.5, 0.5, 0.5))
 """USD's sky has its pole along +Y and the image's centre along +Z; here +Z and +X."""
 
 
-def define_light(stage: Any, path: str, steps: Sequence[Light]) -> None:
+def define_light(
+    stage: Any, path: str, steps: Sequence[Light], codes: Sequence[float] = (0.0,)
+) -> None:
     """Define a light, with a pose per time code."""
     from pxr import UsdLux
 
@@ -57,7 +59,7 @@ def define_light(stage: Any, path: str, steps: Sequence[Light]) -> None:
             shaping.CreateShapingConeAngleAttr(math.degrees(light.cone_rad))
             shaping.CreateShapingConeSoftnessAttr(1.0 - light.even)
     prim.CreateColorAttr(light.color)
-    set_transforms(prim.GetPrim(), [_light_pose(step).matrix() for step in steps])
+    set_transforms(prim.GetPrim(), [_light_pose(step).matrix() for step in steps], codes)
 
 
 def define_sky(stage: Any, path: str, environment: Environment, image: str) -> None:
@@ -68,7 +70,9 @@ def define_sky(stage: Any, path: str, environment: Environment, image: str) -> N
     prim.CreateTextureFileAttr(image)
     prim.CreateTextureFormatAttr(UsdLux.Tokens.latlong)
     prim.CreateIntensityAttr(environment.luminance_cd_m2)
-    set_transforms(prim.GetPrim(), [(SE3.about_z(environment.yaw_rad) @ T_WORLD_DOME).matrix()])
+    set_transforms(
+        prim.GetPrim(), [(SE3.about_z(environment.yaw_rad) @ T_WORLD_DOME).matrix()], (0.0,)
+    )
 
 
 def read_light(prim: Any, name: str, T_stage_light: Array) -> Light | None:

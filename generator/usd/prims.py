@@ -17,21 +17,21 @@ T_CAMERA_USD = SE3((0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0))
 """USD's camera looks along -Z with +Y up, this project's along +Z with -Y up."""
 
 
-def set_values(attribute: Any, values: Sequence[Any]) -> None:
-    """Set an attribute per time code, or once for all times if all values are equal."""
+def set_values(attribute: Any, values: Sequence[Any], codes: Sequence[float]) -> None:
+    """Set an attribute at time codes, or once for all times if all values are equal."""
     if all(value == values[0] for value in values):
         attribute.Set(values[0])
         return
-    for code, value in enumerate(values):
+    for code, value in zip(codes, values, strict=True):
         attribute.Set(value, code)
 
 
-def set_transforms(prim: Any, matrices: Sequence[Array]) -> None:
+def set_transforms(prim: Any, matrices: Sequence[Array], codes: Sequence[float]) -> None:
     """Set a prim's transform to column-vector matrices [4, 4], one per time code."""
     from pxr import Gf, UsdGeom
 
     rows = [Gf.Matrix4d(*np.asarray(m).T.ravel().tolist()) for m in matrices]
-    set_values(UsdGeom.Xformable(prim).MakeMatrixXform(), rows)
+    set_values(UsdGeom.Xformable(prim).MakeMatrixXform(), rows, codes)
 
 
 def scale_pose(pose: SE3, scale: float) -> Array:
@@ -75,16 +75,25 @@ def open_stage_for_writing(path: Path, root: str) -> Iterator[Any]:
     Raises:
         StorageError: if it cannot be written.
     """
-    from pxr import Tf, Usd, UsdGeom
+    from pxr import Usd, UsdGeom
 
     path.parent.mkdir(parents=True, exist_ok=True)
-    try:
+    with _storage_errors(path):
         stage = Usd.Stage.CreateNew(str(path))
-        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
-        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
-        stage.SetDefaultPrim(stage.DefinePrim(root, "Xform"))
-        yield stage
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    stage.SetDefaultPrim(stage.DefinePrim(root, "Xform"))
+    yield stage
+    with _storage_errors(path):
         stage.GetRootLayer().Save()
+
+
+@contextmanager
+def _storage_errors(path: Path) -> Iterator[None]:
+    from pxr import Tf
+
+    try:
+        yield
     except Tf.ErrorException as error:
         lines = str(error).strip().splitlines() or ["unknown reason"]
         raise StorageError(

@@ -11,12 +11,13 @@
         /Prototypes         classes: meshes with overridden materials
 
 A body whose appearance changes has one ``look`` per mesh and set of materials, of which one is
-visible at a time. Step ``k`` of a sequence is time code ``k``.
+visible at a time. Step ``k`` of a sequence is time code ``k``; images of a camera with
+``genData:timeOffset`` were taken that many time codes later.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -57,30 +58,46 @@ class StageFiles:
     materials: Callable[[str], tuple[Material, ...]]
 
 
-def write_stage(path: Path, steps: Sequence[Scene], step_s: float, files: StageFiles) -> None:
-    """Write the stage of a sequence, or of a single scene (one step).
+def write_stage(
+    path: Path,
+    instants: Sequence[Scene],
+    step_s: float,
+    files: StageFiles,
+    offsets_s: Mapping[str, float],
+) -> None:
+    """Write the stage of a sequence, or of a single scene.
+
+    Args:
+        path: File of the stage.
+        instants: A scene at several instants, in order of time.
+        step_s: Time between time codes.
+        files: Files that the stage refers to.
+        offsets_s: Delay of the images of a camera after their step; 0 for cameras without one.
 
     Raises:
         StorageError: if it cannot be written.
     """
     with open_stage_for_writing(path, WORLD) as stage:
-        if len(steps) > 1:
-            stage.SetStartTimeCode(0.0)
-            stage.SetEndTimeCode(len(steps) - 1.0)
+        codes = [round(scene.time_s / step_s, 9) for scene in instants]
+        if len(codes) > 1:
+            stage.SetStartTimeCode(codes[0])
+            stage.SetEndTimeCode(codes[-1])
             stage.SetTimeCodesPerSecond(round(1.0 / step_s, 9))
-        writer = _Writer(stage, files)
-        writer.bodies(steps)
-        writer.lights(steps)
-        for camera in steps[0].cameras:
-            at = [step.camera(camera.name) for step in steps]
-            define_camera(stage, writer.path(f"{WORLD}/Cameras", camera.name), at)
+        writer = _Writer(stage, files, codes)
+        writer.bodies(instants)
+        writer.lights(instants)
+        for camera in instants[0].cameras:
+            at = [scene.camera(camera.name) for scene in instants]
+            offset = round(offsets_s.get(camera.name, 0.0) / step_s, 9)
+            place = writer.path(f"{WORLD}/Cameras", camera.name)
+            define_camera(stage, place, at, codes, offset)
 
 
 class _Writer:
     """Writer of the prims of one stage; keeps track of used names and existing prototypes."""
 
-    def __init__(self, stage: Any, files: StageFiles) -> None:
-        self._stage, self._files = stage, files
+    def __init__(self, stage: Any, files: StageFiles, codes: Sequence[float]) -> None:
+        self._stage, self._files, self._codes = stage, files, codes
         self._taken: dict[str, set[str]] = {
             WORLD: {"Background", "Lights", "Cameras", "Prototypes"}
         }
@@ -114,7 +131,7 @@ class _Writer:
 
         path = self.path(WORLD, instance.name)
         prim = self._stage.DefinePrim(path, "Xform")
-        set_transforms(prim, [pose.matrix() for pose in poses])
+        set_transforms(prim, [pose.matrix() for pose in poses], self._codes)
         labels = {"instance_id": str(instance.instance_id)}
         if instance.annotated:
             labels["category"] = instance.category
@@ -135,7 +152,8 @@ class _Writer:
         poses = [
             (T_world_parent.inverse() @ b.T_world_body, b.scale) for T_world_parent, b in placed
         ]
-        set_transforms(prim, [scale_pose(pose, scale) for pose, scale in poses])
+        matrices = [scale_pose(pose, scale) for pose, scale in poses]
+        set_transforms(prim, matrices, self._codes)
         looks = [self._find_look(body) for body in steps]
         for look in dict.fromkeys(looks):
             child = self._stage.DefinePrim(self.path(path, "look"), "Xform")
@@ -144,7 +162,8 @@ class _Writer:
             if len(set(looks)) > 1:
                 tokens = UsdGeom.Tokens
                 shown = [tokens.inherited if one == look else tokens.invisible for one in looks]
-                set_values(UsdGeom.Imageable(child).CreateVisibilityAttr(), shown)
+                visibility = UsdGeom.Imageable(child).CreateVisibilityAttr()
+                set_values(visibility, shown, self._codes)
 
     def _find_look(self, body: Body) -> Look:
         """Mesh and materials of a body, with texture scales adapted to the body's scale."""
@@ -181,7 +200,8 @@ class _Writer:
         parent = f"{WORLD}/Lights"
         for k, light in enumerate(steps[0].lights):
             path = self.path(parent, light.name)
-            define_light(self._stage, path, [step.lights[k] for step in steps])
+            at = [step.lights[k] for step in steps]
+            define_light(self._stage, path, at, self._codes)
         sky = steps[0].environment
         if sky.luminance_cd_m2 > 0.0:
             path = self.path(parent, "sky")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from gen_data.generator.annotations import TABLE
 from gen_data.generator.annotations.annotate import Thresholds, annotate_objects
+from gen_data.generator.annotations.boxes3d import annotate_boxes
 from gen_data.generator.core.boxes import BoxPx
 from gen_data.generator.core.capture import Channel, SensorReading, Silhouette
 from gen_data.generator.core.errors import ConfigError, SampleError
@@ -200,6 +201,26 @@ def test_boxes_in_both_frames_are_the_instances_bounds(truths: tuple[ObjectTruth
         assert truth.box3d_camera is not None
         np.testing.assert_allclose(truth.box3d_world.corners(), world[:, :3], atol=1e-12)
         np.testing.assert_allclose(truth.box3d_camera.corners(), camera[:, :3], atol=1e-12)
+
+
+def test_boxes_of_space_leave_out_what_is_beside_the_body() -> None:
+    """In every frame, also of samples as a whole; the centre moves by half of what is missing."""
+    scene, reading = scene_and_reading()
+    arm = replace(ARM, body_bounds_m=((-0.1, -0.2, 0.0), (0.2, 0.1, 1.0)))
+    scene = replace(scene, instances=(MUG, arm))
+
+    (seen, _) = annotate_objects(scene, reading, annotators("boxes3d"), Thresholds()).objects
+    frame = annotate_boxes(scene, SE3())
+
+    assert seen.box3d_world is not None and seen.box3d_camera is not None
+    whole = ARM.box3d
+    moved = ARM.T_world_instance.rotate(np.array([-0.05, -0.05, 0.0]))
+    for box in (seen.box3d_world, frame[2]):
+        assert box.size_m == pytest.approx((0.3, 0.3, 1.0))
+        between = np.subtract(box.T_frame_box.translation_m, whole.T_frame_box.translation_m)
+        assert between == pytest.approx(moved)
+    assert seen.box3d_camera.size_m == seen.box3d_world.size_m
+    assert frame[5] == MUG.box3d
 
 
 @pytest.mark.parametrize("name", OF_OBJECTS)

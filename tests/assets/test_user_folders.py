@@ -456,3 +456,51 @@ def raising(error: Exception) -> Callable[..., NoReturn]:
         raise error
 
     return fail
+
+
+def write_car(path: Path) -> None:
+    """A body of 4 x 1.8 x 1.5 m and two parts called mirrors, which make it 2.2 m wide."""
+    scene = trimesh.Scene()
+    for name, size, at in (
+        ("Body", (4.0, 1.8, 1.5), (0.0, 0.0, 0.0)),
+        ("Side_Mirror_L", (0.1, 0.2, 0.2), (1.0, 1.0, 0.3)),
+        ("SideMirror_R", (0.1, 0.2, 0.2), (1.0, -1.0, 0.3)),
+    ):
+        made = trimesh.Trimesh(
+            box(size).reshape(-1, 3), np.arange(36).reshape(-1, 3), process=False
+        )
+        scene.add_geometry(made.apply_translation(at), name, name)
+    data = scene.export(file_type=path.suffix[1:])
+    path.write_bytes(data if isinstance(data, bytes) else data.encode())
+
+
+@pytest.mark.parametrize("suffix", ["obj", "glb"])
+def test_parts_named_like_mirrors_are_outside_the_body_of_a_vehicle(
+    folder: Path, tmp_path: Path, suffix: str
+) -> None:
+    """A cabinet with the same parts is measured with its mirrors."""
+    write_car(folder / f"a.{suffix}")
+    (folder / "assets.yaml").write_text(
+        f"assets:\n  - {{id: car, file: a.{suffix}, category: car, up: z, front: x}}\n"
+        f"  - {{id: cabinet, file: a.{suffix}, category: cabinet, up: z, front: x}}\n"
+    )
+    for _ in range(2):  # The second library reads the cache.
+        library = open_library([folder], cache_dir=tmp_path / "cache")
+        low, high = library.bounds_m("user/car")
+        assert np.subtract(high, low) == pytest.approx((4.0, 2.2, 1.5), abs=1e-5)
+        bounds = library.body_bounds_m("user/car")
+        assert bounds is not None
+        assert np.subtract(bounds[1], bounds[0]) == pytest.approx((4.0, 1.8, 1.5), abs=1e-5)
+        assert library.body_bounds_m("user/cabinet") is None
+
+
+def test_a_vehicle_without_named_mirrors_is_measured_whole(folder: Path, tmp_path: Path) -> None:
+    """So is one that consists of a mirror alone."""
+    write_box(folder / "car/plain.obj", (4.0, 1.8, 1.5))
+    (folder / "car/all.obj").write_text(
+        "o wing mirror\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+    )
+    library = open_library([folder], cache_dir=tmp_path / "cache")
+    assert library.get("user/car/plain").category == "car"
+    assert library.body_bounds_m("user/car/plain") is None
+    assert library.body_bounds_m("user/car/all") is None

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from gen_data.exporters.image_files import write_media
 from gen_data.generator import annotations
 from gen_data.generator.annotations.annotate import Thresholds, annotate_objects
-from gen_data.generator.annotations.boxes3d import oriented_box
 from gen_data.generator.core.asset_types import (
     SURFACES,
     Asset,
@@ -373,7 +372,7 @@ def frame_of(scene: Scene) -> EgoTruth:
     drivable[:, 40:] = True
     return EgoTruth(
         "ego",
-        boxes3d={"ego": {i.instance_id: oriented_box(i) for i in scene.instances}},
+        boxes3d={"ego": {i.instance_id: i.box3d for i in scene.instances}},
         borders=(LaneBorder("lane:left", "road", ((-90.0, 0.0, 0.0), (90.0, 0.0, 0.0))),),
         birdseye=BirdseyeMap(SE3(), 0.5, {"drivable": drivable, "vehicles": ~drivable}),
     )

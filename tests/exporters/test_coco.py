@@ -221,6 +221,26 @@ def test_visibility_and_amodal_shapes_agree_with_the_masks(train: COCO) -> None:
     assert truncated > 0
 
 
+def test_amodal_boxes_are_those_of_the_silhouettes_in_the_image(
+    world: Any, tmp_path: Path, train: COCO
+) -> None:
+    """As pycocotools finds them; masks, areas and the score of the ground truth stay."""
+    root = world.export(Coco(bbox="amodal"), world.info(7), world.samples, tmp_path)
+    path = root / "annotations/instances_train.json"
+    amodal = opened(path)
+    assert average_precision(amodal, "bbox") == pytest.approx(1.0, abs=1e-9)
+    assert average_precision(amodal, "segm") == pytest.approx(1.0, abs=1e-9)
+    grown = 0
+    for number, row in amodal.anns.items():
+        assert row["bbox"] == coco_mask.toBbox(row["amodal_segmentation"]).tolist()
+        before = train.anns[number]
+        grown += row["bbox"] != before["bbox"]
+        for key in ("segmentation", "area", "amodal_bbox", "truncation"):
+            assert row[key] == before[key]
+    assert 0 < grown < len(amodal.anns)
+    assert Coco(bbox="amodal", amodal=False).needs == {"instance_masks", "boxes2d"}
+
+
 def test_boxes_only_and_no_amodal_keys_on_request(world: Any, tmp_path: Path) -> None:
     """Options leave out what they say, and nothing else."""
     exporter = Coco(segmentation="none", amodal=False)

@@ -10,6 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from scipy.special import fresnel
 
 from gen_data.exporters.kitti_raw import KittiRaw
 from gen_data.exporters.oxts import (
@@ -20,11 +21,14 @@ from gen_data.exporters.oxts import (
     rig_motion,
     roll_pitch_yaw,
 )
+from gen_data.exporters.sequences import Mount
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.motion import STILL, Twist
 from gen_data.generator.core.scene import Device
+from gen_data.generator.core.scene_time import scene_at
 from gen_data.generator.core.se3 import SE3
 from tests.exporters.drives import DRIVE
+from tests.sensors.streetcar import world as driving
 
 
 def mercator(lat_deg: float, lon_deg: float, scale: float) -> tuple[float, float]:
@@ -113,3 +117,19 @@ def test_a_pose_without_motion_is_where_the_rig_stands(world: Any, tmp_path: Pat
 
     assert float(row[2]) == pytest.approx(1.6)
     assert float(row[8]) == 0.0
+
+
+def test_navigation_in_a_growing_turn_is_that_of_its_instant() -> None:
+    """10 m/s on a clothoid: turn rate 0.2 t and v times that to the left, from end to end."""
+    unit_s = math.sqrt(math.pi / 0.2)
+
+    def clothoid(t: float) -> SE3:
+        sine, cosine = fresnel(t / unit_s)
+        return SE3.about_z(0.1 * t * t, (10.0 * unit_s * cosine, 10.0 * unit_s * sine, 0.0))
+
+    drive = driving(clothoid, seconds=1.0)
+    for k in range(11):
+        motion = rig_motion(scene_at(drive, round(0.1 * k, 6)), Mount("ego", SE3()))
+        row = np.array(oxts_row(motion, (0.0, 0.0)).split(), float)
+        assert row[[19, 22]] == pytest.approx(0.02 * k, abs=1e-5), k
+        assert row[[14, 15]] == pytest.approx([0.0, 0.2 * k], abs=0.02), k

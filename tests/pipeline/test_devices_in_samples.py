@@ -43,6 +43,9 @@ class Boxes:
         """An entry without facts."""
         return SimpleNamespace(attributes=(), subcategory="")
 
+    def body_bounds_m(self, asset_id: str) -> None:
+        """None: there are no mirrors."""
+
     def bounds_m(self, asset_id: str) -> tuple:
         """A car's."""
         return CAR_M

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.sample import ImageTruth
 from gen_data.generator.core.scene import Articulation, Body, Camera, Instance, Scene
 from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.serialization import canonical_json, from_plain
 from gen_data.generator.pipeline import Pipeline
 from gen_data.generator.pipeline.finalize_scene import finalize_scene
 from gen_data.generator.pipeline.pipeline import PipelineConfig
@@ -243,6 +245,9 @@ class TwoBoxes:
         """One."""
         return (Keypoint("top", (0.0, 0.0, 0.03)),)
 
+    def body_bounds_m(self, asset_id: str) -> None:
+        """None: there are no mirrors."""
+
     def bounds_m(self, asset_id: str) -> Any:
         """Bounds of the box."""
         return (-0.01, -0.02, -0.03), (0.01, 0.02, 0.03)
@@ -283,3 +288,31 @@ def test_freezing_fills_ids_frames_and_boxes() -> None:
     assert arm.T_world_instance == SE3((0.0, 0.0, -1.0))
     assert arm.box_min_m == pytest.approx((-0.01, -0.02, 0.97), abs=1e-6)
     assert arm.box_max_m == pytest.approx((0.01, 0.02, 2.03), abs=1e-6)
+
+
+class WithMirrors(TwoBoxes):
+    """Boxes of 4 cm width, 1 cm of which are mirrors on both sides."""
+
+    def body_bounds_m(self, asset_id: str) -> Any:
+        """Bounds without them."""
+        return (-0.01, -0.01, -0.03), (0.01, 0.01, 0.03)
+
+
+@pytest.mark.parametrize(("extent", "width_m"), [("body", 0.04), ("all", 0.08)])
+def test_boxes_leave_out_mirrors_unless_all_is_labelled(
+    extent: Literal["body", "all"], width_m: float
+) -> None:
+    """A body of twice its size; what other code measures it by stays whole."""
+    scene = Scene(
+        "test",
+        bodies=(Body("car", "box", SE3((1.0, 0.0, 0.5)), scale=2.0, instance_id=1),),
+        instances=(Instance(1, "car", "car", 0, "box"),),
+        box3d=extent,
+    )
+
+    (car,) = finalize_scene(scene, WithMirrors(), {"car": 1}).instances  # type: ignore[arg-type]
+
+    assert car.box3d.size_m == pytest.approx((0.04, width_m, 0.12), abs=1e-9)
+    assert car.box3d.T_frame_box.translation_m == pytest.approx((1.0, 0.0, 0.5), abs=1e-9)
+    assert car.box_max_m == pytest.approx((0.02, 0.04, 0.06), abs=1e-9)
+    assert from_plain(Instance, json.loads(canonical_json(car))) == car

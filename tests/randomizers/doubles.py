@@ -126,6 +126,9 @@ class FakeAssets:
             return THINGS[asset_id].materials
         return (Material(),) * SLOTS.get(parse_asset_id(asset_id).name, 1)
 
+    def body_bounds_m(self, asset_id: str) -> None:
+        """None: there are no mirrors."""
+
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
         """Bounds: centred at the origin for objects, above it for furniture."""
         if asset_id in THINGS:

@@ -16,9 +16,9 @@ from gen_data.generator.config.distributions import Constant, Probability, Unifo
 from gen_data.generator.core.errors import ConfigError, LayoutRejected
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.scene import Body, Camera, Lane, ObjectGroup, Scene
-from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.se3 import SE3, look_at
 from gen_data.randomizers.camera_on_lane import CameraOnLane
-from gen_data.randomizers.free_space import Footprint, Ground
+from gen_data.randomizers.free_space import Footprint, Ground, hidden_share
 from gen_data.randomizers.lane_objects import LaneObjects
 from tests.randomizers.doubles import FakeAssets, rng_of
 
@@ -155,6 +155,43 @@ def test_the_camera_rides_where_nothing_stands() -> None:
         assert (y, z) == pytest.approx((-1.5, 1.65))
         assert 15.0 < x < 25.0
         assert camera.T_world_camera.rotation()[:, 2] == pytest.approx((1.0, 0.0, 0.0), abs=1e-5)
+
+
+def test_hidden_shares_are_those_of_boxes_seen_in_perspective() -> None:
+    """A board 2 m ahead that fills the left half, the whole image or nothing of it."""
+    camera = Camera(
+        "color", look_at((0.0, 0.0, 1.0), (1.0, 0.0, 1.0)), Intrinsics.from_hfov(64, 48, 1.0)
+    )
+
+    def share(y_m: float, near_m: float = 4.0, ahead_m: float = 12.0) -> float:
+        # A box of 20 m a side: its near face is 10 m before its middle.
+        board = Body("board", "ball", SE3((ahead_m, y_m, 1.0)), scale=100.0, instance_id=1)
+        return hidden_share(camera, Scene("test", bodies=(board,)), FakeAssets(), near_m)
+
+    assert share(10.0) == 0.5
+    assert share(-10.0) == 0.5
+    assert share(0.0) == 1.0
+    assert share(0.0, near_m=1.9) == 0.0
+    assert share(0.0, ahead_m=-12.0) == 0.0
+    assert share(0.0, ahead_m=0.0) == 1.0
+
+
+def test_a_camera_on_a_pole_does_not_look_out_of_a_tree() -> None:
+    """Crowns of 4 m, with gaps of 4 m, along a part of a lane: not in a gap before a crown."""
+    crowns = tuple(
+        Body(f"trees/{k}", "ball", SE3((8.0 * k, -1.5, 4.0)), 20.0, instance_id=k + 1)
+        for k in range(4)
+    )
+    scene = replace(street(), bodies=crowns)
+    fields = {"lanes": ("driving",), "ahead_m": 5.0, "free_m": (0.1, 0.1)}
+    high = {"height_m": Constant(4.0), "pitch_deg": Constant(0.0), "yaw_deg": Constant(0.0)}
+    shares = []
+    for near_m in (0.0, 3.0):
+        pole = CameraOnLane(name="pole", near_m=near_m, **fields, **high)
+        views = [pole(scene, FakeAssets(), rng_of(f"{k}")) for k in range(30)]
+        shares.append(max(hidden_share(v.camera("color"), v, FakeAssets(), 3.0) for v in views))
+    assert shares[0] > 0.5
+    assert shares[1] <= 0.1
 
 
 def test_a_street_without_such_a_lane_is_one_clear_error() -> None:

@@ -124,6 +124,9 @@ class FakeLibrary:
     def materials(self, asset_id: str) -> tuple[Material, ...]:
         return self.meshes[asset_id].materials
 
+    def body_bounds_m(self, asset_id: str) -> None:
+        """None: there are no mirrors."""
+
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
         return self.meshes[asset_id].bounds_m()
 

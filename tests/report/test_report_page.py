@@ -217,6 +217,33 @@ def test_each_check_finds_its_contradiction_and_no_other(tmp_path: Path, title: 
     assert (finding.index, finding.instance_id) == (0, 1)
 
 
+def test_mirrors_may_exceed_the_3d_box(tmp_path: Path) -> None:
+    """Where labels leave them out, the 2D box is compared with the whole geometry's."""
+    thing = make_object(1, "car")
+    assert thing.box3d_camera is not None
+    side_m = thing.box3d_camera.size_m[0]
+    half = (0.5 * side_m,) * 3
+    whole = replace(
+        thing.instance,
+        T_world_instance=thing.box3d_camera.T_frame_box,
+        box_min_m=(-half[0], -half[1], -half[2]),
+        box_max_m=half,
+        body_bounds_m=((-half[0], -0.3 * half[1], -half[2]), (half[0], 0.3 * half[1], half[2])),
+    )
+    narrow = replace(thing.box3d_camera, size_m=(side_m, 0.3 * side_m, side_m))
+    labelled = replace(thing, instance=whole, box3d_camera=narrow)
+    too_small = replace(labelled, instance=replace(whole, box_max_m=(0.0, *half[1:])))
+    findings = []
+    for name, item in (("good", labelled), ("bad", too_small)):
+        checks = LabelChecks()
+        image = np.zeros((48, 64, 3), np.uint8)
+        folder = write_dataset(tmp_path / name, [[item]], ("car",), [image])
+        for labels in read_images(StoredSamples(folder)):
+            checks.add(labels)
+        findings.append({r.title for r in checks.results if r.found})
+    assert findings == [set(), {"2D box exceeds the projected 3D box"}]
+
+
 def test_all_pairs_of_near_hashes_are_found() -> None:
     """As by comparing all pairs: components of the graph of pairs at most 4 bits apart."""
     rng = np.random.default_rng(7)

@@ -61,6 +61,32 @@ def test_the_card_counts_and_states_the_publication() -> None:
         assert line in card
 
 
+@pytest.mark.parametrize(
+    ("labels", "words"),
+    [
+        (None, ["at least 16 pixels are visible, in a box of at least 3 pixels ", "leave out"]),
+        (
+            {"min_visible_px": 40, "min_box_px": 8, "min_visible_fraction": 0.2, "box3d": "all"},
+            ["at least 40 pixels and 0.2 of the silhouette are visible, in a box of at least 8 ",
+             "with the mirrors of vehicles"],
+        ),
+        ({"include_invisible": True}, ["All objects are annotated in every image"]),
+        ({"map": {"min_box_px": 20, "ignore": ["bowl"]}}, ["`min_box_px: 20, ignore: [bowl]`"]),
+    ],
+)  # fmt: skip
+def test_the_card_states_what_has_no_labels(
+    labels: dict[str, Any] | None, words: list[str]
+) -> None:
+    """The configuration's limits, or the default ones."""
+    given = {} if labels is None else {"labels": labels}
+    plan = replace(fake_plan(), config={**fake_plan().config, **given})
+
+    card = data_card(replace(facts(), plan=plan))
+
+    for sentence in words:
+        assert sentence in card
+
+
 def test_without_a_publication_only_licences_of_assets_are_stated() -> None:
     """No licence is invented."""
     bare = facts(Publication())

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from scipy.special import fresnel
 
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.geodesy import (
@@ -50,6 +51,22 @@ def test_circular_motion_is_felt_as_its_centripetal_acceleration() -> None:
 
     assert np.allclose(forces(rows), [0.0, 3.2, GRAVITY], atol=5e-3)
     assert np.allclose(rates(rows), [0.0, 0.0, 0.4], atol=1e-4)
+
+
+def test_a_growing_turn_is_felt_from_the_first_to_the_last_reading() -> None:
+    """10 m/s on a clothoid: turn rate 0.2 t and v times that to the left, at both ends too."""
+    unit_s = math.sqrt(math.pi / 0.2)
+
+    def clothoid(t: float) -> SE3:
+        sine, cosine = fresnel(t / unit_s)
+        return SE3.about_z(0.1 * t * t, (10.0 * unit_s * cosine, 10.0 * unit_s * sine, 0.0))
+
+    rows = readings(Imu(noise=0, rate_hz=10), world(clothoid, seconds=1.0), 11)
+    rate = 0.2 * rows["time_s"]
+
+    assert rows["time_s"][[0, -1]] == pytest.approx([0.0, 1.0])
+    assert np.allclose(rates(rows)[:, 2], rate, atol=2e-3)
+    assert np.allclose(forces(rows)[:, 1], 10.0 * rate, atol=1e-2)
 
 
 def test_lever_arm_adds_its_own_centripetal_acceleration() -> None:

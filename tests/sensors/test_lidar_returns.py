@@ -21,6 +21,7 @@ from gen_data.generator.sensors.lidar.lidar_atmosphere import (
     rain_extinction_per_m,
 )
 from gen_data.generator.sensors.lidar.lidar_detection import (
+    Kept,
     is_detected,
     make_pulses,
     received_light,
@@ -95,6 +96,31 @@ def test_an_ideal_scan_reports_every_hit_where_it_is() -> None:
     np.testing.assert_allclose(points["intensity"], 0.5 * 0.392, rtol=1e-5)
     assert (points["instance_id"] == 7).all() and (points["category_id"] == 2).all()
     assert (points["return_number"] == 1).all() and (points["return_count"] == 1).all()
+
+
+class Mirrors(Wall):
+    """A renderer whose first three rays also see a wall in a mirror, the fourth behind glass."""
+
+    def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
+        hits = super().scan(scene, lidar, beams)
+        surface = np.array([SURFACES.index("mirrored")] * 3 + [0], np.uint8)
+        far_m, bright = np.full(4, 50.0, np.float32), np.ones(4, np.float32)
+        ids = np.array([0, 0, 0, 9], np.uint16)
+        detours = SecondaryHits(np.arange(4) * beams.subrays, far_m, bright, ids, ids, surface)
+        return replace(hits, detours=detours)
+
+
+@pytest.mark.parametrize("returns", ["strongest", "last", "dual"])
+def test_an_ideal_scan_has_nothing_behind_mirrors(returns: Kept) -> None:
+    """What is behind glass is there, and stays."""
+    seen = Mirrors(30.0, reflectance=0.01)
+    real = scan(LidarSensor(model="VLP-16", divergence=False, returns=returns), seen)
+    ideal = scan(LidarSensor(model="VLP-16", ideal=True, returns=returns), seen)
+
+    far = np.linalg.norm(ideal["position_m"].astype(float), axis=1) > 40.0
+    assert (real["surface"] == SURFACES.index("mirrored")).sum() == 3
+    assert (ideal["surface"] != SURFACES.index("mirrored")).all()
+    assert ideal["instance_id"][far].tolist() == [9]
 
 
 def test_half_of_the_pulses_answer_at_the_limit_of_sensitivity() -> None:

@@ -13,17 +13,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pxr import Usd, UsdGeom, UsdLux, UsdSemantics, UsdShade, UsdUtils, UsdValidation
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdLux, UsdSemantics, UsdShade, UsdUtils, UsdValidation
 
 from gen_data.exporters.usd import Usd as UsdExporter
 from gen_data.generator.assets.library import Library, open_library
 from gen_data.generator.core.capture import Capture, Channel
+from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.lens import Lens
 from gen_data.generator.core.motion import StateChange
 from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Scene
-from gen_data.generator.core.scene_time import scene_at
+from gen_data.generator.core.scene import Rig, Scene
+from gen_data.generator.core.scene_time import place_sensors, scene_at
 from gen_data.generator.renderers.warp.renderer import WarpRenderer
+from gen_data.generator.usd.prims import open_stage_for_writing
 from tests.usd.worlds import STEP_S, STEPS, exported, off_centre_camera, table_world
 
 
@@ -204,6 +207,71 @@ def test_a_scene_without_motion_has_no_time_codes(library: Library, tmp_path: Pa
     assert not stage.HasAuthoredTimeCodeRange()
     attributes = [a for p in stage.Traverse() for a in p.GetAttributes()]
     assert attributes and not any(a.ValueMightBeTimeVarying() for a in attributes)
+
+
+@pytest.mark.parametrize("steps", [1, STEPS])
+def test_a_camera_with_an_offset_has_the_poses_of_its_images(
+    library: Library, tmp_path: Path, steps: int
+) -> None:
+    """It rides on the thing that moves by 0.2 m/s along X; so do the poses of all other things."""
+    world = table_world(library)
+    camera = replace(off_centre_camera(), rig="mover")
+    scene = replace(world, cameras=(camera,), rigs=(Rig("mover", "clutter/0"),))
+    path = exported(place_sensors(scene), library, tmp_path, steps=steps, time_offset_s=0.04)
+    stage = Usd.Stage.Open(str(path))
+    prim = stage.GetPrimAtPath("/World/Cameras/color")
+    offset = prim.GetAttribute("genData:timeOffset").Get()
+    mover = stage.GetPrimAtPath("/World/clutter_0")
+
+    def x_m(of: Any, code: float) -> float:
+        return UsdGeom.Xformable(of).ComputeLocalToWorldTransform(code).ExtractTranslation()[0]
+
+    assert offset == pytest.approx(0.4)
+    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (0.0, steps - 1 + offset)
+    for step in range(steps):
+        # The last step's image is taken after the last knot, when the body is at rest.
+        moved_m = min(0.02 * (step + 0.4), 0.02 * (STEPS - 1))
+        for thing in (prim, mover):
+            assert x_m(thing, step + offset) - x_m(thing, 0.0) == pytest.approx(moved_m, abs=2e-6)
+
+
+LENSES = {
+    "kannala_brandt": Lens("kannala_brandt", (0.01, -0.002, 0.0, 0.0003), 1.5),
+    "brown_conrady": Lens("brown_conrady", (0.1, 0.0, 0.001, 0.0, 0.0, 0.0, 0.0, 0.0)),
+    "equirectangular": Lens("equirectangular"),
+}
+
+
+@pytest.mark.parametrize("model", LENSES)
+def test_every_lens_is_stated_beside_the_pinhole(
+    library: Library, tmp_path: Path, model: str
+) -> None:
+    """The four coefficients of a fisheye, which look like a vector, too."""
+    camera = off_centre_camera()
+    bent = replace(camera, intrinsics=replace(camera.intrinsics, lens=LENSES[model]))
+    scene = replace(table_world(library), cameras=(bent,))
+    stage = Usd.Stage.Open(str(exported(scene, library, tmp_path)))
+    prim = stage.GetPrimAtPath("/World/Cameras/color")
+
+    assert prim.GetAttribute("genData:lens:model").Get() == model
+    stated = prim.GetAttribute("genData:lens:coefficients").Get()
+    assert tuple(stated or ()) == LENSES[model].coefficients
+    assert prim.GetAttribute("genData:lens:halfField").Get() == LENSES[model].half_field_rad
+    assert UsdGeom.Camera(prim).GetFocalLengthAttr().Get() == pytest.approx(300.0 / 2048)
+
+
+def test_only_storage_is_blamed_for_a_file_that_cannot_be_written(tmp_path: Path) -> None:
+    """A mistake in what is written keeps its own error."""
+    with (
+        pytest.raises(StorageError, match="space and rights"),
+        open_stage_for_writing(tmp_path / "a.unknown", "/World"),
+    ):
+        pass
+    with (
+        pytest.raises(Tf.ErrorException),
+        open_stage_for_writing(tmp_path / "a.usda", "/World") as one,
+    ):
+        one.GetDefaultPrim().CreateAttribute("a", Sdf.ValueTypeNames.Double).Set("text")
 
 
 def test_a_sequence_is_written_where_it_begins(library: Library, tmp_path: Path) -> None:

@@ -67,7 +67,13 @@ def table_world(library: Library) -> Scene:
 
 
 def exported(
-    scene: Scene, library: Library, folder: Path, *, steps: int = 1, **options: str
+    scene: Scene,
+    library: Library,
+    folder: Path,
+    *,
+    steps: int = 1,
+    time_offset_s: float = 0.0,
+    **options: str,
 ) -> Path:
     """The stage of a scene, as the exporter leaves it."""
     info = DatasetInfo(
@@ -76,7 +82,7 @@ def exported(
         steps,
         1,
         ("thing",),
-        (SensorInfo("color", Modality.CAMERA),),
+        (SensorInfo("color", Modality.CAMERA, time_offset_s=time_offset_s),),
         steps_per_scene=steps,
         step_s=STEP_S,
     )

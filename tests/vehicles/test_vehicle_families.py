@@ -280,3 +280,32 @@ def test_paint_is_drawn_from_the_seed() -> None:
 
     assert len(set(paints)) >= 6
     assert max(paints.count(paint) for paint in set(paints)) <= 10
+
+
+MIRROR_M = {"car": 0.25, "van": 0.25, "truck": 0.2, "bus": 0.3}
+"""Width of both mirrors beside the body: at least this [m]."""
+
+
+@pytest.mark.parametrize("name", FAMILIES)
+def test_the_body_is_as_wide_as_registered_and_leaves_out_mirrors_only(name: str) -> None:
+    """Regulation (EU) 1230/2012 measures widths without mirrors; bicycles have none."""
+    for seed in range(5):
+        built = variant(name, seed)
+        low, high = (np.array(edge) for edge in built.mesh.bounds_m())
+        if name in ("bicycle", "cyclist"):
+            assert built.body_bounds_m is None
+            continue
+        assert built.body_bounds_m is not None
+        body_low, body_high = (np.array(edge) for edge in built.body_bounds_m)
+        assert (body_low >= low).all() and (body_high <= high).all()
+        if name not in FOUR_WHEELED:
+            # Handlebars are wider than the mirrors above them; riders are higher.
+            assert body_low[1] == low[1] and body_high[1] == high[1]
+            continue
+        width = body_high[1] - body_low[1]
+        # Door handles stand out by 12 mm a side.
+        assert LIMITS[name][1][0] <= width <= LIMITS[name][1][1] + 0.024, seed
+        assert (high[1] - low[1]) - width >= MIRROR_M[name], seed
+        assert body_low[2] == low[2] and body_high[2] == high[2] and body_low[0] == low[0]
+        # Only those of buses hang in front.
+        assert (body_high[0] < high[0]) == (name == "bus")

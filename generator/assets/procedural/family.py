@@ -16,6 +16,7 @@ from gen_data.generator.core.asset_types import (
     Symmetry,
 )
 from gen_data.generator.core.errors import AssetError, did_you_mean
+from gen_data.generator.core.se3 import Vec3
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -26,11 +27,14 @@ class Solid:
         mesh: Visual geometry in the object's frame.
         collision: Convex parts in the same frame.
         keypoints: Named points in the same frame.
+        body_bounds_m: Bounds of the mesh without a vehicle's exterior mirrors, smallest and largest
+            coordinates [m]; None if it has none.
     """
 
     mesh: MeshData
     collision: ConvexParts
     keypoints: tuple[Keypoint, ...] = ()
+    body_bounds_m: tuple[Vec3, Vec3] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.triangle_soup import face_crosses, first_occurrences
 from gen_data.generator.core.asset_types import ConvexParts, Material, MeshData
+from gen_data.generator.core.se3 import Vec3
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -120,6 +121,14 @@ def make_solid_in_place(
     mesh = finish_mesh(join_patches(patches), materials, crease_deg)
     parts = tuple(np.round(round_values(hull), 6) + 0.0 for hull in hulls_m)
     return Solid(mesh, ConvexParts(parts))
+
+
+def grid_bounds_m(patches: Sequence[Patch]) -> tuple[Vec3, Vec3]:
+    """Smallest and largest coordinates of the mesh that ``finish_mesh`` makes of patches."""
+    corners = np.concatenate([patch.corners_m.reshape(-1, 3) for patch in patches])
+    vertices = (np.round(round_values(corners) / GRID_M) * GRID_M).astype(np.float32)
+    (x0, y0, z0), (x1, y1, z1) = vertices.min(axis=0).tolist(), vertices.max(axis=0).tolist()
+    return (x0, y0, z0), (x1, y1, z1)
 
 
 def finish_mesh(patch: Patch, materials: Sequence[Material], crease_deg: float) -> MeshData:

@@ -11,7 +11,7 @@ import binascii
 import json
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
 from urllib.parse import unquote
@@ -39,6 +39,8 @@ _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _MAX_PARTS = 50_000
 """Bound on nodes, and on primitives of all nodes: each takes about 0.1 ms."""
+_NAME_MAX = 400
+"""Bound on the characters kept of names of nodes."""
 _SUPPORTED_EXTENSIONS = (
     "KHR_materials_",
     "KHR_texture_transform",
@@ -75,12 +77,12 @@ def read_gltf(folder: Folder, relative: str, materials: bool) -> MeshSource:
             MaterialSlot(),
         )
         meshes = _mesh_instances(document)
-        if sum(len(mesh["primitives"]) for _, mesh in meshes) > _MAX_PARTS:
+        if sum(len(mesh["primitives"]) for _, mesh, _ in meshes) > _MAX_PARTS:
             raise ValueError(f"more than {_MAX_PARTS} primitives; join them")
         parts = [
             part
-            for matrix, mesh in meshes
-            for part in _read_primitives(document, mesh, matrix, slots)
+            for matrix, mesh, name in meshes
+            for part in _read_primitives(document, mesh, matrix, slots, name)
         ]
     except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError) as error:
         reason = f"missing {error}" if isinstance(error, KeyError) else str(error)[:120]
@@ -131,8 +133,11 @@ def _get_item(items: Sequence[Any], index: Any, what: str) -> Any:
     return items[index]
 
 
-def _mesh_instances(document: _Document) -> list[tuple[Float64, Mapping[str, Any]]]:
-    """``(matrix [4, 4], mesh)`` of every mesh node of the default scene, in document order."""
+def _mesh_instances(document: _Document) -> list[tuple[Float64, Mapping[str, Any], str]]:
+    """``(matrix [4, 4], mesh, name)`` of the mesh nodes of the default scene, in document order.
+
+    The name consists of those of the node, its ancestors and its mesh.
+    """
     nodes, meshes = _get_list(document, "nodes"), _get_list(document, "meshes")
     if len(nodes) > _MAX_PARTS:
         raise ValueError(f"{len(nodes)} nodes, at most {_MAX_PARTS}; join them")
@@ -142,19 +147,21 @@ def _mesh_instances(document: _Document) -> list[tuple[Float64, Mapping[str, Any
     else:
         children = {c for node in nodes for c in node.get("children", [])}
         roots = [k for k in range(len(nodes)) if k not in children]
-    placed: list[tuple[Float64, Mapping[str, Any]]] = []
+    placed: list[tuple[Float64, Mapping[str, Any], str]] = []
     visited: set[int] = set()
-    pending = [(index, np.eye(4)) for index in reversed(roots)]
+    pending = [(index, np.eye(4), "") for index in reversed(roots)]
     while pending:
-        index, parent = pending.pop()
+        index, parent, path = pending.pop()
         node = _get_item(nodes, index, "node")
         if index in visited:
             raise ValueError(f"node {index} has two parents or is its own ancestor")
         visited.add(index)
         matrix = _product(parent, _local_matrix(node))
+        path = f"{path}/{str(node.get('name', ''))[:_NAME_MAX]}"[-_NAME_MAX:]
         if "mesh" in node:
-            placed.append((matrix, _get_item(meshes, node["mesh"], "mesh")))
-        pending += [(child, matrix) for child in reversed(node.get("children", []))]
+            mesh = _get_item(meshes, node["mesh"], "mesh")
+            placed.append((matrix, mesh, f"{path}/{str(mesh.get('name', ''))[:_NAME_MAX]}"))
+        pending += [(child, matrix, path) for child in reversed(node.get("children", []))]
     return placed
 
 
@@ -182,14 +189,19 @@ def _product(a: Float64, b: Float64) -> Float64:
 
 
 def _read_primitives(
-    document: _Document, mesh: Mapping[str, Any], matrix: Float64, slots: tuple[MaterialSlot, ...]
+    document: _Document,
+    mesh: Mapping[str, Any],
+    matrix: Float64,
+    slots: tuple[MaterialSlot, ...],
+    name: str,
 ) -> list[TriangleSoup]:
     soups = []
     for primitive in mesh["primitives"]:
         if primitive.get("mode", _TRIANGLES) not in (_TRIANGLES, _STRIP, _FAN):
             continue
         slot = _get_item(slots, primitive.get("material", len(slots) - 1), "material")
-        soups.append(_read_primitive(document, primitive, slot).transformed(matrix[:3]))
+        soup = replace(_read_primitive(document, primitive, slot), group_names=(name,))
+        soups.append(soup.transformed(matrix[:3]))
     return soups
 
 

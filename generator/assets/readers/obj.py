@@ -43,6 +43,8 @@ class _Statements:
     polygon_groups: list[int] = field(default_factory=list)
     materials: dict[str, int] = field(default_factory=dict)
     libraries: list[str] = field(default_factory=list)
+    object_names: list[str] = field(default_factory=lambda: [""])
+    group_names: list[str] = field(default_factory=lambda: [""])
 
 
 def read_obj(folder: Folder, relative: str, materials: bool) -> MeshSource:
@@ -68,7 +70,7 @@ def read_obj(folder: Folder, relative: str, materials: bool) -> MeshSource:
 
 def _parse_statements(text: str) -> _Statements:
     s = _Statements()
-    material, object_count, group_count = 0, 0, 0
+    material = 0
     s.materials[""] = 0
     for line in text.split("\n"):
         key, _, rest = line.strip().partition(" ")
@@ -88,16 +90,16 @@ def _parse_statements(text: str) -> _Statements:
             s.corners += tokens
             s.polygon_sizes.append(len(tokens))
             s.polygon_materials.append(material)
-            s.polygon_objects.append(object_count)
-            s.polygon_groups.append(group_count)
+            s.polygon_objects.append(len(s.object_names) - 1)
+            s.polygon_groups.append(len(s.group_names) - 1)
         elif key == "usemtl":
             material = s.materials.setdefault(rest.strip(), len(s.materials))
         elif key == "mtllib":
             s.libraries.append(rest.strip())
         elif key == "o":
-            object_count += 1
+            s.object_names.append(rest.strip())
         elif key == "g":
-            group_count += 1
+            s.group_names.append(rest.strip())
     return s
 
 
@@ -126,7 +128,9 @@ def _build_soup(s: _Statements, slots: tuple[MaterialSlot, ...]) -> TriangleSoup
     positions = _parse_table(s.positions, 3, "v")
     texcoords = _parse_table(s.texcoords, 2, "vt")
     normals = _parse_table(s.normals, 3, "vn")
-    groups = s.polygon_objects if max(s.polygon_objects, default=0) else s.polygon_groups
+    groups, names = s.polygon_groups, s.group_names
+    if max(s.polygon_objects, default=0):
+        groups, names = s.polygon_objects, s.object_names
     return TriangleSoup(
         corners=_look_up(positions, indices[..., 0], "vertex", required=True),
         uvs=_look_up(texcoords, indices[..., 1], "vt") if len(texcoords) else None,
@@ -136,6 +140,7 @@ def _build_soup(s: _Statements, slots: tuple[MaterialSlot, ...]) -> TriangleSoup
         face_slots=np.array(s.polygon_materials, dtype=np.int64)[polygon],
         face_groups=np.array(groups, dtype=np.int64)[polygon],
         slots=slots,
+        group_names=tuple(names),
     )
 
 

@@ -67,7 +67,9 @@ class StageFile:
                 self._make_slot(k, images) if materials else MaterialSlot() for k in mesh.materials
             )
             zeros = np.zeros(len(mesh.corners), dtype=np.int64)
-            soup = TriangleSoup(mesh.corners, mesh.uvs, mesh.normals, mesh.face_slots, zeros, slots)
+            soup = TriangleSoup(
+                mesh.corners, mesh.uvs, mesh.normals, mesh.face_slots, zeros, slots, (piece.name,)
+            )
             soups.append(soup.transformed(piece.T_stage_prim[:3]))
         return MeshSource(join_soups(soups), images)
 

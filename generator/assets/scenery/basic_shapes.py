@@ -14,6 +14,7 @@ from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import (
     Array,
     Patch,
+    grid_bounds_m,
     join_patches,
     make_solid_in_place,
 )
@@ -30,15 +31,20 @@ def make_solid(
     materials: Sequence[Material],
     hulls_m: Iterable[Array],
     keypoints: Sequence[Keypoint] = (),
+    body: Sequence[Patch] = (),
 ) -> Solid:
-    """A solid that keeps its frame; materials that no triangle uses are left out."""
+    """A solid that keeps its frame; materials that no triangle uses are left out.
+
+    ``body`` are the patches within ``Solid.body_bounds_m``; without any, the solid states none.
+    """
     patch = join_patches(patches)
     used = np.unique(patch.slots)
     numbers = np.zeros(len(materials), dtype=np.int64)
     numbers[used] = np.arange(len(used))
     compact = replace(patch, slots=numbers[patch.slots])
     made = make_solid_in_place((compact,), [materials[k] for k in used], hulls_m)
-    return replace(made, keypoints=tuple(keypoints))
+    bounds_m = grid_bounds_m(body) if body else None
+    return replace(made, keypoints=tuple(keypoints), body_bounds_m=bounds_m)
 
 
 def quad(

@@ -126,20 +126,25 @@ DESIGNS = load_table(__package__, "designs", Design)
 
 def make_vehicle(design: Design, steer_deg: float, finish: tuple[Material, ...]) -> Solid:
     """The vehicle of a design with steered front wheels."""
-    return make_solid([bodywork(design, steer_deg)], finish, _collision(design), _keypoints(design))
+    panels, fittings = _panels(design), list(_fittings(design))
+    middle = [*_plates(design), *design.axles.wheels(steer_deg)]
+    middle = [body_shell.drop_uvs(patch) for patch in middle]
+
+    def both_sides(half: list[Patch]) -> list[Patch]:
+        return [body_shell.mirror_half(join_patches(half), SIDES), *middle]
+
+    body = both_sides([*panels, *fittings])
+    whole = both_sides([*panels, *_mirror(design), *fittings])
+    return make_solid(whole, finish, _collision(design), _keypoints(design), body)
 
 
-def bodywork(design: Design, steer_deg: float) -> Patch:
-    """The whole vehicle, both sides."""
+def _panels(design: Design) -> list[Patch]:
+    """Lower body and glass house, left half."""
     ring = body_shell.plan(*design.body_ends, sides=20)
     plain = _lower(design, ring)
     lower, wells = design.axles.wells(_lower_paint(design, ring, plain), design.half_m)
     gaps = _gaps(design, design.axles.wells(plain, design.half_m)[0])
-    half = join_patches([lower, *wells, *gaps, _house(design), *_fittings(design)])
-    middle = [*_plates(design), *design.axles.wheels(steer_deg)]
-    return join_patches(
-        [body_shell.mirror_half(half, SIDES), *(body_shell.drop_uvs(p) for p in middle)]
-    )
+    return [lower, *wells, *gaps, _house(design)]
 
 
 def _collision(design: Design) -> list[Array]:
@@ -281,8 +286,8 @@ def _glaze(design: Design, ring: BodyOutline, house: Patch) -> Patch:
     return house
 
 
-def _fittings(design: Design) -> Iterable[Patch]:
-    """Mirror, door handles, roof rail: the left one of each."""
+def _mirror(design: Design) -> Iterable[Patch]:
+    """The left exterior mirror."""
     shoulder = design.shoulder()
     y = design.half_m
     mirror_x = design.x(design.cowl + 0.42 * (design.header - design.cowl))
@@ -295,6 +300,11 @@ def _fittings(design: Design) -> Iterable[Patch]:
     yield block(
         (mirror_x - 0.03, 0.86 * y, z - 0.1), (mirror_x + 0.03, y, z - 0.04), 0.0, Slot.TRIM
     )
+
+
+def _fittings(design: Design) -> Iterable[Patch]:
+    """Door handles, roof rail: the left one of each."""
+    shoulder, y = design.shoulder(), design.half_m
     for share in design.seams[1:]:
         x = design.x(share) + 0.16
         z = float(shoulder(np.array(x))) - 0.13

@@ -37,14 +37,16 @@ def bus(seed: int) -> Solid:
     livery = rng.choose(COLORS["liveries"]).split()
     body = _body(x, top, axles, striped=rng.chance(0.6))
     body = _doors(body, (x - 0.55, x - 6.0, *((x - 9.6,) if rng.chance(0.5) else ())), top)
-    parts = [body, *(drop_uvs(p) for p in [*axles.wheels(0.0), *_fittings(x, top)])]
+    shell = [body, *(drop_uvs(p) for p in axles.wheels(0.0))]
+    parts = [*shell, *_fittings(x, top, mirrors=True)]
     colors = [hex_to_linear(code) for code in livery]
     hull = [
         hulls.box((-x, -_HALF_M, _FLOOR_M), (x, _HALF_M, top)),
         hulls.box((axles.rear_m - 0.48, -1.1, 0.0), (axles.front_m + 0.48, 1.1, _FLOOR_M)),
     ]
     points = axles.keypoints((x - 0.1, 0.95, 0.72), (-x + 0.06, 1.1, 1.1))
-    return make_solid([join_patches(parts)], materials(rng, colors[0], colors[1]), hull, points)
+    finish, bare = materials(rng, colors[0], colors[1]), _fittings(x, top, mirrors=False)
+    return make_solid(parts, finish, hull, points, [*shell, *bare])
 
 
 def _body(x: float, top: float, axles: Axles, *, striped: bool) -> Patch:
@@ -90,8 +92,8 @@ def _doors(body: Patch, fronts_m: tuple[float, ...], top: float) -> Patch:
     return body
 
 
-def _fittings(x: float, top: float) -> list[Patch]:
-    """Pillars, display, mirrors, plates, cooling unit."""
+def _fittings(x: float, top: float, *, mirrors: bool) -> list[Patch]:
+    """Pillars, display, plates, cooling unit, and exterior mirrors or none."""
     parts = [
         block((x - 0.35, -0.75, top - 0.37), (x - 0.105, 0.75, top - 0.15), 0.0, Slot.TRIM),
         block((x - 0.03, -0.26, 0.42), (x + 0.006, 0.26, 0.53), 0.0, Slot.PLATE),
@@ -99,12 +101,19 @@ def _fittings(x: float, top: float) -> list[Patch]:
         block((-1.6, -0.85, top - 0.05), (1.2, 0.85, top + 0.12), 0.05, Slot.PAINT),
     ]
     for sign in (1.0, -1.0):
-        y = sign * 1.36
-        parts.append(block((x + 0.02, y - 0.11, 1.75), (x + 0.14, y + 0.11, 2.2), 0.04, Slot.TRIM))
-        arm = sorted((sign * 1.1, y))
-        parts.append(block((x - 0.3, arm[0], 2.2), (x + 0.1, arm[1], 2.25), 0.0, Slot.TRIM))
+        parts += _mirror(x, sign) if mirrors else []
         for k in range(1, 7):
             at, edge = x - 0.9 - 1.45 * k, sorted((sign * 1.2, sign * (_HALF_M + 0.003)))
             parts.append(block((at - 0.03, edge[0], 1.13), (at + 0.03, edge[1], top - 0.39), 0.0,
                                Slot.TRIM))  # fmt: skip
-    return parts
+    return [drop_uvs(part) for part in parts]
+
+
+def _mirror(x: float, sign: float) -> list[Patch]:
+    """The exterior mirror of the left (1) or right (-1) side, and its arm."""
+    y = sign * 1.36
+    arm = sorted((sign * 1.1, y))
+    return [
+        block((x + 0.02, y - 0.11, 1.75), (x + 0.14, y + 0.11, 2.2), 0.04, Slot.TRIM),
+        block((x - 0.3, arm[0], 2.2), (x + 0.1, arm[1], 2.25), 0.0, Slot.TRIM),
+    ]

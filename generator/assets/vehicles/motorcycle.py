@@ -50,10 +50,14 @@ def motorcycle(seed: int) -> Solid:
     rng = variant_rng("motorcycle", seed)
     style = in_turn(STYLES, seed)
     build = _BUILDS[style]
-    parts = [*_running_gear(build), *_lamps(style, build), *_bodies(style, build)]
+    above = [*_lamps(style, build), *_bodies(style, build)]
     ridden = _is_ridden(seed)
     if ridden:
-        parts += people.rider(_seat(build), rng)
+        above += people.rider(_seat(build), rng)
+    parts, body = (
+        [drop_uvs(part) for part in (*_running_gear(build, mirrors=mirrors), *above)]
+        for mirrors in (True, False)
+    )
     paint = hex_to_linear(rng.choose(COLORS["motorcycles"]))
     finish = materials(rng, paint, clothes=people.draw_clothes(rng), plate_rows=2)
     reach = build.axle + build.wheel_m
@@ -69,7 +73,7 @@ def motorcycle(seed: int) -> Solid:
         Keypoint("headlight", head, 0.12),
         Keypoint("taillight", tail, 0.1),
     )
-    return make_solid([drop_uvs(part) for part in parts], finish, hull, points)
+    return make_solid(parts, finish, hull, points, body)
 
 
 def motorcycle_facts(seed: int) -> Facts:
@@ -81,8 +85,8 @@ def _is_ridden(seed: int) -> bool:
     return variant_rng("motorcycle rider", seed).chance(2.0 / 3.0)
 
 
-def _running_gear(build: _Build) -> list[Patch]:
-    """Wheels, fork, swing arm, handlebar, mirrors."""
+def _running_gear(build: _Build, *, mirrors: bool) -> list[Patch]:
+    """Wheels, fork, swing arm, handlebar, and mirrors or none."""
     made = wheel(build.wheel_m, build.tyre_m, 6, 0.62)
     both = [made, made.rotated("z", math.pi)]
     parts = [w.moved(sign * build.axle, 0.0, build.wheel_m) for sign in (1.0, -1.0) for w in both]
@@ -99,6 +103,8 @@ def _running_gear(build: _Build) -> list[Patch]:
         bar = [np.array([head_x, 0.0, head_z + 0.03]), np.array([gx + 0.1, sign * (gy - 0.12), gz]),
                grip + np.array([-0.03, sign * 0.04, 0.0])]  # fmt: skip
         parts.append(limb(bar, (0.014, 0.014, 0.018), Slot.TRIM, 6))
+        if not mirrors:
+            continue
         glass = np.array([gx + 0.1, sign * (gy - 0.06), gz + 0.17])
         parts.append(limb([bar[1], glass], (0.006, 0.006), Slot.TRIM, 4))
         parts.append(blob(glass, (0.02, 0.065, 0.04), Slot.TRIM))

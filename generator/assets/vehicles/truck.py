@@ -36,11 +36,12 @@ def truck(seed: int) -> Solid:
     top = max(roof + 0.25, rng.between(3.0, 3.75))
     radius = rng.between(0.42, 0.49)
     axles = Axles(x - 1.22, -x + rng.between(1.6, 2.0), 1.0, radius, 0.27, radius + 0.08, 0, True)
-    parts = [_cab(x, cab, roof, axles)]
-    fitted = [*axles.wheels(0.0), *_load(x, cab, top), *_chassis(x, cab, axles), *_lamps(x)]
-    if rng.chance(0.6):
-        fitted.append(_spoiler(x, cab, roof, top))
-    parts += [drop_uvs(p) for p in fitted]
+    before = [_cab(x, cab, roof, axles)]
+    fitted = [*axles.wheels(0.0), *_load(x, cab, top), *_chassis(x, cab, axles)]
+    before += [drop_uvs(p) for p in fitted]
+    after = [drop_uvs(_spoiler(x, cab, roof, top))] if rng.chance(0.6) else []
+    body = [*before, *_lamps(x, mirrors=False), *after]
+    parts = [*before, *_lamps(x, mirrors=True), *after]
     cab_paint, box_paint = (hex_to_linear(rng.choose(COLORS[k])) for k in ("cabs", "boxes"))
     hull = [
         hulls.box((x - cab, -_HALF_M, _FLOOR_M), (x, _HALF_M, roof)),
@@ -48,7 +49,7 @@ def truck(seed: int) -> Solid:
         hulls.box((-x + 0.4, -1.1, 0.0), (x - 0.6, 1.1, 0.95)),
     ]
     points = axles.keypoints((x - 0.08, 0.95, 0.72), (-x + 0.02, 1.0, 0.8))
-    return make_solid([join_patches(parts)], materials(rng, cab_paint, box_paint), hull, points)
+    return make_solid(parts, materials(rng, cab_paint, box_paint), hull, points, body)
 
 
 def _cab(x: float, length: float, roof: float, axles: Axles) -> Patch:
@@ -112,8 +113,8 @@ def _chassis(x: float, cab: float, axles: Axles) -> list[Patch]:
     return [*made, tank]
 
 
-def _lamps(x: float) -> list[Patch]:
-    """Lamps behind, plates, mirrors."""
+def _lamps(x: float, *, mirrors: bool) -> list[Patch]:
+    """Lamps behind, plates, and exterior mirrors or none."""
     parts = [
         block((x - 0.04, -0.26, 0.46), (x + 0.006, 0.26, 0.57), 0.0, Slot.PLATE),
         block((-x + 0.02, -0.26, 0.66), (-x + 0.06, 0.26, 0.77), 0.0, Slot.PLATE),
@@ -122,11 +123,13 @@ def _lamps(x: float) -> list[Patch]:
         for slot, inner in ((Slot.TAILLIGHT, 0.78), (Slot.BRAKELIGHT, 0.92), (wink, 1.06)):
             y = sorted((sign * inner, sign * (inner + 0.13)))
             parts.append(block((-x + 0.01, y[0], 0.73), (-x + 0.08, y[1], 0.87), 0.0, slot))
+        if not mirrors:
+            continue
         y = sorted((sign * 1.2, sign * 1.38))
         parts.append(block((x - 0.42, y[0], 1.65), (x - 0.3, y[1], 2.1), 0.03, Slot.TRIM))
         y = sorted((sign * 1.0, sign * 1.25))
         parts.append(block((x - 0.45, y[0], 2.1), (x - 0.4, y[1], 2.14), 0.0, Slot.TRIM))
-    return parts
+    return [drop_uvs(part) for part in parts]
 
 
 def _spoiler(x: float, cab: float, roof: float, top: float) -> Patch:

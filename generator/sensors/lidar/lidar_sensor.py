@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 from pydantic import Field, WithJsonSchema, field_validator
 
 from gen_data.generator.config.base_model import NAME_PATTERN
-from gen_data.generator.core.capture import POINT, Channel, LidarRays, PointCloud
+from gen_data.generator.core.asset_types import SURFACES
+from gen_data.generator.core.capture import (
+    POINT,
+    Channel,
+    LidarHits,
+    LidarRays,
+    PointCloud,
+    SecondaryHits,
+)
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
 from gen_data.generator.core.scene import Lidar, Scene, Weather
@@ -81,7 +89,7 @@ class LidarSensor(Mounted):
             centre, along its axis.
         returns: Return of a pulse to report; ``dual`` reports two.
         divergence: Whether beams diverge; costs seven rays instead of one.
-        ideal: No noise, no missed return, no weather: every hit within range.
+        ideal: No noise, no missed return, no weather, no mirror images: every hit within range.
         motion_distortion: Effect of the scanner's motion during a sweep. ``raw``: points are in
             the lidar frame of each pulse's own instant. ``deskewed``: in that of the sweep's
             middle, as in KITTI's files; moving objects are where each pulse hit them. ``none``:
@@ -153,7 +161,9 @@ class LidarSensor(Mounted):
             shots.time_s,
             sweep.order,
         )
-        pulses = make_pulses(renderer.scan(scene, lidar, beams), model, self.returns)
+        hits = renderer.scan(scene, lidar, beams)
+        hits = _without_mirrored(hits) if self.ideal else hits
+        pulses = make_pulses(hits, model, self.returns)
         weather = CLEAR if self.ideal else scene.weather
         if weather != CLEAR:
             pulses = _apply_weather(pulses, weather, model, lidar, shots, rng)
@@ -183,6 +193,15 @@ class Returns:
         """Select candidate ``picks[k]`` of pulse ``rows[k]``."""
         which = rows * pulses.light.shape[1] + picks
         return cls(rows, *(getattr(pulses, name).ravel().take(which) for name in FIELDS))
+
+
+def _without_mirrored(hits: LidarHits) -> LidarHits:
+    """The hits without those by way of a mirror, where nothing is at the place of the point."""
+    if hits.detours is None:
+        return hits
+    real = hits.detours.surface != SURFACES.index("mirrored")
+    kept = (getattr(hits.detours, field.name)[real] for field in fields(SecondaryHits))
+    return replace(hits, detours=SecondaryHits(*kept) if real.any() else None)
 
 
 def _apply_weather(
