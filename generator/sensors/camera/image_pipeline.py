@@ -78,7 +78,9 @@ class ImagePipeline(Strict):
             every exposure is possible.
         image_sensor: The sensor; null = an ideal one.
         color_matrix: Matrix from white-balanced raw colours to linear sRGB; rows sum to 1.
-        white_balance: Share of the illuminant's colour to correct, by the grey-world assumption.
+        white_balance: Share of the illuminant's colour that automatic white balance corrects.
+        white_balance_norm: Minkowski norm of each channel that estimates the illuminant: 1 = grey
+            world, 6 = shades of grey, which errs least, large = white patch.
         warmth_ev: Error of the white balance: red over blue, in stops.
         demosaic: Method of demosaicing.
         saturation: Factor on saturation.
@@ -103,6 +105,7 @@ class ImagePipeline(Strict):
     image_sensor: ImageSensor | None = None
     color_matrix: tuple[Row, Row, Row] | None = None
     white_balance: UnitInterval = NONE
+    white_balance_norm: float = Field(1.0, ge=1, le=50)
     warmth_ev: Annotated[Scalar, Bounds(-3, 3)] = NONE
     demosaic: isp.Demosaic = "edge_aware"
     saturation: NonNegative = Constant(1.0)
@@ -291,7 +294,7 @@ def _image_sensor(light: Light, shot: Shot) -> Light:
     raw = expose(received, shot.exposure.gain, shot.exposure.time_s, sensor, shot.rng)
     share, warmth_ev = pipeline.white_balance.draw(shot.rng), pipeline.warmth_ev.draw(shot.rng)
     if sensor.pattern != "mono":
-        gains = isp.white_balance_gains(image, share, warmth_ev)
+        gains = isp.white_balance_gains(image, share, pipeline.white_balance_norm, warmth_ev)
         raw = raw * gains[filter_at(sensor.pattern, *raw.shape)]
     white = 2.0 * pipeline.headroom
     image = isp.demosaic(raw, sensor.pattern, pipeline.demosaic, white)
@@ -306,7 +309,7 @@ def _white_balance(light: Light, shot: Shot) -> Light:
         return light
     camera_from_srgb, srgb_from_camera = _color_matrices(pipeline)
     image = light.values * np.float32(1.0 / light.white) @ camera_from_srgb.T
-    gains = isp.white_balance_gains(image, share, warmth_ev)
+    gains = isp.white_balance_gains(image, share, pipeline.white_balance_norm, warmth_ev)
     return Light(image * gains @ srgb_from_camera.T, 1.0)
 
 

@@ -52,29 +52,34 @@ def demosaic(raw: Float32, pattern: Pattern, method: Demosaic, white: float) -> 
     return np.asarray(cv2.cvtColor(steps, code) * np.float32(white / _DEPTH), np.float32)
 
 
-def grey_world_gains(image: Float32) -> Float32:
-    """Factors on red, green and blue that make the mean of an image grey, float32 [3].
+def illuminant_gains(image: Float32, norm: float) -> Float32:
+    """Factors on red, green and blue that make the estimated illuminant grey, float32 [3].
 
-    Clipped pixels, at 1, are left out; 1 if hardly any other is left. Source: Buchsbaum, "A spatial
-    processor model for object colour perception", 1980.
+    The estimate is the Minkowski norm of each channel: 1 is the mean (grey world; Buchsbaum, "A
+    spatial processor model for object colour perception", 1980), infinity the largest value (white
+    patch); 6 estimated best (Finlayson and Trezzi, "Shades of gray and colour constancy", 2004).
+    Clipped pixels, at 1, are left out; factors are 1 if hardly any other is left.
     """
     seen = image.reshape(-1, 3)[::7]
     seen = seen[(seen.max(axis=1) < 0.95) & (seen.min(axis=1) > 0.0)]
     if len(seen) < 16:
         return np.ones(3, np.float32)
-    means = seen.mean(axis=0, dtype=np.float64)
+    if norm == 1.0:
+        means = seen.mean(axis=0, dtype=np.float64)
+    else:
+        means = (seen.astype(np.float64) ** norm).mean(axis=0) ** (1.0 / norm)
     return np.asarray(np.clip(means[1] / means, 0.3, 3.0), np.float32)
 
 
-def white_balance_gains(image: Float32, share: float, warmth_ev: float) -> Float32:
+def white_balance_gains(image: Float32, share: float, norm: float, warmth_ev: float) -> Float32:
     """Factors on red, green and blue relative to green, float32 [3]; 1 saturates the image.
 
-    ``share`` of the illuminant's colour is corrected by the grey-world assumption; the error
-    ``warmth_ev`` is red over blue, in stops.
+    ``share`` of the illuminant's colour is corrected, which is estimated by a Minkowski norm; the
+    error ``warmth_ev`` is red over blue, in stops.
     """
     gains = np.ones(3, np.float32)
     if share > 0.0:
-        gains = grey_world_gains(image) ** np.float32(share)
+        gains = illuminant_gains(image, norm) ** np.float32(share)
     error = np.array([2.0 ** (0.5 * warmth_ev), 1.0, 2.0 ** (-0.5 * warmth_ev)], np.float32)
     return np.asarray(gains * error, np.float32)
 

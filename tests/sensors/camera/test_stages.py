@@ -288,6 +288,23 @@ def test_white_balance_takes_out_the_light_of_a_lamp() -> None:
     assert np.ptp(plain.reshape(-1, 3).mean(axis=0)) > 60.0
 
 
+@pytest.mark.parametrize(("norm", "tolerance"), [(1, 0.4), (6, 0.06), (50, 0.03)])
+def test_white_surface_corrects_a_colored_scene_by_larger_norms(
+    norm: float, tolerance: float
+) -> None:
+    """A red wall with a white patch under a warm lamp: grey world takes the wall for light."""
+    lamp = np.array([0.8, 0.6, 0.4], np.float32)
+    image = np.broadcast_to(np.array([0.5, 0.2, 0.1], np.float32) * lamp, (48, 64, 3)).copy()
+    image[:, :16] = lamp
+    gains = isp.illuminant_gains(image, norm)
+
+    # By hand: a quarter of the image is the lamp's colour; the norm of both parts.
+    wall = np.array([0.5, 0.2, 0.1], np.float64)
+    parts = lamp * (0.25 + 0.75 * wall**norm) ** (1.0 / norm)
+    assert gains == pytest.approx(parts[1] / parts, rel=5e-3)
+    assert np.abs(gains * lamp / lamp[1] - 1.0).max() < tolerance
+
+
 def test_compression_leaves_its_traces_and_little_else() -> None:
     """A noisy image through JPEG differs, by less the better the quality."""
     ramp = np.linspace(0.2, 0.8, 64, dtype=np.float32)[:, None, None]
