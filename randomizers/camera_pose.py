@@ -1,34 +1,58 @@
-"""Camera poses on an orbit around the scene's focus."""
+"""Camera poses on an orbit around the scene's focus or around a thing in it."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Annotated, Literal
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, model_validator
 
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Camera, Scene
-from gen_data.generator.core.se3 import look_at
+from gen_data.generator.core.se3 import Array, Vec3, look_at
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.base import RandomizerBase, check_known
+from gen_data.randomizers.framing import (
+    Framing,
+    Thing,
+    candidates,
+    frame,
+    measure,
+    names_to_aim_at,
+    smallest_and_largest_share,
+)
 from gen_data.randomizers.free_space import is_in_the_open
 
 TRIES = 48
+_LENS_CHANGE = 2.0
+"""Largest factor by which other randomizers are assumed to change a camera's focal length."""
 
 
 class CameraPose(RandomizerBase):
-    """Places cameras on an orbit around the scene's focus, aimed at it.
+    """Places cameras on an orbit around the scene's focus or a thing in it, aimed at it.
+
+    The distance is given by ``distance_m``, or follows from the share of the image that the thing
+    fills, for the lens that the camera has then: list ``camera_intrinsics`` before it.
 
     Attributes:
         camera: Name of a sensor; empty = every camera that is not on a rig, drawn independently.
+        aim: What to look at: a group, of which an object is drawn, a surface, or an element by
+            name; empty = the scene's focus.
+        fills: Share of the image's longer side that the longer side of the projected box of the
+            aimed thing spans, hidden parts and parts outside the image included; above 1 it is
+            truncated. Takes the place of ``distance_m`` and ``jitter_m``.
+        off_center: With ``fills``: displacement of the thing's centre from the middle of the image,
+            along both axes, drawn for each; 1 = a square of the thing's size touches the border.
         distance_m: Distance to the look-at point.
         azimuth_deg: Angle around the vertical: 0 is on the +X side, 90 on the +Y side.
         elevation_deg: Angle above the horizon.
-        jitter_m: Largest offset of the look-at point from the focus, along each axis.
+        jitter_m: Largest offset of the look-at point from the focus or the thing's centre, along
+            each axis.
         roll_deg: Rotation about the viewing direction.
         clearance_m: Smallest distance to any body.
     """
@@ -36,6 +60,9 @@ class CameraPose(RandomizerBase):
     type: Literal["camera_pose"] = "camera_pose"
     stage: Literal["scene", "view"] = "view"
     camera: str = ""
+    aim: dist.Name = dist.Constant("")
+    fills: Annotated[dist.Scalar, dist.Bounds(0, 4, open_low=True)] | None = None
+    off_center: Annotated[dist.Scalar, dist.Bounds(-1, 1)] = dist.Normal(0.0, 0.35, clip=(-1, 1))
     distance_m: dist.Positive = dist.Uniform(0.8, 1.3)
     azimuth_deg: dist.Scalar = dist.Uniform(0.0, 360.0)
     elevation_deg: Annotated[dist.Scalar, dist.Bounds(-90, 90)] = dist.Uniform(25.0, 65.0)
@@ -43,24 +70,55 @@ class CameraPose(RandomizerBase):
     roll_deg: dist.Scalar = dist.Normal(0.0, 3.0, clip=(-10.0, 10.0))
     clearance_m: float = Field(0.1, ge=0)
 
+    @model_validator(mode="after")
+    def _has_one_distance(self) -> CameraPose:
+        given = self.model_fields_set
+        if self.fills is None:
+            if "off_center" in given:
+                raise ValueError("off_center: needs fills; displace the look-at point by jitter_m")
+            return self
+        for name in ("distance_m", "jitter_m"):
+            if name in given:
+                instead = "off_center" if name == "jitter_m" else "fills alone"
+                raise ValueError(f"{name}: excludes fills; expected {instead}")
+        return self
+
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """Check names, and whether some distance in the scene's interior gives the share.
+
+        Raises:
+            ConfigError: a name is unknown, or no camera can see a thing as large or as small.
+        """
+        known = names_to_aim_at(scene)
+        for name in self.aim.outcomes():
+            if name:
+                fault = f"randomizers.{self.name}.aim: nothing in the scene is named"
+                check_known(name, known, fault)
+        for camera in self._moved(scene):
+            self._check_reach(camera, scene, assets)
+
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with its cameras moved, all outside of bodies and inside the room."""
-        known = [camera.name for camera in scene.cameras if not camera.rig]
+        moved = {camera.name for camera in self._moved(scene)}
+        place = self._move_camera if self.fills is None else self._frame_thing
+        cameras = tuple(
+            place(camera, scene, assets, rng) if camera.name in moved else camera
+            for camera in scene.cameras
+        )
+        return replace(scene, cameras=cameras)
+
+    def _moved(self, scene: Scene) -> tuple[Camera, ...]:
+        free = tuple(camera for camera in scene.cameras if not camera.rig)
+        known = [camera.name for camera in free]
         if self.camera and self.camera not in known:
             raise ConfigError(
                 f"randomizers.{self.name}.camera: no camera '{self.camera}' without a rig; "
                 f"expected one of {', '.join(known) or 'none'}{did_you_mean(self.camera, known)}"
             )
-        cameras = tuple(
-            self._move_camera(camera, scene, assets, rng)
-            if camera.name in known and self.camera in ("", camera.name)
-            else camera
-            for camera in scene.cameras
-        )
-        return replace(scene, cameras=cameras)
+        return tuple(camera for camera in free if self.camera in ("", camera.name))
 
     def _move_camera(self, camera: Camera, scene: Scene, assets: AssetIndex, rng: Rng) -> Camera:
-        x, y, z = scene.focus.center_m
+        x, y, z = self._draw_thing(scene, assets, rng).center_m
         for _ in range(TRIES):
             distance_m = self.distance_m.draw(rng)
             azimuth = math.radians(self.azimuth_deg.draw(rng))
@@ -79,3 +137,87 @@ class CameraPose(RandomizerBase):
                 return replace(camera, T_world_camera=look_at(eye, target, roll).rounded())
         remedy = "other distance_m, azimuth_deg or elevation_deg"
         raise self.reject("no free place for a camera", remedy)
+
+    def _frame_thing(self, camera: Camera, scene: Scene, assets: AssetIndex, rng: Rng) -> Camera:
+        """Draw the share once: places that are taken change thing and direction, never the share.
+
+        Otherwise large shares of small things, near others, would be rarer than declared.
+        """
+        assert self.fills is not None, "only framed cameras come here"
+        share = self.fills.draw(rng)
+        seen = False
+        for _ in range(TRIES):
+            thing = self._draw_thing(scene, assets, rng)
+            framing = self._draw_framing(share, camera, rng)
+            pose = frame(thing, framing, camera.intrinsics)
+            seen = seen or pose is not None
+            if pose is not None and is_in_the_open(
+                pose.translation_m, scene, assets, self.clearance_m
+            ):
+                return replace(camera, T_world_camera=pose.rounded())
+        if not seen:
+            remedy = "a smaller range of fills or off_center, or another lens"
+            raise self.reject("the lens cannot show a thing at the drawn share", remedy)
+        remedy = "another range of fills, azimuth_deg or elevation_deg, or a smaller clearance_m"
+        raise self.reject("no free place for a camera that frames a thing", remedy)
+
+    def _draw_thing(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Thing:
+        name = self.aim.draw(rng)
+        found = candidates(scene, name)
+        if not found:
+            if name not in names_to_aim_at(scene):
+                self.check(scene, assets)
+            raise self.reject(f"no object of the group '{name}' to aim at", "another count or aim")
+        return measure(found[int(rng.integers(len(found))) if len(found) > 1 else 0], assets)
+
+    def _draw_framing(self, share: float, camera: Camera, rng: Rng) -> Framing:
+        azimuth = math.radians(self.azimuth_deg.draw(rng))
+        elevation = math.radians(self.elevation_deg.draw(rng))
+        level = math.cos(elevation)
+        toward = (level * math.cos(azimuth), level * math.sin(azimuth), math.sin(elevation))
+        sides_px = camera.intrinsics.width_px, camera.intrinsics.height_px
+        u, v = (
+            0.5 * side + 0.5 * max(0.0, side - share * max(sides_px)) * self.off_center.draw(rng)
+            for side in sides_px
+        )
+        return Framing(share, toward, (u, v), math.radians(self.roll_deg.draw(rng)))
+
+    def _check_reach(self, camera: Camera, scene: Scene, assets: AssetIndex) -> None:
+        """Raise ConfigError if every share to draw is out of reach, for anything to aim at."""
+        if self.fills is None:
+            return
+        low, high = self.fills.support()
+        image_px = max(camera.intrinsics.width_px, camera.intrinsics.height_px)
+        farthest_m = math.dist(*scene.interior_m)
+        smallest, largest = smallest_and_largest_share(
+            self._sizes_m(scene, assets), camera.intrinsics.fx_px, image_px, self.clearance_m,
+            farthest_m,
+        )  # fmt: skip
+        fault = f"randomizers.{self.name}.fills: "
+        if high * _LENS_CHANGE < smallest:
+            raise ConfigError(
+                f"{fault}at most {high:g} of the image of camera '{camera.name}', but the smallest "
+                f"thing fills about {smallest:.2g} from the farthest place, {farthest_m:.3g} m "
+                "away; expected a larger share, a wider lens or a larger room"
+            )
+        if low > _LENS_CHANGE * largest:
+            raise ConfigError(
+                f"{fault}at least {low:g} of the image of camera '{camera.name}', but the largest "
+                f"thing fills about {largest:.2g} at the clearance_m of {self.clearance_m:g}; "
+                "expected a smaller share, a smaller clearance_m or a longer lens"
+            )
+
+    def _sizes_m(self, scene: Scene, assets: AssetIndex) -> Iterator[Vec3]:
+        """Sizes of all that may be aimed at, along its axes [m]."""
+        groups = {group.name: group.assets for group in scene.groups}
+        for name in self.aim.outcomes():
+            for asset in groups.get(name, ()):
+                yield _extent_m(np.array(assets.bounds_m(asset)))
+            for found in () if name in groups else candidates(scene, name):
+                yield _extent_m(measure(found, assets).points_m)
+
+
+def _extent_m(points_m: Array) -> Vec3:
+    """Extents of points along the axes [m]."""
+    x, y, z = (float(side) for side in np.ptp(points_m, axis=0))
+    return (x, y, z)

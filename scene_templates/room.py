@@ -7,6 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from gen_data.generator.assets.asset_ids import ParameterValue
 from gen_data.generator.config.base_model import NAME_PATTERN
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
@@ -23,20 +24,28 @@ class Room(Element):
     Attributes:
         size_m: Length, width and height of the inside.
         door, window: Whether the room has a door and a window.
+        walls: Whether it has walls and a ceiling; a floor alone is a terrace under the environment.
     """
 
     type: Literal["room"] = "room"
     size_m: tuple[float, float, float] = (5.0, 4.0, 2.8)
     door: bool = True
     window: bool = True
+    walls: bool = True
     name: str = Field("room", pattern=NAME_PATTERN)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the room as background, without an instance."""
         x, y, z = self.size_m
-        asset = parametric_id(
-            "room", size_m=self.size_m, door=int(self.door), window=int(self.window)
-        )
+        shape: dict[str, ParameterValue] = {
+            "size_m": self.size_m,
+            "door": int(self.door),
+            "window": int(self.window),
+        }
+        # Left out where it is the default, so that rooms keep their ids.
+        if not self.walls:
+            shape["walls"] = 0
+        asset = parametric_id("room", **shape)
         scene = add_background(scene, assets, self.name, asset, SE3())
         inside = (
             (-x / 2 + CLEARANCE_M, -y / 2 + CLEARANCE_M, CLEARANCE_M),

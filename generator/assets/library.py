@@ -116,6 +116,14 @@ class Library:
             return None
         return self._summarize(asset_id).body_bounds_m
 
+    def vertices_m(self, asset_id: str) -> Float32:
+        """Vertices of the asset's mesh in its own frame [m], float32 [n, 3].
+
+        Raises:
+            AssetError: if a link has no visual geometry.
+        """
+        return self.mesh(asset_id).vertices_m
+
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
         """Named points of the asset, in its own frame; empty if it has none."""
         if asset_id not in self._summaries:

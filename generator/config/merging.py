@@ -4,7 +4,7 @@
 2. A distribution and a selection by a shared value are one value each: they are replaced.
 3. A mapping with another ``type`` (``model`` if it has no type) replaces the old one as a whole.
 4. Keys that select assets (``asset``, ``ids``, ``tags``, ``any_of``) are alternatives: giving one
-   drops the inherited ones.
+   drops the inherited ones. So are the two ways to give a camera's distance.
 5. Lists of plug-ins merge item by item, see ``merge_named``.
 """
 
@@ -19,6 +19,13 @@ from gen_data.generator.config.yaml_tree import Node, is_distribution
 ASSET_KEYS = frozenset({"asset", "ids", "tags", "any_of"})
 """Alternatives: a mapping that gives one of these keys inherits none of them."""
 
+DROPPED: Mapping[str, frozenset[str]] = {
+    **dict.fromkeys(ASSET_KEYS, ASSET_KEYS),
+    "fills": frozenset({"distance_m", "jitter_m"}),
+    "distance_m": frozenset({"fills", "off_center"}),
+}
+"""Inherited keys that a mapping drops, by the key that it gives."""
+
 
 def merge_nodes(base: Node, override: Node) -> Node:
     """Merge ``override`` into ``base``."""
@@ -27,7 +34,7 @@ def merge_nodes(base: Node, override: Node) -> Node:
     is_one_value = any(is_distribution(node) or is_reference(node) for node in (base, override))
     if is_one_value or _differ_in_kind(base, override):
         return override
-    dropped = ASSET_KEYS if ASSET_KEYS & override.content.keys() else frozenset()
+    dropped = {old for key in override.content for old in DROPPED.get(key, ())}
     content = {key: node for key, node in base.content.items() if key not in dropped}
     for key, node in override.content.items():
         content[key] = merge_nodes(content[key], node) if key in content else node

@@ -69,3 +69,23 @@ def srgb_decode(encoded: float | NDArray[Real]) -> float | NDArray[Real]:
     power = ((np.maximum(encoded, 0.0) + 0.055) / 1.055) ** 2.4
     linear: NDArray[Real] = np.where(encoded <= _KNEE_ENCODED, encoded / 12.92, power)
     return linear
+
+
+def temperature_to_chromaticity(kelvin: float) -> tuple[float, float]:
+    """CIE 1931 x, y of a black body between 1667 K and 25000 K.
+
+    Source: Kim et al., "Design of advanced color temperature control system for HDTV
+    applications", J. Korean Physical Society 41(6), 2002: cubic fits to the Planckian locus.
+    """
+    t = 1e3 / kelvin
+    if kelvin <= 4000.0:
+        x = -0.2661239 * t**3 - 0.2343589 * t**2 + 0.8776956 * t + 0.179910
+    else:
+        x = -3.0258469 * t**3 + 2.1070379 * t**2 + 0.2226347 * t + 0.240390
+    if kelvin <= 2222.0:
+        y = -1.1063814 * x**3 - 1.34811020 * x**2 + 2.18555832 * x - 0.20219683
+    elif kelvin <= 4000.0:
+        y = -0.9549476 * x**3 - 1.37418593 * x**2 + 2.09137015 * x - 0.16748867
+    else:
+        y = 3.0817580 * x**3 - 5.87338670 * x**2 + 3.75112997 * x - 0.37001483
+    return x, y

@@ -72,7 +72,7 @@ class Stage(str, Enum):
 
 
 class AssetIndex(Protocol):
-    """Index of the assets, without geometry."""
+    """Index of the assets: their properties and extents, no surfaces or images."""
 
     def get(self, asset_id: str) -> Asset:
         """The asset of that id. Raises AssetError with the nearest ids if unknown."""
@@ -92,6 +92,13 @@ class AssetIndex(Protocol):
 
     def body_bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3] | None:
         """The same without a vehicle's exterior mirrors; None if it has none."""
+        ...
+
+    def vertices_m(self, asset_id: str) -> Float32:
+        """Vertices of the asset's mesh in its own frame [m], float32 [n, 3]; not to be written to.
+
+        Raises AssetError if a link has no visual geometry.
+        """
         ...
 
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:

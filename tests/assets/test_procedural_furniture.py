@@ -147,6 +147,20 @@ def test_a_room_faces_inward_and_its_walls_are_solid_outside() -> None:
         assert _inside_any(solid, outside)
 
 
+def test_a_room_without_walls_is_a_floor_that_carries() -> None:
+    """One face upward in the floor's slot, solid below and free above; materials stay."""
+    solid = FAMILIES["room"].build(size_m=(30.0, 20.0, 3.0), walls=0)
+    low, high = solid.mesh.bounds_m()
+
+    assert (low, high) == ((-15.0, -10.0, 0.0), (15.0, 10.0, 0.0))
+    assert (solid.mesh.normals == (0.0, 0.0, 1.0)).all()
+    assert set(solid.mesh.face_slots) == {0}
+    assert solid.mesh.materials == FAMILIES["room"].build().mesh.materials
+    assert _inside_any(solid, (14.0, -9.0, -0.1))
+    assert not _inside_any(solid, (15.1, 0.0, 1.0))
+    assert not _inside_any(solid, (0.0, 0.0, 3.1))
+
+
 def test_a_small_room_has_neither_door_nor_window() -> None:
     """What does not fit is left out; the walls are then whole."""
     whole = FAMILIES["room"].build(size_m=(5.0, 4.0, 2.8), door=0, window=0).mesh

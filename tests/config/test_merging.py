@@ -49,6 +49,18 @@ def test_merging_replaces_a_distribution_by_another_as_a_whole() -> None:
     }
 
 
+def test_share_of_the_image_and_distance_take_each_others_place() -> None:
+    """A camera has one of both; everything else is inherited."""
+    near = parse_yaml("{distance_m: 1, jitter_m: 0, roll_deg: 3}", "base.yaml")
+    close = parse_yaml("{fills: 0.5, off_center: 0, roll_deg: 3}", "close.yaml")
+
+    framed = merge_nodes(near, parse_yaml("{fills: 0.4}", "over.yaml"))
+    placed = merge_nodes(close, parse_yaml("{distance_m: 2}", "over.yaml"))
+
+    assert framed.plain() == {"roll_deg": 3, "fills": 0.4}
+    assert placed.plain() == {"roll_deg": 3, "distance_m": 2}
+
+
 def test_merging_leaves_its_arguments_alone() -> None:
     """Trees are values."""
     base, override = parse_yaml("a: {x: 1}", "b.yaml"), parse_yaml("a: {y: 2}", "o.yaml")

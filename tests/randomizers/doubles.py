@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, product
 
 import numpy as np
 
 from gen_data.generator.assets.asset_ids import parse_asset_id
 from gen_data.generator.core.asset_types import (
     Asset,
+    Float32,
     Gripper,
     Joint,
     Keypoint,
@@ -142,6 +143,12 @@ class FakeAssets:
         assert isinstance(given, tuple)
         x, y, *height = (float(v) for v in given)
         return (-x / 2, -y / 2, 0.0), (x / 2, y / 2, height[0] if height else 0.0)
+
+    def vertices_m(self, asset_id: str) -> Float32:
+        """Corners of the bounds, and the middles of their faces."""
+        low, high = np.array(self.bounds_m(asset_id), np.float32)
+        steps = np.array(list(product((0.0, 0.5, 1.0), repeat=3)), np.float32)
+        return low + (high - low) * steps
 
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
         """A street lamp has its lamp at the top, a wagon its headlights in front."""

@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from gen_data.randomizers.color_space import (
-    hsv_to_linear,
-    temperature_to_chromaticity,
-    temperature_to_linear,
-)
+from gen_data.generator.core.colorimetry import temperature_to_chromaticity
+from gen_data.randomizers.color_space import hsv_to_linear, temperature_to_linear
 
 PLANCKIAN_XY = {
     2000: (0.5267, 0.4133),

@@ -130,6 +130,9 @@ class FakeLibrary:
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
         return self.meshes[asset_id].bounds_m()
 
+    def vertices_m(self, asset_id: str) -> Float32:
+        return self.meshes[asset_id].vertices_m
+
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
         return ()
 

@@ -205,6 +205,15 @@ def test_focus_is_the_air_over_what_carries_objects() -> None:
     assert 0.74 < scene.focus.center_m[2] < 1.0
 
 
+def test_room_without_walls_has_an_id_of_its_own_and_the_same_bounds() -> None:
+    """Rooms with walls keep the id that they had before there were others."""
+    room, terrace = built(ROOM), built({**ROOM, "walls": False})
+
+    assert room.body("room").asset == "room?door=1&size_m=5,4,2.8&window=1"
+    assert terrace.body("room").asset == "room?door=1&size_m=5,4,2.8&walls=0&window=1"
+    assert terrace.interior_m == room.interior_m
+
+
 def test_room_bounds_cameras_and_lights() -> None:
     """A hand's breadth inside its walls."""
     low, high = built(ROOM).interior_m

@@ -12,8 +12,8 @@ from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
 
 
-def room(size_m: Vec3 = (5.0, 4.0, 2.8), door: int = 1, window: int = 1) -> Solid:
-    """The inside of a room, seen from within.
+def room(size_m: Vec3 = (5.0, 4.0, 2.8), door: int = 1, window: int = 1, walls: int = 1) -> Solid:
+    """The inside of a room, seen from within, or its floor alone: a terrace.
 
     Slots: floor, ceiling, walls, skirting, door, frames, window, handle. The door is in the wall
     at -X, the window in the wall at +Y; both are left out where the wall is too small for them.
@@ -22,6 +22,7 @@ def room(size_m: Vec3 = (5.0, 4.0, 2.8), door: int = 1, window: int = 1) -> Soli
         size_m: Inner length, width, height; the floor is at z = 0.
         door: 1 with a door, 0 without.
         window: 1 with a window, 0 without.
+        walls: 1 with walls and a ceiling, 0 with the floor alone.
 
     Raises:
         AssetError: if a size is not usable.
@@ -30,8 +31,12 @@ def room(size_m: Vec3 = (5.0, 4.0, 2.8), door: int = 1, window: int = 1) -> Soli
     has_door = door > 0 and y > 1.6 and z > 2.2
     has_window = window > 0 and x > 2.0 and z > 2.0
     a, b, t = x / 2, y / 2, 0.2
+    floor = rectangle((-a, -b, 0.0), (x, 0.0, 0.0), (0.0, y, 0.0))
+    if not walls:
+        slab = hulls.box((-a, -b, -t), (a, b, 0.0))
+        return make_solid_in_place([floor], _room_materials(), [slab])
     patches = [
-        rectangle((-a, -b, 0.0), (x, 0.0, 0.0), (0.0, y, 0.0)),
+        floor,
         rectangle((-a, b, z), (x, 0.0, 0.0), (0.0, -y, 0.0)).painted(1),
         rectangle((a, -b, 0.0), (0.0, y, 0.0), (0.0, 0.0, z)).flipped().painted(2),
         rectangle((-a, -b, 0.0), (0.0, y, 0.0), (0.0, 0.0, z)).painted(2),

@@ -86,7 +86,11 @@ class ImagePipeline(Strict):
             every exposure is possible.
         image_sensor: The sensor; null = an ideal one.
         color_matrix: Matrix from white-balanced raw colours to linear sRGB; rows sum to 1.
-        white_balance: Share of the illuminant's colour to correct, by the grey-world assumption.
+        white_balance: Share of the illuminant's colour that automatic white balance corrects.
+        white_balance_norm: Minkowski norm of each channel that estimates the illuminant: 1 = grey
+            world, 6 = shades of grey, which errs least, large = white patch.
+        white_balance_tint_ev: Largest difference of the estimate from the colours of lamps and
+            daylight, between green and magenta, in stops; null = any estimate.
         warmth_ev: Error of the white balance: red over blue, in stops.
         demosaic: Method of demosaicing.
         saturation: Factor on saturation.
@@ -114,6 +118,8 @@ class ImagePipeline(Strict):
     image_sensor: ImageSensor | None = None
     color_matrix: tuple[Row, Row, Row] | None = None
     white_balance: UnitInterval = NONE
+    white_balance_norm: float = Field(1.0, ge=1, le=50)
+    white_balance_tint_ev: float | None = Field(None, ge=0, le=8)
     warmth_ev: Annotated[Scalar, Bounds(-3, 3)] = NONE
     demosaic: isp.Demosaic = "edge_aware"
     saturation: NonNegative = Constant(1.0)
@@ -306,7 +312,7 @@ def _image_sensor(light: Light, shot: Shot) -> Light:
     raw = expose(received, shot.exposure.gain, shot.exposure.time_s, sensor, shot.noise_rng)
     share, warmth_ev = pipeline.white_balance.draw(shot.rng), pipeline.warmth_ev.draw(shot.rng)
     if sensor.pattern != "mono":
-        gains = isp.white_balance_gains(image, share, warmth_ev)
+        gains = isp.white_balance_gains(_illuminant(image, pipeline), share, warmth_ev)
         raw = raw * gains[filter_at(sensor.pattern, *raw.shape)]
     white = 2.0 * pipeline.headroom
     image = isp.demosaic(raw, sensor.pattern, pipeline.demosaic, white)
@@ -321,8 +327,21 @@ def _white_balance(light: Light, shot: Shot) -> Light:
         return light
     camera_from_srgb, srgb_from_camera = _color_matrices(pipeline)
     image = isp.transform_colors(light.values, camera_from_srgb / light.white)
-    gains = isp.white_balance_gains(image, share, warmth_ev)
+    gains = isp.white_balance_gains(_illuminant(image, pipeline), share, warmth_ev)
     return Light(isp.transform_colors(image, srgb_from_camera * gains), 1.0)
+
+
+def _illuminant(image: Float32, pipeline: ImagePipeline) -> Array:
+    """Estimated colour of the light in a linear image, [3], both in the camera's colours."""
+    estimate = isp.estimate_illuminant(image, pipeline.white_balance_norm)
+    if pipeline.white_balance_tint_ev is None:
+        return estimate
+    camera_from_srgb, srgb_from_camera = _color_matrices(pipeline)
+    # By rows, because a matrix product may round differently on other processors.
+    lamp = isp.move_to_lamps(
+        (srgb_from_camera * estimate).sum(axis=1), pipeline.white_balance_tint_ev
+    )
+    return np.asarray(np.maximum((camera_from_srgb * lamp).sum(axis=1), 1e-3))
 
 
 Stage = Callable[[Light, Shot], Light]

@@ -23,7 +23,7 @@ their scenes, with powers of 1.1 to 1.6 (Poynton, "Digital Video and HD", 2012, 
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any, Literal, TypeVar
 
 import cv2
@@ -31,7 +31,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.core.colorimetry import MIDDLE_GREY, REC709_LUMINANCE, srgb_encode
+from gen_data.generator.core.colorimetry import (
+    MIDDLE_GREY,
+    REC709_FROM_XYZ,
+    REC709_LUMINANCE,
+    srgb_encode,
+    temperature_to_chromaticity,
+)
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.sensors.camera.image_sensor import Pattern
 
@@ -55,29 +61,66 @@ def demosaic(raw: Float32, pattern: Pattern, method: Demosaic, white: float) -> 
     return np.asarray(cv2.cvtColor(steps, code) * np.float32(white / _DEPTH), np.float32)
 
 
-def grey_world_gains(image: Float32) -> Float32:
-    """Factors on red, green and blue that make the mean of an image grey, float32 [3].
+def estimate_illuminant(image: Float32, norm: float) -> Array:
+    """Colour of the light in an image, linear [3], of any luminance.
 
-    Clipped pixels, at 1, are left out; 1 if hardly any other is left. Source: Buchsbaum, "A spatial
-    processor model for object colour perception", 1980.
+    It is the Minkowski norm of each channel: 1 is the mean (grey world; Buchsbaum, "A spatial
+    processor model for object colour perception", 1980), infinity the largest value (white patch);
+    6 estimated best (Finlayson and Trezzi, "Shades of gray and colour constancy", 2004). Clipped
+    pixels, at 1, are left out; the light is white if hardly any other is left.
     """
     seen = image.reshape(-1, 3)[::7]
     seen = seen[(seen.max(axis=1) < 0.95) & (seen.min(axis=1) > 0.0)]
     if len(seen) < 16:
-        return np.ones(3, np.float32)
-    means = seen.mean(axis=0, dtype=np.float64)
-    return np.asarray(np.clip(means[1] / means, 0.3, 3.0), np.float32)
+        return np.ones(3)
+    if norm == 1.0:
+        return np.asarray(seen.mean(axis=0, dtype=np.float64))
+    return np.asarray((seen.astype(np.float64) ** norm).mean(axis=0) ** (1.0 / norm))
 
 
-def white_balance_gains(image: Float32, share: float, warmth_ev: float) -> Float32:
-    """Factors on red, green and blue relative to green, float32 [3]; 1 saturates the image.
+COLDEST_K, HOTTEST_K = 2000.0, 10_000.0
+"""Range of colour temperatures that cameras balance: candlelight to shade under a blue sky."""
 
-    ``share`` of the illuminant's colour is corrected by the grey-world assumption; the error
-    ``warmth_ev`` is red over blue, in stops.
+
+def move_to_lamps(illuminant: Array, tint_ev: float) -> Array:
+    """The light, linear sRGB [3], moved to where it differs from a black body by a tint at most.
+
+    The difference is the distance in stops of red over green and of blue over green. Cameras seek
+    lights along the black bodies, which are the colours of daylight and lamps (Hordley, "Scene
+    illuminant estimation: past, present, and future", 2006).
+    """
+    light = np.maximum(illuminant, 1e-3)
+    here = np.log2(light[[0, 2]] / light[1])
+    bodies = _black_bodies_ev()
+    away = here - bodies
+    nearest = int((away * away).sum(axis=1).argmin())
+    distance_ev = math.sqrt(float((away[nearest] * away[nearest]).sum()))
+    kept = min(1.0, tint_ev / max(distance_ev, 1e-9))
+    red, blue = 2.0 ** (bodies[nearest] + kept * away[nearest])
+    return np.array([red, 1.0, blue])
+
+
+@cache
+def _black_bodies_ev() -> Array:
+    """Logarithms of red over green and of blue over green of black bodies, base 2, [n, 2]."""
+    points = []
+    for mired in np.linspace(1e6 / HOTTEST_K, 1e6 / COLDEST_K, 256):
+        x, y = temperature_to_chromaticity(1e6 / float(mired))
+        red, green, blue = (REC709_FROM_XYZ * (x / y, 1.0, (1.0 - x - y) / y)).sum(axis=1)
+        points.append((math.log2(red / green), math.log2(max(blue, 1e-3) / green)))
+    return np.array(points)
+
+
+def white_balance_gains(illuminant: Array, share: float, warmth_ev: float) -> Float32:
+    """Factors on red, green and blue relative to green, float32 [3].
+
+    ``share`` of the illuminant's colour, linear [3], is corrected; the error ``warmth_ev`` is red
+    over blue, in stops.
     """
     gains = np.ones(3, np.float32)
     if share > 0.0:
-        gains = grey_world_gains(image) ** np.float32(share)
+        gains = np.asarray(np.clip(illuminant[1] / illuminant, 0.3, 3.0), np.float32)
+        gains = gains ** np.float32(share)
     error = np.array([2.0 ** (0.5 * warmth_ev), 1.0, 2.0 ** (-0.5 * warmth_ev)], np.float32)
     return np.asarray(gains * error, np.float32)
 

@@ -74,7 +74,8 @@ def test_every_stage_of_a_camera_with_all_errors_changes_its_picture() -> None:
         "flare": 0.5, "glare": 0.3, "blur_px": 2, "chromatic_aberration_px": 3,
         "vignetting": 0.5, "natural_vignetting": True, "exposure_compensation_ev": 1,
         "image_sensor": {"full_well_e": 500}, "color_matrix": [[2, -1, 0], [0, 1, 0], [0, 0, 1]],
-        "saturation": 0.3, "white_balance": 1, "contrast": 0.7, "tone": "knee", "sharpening": 1,
+        "saturation": 0.3, "white_balance": 1, "white_balance_norm": 6,
+        "white_balance_tint_ev": 0, "contrast": 0.7, "tone": "knee", "sharpening": 1,
         "jpeg_quality": 40,
     }  # fmt: skip
 

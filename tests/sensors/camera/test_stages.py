@@ -332,6 +332,55 @@ def test_white_balance_takes_out_the_light_of_a_lamp() -> None:
     assert np.ptp(plain.reshape(-1, 3).mean(axis=0)) > 60.0
 
 
+@pytest.mark.parametrize(("norm", "tolerance"), [(1, 0.4), (6, 0.06), (50, 0.03)])
+def test_white_surface_corrects_a_colored_scene_by_larger_norms(
+    norm: float, tolerance: float
+) -> None:
+    """A red wall with a white patch under a warm lamp: grey world takes the wall for light."""
+    lamp = np.array([0.8, 0.6, 0.4], np.float32)
+    image = np.broadcast_to(np.array([0.5, 0.2, 0.1], np.float32) * lamp, (48, 64, 3)).copy()
+    image[:, :16] = lamp
+    gains = isp.white_balance_gains(isp.estimate_illuminant(image, norm), 1.0, 0.0)
+
+    # By hand: a quarter of the image is the lamp's colour; the norm of both parts.
+    wall = np.array([0.5, 0.2, 0.1], np.float64)
+    parts = lamp * (0.25 + 0.75 * wall**norm) ** (1.0 / norm)
+    assert gains == pytest.approx(parts[1] / parts, rel=5e-3)
+    assert np.abs(gains * lamp / lamp[1] - 1.0).max() < tolerance
+
+
+def test_light_of_a_lamp_is_kept_and_that_of_a_colored_wall_is_not() -> None:
+    """A black body of 2856 K (CIE's illuminant A) stays; a green one moves to a tint of 0.2."""
+    # Linear sRGB of x = 0.44757, y = 0.40745 by the matrix that IEC 61966-2-1 prints.
+    x, y = 0.44757, 0.40745
+    matrix = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415],
+                       [0.0557, -0.2040, 1.0570]])  # fmt: skip
+    warm = matrix @ np.array([x / y, 1.0, (1.0 - x - y) / y])
+
+    assert isp.move_to_lamps(warm, 0.0) == pytest.approx(warm / warm[1], rel=0.03)
+    assert isp.move_to_lamps(warm * 7.0, 8.0) == pytest.approx(warm / warm[1])
+    for color in ((0.3, 1.0, 0.3), (1.0, 0.3, 1.0)):
+        neutral, tinted = (isp.move_to_lamps(np.array(color), ev) for ev in (0.0, 0.2))
+        moved_ev = np.log2(tinted[[0, 2]] / neutral[[0, 2]])
+        assert np.hypot(*moved_ev) == pytest.approx(0.2)
+        assert np.sign(moved_ev.sum()) == (-1.0 if color[1] == 1.0 else 1.0)
+
+
+def test_white_balance_of_a_colored_camera_seeks_lamps_in_srgb() -> None:
+    """A magenta picture keeps its colour with a tint of 0, and loses it without a limit."""
+    random = Streams(seed=1, scene=0).rng("patches").random((48, 64, 1))
+    scene = random * np.array([0.7, 0.25, 0.7]) * WHITE_CD_M2
+    matrix = [[1.6, -0.5, -0.1], [-0.2, 1.4, -0.2], [0, -0.5, 1.5]]
+    given = {"white_balance": 1, "white_balance_norm": 6, "tone": "srgb", "color_matrix": matrix}
+    free, bound = (
+        photograph(scene, made(**given, **limit)).reshape(-1, 3).mean(axis=0)
+        for limit in ({}, {"white_balance_tint_ev": 0.0})
+    )
+
+    assert abs(free[0] - free[1]) < 8.0
+    assert bound[0] - bound[1] > 40.0
+
+
 def test_compression_leaves_its_traces_and_little_else() -> None:
     """A noisy image through JPEG differs, by less the better the quality."""
     ramp = np.linspace(0.2, 0.8, 64, dtype=np.float32)[:, None, None]
