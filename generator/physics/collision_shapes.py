@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import blake2b
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.core.asset_types import ConvexParts
+from gen_data.generator.core.code_digests import code_digest
 from gen_data.generator.core.se3 import SE3, Array, Vec3
 
 if TYPE_CHECKING:
@@ -111,6 +112,37 @@ class CollisionShape:
         """Low and high corner in the world [m] with the centre of mass at a pose."""
         points = T_world_center.apply(self.vertices_m * scale)
         return points.min(axis=0), points.max(axis=0)
+
+
+def pack_shape(shape: CollisionShape) -> dict[str, NDArray[Any]]:
+    """Arrays that hold a shape, for storage."""
+    return {
+        "starts": np.cumsum([0, *(len(hull.vertices_m) for hull in shape.hulls)]),
+        "vertices_m": shape.vertices_m,
+        "retreats": np.concatenate([hull.retreats for hull in shape.hulls]),
+        "widths_m": np.array([hull.width_m for hull in shape.hulls]),
+        "center_of_mass_m": np.array(shape.center_of_mass_m),
+        "boxes": np.array(shape.boxes, dtype=np.float64).reshape(-1, 2, 3),
+    }
+
+
+def unpack_shape(arrays: Mapping[str, NDArray[Any]]) -> CollisionShape:
+    """The shape of ``pack_shape``'s arrays, which it refers to."""
+    starts = arrays["starts"].tolist()
+    hulls = tuple(
+        Hull(arrays["vertices_m"][a:b], arrays["retreats"][a:b], width_m)
+        for a, b, width_m in zip(starts[:-1], starts[1:], arrays["widths_m"].tolist(), strict=True)
+    )
+    x, y, z = arrays["center_of_mass_m"].tolist()
+    boxes = tuple((tuple(center), tuple(half)) for center, half in arrays["boxes"].tolist())
+    return CollisionShape(hulls, (x, y, z), boxes)
+
+
+def shape_version() -> str:
+    """Everything but the parts that a shape depends on: code and libraries."""
+    import scipy
+
+    return code_digest((__file__,), np.__version__, scipy.__version__)
 
 
 def scale_step(scale: float) -> int:

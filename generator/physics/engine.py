@@ -5,18 +5,27 @@ from __future__ import annotations
 from dataclasses import replace
 from types import TracebackType
 
+from gen_data.generator.core.bounded_cache import CountCache
 from gen_data.generator.core.errors import Rejection
-from gen_data.generator.core.interfaces import AssetLibrary, Settled
+from gen_data.generator.core.interfaces import AssetLibrary, DerivedArrays, Settled
 from gen_data.generator.core.kinematics import make_link_bodies
 from gen_data.generator.core.scene import Articulation, Body, Scene
 from gen_data.generator.physics.bullet import World
-from gen_data.generator.physics.collision_shapes import CollisionShape, collision_shape
+from gen_data.generator.physics.collision_shapes import (
+    CollisionShape,
+    collision_shape,
+    pack_shape,
+    shape_version,
+    unpack_shape,
+)
 from gen_data.generator.physics.manipulation.arm_goals import Arm, ArmState
 from gen_data.generator.physics.manipulation.joint_trajectories import TrajectoryRecording
 from gen_data.generator.physics.manipulation.manipulation_planner import TaskPlanner
 from gen_data.generator.physics.physics_config import PhysicsConfig
 from gen_data.generator.physics.settling import Settling, candidate_surfaces
 
+_SHAPES = 512
+"""Capacity of the cache of collision shapes, about 20 kB each."""
 _DENSITY_KG_M3 = 300.0
 """Mass over bounding box for bodies without a mass: household objects are mostly hollow."""
 
@@ -33,7 +42,7 @@ class BulletEngine:
         self._assets = assets
         self._config = config
         self._world = World(config.time_step_s, config.solver_iterations)
-        self._shapes: dict[str, CollisionShape] = {}
+        self._shapes: CountCache[CollisionShape] = CountCache(_SHAPES)
 
     def __enter__(self) -> BulletEngine:
         """Return the engine, ready to settle."""
@@ -96,9 +105,16 @@ class BulletEngine:
         )
 
     def _shape(self, asset_id: str) -> CollisionShape:
-        if asset_id not in self._shapes:
-            self._shapes[asset_id] = collision_shape(self._assets.convex_parts(asset_id))
-        return self._shapes[asset_id]
+        return self._shapes.get(asset_id, lambda: self._load_shape(asset_id))
+
+    def _load_shape(self, asset_id: str) -> CollisionShape:
+        def compute() -> CollisionShape:
+            return collision_shape(self._assets.convex_parts(asset_id))
+
+        if not isinstance(self._assets, DerivedArrays):
+            return compute()
+        name = f"collision shape {shape_version()}"
+        return unpack_shape(self._assets.derived(asset_id, name, lambda: pack_shape(compute())))
 
     def _solve_goals(
         self, scene: Scene, fixed: list[str], placed: list[str]

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
 from gen_data.generator.core.asset_types import ConvexParts
-from gen_data.generator.physics.collision_shapes import SHELL_M, collision_shape, scale_step
+from gen_data.generator.physics.collision_shapes import (
+    SHELL_M,
+    collision_shape,
+    pack_shape,
+    scale_step,
+    unpack_shape,
+)
 from tests.physics.doubles import ball, box, cylinder
 
 
@@ -77,3 +85,21 @@ def test_any_scale_is_near_a_step() -> None:
     for scale in np.geomspace(0.01, 100.0, 997):
         assert 1.05 ** scale_step(float(scale)) == pytest.approx(scale, rel=0.0251)
     assert scale_step(1.0) == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_stored_shape_is_the_same(seed: int) -> None:
+    """Arrays of several parts, flat ones and boxes among them, to the last bit."""
+    rng = np.random.default_rng(seed)
+    corners = np.array(list(itertools.product([-1.0, 1.0], repeat=3)))
+    parts = [corners * rng.uniform(0.01, 0.2, 3) + rng.uniform(-0.3, 0.3, 3) for _ in range(2)]
+    if seed % 2:
+        parts += [rng.normal(0.0, 0.1, (30, 3)), np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])]
+    shape = collision_shape(ConvexParts(tuple(parts)))
+    stored = unpack_shape(pack_shape(shape))
+
+    assert bool(shape.boxes) == (seed % 2 == 0)
+    assert stored.boxes == shape.boxes
+    assert stored.center_of_mass_m == shape.center_of_mass_m
+    assert stored.key == shape.key
+    assert [stored.obj(step) for step in (-3, 0, 5)] == [shape.obj(step) for step in (-3, 0, 5)]

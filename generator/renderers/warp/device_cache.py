@@ -19,7 +19,7 @@ from gen_data.generator.renderers.warp.scene.device_assets import (
     Arrays,
     DeviceMesh,
     DeviceTexture,
-    code_digest,
+    arrays_version,
     prepare_mesh,
     prepare_texture,
     upload_mesh,
@@ -104,7 +104,7 @@ class DeviceCache:
         """Arrays computed from an asset by the present code; stored if the library can do so."""
         if not isinstance(self.assets, DerivedArrays):
             return compute()
-        return self.assets.derived(asset_id, f"{name} {code_digest()}", compute)
+        return self.assets.derived(asset_id, f"{name} {arrays_version()}", compute)
 
     def environment(self, environment_id: str) -> DeviceEnvironment:
         """Light of an environment, as an image."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from hashlib import sha256
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -16,6 +14,7 @@ from numpy.typing import NDArray
 
 from gen_data.generator.core import colorimetry
 from gen_data.generator.core.asset_types import Material, MeshData, TextureData, UInt8
+from gen_data.generator.core.code_digests import code_digest
 from gen_data.generator.core.colorimetry import srgb_decode
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.scene import bvh
@@ -35,13 +34,10 @@ _LARGE_FACES_MAX = 256
 _CONVEXITY_FACES_MAX = 2000
 
 
-@cache
-def code_digest() -> str:
-    """Digest of everything but the asset that prepared arrays depend on: code and libraries."""
-    digest = sha256(f"{cv2.__version__} {np.__version__} {wp.__version__}".encode())
-    for module in (__file__, bvh.__file__, bvh_build.__file__, colorimetry.__file__):
-        digest.update(Path(module).read_bytes())
-    return digest.hexdigest()[:16]
+def arrays_version() -> str:
+    """Everything but the asset that prepared arrays depend on: code and libraries."""
+    modules = (__file__, bvh.__file__, bvh_build.__file__, colorimetry.__file__)
+    return code_digest(modules, cv2.__version__, np.__version__, wp.__version__)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
