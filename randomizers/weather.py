@@ -13,6 +13,7 @@ from pydantic import Field, field_validator
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.skies.sky import SkyModel
 from gen_data.generator.config import distributions as dist
+from gen_data.generator.config.yaml_scalars import quote_value
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
@@ -134,8 +135,8 @@ class Weather(RandomizerBase):
         for name in preset.outcomes():
             if name not in PRESETS:
                 raise ValueError(
-                    f"there is no weather '{name}'; expected a condition and a time such as "
-                    f"ClearNoon{did_you_mean(name, PRESETS)}"
+                    f"there is no weather {quote_value(name)}; expected a condition and a time "
+                    f"such as ClearNoon{did_you_mean(name, PRESETS)}"
                 )
         return preset
 

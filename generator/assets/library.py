@@ -27,7 +27,7 @@ from gen_data.generator.core.errors import AssetError, UnknownAsset, did_you_mea
 from gen_data.generator.core.scene import Lane, StageModel
 from gen_data.generator.core.se3 import Vec3
 
-_ENTRIES = 16_384
+_ENTRIES = 8192
 _SUMMARIES = 4096
 """Kept in memory: about 1 and 5 kB each."""
 

@@ -21,10 +21,15 @@ V = TypeVar("V")
 
 
 class ByteCache(Generic[S]):
-    """Values by name; the least recently used go first when the bound is exceeded."""
+    """Values by name; the least recently used go first when a bound is exceeded.
 
-    def __init__(self, limit_bytes: int) -> None:
+    ``limit`` bounds the number of values whose names never repeat: many small ones take more memory
+    than their bytes say.
+    """
+
+    def __init__(self, limit_bytes: int, limit: int | None = None) -> None:
         self._limit_bytes = limit_bytes
+        self._limit = limit
         self._held_bytes = 0
         self._values: OrderedDict[str, S] = OrderedDict()
 
@@ -36,10 +41,14 @@ class ByteCache(Generic[S]):
         value = make()
         self._values[name] = value
         self._held_bytes += value.nbytes
-        while self._held_bytes > self._limit_bytes and len(self._values) > 1:
+        while self._is_too_full() and len(self._values) > 1:
             _, dropped = self._values.popitem(last=False)
             self._held_bytes -= dropped.nbytes
         return value
+
+    def _is_too_full(self) -> bool:
+        too_many = self._limit is not None and len(self._values) > self._limit
+        return too_many or self._held_bytes > self._limit_bytes
 
     def __len__(self) -> int:
         """How many values are held."""

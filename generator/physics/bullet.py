@@ -10,6 +10,7 @@ import math
 import weakref
 from collections.abc import Iterable
 from dataclasses import dataclass
+from pathlib import Path
 
 from gen_data.generator.core.processes import silence_stdio
 from gen_data.generator.core.se3 import SE3, Array, Vec3
@@ -21,6 +22,8 @@ with silence_stdio():  # it prints its build time
 
 GRAVITY_M_S2 = 9.81
 
+_HULL_FILES = 4096
+"""Most files of shapes in the scratch folder, 10 kB each."""
 _ANGULAR_DAMPING = 0.5
 _ROLLING_FRICTION_SHARE = 0.1
 """Rolling friction over an object's smallest half extent: balls and cans stop within a few turns,
@@ -49,9 +52,11 @@ class World:
             "deterministicOverlappingPairs": 1,
             "contactBreakingThreshold": 0.02,
             "useSplitImpulse": 1,
+            # pybullet never drops cached files: 16 kB for each shape at each scale.
+            "enableFileCaching": 0,
         }
         folder = TemporaryFolder("physics")
-        self._folder = folder.path
+        self._folder, self._hull_files = folder.path, 0
         # Also when a program ends, or drops the world, without closing it.
         self._remove_folder = weakref.finalize(self, folder.remove)
         self._client: int = pybullet.connect(pybullet.DIRECT)
@@ -192,18 +197,25 @@ class World:
                 **self._here,
             )
             return int(number)
-        # pybullet takes compounds of hulls only from files, and caches files by name for the life
-        # of the process: hence names by content.
-        step = scale_step(scale)
-        path = self._folder / f"{shape.key}_{step}.obj"
-        if not path.exists():
-            path.write_text(shape.obj(step))
-        size = [scale, scale, scale]
-        mesh = pybullet.GEOM_MESH
         number = pybullet.createCollisionShape(
-            mesh, fileName=str(path), meshScale=size, **self._here
+            pybullet.GEOM_MESH,
+            fileName=str(self._hull_file(shape, scale_step(scale))),
+            meshScale=[scale, scale, scale],
+            **self._here,
         )
         return int(number)
+
+    def _hull_file(self, shape: CollisionShape, step: int) -> Path:
+        """The file of a shape: pybullet takes compounds of hulls only from files, read at once."""
+        path = self._folder / f"{shape.key}_{step}.obj"
+        if not path.exists():
+            if self._hull_files == _HULL_FILES:
+                for old in self._folder.iterdir():
+                    old.unlink()
+                self._hull_files = 0
+            path.write_text(shape.obj(step))
+            self._hull_files += 1
+        return path
 
 
 def _bullet_pose(pose: SE3) -> tuple[Vec3, tuple[float, float, float, float]]:

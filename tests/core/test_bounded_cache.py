@@ -26,6 +26,15 @@ def test_a_value_larger_than_the_bound_displaces_all_others() -> None:
     assert len(cache) == 1
 
 
+def test_small_values_are_bounded_by_number_too() -> None:
+    """Four of them, although thousands would fit."""
+    cache: ByteCache[np.ndarray] = ByteCache(1_000_000, limit=4)
+    for k in range(1000):
+        cache.get(str(k), lambda: np.zeros(10, np.uint8))
+
+    assert list(cache._values) == ["996", "997", "998", "999"]
+
+
 def test_values_are_bounded_by_number_and_the_oldest_go() -> None:
     """Three fit; the one requested again stays."""
     cache: CountCache[int] = CountCache(3)

@@ -43,7 +43,7 @@ SMALLER = {
     },
     "train_a_detector": {
         "examples/detector.yaml": "examples/detector.yaml --set sensors.color.size_px=[96,72]",
-        "--n 800": "--n 8", "--n 200": "--n 4", "--minutes 19": "--steps 2 --size 96 --workers 0",
+        "--n 800": "--n 8", "--n 200": "--n 4", "--steps 2400 --minutes 60": "--steps 2 --size 96 --workers 0",
     },
 }  # fmt: skip
 """Texts of each page that are replaced, so that it runs within seconds."""

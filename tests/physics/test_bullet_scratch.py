@@ -6,6 +6,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+import pytest
+import trimesh
+
+from gen_data.generator.core.asset_types import ConvexParts
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.physics.bullet import World
+from gen_data.generator.physics.collision_shapes import collision_shape
+from gen_data.generator.runner.resident_memory import release_memory, resident_bytes
+
 
 def test_a_world_that_is_never_closed_leaves_no_folder(tmp_path: Path) -> None:
     """A program may end, or forget a data set, without closing it."""
@@ -25,3 +35,31 @@ def test_a_world_that_is_never_closed_leaves_no_folder(tmp_path: Path) -> None:
 
     assert done.stdout.strip() == "1"
     assert not list(tmp_path.iterdir())
+
+
+def test_shapes_at_new_scales_take_neither_memory_nor_disk() -> None:
+    """Otherwise every file that pybullet has read stays in memory: 9 MB for these shapes."""
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.05)
+    shape = collision_shape(ConvexParts((np.asarray(ball.vertices),)))
+
+    def files_after_a_fall(step: int) -> int:
+        world.reset()
+        world.add("ball", shape, SE3((0.0, 0.0, 1.0)), scale=1.05**step, mass_kg=1.0)
+        world.step(1)
+        world.reset()
+        return len(list(world._folder.iterdir()))
+
+    world = World(1 / 240, 10)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("gen_data.generator.physics.bullet._HULL_FILES", 20)
+        for step in range(-130, -100):
+            files_after_a_fall(step)
+        release_memory()
+        before = resident_bytes()
+        files = [files_after_a_fall(step) for step in range(-100, 100)]
+        release_memory()
+        grown = resident_bytes() - before
+    world.close()
+
+    assert max(files) <= 20
+    assert grown < 3e6

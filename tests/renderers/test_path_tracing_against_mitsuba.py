@@ -34,7 +34,7 @@ from tests.renderers.fake_library import (
 from tests.renderers.mitsuba_scene import mitsuba, mitsuba_images, mitsuba_scene
 from tests.renderers.paths import replicates_of
 
-SIZE_PX = (48, 48)
+SIZE_PX = (32, 32)
 FAMILY_LEVEL = 0.01
 """Probability that equal renderers fail one test of a picture."""
 RGB = tuple[float, float, float]
@@ -341,7 +341,7 @@ def test_a_closed_box_looks_as_in_mitsuba() -> None:
     """Few samples: the same mean radiance to three standard errors, no pixel off beyond chance."""
     pytest.importorskip("mitsuba")
 
-    own, theirs = both(cornell(), 16, 8)
+    own, theirs = both(cornell(), 16, 12)
 
     means = own.mean(axis=(1, 2, 3)), theirs.mean(axis=(1, 2, 3))
     error = math.sqrt(sum(m.var(ddof=1) / len(m) for m in means))

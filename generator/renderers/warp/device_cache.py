@@ -36,6 +36,8 @@ _MESH_BYTES = 176 << 20
 _TEXTURE_BYTES = 160 << 20
 _ENVIRONMENT_BYTES = 32 << 20
 _OPTICS_BYTES = 192 << 20
+_LENSES = 64
+"""Capacity of the cache of lenses: a randomized one is new in every scene."""
 _SCRATCH_BYTES = 64 << 20
 _BODIES = 2048
 """Capacity of the caches of material records."""
@@ -65,7 +67,7 @@ class DeviceCache:
         self._meshes: ByteCache[DeviceMesh] = ByteCache(_MESH_BYTES)
         self._textures: ByteCache[DeviceTexture] = ByteCache(_TEXTURE_BYTES)
         self._environments: ByteCache[DeviceEnvironment] = ByteCache(_ENVIRONMENT_BYTES)
-        self._optics: ByteCache[DeviceOptics] = ByteCache(_OPTICS_BYTES)
+        self._optics: ByteCache[DeviceOptics] = ByteCache(_OPTICS_BYTES, _LENSES)
         self._scratch: ByteCache[_Scratch] = ByteCache(_SCRATCH_BYTES)
         self._constants: dict[tuple[object, ...], wp.array] = {}
 
