@@ -16,6 +16,7 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.streams import Rng, Streams
 from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
 from gen_data.generator.sensors.lidar.lidar_atmosphere import (
+    add_atmosphere,
     fog_peak,
     optical_depth,
     rain_extinction_per_m,
@@ -183,10 +184,33 @@ def test_dense_fog_answers_itself_a_few_metres_away() -> None:
     ranges_m = np.linalg.norm(air["position_m"].astype(float), axis=1)
 
     assert 1.0 < peak_m < 8.0
-    assert len(air) > 100
+    assert len(air) > 10_000
     assert (air["instance_id"] == 0).all()
     assert np.median(ranges_m) == pytest.approx(peak_m, rel=0.1)
     assert not (scan(LidarSensor(), Wall(90.0))["surface"] == SURFACES.index("air")).any()
+
+
+def test_the_air_has_a_sensitivity_of_its_own() -> None:
+    """Neither the loss nearby nor the sensitivity to solid targets changes its returns."""
+    model = lidar_model("HDL-64E")
+    one, two = (
+        add_atmosphere(
+            make_pulses(echoes(np.full((500, 1), 90.0)), device),
+            Weather(fog_extinction_per_m=0.06, rain_mm_h=20.0, snow_mm_h=2.0),
+            device,
+            1.7,
+            rng(),
+        )
+        for device in (
+            model,
+            model.model_copy(update={"seen": model.seen_air, "seen_air": None, "near_m": 0.0}),
+        )
+    )
+
+    assert (one.light[:, 0] < two.light[:, 0]).all()
+    assert (one.light[:, 1:] > 0.0).any(axis=0).all()
+    np.testing.assert_array_equal(one.light[:, 1:], two.light[:, 1:])
+    np.testing.assert_array_equal(one.range_m, two.range_m)
 
 
 def test_thicker_fog_answers_more() -> None:

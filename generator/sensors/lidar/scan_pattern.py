@@ -100,7 +100,8 @@ class LidarModel(Strict):
         wavelength_nm: Of the laser.
         seen: Sensitivity.
         near_m: Range within which the receiver, focused at a distance, collects less: received
-            light is proportional to ``1 / (range^2 + near_m^2)``.
+            light is proportional to ``1 / (range^2 + near_m^2)``. Not applied to the air.
+        seen_air: Sensitivity to fog, drops and flakes; null = ``seen``.
         white_intensity: Intensity in [0, 1] reported for a white matte surface; values above are
             for retro-reflectors.
         response: Reported intensities; null = proportional to reflectance, without noise.
@@ -121,6 +122,7 @@ class LidarModel(Strict):
     wavelength_nm: float = Field(ge=400, le=2000)
     seen: Sensitivity
     near_m: float = Field(0.0, ge=0, le=1000)
+    seen_air: Sensitivity | None = None
     white_intensity: float = Field(gt=0, le=1)
     response: Response | None = None
 
