@@ -33,6 +33,29 @@ def test_the_hdl64_has_two_blocks_of_lasers() -> None:
     assert max(np.ptp(elevation[ring == k]) for k in range(64)) < 1e-4
 
 
+def test_beams_of_the_hdl64_pass_beside_their_axis_at_two_heights() -> None:
+    """0.026 m from it, left and right in turn; blocks start at 0.209 and 0.124 m."""
+    sweep = make_sweep(lidar_model("HDL-64E"), 0.0)
+    assert sweep.origins_m is not None
+    origins, directions = sweep.origins_m.astype(float), sweep.directions.astype(float)
+    x, y = directions[:, 0], directions[:, 1]
+    # z of (direction x origin) over the level part: distance from the axis, to the left.
+    left = (x * origins[:, 1] - y * origins[:, 0]) / np.hypot(x, y)
+    even = sweep.ring % 2 == 0
+
+    np.testing.assert_allclose(left, np.where(even, -0.026, 0.026), atol=1e-6)
+    heights = [origins[sweep.ring == k, 2].mean() for k in (0, 31, 32, 63)]
+    np.testing.assert_allclose(heights, [0.209, 0.1956, 0.1243, 0.1052], atol=1e-5)
+    assert make_sweep(lidar_model("VLP-16"), 0.0).origins_m is None
+
+
+def test_other_beams_of_a_device_start_at_its_origin() -> None:
+    """Heights and lateral offsets belong to the lasers that were replaced."""
+    device = lidar_model("HDL-64E").with_beams([(1.0, 0.0), (-5.0, 0.0)])
+
+    assert make_sweep(device, 0.0).origins_m is None
+
+
 @pytest.mark.parametrize(
     ("name", "rings", "top", "bottom", "pulses"),
     [
@@ -111,6 +134,9 @@ def test_a_scanner_either_turns_or_draws_a_rosette() -> None:
         LidarModel.model_validate({**plain, "elevations_deg": ()})
     with pytest.raises(ValidationError, match="must rise"):
         LidarModel.model_validate({**plain, "range_m": (100.0, 1.0)})
+    old = lidar_model("HDL-64E").model_dump()
+    with pytest.raises(ValidationError, match="range_exponent needs near_m"):
+        LidarModel.model_validate({**old, "near_m": 0.0})
 
 
 @pytest.mark.parametrize("name", ["HDL-64E", "OS1-64", "VLP-16"])

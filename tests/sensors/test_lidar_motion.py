@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -212,3 +214,24 @@ def test_a_moving_sweep_made_again_is_the_same() -> None:
 
     assert len(one) > 100
     assert one.tobytes() == two.tobytes()
+
+
+@pytest.mark.parametrize("motion", ["raw", "deskewed", "none"])
+def test_points_of_lasers_beside_the_axis_lie_on_the_walls(motion: str) -> None:
+    """Beams that pass beside the axis, at two heights, end on the walls of a hall."""
+    hall = Body("hall", "hall", SE3((0.0, 0.0, -2.5)))
+    sensor = LidarSensor(name="velodyne", model="HDL-64E", ideal=True, motion_distortion=motion)
+    renderer = WarpRenderer(FakeLibrary(MESHES), "cpu")
+    scene = replace(scene_of([hall]), tracks=())
+    cloud = sensor.capture(scene, renderer, frozenset(), Streams(1, 2).rng("lidar"))
+    p_world = cloud.lidar.T_world_lidar.apply(cloud.points["position_m"].astype(np.float64))
+
+    sides = np.abs(np.abs(p_world[:, :2]) - 30.0).min(axis=1)
+    floor = np.abs(p_world[:, 2] + 2.5)
+    assert len(p_world) > 130_000
+    assert np.minimum(sides, floor).max() < 1e-3
+    # The highest beam starts 0.209 m up, 29.5 m from the wall ahead, and rises by 2 degrees.
+    top = cloud.points[cloud.points["ring"] == 0]["position_m"]
+    ahead = top[np.abs(top[:, 1]) < 0.5]
+    ahead = ahead[ahead[:, 0] > 0.0]
+    np.testing.assert_allclose(ahead[:, 2], 0.209 + 29.5 * np.tan(np.radians(2.0)), atol=2e-3)

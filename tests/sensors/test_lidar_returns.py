@@ -16,6 +16,7 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.streams import Rng, Streams
 from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
 from gen_data.generator.sensors.lidar.lidar_atmosphere import (
+    add_atmosphere,
     fog_peak,
     optical_depth,
     rain_extinction_per_m,
@@ -23,7 +24,9 @@ from gen_data.generator.sensors.lidar.lidar_atmosphere import (
 from gen_data.generator.sensors.lidar.lidar_detection import (
     Kept,
     is_detected,
+    laser_gains,
     make_pulses,
+    measure_intensity,
     received_light,
     report_intensity,
     select_returns,
@@ -207,10 +210,33 @@ def test_dense_fog_answers_itself_a_few_metres_away() -> None:
     ranges_m = np.linalg.norm(air["position_m"].astype(float), axis=1)
 
     assert 1.0 < peak_m < 8.0
-    assert len(air) > 100
+    assert len(air) > 10_000
     assert (air["instance_id"] == 0).all()
     assert np.median(ranges_m) == pytest.approx(peak_m, rel=0.1)
     assert not (scan(LidarSensor(), Wall(90.0))["surface"] == SURFACES.index("air")).any()
+
+
+def test_the_air_has_a_sensitivity_of_its_own() -> None:
+    """Neither the loss nearby nor the sensitivity to solid targets changes its returns."""
+    model = lidar_model("HDL-64E")
+    one, two = (
+        add_atmosphere(
+            make_pulses(echoes(np.full((500, 1), 90.0)), device),
+            Weather(fog_extinction_per_m=0.06, rain_mm_h=20.0, snow_mm_h=2.0),
+            device,
+            1.7,
+            rng(),
+        )
+        for device in (
+            model,
+            model.model_copy(update={"seen": model.seen_air, "seen_air": None, "near_m": 0.0}),
+        )
+    )
+
+    assert (one.light[:, 0] < two.light[:, 0]).all()
+    assert (one.light[:, 1:] > 0.0).any(axis=0).all()
+    np.testing.assert_array_equal(one.light[:, 1:], two.light[:, 1:])
+    np.testing.assert_array_equal(one.range_m, two.range_m)
 
 
 def test_thicker_fog_answers_more() -> None:
@@ -265,6 +291,87 @@ def test_retro_reflectors_are_told_from_white() -> None:
     told = report_intensity(np.float32([0.0, 0.5, 1.0, 800.0, 1e5]), MODEL)
 
     np.testing.assert_allclose(told, [0.0, 0.196, 0.392, 1.0, 1.0], atol=1e-6)
+
+
+def measured(reflectance: list[float], range_m: float, **changes: float) -> np.ndarray:
+    """Intensities of an HDL-64E without noise, steps and spread, unless changed."""
+    model = lidar_model("HDL-64E")
+    exact = {"noise": 0.0, "laser_spread": 0.0, "step": 0.0, "range_exponent": 0.0, **changes}
+    assert model.response is not None
+    model = model.model_copy(update={"response": model.response.model_copy(update=exact)})
+    light = np.asarray(reflectance, np.float32)
+    ring = (np.arange(len(light)) % 64).astype(np.uint16)
+    return measure_intensity(light, np.full(len(light), range_m, np.float32), ring, model, rng())
+
+
+def test_a_receiver_focused_at_a_distance_collects_less_nearby() -> None:
+    """1 / (range^2 + near^2), and 1 at the sensitivity's own range."""
+    model = lidar_model("HDL-64E")
+    r = np.array([2.0, 12.0, 50.0, 120.0], np.float32)
+    light = received_light(np.full(4, model.seen.reflectance, np.float32), r, model)
+
+    expected = [(50.0**2 + 12.0**2) / (v * v + 12.0**2) for v in r.tolist()]
+    np.testing.assert_allclose(light, expected, rtol=1e-5)
+
+
+def test_the_range_of_an_hdl64_follows_the_reflectance() -> None:
+    """The range equation, solved for range: 10 % near 50 m, 80 % beyond the 120 m it reports."""
+    model = lidar_model("HDL-64E")
+    for reflectance, range_m in ((0.09, 50.0), (0.10, 52.9), (0.8, 152.9)):
+        reach = math.sqrt(reflectance / 0.09 * (50.0**2 + 12.0**2) - 12.0**2)
+        assert reach == pytest.approx(range_m, abs=0.1)
+        light = received_light(np.float32([reflectance]), np.float32([reach]), model)
+        assert light[0] == pytest.approx(1.0, rel=1e-4)
+
+
+def test_intensities_are_compressed_and_zero_in_the_dark() -> None:
+    """White as stated, 1 for the brightest signs, 0 below the dark level, rising between."""
+    told = measured([0.0, 0.01, 0.1, 0.3, 1.0, 800.0], 10.0)
+    model = lidar_model("HDL-64E")
+    assert model.response is not None
+    h, dark, white = model.response.half, model.response.dark, model.white_intensity
+
+    assert told[0] == told[1] == 0.0
+    assert told[4] == pytest.approx(white, abs=1e-6) and told[5] == pytest.approx(1.0, abs=1e-6)
+    assert (np.diff(told[1:]) > 0.0).all()
+    # The reflectance at which a Naka-Rushton curve has the value dark.
+    edge = dark * h / ((white + dark) * (1.0 + h) - dark)
+    np.testing.assert_allclose(measured([edge], 10.0), 0.0, atol=1e-6)
+    assert measured([1.05 * edge], 10.0)[0] > 0.0
+
+
+def test_range_is_compensated_in_part() -> None:
+    """At range 12 sqrt(3) m, c is 4^-0.5 times the reflectance: half of it."""
+    far = measured([0.2, 0.05], 12.0 * math.sqrt(3.0), range_exponent=0.5)
+
+    np.testing.assert_allclose(far, measured([0.1, 0.025], 1.0), atol=1e-5)
+
+
+def test_noise_spread_and_steps_of_intensities() -> None:
+    """As stated, within 3 %; multiples of a step."""
+    grey = [0.2] * 20_000
+    plain = measured(grey, 10.0)
+    noisy = measured(grey, 10.0, noise=0.02)
+    steps = measured(grey, 10.0, noise=0.02, step=0.01) / 0.01
+    gains = laser_gains(64, 0.1)
+
+    assert np.ptp(plain) == 0.0
+    assert noisy.std() == pytest.approx(0.02, rel=0.03)
+    assert noisy.mean() == pytest.approx(plain[0], abs=1e-3)
+    assert np.abs(steps - np.rint(steps)).max() < 1e-3
+    assert gains.mean() == pytest.approx(1.0, abs=0.01)
+    assert gains.std() == pytest.approx(0.1, rel=0.1)
+    assert (laser_gains(16, 0.0) == 1.0).all()
+
+
+def test_an_ideal_scanner_reports_intensity_in_proportion() -> None:
+    """Neither response nor noise: reflectance times the value of white."""
+    points = scan(LidarSensor(model="HDL-64E", ideal=True), Wall(30.0))
+    white = lidar_model("HDL-64E").white_intensity
+
+    np.testing.assert_allclose(points["intensity"], 0.5 * white, rtol=1e-5)
+    noisy = scan(LidarSensor(model="HDL-64E"), Wall(30.0))
+    assert noisy["intensity"].std() > 0.03
 
 
 def test_a_scanner_needs_a_camera_listed_before_it() -> None:

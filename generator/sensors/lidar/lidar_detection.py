@@ -1,14 +1,19 @@
 """Detection of laser returns: from hits of rays to reported points.
 
-Received light is ``reflectance / range^2 * exp(-2 * optical depth)`` (the lidar equation of an
-extended target; Wandinger, "Introduction to Lidar", 2005). The scanner's sensitivity sets its unit:
-light of 1 is detected half of the time.
+Received light is ``reflectance / (range^2 + near^2) * exp(-2 * optical depth)``: the lidar equation
+of an extended target (Wandinger, "Introduction to Lidar", 2005), whose overlap function
+``range^2 / (range^2 + near^2)`` is that of a receiver focused at a distance: the blur of a near
+target is larger than the detector, in proportion to 1 / range. The scanner's sensitivity sets the
+unit: light of 1 is detected half of the time.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from statistics import NormalDist
 from typing import Any, Literal
 
 import numpy as np
@@ -80,9 +85,10 @@ def make_pulses(echoes: LidarHits, model: LidarModel, keep: Kept = "dual") -> Pu
 
 def received_light(reflectance: Float32, range_m: Float32, model: LidarModel) -> Float32:
     """Light received from a reflectance at a range through clear air; 0 without reflectance."""
-    reach = np.float32(model.seen.range_m)
-    near = reach / np.maximum(range_m, np.float32(1e-3))
-    return np.asarray(reflectance * (near * near) * np.float32(1.0 / model.seen.reflectance))
+    near2 = np.float32(model.near_m**2)
+    unit = np.float32((model.seen.range_m**2 + model.near_m**2) / model.seen.reflectance)
+    away = np.maximum(range_m, np.float32(1e-3))
+    return np.asarray(reflectance * (unit / (away * away + near2)))
 
 
 def join_pulses(pulses: Pulses, more: Pulses) -> Pulses:
@@ -144,6 +150,41 @@ def report_intensity(reflectance: Float32, model: LidarModel) -> Float32:
         above, np.float32(1.0)
     )
     return np.asarray(intensity, dtype=np.float32)
+
+
+def measure_intensity(
+    reflectance: Float32, range_m: Float32, ring: UInt16, model: LidarModel, rng: Rng
+) -> Float32:
+    """Intensity in [0, 1] that the device measures for returns [n], with its errors."""
+    response = model.response
+    if response is None:
+        return report_intensity(reflectance, model)
+    c = reflectance
+    if response.range_exponent > 0.0:
+        away = range_m * np.float32(1.0 / model.near_m)
+        c = c * (1.0 + away * away) ** np.float32(-response.range_exponent)
+    white = np.float32(model.white_intensity)
+    half, dark = np.float32(response.half), np.float32(response.dark)
+    matte = np.minimum(c, np.float32(1.0))
+    above = np.log(np.maximum(c, np.float32(1.0))) / np.float32(np.log(RETRO_MAX))
+    signal = (white + dark) * (1.0 + half) * matte / (matte + half)
+    signal += (1.0 - white) * np.minimum(above, np.float32(1.0))
+    signal *= laser_gains(int(ring.max(initial=0)) + 1, response.laser_spread)[ring]
+    noise = rng.standard_normal(len(c), dtype=np.float32)
+    intensity = np.clip(signal - dark + np.float32(response.noise) * noise, 0.0, 1.0)
+    if response.step > 0.0:
+        intensity = np.floor(intensity / np.float32(response.step)) * np.float32(response.step)
+    return np.asarray(intensity, dtype=np.float32)
+
+
+@lru_cache(maxsize=8)
+def laser_gains(rings: int, spread: float) -> Float32:
+    """Gains of a device's lasers, [rings]: the same for each, normal with mean 1."""
+    # Quantiles in golden-ratio order: neighbours differ, and any number of lasers fills the range.
+    shares = [(0.5 + k * (math.sqrt(5.0) - 1.0) / 2.0) % 1.0 for k in range(rings)]
+    normal = NormalDist(1.0, spread) if spread > 0.0 else None
+    gains = [normal.inv_cdf(share) if normal else 1.0 for share in shares]
+    return np.array(gains, np.float32)
 
 
 def _empty_field(name: str, like: NDArray[Any], candidates: int) -> NDArray[Any]:

@@ -41,6 +41,7 @@ from gen_data.generator.sensors.lidar.lidar_detection import (
     clip_range,
     is_detected,
     make_pulses,
+    measure_intensity,
     report_intensity,
     select_returns,
 )
@@ -149,7 +150,7 @@ class LidarSensor(Mounted):
         model = self.device
         lidar = scene.lidar(self.name)
         sweep = make_sweep(model, float(rng.uniform(0.0, 3600.0)))
-        shots = SweepPulses(sweep.directions)
+        shots = still = SweepPulses(sweep.directions, sweep.origins_m)
         if self.motion_distortion != "none":
             shots = fire_pulses(scene, lidar, sweep)
         beams = LidarRays(
@@ -170,10 +171,15 @@ class LidarSensor(Mounted):
         pulses = clip_range(pulses, model)
         detected = pulses.light > 0.0 if self.ideal else is_detected(pulses, rng)
         returns = Returns.select(pulses, *select_returns(pulses, detected, self.returns))
-        if not self.ideal:
+        if self.ideal:
+            intensity = report_intensity(returns.reflectance, model)
+        else:
+            ring = sweep.ring.take(returns.row)
+            light = returns.reflectance
+            intensity = measure_intensity(light, returns.range_m, ring, model, rng)
             returns = _add_range_noise(returns, model, weather, rng)
-        frames = SweepPulses(sweep.directions) if self.motion_distortion == "raw" else shots
-        points = _make_points(returns, frames, sweep, model)
+        frames = still if self.motion_distortion == "raw" else shots
+        points = _make_points(returns, intensity, frames, sweep)
         return PointCloud(self.name, lidar, points, scene.time_s)
 
 
@@ -226,13 +232,13 @@ def _add_range_noise(returns: Returns, model: LidarModel, weather: Weather, rng:
 
 
 def _make_points(
-    returns: Returns, shots: SweepPulses, sweep: Sweep, model: LidarModel
+    returns: Returns, intensity: Float32, shots: SweepPulses, sweep: Sweep
 ) -> NDArray[np.void]:
     """Records of ``POINT`` [n]; returns of one pulse are adjacent, nearest first."""
     rows = returns.row
     points: NDArray[Any] = np.zeros(len(rows), POINT)
     points["position_m"] = shots.points_m(rows, returns.range_m)
-    points["intensity"] = report_intensity(returns.reflectance, model)
+    points["intensity"] = intensity
     points["time_s"] = sweep.time_s.take(rows)
     points["ring"] = sweep.ring.take(rows)
     points["return_number"] = points["return_count"] = 1

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Annotated
 
@@ -29,11 +29,16 @@ Hertz = Annotated[float, Field(gt=0, le=10_000)]
 
 
 class Block(Strict):
-    """Lasers at equal steps of elevation, including first and last."""
+    """Lasers at equal steps of elevation [deg], including first and last.
+
+    ``heights_m``: where the beams of the first and the last laser cross the axis of rotation, above
+    the origin of the scanner's frame; even steps between them.
+    """
 
     first: float = Field(ge=-90, le=90)
     last: float = Field(ge=-90, le=90)
     count: int = Field(ge=1, le=1024)
+    heights_m: tuple[float, float] = (0.0, 0.0)
 
 
 class Prisms(Strict):
@@ -50,6 +55,31 @@ class Sensitivity(Strict):
     range_m: float = Field(gt=0)
 
 
+class Response(Strict):
+    """Intensity that a device reports, where it is not proportional to reflectance.
+
+    The laser's power follows the strength of the previous return, which compresses intensities. A
+    reflectance c up to white gives ``(white + dark) * c * (1 + half) / (c + half) - dark``, or 0 if
+    that is negative (the curve is that of Naka and Rushton 1966). Range is compensated in part:
+    ``c = reflectance * (1 + (range / near)^2)^-p``.
+
+    Attributes:
+        half: Reflectance c at which the uncompressed signal has risen to about half.
+        dark: Signal below which 0 is reported.
+        range_exponent: p; 0 = range is compensated.
+        noise: Standard deviation of intensities.
+        laser_spread: Relative standard deviation of the gain between lasers.
+        step: Quantisation; 0 = none.
+    """
+
+    half: float = Field(gt=0, le=10)
+    dark: float = Field(ge=0, le=1)
+    range_exponent: float = Field(ge=0, le=2)
+    noise: float = Field(ge=0, le=1)
+    laser_spread: float = Field(ge=0, le=0.5)
+    step: float = Field(ge=0, le=0.1)
+
+
 class LidarModel(Strict):
     """Data sheet of a laser scanner.
 
@@ -57,6 +87,8 @@ class LidarModel(Strict):
         name: Its name in labels; empty = the name of its file.
         elevations_deg: Blocks of lasers, from the top; none for a rosette scanner.
         azimuth_offsets_deg: Offsets of the lasers to the left, repeated down the table.
+        lateral_offsets_m: Distances at which the beams pass the axis of rotation, to its left,
+            repeated down the table.
         prisms: Prisms of a rosette scanner; none for a rotating one.
         rotation_hz: Sweeps per second.
         points_per_second: Pulses per second of all lasers together.
@@ -67,13 +99,18 @@ class LidarModel(Strict):
         pulse_m: Returns of one pulse that are closer than this merge.
         wavelength_nm: Of the laser.
         seen: Sensitivity.
+        near_m: Range within which the receiver, focused at a distance, collects less: received
+            light is proportional to ``1 / (range^2 + near_m^2)``. Not applied to the air.
+        seen_air: Sensitivity to fog, drops and flakes; null = ``seen``.
         white_intensity: Intensity in [0, 1] reported for a white matte surface; values above are
             for retro-reflectors.
+        response: Reported intensities; null = proportional to reflectance, without noise.
     """
 
     name: str = ""
     elevations_deg: tuple[Block, ...] = ()
     azimuth_offsets_deg: tuple[float, ...] = ()
+    lateral_offsets_m: tuple[float, ...] = ()
     prisms: Prisms | None = None
     rotation_hz: Hertz
     points_per_second: int = Field(ge=1, le=100_000_000)
@@ -84,12 +121,17 @@ class LidarModel(Strict):
     pulse_m: float = Field(gt=0, le=10)
     wavelength_nm: float = Field(ge=400, le=2000)
     seen: Sensitivity
+    near_m: float = Field(0.0, ge=0, le=1000)
+    seen_air: Sensitivity | None = None
     white_intensity: float = Field(gt=0, le=1)
+    response: Response | None = None
 
     @model_validator(mode="after")
     def _is_one_kind(self) -> LidarModel:
         if (self.prisms is None) == (not self.elevations_deg):
             raise ValueError("expected either elevations_deg or prisms")
+        if self.response and self.response.range_exponent > 0 and self.near_m == 0:
+            raise ValueError("response.range_exponent needs near_m above 0")
         low, high = self.range_m
         if not 0 <= low < high:
             raise ValueError(f"range_m must rise from 0 or more, got [{low:g}, {high:g}]")
@@ -100,8 +142,18 @@ class LidarModel(Strict):
         sorted_ = sorted(beams, key=lambda beam: -beam[0])
         blocks = tuple(Block(first=up, last=up, count=1) for up, _ in sorted_)
         offsets = tuple(left for _, left in sorted_)
-        changed = {"elevations_deg": blocks, "azimuth_offsets_deg": offsets, "prisms": None}
+        changed = {
+            "elevations_deg": blocks,
+            "azimuth_offsets_deg": offsets,
+            "lateral_offsets_m": (),
+            "prisms": None,
+        }
         return self.model_copy(update=changed)
+
+    def heights_m(self) -> NDArray[np.float64]:
+        """Height of every laser above the frame's origin, [rings]; empty for a rosette scanner."""
+        blocks = [np.linspace(*b.heights_m, b.count) for b in self.elevations_deg]
+        return np.asarray(np.concatenate([np.zeros(0), *blocks]), np.float64)
 
     def elevations_rad(self) -> NDArray[np.float64]:
         """Elevation of every laser, the highest first, [rings]; empty for a rosette scanner."""
@@ -124,12 +176,14 @@ class Sweep:
         ring: Row of the table, uint16 [n].
         time_s: From the start of the sweep, float32 [n].
         order: As in LidarRays.
+        origins_m: Origins of the pulses in the lidar frame, float32 [n, 3]; None = its origin.
     """
 
     directions: NDArray[np.float32]
     ring: NDArray[np.uint16]
     time_s: NDArray[np.float32]
     order: NDArray[np.int32] | None = None
+    origins_m: NDArray[np.float32] | None = None
 
 
 TILE = (32, 4)
@@ -169,9 +223,22 @@ def _rotation(model: LidarModel) -> Sweep:
         time_s.reshape(-1).astype(np.float32),
         _tile_order(azimuth),
     )
-    for field in fields:
+    origins_m = _laser_origins_m(model, azimuth)
+    for field in fields if origins_m is None else (*fields, origins_m):
         field.setflags(write=False)
-    return Sweep(*fields)
+    return Sweep(*fields, origins_m)
+
+
+def _laser_origins_m(model: LidarModel, azimuth: NDArray[np.float64]) -> Float32 | None:
+    """Origins of pulses with azimuths [columns, rings], [n, 3]; None if all are the frame's."""
+    height = np.broadcast_to(model.heights_m(), azimuth.shape)
+    left = np.zeros(azimuth.shape)
+    if model.lateral_offsets_m:
+        left = left + np.resize(np.asarray(model.lateral_offsets_m), azimuth.shape[1])
+    if not (height.any() or left.any()):
+        return None
+    origins = np.stack([-np.sin(azimuth) * left, np.cos(azimuth) * left, height], axis=-1)
+    return origins.reshape(-1, 3).astype(np.float32)
 
 
 def _tile_order(azimuth: NDArray[np.float64]) -> NDArray[np.int32]:
@@ -229,13 +296,14 @@ def fire_pulses(scene: Scene, lidar: Lidar, sweep: Sweep) -> SweepPulses:
 
     Directions in ``sweep`` are in the lidar frame of each pulse's own instant.
     """
+    still = SweepPulses(sweep.directions, sweep.origins_m)
     if not scene.tracks:
-        return SweepPulses(sweep.directions)
+        return still
     time_s = sweep.time_s - np.float32(0.5 * lidar.sweep_s)
     body, T_body_lidar = carrier(scene, lidar)
     track = scene.track(body) if body else None
     if track is None:
-        return SweepPulses(sweep.directions, None, time_s)
+        return replace(still, time_s=time_s)
     # Lasers that fire together share an instant, and a pose.
     fresh = np.diff(time_s, prepend=np.float32(-np.inf)) != 0.0
     instants_s = scene.time_s + time_s[fresh].astype(np.float64)
@@ -246,13 +314,12 @@ def fire_pulses(scene: Scene, lidar: Lidar, sweep: Sweep) -> SweepPulses:
     R_lidar_shot = np.einsum("ji,njk->nik", R[-1], R[:-1], optimize=False).astype(np.float32)
     t_lidar_shot = np.einsum("ji,nj->ni", R[-1], t[:-1] - t[-1], optimize=False)
     if np.abs(t_lidar_shot).max() < 1e-6 and np.abs(R_lidar_shot - R_lidar_shot[0]).max() < 1e-7:
-        return SweepPulses(sweep.directions, None, time_s)
+        return replace(still, time_s=time_s)
     count = np.diff(np.append(np.flatnonzero(fresh), len(fresh)))
-    return SweepPulses(
-        _rotate_runs(R_lidar_shot, sweep.directions, count),
-        t_lidar_shot.astype(np.float32).repeat(count, axis=0),
-        time_s,
-    )
+    origins_m = t_lidar_shot.astype(np.float32).repeat(count, axis=0)
+    if sweep.origins_m is not None:
+        origins_m += _rotate_runs(R_lidar_shot, sweep.origins_m, count)
+    return SweepPulses(_rotate_runs(R_lidar_shot, sweep.directions, count), origins_m, time_s)
 
 
 def _rotate_runs(R: Float32, vectors: Float32, count: NDArray[np.intp]) -> Float32:

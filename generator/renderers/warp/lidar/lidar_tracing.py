@@ -57,15 +57,18 @@ def pack_moving_bodies(
     motion = kernels.BodyMotion()
     motion.keys = 0
     movers = _find_movers(scene, beams.time_s)
-    if beams.time_s is None or not (movers or beams.origins_m is not None):
+    if not movers and beams.origins_m is None:
         return world, motion
+    time_s = beams.time_s
+    if time_s is None:
+        time_s = np.zeros(len(beams.directions), np.float32)
     rows = np.full(max(len(scene.bodies), 1), -1, np.int32)
     rows[[mover.number for mover in movers]] = np.arange(len(movers))
-    start_s, end_s = float(beams.time_s.min()), float(beams.time_s.max())
-    phases = (beams.time_s - start_s) * np.float32((KEYS - 1) / max(end_s - start_s, 1e-9))
+    start_s, end_s = float(time_s.min()), float(time_s.max())
+    phases = (time_s - start_s) * np.float32((KEYS - 1) / max(end_s - start_s, 1e-9))
     origins_m = beams.origins_m
     if origins_m is None:
-        origins_m = np.zeros((len(beams.time_s), 3), np.float32)
+        origins_m = np.zeros((len(time_s), 3), np.float32)
     B_mesh_lidar, eye_mesh = _lidar_in_mesh_frames(lidar, movers)
     motion.keys = KEYS
     motion.rows = wp.array(rows, dtype=int, device=device)
