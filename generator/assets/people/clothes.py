@@ -12,6 +12,7 @@ from gen_data.generator.assets.people.body import Array, BodyTemplate, Indices
 from gen_data.generator.assets.people.person import Outfit, Person
 from gen_data.generator.assets.people.posing import vertex_normals
 from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.se3 import Vec3
 
 Profile = Sequence[tuple[float, float]]
 """(height in the template [m], distance from the body [m]), heights rising."""
@@ -34,6 +35,7 @@ class Layer:
         waves_per_m: Of the wrinkles.
         tapered: Whether the sheet's edge lies on the body (hair).
         smoothings: How often the sheet is smoothed: cloth spans hollows.
+        mapped: Whether its materials have garment textures (``garment_layout``).
     """
 
     zones: tuple[tuple[str, Material], ...]
@@ -42,6 +44,7 @@ class Layer:
     waves_per_m: float = 6.0
     tapered: bool = False
     smoothings: int = 0
+    mapped: bool = False
 
 
 def layers(person: Person) -> tuple[Layer, ...]:
@@ -89,13 +92,16 @@ def displace_layer(
 
 def _skin(person: Person) -> Layer:
     outfit = person.outfit
-    skin = Material(base_color=person.skin, roughness=0.5, specular=0.4, role="skin")
-    r, g, b = person.skin
+    skin = Material(
+        _lifted(person.skin, _SKIN_LIFT), 0.5, specular=0.4,
+        texture="texture/skin_relief?seed=0", texture_scale_m=0.3, role="skin",
+    )  # fmt: skip
+    r, g, b = skin.base_color
     lips = replace(skin, base_color=(0.82 * r, 0.55 * g, 0.55 * b), roughness=0.4)
     x, y, z = ((1.0 - 0.45) * p + 0.45 * q for p, q in zip(person.hair, person.skin, strict=True))
     brows = Material(base_color=(x, y, z), roughness=0.8, role="hair")
     zones = [("face", skin), ("lips", lips), ("brows", brows), ("hands", skin)]
-    if person.haircut == "bald" and not outfit.hat:
+    if person.haircut == "bald" and not outfit.headwear:
         zones.append(("scalp", skin))
     if not outfit.sleeves:
         zones.append(("arms", skin))
@@ -113,18 +119,49 @@ def _hair(person: Person) -> tuple[Layer, ...]:
     white = Material((0.72, 0.7, 0.68), 0.15, role="eyes")
     iris = Material((0.035, 0.022, 0.014), 0.1, role="eyes")
     made = [Layer((("eyes", white), ("irises", iris)))]
-    hair = Material(person.hair, 0.55, specular=0.5, role="hair")
+    hair = Material(
+        _lifted(person.hair, _HAIR_LIFT), 0.55, specular=0.5,
+        texture="texture/hair_strands?seed=0", texture_scale_m=0.25, role="hair",
+    )  # fmt: skip
+    headwear = person.outfit.headwear
+    if headwear in ("hood", "headscarf"):
+        return (*made, *_hood(person.outfit))
     if person.haircut in ("bob", "long"):
         zones = ("hair", "hair_end") if person.haircut == "long" else ("hair",)
         made.append(Layer(tuple((zone, hair) for zone in zones), ((0.0, 0.001),), 0.005, 11.0))
-    if person.outfit.hat:
-        hat = person.outfit.hat_material
-        made.append(Layer((("scalp", hat),), ((0.66, 0.008), (0.8, 0.012), (0.85, 0.022))))
+    if headwear:
+        hat = ("scalp", person.outfit.hat_material)
+        profile: Profile = ((0.66, 0.008), (0.8, 0.012), (0.85, 0.022))
+        made.append(Layer((hat,), profile if headwear == "beanie" else _CAP))
     elif person.haircut != "bald":
         thick = 0.006 if person.haircut == "cropped" else 0.016
         profile = ((0.66, 0.6 * thick), (0.76, 0.7 * thick), (0.84, 1.4 * thick))
         made.append(Layer((("scalp", hair),), profile, 0.22 * thick, 16.0, tapered=True))
     return tuple(made)
+
+
+_CAP: Profile = ((0.66, 0.006), (0.76, 0.009), (0.83, 0.02), (0.85, 0.016))
+_HAIR_LIFT = 1.75
+"""One over the mean reflectance of ``hair_strands``."""
+
+
+_SKIN_LIFT = 1.13
+"""One over the mean reflectance of ``skin_relief``."""
+
+
+def _lifted(color: Vec3, factor: float) -> Vec3:
+    r, g, b = (min(1.0, factor * c) for c in color)
+    return (r, g, b)
+
+
+def _hood(outfit: Outfit) -> tuple[Layer, ...]:
+    """A hood that is up, or a headscarf: over the head and down to the shoulders."""
+    scarf = outfit.headwear == "headscarf"
+    material = outfit.hat_material if scarf else replace(outfit.top_material, texture="")
+    thick = 0.012 if scarf else 0.026
+    profile: Profile = ((0.5, 0.018), (0.6, thick), (0.74, thick), (0.84, 1.2 * thick))
+    zones = (("scalp", material), ("hair", material))
+    return tuple(Layer((zone,), profile, 0.004, 9.0) for zone in zones)
 
 
 def _bottoms(outfit: Outfit) -> tuple[Layer, ...]:
@@ -136,14 +173,15 @@ def _bottoms(outfit: Outfit) -> tuple[Layer, ...]:
         profile: Profile = ((-0.78, 0.024), (-0.7, 0.018), (-0.36, 0.013), (-0.1, 0.008),
                             (0.0, 0.004), (0.12, 0.002))  # fmt: skip
         painted = tuple((zone, material) for zone in zones)
-        return (Layer(painted, profile, 0.0025, 5.0, smoothings=1),)
+        return (Layer(painted, profile, 0.0025, 5.0, smoothings=1, mapped=True),)
     if outfit.bottom == "shorts":
         profile = ((-0.31, 0.022), (-0.1, 0.01), (0.0, 0.004), (0.12, 0.002))
-        return (Layer((("hips", material), ("thighs", material)), profile, 0.0025, smoothings=1),)
+        painted = (("hips", material), ("thighs", material))
+        return (Layer(painted, profile, 0.0025, smoothings=1, mapped=True),)
     if outfit.bottom == "skirt":
         zones = ("skirt_top", "skirt_middle", "skirt_end")[: outfit.skirt_zones]
         profile = ((0.02, 0.004), (0.12, 0.016), (0.18, 0.016))
-        return (Layer(tuple((zone, material) for zone in zones), profile, 0.001),)
+        return (Layer(tuple((zone, material) for zone in zones), profile, 0.001, mapped=True),)
     return ()
 
 
@@ -160,7 +198,7 @@ def _tops(outfit: Outfit) -> tuple[Layer, ...]:
                (0.54, 0.3 * thick))  # fmt: skip
     materials = {"front": outfit.front_material}
     painted = tuple((zone, materials.get(zone, outfit.top_material)) for zone in zones)
-    return (Layer(painted, profile, 0.32 * thick, 5.0, smoothings=5),)
+    return (Layer(painted, profile, 0.32 * thick, 5.0, smoothings=5, mapped=True),)
 
 
 def _shoes(outfit: Outfit) -> Layer:

@@ -14,7 +14,6 @@ from gen_data.generator.assets.procedural.material_presets import (
     draw_linear,
     hex_to_linear,
     jitter_color,
-    patterned_material,
 )
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
@@ -22,9 +21,6 @@ from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.se3 import Vec3
 
 _COLORS = load_table(__package__, "wardrobe", tuple[str, ...])
-_WARM_FABRICS = tuple(f"texture/fabric?seed={k}" for k in (2, 5, 9))
-_STRIPES = tuple(f"texture/stripes?seed={k}" for k in (3, 6))
-"""Few textures, shared by all people: each texture in an image has to be uploaded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +31,10 @@ class Outfit:
         top: ``tshirt``, ``shirt``, ``jacket``, ``coat`` or ``dress``.
         bottom: ``trousers``, ``shorts``, ``skirt`` or, under a dress, ``none``.
         skirt_zones: How many of the skirt's three zones skirt, dress or coat reach down to.
-        bag: ``""``, ``backpack`` or ``handbag``.
+        bag: ``""``, ``backpack``, ``handbag``, ``shoulder_bag``, ``shopping`` (a carrier bag in one
+            hand) or ``shopping_both``.
         front_material: Of the chest, where an open jacket shows a shirt.
-        hat: Whether a knitted hat is worn.
+        headwear: ``""``, ``beanie``, ``cap``, ``hood`` or ``headscarf``.
         stockings: Whether legs that show are covered.
     """
 
@@ -46,7 +43,7 @@ class Outfit:
     skirt_zones: int
     sleeves: bool
     bag: str
-    hat: bool
+    headwear: str
     stockings: bool
     top_material: Material
     front_material: Material
@@ -62,45 +59,79 @@ def draw_outfit(sex: str, child: bool, rng: VariantRng) -> Outfit:
     tops = ("jacket",) * 5 + ("shirt",) * 4 + ("tshirt",) * 3 + ("coat",) * (0 if child else 3)
     top = rng.choose(tops + ("dress",) * (2 if woman else 0))
     bottoms = ("trousers",) * 9 + ("shorts",) * (2 if top in ("tshirt", "shirt") else 0)
-    bottom = rng.choose(bottoms + ("skirt",) * (3 if woman else 0))
+    bottom = rng.choose(bottoms + ("skirt",) * (2 if woman else 0))
     if top == "dress":
         bottom = "none"
-    outer = _top(top, child, rng)
-    open_front = top in ("jacket", "coat") and rng.chance(0.6)
+    outer = draw_top_material(top, child, rng)
+    open_front = top in ("jacket", "coat") and rng.chance(0.45)
     reach = rng.choose((1, 1, 1, 2, 2, 2, 3))
     return Outfit(
         top=top,
         bottom=bottom,
         skirt_zones=min(reach, 2) if top == "coat" else reach,
         sleeves=top in ("shirt", "jacket", "coat") or (top == "dress" and rng.chance(0.4)),
-        bag=rng.choose(("", "", "", "backpack", "handbag" if woman and not child else "")),
-        hat=top in ("jacket", "coat") and rng.chance(0.2),
+        bag=_drawn_bag(woman, child, rng),
+        headwear=_drawn_headwear(top, woman, child, rng),
         stockings=top == "coat" or rng.chance(0.5),
         top_material=outer,
-        front_material=_top("shirt", child, rng) if open_front else outer,
-        bottom_material=_bottom(bottom, rng),
+        front_material=draw_top_material("shirt", child, rng) if open_front else outer,
+        bottom_material=draw_bottom_material(bottom, rng),
         shoe_material=_plain_material(_COLORS["shoes"], rng.between(0.35, 0.7), "shoes", rng),
         bag_material=_plain_material(_COLORS["bags"], rng.between(0.45, 0.8), "bag", rng),
         hat_material=_plain_material(_COLORS["hats"], 0.95, "hat", rng),
     )
 
 
-def _top(kind: str, child: bool, rng: VariantRng) -> Material:
+# Shares of bags and headwear among people in streets: assumed, +/- half of each.
+def _drawn_bag(woman: bool, child: bool, rng: VariantRng) -> str:
+    bags: tuple[str, ...] = ("",) * 9 + ("backpack",) * 4
+    if not child:
+        bags += ("handbag", "shoulder_bag", "shoulder_bag") if woman else ("shoulder_bag",)
+        bags += ("shopping", "shopping_both", "shoulder_bag" if woman else "")
+    return rng.choose(bags)
+
+
+def _drawn_headwear(top: str, woman: bool, child: bool, rng: VariantRng) -> str:
+    warm = top in ("jacket", "coat")
+    kinds: tuple[str, ...] = ("beanie", "beanie", "hood") if warm else ("cap", "cap", "")
+    if warm and not woman:
+        kinds += ("cap",)
+    if woman and not child:
+        kinds += ("headscarf",)
+    return rng.choose(kinds) if rng.chance(0.28) else ""
+
+
+def draw_top_material(kind: str, child: bool, rng: VariantRng) -> Material:
+    """Draw the cloth of a top: mostly plain, dark and muted, some striped, checked or printed."""
+    pattern, seed = float(rng.random()), int(16 * rng.random())
     if kind in ("jacket", "coat"):
-        colors = _COLORS["bright"] if rng.chance(0.35 if child else 0.07) else _COLORS["jackets"]
-        return _plain_material(colors, rng.between(0.55, 0.9), "top", rng)
-    pattern, seed = float(rng.random()), float(rng.random())
-    if kind != "tshirt" and pattern < 0.12:
-        return _patterned_top(_WARM_FABRICS[int(seed * len(_WARM_FABRICS))], 0.22)
-    if pattern < 0.12:
-        return _patterned_top(_STRIPES[int(seed * len(_STRIPES))], 0.3)
-    colors = _COLORS["bright"] if rng.chance(0.4 if child else 0.1) else _COLORS["tops"]
-    return _plain_material(colors, rng.between(0.75, 0.95), "top", rng)
+        if pattern < 0.02:
+            return _patterned("hi_vis", seed % 2)
+        colors = _COLORS["bright"] if rng.chance(0.3 if child else 0.06) else _COLORS["jackets"]
+        texture = f"quilted?seed={seed % 2}" if pattern < 0.3 else f"jacket_cloth?seed={seed % 3}"
+        return _woven(texture, colors, rng.between(0.5, 0.9), "top", rng)
+    if pattern < (0.3 if kind == "tshirt" else 0.1):
+        return _patterned("printed_jersey", seed % 8)
+    if pattern < 0.4:
+        name, count = rng.choose(_PATTERNS["dress" if kind == "dress" else "shirt"])
+        return _patterned(name, seed % count)
+    colors = _COLORS["bright"] if rng.chance(0.3 if child else 0.08) else _COLORS["tops"]
+    return _woven(f"jersey?seed={seed % 3}", colors, rng.between(0.75, 0.95), "top", rng)
 
 
-def _bottom(kind: str, rng: VariantRng) -> Material:
-    colors = "skirts" if kind == "skirt" else "denim" if rng.chance(0.42) else "trousers"
-    return _plain_material(_COLORS[colors], rng.between(0.75, 0.95), "bottom", rng)
+_PATTERNS = {
+    "shirt": (("striped_jersey", 4), ("checked_shirt", 4), ("checked_shirt", 4)),
+    "dress": (("patterned_cloth", 3), ("patterned_cloth", 3), ("striped_jersey", 4)),
+}
+
+
+def draw_bottom_material(kind: str, rng: VariantRng) -> Material:
+    """Draw the cloth of trousers or a skirt."""
+    jeans, seed = kind != "skirt" and rng.chance(0.42), int(4 * rng.random())
+    colors = _COLORS["skirts" if kind == "skirt" else "denim" if jeans else "trousers"]
+    name = "skirt_cloth" if kind == "skirt" else "denim" if jeans else "trouser_cloth"
+    texture = f"{name}?seed={seed % 2 if kind == 'skirt' else seed}"
+    return _woven(texture, colors, rng.between(0.75, 0.95), "bottom", rng)
 
 
 def _plain_material(
@@ -109,9 +140,26 @@ def _plain_material(
     return Material(draw_linear(colors, 0.12, rng), roughness, specular=0.35, role=role)
 
 
-def _patterned_top(texture: str, scale_m: float) -> Material:
-    plain = patterned_material(texture, scale_m, 0.9, (0.9, 0.9, 0.9))
-    return replace(plain, specular=0.35, role="top")
+def _woven(
+    texture: str, colors: Sequence[str], roughness: float, role: str, rng: VariantRng
+) -> Material:
+    """Cloth of one colour; its texture has folds and seams only."""
+    plain = _plain_material(colors, roughness, role, rng)
+    # The texture is light grey: it must not darken the colour.
+    lift = _DENIM_LIFT if texture.startswith("denim") else _CLOTH_LIFT
+    r, g, b = (min(1.0, lift * c) for c in plain.base_color)
+    return replace(plain, base_color=(r, g, b), texture=f"texture/{texture}")
+
+
+_CLOTH_LIFT, _DENIM_LIFT = 1.3, 3.2
+"""One over the mean reflectance of plain textures and of denim's."""
+
+
+def _patterned(name: str, seed: int) -> Material:
+    """Cloth whose texture has its own colours."""
+    return Material(
+        (1.0, 1.0, 1.0), 0.85, specular=0.35, texture=f"texture/{name}?seed={seed}", role="top"
+    )
 
 
 Sex = Literal["female", "male"]

@@ -19,7 +19,8 @@ from gen_data.generator.assets.people.body import (
     Indices,
     load,
 )
-from gen_data.generator.assets.people.clothes import displace_layer, layers
+from gen_data.generator.assets.people.clothes import Layer, displace_layer, layers
+from gen_data.generator.assets.people.garment_layout import lay_out
 from gen_data.generator.assets.people.person import Person, draw_person
 from gen_data.generator.assets.people.posing import (
     Stance,
@@ -48,6 +49,7 @@ class _Sheet:
     faces: Indices
     slots: Indices
     materials: tuple[Material, ...]
+    uvs: Array | None = None
 
 
 def _make_props(
@@ -134,6 +136,9 @@ class _Piece:
     Attributes:
         used: Points of the body that its vertices move with, [n].
         vertices_m, faces, slots, materials: As of a sheet.
+        corners: Vertex that each corner shows, [k]; a vertex has one per field of its texture.
+        corner_faces: Triangles of corners, [m, 3].
+        uvs: Texture coordinates of the corners, [k, 2].
     """
 
     used: Indices
@@ -141,6 +146,9 @@ class _Piece:
     faces: Indices
     slots: Indices
     materials: tuple[Material, ...]
+    corners: Indices
+    corner_faces: Indices
+    uvs: Array
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -171,9 +179,17 @@ def dress_person(person: Person, body: BodyTemplate) -> Figure:
     made = []
     for layer in layers(person):
         phases = 2.0 * math.pi * np.array([rng.random() for _ in range(_PHASES)])
-        materials = tuple(material for _, material in layer.zones)
-        made.append(_Piece(*displace_layer(body, layer, points, phases), materials))
+        made.append(_make_piece(body, layer, points, phases))
     return Figure(body, points, scale, tuple(made))
+
+
+def _make_piece(body: BodyTemplate, layer: Layer, points: Array, phases: Array) -> _Piece:
+    used, places, faces, slots = displace_layer(body, layer, points, phases)
+    zones, materials = zip(*layer.zones, strict=True)
+    corners, corner_faces, uvs = np.arange(len(used)), faces, np.zeros((len(used), 2))
+    if layer.mapped:
+        corners, corner_faces, uvs = lay_out(body.points_m[used], faces, zones, slots)
+    return _Piece(used, places, faces, slots, materials, corners, corner_faces, uvs)
 
 
 def build_person(person: Person, figure: Figure) -> Solid:
@@ -206,7 +222,15 @@ def _pose_piece(piece: _Piece, body: BodyTemplate, transforms: Array) -> _Sheet:
     bones, weights = body.weight_bones[piece.used], body.weights[piece.used]
     moved = skin_points(piece.vertices_m, bones, weights, transforms)
     normals = vertex_normals(moved, piece.faces)
-    return _Sheet(moved, normals, piece.faces, piece.slots, piece.materials)
+    # Normals come from the whole surface: fields of the texture must not show in its shading.
+    return _Sheet(
+        moved[piece.corners],
+        normals[piece.corners],
+        piece.corner_faces,
+        piece.slots,
+        piece.materials,
+        piece.uvs,
+    )
 
 
 def _join_on_ground(
@@ -227,12 +251,16 @@ def _join_on_ground(
             vertices_m=(np.rint((vertices + shift) / _GRID_M) * _GRID_M + 0.0).astype(np.float32),
             faces=np.concatenate(faces).astype(np.int32),
             normals=(np.round(normals, 5) + 0.0).astype(np.float32),
-            uvs=np.zeros((len(vertices), 2), np.float32),
+            uvs=np.round(np.concatenate([_uvs(sheet) for sheet in sheets]), 5).astype(np.float32),
             face_slots=np.concatenate(slots).astype(np.int32),
             materials=tuple(material for sheet in sheets for material in sheet.materials),
         ),
         shift,
     )
+
+
+def _uvs(sheet: _Sheet) -> Array:
+    return np.zeros((len(sheet.vertices_m), 2)) if sheet.uvs is None else sheet.uvs
 
 
 def _index(body: BodyTemplate, mark: str) -> int:
