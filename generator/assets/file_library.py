@@ -17,6 +17,7 @@ from gen_data.generator.assets.asset_cache import FORMAT, Arrays, DiskCache, Sto
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.content_hashes import ContentHashes
 from gen_data.generator.assets.folder_index import (
+    INDEX_NAME,
     ROAD_SUFFIX,
     Entry,
     IndexedAsset,
@@ -63,6 +64,7 @@ from gen_data.generator.core.plates import Plate
 from gen_data.generator.core.scene import Lane, StageModel
 
 _BUILT_IN = Path(__file__).with_name("pybullet.yaml")
+_RENDERED = Path(__file__).parent / "plates" / "rendered"
 PLATES_VERSION = 1
 """Changes with what is measured in photographs."""
 
@@ -341,6 +343,7 @@ def _is_road_network(entry: Entry) -> bool:
 
 def _list_everything(packs: Path, user_roots: Sequence[Path]) -> Iterator[IndexedAsset]:
     yield from list_assets(read_index(_BUILT_IN), _pybullet_data())
+    yield from list_assets(read_index(_RENDERED / INDEX_NAME), _RENDERED, "plate/")
     yield from pack_assets(packs)
     for root in user_roots:
         yield from user_folder(root)

@@ -32,7 +32,7 @@ from gen_data.generator.core.plates import (
     is_catcher,
     is_inside,
 )
-from gen_data.generator.core.scene import Camera, Scene
+from gen_data.generator.core.scene import Camera, Scene, Weather
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.frame_context import CameraView
 
@@ -76,11 +76,20 @@ def open_backdrop(scene: Scene, camera: Camera, assets: AssetLibrary) -> Backdro
     """The photograph behind a scene, without ``unshaded``; None if there is none.
 
     Raises:
-        SampleError: the camera was moved away from the photograph's.
+        SampleError: the camera or the light is not the photograph's.
     """
     if not has_plate(scene):
         return None
     photo_id = scene.environment.image
+    if scene.weather != Weather():
+        raise SampleError(
+            "the scene has weather, but a photograph has its own; remove the randomizer weather"
+        )
+    if assets.get(photo_id).kind != "plate":
+        raise SampleError(
+            f"environment '{photo_id}': the scene has the ground of a photograph, but other light; "
+            "remove the randomizers that change the environment (environment, time_of_day, weather)"
+        )
     plate = assets.plate(photo_id)
     _check_camera(camera, plate)
     size = (camera.intrinsics.width_px, camera.intrinsics.height_px)

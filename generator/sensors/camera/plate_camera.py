@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import model_validator
 
@@ -27,29 +26,26 @@ class PlateCamera(RgbCamera):
 
     Attributes:
         ev100: Exposure value at ISO 100; at 12 the photograph keeps its brightness. null = metered.
-        image_pipeline: From radiance to photographs. The photograph has been developed before: by
-            default it keeps its tones, and noise, blur and compression that are set apply to the
-            photograph and to what is inserted alike. A ``preset`` develops it a second time.
+        image_pipeline: From radiance to photographs. With the preset ``photograph`` the tones of
+            the photograph stay as they are; noise, blur and compression that are set apply to it
+            and to what is inserted alike. Presets of cameras develop it a second time.
     """
 
     type: Literal["plate_camera"] = "plate_camera"  # type: ignore[assignment]
     ev100: float | None = EV100
-    image_pipeline: ImagePipeline = ImagePipeline(tone="srgb")
+    image_pipeline: ImagePipeline = ImagePipeline(preset="photograph")
 
-    @model_validator(mode="before")
-    @classmethod
-    def _follows_the_photograph(cls, given: Any) -> Any:
-        if not isinstance(given, Mapping):
-            return given
+    @model_validator(mode="after")
+    def _follows_the_photograph(self) -> PlateCamera:
         for name in _GIVEN_BY_THE_PHOTOGRAPH:
-            if name in given:
-                raise ValueError(
-                    f"{name}: the photograph gives the camera's geometry; leave it out"
-                )
-        pipeline = given.get("image_pipeline")
-        if isinstance(pipeline, Mapping) and not {"tone", "preset"} & set(pipeline):
-            return {**given, "image_pipeline": {**pipeline, "tone": "srgb"}}
-        return given
+            if name in self.model_fields_set:
+                raise ValueError(f"{name}: the photograph gives it; leave it out")
+        if self.image_pipeline.preset == "ideal":
+            raise ValueError(
+                "image_pipeline.preset: ideal has a tone curve, but the photograph was developed "
+                "before; expected photograph"
+            )
+        return self
 
     def mount(self, scene: Scene) -> Scene:
         """Give the camera of the plate this camera's size and exposure.
