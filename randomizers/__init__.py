@@ -25,6 +25,7 @@ TABLE = PluginTable[Randomizer](
         "materials": "gen_data.randomizers.materials:Materials",
         "objects": "gen_data.randomizers.objects:Objects",
         "physics_properties": "gen_data.randomizers.physics_properties:PhysicsProperties",
+        "plate": "gen_data.randomizers.plate:PhotoPlate",
         "rig_calibration": "gen_data.randomizers.rig_calibration:RigCalibration",
         "street_lights": "gen_data.randomizers.street_lights:StreetLights",
         "textures": "gen_data.randomizers.textures:Textures",

@@ -18,6 +18,7 @@ TABLE = PluginTable[Element](
         "light": "gen_data.scene_templates.light:LightElement",
         "objects": "gen_data.scene_templates.objects:Objects",
         "parking_area": "gen_data.scene_templates.parking_area:ParkingArea",
+        "plate": "gen_data.scene_templates.plate:PlateElement",
         "prop": "gen_data.scene_templates.prop:Prop",
         "road": "gen_data.scene_templates.road:Road",
         "road_network": "gen_data.scene_templates.road_network:RoadNetwork",

@@ -9,6 +9,7 @@ import numpy as np
 
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex, Element
+from gen_data.generator.core.plates import has_plate
 from gen_data.generator.core.scene import Lane, Light, Region, Scene, SupportSurface
 from gen_data.generator.core.se3 import Vec3
 
@@ -35,7 +36,7 @@ def build_scene(name: str, elements: Sequence[Element], assets: AssetIndex) -> S
     scene = Scene(template=name)
     for element in sorted(elements, key=lambda element: element.follows_others):
         scene = element.add(scene, assets)
-    if not scene.lights:
+    if not scene.lights and not has_plate(scene):
         scene = replace(scene, lights=(DEFAULT_LIGHT,))
     if scene.lanes:
         scene = replace(scene, interior_m=_bounds_of_lanes(scene.lanes))

@@ -30,10 +30,12 @@ from gen_data.generator.core.interfaces import (
     Sensor,
     SensorInfo,
 )
+from gen_data.generator.core.plates import has_plate
 from gen_data.generator.core.scene import LABEL_IDS_MAX, Scene, SharedValue
 from gen_data.generator.physics import open_engine
 from gen_data.generator.pipeline import Pipeline
 from gen_data.generator.pipeline.pipeline import PipelineConfig, SceneSource
+from gen_data.generator.sensors.camera.plate_camera import PlateCamera
 from gen_data.generator.sensors.mounting import check_not_buried, stride, within_steps
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.scene_templates.builder import build_scene
@@ -257,6 +259,8 @@ def nominal_scene(config: Config, scene_config: SceneConfig, assets: AssetIndex)
             scene = sensor.mount(scene)
             info = sensor.describe()
             _check_mounted(scene, info)
+            if has_plate(scene):
+                _check_on_plate(sensor)
             if info.needs_clear_view:
                 check_not_buried(scene, info.name, assets)
     return scene
@@ -273,6 +277,19 @@ def _check_mounted(scene: Scene, info: SensorInfo) -> None:
         raise ConfigError(
             f"sensor '{info.name}': describe() names a {info.modality.value}, but mount() adds no"
             f" {info.modality.value} of this name to the scene"
+        )
+
+
+def _check_on_plate(sensor: Sensor) -> None:
+    """Refuse a sensor that would need more of the world than a photograph shows.
+
+    Raises:
+        ConfigError: it is not the camera of the photograph.
+    """
+    if not isinstance(sensor, PlateCamera):
+        raise ConfigError(
+            f"sensor '{sensor.name}': the world of a photograph has no geometry but its ground; "
+            "expected a plate_camera"
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +18,7 @@ from gen_data.generator.assets.folder_index import (
 from gen_data.generator.assets.library import Library
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.kinematics import link_poses
+from gen_data.generator.core.plates import ground_rectangle, horizon_px
 from gen_data.generator.core.se3 import SE3, Vec3
 
 _SMALLEST_M, _LARGEST_M = 0.001, 20.0
@@ -35,6 +37,7 @@ class Finding:
         up: Axis of the file that points up; empty if the file itself states it.
         error: Reason why it cannot be used; empty if it can.
         warnings: Doubtful properties.
+        note: What was measured, for photographs.
     """
 
     asset_id: str
@@ -46,6 +49,7 @@ class Finding:
     up: str = ""
     error: str = ""
     warnings: tuple[str, ...] = ()
+    note: str = ""
 
 
 def check_folder(root: Path, library: Library) -> Iterator[Finding]:
@@ -69,6 +73,8 @@ def check_folder(root: Path, library: Library) -> Iterator[Finding]:
 def _inspect(one: IndexedAsset, library: Library) -> Finding:
     """Import an asset. Raises AssetError if it cannot be used."""
     origin = () if one.origin.licence not in ("", "unknown") else ("no licence is given",)
+    if one.kind == "plate":
+        return _inspect_plate(one, library, origin)
     if one.kind in ("texture", "environment"):
         (library.texture if one.kind == "texture" else library.environment)(one.asset_id)
         return Finding(one.asset_id, one.kind, "", warnings=origin)
@@ -78,6 +84,23 @@ def _inspect(one: IndexedAsset, library: Library) -> Finding:
     warnings = (*_find_doubts(one, max(size_m)), *origin)
     found = (triangles, size_m, _describe_unit(one), _describe_up(one))
     return Finding(one.asset_id, one.kind, one.category(), *found, warnings=warnings)
+
+
+def _inspect_plate(one: IndexedAsset, library: Library, doubts: tuple[str, ...]) -> Finding:
+    """Estimate a photograph's camera."""
+    plate = library.plate(one.asset_id)
+    library.environment(one.asset_id)
+    (_, left_px), (_, right_px) = horizon_px(plate)
+    source = "given"
+    if plate.estimated:
+        source = f"estimated to {math.degrees(plate.horizon_error_rad):.2f} deg"
+    hfov = math.degrees(2.0 * math.atan(0.5 * plate.size_px[0] / plate.focal_px))
+    _, (length_m, width_m) = ground_rectangle(plate)
+    note = (
+        f"horizon from row {left_px:.0f} to row {right_px:.0f} px ({source}), hfov {hfov:.1f} deg, "
+        f"room for things {length_m:.1f} m x {width_m:.1f} m"
+    )
+    return Finding(one.asset_id, one.kind, "", note=note, warnings=doubts)
 
 
 def _measure_object(one: IndexedAsset, library: Library) -> tuple[int, Vec3, Vec3]:

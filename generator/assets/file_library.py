@@ -17,11 +17,13 @@ from gen_data.generator.assets.asset_cache import FORMAT, Arrays, DiskCache, Sto
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.content_hashes import ContentHashes
 from gen_data.generator.assets.folder_index import (
+    INDEX_NAME,
     ROAD_SUFFIX,
     Entry,
     IndexedAsset,
     MeshEntry,
     Origin,
+    PlateEntry,
     RobotEntry,
     TextureEntry,
     list_assets,
@@ -38,8 +40,10 @@ from gen_data.generator.assets.parsing import (
     parse_lanes,
     parse_link,
     parse_object,
+    parse_plate,
     parse_road_network,
     parse_stage,
+    parse_surroundings,
     unpack_value,
 )
 from gen_data.generator.assets.robot_models import robot_model
@@ -56,9 +60,13 @@ from gen_data.generator.core.asset_types import (
     UInt8,
 )
 from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.plates import Plate
 from gen_data.generator.core.scene import Lane, StageModel
 
 _BUILT_IN = Path(__file__).with_name("pybullet.yaml")
+_RENDERED = Path(__file__).parent / "plates" / "rendered"
+PLATES_VERSION = 1
+"""Changes with what is measured in photographs."""
 
 
 class FileLibrary:
@@ -162,13 +170,28 @@ class FileLibrary:
             )
         return self._stages[asset_id]
 
+    def plate(self, asset_id: str) -> Plate:
+        """Camera, ground and light of a photograph. Raises AssetError if it is none."""
+        one = self._entries()[asset_id]
+        entry = one.entry
+        if not isinstance(entry, PlateEntry):
+            raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not a plate")
+        plate: Plate = self._store.get(
+            content_key({"asset": self._key(one), "part": "plate", "version": PLATES_VERSION}),
+            lambda: self._parse(one, parse_plate, entry),
+            lambda arrays: unpack_value(Plate, arrays),
+        )
+        return plate
+
     def texture(self, texture_id: str) -> TextureData:
-        """Images of a texture entry, or of a mesh's material (``<asset>#<image>``)."""
+        """Images of a texture entry, of a plate, or of a mesh's material (``<asset>#<image>``)."""
         owner, _, name = texture_id.partition("#")
         part = self._part(owner)
         one = part[0] if part else self._entries()[owner]
         folder = Folder(one.root)
-        if not name:
+        if not name and isinstance(one.entry, PlateEntry):
+            name = one.entry.file
+        elif not name:
             if not isinstance(one.entry, TextureEntry):
                 raise AssetError(f"asset '{owner}': is of kind {one.kind}, not a texture")
             name = one.entry.texture_name()
@@ -192,9 +215,21 @@ class FileLibrary:
     def environment(self, asset_id: str) -> Float32:
         """Pixels of a panorama."""
         one = self._entries()[asset_id]
+        if one.kind == "plate":
+            return self._surroundings(one)
         if one.kind != "environment":
             raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not an environment")
         radiance: Float32 = self._decode_cached(Folder(one.root), one.entry.file, "radiance")
+        return radiance
+
+    def _surroundings(self, one: IndexedAsset) -> Float32:
+        """The light around a photograph's scene, of mean luminance 1."""
+        plate = self.plate(one.asset_id)
+        radiance: Float32 = self._store.get(
+            content_key({"asset": self._key(one), "part": "around", "version": PLATES_VERSION}),
+            lambda: self._parse(one, parse_surroundings, one.entry.file, plate),
+            lambda arrays: next(iter(arrays.values())),
+        )
         return radiance
 
     def _decode_cached(self, folder: Folder, name: str, channels: str) -> Any:
@@ -308,6 +343,7 @@ def _is_road_network(entry: Entry) -> bool:
 
 def _list_everything(packs: Path, user_roots: Sequence[Path]) -> Iterator[IndexedAsset]:
     yield from list_assets(read_index(_BUILT_IN), _pybullet_data())
+    yield from list_assets(read_index(_RENDERED / INDEX_NAME), _RENDERED, "plate/")
     yield from pack_assets(packs)
     for root in user_roots:
         yield from user_folder(root)

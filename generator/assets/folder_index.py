@@ -31,6 +31,7 @@ from gen_data.generator.config.problems import Problems
 from gen_data.generator.config.validation import validate
 from gen_data.generator.config.yaml_tree import Node, find_text, load_yaml
 from gen_data.generator.core.errors import AssetError, did_you_mean
+from gen_data.generator.core.scene import LaneKind
 from gen_data.generator.core.se3 import Vec3
 
 INDEX_NAME = "assets.yaml"
@@ -334,6 +335,68 @@ class ImageEntry(Origin):
         return (self.file,)
 
 
+PointPx = tuple[float, float]
+
+
+class LevelHorizon(Strict):
+    """A horizon by its height in the middle of the photograph."""
+
+    height_px: float
+    """Row of the horizon in the middle column, from the top."""
+    roll_deg: float = Field(0.0, gt=-45, lt=45)
+    """Slope of the horizon; positive falls to the right."""
+
+
+class PlateSunEntry(Strict):
+    """The sun of a photograph, of which shadows show the direction."""
+
+    azimuth_deg: float
+    """From the viewing direction, positive to the left; 180 = behind the camera."""
+    elevation_deg: Annotated[float, Field(ge=2.0, le=90.0)]
+    share: Annotated[float, Field(ge=0.0, le=1.0)] = 0.8
+    """Share of the light on level ground; the default is for a clear sky (assumed, within 0.1)."""
+
+
+class PlateLane(Strict):
+    """A lane on the ground of a photograph."""
+
+    kind: LaneKind = "driving"
+    center_px: Annotated[tuple[PointPx, ...], Field(min_length=2)]
+    """Points of its centre line, in the direction of travel."""
+    width_m: Length = 3.0
+
+
+class PlateEntry(Origin):
+    """A photograph as backdrop; see ``core.plates``. Pixels are counted from the top left."""
+
+    id: Id | None = None
+    file: str
+    camera_height_m: Length
+    """Height of the camera above the ground."""
+    ground: Annotated[tuple[PointPx, ...], Field(min_length=3)]
+    """Corners of the ground on which things may stand [px]."""
+    hfov_deg: Annotated[float, Field(ge=5.0, le=150.0)] | None = None
+    """Horizontal field of view; by default from the photograph's EXIF data, else estimated."""
+    horizon: LevelHorizon | tuple[PointPx, PointPx] | None = None
+    """Two points of the horizon [px], or its height; by default estimated from straight edges."""
+    mask: str = ""
+    """Image of the foreground, of the photograph's size: white hides what is inserted."""
+    lanes: tuple[PlateLane, ...] = ()
+    sun: PlateSunEntry | None = None
+    """By default the light comes from the sky alone."""
+    ground_albedo: Annotated[float, Field(gt=0.0, le=1.0)] = 0.15
+    """Reflectance of the ground, which sets the brightness of inserted things against it. Asphalt:
+    0.04 when new, 0.12 after five years, at most 0.16 (LBNL Heat Island Group, "Pavement albedo");
+    other ground 0.2 to 0.4, snow 0.8 (assumed, within a factor of 1.5)."""
+    ground_roughness: Fraction = 0.9
+    """Less for ground that mirrors what stands on it."""
+    tags: tuple[Word, ...] = ()
+
+    def files(self) -> tuple[str, ...]:
+        """The files that it names."""
+        return _unique_files(self.file, self.mask)
+
+
 class FolderIndex(Origin):
     """Content of ``assets.yaml``."""
 
@@ -341,13 +404,15 @@ class FolderIndex(Origin):
     robots: tuple[RobotEntry, ...] = ()
     textures: tuple[TextureEntry, ...] = ()
     environments: tuple[ImageEntry, ...] = ()
+    plates: tuple[PlateEntry, ...] = ()
 
 
 Model = TypeVar("Model", bound=Strict)
-Entry = MeshEntry | RobotEntry | TextureEntry | ImageEntry
-Kind = Literal["object", "robot", "texture", "environment"]
+Entry = MeshEntry | RobotEntry | TextureEntry | ImageEntry | PlateEntry
+Kind = Literal["object", "robot", "texture", "environment", "plate"]
 _SECTIONS: dict[Kind, str] = {
     "object": "assets", "robot": "robots", "texture": "textures", "environment": "environments",
+    "plate": "plates",
 }  # fmt: skip
 
 

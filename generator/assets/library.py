@@ -24,6 +24,7 @@ from gen_data.generator.core.asset_types import (
 )
 from gen_data.generator.core.bounded_cache import CountCache
 from gen_data.generator.core.errors import AssetError, UnknownAsset, did_you_mean
+from gen_data.generator.core.plates import Plate
 from gen_data.generator.core.scene import Lane, StageModel
 from gen_data.generator.core.se3 import Vec3
 
@@ -147,6 +148,12 @@ class Library:
         if self._is_generated(asset_id):
             raise AssetError(f"asset '{asset_id}': is not a stage")
         return self._files.stage(asset_id)
+
+    def plate(self, asset_id: str) -> Plate:
+        """Camera, ground and light of a photograph. Raises AssetError if the asset is none."""
+        if self._is_generated(asset_id):
+            raise AssetError(f"asset '{asset_id}': is not a plate")
+        return self._files.plate(asset_id)
 
     def mesh(self, asset_id: str) -> MeshData:
         """Visual geometry of an object or a robot link: ``franka_panda/panda_link3``.

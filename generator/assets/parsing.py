@@ -15,7 +15,7 @@ import numpy as np
 from gen_data.generator.assets.asset_arrays import encode_text, pack_imported
 from gen_data.generator.assets.asset_cache import Arrays
 from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.folder_index import MeshEntry, RobotEntry
+from gen_data.generator.assets.folder_index import MeshEntry, PlateEntry, RobotEntry
 from gen_data.generator.assets.image_decoding import decode_image, decode_radiance
 from gen_data.generator.assets.importer import (
     import_link,
@@ -26,6 +26,7 @@ from gen_data.generator.assets.importer import (
 from gen_data.generator.assets.urdf import read_urdf
 from gen_data.generator.assets.usd_stages import stage_model
 from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.plates import Plate
 from gen_data.generator.core.serialization import canonical_json, from_plain
 from gen_data.generator.usd.stage_reader import layer_references
 
@@ -80,6 +81,23 @@ def parse_image(root: Path, digests: Digests, name: str, channels: str) -> Array
         else decode_image(data, place, alpha=channels == "rgba")
     )
     return _checked(folder, digests, {channels: pixels})
+
+
+def parse_plate(root: Path, digests: Digests, entry: PlateEntry) -> Arrays:
+    """Read a photograph's plate, for ``unpack_value``."""
+    from gen_data.generator.assets.plates.plate_import import import_plate
+
+    folder = Folder(root)
+    return _checked(folder, digests, _pack_value(import_plate(folder, entry)))
+
+
+def parse_surroundings(root: Path, digests: Digests, file: str, plate: Plate) -> Arrays:
+    """Continue a photograph to all sides: ``{"radiance": pixels}``."""
+    from gen_data.generator.assets.plates.surroundings import surroundings
+
+    folder = Folder(root)
+    rgb = decode_image(folder.read(file), str(root / file))
+    return _checked(folder, digests, {"radiance": surroundings(plate, rgb)[1]})
 
 
 def parse_layer_references(root: Path, digests: Digests, file: str) -> Arrays:

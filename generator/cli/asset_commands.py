@@ -117,7 +117,10 @@ def show(asset_id: str, folders: tuple[Path, ...]) -> None:
     "--sheet", type=click.Path(path_type=Path), help="Write pictures of all assets to this PNG."
 )
 def check(folder: Path, sheet: Path | None) -> None:
-    """Import every asset of your FOLDER; report its category, size, unit and faults."""
+    """Import every asset of your FOLDER; report its category, size, unit and faults.
+
+    Pictures of plates show the horizon and a grid of 1 m on the ground.
+    """
     from gen_data.generator.assets.checking import check_folder
     from gen_data.generator.assets.library import open_library
 
@@ -195,13 +198,13 @@ def _list_assets(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
     from gen_data.generator.assets.library import open_library
 
     library = open_library(folders)
-    for kind in ("object", "robot", "texture", "environment"):
+    for kind in ("object", "robot", "texture", "environment", "plate"):
         for asset in library.find(tags, kind):
             click.echo(f"{asset.asset_id}  {asset.category}  [{' '.join(asset.tags)}]")
 
 
 def _print_findings(findings: Sequence[Finding]) -> None:
-    """Print a table, followed by all errors and warnings in full."""
+    """Print a table, followed by all errors, measurements and warnings in full."""
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -216,7 +219,7 @@ def _print_findings(findings: Sequence[Finding]) -> None:
     console = Console()
     Console(width=None if console.is_terminal else 160).print(table)
     for one in findings:
-        for problem in (one.error, *one.warnings):
+        for problem in (one.error, one.note, *one.warnings):
             if problem:
                 click.echo(f"{one.asset_id}: {problem}")
 

@@ -262,7 +262,7 @@ class Asset:
 
     Attributes:
         asset_id: Its name in YAML and scenes: ``mug?seed=3``, ``pybullet/teddy``.
-        kind: ``object`` (a mesh), ``robot``, ``texture`` or ``environment``.
+        kind: ``object`` (a mesh), ``robot``, ``texture``, ``environment`` or ``plate``.
         category: Its category in labels.
         tags: Tags for selection in YAML, sorted.
         mass_kg: Nominal mass; 0 = unknown.
@@ -274,7 +274,7 @@ class Asset:
     """
 
     asset_id: str
-    kind: Literal["object", "robot", "texture", "environment"]
+    kind: Literal["object", "robot", "texture", "environment", "plate"]
     category: str
     tags: tuple[str, ...]
     licence: str

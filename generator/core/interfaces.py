@@ -56,6 +56,7 @@ from gen_data.generator.core.capture import (
 from gen_data.generator.core.errors import Rejection
 from gen_data.generator.core.lens import LensModel
 from gen_data.generator.core.measurement_dtypes import Column
+from gen_data.generator.core.plates import Plate
 from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth, Sample
 from gen_data.generator.core.scene import Camera, Lane, Lidar, Scene, StageModel
 from gen_data.generator.core.se3 import Vec3
@@ -115,6 +116,13 @@ class AssetIndex(Protocol):
 
     def stage(self, asset_id: str) -> StageModel:
         """Content of a stage file. Raises AssetError if the asset is no stage."""
+        ...
+
+    def plate(self, asset_id: str) -> Plate:
+        """Camera, ground and light of a photograph. Raises AssetError if the asset is none.
+
+        ``AssetLibrary.texture`` gives its pixels, ``AssetLibrary.environment`` the light around it.
+        """
         ...
 
 

@@ -17,6 +17,7 @@ from gen_data.generator.core.scene import Articulation, Body, Camera, Environmen
 from gen_data.generator.core.se3 import SE3, look_at
 from gen_data.generator.core.streams import Streams
 from gen_data.generator.preview.overlay import Image
+from gen_data.generator.preview.plate_overlay import plate_overlay
 from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, capture_photograph
 
 _HALF_FIELD_RAD = math.radians(15.0)
@@ -32,6 +33,9 @@ def thumbnail(asset: Asset, library: AssetLibrary, renderer: Renderer, size_px: 
     """
     if asset.kind == "texture":
         return _fit_in_square(library.texture(asset.asset_id).albedo, size_px)
+    if asset.kind == "plate":
+        plate = library.plate(asset.asset_id)
+        return _fit_in_square(plate_overlay(plate, library.texture(asset.asset_id).albedo), size_px)
     if asset.kind == "environment":
         radiance = library.environment(asset.asset_id)
         shown = np.power(radiance / (1.0 + radiance), 1.0 / 2.2)

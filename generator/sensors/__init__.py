@@ -9,6 +9,7 @@ TABLE = PluginTable[Sensor](
     "sensor",
     {
         "rgb_camera": "gen_data.generator.sensors.camera.rgb_camera:RgbCamera",
+        "plate_camera": "gen_data.generator.sensors.camera.plate_camera:PlateCamera",
         "depth_camera": "gen_data.generator.sensors.depth.depth_camera:DepthCamera",
         "lidar": "gen_data.generator.sensors.lidar.lidar_sensor:LidarSensor",
         "pseudo_lidar": "gen_data.generator.sensors.lidar.pseudo_lidar:PseudoLidar",

@@ -24,6 +24,7 @@ from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer, find_v
 
 if TYPE_CHECKING:
     from gen_data.generator.renderers.warp.pathtraced.path_tracer import PathTracer
+    from gen_data.generator.renderers.warp.plates import Backdrop
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -32,11 +33,13 @@ class RenderContext:
 
     Attributes:
         paths: The path tracer; None in the realtime tier.
+        backdrop: The photograph behind the scene; None if there is none.
     """
 
     cache: DeviceCache
     settings: RenderSettings
     paths: PathTracer | None = None
+    backdrop: Backdrop | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -12,9 +12,11 @@ from gen_data.generator.renderers.warp.device import compile_kernels, open_devic
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.frame_context import CameraState, CameraView, RenderContext
 from gen_data.generator.renderers.warp.lidar.lidar_tracing import trace_scan
+from gen_data.generator.renderers.warp.plates import open_backdrop
 from gen_data.generator.renderers.warp.realtime.realtime_shading import (
     add_precipitation,
     radiance_image,
+    render_bare_ground,
     shade_pixels,
     smooth_edges,
 )
@@ -65,17 +67,34 @@ class WarpRenderer:
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
         """All requested channels of one camera."""
-        reading = expose_shutter(scene, camera, channels, self._context)
-        return reading or self._render_instant(scene, camera, channels)
+        context = self._with_photo(scene, camera, channels)
+        reading = expose_shutter(scene, camera, channels, context)
+        return reading or self._render_instant(scene, camera, channels, context)
+
+    def _with_photo(
+        self, scene: Scene, camera: Camera, channels: frozenset[Channel]
+    ) -> RenderContext:
+        """The context with the photograph behind the scene, if there is one."""
+        backdrop = open_backdrop(scene, camera, self._cache.assets)
+        if backdrop is None:
+            return self._context
+        if Channel.RADIANCE in channels:
+            bare = render_bare_ground(CameraState.of(scene, camera), self._context)
+            backdrop = replace(backdrop, unshaded=bare)
+        return replace(self._context, backdrop=backdrop)
 
     def _render_instant(
-        self, scene: Scene, camera: Camera, channels: frozenset[Channel]
+        self,
+        scene: Scene,
+        camera: Camera,
+        channels: frozenset[Channel],
+        context: RenderContext,
     ) -> SensorReading:
         """The image of a single instant."""
         world = pack_world(scene, camera, self._cache)
         view = pack_view(camera, self._cache)
         gbuffer = find_visible(world, view, self._cache, self._settings.visibility)
-        frame = CameraView(CameraState(scene, camera), world, view, gbuffer, self._context)
+        frame = CameraView(CameraState(scene, camera), world, view, gbuffer, context)
         if Channel.AMODAL in channels:
             channels = channels | {Channel.INSTANCE}
         images = label_images(frame, channels)

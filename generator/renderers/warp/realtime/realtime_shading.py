@@ -17,7 +17,19 @@ from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.atmosphere.precipitation import draw_precipitation
 from gen_data.generator.renderers.warp.atmosphere.weather import expose_ground, fill_air
-from gen_data.generator.renderers.warp.frame_context import CameraView
+from gen_data.generator.renderers.warp.frame_context import (
+    CameraState,
+    CameraView,
+    RenderContext,
+    render_view,
+)
+from gen_data.generator.renderers.warp.plates import (
+    cover_by_foreground,
+    mix_photo,
+    show_photo,
+    things_in,
+    without_things,
+)
 from gen_data.generator.renderers.warp.realtime.kernels import (
     lattice_interpolation,
     lattice_lighting,
@@ -48,6 +60,8 @@ from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import 
 
 _PARTS = 2
 """Samples per pixel on edges in reflections or behind glass."""
+_COVERAGE_SAMPLES = 8
+"""Samples per pixel on edges that determine what covers a photograph."""
 
 
 def shade_pixels(frame: CameraView) -> wp.array:
@@ -55,6 +69,26 @@ def shade_pixels(frame: CameraView) -> wp.array:
 
     The realtime tier shades pixel centres, which ``smooth_edges`` anti-aliases.
     """
+    radiance = _shade_world(frame)
+    backdrop = frame.context.backdrop
+    if backdrop is None:
+        return radiance
+    if frame.context.paths is None:
+        show_photo(frame, backdrop, radiance)
+    else:
+        mix_photo(frame, backdrop, _coverage(frame), radiance)
+    return radiance
+
+
+def render_bare_ground(state: CameraState, context: RenderContext) -> Float32:
+    """Radiance of the ground of a photograph without the things on it, float32 [h, w, 3]."""
+    bare = CameraState.of(without_things(state.scene), state.camera)
+    frame = render_view(bare, replace(context, backdrop=None))
+    return radiance_image(shade_pixels(frame), frame.view)
+
+
+def _shade_world(frame: CameraView) -> wp.array:
+    """As ``shade_pixels``, without a photograph."""
     if frame.context.paths is not None:
         return frame.context.paths.light(frame)
     if frame.settings.environment_shadow == "auto":
@@ -70,11 +104,26 @@ def shade_pixels(frame: CameraView) -> wp.array:
 def smooth_edges(frame: CameraView, radiance: wp.array) -> None:
     """Anti-alias radiance that is not averaged over pixels yet, in place.
 
-    Pixels on edges become the mean of their samples' radiance.
+    Pixels on edges become the mean of their samples' radiance. Then the foreground of a photograph
+    covers the image.
     """
     samples = frame.settings.antialias
-    if frame.context.paths is not None or samples == 1:
-        return
+    if frame.context.paths is None and samples > 1:
+        _average_samples(frame, radiance, samples)
+    if frame.context.backdrop is not None:
+        cover_by_foreground(frame, frame.context.backdrop, radiance)
+
+
+def _coverage(frame: CameraView) -> Float32:
+    """Share of each pixel that is not background or a photograph's ground, float32 [h, w]."""
+    things = np.repeat(things_in(frame).reshape(-1, 1), 3, axis=1).astype(np.float32)
+    values = wp.array(things, dtype=wp.vec3, device=frame.cache.device)
+    _average_samples(frame, values, max(frame.settings.antialias, _COVERAGE_SAMPLES))
+    return np.ascontiguousarray(radiance_image(values, frame.view)[..., 0])
+
+
+def _average_samples(frame: CameraView, radiance: wp.array, samples: int) -> None:
+    """Replace the values of pixels on edges by the means of their samples, in place."""
     cache, projected = frame.cache, frame.gbuffer.projected
     count = wp.zeros(1, dtype=wp.int32, device=cache.device)
     pixels = cache.scratch("listed pixels", frame.pixels, wp.int32)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.renderers.warp.frame_context import CameraView
+from gen_data.generator.renderers.warp.plates import hide_labels
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.visibility.kernels import label_resolve
 
@@ -45,6 +46,8 @@ def label_images(frame: CameraView, channels: frozenset[Channel]) -> dict[Channe
         boxes = wp.array(frames, dtype=label_resolve.BoxFrame, device=frame.cache.device)
         inputs = [frame.world.record, gbuffer.hits, gbuffer.weights, boxes]
         images[Channel.OBJECT_COORDINATES] = _launch(frame, kernel, inputs, wp.vec3)
+    if frame.context.backdrop is not None:
+        hide_labels(frame, frame.context.backdrop, images)
     return images
 
 

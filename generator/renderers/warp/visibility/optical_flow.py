@@ -20,6 +20,7 @@ from gen_data.generator.renderers.warp.frame_context import (
     RowBand,
     render_view,
 )
+from gen_data.generator.renderers.warp.plates import hide_flow
 from gen_data.generator.renderers.warp.visibility.reprojection import (
     BandedGBuffer,
     ReprojectedPoints,
@@ -68,6 +69,8 @@ def flow_images(
         images |= _flow_channels(
             points, gbuffer, middle.later(-step_s), channels & BACKWARD, reference
         )
+    if reference.context.backdrop is not None:
+        hide_flow(reference.context.backdrop, images)
     return images
 
 
@@ -97,6 +100,9 @@ def _flow_channels(
             # Bands four times as high allow one pixel of motion: as accurate as the occlusion test.
             starts = [band.first for band in bands[::4]]
             _, other = render_bands(make_bands(then, starts), seen, reference)
+            if reference.context.backdrop is not None:
+                # The foreground is nearer than everything.
+                other[Channel.RANGE][reference.context.backdrop.hidden] = 0.0
             images[channel] = find_occluded(points, found, other, gbuffer.intrinsics)
     return images
 

@@ -1,0 +1,1 @@
+"""Photographs as plates: estimation of their cameras, and their light."""

@@ -1,0 +1,63 @@
+"""Photographs with their horizon, the corners of their ground, and a grid on it."""
+
+from __future__ import annotations
+
+import math
+
+import cv2
+import numpy as np
+
+from gen_data.generator.core.asset_types import UInt8
+from gen_data.generator.core.plates import Plate, ground_points, horizon_px
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.preview.overlay import Image
+
+_HORIZON, _CORNERS, _GRID, _LANE = (255, 60, 60), (255, 220, 0), (0, 220, 255), (120, 255, 80)
+_LINES_MAX = 60
+"""Lines of the grid along each axis; larger grounds get a grid of several metres."""
+_POINTS = 40
+_SHIFT = 4
+"""Fractional bits of drawn coordinates."""
+
+
+def plate_overlay(plate: Plate, rgb: UInt8) -> Image:
+    """The photograph, uint8 [h, w, 3], with its estimated or given geometry drawn on it."""
+    image = rgb.copy()
+    width = max(1, round(max(plate.size_px) / 500))
+    for line in _grid_lines(plate):
+        _draw(image, line, _GRID, max(width // 2, 1))
+    corners = np.array([*plate.ground_px, plate.ground_px[0]])
+    _draw(image, corners, _CORNERS, width)
+    for lane in plate.lanes:
+        _draw(image, _project(plate, np.array(lane.center_m)), _LANE, width)
+    _draw(image, np.array(horizon_px(plate)), _HORIZON, width)
+    return image
+
+
+def _grid_lines(plate: Plate) -> list[Array]:
+    """Image points of lines 1 m (or more) apart on the ground, around its corners."""
+    corners = ground_points(plate, np.array(plate.ground_px))
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    step = max(1, math.ceil(float((high - low).max()) / _LINES_MAX))
+    lines = []
+    for axis in (0, 1):
+        first, end = math.floor(low[axis] / step), math.ceil(high[axis] / step)
+        for k in range(first, end + 1):
+            points = np.zeros((_POINTS, 3))
+            points[:, axis] = k * step
+            points[:, 1 - axis] = np.linspace(low[1 - axis], high[1 - axis], _POINTS)
+            lines.append(_project(plate, points))
+    return lines
+
+
+def _project(plate: Plate, points_m: Array) -> Array:
+    """Image coordinates of points of the plate's world; NaN behind the camera."""
+    return plate.intrinsics.project(plate.T_world_camera.inverse().apply(points_m))
+
+
+def _draw(image: Image, points_px: Array, color: tuple[int, int, int], width: int) -> None:
+    """Draw a line through image points, without those that have none."""
+    shown = points_px[np.isfinite(points_px).all(axis=1)]
+    # OpenCV puts pixel centres at integers, and takes 16 bits before the point.
+    scaled = np.clip((shown - 0.5) * (1 << _SHIFT), -(1 << 24), 1 << 24).round().astype(np.int32)
+    cv2.polylines(image, [scaled], False, color, width, cv2.LINE_AA, _SHIFT)
