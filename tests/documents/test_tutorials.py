@@ -43,13 +43,19 @@ SMALLER = {
     },
     "train_a_detector": {
         "examples/detector.yaml": "examples/detector.yaml --set sensors.color.size_px=[96,72]",
+        "--n 1000": "--n 8",
+        "{train: 0.8, val: 0.2, test: 0}": "{train: 0.5, val: 0.5, test: 0, assign: round_robin}",
         "--n 800": "--n 8", "--n 200": "--n 4",
         "--steps 2400 --minutes 60": "--steps 2 --size 96 --workers 0",
     },
 }  # fmt: skip
 """Texts of each page that are replaced, so that it runs within seconds."""
 
-SETUP = ("python3 -m venv .venv && . .venv/bin/activate", "pip install . torch==2.13.0")
+SETUP = (
+    "python3 -m venv .venv && . .venv/bin/activate",
+    "pip install . torch==2.13.0",
+    "pip install . ultralytics-opencv-headless",
+)
 """Commands that make the environment in which the tests already run."""
 
 
@@ -126,6 +132,9 @@ def run(words: list[str], folder: Path) -> None:
     elif command in ("ln", "mkdir"):
         subprocess.run(words, check=True)
         return
+    elif command == "yolo":
+        run_yolo(*arguments)
+        return
     else:
         raise AssertionError(f"unknown command: {shlex.join(words)}")
     path = os.pathsep.join([str(ROOT), str(site)])
@@ -151,6 +160,19 @@ def stand_ins() -> Iterator[ModuleType]:
             yield module
 
 
+def run_yolo(task: str, mode: str, *settings: str) -> None:
+    """Stand in for the command ``yolo``, which trains for minutes."""
+    values = dict(setting.split("=") for setting in settings)
+    known = {"model", "data", "imgsz", "epochs", "optimizer", "lr0", "plots", "val"}
+    assert task == "detect" and values.keys() <= known
+    if mode == "train":
+        model = YoloStandIn(values["model"])
+        model.train(data=values["data"], epochs=int(values["epochs"]), imgsz=int(values["imgsz"]))
+    else:
+        assert mode == "val" and values["model"] == "runs/detect/train/weights/last.pt"
+        YoloStandIn.read_labels(values["data"], "val")
+
+
 class YoloStandIn:
     """Reads the data set as Ultralytics does: images from ``data.yaml``, labels beside them."""
 
@@ -159,9 +181,15 @@ class YoloStandIn:
 
     def train(self, *, data: str, epochs: int, imgsz: int) -> None:
         """Every image has a label file of normalised boxes of known classes."""
+        assert epochs > 0 and imgsz > 0
+        self.read_labels(data, "train")
+
+    @staticmethod
+    def read_labels(data: str, split: str) -> None:
+        """Every image of a split has a label file of normalised boxes of known classes."""
         content = yaml.safe_load(Path(data).read_text())
-        images = sorted((Path(data).parent / content["train"]).glob("*.png"))
-        assert images and epochs > 0 and imgsz > 0
+        images = sorted((Path(data).parent / content[split]).glob("*.png"))
+        assert images
         rows = []
         for image in images:
             label = Path(str(image.with_suffix(".txt")).replace("/images/", "/labels/"))
