@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from gen_data.generator.assets.procedural.data_tables import load_table
-from gen_data.generator.assets.vehicles.plates import SEEDS, reseed_plate
+from gen_data.generator.assets.vehicles.plates import FORMATS, IN_EUROPE, SEEDS, reseed_plate
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
@@ -24,7 +25,17 @@ _PIGMENT = 0.45
 """Roughness of the pigment below a clear coat."""
 _WORN = 0.4
 """Ratio of a clear coat's roughness to that of an uncoated paint of similar appearance."""
-_SOILED = ("paint", "glass", "rim", "tyre", "trim", "chrome", "plate", "headlight", "taillight")
+_WEATHERED = (0.42, 0.65)
+"""Roughness of paint whose clear coat has gone; assumed."""
+_PALER = 0.02
+"""Share of white in it: chalked pigment; assumed, within a half."""
+_SOILED = {
+    "paint": 1.0, "glass": 0.35, "rim": 1.5, "tyre": 1.6, "trim": 1.3, "chrome": 1.0,
+    "plate": 0.8, "headlight": 0.8, "taillight": 1.0, "brakelight": 1.0, "lens": 0.8,
+    "canvas": 1.2,
+}  # fmt: skip
+"""Dust over that on the paint, by role: wheels, sills and bumpers are near the road, panes are
+wiped; assumed, within a half."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +62,13 @@ class VehiclePaint(SurfaceRandomizer):
         roughness: Roughness of the finish: 0.1 waxed, 0.3 weathered.
         metallic: Whether the paint contains metal flakes; white never does.
         dirt: Fraction of dust on the vehicle's surfaces.
+        weathered: Probability that the clear coat of a vehicle has gone, so that its paint is matt
+            and paler, without flakes.
         plates: Whether every vehicle gets its own licence plate instead of its model's.
+        countries: Relative frequency by country of licence plates, drawn once per scene: de, fr,
+            gb, ..., us_ca, us_tx, jp, cn. Those that are not 520 mm by 110 mm are drawn smaller, in
+            a dark holder.
+        foreign: Probability that a vehicle's plate is of another of the countries.
         coat: Weight of a separate clear coat, traced with one ray per pixel; ``roughness`` then
             sets the wear of the coat. 0 = no separate coat.
     """
@@ -62,17 +79,24 @@ class VehiclePaint(SurfaceRandomizer):
     roughness: dist.UnitInterval = dist.LogUniform(0.1, 0.3)
     metallic: dist.Flag = dist.Probability(0.6)
     dirt: dist.UnitInterval = dist.Uniform(0.0, 0.25)
+    weathered: dist.Chance = dist.Probability(0.06)
     plates: bool = Field(True)
+    countries: dict[str, Annotated[float, Field(ge=0)]] = Field(IN_EUROPE)
+    foreign: dist.Chance = dist.Probability(0.05)
     coat: dist.UnitInterval = dist.Constant(0.0)
 
     def model_post_init(self, context: object) -> None:
-        """Reject unknown colours, and weights that are all 0."""
+        """Reject unknown colours and countries, and weights that are all 0."""
         del context
-        unknown = sorted(set(self.weights) - set(PAINTS))
-        if unknown:
-            raise ValueError(f"unknown colour '{unknown[0]}'; expected {', '.join(PAINTS)}")
-        if not any(self.weights.values()):
-            raise ValueError("every weight is 0; expected one above 0")
+        for kind, given, known in (
+            ("colour", self.weights, PAINTS),
+            ("country", self.countries, FORMATS),
+        ):
+            unknown = sorted(set(given) - set(known))
+            if unknown:
+                raise ValueError(f"unknown {kind} '{unknown[0]}'; expected {', '.join(known)}")
+            if not any(given.values()):
+                raise ValueError(f"every weight of a {kind} is 0; expected one above 0")
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with its vehicles painted; the same number of draws for each."""
@@ -82,15 +106,20 @@ class VehiclePaint(SurfaceRandomizer):
             anew, dirt = self.probability.draw(rng), self.dirt.draw(rng)
             painted.append(_finish(body, assets, paint if anew else None, dirt))
         if self.plates:
-            painted = [_change_plates(body, int(rng.integers(SEEDS))) for body in painted]
+            home = _pick(self.countries, rng)
+            painted = [self._change_plates(body, home, rng) for body in painted]
         return scene.with_bodies(*painted)
+
+    def _change_plates(self, body: Body, home: str, rng: Rng) -> Body:
+        """Return the body with another licence plate, if it has one."""
+        seed, other = int(rng.integers(SEEDS)), _pick(self.countries, rng)
+        country = other if self.foreign.draw(rng) else home
+        slots = (replace(m, texture=reseed_plate(m.texture, seed, country)) for m in body.materials)
+        return replace(body, materials=tuple(slots))
 
     def _draw_paint(self, rng: Rng) -> dict[str, Any]:
         """Draw the fields of a paint's material: colour, gloss and coat."""
-        names = sorted(self.weights)
-        ends = [sum(self.weights[n] for n in names[: k + 1]) for k in range(len(names))]
-        draw = float(rng.uniform()) * ends[-1]
-        name = next(n for n, end in zip(names, ends, strict=True) if draw < end)
+        name = _pick(self.weights, rng)
         paint = PAINTS[name]
         hue, saturation, value = (
             float(rng.uniform(low, high))
@@ -98,8 +127,13 @@ class VehiclePaint(SurfaceRandomizer):
         )
         flakes = self.metallic.draw(rng) and name != "white"
         roughness, coat = round(self.roughness.draw(rng), 4), round(self.coat.draw(rng), 4)
+        color, matt = hsv_to_linear(hue, saturation, value), float(rng.uniform(*_WEATHERED))
+        if self.weathered.draw(rng):
+            flakes, coat, roughness = False, 0.0, round(matt, 4)
+            red, green, blue = (round(c + _PALER * (1.0 - c), 6) for c in color)
+            color = (red, green, blue)
         return {
-            "base_color": hsv_to_linear(hue, saturation, value),
+            "base_color": color,
             "roughness": _PIGMENT if coat else roughness,
             "metallic": 0.25 if flakes else 0.0,
             "specular": 0.6,
@@ -121,17 +155,17 @@ def _finish(body: Body, assets: AssetIndex, paint: dict[str, Any] | None, dirt: 
     return replace(body, materials=tuple(finish(material) for material in slots))
 
 
-def _change_plates(body: Body, seed: int) -> Body:
-    """Return the body with another licence plate, if it has one."""
-    return replace(
-        body,
-        materials=tuple(replace(m, texture=reseed_plate(m.texture, seed)) for m in body.materials),
-    )
+def _pick(weights: Mapping[str, float], rng: Rng) -> str:
+    """Draw a name in proportion to its weight; independent of the order of the names."""
+    names = sorted(weights)
+    ends = [sum(weights[n] for n in names[: k + 1]) for k in range(len(names))]
+    draw = float(rng.uniform()) * ends[-1]
+    return next(n for n, end in zip(names, ends, strict=True) if draw < end)
 
 
 def _soil(material: Material, dirt: float) -> Material:
     """Return the material under a thin layer of dust: blended with its colour, and rougher."""
-    share = 0.35 * dirt if material.role == "glass" else dirt
+    share = min(_SOILED[material.role] * dirt, 1.0)
     red, green, blue = (
         round(clean * (1.0 - share) + dust * share, 6)
         for clean, dust in zip(material.base_color, _DUST, strict=True)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import Point2, grid, spline
-from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot
+from gen_data.generator.assets.vehicles.vehicle_materials import PRINTED, VehicleSlot
 
 Curve = Callable[[Array], Array]
 Mask = NDArray[np.bool_]
@@ -255,18 +255,35 @@ def round_x_z(x_m: float, z_m: float, radius_m: float, beyond_y_m: float) -> Lev
 
 
 def mirror_half(half: Patch, swaps: Sequence[tuple[int, int]] = ()) -> Patch:
-    """A left half and its mirror image, which exchanges the pairs of slots in ``swaps``."""
+    """A left half and its mirror image, which exchanges the pairs of slots in ``swaps``.
+
+    Print on the right half is not mirrored: it reads from left to right on both sides.
+    """
     slots = half.slots.copy()
     for left, right in swaps:
         slots[half.slots == left] = right
-    mirrored = replace(half, corners_m=half.corners_m * np.array([1.0, -1.0, 1.0]), slots=slots)
-    return drop_uvs(join_patches([half, mirrored.flipped()]))
+    uvs = np.where([True, False], 1.0 - half.uvs, half.uvs)
+    corners_m = half.corners_m * np.array([1.0, -1.0, 1.0])
+    return drop_uvs(join_patches([half, Patch(corners_m, uvs, slots).flipped()]))
 
 
 def drop_uvs(patch: Patch) -> Patch:
-    """The patch without texture coordinates, but for those of licence plates."""
-    printed = (patch.slots == VehicleSlot.PLATE)[:, None, None]
+    """The patch without texture coordinates, but for those of printed slots."""
+    printed = np.isin(patch.slots, PRINTED)[:, None, None]
     return replace(patch, uvs=np.where(printed, patch.uvs, 0.0))
+
+
+def print_side(patch: Patch, x_m: Point2, z_m: Point2, *further: Level) -> Patch:
+    """The patch with an image on its left side, between two x and two z, in the slot ``LIVERY``.
+
+    The image's left border is at the larger x: the front. It is the last step of painting, since
+    the rows and places along the ring are lost where the image is.
+    """
+    marked = paint(patch, VehicleSlot.LIVERY, *further, x=x_m, z=z_m)
+    u = (x_m[1] - marked.corners_m[..., 0]) / (x_m[1] - x_m[0])
+    v = (marked.corners_m[..., 2] - z_m[0]) / (z_m[1] - z_m[0])
+    printed = (marked.slots == VehicleSlot.LIVERY)[:, None, None]
+    return replace(marked, uvs=np.where(printed, np.stack([u, v], axis=2), marked.uvs))
 
 
 def _along(across: Array, exponents: Point2) -> Array:

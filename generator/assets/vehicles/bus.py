@@ -33,7 +33,7 @@ def bus(seed: int) -> Solid:
     """A city bus with its doors on the right. Slots and keypoints are those of all vehicles."""
     rng = variant_rng("bus", seed)
     x, top = 0.5 * rng.between(11.2, 12.2), rng.between(2.95, 3.08)
-    axles = Axles(x - 2.72, -x + 3.35, 1.08, 0.48, 0.29, 0.56, 0)
+    axles = Axles(x - 2.72, -x + 3.35, 1.08, 0.48, 0.29, 0.56, "truck")
     livery = rng.choose(COLORS["liveries"]).split()
     body = _body(x, top, axles, striped=rng.chance(0.6))
     body = _doors(body, (x - 0.55, x - 6.0, *((x - 9.6,) if rng.chance(0.5) else ())), top)
@@ -97,7 +97,7 @@ def _fittings(x: float, top: float, *, mirrors: bool) -> list[Patch]:
     parts = [
         block((x - 0.35, -0.75, top - 0.37), (x - 0.105, 0.75, top - 0.15), 0.0, Slot.TRIM),
         block((x - 0.03, -0.26, 0.42), (x + 0.006, 0.26, 0.53), 0.0, Slot.PLATE),
-        block((-x - 0.006, -0.26, 0.62), (-x + 0.05, 0.26, 0.73), 0.0, Slot.PLATE),
+        block((-x - 0.006, -0.26, 0.62), (-x + 0.05, 0.26, 0.73), 0.0, Slot.REAR_PLATE),
         block((-1.6, -0.85, top - 0.05), (1.2, 0.85, top + 0.12), 0.05, Slot.PAINT),
     ]
     for sign in (1.0, -1.0):

@@ -18,7 +18,7 @@ from gen_data.generator.assets.scenery.basic_shapes import make_solid
 from gen_data.generator.assets.vehicles import rider as people
 from gen_data.generator.assets.vehicles.body_shell import drop_uvs
 from gen_data.generator.assets.vehicles.rider import Seat, blob, limb
-from gen_data.generator.assets.vehicles.vehicle_materials import COLORS, materials
+from gen_data.generator.assets.vehicles.vehicle_materials import COLORS, Print, materials
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.assets.vehicles.wheels import wheel
 from gen_data.generator.core.asset_types import Keypoint
@@ -59,7 +59,7 @@ def motorcycle(seed: int) -> Solid:
         for mirrors in (True, False)
     )
     paint = hex_to_linear(rng.choose(COLORS["motorcycles"]))
-    finish = materials(rng, paint, clothes=people.draw_clothes(rng), plate_rows=2)
+    finish = materials(rng, paint, clothes=people.draw_clothes(rng), printed=Print(plate_rows=2))
     reach = build.axle + build.wheel_m
     hull = [
         hulls.box((-reach, -0.12, 0.0), (reach, 0.12, 0.75)),
@@ -87,7 +87,7 @@ def _is_ridden(seed: int) -> bool:
 
 def _running_gear(build: _Build, *, mirrors: bool) -> list[Patch]:
     """Wheels, fork, swing arm, handlebar, and mirrors or none."""
-    made = wheel(build.wheel_m, build.tyre_m, 6, 0.62)
+    made = wheel(build.wheel_m, build.tyre_m, "six")
     both = [made, made.rotated("z", math.pi)]
     parts = [w.moved(sign * build.axle, 0.0, build.wheel_m) for sign in (1.0, -1.0) for w in both]
     head_x, head_z = build.head
@@ -135,7 +135,7 @@ def _lamps(style: str, build: _Build) -> list[Patch]:
         blob((hx, 0.0, hz), (0.075, 0.085, 0.08), Slot.HEADLIGHT),
         blob((tx, 0.0, tz), (0.05, 0.09, 0.035), Slot.TAILLIGHT),
         blob((tx - 0.02, 0.0, tz), (0.04, 0.045, 0.03), Slot.BRAKELIGHT),
-        block((tx - 0.05, -0.09, tz - 0.25), (tx - 0.03, 0.09, tz - 0.1), 0.0, Slot.PLATE),
+        block((tx - 0.05, -0.09, tz - 0.25), (tx - 0.03, 0.09, tz - 0.1), 0.0, Slot.REAR_PLATE),
         block((tx - 0.03, -0.03, tz - 0.2), (tx + 0.12, 0.03, tz - 0.02), 0.0, Slot.TRIM),
     ]
     for sign, slot in ((1.0, Slot.INDICATOR_LEFT), (-1.0, Slot.INDICATOR_RIGHT)):
