@@ -237,7 +237,7 @@ def test_what_contradicts_the_photograph_is_refused() -> None:
 
 def test_the_path_traced_tier_agrees() -> None:
     """Ground far from the cube is the photograph to a byte, its shadow that of the whole scene."""
-    given = {"tier": "pathtraced", "samples": 32, "max_bounces": 3}
+    given = {"tier": "pathtraced", "samples": 8, "max_bounces": 2}
     library = PlateLibrary(empty_photo())
     reading = seen(library, world(cube=True, photo=True), **given)
     truth = photographed(seen(library, world(cube=True, photo=False), **given)).astype(int)
