@@ -11,6 +11,7 @@ from gen_data.generator.assets.procedural.furniture import SLOTS
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.plates import is_catcher
 from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import (
@@ -55,7 +56,7 @@ class Backdrop(RandomizerBase):
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with new materials on every background body."""
         floors, walls = self._find_options(assets)
-        background = [b for b in scene.bodies if b.instance_id == 0]
+        background = [b for b in scene.bodies if b.instance_id == 0 and not is_catcher(b)]
         return scene.with_bodies(
             *(self._redecorate(b, assets, floors, walls, rng) for b in background)
         )

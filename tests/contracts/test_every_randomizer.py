@@ -12,8 +12,10 @@ from pydantic import ValidationError
 
 from gen_data.generator.config.describe import describe
 from gen_data.generator.config.schema import json_schema
+from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import Stage
 from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.plates import CATCHER
 from gen_data.generator.core.scene import (
     Body,
     Camera,
@@ -46,7 +48,7 @@ GIVEN: dict[str, dict[str, Any]] = {
 
 PHYSICS_BOUND = (
     "arm_configuration", "arm_motion", "distractors", "ego_on_lane", "lane_objects", "objects",
-    "physics_properties", "traffic_flow",
+    "physics_properties", "plate", "traffic_flow",
 )  # fmt: skip
 """Randomizers that must run before physics."""
 
@@ -76,9 +78,10 @@ def nominal_scene() -> Scene:
     scene = build_scene("test", elements, FakeAssets())
     lamp = Body("street_lamp", "street_lamp", SE3((1.0, 1.0, 0.0)))
     signal = Body("signal", "signal", SE3((3.0, 3.0, 0.0)))
+    plate = Body("plate", "plane", materials=(Material(role=CATCHER),))
     return replace(
         scene,
-        bodies=(*scene.bodies, lamp, signal, wagon, ego),
+        bodies=(*scene.bodies, lamp, signal, plate, wagon, ego),
         instances=(*scene.instances, labelled, carrier),
         rigs=(*scene.rigs, Rig("ego", "ego"), Rig("car", "lane_objects/0")),
         cameras=cameras,

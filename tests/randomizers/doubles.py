@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
@@ -19,6 +19,7 @@ from gen_data.generator.core.asset_types import (
     RobotModel,
 )
 from gen_data.generator.core.errors import AssetError, did_you_mean
+from gen_data.generator.core.plates import Plate, upright_pose
 from gen_data.generator.core.scene import Body, ObjectGroup, Scene, SupportSurface
 from gen_data.generator.core.se3 import SE3, Array, Vec3
 from gen_data.generator.core.streams import Rng, Streams
@@ -92,6 +93,16 @@ ENVIRONMENTS = {
 }
 
 
+PLATES = tuple(f"plate/{k}" for k in range(64))
+PLATE = Plate(
+    (640, 480),
+    500.0,
+    upright_pose(np.array([0.0, -1.0, 0.0]), 1.5),
+    ((100.0, 470.0), (540.0, 470.0), (400.0, 300.0), (240.0, 300.0)),
+)
+"""All photographs show the same; the number is in the colour of the ground."""
+
+
 class FakeAssets:
     """An AssetIndex without files; the id of a piece of furniture gives its size."""
 
@@ -106,6 +117,8 @@ class FakeAssets:
             return _asset(asset_id, "texture", "", TEXTURES[asset_id])
         if asset_id in ENVIRONMENTS:
             return _asset(asset_id, "environment", "", ENVIRONMENTS[asset_id])
+        if asset_id in PLATES:
+            return _asset(asset_id, "plate", "", ("rendered",))
         family = parse_asset_id(asset_id).name
         if family in FURNITURE_M:
             return _asset(asset_id, "object", family, ("furniture",))
@@ -118,6 +131,8 @@ class FakeAssets:
     def find(self, tags: Iterable[str], kind: str = "object") -> tuple[Asset, ...]:
         """All assets of the kind with all tags, sorted by id."""
         wanted = set(tags)
+        if kind == "plate":
+            return tuple(self.get(plate) for plate in PLATES if wanted <= {"rendered"})
         every = (self.get(i) for i in sorted([*THINGS, *TEXTURES, *ENVIRONMENTS, "two_link"]))
         return tuple(a for a in every if a.kind == kind and wanted <= set(a.tags))
 
@@ -158,6 +173,11 @@ class FakeAssets:
                 Keypoint("headlight_right", (2.2, -0.7, -0.1)),
             )
         return (Keypoint("lamp", (1.5, 0.0, 6.0)),) if asset_id == "street_lamp" else ()
+
+    def plate(self, asset_id: str) -> Plate:
+        """A level view of a street from 1.5 m."""
+        grey = round(0.1 + 0.01 * PLATES.index(asset_id), 4)
+        return replace(PLATE, ground_color=(grey, grey, grey))
 
     def robot(self, asset_id: str) -> RobotModel:
         """An arm of two links with a parallel gripper that opens 8 cm."""

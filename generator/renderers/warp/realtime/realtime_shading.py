@@ -26,6 +26,7 @@ from gen_data.generator.renderers.warp.frame_context import (
 from gen_data.generator.renderers.warp.plates import (
     cover_by_foreground,
     mix_photo,
+    restore_photo,
     show_photo,
     things_in,
     without_things,
@@ -107,11 +108,13 @@ def smooth_edges(frame: CameraView, radiance: wp.array) -> None:
     Pixels on edges become the mean of their samples' radiance. Then the foreground of a photograph
     covers the image.
     """
-    samples = frame.settings.antialias
+    samples, backdrop = frame.settings.antialias, frame.context.backdrop
+    centres = None if backdrop is None else radiance.numpy().copy()
     if frame.context.paths is None and samples > 1:
         _average_samples(frame, radiance, samples)
-    if frame.context.backdrop is not None:
-        cover_by_foreground(frame, frame.context.backdrop, radiance)
+    if backdrop is not None and centres is not None:
+        restore_photo(frame, centres, radiance)
+        cover_by_foreground(frame, backdrop, radiance)
 
 
 def _coverage(frame: CameraView) -> Float32:

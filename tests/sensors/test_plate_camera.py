@@ -1,0 +1,100 @@
+"""Cameras that look through photographs, and what else a photograph refuses."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import nominal_scene
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.plates import EV100, fitted_intrinsics, has_plate
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.sensors.camera.plate_camera import PlateCamera
+from gen_data.scene_templates.builder import build_scene
+from gen_data.scene_templates.plate import PlateElement
+from tests.randomizers.doubles import PLATE, FakeAssets
+
+
+def made(**fields: Any) -> PlateCamera:
+    """The sensor, as from YAML."""
+    plain = {"type": "plate_camera", "size_px": [320, 200], **fields}
+    return PlateCamera.model_validate_json(json.dumps(plain))
+
+
+def on_a_plate() -> Scene:
+    """The ground of a photograph and its camera."""
+    return build_scene("test", (PlateElement(name="plate"),), FakeAssets())
+
+
+def test_it_looks_as_the_photograph() -> None:
+    """Pose, lens and exposure, at its own size."""
+    camera = made().mount(on_a_plate()).camera("color")
+    assert camera.T_world_camera == PLATE.T_world_camera
+    assert camera.intrinsics == fitted_intrinsics(PLATE.intrinsics, 320, 200)
+    assert camera.ev100 == EV100
+    assert made().image_pipeline.preset == "photograph"
+    assert made().image_pipeline.tone == "srgb"
+
+
+def test_mounting_twice_changes_nothing() -> None:
+    """Its image is the photograph's part already."""
+    once = made().mount(on_a_plate())
+    assert made().mount(once) == once
+
+
+def test_a_plate_has_no_lamps_but_its_sun() -> None:
+    """The default lamp of scenes without lights would light the photograph's ground."""
+    scene = on_a_plate()
+    assert has_plate(scene)
+    assert scene.lights == ()
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [("hfov_deg", 70.0), ("rig", "ego"), ("lens", {"model": "pinhole"}), ("yaw_deg", 3.0)],
+)
+def test_geometry_of_its_own_is_refused(field: str, value: Any) -> None:
+    """The photograph gives it."""
+    with pytest.raises(ValidationError, match=f"{field}: the photograph gives it"):
+        made(**{field: value})
+
+
+def test_developing_twice_by_default_is_refused() -> None:
+    """A pipeline without a preset is ``ideal``, which has a tone curve."""
+    with pytest.raises(ValidationError, match="the photograph was developed before"):
+        made(image_pipeline={"jpeg_quality": 90})
+    assert made(
+        image_pipeline={"preset": "photograph", "jpeg_quality": 90}
+    ).image_pipeline.jpeg_quality
+
+
+def test_it_needs_a_plate_with_its_name() -> None:
+    """Otherwise there is nothing to look through."""
+    with pytest.raises(ConfigError, match="sensor 'front': there is no photograph"):
+        made(name="front").mount(on_a_plate())
+    with pytest.raises(ConfigError, match="sensor 'color': there is no photograph"):
+        made().mount(Scene("empty"))
+
+
+@pytest.mark.parametrize(
+    "sensor", ["{type: rgb_camera, name: other}", "{type: lidar, name: roof, model: VLP-16}"]
+)
+def test_other_sensors_are_refused(sensor: str) -> None:
+    """With the place in the configuration."""
+    color = "{type: plate_camera, name: color}"
+    text = f"sensors=[{color}, {sensor}]"
+    config = load_config("photo_plates", overrides=[text, "exporters=[]"])
+    with pytest.raises(ConfigError, match="no geometry but its ground; expected a plate_camera"):
+        nominal_scene(config, config.probes[0], FakeVehicles())
+
+
+class FakeVehicles(FakeAssets):
+    """Fake assets whose vehicles are found by every tag."""
+
+    def find(self, tags: Any, kind: str = "object") -> Any:
+        """The wagon for any tags of objects."""
+        return (self.get("wagon"),) if kind == "object" else super().find(tags, kind)
