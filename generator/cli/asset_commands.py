@@ -116,11 +116,13 @@ def show(asset_id: str, folders: tuple[Path, ...]) -> None:
 @click.option(
     "--sheet", type=click.Path(path_type=Path), help="Write pictures of all assets to this PNG."
 )
-def check(folder: Path, sheet: Path | None) -> None:
-    """Import every asset of your FOLDER; report its category, size, unit and faults.
-
-    Pictures of plates show the horizon and a grid of 1 m on the ground.
-    """
+@click.option(
+    "--overlays",
+    type=click.Path(path_type=Path),
+    help="Write plates with their horizon and a grid of metres to this folder.",
+)
+def check(folder: Path, sheet: Path | None, overlays: Path | None) -> None:
+    """Import every asset of your FOLDER; report its category, size, unit and faults."""
     from gen_data.generator.assets.checking import check_folder
     from gen_data.generator.assets.library import open_library
 
@@ -129,6 +131,9 @@ def check(folder: Path, sheet: Path | None) -> None:
     _print_findings(findings)
     if sheet is not None:
         _write_thumbnails(library, tuple(f.asset_id for f in findings if not f.error), sheet)
+    if overlays is not None:
+        plates = [f.asset_id for f in findings if f.kind == "plate" and not f.error]
+        _write_overlays(library, plates, overlays)
     unusable = [finding for finding in findings if finding.error]
     if unusable:
         raise AssetError(f"{folder}: {len(unusable)} of {len(findings)} assets cannot be used")
@@ -245,6 +250,19 @@ def _write_thumbnails(library: Library, asset_ids: Sequence[str], path: Path) ->
     )
     write_sheet(arrange_tiles(render_tiles(shown, TILE_PX, captions=True), 0), path)
     click.echo(f"{path}: {len(asset_ids)} pictures")
+
+
+def _write_overlays(library: Library, plates: Sequence[str], folder: Path) -> None:
+    """Write every photograph with the geometry that is known of it, in full size."""
+    from PIL import Image
+
+    from gen_data.generator.preview.plate_overlay import plate_overlay
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for asset_id in plates:
+        shown = plate_overlay(library.plate(asset_id), library.texture(asset_id).albedo)
+        Image.fromarray(shown).save(folder / f"{asset_id.replace('/', '_')}.png")
+    click.echo(f"{folder}: {len(plates)} plates")
 
 
 def _describe_asset(asset: Asset) -> dict[str, str]:

@@ -31,7 +31,7 @@ def plate_overlay(plate: Plate, rgb: UInt8) -> Image:
     for lane in plate.lanes:
         _draw(image, _project(plate, np.array(lane.center_m)), _LANE, width)
     _draw(image, np.array(horizon_px(plate)), _HORIZON, width)
-    return image
+    return np.asarray(image, np.uint8)
 
 
 def _grid_lines(plate: Plate) -> list[Array]:

@@ -31,7 +31,10 @@ FILE = re.compile(r"# ([\w./-]+\.(?:py|toml|yaml))\n")
 SMALLER = {
     "my_own_objects": {"--n 2000": "--n 2", "--n 6 ": "--n 1 "},
     "my_own_template": {"--n 300": "--n 3", "--n 6 ": "--n 1 ", "[640, 480]": "[96, 72]"},
-    "photo_plates": {"--n 20": "--n 1 --set sensors.color.size_px=[96,60]", "--index 0 --out": "--index 0 --set sensors.color.size_px=[96,60] --out"},
+    "photo_plates": {
+        "--n 20": "--n 1 --set sensors.color.size_px=[96,60]",
+        "--index 0 --out": "--index 0 --set sensors.color.size_px=[96,60] --out",
+    },
     "my_first_plugin": {"--n 20 ": "--n 1 ", "[320, 240]": "[96, 72]"},
     "read_labels": {
         "tabletop.yaml --n 20": "tabletop.yaml --n 5 --set sensors.color.size_px=[96,72] "

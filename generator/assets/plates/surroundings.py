@@ -73,7 +73,7 @@ def _continue(plate: Plate, rgb: UInt8, polar: Array, azimuth: Array) -> Array:
     border = np.where((y < 0.0)[..., None], small[0].mean(axis=0), small[-1].mean(axis=0))
     beyond = np.maximum(np.maximum(-y, y - (size[1] - 1)), 0.0) / (_FADE * size[1])
     share = np.minimum(beyond, 1.0)[..., None]
-    return np.maximum(found * (1.0 - share) + border * share, 1e-4)
+    return np.asarray(np.maximum(found * (1.0 - share) + border * share, 1e-4))
 
 
 def _match_ground(image: Array, polar: Array, plate: Plate) -> Array:
