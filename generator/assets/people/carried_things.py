@@ -17,13 +17,17 @@ from gen_data.generator.assets.people.body_regions import grid_faces
 from gen_data.generator.assets.people.person import Person
 from gen_data.generator.assets.people.posing import HELD, vertex_normals
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
-from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.asset_types import Float32, Material
 
 _PHONE = Material((0.012, 0.012, 0.014), 0.15, role="bag")
 _PAPER = Material(hex_to_linear("#e4e0d6"), 0.8, role="bag")
 _CARDBOARD = Material(hex_to_linear("#a67f55"), 0.9, role="bag")
 _RUBBER = Material((0.02, 0.02, 0.021), 0.85, role="bag")
 _BAR = Material((0.25, 0.25, 0.26), 0.4, 0.9, role="bag")
+
+
+STRAPPED = ("backpack", "shoulder_bag")
+"""Bags with straps that lie on clothes."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -35,7 +39,7 @@ class Sheet:
     faces: Indices
     slots: Indices
     materials: tuple[Material, ...]
-    uvs: Array | None = None
+    uvs: Float32 | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -47,7 +51,8 @@ class Carrier:
         transforms: Of every bone, shape [bones, 3, 4].
         scale: The person's size against the template's.
         ground_m: Height of the lowest vertex.
-        surface: Places of garment vertices in the template frame, in the pose, and their normals.
+        surface: Places of the top's vertices in the template frame, in the pose, and their normals;
+            empty unless the bag is one of ``STRAPPED``.
     """
 
     person: Person

@@ -19,7 +19,7 @@ from gen_data.generator.assets.people.body import (
     Indices,
     load,
 )
-from gen_data.generator.assets.people.carried_things import Carrier, Sheet, make_things
+from gen_data.generator.assets.people.carried_things import STRAPPED, Carrier, Sheet, make_things
 from gen_data.generator.assets.people.clothes import Layer, displace_layer, layers
 from gen_data.generator.assets.people.garment_layout import lay_out
 from gen_data.generator.assets.people.person import Person, draw_person
@@ -37,7 +37,7 @@ from gen_data.generator.assets.procedural.collision_hulls import extreme
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
-from gen_data.generator.core.asset_types import ConvexParts, Keypoint, Material, MeshData
+from gen_data.generator.core.asset_types import ConvexParts, Float32, Keypoint, Material, MeshData
 
 _GRID_M = 1e-5
 """Vertices lie on this grid, so that the last bits of sines do not reach the mesh."""
@@ -68,7 +68,7 @@ class _Piece:
     materials: tuple[Material, ...]
     corners: Indices
     corner_faces: Indices
-    uvs: Array
+    uvs: Float32
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -109,7 +109,8 @@ def _make_piece(body: BodyTemplate, layer: Layer, points: Array, phases: Array) 
     corners, corner_faces, uvs = np.arange(len(used)), faces, np.zeros((len(used), 2))
     if layer.mapped:
         corners, corner_faces, uvs = lay_out(body.points_m[used], faces, zones, slots)
-    return _Piece(used, places, faces, slots, materials, corners, corner_faces, uvs)
+    rounded = np.round(uvs, 5).astype(np.float32)
+    return _Piece(used, places, faces, slots, materials, corners, corner_faces, rounded)
 
 
 def build_person(person: Person, figure: Figure) -> Solid:
@@ -121,7 +122,7 @@ def build_person(person: Person, figure: Figure) -> Solid:
     sheets = [_pose_piece(piece, body, transforms) for piece in figure.pieces]
     marks = slice(0, bones + len(LANDMARKS))
     posed = skin_points(points[marks], body.weight_bones[marks], body.weights[marks], transforms)
-    surface = _surface(figure, sheets)
+    surface = _surface(figure, sheets) if person.outfit.bag in STRAPPED else _NO_SURFACE
     ground_m = min(float(sheet.vertices_m[:, 2].min()) for sheet in sheets)
     sheets += make_things(Carrier(person, body, posed, transforms, scale, ground_m, surface))
     mesh, shift = _join_on_ground(sheets, body, posed)
@@ -133,11 +134,14 @@ def build_person(person: Person, figure: Figure) -> Solid:
     return Solid(mesh, ConvexParts((hull,)), keypoints)
 
 
+_NO_SURFACE = (np.zeros((0, 3)),) * 3
+
+
 def _surface(figure: Figure, sheets: list[Sheet]) -> tuple[Array, Array, Array]:
     """Garment vertices in the template frame and in the pose [m], and their normals."""
     template, posed, normals = [], [], []
     for piece, sheet in zip(figure.pieces, sheets, strict=True):
-        if any(material.role == "top" for material in piece.materials):
+        if piece.materials[0].role == "top":
             template.append(figure.body.points_m[piece.used][piece.corners])
             posed.append(sheet.vertices_m)
             normals.append(sheet.normals)
@@ -188,7 +192,7 @@ def _join_on_ground(
             vertices_m=(np.rint((vertices + shift) / _GRID_M) * _GRID_M + 0.0).astype(np.float32),
             faces=np.concatenate(faces).astype(np.int32),
             normals=(np.round(normals, 5) + 0.0).astype(np.float32),
-            uvs=np.round(np.concatenate([_uvs(sheet) for sheet in sheets]), 5).astype(np.float32),
+            uvs=np.concatenate([_uvs(sheet) for sheet in sheets]),
             face_slots=np.concatenate(slots).astype(np.int32),
             materials=tuple(material for sheet in sheets for material in sheet.materials),
         ),
@@ -196,8 +200,10 @@ def _join_on_ground(
     )
 
 
-def _uvs(sheet: Sheet) -> Array:
-    return np.zeros((len(sheet.vertices_m), 2)) if sheet.uvs is None else sheet.uvs
+def _uvs(sheet: Sheet) -> Float32:
+    if sheet.uvs is None:
+        return np.zeros((len(sheet.vertices_m), 2), np.float32)
+    return sheet.uvs
 
 
 def _index(body: BodyTemplate, mark: str) -> int:
