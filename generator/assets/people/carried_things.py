@@ -235,7 +235,7 @@ def _strap(carrier: Carrier, course: Sequence[tuple[float, float, float]], width
     nearest = np.argsort(away, axis=1, kind="stable")[:, :4]
     up = normals[nearest].mean(axis=1)
     up /= np.maximum(np.sqrt((up * up).sum(axis=1, keepdims=True)), 1e-9)
-    places = posed[nearest].mean(axis=1) + 0.016 * carrier.scale * up
+    places = posed[nearest].mean(axis=1) + 0.026 * carrier.scale * up
     places[1:-1] = 0.5 * places[1:-1] + 0.25 * (places[:-2] + places[2:])
     along = np.gradient(places, axis=0)
     side = np.cross(up, along)
