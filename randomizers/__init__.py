@@ -17,6 +17,7 @@ TABLE = PluginTable[Randomizer](
         "camera_pose": "gen_data.randomizers.camera_pose:CameraPose",
         "ceiling_lights": "gen_data.randomizers.ceiling_lights:CeilingLights",
         "colors": "gen_data.randomizers.colors:Colors",
+        "companions": "gen_data.randomizers.companions:Companions",
         "distractors": "gen_data.randomizers.distractors:Distractors",
         "ego_on_lane": "gen_data.randomizers.ego_on_lane:EgoOnLane",
         "environment": "gen_data.randomizers.environment:EnvironmentLight",

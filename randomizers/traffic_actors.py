@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gen_data.generator.assets.people.posing import MOVING_POSES
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.se3 import SE3, Array
@@ -19,8 +20,6 @@ from gen_data.randomizers.free_space import Footprint, standing_bodies
 from gen_data.randomizers.traffic_lights import Signal, runs_along
 
 PERSON = "person"
-MOVING_POSES = ("walk", "run", "carry")
-"""Poses of people who walk; people in other poses stand."""
 POSTS = ("street_light", "traffic_light", "traffic_sign", "tree")
 POST_M = 0.12
 """Half width of the post at the origin of ``POSTS``; only parts above head height reach further."""

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 
+from gen_data.generator.assets.people.person import draw_person
 from gen_data.generator.assets.people.posing import (
+    BEHAVIOURS,
+    MOVING_POSES,
     PHASES,
     POSES,
     bone_rotations,
@@ -81,3 +86,45 @@ def test_the_standing_foot_is_flat_while_the_other_swings() -> None:
     for step in range(2, 7):
         leg = stance("walk", step).left_leg
         assert abs(leg.hip - leg.knee + leg.ankle) <= 3.0
+
+
+def test_there_are_more_than_sixty_poses_and_two_of_three_people_walk() -> None:
+    """Poses that nobody sits or leans in without furniture are drawn."""
+    drawn = Counter(draw_person(seed).pose for seed in range(600))
+    assert len(POSES) > 60 and len(drawn) > 50
+    assert not any(pose.startswith(("sit", "lean")) for pose in drawn)
+    assert 0.55 < sum(drawn[pose] for pose in MOVING_POSES) / 600 < 0.75
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_both_feet_of_people_who_stand_are_on_the_ground(kind: str) -> None:
+    """Ankles are within 2 cm of each other's height, whichever leg carries the body."""
+    for pose in POSES:
+        if pose in MOVING_POSES or BEHAVIOURS[pose] == "sitting":
+            continue
+        body = body_of(kind)
+        _, after, _ = posed_heads(kind, pose, 0)
+        left, right = (after[body.bone(f"foot_{side}"), 2] for side in "lr")
+        assert abs(left - right) < 0.02, pose
+
+
+def test_heads_turn_without_the_trunk() -> None:
+    """A head that is turned by 42 degrees to the left faces there; the chest stays ahead."""
+    body = body_of("simple")
+    heads = body.points_m[: len(body.bones)]
+    ahead = np.array([1.0, 0.0, 0.0])
+    look, walk = (
+        bone_rotations(body, heads, stance(pose, 4)) for pose in ("walk_look_left", "walk")
+    )
+    facing = look["head"] @ ahead
+    assert np.degrees(np.arctan2(facing[1], facing[0])) == pytest.approx(42.0, abs=1.0)
+    np.testing.assert_allclose(look["spine_03"], walk["spine_03"])
+
+
+def test_poses_fit_ages() -> None:
+    """Nobody under fifteen pushes a pram, nobody over 64 runs; children run most often."""
+    people = [draw_person(seed) for seed in range(1500)]
+    poses = {age: {p.pose for p in people if p.age_group == age} for age in ("child", "senior")}
+    assert not poses["child"] & {"push_pram", "stand_pram", "walk_stooped"}
+    assert not poses["senior"] & {"run", "jog"}
+    assert poses["child"] & {"run", "jog"}

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, cast
+from functools import cache
+from typing import Literal
 
-from gen_data.generator.assets.people.posing import BEHAVIOURS, PHASES, POSES, PoseName
+from gen_data.generator.assets.people.posing import BEHAVIOURS, PHASES, POSES, SHARES
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Facts
 from gen_data.generator.assets.procedural.material_presets import (
@@ -165,14 +166,18 @@ def _patterned(name: str, seed: int) -> Material:
 Sex = Literal["female", "male"]
 AgeGroup = Literal["child", "adult", "senior"]
 
-_CHILD_SHARE, _SENIOR_SHARE = 0.1, 0.14
+# Shares of the ages up to 14 and from 65 in the European Union: Eurostat, "Population structure and
+# ageing", 1 January 2024: 14.6 % and 21.6 %. Of the children a third is assumed to be carried,
+# pushed or indoors.
+_CHILD_SHARE, _SENIOR_SHARE = 0.1, 0.216
 # Mean and standard deviation [m] of adults: Fryar, Carroll, Gu, Afful and Ogden, "Anthropometric
 # reference data for children and adults: United States, 2015-2018", NCHS 2021, tables 9 to 12.
 _HEIGHT_M = {"female": (1.613, 0.07), "male": (1.753, 0.075)}
-_ADULT_M = (1.5, 1.95)
-# Median from 6 to 12 years: de Onis et al., "Development of a WHO growth reference for school-aged
+_SHRUNK_M = 0.03
+_ADULT_M = (1.45, 2.0)
+# Median from 5 to 12 years: de Onis et al., "Development of a WHO growth reference for school-aged
 # children and adolescents", Bulletin of the WHO 85(9), 2007.
-_CHILD_M = (1.16, 1.5)
+_CHILD_M = (1.1, 1.5)
 
 _HAIRCUTS = {
     "female": ("long", "long", "bob", "bob", "short", "long"),
@@ -199,7 +204,7 @@ class Person:
     hair: Vec3
     haircut: str
     outfit: Outfit
-    pose: PoseName
+    pose: str
     step: int
 
 
@@ -222,7 +227,7 @@ def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
     height_m = _drawn_height_m(sex, age_group, rng)
     tone = rng.choose(range(len(_COLORS["skin"])))
     figure = _drawn_figure(sex, age_group, height_m, tone, rng)
-    action, step = _drawn_action(seed, pose, phase)
+    action, step = _drawn_action(seed, age_group, pose, phase)
     return Person(
         seed,
         sex,
@@ -265,6 +270,8 @@ def _drawn_height_m(sex: Sex, age_group: AgeGroup, rng: VariantRng) -> float:
     if age_group == "child":
         return round(rng.between(*_CHILD_M), 2)
     mean, deviation = _HEIGHT_M[sex]
+    # The elderly of NCHS 2021 are 3 to 4 cm shorter than the mean of all adults.
+    mean -= _SHRUNK_M if age_group == "senior" else -_SHRUNK_M * _SENIOR_SHARE
     # Irwin and Hall: twelve uniforms add up to nearly a normal, exactly alike everywhere.
     normal = sum(float(rng.random()) for _ in range(12)) - 6.0
     return round(min(max(mean + deviation * normal, _ADULT_M[0]), _ADULT_M[1]), 2)
@@ -283,7 +290,7 @@ def _drawn_figure(
         old = rng.between(0.55, 1.0) if age_group == "senior" else rng.between(0.0, 0.35)
         figure |= {"old": old, "young": 1.0 - old}
     figure |= _three("muscle", rng.between(-0.5, 0.6 if sex == "male" else 0.2))
-    figure |= _three("weight", rng.between(-0.7, 0.8) if age_group != "child" else -0.1)
+    figure |= _three("weight", rng.between(-0.7, 0.95) if age_group != "child" else -0.1)
     if age_group != "child":
         mean, _ = _HEIGHT_M[sex]
         tall = max(-0.6, min(0.6, (height_m - mean) / 0.3))
@@ -312,13 +319,35 @@ def _drawn_hair(age_group: AgeGroup, tone: int, rng: VariantRng) -> Vec3:
     return draw_linear(_COLORS["hair"][: 8 if tone < 2 else 4 if tone < 4 else 2], 0.12, rng)
 
 
-def _drawn_action(seed: int, pose: str, phase: float) -> tuple[PoseName, int]:
+_NOT_OF_AGE: Mapping[AgeGroup, tuple[str, ...]] = {
+    "child": ("walk_stooped", "stand_stooped", "push_pram", "stand_pram", "carry_box", "walk_cup",
+              "stand_cup", "pull_suitcase", "stand_suitcase"),
+    "adult": ("walk_stooped", "stand_stooped"),
+    "senior": ("run", "jog", "hurry", "crouch", "push_pram", "stand_pram"),
+}  # fmt: skip
+_CHILD_RUNS = 6
+"""How many times more often children run than adults; assumed."""
+
+
+def _drawn_action(seed: int, age_group: AgeGroup, pose: str, phase: float) -> tuple[str, int]:
     """Pose and step; they have a stream of their own, so that the same person can do anything."""
     rng = variant_rng("person/pose", seed)
-    drawn = rng.choose(("walk",) * 12 + ("stand",) * 4 + ("phone",) * 2 + ("carry",) * 3)
+    drawn = rng.choose(_pose_lots(age_group))
     step = rng.choose(range(PHASES))
     if not math.isfinite(phase):
         raise ValueError("phase is no number")
     if phase >= 0.0:
         step = round(phase * PHASES) % PHASES
-    return cast(PoseName, pose or drawn), step
+    return pose or drawn, step
+
+
+@cache
+def _pose_lots(age_group: AgeGroup) -> tuple[str, ...]:
+    """Poses that an age takes, each as often as it is drawn."""
+    runs = {"run": _CHILD_RUNS, "jog": _CHILD_RUNS} if age_group == "child" else {}
+    return tuple(
+        name
+        for name in POSES
+        if name not in _NOT_OF_AGE[age_group]
+        for _ in range(round(SHARES[name]) * runs.get(name, 1))
+    )

@@ -19,10 +19,12 @@ from gen_data.generator.assets.people.body import (
     Indices,
     load,
 )
+from gen_data.generator.assets.people.carried_things import STRAPPED, Carrier, Sheet, make_things
 from gen_data.generator.assets.people.clothes import Layer, displace_layer, layers
 from gen_data.generator.assets.people.garment_layout import lay_out
 from gen_data.generator.assets.people.person import Person, draw_person
 from gen_data.generator.assets.people.posing import (
+    BEHAVIOURS,
     Stance,
     bone_rotations,
     bone_transforms,
@@ -35,89 +37,7 @@ from gen_data.generator.assets.procedural.collision_hulls import extreme
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
-from gen_data.generator.core.asset_types import ConvexParts, Keypoint, Material, MeshData
-
-_PHONE = Material((0.012, 0.012, 0.014), 0.15, role="bag")
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class _Sheet:
-    """A finished piece of surface."""
-
-    vertices_m: Array
-    normals: Array
-    faces: Indices
-    slots: Indices
-    materials: tuple[Material, ...]
-    uvs: Array | None = None
-
-
-def _make_props(
-    person: Person, body: BodyTemplate, posed_m: Array, transforms: Array, scale: float
-) -> list[_Sheet]:
-    """Everything a person carries: backpack, handbag, telephone.
-
-    ``posed_m`` are the bone heads and landmarks after the pose [m], ``transforms`` those of every
-    bone [bones, 3, 4], ``scale`` the person's against the template.
-    """
-    made = []
-    material = person.outfit.bag_material
-    if person.outfit.bag == "backpack":
-        trunk = transforms[body.bone("spine_03"), :, :3]
-        middle = posed_m[body.bone("spine_03")] + trunk @ (np.array([-0.172, 0.0, 0.03]) * scale)
-        size = np.array([0.17, 0.3, 0.42]) * scale
-        made.append(_pillow(middle, size, trunk, material))
-    if person.pose == "carry" or (person.outfit.bag == "handbag" and person.pose != "phone"):
-        # Bags hang from the hand and keep upright.
-        grip = 0.5 * (posed_m[body.bone("hand_r")] + posed_m[body.bone("middle_03_r")])
-        middle = grip - np.array([0.0, 0.0, 0.25 * scale])
-        made.append(_pillow(middle, np.array([0.32, 0.1, 0.3]) * scale, np.eye(3), material))
-        handle = grip - np.array([0.0, 0.0, 0.06 * scale])
-        made.append(_pillow(handle, np.array([0.1, 0.02, 0.16]) * scale, np.eye(3), material))
-    if person.pose == "phone":
-        hand = transforms[body.bone("hand_r"), :, :3]
-        grip = posed_m[body.bone("middle_01_r")]
-        thumb = posed_m[body.bone("thumb_03_r")]
-        made.append(_pillow(0.6 * grip + 0.4 * thumb, np.array([0.14, 0.075, 0.01]), hand, _PHONE))
-    return made
-
-
-def _pillow(middle: Array, size_m: Array, axes: Array, material: Material) -> _Sheet:
-    """A box with round edges."""
-    n = 5
-    t = np.linspace(-1.0, 1.0, n)
-    u, v = (grid.ravel() for grid in np.meshgrid(t, t, indexing="ij"))
-    quads = [
-        (i * n + j, (i + 1) * n + j, (i + 1) * n + j + 1, i * n + j + 1)
-        for i in range(n - 1)
-        for j in range(n - 1)
-    ]
-    faces = np.array([tri for a, b, c, d in quads for tri in ((a, b, c), (a, c, d))])
-    places: list[Array] = []
-    triangles: list[Indices] = []
-    for axis in range(3):
-        for sign in (-1.0, 1.0):
-            p = np.zeros((n * n, 3))
-            p[:, axis], p[:, (axis + 1) % 3], p[:, (axis + 2) % 3] = sign, u, v
-            triangles.append((faces if sign > 0 else faces[:, ::-1]) + n * n * len(places))
-            places.append(p)
-    cube = np.concatenate(places)
-    # A superellipsoid of degree six: flat sides, soft edges.
-    around = cube / ((cube**6).sum(axis=1, keepdims=True) ** (1.0 / 6.0))
-    vertices = (0.5 * size_m * around) @ axes.T + middle
-    index = np.concatenate(triangles)
-    normals = _across_seams(around, vertices, index)
-    return _Sheet(vertices, normals, index, np.zeros(len(index), np.int64), (material,))
-
-
-def _across_seams(around: Array, vertices: Array, faces: Indices) -> Array:
-    """Normals that vertices in the same place share."""
-    _, first, inverse = np.unique(
-        np.rint(around * 1e6), axis=0, return_index=True, return_inverse=True
-    )
-    normals: Array = vertex_normals(vertices[first], inverse.reshape(-1)[faces])
-    return normals[inverse.reshape(-1)]
-
+from gen_data.generator.core.asset_types import ConvexParts, Float32, Keypoint, Material, MeshData
 
 _GRID_M = 1e-5
 """Vertices lie on this grid, so that the last bits of sines do not reach the mesh."""
@@ -148,7 +68,7 @@ class _Piece:
     materials: tuple[Material, ...]
     corners: Indices
     corner_faces: Indices
-    uvs: Array
+    uvs: Float32
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -189,7 +109,8 @@ def _make_piece(body: BodyTemplate, layer: Layer, points: Array, phases: Array) 
     corners, corner_faces, uvs = np.arange(len(used)), faces, np.zeros((len(used), 2))
     if layer.mapped:
         corners, corner_faces, uvs = lay_out(body.points_m[used], faces, zones, slots)
-    return _Piece(used, places, faces, slots, materials, corners, corner_faces, uvs)
+    rounded = np.round(uvs, 5).astype(np.float32)
+    return _Piece(used, places, faces, slots, materials, corners, corner_faces, rounded)
 
 
 def build_person(person: Person, figure: Figure) -> Solid:
@@ -201,7 +122,9 @@ def build_person(person: Person, figure: Figure) -> Solid:
     sheets = [_pose_piece(piece, body, transforms) for piece in figure.pieces]
     marks = slice(0, bones + len(LANDMARKS))
     posed = skin_points(points[marks], body.weight_bones[marks], body.weights[marks], transforms)
-    sheets += _make_props(person, body, posed, transforms, scale)
+    surface = _surface(figure, sheets) if person.outfit.bag in STRAPPED else _NO_SURFACE
+    ground_m = min(float(sheet.vertices_m[:, 2].min()) for sheet in sheets)
+    sheets += make_things(Carrier(person, body, posed, transforms, scale, ground_m, surface))
     mesh, shift = _join_on_ground(sheets, body, posed)
     keypoints = tuple(
         Keypoint(name, _vec(posed[_index(body, mark)] + shift), round(radius * scale, 4))
@@ -211,19 +134,37 @@ def build_person(person: Person, figure: Figure) -> Solid:
     return Solid(mesh, ConvexParts((hull,)), keypoints)
 
 
+_NO_SURFACE = (np.zeros((0, 3)),) * 3
+
+
+def _surface(figure: Figure, sheets: list[Sheet]) -> tuple[Array, Array, Array]:
+    """Garment vertices in the template frame and in the pose [m], and their normals."""
+    template, posed, normals = [], [], []
+    for piece, sheet in zip(figure.pieces, sheets, strict=True):
+        if piece.materials[0].role == "top":
+            template.append(figure.body.points_m[piece.used][piece.corners])
+            posed.append(sheet.vertices_m)
+            normals.append(sheet.normals)
+    return np.concatenate(template), np.concatenate(posed), np.concatenate(normals)
+
+
 def _stance(person: Person) -> Stance:
     made = stance(person.pose, person.step)
     outfit = person.outfit
     narrow = outfit.skirt_zones > 1 and (outfit.bottom in ("skirt", "none") or outfit.top == "coat")
-    return shorten_stride(made, _NARROW_STRIDE) if narrow and person.pose != "sit" else made
+    return (
+        shorten_stride(made, _NARROW_STRIDE)
+        if narrow and BEHAVIOURS[person.pose] != "sitting"
+        else made
+    )
 
 
-def _pose_piece(piece: _Piece, body: BodyTemplate, transforms: Array) -> _Sheet:
+def _pose_piece(piece: _Piece, body: BodyTemplate, transforms: Array) -> Sheet:
     bones, weights = body.weight_bones[piece.used], body.weights[piece.used]
     moved = skin_points(piece.vertices_m, bones, weights, transforms)
     normals = vertex_normals(moved, piece.faces)
     # Normals come from the whole surface: fields of the texture must not show in its shading.
-    return _Sheet(
+    return Sheet(
         moved[piece.corners],
         normals[piece.corners],
         piece.corner_faces,
@@ -234,7 +175,7 @@ def _pose_piece(piece: _Piece, body: BodyTemplate, transforms: Array) -> _Sheet:
 
 
 def _join_on_ground(
-    sheets: list[_Sheet], body: BodyTemplate, posed: Array
+    sheets: list[Sheet], body: BodyTemplate, posed: Array
 ) -> tuple[MeshData, Array]:
     """Join the sheets into one mesh whose lowest vertex has z = 0; also return its shift [m]."""
     vertices = np.concatenate([sheet.vertices_m for sheet in sheets])
@@ -251,7 +192,7 @@ def _join_on_ground(
             vertices_m=(np.rint((vertices + shift) / _GRID_M) * _GRID_M + 0.0).astype(np.float32),
             faces=np.concatenate(faces).astype(np.int32),
             normals=(np.round(normals, 5) + 0.0).astype(np.float32),
-            uvs=np.round(np.concatenate([_uvs(sheet) for sheet in sheets]), 5).astype(np.float32),
+            uvs=np.concatenate([_uvs(sheet) for sheet in sheets]),
             face_slots=np.concatenate(slots).astype(np.int32),
             materials=tuple(material for sheet in sheets for material in sheet.materials),
         ),
@@ -259,8 +200,10 @@ def _join_on_ground(
     )
 
 
-def _uvs(sheet: _Sheet) -> Array:
-    return np.zeros((len(sheet.vertices_m), 2)) if sheet.uvs is None else sheet.uvs
+def _uvs(sheet: Sheet) -> Float32:
+    if sheet.uvs is None:
+        return np.zeros((len(sheet.vertices_m), 2), np.float32)
+    return sheet.uvs
 
 
 def _index(body: BodyTemplate, mark: str) -> int:

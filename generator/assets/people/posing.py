@@ -14,27 +14,30 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Literal, get_args
 
 import numpy as np
 
 from gen_data.generator.assets.people.body import Array, BodyTemplate, Indices
 from gen_data.generator.assets.procedural.data_tables import load_table
 
-PoseName = Literal["walk", "run", "stand", "phone", "carry", "sit"]
-POSES: tuple[PoseName, ...] = get_args(PoseName)
 PHASES = 16
 """A stride is divided into this many steps, from one heel strike to the next of the same foot."""
 
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """Joint angles of one leg [deg]; ``toes`` bends them up against the foot."""
+    """Joint angles of one leg [deg].
+
+    Attributes:
+        toes: Bends them up against the foot.
+        out: Away from the other leg.
+    """
 
     hip: float = 0.0
     knee: float = 0.0
     ankle: float = 0.0
     toes: float = 0.0
+    out: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +67,10 @@ class Stance:
         lean: Trunk forward.
         nod: Head downward.
         twist: Pelvis to the left; the shoulders turn as far to the right.
+        bow: Pelvis, and all above it, forward.
+        turn: Head to the left.
+        tilt: Head down to the right.
+        level: Whether the pelvis drops to one side until both feet stand.
     """
 
     left_leg: Leg = Leg()
@@ -73,6 +80,10 @@ class Stance:
     lean: float = 0.0
     nod: float = 0.0
     twist: float = 0.0
+    bow: float = 0.0
+    turn: float = 0.0
+    tilt: float = 0.0
+    level: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,43 +103,92 @@ class _Gait:
 
 @dataclass(frozen=True, slots=True)
 class _Pose:
-    """A row of ``poses.yaml``."""
+    """A row of ``poses.yaml``.
+
+    Attributes:
+        gait: Row of ``gaits.yaml`` that moves legs and arms; empty = the pose stands or sits.
+        stride, swing: Factors on the gait's hip angles and on its swing of the arms.
+        leg, arm: Of both sides; of a gait, ``arm`` is what its arms swing about.
+        right_leg, left_arm, right_arm: Of one side, in place of the pose's or the gait's.
+        held: Thing in the hands, see ``carried_things``; empty = none.
+        share: How often it is drawn.
+    """
 
     behaviour: str
     gait: str = ""
+    stride: float = 1.0
+    swing: float = 1.0
     leg: Leg = Leg()
-    arm: Arm = Arm()
+    right_leg: Leg | None = None
+    arm: Arm | None = None
+    left_arm: Arm | None = None
     right_arm: Arm | None = None
     lean: float = 0.0
     nod: float = 0.0
+    bow: float = 0.0
+    turn: float = 0.0
+    tilt: float = 0.0
+    held: str = ""
+    share: float = 0.0
 
 
 _GAITS = load_table(__package__, "gaits", _Gait)
 _POSES = load_table(__package__, "poses", _Pose)
+POSES = tuple(_POSES)
 BEHAVIOURS = {name: pose.behaviour for name, pose in _POSES.items()}
+SHARES = {name: pose.share for name, pose in _POSES.items()}
+HELD = {name: pose.held for name, pose in _POSES.items()}
+MOVING_POSES = tuple(name for name, pose in _POSES.items() if pose.gait)
+"""Poses with a stride: their phase changes while a person walks."""
 
 
 def shorten_stride(stance: Stance, share: float) -> Stance:
     """Shorten the steps of a stride, for narrow clothes."""
     left, right = (
-        Leg(share * leg.hip, leg.knee * (0.5 + 0.5 * share), leg.ankle * share, leg.toes)
+        replace(
+            leg,
+            hip=share * leg.hip,
+            knee=leg.knee * (0.5 + 0.5 * share),
+            ankle=leg.ankle * share,
+        )
         for leg in (stance.left_leg, stance.right_leg)
     )
     return replace(stance, left_leg=left, right_leg=right)
 
 
-def stance(pose: PoseName, step: int) -> Stance:
+def stance(pose: str, step: int) -> Stance:
     """Joint angles of a pose.
 
     Args:
         pose: Name of the pose.
-        step: Sixteenth of the stride of the left leg, 0 = its heel strikes; walk, carry, run.
+        step: Sixteenth of the stride of the left leg, 0 = its heel strikes; poses with a gait.
     """
     row = _POSES[pose]
-    made = Stance(row.leg, row.leg, row.arm, row.arm, row.lean, row.nod)
     if row.gait:
-        made = _stride(_GAITS[row.gait], step % PHASES)
-    return replace(made, right_arm=row.right_arm or made.right_arm)
+        made = _stride(_adapted(_GAITS[row.gait], row), step % PHASES)
+        if row.stride != 1.0:
+            made = shorten_stride(made, row.stride)
+    else:
+        arm = row.arm or Arm()
+        made = Stance(row.leg, row.right_leg or row.leg, arm, arm, level=row.right_leg is not None)
+    return replace(
+        made,
+        left_arm=row.left_arm or made.left_arm,
+        right_arm=row.right_arm or made.right_arm,
+        lean=made.lean + row.lean,
+        nod=row.nod,
+        bow=row.bow,
+        turn=row.turn,
+        tilt=row.tilt,
+    )
+
+
+def _adapted(gait: _Gait, row: _Pose) -> _Gait:
+    """The gait with the arms of a pose."""
+    if row.arm is None and row.swing == 1.0:
+        return gait
+    swing, elbow = row.swing * gait.arm_swing, row.swing * gait.elbow_swing
+    return replace(gait, arm=row.arm or gait.arm, arm_swing=swing, elbow_swing=elbow)
 
 
 def _stride(gait: _Gait, step: int) -> Stance:
@@ -232,13 +292,20 @@ def bone_rotations(body: BodyTemplate, heads_m: Array, stance: Stance) -> Rotati
         heads_m: Bone heads before the pose [m], shape [bones, 3].
         stance: Joint angles.
     """
+    body_tilt = _pitch(-stance.bow)
+    drop = _roll(_pelvic_drop_deg(body, heads_m, stance)) if stance.level else np.eye(3)
     rotations: dict[str, Array] = {
-        "pelvis": _yaw(stance.twist),
-        "spine_01": _yaw(stance.twist / 3.0) @ _pitch(-stance.lean / 2.0),
-        "spine_02": _yaw(-stance.twist / 3.0) @ _pitch(-stance.lean),
-        "spine_03": _yaw(-stance.twist) @ _pitch(-stance.lean),
-        "neck_01": _pitch(-(stance.lean + stance.nod) / 2.0),
-        "head": _pitch(-stance.nod),
+        "pelvis": drop @ body_tilt @ _yaw(stance.twist),
+        "spine_01": body_tilt @ _yaw(stance.twist / 3.0) @ _pitch(-stance.lean / 2.0),
+        "spine_02": body_tilt @ _yaw(-stance.twist / 3.0) @ _pitch(-stance.lean),
+        "spine_03": body_tilt @ _yaw(-stance.twist) @ _pitch(-stance.lean),
+    }
+    # The head keeps two thirds of its direction when the trunk bends.
+    nod = stance.nod + stance.bow / 3.0
+    half_turn = _yaw(stance.turn / 2.0)
+    rotations |= {
+        "neck_01": half_turn @ _pitch(-(stance.lean + 0.5 * stance.bow + nod) / 2.0),
+        "head": half_turn @ half_turn @ _pitch(-nod) @ _roll(-stance.tilt),
     }
     for side, sign, leg, arm in (
         ("l", 1.0, stance.left_leg, stance.left_arm),
@@ -249,15 +316,34 @@ def bone_rotations(body: BodyTemplate, heads_m: Array, stance: Stance) -> Rotati
     return rotations
 
 
+def _pelvic_drop_deg(body: BodyTemplate, heads_m: Array, stance: Stance) -> float:
+    """How far the pelvis drops to the side of the shorter leg, so that both ankles are level."""
+    heights = []
+    for side, sign, leg in (("l", 1.0, stance.left_leg), ("r", -1.0, stance.right_leg)):
+        rotations = _leg(body, heads_m, side, sign, leg)
+        thigh, calf, foot = (
+            heads_m[body.bone(f"{bone}_{side}")] for bone in ("thigh", "calf", "foot")
+        )
+        reach = rotations[f"thigh_{side}"] @ (calf - thigh)
+        reach = reach + rotations[f"calf_{side}"] @ (foot - calf)
+        heights.append(float(reach[2]))
+    left, right = (heads_m[body.bone(f"thigh_{side}"), 1] for side in "lr")
+    sine = (heights[1] - heights[0]) / float(left - right)
+    return math.degrees(math.asin(max(-0.2, min(0.2, sine))))
+
+
 def _leg(body: BodyTemplate, heads_m: Array, side: str, sign: float, leg: Leg) -> Rotations:
     thigh = _direction(body, heads_m, f"thigh_{side}", f"calf_{side}")
     calf = _direction(body, heads_m, f"calf_{side}", f"foot_{side}")
     inward = np.array([0.0, -sign * math.sin(math.radians(_STANCE_IN_DEG)), -1.0])
     foot = leg.hip - leg.knee + leg.ankle
     out = _yaw(sign * _TOES_OUT_DEG)
+    aside = _roll(sign * leg.out)
     return {
-        f"thigh_{side}": _pitch(leg.hip) @ _between(thigh, inward),
-        f"calf_{side}": _pitch(leg.hip - leg.knee) @ _between(calf, inward * (1.0, 0.5, 1.0)),
+        f"thigh_{side}": aside @ _pitch(leg.hip) @ _between(thigh, inward),
+        f"calf_{side}": aside
+        @ _pitch(leg.hip - leg.knee)
+        @ _between(calf, inward * (1.0, 0.5, 1.0)),
         f"foot_{side}": out @ _pitch(foot),
         f"ball_{side}": out @ _pitch(foot + leg.toes),
     }

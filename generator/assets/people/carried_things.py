@@ -1,0 +1,344 @@
+"""Things that people carry, push and pull, made to fit their hands, shoulders and heads.
+
+Sizes are of common products: a phone of 150 x 75 mm, a cabin suitcase of 55 x 40 x 23 cm, an
+umbrella of 1 m across, a pram of 0.8 x 0.5 m; assumed, +/- 15 %.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gen_data.generator.assets.people.body import Array, BodyTemplate, Indices
+from gen_data.generator.assets.people.body_regions import grid_faces
+from gen_data.generator.assets.people.person import Person
+from gen_data.generator.assets.people.posing import HELD, vertex_normals
+from gen_data.generator.assets.procedural.material_presets import hex_to_linear
+from gen_data.generator.core.asset_types import Float32, Material
+
+_PHONE = Material((0.012, 0.012, 0.014), 0.15, role="bag")
+_PAPER = Material(hex_to_linear("#e4e0d6"), 0.8, role="bag")
+_CARDBOARD = Material(hex_to_linear("#a67f55"), 0.9, role="bag")
+_RUBBER = Material((0.02, 0.02, 0.021), 0.85, role="bag")
+_BAR = Material((0.25, 0.25, 0.26), 0.4, 0.9, role="bag")
+
+
+STRAPPED = ("backpack", "shoulder_bag")
+"""Bags with straps that lie on clothes."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Sheet:
+    """A finished piece of surface."""
+
+    vertices_m: Array
+    normals: Array
+    faces: Indices
+    slots: Indices
+    materials: tuple[Material, ...]
+    uvs: Float32 | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Carrier:
+    """A posed person, as far as carried things need it.
+
+    Attributes:
+        posed_m: Bone heads and landmarks [m], shape [bones + landmarks, 3].
+        transforms: Of every bone, shape [bones, 3, 4].
+        scale: The person's size against the template's.
+        ground_m: Height of the lowest vertex.
+        surface: Places of the top's vertices in the template frame, in the pose, and their normals;
+            empty unless the bag is one of ``STRAPPED``.
+    """
+
+    person: Person
+    body: BodyTemplate
+    posed_m: Array
+    transforms: Array
+    scale: float
+    ground_m: float
+    surface: tuple[Array, Array, Array]
+
+    def at(self, bone: str) -> Array:
+        """Head of a bone [m]."""
+        place: Array = self.posed_m[self.body.bone(bone)]
+        return place
+
+    def axes(self, bone: str) -> Array:
+        """Rotation of a bone from the template's pose [3, 3]."""
+        turn: Array = self.transforms[self.body.bone(bone), :, :3]
+        return turn
+
+    def grip(self, side: str) -> Array:
+        """Middle of a hand [m]."""
+        middle: Array = 0.5 * (self.at(f"hand_{side}") + self.at(f"middle_03_{side}"))
+        return middle
+
+
+def make_things(carrier: Carrier) -> list[Sheet]:
+    """All that a person wears on the back, holds, pushes or pulls."""
+    outfit, held = carrier.person.outfit, HELD[carrier.person.pose]
+    made = _visor(carrier) if outfit.headwear == "cap" else []
+    if outfit.bag == "backpack":
+        made += _backpack(carrier)
+    elif outfit.bag == "shoulder_bag":
+        made += _shoulder_bag(carrier)
+    elif outfit.bag and not held:
+        sides = "lr" if outfit.bag == "shopping_both" else "r"
+        paper = outfit.bag.startswith("shopping")
+        for side in sides:
+            made += _hanging_bag(carrier, side, _PAPER if paper else outfit.bag_material)
+    return made + (_HELD[held](carrier) if held else [])
+
+
+def _phone(carrier: Carrier) -> list[Sheet]:
+    place = 0.6 * carrier.at("middle_01_r") + 0.4 * carrier.at("thumb_03_r")
+    return [pillow(place, np.array([0.15, 0.075, 0.01]), carrier.axes("hand_r"), _PHONE)]
+
+
+def _cup(carrier: Carrier) -> list[Sheet]:
+    place = 0.5 * carrier.at("middle_01_r") + 0.5 * carrier.at("thumb_03_r")
+    cup = pillow(place, np.array([0.08, 0.08, 0.12]), np.eye(3), _PAPER)
+    lid = pillow(_moved(place, z=0.06), np.array([0.086, 0.086, 0.018]), np.eye(3), _RUBBER)
+    return [cup, lid]
+
+
+def _carrier_bag(carrier: Carrier) -> list[Sheet]:
+    return _hanging_bag(carrier, "r", carrier.person.outfit.bag_material)
+
+
+def _carrier_bags(carrier: Carrier) -> list[Sheet]:
+    return [*_hanging_bag(carrier, "l", _PAPER), *_carrier_bag(carrier)]
+
+
+def _hanging_bag(carrier: Carrier, side: str, material: Material) -> list[Sheet]:
+    """A bag that hangs from a hand and keeps upright."""
+    grip, scale = carrier.grip(side), carrier.scale
+    room_m = float(grip[2]) - carrier.ground_m
+    size = np.minimum(np.array([0.32, 0.12, 0.34]) * scale, (1.0, 1.0, 0.75 * room_m))
+    drop = 0.1 * scale + 0.5 * float(size[2])
+    bag = pillow(grip - (0.0, 0.0, drop), size, np.eye(3), material)
+    handle_m = np.array([0.1, 0.02, 0.16]) * scale
+    handle = pillow(grip - (0.0, 0.0, 0.06 * scale), handle_m, np.eye(3), material)
+    return [bag, handle]
+
+
+def _box(carrier: Carrier) -> list[Sheet]:
+    middle = 0.5 * (carrier.grip("l") + carrier.grip("r")) + (0.02, 0.0, 0.08)
+    across = abs(float(carrier.grip("l")[1] - carrier.grip("r")[1]))
+    size = np.array([0.28, max(0.2, across - 0.04), 0.26])
+    return [pillow(middle, size, np.eye(3), _CARDBOARD)]
+
+
+def _suitcase(carrier: Carrier) -> list[Sheet]:
+    grip = carrier.grip("r")
+    foot = np.array([grip[0] - 0.42, grip[1] - 0.06, carrier.ground_m + 0.03])
+    axes = _axes_along(grip - foot)
+    length = math.sqrt(float(((grip - foot) ** 2).sum()))
+    case_m = min(0.55, 0.7 * length)
+    middle, cloth = (
+        foot + axes @ (0.0, 0.0, 0.5 * case_m + 0.03),
+        carrier.person.outfit.bag_material,
+    )
+    case = pillow(middle, np.array([0.23, 0.4, case_m]), axes, cloth)
+    bars = [_bar(foot + axes @ (0.0, y, case_m), grip + axes @ (0.0, y, 0.0), 0.014, _BAR)
+            for y in (-0.07, 0.07)]  # fmt: skip
+    handle = _bar(grip + axes @ (0.0, -0.09, 0.0), grip + axes @ (0.0, 0.09, 0.0), 0.025, _RUBBER)
+    wheels = [_wheel(_moved(foot, y=y), 0.06, 0.03) for y in (-0.16, 0.16)]
+    return [case, *bars, handle, *wheels]
+
+
+def _pram(carrier: Carrier) -> list[Sheet]:
+    left, right = carrier.grip("l"), carrier.grip("r")
+    hand, ground = 0.5 * (left + right), carrier.ground_m
+    middle = np.array([hand[0] + 0.62, hand[1], ground + 0.62])
+    cloth = carrier.person.outfit.bag_material
+    basket = pillow(middle, np.array([0.8, 0.42, 0.3]), np.eye(3), cloth)
+    hood = pillow(_moved(middle, x=-0.2, z=0.2), np.array([0.42, 0.42, 0.4]), np.eye(3), cloth)
+    bar = _bar(_moved(hand, y=-0.24), _moved(hand, y=0.24), 0.03, _RUBBER)
+    frame = []
+    for y in (-0.22, 0.22):
+        side = np.array([0.0, y, 0.0])
+        front = np.array([middle[0] + 0.28, hand[1], ground + 0.12])
+        back = np.array([middle[0] - 0.3, hand[1], ground + 0.12])
+        frame += [_bar(hand + side, front + side, 0.022, _BAR),
+                  _bar(back + side, middle + side + (0.1, 0.0, -0.1), 0.022, _BAR)]  # fmt: skip
+        frame += [_wheel(at + side, 0.24, 0.04) for at in (front, back)]
+    return [basket, hood, bar, *frame]
+
+
+def _umbrella(carrier: Carrier) -> list[Sheet]:
+    """Eight panels that sag between their ribs, on a shaft that leans back over the shoulder."""
+    grip = carrier.grip("r")
+    axes = _axes_along(np.array([-0.12, 0.1, 1.0]))
+    rings, columns = 5, 25
+    reach = np.linspace(0.02, 1.0, rings)[:, None]
+    turn = 2.0 * math.pi * np.arange(columns)[None] / (columns - 1)
+    sag = 0.05 * np.sin(4.0 * turn) ** 2 * reach**2
+    radius = (0.5 - sag) * reach
+    dome = np.stack([radius * np.cos(turn), radius * np.sin(turn),
+                     0.72 * carrier.scale + 0.0 * turn - 0.22 * reach**2], axis=2)  # fmt: skip
+    places = dome.reshape(-1, 3) @ axes.T + grip
+    faces = grid_faces(rings, columns)
+    both = np.concatenate([faces, faces[:, ::-1] + len(places)])
+    normals = vertex_normals(places, faces)
+    # Rings run outward: the upper side is the one whose normals rise.
+    normals = normals * np.sign(normals[:, 2].mean() + 1e-9)
+    cloth = replace(carrier.person.outfit.hat_material, roughness=0.6, role="bag")
+    canopy = Sheet(np.concatenate([places, places - 0.003 * normals]),
+                   np.concatenate([normals, -normals]), both, np.zeros(len(both), np.int64),
+                   (cloth,))  # fmt: skip
+    shaft = _bar(grip - axes @ (0.0, 0.0, 0.12), grip + axes @ (0.0, 0.0, 0.7 * carrier.scale),
+                 0.014, _BAR)  # fmt: skip
+    return [canopy, shaft]
+
+
+def _backpack(carrier: Carrier) -> list[Sheet]:
+    scale, trunk = carrier.scale, carrier.axes("spine_03")
+    middle = carrier.at("spine_03") + trunk @ (np.array([-0.172, 0.0, 0.03]) * scale)
+    material = carrier.person.outfit.bag_material
+    pack = pillow(middle, np.array([0.17, 0.3, 0.42]) * scale, trunk, material)
+    pocket = pillow(middle + trunk @ (np.array([-0.08, 0.0, -0.07]) * scale),
+                    np.array([0.07, 0.22, 0.2]) * scale, trunk, material)  # fmt: skip
+    straps = [
+        _strap(carrier, [(x, sign * y, z) for x, y, z in _BACKPACK_STRAP], 0.055)
+        for sign in (-1.0, 1.0)
+    ]
+    return [pack, pocket, *straps]
+
+
+_BACKPACK_STRAP = ((-0.07, 0.09, 0.5), (0.0, 0.1, 0.56), (0.07, 0.1, 0.52), (0.12, 0.105, 0.45),
+                   (0.13, 0.11, 0.38), (0.1, 0.13, 0.31), (0.04, 0.155, 0.27))  # fmt: skip
+_SHOULDER_STRAP = ((-0.06, -0.08, 0.5), (0.0, -0.085, 0.57), (0.08, -0.07, 0.5), (0.13, -0.02, 0.4),
+                   (0.13, 0.05, 0.28), (0.11, 0.1, 0.17), (0.06, 0.15, 0.06))  # fmt: skip
+"""Courses of straps over a shoulder, in the template frame [m]."""
+
+
+def _shoulder_bag(carrier: Carrier) -> list[Sheet]:
+    """A bag at the left hip whose strap crosses the chest."""
+    scale = carrier.scale
+    middle = carrier.at("thigh_l") + np.array([-0.05, 0.15, 0.03]) * scale
+    material = carrier.person.outfit.bag_material
+    bag = pillow(middle, np.array([0.3, 0.1, 0.24]) * scale, np.eye(3), material)
+    return [bag, _strap(carrier, _SHOULDER_STRAP, 0.035)]
+
+
+def _strap(carrier: Carrier, course: Sequence[tuple[float, float, float]], width_m: float) -> Sheet:
+    """A ribbon on the clothes along a course in the template frame [m]."""
+    template, posed, normals = carrier.surface
+    away = ((template[None] - np.array(course)[:, None]) ** 2).sum(axis=2)
+    # Of the nearest few the outermost layer's mean place: single vertices zigzag.
+    nearest = np.argsort(away, axis=1, kind="stable")[:, :4]
+    up = normals[nearest].mean(axis=1)
+    up /= np.maximum(np.sqrt((up * up).sum(axis=1, keepdims=True)), 1e-9)
+    places = posed[nearest].mean(axis=1) + 0.026 * carrier.scale * up
+    places[1:-1] = 0.5 * places[1:-1] + 0.25 * (places[:-2] + places[2:])
+    along = np.gradient(places, axis=0)
+    side = np.cross(up, along)
+    side *= 0.5 * width_m / np.maximum(np.sqrt((side * side).sum(axis=1, keepdims=True)), 1e-9)
+    ribbon = np.stack([places - side, places + side], axis=1).reshape(-1, 3)
+    faces = grid_faces(len(places), 2)
+    material = carrier.person.outfit.bag_material
+    return Sheet(
+        ribbon, np.repeat(up, 2, axis=0), faces, np.zeros(len(faces), np.int64), (material,)
+    )
+
+
+def _visor(carrier: Carrier) -> list[Sheet]:
+    """The peak of a cap, above the eyes."""
+    head, body = carrier.axes("head"), carrier.body
+    eyes = [carrier.posed_m[body.landmark(f"{side}_eye")] for side in ("left", "right")]
+    middle = 0.5 * (eyes[0] + eyes[1]) + head @ (np.array([0.035, 0.0, 0.058]) * carrier.scale)
+    size = np.array([0.13, 0.15, 0.014]) * carrier.scale
+    return [pillow(middle, size, head, carrier.person.outfit.hat_material)]
+
+
+def _moved(place: Array, *, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Array:
+    moved: Array = place + np.array([x, y, z])
+    return moved
+
+
+def _wheel(middle: Array, diameter_m: float, width_m: float) -> Sheet:
+    """A wheel about the Y axis."""
+    profile = ((0.02, -0.5), (0.92, -0.5), (1.0, 0.0), (0.92, 0.5), (0.02, 0.5))
+    turn = 2.0 * math.pi * np.arange(13) / 12.0
+    rows = [
+        np.stack([0.5 * diameter_m * r * np.cos(turn), np.full_like(turn, w * width_m),
+                  0.5 * diameter_m * r * np.sin(turn)], axis=1)
+        for r, w in profile
+    ]  # fmt: skip
+    places = np.concatenate(rows) + middle
+    faces = grid_faces(len(profile), 13)[:, ::-1]
+    normals = vertex_normals(places, faces)
+    return Sheet(places, normals, faces, np.zeros(len(faces), np.int64), (_RUBBER,))
+
+
+def _bar(start: Array, end: Array, width_m: float, material: Material) -> Sheet:
+    """A straight bar between two points."""
+    length = math.sqrt(float(((end - start) ** 2).sum()))
+    size = np.array([width_m, width_m, length])
+    return pillow(0.5 * (start + end), size, _axes_along(end - start), material, steps=2)
+
+
+def _axes_along(direction: Array) -> Array:
+    """Axes whose third is a direction and whose second is as level and as far left as can be."""
+    z = direction / math.sqrt(float((direction * direction).sum()))
+    hint = np.array([0.0, 1.0, 0.0]) if abs(float(z[1])) < 0.9 else np.array([1.0, 0.0, 0.0])
+    x = np.cross(hint, z)
+    x = x / math.sqrt(float((x * x).sum()))
+    return np.stack([x, np.cross(z, x), z], axis=1)
+
+
+def pillow(
+    middle: Array, size_m: Array, axes: Array, material: Material, *, steps: int = 4
+) -> Sheet:
+    """A box with round edges; ``steps`` squares along each edge."""
+    n = steps + 1
+    t = np.linspace(-1.0, 1.0, n)
+    u, v = (grid.ravel() for grid in np.meshgrid(t, t, indexing="ij"))
+    quads = [
+        (i * n + j, (i + 1) * n + j, (i + 1) * n + j + 1, i * n + j + 1)
+        for i in range(n - 1)
+        for j in range(n - 1)
+    ]
+    faces = np.array([tri for a, b, c, d in quads for tri in ((a, b, c), (a, c, d))])
+    places: list[Array] = []
+    triangles: list[Indices] = []
+    for axis in range(3):
+        for sign in (-1.0, 1.0):
+            p = np.zeros((n * n, 3))
+            p[:, axis], p[:, (axis + 1) % 3], p[:, (axis + 2) % 3] = sign, u, v
+            triangles.append((faces if sign > 0 else faces[:, ::-1]) + n * n * len(places))
+            places.append(p)
+    cube = np.concatenate(places)
+    # A superellipsoid of degree six: flat sides, soft edges.
+    around = cube / ((cube**6).sum(axis=1, keepdims=True) ** (1.0 / 6.0))
+    vertices = (0.5 * size_m * around) @ axes.T + middle
+    index = np.concatenate(triangles)
+    normals = _across_seams(around, vertices, index)
+    return Sheet(vertices, normals, index, np.zeros(len(index), np.int64), (material,))
+
+
+def _across_seams(around: Array, vertices: Array, faces: Indices) -> Array:
+    """Normals that vertices in the same place share."""
+    _, first, inverse = np.unique(
+        np.rint(around * 1e6), axis=0, return_index=True, return_inverse=True
+    )
+    normals: Array = vertex_normals(vertices[first], inverse.reshape(-1)[faces])
+    return normals[inverse.reshape(-1)]
+
+
+_HELD: Mapping[str, Callable[[Carrier], list[Sheet]]] = {
+    "phone": _phone,
+    "cup": _cup,
+    "carrier_bag": _carrier_bag,
+    "carrier_bags": _carrier_bags,
+    "box": _box,
+    "suitcase": _suitcase,
+    "pram": _pram,
+    "umbrella": _umbrella,
+}

@@ -1,0 +1,152 @@
+"""Company for people who stand or walk along lanes: couples, families, talking circles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Annotated, Literal
+
+from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
+from gen_data.generator.assets.people.posing import BEHAVIOURS, MOVING_POSES, PHASES
+from gen_data.generator.config import distributions as dist
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.members import Member, add_members
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.asset_groups import CategoryWeights, GroupRandomizer, draw_asset
+from gen_data.randomizers.base import choose
+from gen_data.randomizers.free_space import Footprint, Ground, make_ground, standing_bodies
+
+SIZE_MAX = 12
+"""Largest size of a company."""
+_TALKING = tuple(pose for pose, behaviour in BEHAVIOURS.items() if behaviour == "talking")
+_STANDS = tuple(pose for pose in _TALKING if pose not in MOVING_POSES)
+_WALKS = ("walk", "walk", "walk_slow", "walk_pockets", "walk_talk", "walk_talk_right")
+_SWAY_M = 0.2
+"""Standard deviation of how far a companion walks ahead or behind."""
+
+
+class Companions(GroupRandomizer):
+    """Gives members of a ``lane_objects`` group company.
+
+    List it after the randomizer that draws the group. Companions of somebody who walks walk beside
+    them in the same direction; companions of somebody who stands form a circle with them and talk.
+    Those who would overlap something else are left out.
+
+    Attributes:
+        size: Number of people in a company, including the one who has a place already. By default a
+            Poisson distribution without 0 with a mean parameter of 1, so that 63 % of all people
+            have company; Moussaid et al., "The walking behaviour of pedestrian social groups and
+            its impact on crowd dynamics", PLoS ONE 5(4), 2010, report this family of distributions
+            and up to 70 %.
+        gap_m: Distance between neighbours who walk abreast.
+        radius_m: Radius of a circle of two; larger circles grow with their size.
+        min_clearance_m: Smallest distance to anything else.
+    """
+
+    type: Literal["companions"] = "companions"
+    stage: Literal["scene"] = "scene"
+    size: Annotated[dist.Count, dist.Bounds(1, SIZE_MAX)] = dist.Choice(
+        {1: 0.582, 2: 0.291, 3: 0.097, 4: 0.024, 5: 0.006}
+    )
+    gap_m: Annotated[dist.Scalar, dist.Bounds(0.3, 5.0)] = dist.Uniform(0.6, 0.85)
+    radius_m: Annotated[dist.Scalar, dist.Bounds(0.2, 5.0)] = dist.Uniform(0.4, 0.6)
+    min_clearance_m: float = 0.02
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """Return the scene with companions added to the group."""
+        group, weights = self.find_group(scene, assets)
+        leaders = [body for body in scene.bodies if body.group == group.name]
+        ground = make_ground(standing_bodies(scene), assets)
+        added: list[Member] = []
+        changed: list[Body] = []
+        for leader in leaders:
+            others = self.size.draw(rng) - 1
+            pose = dict(assets.get(leader.asset).attributes).get("pose", "")
+            if others == 0:
+                continue
+            if not pose or pose in MOVING_POSES:
+                added += self._walk_beside(leader, others, weights, ground, assets, rng)
+            else:
+                changed.append(replace(leader, asset=_posed(leader.asset, _STANDS, assets, rng)))
+                added += self._stand_around(leader, others, weights, ground, assets, rng)
+        scene = _replaced(scene, changed)
+        return add_members(scene, group, added, assets, first=_free_number(leaders))
+
+    def _walk_beside(
+        self,
+        leader: Body,
+        others: int,
+        weights: CategoryWeights,
+        ground: Ground,
+        assets: AssetIndex,
+        rng: Rng,
+    ) -> list[Member]:
+        """Companions to the left and right by turns, in the leader's direction."""
+        made = []
+        side = 1.0 if rng.uniform() < 0.5 else -1.0
+        gap_m = self.gap_m.draw(rng)
+        for k in range(others):
+            asset = _posed(draw_asset(weights, rng), _WALKS, assets, rng)
+            aside_m = side * gap_m * (k // 2 + 1) * (-1.0 if k % 2 else 1.0)
+            ahead_m = _SWAY_M * float(rng.normal())
+            place = leader.T_world_body @ SE3((ahead_m, aside_m, 0.0))
+            made += self._place(asset, place, ground, assets)
+        return made
+
+    def _stand_around(
+        self,
+        leader: Body,
+        others: int,
+        weights: CategoryWeights,
+        ground: Ground,
+        assets: AssetIndex,
+        rng: Rng,
+    ) -> list[Member]:
+        """Companions on a circle ahead of the leader; all look to its middle."""
+        radius_m = self.radius_m.draw(rng) / math.sin(math.pi / (others + 1))
+        middle = leader.T_world_body @ SE3((radius_m, 0.0, 0.0))
+        made = []
+        for k in range(others):
+            asset = _posed(draw_asset(weights, rng), _STANDS, assets, rng)
+            turn = 2.0 * math.pi * (k + 1) / (others + 1) + 0.15 * float(rng.normal())
+            place = middle @ SE3.about_z(turn) @ SE3((-radius_m, 0.0, 0.0))
+            made += self._place(asset, place, ground, assets)
+        return made
+
+    def _place(self, asset: str, pose: SE3, ground: Ground, assets: AssetIndex) -> list[Member]:
+        """The member, if its place is free; it then occupies that place."""
+        footprint = Footprint.of(pose, assets.bounds_m(asset))
+        if not ground.is_free(footprint.expand(self.min_clearance_m)):
+            return []
+        ground.add(footprint)
+        return [Member(asset, pose.rounded(), collides=False)]
+
+
+def _posed(asset: str, poses: tuple[str, ...], assets: AssetIndex, rng: Rng) -> str:
+    """The asset in one of several poses, at any phase; assets without poses stay as they are."""
+    pose, phase = choose(poses, rng), float(rng.integers(PHASES)) / PHASES
+    if "pose" not in dict(assets.get(asset).attributes):
+        return asset
+    parsed = parse_asset_id(asset)
+    parameters = {**parsed.parameters, "pose": pose}
+    if pose in MOVING_POSES:
+        parameters["phase"] = phase
+    return str(AssetId(parsed.name, parameters))
+
+
+def _replaced(scene: Scene, changed: Sequence[Body]) -> Scene:
+    """The scene with other assets on some bodies and their instances."""
+    assets = {body.instance_id: body.asset for body in changed}
+    instances = tuple(
+        replace(i, asset=assets[i.instance_id]) if i.instance_id in assets else i
+        for i in scene.instances
+    )
+    return replace(scene.with_bodies(*changed), instances=instances)
+
+
+def _free_number(members: Sequence[Body]) -> int:
+    """The first number that no member's name ends with."""
+    return max((int(body.name.rpartition("/")[2]) for body in members), default=-1) + 1
