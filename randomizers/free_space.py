@@ -87,8 +87,17 @@ def make_ground(bodies: Iterable[Body], assets: AssetIndex) -> Ground:
     """Collect the footprints of bodies."""
     ground = Ground()
     for body in bodies:
-        ground.add(Footprint.of(body.T_world_body, assets.bounds_m(body.asset), body.scale))
+        bounds_m = standing_bounds_m(assets, body.asset)
+        ground.add(Footprint.of(body.T_world_body, bounds_m, body.scale))
     return ground
+
+
+def standing_bounds_m(assets: AssetIndex, asset: str) -> tuple[Vec3, Vec3]:
+    """Bounds of an asset [m] without the cables that hang between poles, far above all others."""
+    body_m = assets.body_bounds_m(asset)
+    if body_m is None or assets.get(asset).category != "utility_pole":
+        return assets.bounds_m(asset)
+    return body_m
 
 
 def is_inside(point_m: Vec3, low_m: Vec3, high_m: Vec3) -> bool:
@@ -115,7 +124,7 @@ def hidden_share(camera: Camera, scene: Scene, assets: AssetIndex, near_m: float
     eye_m = camera.T_world_camera.translation_m
     hidden = np.zeros(len(rays), np.bool_)
     for body in _solid_bodies(scene):
-        low, high = (body.scale * np.array(edge) for edge in assets.bounds_m(body.asset))
+        low, high = (body.scale * np.array(edge) for edge in standing_bounds_m(assets, body.asset))
         T_body_world = body.T_world_body.inverse()
         start = np.array((T_body_world @ SE3(eye_m)).translation_m)
         if (np.maximum(low - start, start - high) > near_m).any():
@@ -137,7 +146,7 @@ def is_clear(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: float) -
     """
     for body in _solid_bodies(scene):
         local = (body.T_world_body.inverse() @ SE3(point_m)).translation_m
-        low, high = assets.bounds_m(body.asset)
+        low, high = standing_bounds_m(assets, body.asset)
         grown_low = tuple(body.scale * v - margin_m for v in low)
         grown_high = tuple(body.scale * v + margin_m for v in high)
         if all(a <= p <= b for p, a, b in zip(local, grown_low, grown_high, strict=True)):

@@ -17,7 +17,13 @@ from gen_data.generator.core.scene import LaneKind, ObjectGroup, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.asset_groups import CategoryWeights, GroupRandomizer, draw_asset
-from gen_data.randomizers.free_space import Footprint, Ground, make_ground, standing_bodies
+from gen_data.randomizers.free_space import (
+    Footprint,
+    Ground,
+    make_ground,
+    standing_bodies,
+    standing_bounds_m,
+)
 
 COUNT_MAX = 2000
 """Largest count of the template's ``lane_objects`` element."""
@@ -124,7 +130,7 @@ class LaneObjects(GroupRandomizer):
                     place = line.pose(at_m + 0.5 * length_m, left_m)
                     pose = pose_on_lane(place, line.lane, bounds_m, group.facing, turn)
                     pose = pose.rounded()
-                    if self._occupy(ground, pose, bounds_m):
+                    if self._occupy(ground, pose, scale, standing_bounds_m(assets, asset)):
                         yield Member(asset, pose, scale, collides=False)
                 at_m += length_m + self.gap_m.draw(rng)
             else:
@@ -154,16 +160,16 @@ class LaneObjects(GroupRandomizer):
                 x, y = (float(rng.uniform(low[k], high[k])) for k in range(2))
                 stand = SE3.about_z(float(rng.uniform(0.0, 2.0 * math.pi)), (x, y, low[2]))
                 pose = (stand @ SE3((0.0, 0.0, -bounds_m[0][2]))).rounded()
-                if self._occupy(ground, pose, bounds_m):
+                if self._occupy(ground, pose, scale, standing_bounds_m(assets, asset)):
                     yield Member(asset, pose, scale, collides=False)
                     break
             else:
                 remedy = "a smaller count or min_clearance_m"
                 raise self.reject("no free place for a scattered object", remedy)
 
-    def _occupy(self, ground: Ground, pose: SE3, bounds_m: tuple[Vec3, Vec3]) -> bool:
+    def _occupy(self, ground: Ground, pose: SE3, scale: float, bounds_m: tuple[Vec3, Vec3]) -> bool:
         """Occupy the ground under an object if it is free; return whether it was."""
-        footprint = Footprint.of(pose, bounds_m)
+        footprint = Footprint.of(pose, bounds_m, scale)
         if not ground.is_free(footprint.expand(self.min_clearance_m)):
             return False
         ground.add(footprint)
