@@ -22,6 +22,7 @@ TABLE = PluginTable[Element](
         "road": "gen_data.scene_templates.road:Road",
         "road_network": "gen_data.scene_templates.road_network:RoadNetwork",
         "robot": "gen_data.scene_templates.robot:Robot",
+        "roundabout": "gen_data.scene_templates.roundabout:Roundabout",
         "room": "gen_data.scene_templates.room:Room",
         "shelf": "gen_data.scene_templates.shelf:Shelf",
         "signals": "gen_data.scene_templates.signals:Signals",

@@ -174,7 +174,9 @@ def test_roads_one_after_the_other_are_one_path(
 
 
 @pytest.mark.parametrize("lanes", [1, 2])
-@pytest.mark.parametrize("arms", [[0, 90, 180, 270], [0, 180, 270], [0, 70, 180, 300]])
+@pytest.mark.parametrize(
+    "arms", [[0, 90, 180, 270], [0, 180, 270], [0, 70, 180, 300], [0, 140, 220], [0, 140, 180]]
+)
 def test_every_way_into_a_junction_leads_out_again(
     library: Library, arms: list[float], lanes: int
 ) -> None:
@@ -249,3 +251,64 @@ def test_what_makes_no_street_is_refused(
     """One message that names field and remedy."""
     with pytest.raises(ConfigError, match=message):
         built(library, line)
+
+
+@pytest.mark.parametrize("traffic", ["right", "left"])
+@pytest.mark.parametrize("arms", [[0, 90, 180, 270], [0, 120, 240], [90, 180, 270]])
+def test_roundabout_leads_from_every_arm_to_every_other(
+    library: Library, arms: list[float], traffic: str
+) -> None:
+    """Paths link the roads, keep to the ring's circle, and turn the way of their traffic."""
+    roads = [
+        {"type": "road", "name": f"arm{k}", "after": f"ring/{k}", "length_m": 30,
+         "traffic": traffic}
+        for k in range(len(arms))
+    ]  # fmt: skip
+    ring = {"type": "roundabout", "name": "ring", "arms_deg": arms, "traffic": traffic}
+    scene = built(library, ring, *roads)
+    named = by_name(scene)
+    check_links(scene)
+
+    for k in range(len(arms)):
+        paths = [named[after] for after in named[f"arm{k}/backward0"].successors]
+        ways = {path.successors[0].split("/")[0] for path in paths}
+        assert ways == {f"arm{j}" for j in range(len(arms)) if j != k}
+        for path in paths:
+            xy = np.array(path.center_m)[:, :2]
+            radius = np.hypot(xy[:, 0], xy[:, 1])
+            assert radius.min() == pytest.approx(15.0 - 0.5 * (7.0 - 1.6), abs=0.05)
+            # The step about the centre has one sign on the ring.
+            a, b = xy[:-1][radius[:-1] < 12.6], xy[1:][radius[:-1] < 12.6]
+            turn = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+            assert ((turn if traffic == "right" else -turn) > 0.0).all()
+    assert len([lane for lane in scene.lanes if lane.kind == "crosswalk"]) == len(arms)
+
+
+def test_roundabout_meets_the_road_before_it(library: Library) -> None:
+    """``after``: its arm at 180 degrees begins at the road's end, without a step in height."""
+    ring = {"type": "roundabout", "name": "ring", "after": "main", "arms_deg": [0, 90, 180]}
+    scene = built(library, ROAD, ring)
+    lanes = by_name(scene)
+
+    ways = lanes["main/forward0"].successors
+    assert len(ways) == 2
+    assert lanes[ways[0]].center_m[0] == pytest.approx(
+        lanes["main/forward0"].center_m[-1], abs=1e-4
+    )
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"arms_deg": [0, 50, 180]}, "larger diameter_m"),
+        ({"ring_m": 4.5, "truck_apron_m": 2.0}, "elements.ring.ring_m"),
+        ({"radius_m": 6.0, "sidewalk_m": 8.0}, "too tight for the sidewalk"),
+        ({"arms_deg": [0, 180, 90]}, "ascending"),
+    ],
+)
+def test_impossible_roundabouts_are_refused(
+    library: Library, changed: dict[str, Any], message: str
+) -> None:
+    """One message that names field and remedy."""
+    with pytest.raises(ConfigError, match=message):
+        built(library, {"type": "roundabout", "name": "ring", **changed})
