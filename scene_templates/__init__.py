@@ -20,6 +20,7 @@ TABLE = PluginTable[Element](
         "parking_area": "gen_data.scene_templates.parking_area:ParkingArea",
         "prop": "gen_data.scene_templates.prop:Prop",
         "road": "gen_data.scene_templates.road:Road",
+        "road_marking": "gen_data.scene_templates.road_marking:RoadMarking",
         "road_network": "gen_data.scene_templates.road_network:RoadNetwork",
         "robot": "gen_data.scene_templates.robot:Robot",
         "roundabout": "gen_data.scene_templates.roundabout:Roundabout",

@@ -153,7 +153,8 @@ def test_kerbed_median_has_a_lane_for_plants(library: Library) -> None:
     median = {"median_m": 3.0, "median_kerb_m": 0.12}
     lane = by_name(built(library, {**ROAD, **median}))["main/verge_median"]
 
-    assert (lane.kind, lane.width_m) == ("verge", pytest.approx(2.7))
+    assert lane.kind == "verge"
+    assert lane.width_m == pytest.approx(2.7)
     assert lane.center_m[0] == pytest.approx((0.0, 0.0, 0.02 * 3.5 + 0.12))
     assert "main/verge_median" not in by_name(built(library, {**ROAD, "median_m": 3.0}))
 
@@ -243,6 +244,7 @@ def test_car_park_has_a_lane_per_bay(library: Library) -> None:
         ({"type": "junction", "name": "x", "arms_deg": [0, 20, 180]}, "40 to 180"),
         ({"type": "junction", "name": "x", "radius_m": 2.0}, "too tight for the sidewalk"),
         ({"type": "crosswalk", "name": "z", "road": "main"}, "there is no road 'main'"),
+        ({"type": "road_marking", "name": "m", "road": "main"}, "there is no road 'main'"),
     ],
 )
 def test_what_makes_no_street_is_refused(
@@ -312,3 +314,45 @@ def test_impossible_roundabouts_are_refused(
     """One message that names field and remedy."""
     with pytest.raises(ConfigError, match=message):
         built(library, {"type": "roundabout", "name": "ring", **changed})
+
+
+@pytest.mark.parametrize(
+    ("sign", "lane", "low", "high"),
+    [
+        ("left", "forward0", (40.0, -3.5), (45.1, 0.0)),
+        ("word", "backward0", (37.3, 0.0), (40.2, 3.5)),
+        ("blocked_area", "middle", (40.0, -1.1), (52.0, 1.1)),
+        ("zigzag", "parking", (40.0, -5.7), (52.1, -3.5)),
+        ("give_way", "forward0", (40.0, -3.5), (40.61, 0.0)),
+    ],
+)
+def test_painted_signs_lie_in_their_lane(
+    library: Library, sign: str, lane: str, low: tuple[float, float], high: tuple[float, float]
+) -> None:
+    """From their foot in the direction of travel, within the lane."""
+    line = {"type": "road_marking", "name": "m", "road": "main", "sign": sign, "lane": lane,
+            "station_m": 40, "length_m": 12, "text": "30"}  # fmt: skip
+    scene = built(library, {**ROAD, "parking": "parallel"}, line)
+    (x0, y0, _), (x1, y1, _) = library.bounds_m(scene.body("m").asset)
+
+    assert x0 >= low[0] - 0.2
+    assert y0 >= low[1]
+    assert x1 <= high[0] + 0.2
+    assert y1 <= high[1]
+    assert x1 - x0 > 0.5
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"lane": "forward1"}, "has no lane 'forward1'"),
+        ({"sign": "word", "text": "ÖL"}, "cannot be painted"),
+        ({"station_m": 98}, "elements.m.station_m"),
+    ],
+)
+def test_impossible_signs_are_refused(
+    library: Library, changed: dict[str, Any], message: str
+) -> None:
+    """One message that names field and remedy."""
+    with pytest.raises(ConfigError, match=message):
+        built(library, ROAD, {"type": "road_marking", "name": "m", "road": "main", **changed})

@@ -46,6 +46,18 @@ FAMILIES: Mapping[str, Family] = {
         _surface("junction:junction", **_JUNCTION, **_LOOKS, crossings="zebra"),
         _surface("roundabout:roundabout", **_ROUNDABOUT, **_LOOKS, crossings="zebra"),
         _surface("road:crosswalk", **_SHAPE, **_LOOKS, station_m=20.0, width_m=4.0, style="zebra"),
+        _surface(
+            "road_marking:road_marking",
+            **_SHAPE,
+            **_LOOKS,
+            sign="straight",
+            text="_STOP",
+            station_m=20.0,
+            across_m=0.0,
+            turned=0.0,
+            area_m=8.0,
+            width_m=2.8,
+        ),
         _surface("parking_area:parking_area", **_PARKING, **_LOOKS),
         _surface("ground:ground", seed=0, size_m=(800.0, 800.0), cover="grass", relief_m=0.04),
     )

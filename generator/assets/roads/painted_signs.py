@@ -43,6 +43,7 @@ _STROKES: dict[str, str] = {
     "9": "01-10 10-30 30-41 41-47 47-38 38-18 18-07 07-05 05-14 14-44",
 }  # fmt: skip
 """Strokes of a letter: from and to, each a column 0 to 4 and a row 0 to 8 from its foot."""
+LETTERS = frozenset(_STROKES)
 
 
 def arrow(word: str) -> list[Array]:
