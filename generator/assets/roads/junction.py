@@ -10,10 +10,16 @@ from typing import Any
 import numpy as np
 
 from gen_data.generator.assets.procedural.family import Solid
-from gen_data.generator.assets.procedural.patches import Array, Patch, make_solid_in_place
+from gen_data.generator.assets.procedural.patches import Array, Patch
 from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, surface
 from gen_data.generator.assets.roads.markings import NARROW_M, ZEBRA_BAR_M
-from gen_data.generator.assets.roads.road_materials import SCALES_M, street_materials
+from gen_data.generator.assets.roads.road_materials import (
+    SCALES_M,
+    UNPAVED,
+    make_street_solid,
+    number_slots,
+    split_look,
+)
 from gen_data.generator.roads.cross_section import (
     APRON_DROPS,
     APRON_FALL_M,
@@ -24,6 +30,7 @@ from gen_data.generator.roads.cross_section import (
 from gen_data.generator.roads.junction_shape import (
     CROSSWALK_M,
     STOP_LINE_M,
+    ArmsShape,
     Fan,
     JunctionShape,
     arm_points,
@@ -33,38 +40,29 @@ from gen_data.generator.roads.junction_shape import (
 
 _CELL_M = 0.6
 """Markings are cut this small, so that they follow the surface."""
+_TIP_RAD = math.radians(60.0)
 
 
-def junction(
-    *,
-    seed: int = 0,
-    wear: float = 0.3,
-    paving: str = "paving",
-    ground: str = "grass",
-    crossings: str = "zebra",
-    **shape: Any,
-) -> Solid:
+def junction(*, crossings: str = "zebra", **others: Any) -> Solid:
     """A junction about the origin; slots are those of ``street_materials``.
 
     Args:
-        seed: Of textures.
-        wear: 0 freshly laid to 1 worn out.
-        paving: Cover of the sidewalks, a word of ``GROUNDS``.
-        ground: Cover of the land beside, a word of ``GROUNDS``.
-        crossings: Style of the crosswalks: ``zebra``, ``lines`` or ``none``.
-        shape: Fields of ``JunctionShape``.
+        crossings: Style of the crosswalks: ``zebra``, ``ladder``, ``lines`` or ``none``.
+        others: Fields of ``StreetLook`` and of ``JunctionShape``.
     """
+    look, shape = split_look(others)
     profile = JunctionShape(**shape)
-    materials = street_materials(seed, wear, paving, ground)
-    slots = {name: k for k, name in enumerate(materials)}
+    slots = number_slots(look)
     fan = make_fan(profile)
+    paved = look.carriageway not in UNPAVED
     patches = [_carriageway(fan, slots["asphalt"])]
     for number in range(len(profile.arms_rad())):
         if profile.sidewalk_m > 0.0:
-            patches += _corner(profile, number, slots)
+            patches += corner_patches(profile, number, slots)
         patches.append(_land(profile, number, slots["ground"]))
-        patches += _markings(profile, fan, number, crossings, slots["marking"])
-    return make_solid_in_place(patches, tuple(materials.values()), _hulls(profile, fan))
+        if paved:
+            patches += arm_paint(profile, number, crossings, slots["marking"])
+    return make_street_solid(patches, look, _hulls(profile, fan))
 
 
 def _carriageway(fan: Fan, slot: int) -> Patch:
@@ -79,7 +77,7 @@ def _fan_patch(center: Array, line: Array, name: str, slot: int) -> Patch:
     )
 
 
-def _corner(shape: JunctionShape, number: int, slots: dict[str, int]) -> Iterator[Patch]:
+def corner_patches(shape: ArmsShape, number: int, slots: dict[str, int]) -> Iterator[Patch]:
     """Kerb and sidewalk from one arm's end to the next one's, closed at both ends."""
     top, b = shape.kerb_m, 0.02
     yield _band(
@@ -100,7 +98,7 @@ def _corner(shape: JunctionShape, number: int, slots: dict[str, int]) -> Iterato
 
 
 def _band(
-    shape: JunctionShape, number: int, profile: Sequence[tuple[float, float]], name: str, slot: int
+    shape: ArmsShape, number: int, profile: Sequence[tuple[float, float]], name: str, slot: int
 ) -> Patch:
     """A profile of (distance behind the kerb's face, height) drawn around a corner."""
     lines = [
@@ -143,36 +141,45 @@ def _land(shape: JunctionShape, number: int, slot: int) -> Patch:
         flat = arm_points(shape, arm, np.full(len(out), shape.reach_m()), out)
         fall = np.array(APRON_DROPS[1:]) * (z + APRON_FALL_M)
         ends.append(np.column_stack([flat, z - fall])[:: -1 if end == 0 else 1])
-    loop = np.concatenate([ends[0], edge, ends[1], tip[None]])
+    # The tip between arms close to each other lies far out, beyond the land of their roads.
+    loop = np.concatenate([ends[0], edge, ends[1], *([tip[None]] if gap > _TIP_RAD else [])])
+    (ax, ay, _), (bx, by, _) = ends[0][0], ends[1][-1]
+    if ax * by - ay * bx <= 0.0:
+        # Aprons that overlap cover the land between the arms.
+        loop = edge
     # The land is convex. It runs clockwise: with the street on its left.
     center = np.array([*loop[:, :2].mean(axis=0), 0.0])
     return _fan_patch(center, loop, "ground", slot).flipped()
 
 
-def _markings(
-    shape: JunctionShape, fan: Fan, arm: int, crossings: str, slot: int
+def arm_paint(
+    shape: ArmsShape, arm: int, crossings: str, slot: int, *, stop_line: bool = True
 ) -> Iterator[Patch]:
+    """Lines of an arm: stop line, lines between its lanes, crosswalk."""
     start, half = shape.curve_end_m(), shape.half_m
     side = 1.0 if shape.traffic == "right" else -1.0
     stop = (start + STOP_LINE_M[0], start + STOP_LINE_M[1])
 
     def painted(r: tuple[float, float], t: tuple[float, float]) -> Patch:
-        return _drape(shape, fan, arm, r, t, slot)
+        return _drape(shape, arm, r, t, slot)
 
-    inner, outer = sorted((side * 0.06, side * (half - 0.15)))
-    yield painted(stop, (inner, outer))
+    if stop_line:
+        inner, outer = sorted((side * 0.06, side * (half - 0.15)))
+        yield painted(stop, (inner, outer))
     for k in range(1 - shape.lanes, shape.lanes):
         middle = k * shape.lane_width_m
         yield painted(
             (stop[0], shape.reach_m()), (middle - 0.5 * NARROW_M, middle + 0.5 * NARROW_M)
         )
     walk = (start + CROSSWALK_M[0], start + CROSSWALK_M[1])
-    if crossings == "zebra":
+    if crossings in ("zebra", "ladder"):
         count = int((2.0 * half - ZEBRA_BAR_M) // (2.0 * ZEBRA_BAR_M)) + 1
         first = -(count - 0.5) * ZEBRA_BAR_M
         for k in range(count):
             t = first + 2.0 * k * ZEBRA_BAR_M
             yield painted(walk, (t, t + ZEBRA_BAR_M))
+        for edge in walk if crossings == "ladder" else ():
+            yield painted((edge - 0.12, edge + 0.12), (0.2 - half, half - 0.2))
     elif crossings == "lines":
         # A signalled crossing: broken lines, dashes of 0.5 m and gaps of 0.2 m (RMS-1).
         for edge in walk:
@@ -181,12 +188,7 @@ def _markings(
 
 
 def _drape(
-    shape: JunctionShape,
-    fan: Fan,
-    arm: int,
-    r_m: tuple[float, float],
-    t_m: tuple[float, float],
-    slot: int,
+    shape: ArmsShape, arm: int, r_m: tuple[float, float], t_m: tuple[float, float], slot: int
 ) -> Patch:
     """A rectangle of an arm's frame laid on the carriageway."""
     r, t = (
@@ -198,7 +200,7 @@ def _drape(
         t = np.unique(np.append(t, 0.0))
     grid = np.stack(np.meshgrid(r, t, indexing="ij"), axis=2)
     xy = arm_points(shape, arm, grid[..., 0], grid[..., 1])
-    z = fan.height_m(xy.reshape(-1, 2)).reshape(xy.shape[:2]) + PAINT_LIFT_M
+    z = shape.height_m(xy.reshape(-1, 2)).reshape(xy.shape[:2]) + PAINT_LIFT_M
     return surface(np.concatenate([xy, z[..., None]], axis=2), grid, "marking", slot)
 
 
