@@ -14,7 +14,7 @@ import numpy as np
 from gen_data.generator.roads.reference_line import Array, ReferenceLine, bend_line
 
 StripKind = Literal[
-    "median", "driving", "bicycle", "shoulder", "parking", "kerb", "verge", "sidewalk"
+    "median", "driving", "bicycle", "shoulder", "parking", "kerb", "verge", "sidewalk", "garden"
 ]
 Pair = tuple[float, float]
 
@@ -38,6 +38,7 @@ class RoadShape:
         bicycle_m, shoulder_m, parking_m: Widths of strips beside the lanes; 0 = none.
         kerb_m: Height of the kerbs; 0 = none.
         verge_m, sidewalk_m: Widths of planting strips and of sidewalks beyond them; 0 = none.
+        setback_m: Widths of the land between the sidewalks and the fronts of houses; 0 = none.
         curvature_per_m: Curvature of the reference line, positive to the left.
         crown: Cross slope of the carriageway, from the middle to the gutters.
         traffic: Side on which vehicles drive, ``right`` or ``left``.
@@ -56,6 +57,7 @@ class RoadShape:
     curvature_per_m: float = 0.0
     crown: float = 0.02
     traffic: str = "right"
+    setback_m: Pair = (0.0, 0.0)
 
     def line(self) -> ReferenceLine:
         """Reference line, from the origin along +X."""
@@ -140,6 +142,7 @@ def strips(shape: RoadShape, side: int) -> tuple[Strip, ...]:
     fall = FALL if shape.kerb_m > 0.0 else -FALL
     put("verge", shape.verge_m[k], fall * shape.verge_m[k])
     put("sidewalk", shape.sidewalk_m[k], fall * shape.sidewalk_m[k])
+    put("garden", shape.setback_m[k], 0.0)
     return tuple(made)
 
 

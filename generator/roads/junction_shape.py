@@ -31,6 +31,7 @@ class JunctionShape:
         lanes: Number of lanes per arm and direction.
         beside_m: Width between kerb and sidewalk (verge, or the road's parking).
         radius_m: Radius of the kerb at the corners.
+        setback_m: Width of the land between the sidewalks and the fronts of houses.
     """
 
     arms_deg: tuple[float, float, float, float] = (0.0, 90.0, 180.0, 270.0)
@@ -42,6 +43,7 @@ class JunctionShape:
     radius_m: float = 7.0
     crown: float = 0.02
     traffic: str = "right"
+    setback_m: float = 0.0
 
     @property
     def half_m(self) -> float:
@@ -187,8 +189,13 @@ def junction_lanes(
     )
     for number in range(len(shape.arms_rad())):
         for kind, offset_m, width_m in beside if shape.sidewalk_m > 0.0 else ():
-            line = corner(shape, number, offset_m)
-            rise = (shape.edge_z_m - shape.kerb_m) * (offset_m - KERB_WIDTH_M)
+            set_back = kind == "frontage" and shape.setback_m > 0.0
+            if set_back and abs(shape.gaps_rad()[number] - math.pi) > 1e-3:
+                # The fronts of the arms' houses meet in a corner of their own.
+                continue
+            line = corner(shape, number, offset_m + (shape.setback_m if set_back else 0.0))
+            sloping_m = min(offset_m, shape.border_m) - KERB_WIDTH_M
+            rise = (shape.edge_z_m - shape.kerb_m) * sloping_m
             z = shape.kerb_m + rise / (shape.border_m - KERB_WIDTH_M)
             center = world_points(np.column_stack([line, np.full(len(line), z)]), T_world_junction)
             lanes.append(Lane(f"{name}/{kind}{number}", kind, center, width_m, road=name))
