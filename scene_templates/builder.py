@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from typing import cast
 
 import numpy as np
 
@@ -38,10 +37,7 @@ def build_scene(name: str, elements: Sequence[Element], assets: AssetIndex) -> S
     _check_relations(elements, {element.name for element in absent})
     scene = Scene(template=name)
     for element in sorted(elements, key=lambda element: element.follows_others):
-        if element in absent:
-            scene = cast("TemplateElement", element).leave_out(scene)
-        else:
-            scene = element.add(scene, assets)
+        scene = element.leave_out(scene) if element in absent else element.add(scene, assets)
     if not scene.lights:
         scene = replace(scene, lights=(DEFAULT_LIGHT,))
     if scene.lanes:
