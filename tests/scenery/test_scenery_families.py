@@ -12,6 +12,7 @@ from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural_library import TABLES, _import_tables
 from gen_data.generator.assets.scenery import FAMILIES, TEXTURES
 from gen_data.generator.core.errors import AssetError
+from tests.scenery.clutter_limits import CLUTTER
 
 # Height range [m] of real ones, and the largest number of triangles that a street affords.
 LIMITS = {
@@ -24,15 +25,17 @@ LIMITS = {
     "hedge": (0.7, 2.1, 6000), "bush": (0.6, 2.2, 6000), "planter": (0.5, 1.2, 1500),
     "street_light": (6.0, 9.0, 1500), "litter_bin": (0.8, 1.4, 1500), "bench": (0.4, 1.0, 1500),
     "hydrant": (0.7, 1.0, 1500), "bollard": (0.6, 1.1, 1500), "cone": (0.45, 0.8, 1500),
-    "post_box": (1.1, 1.6, 1500), "bus_stop": (2.3, 2.8, 1500), "utility_pole": (8.0, 10.5, 1500),
+    "post_box": (1.1, 1.6, 1500), "bus_stop": (2.3, 2.8, 1500),
     "cabinet": (0.9, 1.4, 1500), "bike_rack": (0.7, 0.9, 1500), "barrier": (0.7, 1.3, 1500),
-    "fence": (0.85, 1.8, 1500), "traffic_light": (2.6, 7.0, 1600),
+    "traffic_light": (2.6, 7.0, 1600),
     "pedestrian_signal": (2.4, 3.3, 1500), "traffic_sign": (2.1, 3.3, 1500),
+    **{name: (*limits.height_m, limits.triangles) for name, limits in CLUTTER.items()},
 }  # fmt: skip
 
 ROLES = {
     "", "facade", "window", "roof", "trim", "chrome", "sign", "bark", "leaf", "lamp", "glass",
-    "lens_red", "lens_yellow", "lens_green", "lens_stop", "lens_walk",
+    "lens_red", "lens_yellow", "lens_green", "lens_stop", "lens_walk", "paint", "underbody", "tyre",
+    "rim", "headlight", "taillight",
 }  # fmt: skip
 
 
@@ -46,7 +49,9 @@ variant = cache(build)
 
 
 @pytest.fixture(
-    params=[(name, seed) for name in FAMILIES for seed in range(4)], ids=str, scope="module"
+    params=[(name, seed) for name in FAMILIES for seed in range(2 if name in CLUTTER else 4)],
+    ids=str,
+    scope="module",
 )
 def built(request: pytest.FixtureRequest) -> tuple[str, Solid]:
     """The first variants of every family."""

@@ -1,4 +1,4 @@
-"""Guard rails, jersey barriers, work-site barriers and fences.
+"""Guard rails, jersey barriers and work-site barriers.
 
 Pieces run along Y, so that they line a street whose traffic they face with +X; sections of equal
 length join end to end.
@@ -17,13 +17,11 @@ from gen_data.generator.assets.procedural.material_presets import (
 from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.surface_shapes import block, extrude, grid
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
-from gen_data.generator.assets.scenery.basic_shapes import facing_rectangle, make_solid, post
+from gen_data.generator.assets.scenery.basic_shapes import make_solid, post
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.se3 import Vec3
 
 BARRIERS = ("guard_rail", "jersey", "construction")
-FENCES = ("pickets", "panel", "wall", "mesh")
 
 
 def barrier(seed: int, style: str) -> Solid:
@@ -35,41 +33,6 @@ def barrier(seed: int, style: str) -> Solid:
 def barrier_facts(seed: int, style: str) -> Facts:
     """Its kind. Raises AssetError for an unknown style."""
     return Facts(choose_option("barrier", "style", style, BARRIERS, seed))
-
-
-def fence(seed: int, style: str) -> Solid:
-    """A fence or garden wall section of 2-3 m."""
-    kind = fence_facts(seed, style).subcategory
-    rng = variant_rng("fence", seed)
-    half, h = 0.5 * rng.between(2.0, 3.0), rng.between(0.9, 1.4)
-    hull = hulls.box((-0.06, -half, 0.0), (0.06, half, h))
-    if kind == "wall":
-        return _garden_wall(half, h, seed)
-    ends = (-half + 0.04, half - 0.04)
-    posts = [block((-0.035, y - 0.035, 0.0), (0.035, y + 0.035, h)) for y in ends]
-    if kind == "pickets":
-        bars = np.linspace(-half + 0.14, half - 0.14, round(2 * half / 0.13))
-        parts = [block((0.03, y - 0.04, 0.06), (0.05, y + 0.04, h)) for y in bars]
-        parts += [block((-0.01, -half, z), (0.03, half, z + 0.07)) for z in (0.25, h - 0.3)]
-        tint = rng.choose(((0.6, 0.56, 0.5), (0.85, 0.83, 0.8)))
-        wood = patterned_material("texture/wood_grain?seed=5", 1.2, 0.8, tint)
-        return make_solid([*posts, *parts], (wood,), [hull])
-    if kind == "panel":
-        panel = block((-0.015, -half + 0.08, 0.08), (0.015, half - 0.08, h + 0.3))
-        tall = [block((-0.04, y - 0.04, 0.0), (0.04, y + 0.04, h + 0.34), slot=1) for y in ends]
-        wood = patterned_material("texture/wood_planks?seed=2", 1.4, 0.8, (0.7, 0.66, 0.62))
-        return make_solid([panel, *tall], (wood, painted_material("#5b4a3c", 0.7)), [hull])
-    at = np.arange(-half + 0.1, half - 0.05, 0.06)
-    wires = [facing_rectangle(0.0, (y - 0.004, y + 0.004), (0.05, h)) for y in at]
-    levels = np.linspace(0.06, h - 0.03, 5)
-    wires += [block((-0.008, -half, z), (0.008, half, z + 0.012)) for z in levels]
-    paint = painted_material(rng.choose(("#2f4236", "#3b3d3f")), 0.5)
-    return make_solid([*posts, *wires], (paint,), [hull])
-
-
-def fence_facts(seed: int, style: str) -> Facts:
-    """Its kind. Raises AssetError for an unknown style."""
-    return Facts(choose_option("fence", "style", style, FENCES, seed))
 
 
 def _guard_rail(seed: int) -> Solid:
@@ -136,16 +99,3 @@ def _striped_board(half: float, z_m: tuple[float, float], fields: int) -> list[P
         corners = np.array([[(x, a, z0), (x, b, z0)], [(x, a + lean, z1), (x, b + lean, z1)]])
         stripes.append(grid(np.clip(corners, None, np.array([1.0, half, 2.0]))))
     return [board, *stripes]
-
-
-def _garden_wall(half: float, h: float, seed: int) -> Solid:
-    """A low wall with a coping."""
-    low: Vec3 = (-0.12, -half, 0.0)
-    body = block(low, (0.12, half, h - 0.06))
-    cap = block((-0.16, -half, h - 0.06), (0.16, half, h), 0.01).painted(1)
-    if seed % 8 < 4:
-        skin = patterned_material("texture/brick?seed=4", 1.1, 0.92, (0.9, 0.88, 0.86))
-    else:
-        skin = patterned_material("texture/plaster?seed=5", 2.5, 0.92, (0.62, 0.58, 0.5))
-    stone = patterned_material("texture/concrete?seed=3", 1.5, 0.9)
-    return make_solid([body, cap], (skin, stone), [hulls.box(low, (0.12, half, h))])

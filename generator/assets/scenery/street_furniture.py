@@ -222,21 +222,6 @@ def bus_stop(seed: int) -> Solid:
     return make_solid(parts, (frame, glass, painted_material("#5f6365", 0.5), wood, art), walls)
 
 
-def utility_pole(seed: int) -> Solid:
-    """A wooden pole with cross-arms and insulators. Slots: wood, insulators."""
-    rng = variant_rng("utility_pole", seed)
-    h = rng.between(8.0, 10.0)
-    pole = cone((0.14, 0.0), (0.1, h), 12)
-    parts = []
-    for z in (h - 0.3, h - 1.0)[: rng.choose((1, 2))]:
-        parts.append(block((-0.06, -0.9, z - 0.05), (0.06, 0.9, z + 0.05)))
-        for y in (-0.8, -0.35, 0.35, 0.8):
-            parts.append(post(0.035, (z + 0.05, z + 0.2), (0.0, y, 0.0), 8).painted(1))
-    bark = patterned_material("texture/bark?seed=1", 1.0, 0.9, (0.17, 0.13, 0.1))
-    hull = hulls.frustum((0.14, 0.0), (0.1, h), 12)
-    return make_solid([pole, *parts], (bark, painted_material("#8b8f90", 0.3)), [hull])
-
-
 def cabinet(seed: int) -> Solid:
     """A distribution cabinet with two doors and a lid. Slots: body, seams, plinth."""
     rng = variant_rng("cabinet", seed)

@@ -58,11 +58,17 @@ _FRAMES = load_table(__package__, "bicycles", _Frame)
 
 def bicycle(seed: int) -> Solid:
     """A bicycle without rider, upright."""
+    parts, finish = bicycle_parts(seed)
+    return _solid(parts, _FRAMES[in_turn(STYLES, seed)], finish, 1.0)
+
+
+def bicycle_parts(seed: int) -> tuple[list[Patch], tuple[Material, ...]]:
+    """Triangles of the same bicycle, without texture coordinates, and materials by slot."""
     rng = variant_rng("bicycle", seed)
     frame = _FRAMES[in_turn(STYLES, seed)]
     parts = _machine(in_turn(STYLES, seed), frame, rng.between(0.0, 2.0 * math.pi), rng)
     paint = hex_to_linear(rng.choose(COLORS["bicycles"]))
-    return _solid(parts, frame, materials(rng, paint), 1.0)
+    return [drop_uvs(part) for part in parts], materials(rng, paint)
 
 
 def bicycle_facts(seed: int) -> Facts:

@@ -1,0 +1,37 @@
+"""Sizes of real street clutter, and the triangles that a street affords for each piece."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+Range = tuple[float, float]
+
+
+class Limits(NamedTuple):
+    """Ranges of the extents [m], where the front is at +X, and the largest number of triangles."""
+
+    length_m: Range
+    width_m: Range
+    height_m: Range
+    variants: int
+    triangles: int = 3000
+
+
+CLUTTER = {
+    "fence": Limits((0.03, 0.25), (1.99, 2.02), (0.8, 1.9), 12),
+    "garden_wall": Limits((0.2, 0.6), (1.99, 2.02), (0.6, 1.9), 6),
+    "utility_pole": Limits((1.8, 2.9), (34.9, 35.1), (8.8, 10.0), 4),
+    "power_box": Limits((0.2, 1.9), (0.4, 2.7), (0.9, 2.2), 6),
+    "wheelie_bin": Limits((0.5, 1.8), (0.45, 1.5), (0.9, 2.3), 6),
+    "rubbish_bags": Limits((0.4, 1.8), (0.4, 1.8), (0.35, 1.1), 6),
+    "skip_container": Limits((1.8, 2.2), (3.2, 4.0), (1.1, 2.2), 4),
+    "traffic_cone": Limits((0.2, 1.1), (0.2, 1.1), (0.2, 1.2), 6),
+    "road_barrier": Limits((0.35, 0.9), (1.1, 2.6), (0.75, 1.5), 6),
+    "construction_fence": Limits((0.6, 0.75), (3.4, 3.6), (1.9, 2.1), 4),
+    "scaffold": Limits((0.7, 1.0), (2.5, 2.65), (6.5, 11.5), 4),
+    # A row of three bicycles, each as detailed as those with a rider.
+    "parked_bicycle": Limits((1.6, 2.0), (0.4, 2.1), (0.45, 1.25), 8, 8000),
+    "kick_scooter": Limits((1.0, 1.2), (0.4, 1.3), (0.4, 1.25), 4),
+    "trailer": Limits((3.2, 4.2), (1.4, 1.8), (0.8, 2.1), 4),
+}
+"""By family: ranges over all variants; sources stand in the families' own modules."""

@@ -1,0 +1,122 @@
+"""Street clutter: sizes, fronts, tags and variety of every family."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.scenery import FAMILIES
+from gen_data.generator.assets.scenery.utility_lines import utility_pole
+from gen_data.generator.core.errors import AssetError
+from tests.scenery.clutter_limits import CLUTTER
+from tests.scenery.test_scenery_families import digest, variant
+
+ACROSS = (
+    "fence",
+    "garden_wall",
+    "road_barrier",
+    "construction_fence",
+    "scaffold",
+    "skip_container",
+)
+"""Families that run along Y, beside a street."""
+ALONG = ("parked_bicycle", "kick_scooter", "trailer")
+"""Families that point along X, as vehicles do."""
+
+
+def test_the_families_tagged_as_clutter_are_those_of_the_table() -> None:
+    """A family without a stated size, or without its tag, is noticed."""
+    tagged = {name for name, family in FAMILIES.items() if "street_clutter" in family.tags}
+
+    assert tagged == set(CLUTTER)
+
+
+@pytest.mark.parametrize("name", CLUTTER)
+def test_every_variant_is_as_long_and_wide_as_real_ones(name: str) -> None:
+    """Extents along X and Y; heights and triangles are those of all scenery."""
+    limits = CLUTTER[name]
+    assert FAMILIES[name].variants >= limits.variants
+    for seed in range(min(8, FAMILIES[name].variants)):
+        low, high = (np.array(edge) for edge in variant(name, seed).mesh.bounds_m())
+        length, width, _ = high - low
+        assert limits.length_m[0] <= length <= limits.length_m[1], seed
+        assert limits.width_m[0] <= width <= limits.width_m[1], seed
+        assert abs(low[2]) < 1e-5, seed
+
+
+@pytest.mark.parametrize("name", CLUTTER)
+def test_all_variants_differ(name: str) -> None:
+    """No two seeds that are offered for selection are the same thing."""
+    seeds = range(FAMILIES[name].variants)
+
+    assert len({digest(variant(name, seed)) for seed in seeds}) == len(seeds)
+
+
+@pytest.mark.parametrize("name", CLUTTER)
+def test_surfaces_face_outward(name: str) -> None:
+    """Closed parts prevail, so triangles turned inside out would make the volume negative."""
+    for seed in range(4):
+        assert signed_volume_m3(variant(name, seed)) > 0.0, seed
+
+
+@pytest.mark.parametrize("name", [*ACROSS, *ALONG])
+def test_pieces_extend_along_the_axis_of_their_kind(name: str) -> None:
+    """Panels line a street along Y; vehicles point along X."""
+    for seed in range(4):
+        low, high = (np.array(edge) for edge in variant(name, seed).mesh.bounds_m())
+        length, width, _ = high - low
+        if variant_is_upright_and_single(name, seed):
+            assert (width > length) == (name in ACROSS), seed
+
+
+def test_cables_of_different_poles_meet_at_mid_span() -> None:
+    """Every variant's cables end at the same places, so that any two poles join."""
+    half = 20.0
+    ends = [cable_ends(utility_pole(seed, 2 * half), half) for seed in range(6)]
+
+    assert len(ends[0]) == 5
+    for seed in range(1, 6):
+        assert np.allclose(ends[seed], ends[0], atol=2e-3)
+
+
+@pytest.mark.parametrize("span_m", [-1.0, 81.0])
+def test_spans_that_no_pole_carries_are_refused(span_m: float) -> None:
+    """The message says what was given."""
+    with pytest.raises(AssetError, match="span_m"):
+        utility_pole(0, span_m)
+
+
+def test_a_pole_without_cables_is_as_wide_as_its_cross_arm() -> None:
+    """A span of 0 leaves the cables out."""
+    low, high = utility_pole(0, 0.0).mesh.bounds_m()
+
+    assert high[1] - low[1] < 0.6
+
+
+def cable_ends(solid: Solid, half_m: float) -> list[tuple[float, float]]:
+    """Middles (x, z) of the cables' ends at +Y, sorted by x."""
+    points = solid.mesh.vertices_m.astype(np.float64)
+    at_end = np.unique(points[np.abs(points[:, 1] - half_m) < 1e-4][:, ::2].round(5), axis=0)
+    groups: list[list[np.ndarray]] = []
+    for point in at_end:
+        near = [group for group in groups if np.abs(group[0] - point).max() < 0.05]
+        if near:
+            near[0].append(point)
+        else:
+            groups.append([point])
+    return [tuple(np.mean(group, axis=0).tolist()) for group in groups]
+
+
+def signed_volume_m3(solid: Solid) -> float:
+    """Sum of the signed tetrahedra between the origin and every triangle."""
+    corners = solid.mesh.vertices_m[solid.mesh.faces].astype(np.float64)
+    return float((corners[:, 0] * np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0)
+
+
+def variant_is_upright_and_single(name: str, seed: int) -> bool:
+    """Not a row in a rack, nothing that has fallen over."""
+    family = FAMILIES[name]
+    assert family.facts is not None
+    parking = family.facts(seed=seed, **family.parameters).attributes.get("parking", "")
+    return parking not in {"rack", "hoop_pair", "fallen"}
