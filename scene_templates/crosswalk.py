@@ -24,12 +24,14 @@ class Crosswalk(Element):
         road: Name of the road.
         station_m: Position of its centre along the road.
         width_m: Width along the road: the length of its bars.
+        style: Bars, or a ladder: bars between two lines.
     """
 
     type: Literal["crosswalk"] = "crosswalk"
     road: str = Field(examples=["main"])
     station_m: float = Field(40.0, ge=0)
     width_m: float = Field(4.0, ge=1.5, le=20)
+    style: Literal["zebra", "ladder"] = "zebra"
 
     @property
     def relations(self) -> Mapping[str, str]:
@@ -45,8 +47,11 @@ class Crosswalk(Element):
                 f"{where}.station_m: {self.station_m:g} is not on '{self.road}', which is "
                 f"{shape.length_m:g} m long"
             )
-        looks: dict[str, Any] = {k: parameters[k] for k in ("seed", "wear") if k in parameters}
+        # The surface around its bars is the road's.
+        shown = ("age_years", "carriageway", "seed", "wear")
+        looks: dict[str, Any] = {k: parameters[k] for k in shown if k in parameters}
         looks |= {"station_m": self.station_m, "width_m": self.width_m}
+        looks |= {} if self.style == "zebra" else {"style": self.style}
         asset = parametric_id("crosswalk", **non_default_fields(shape), **looks)
         t = np.linspace(-shape.carriageway_m(-1), shape.carriageway_m(1), 7)
         flat = shape.line().points(np.full(7, self.station_m), t)

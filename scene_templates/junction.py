@@ -36,7 +36,7 @@ class Junction(RoadSurface, Element):
         radius_m: Radius of the kerb at the corners.
         crown: Cross slope of the arms, from their middle to their gutters.
         traffic: Side on which vehicles drive.
-        crossings: Style of the crosswalks; lines as at traffic lights.
+        crossings: Style of the crosswalks; lines as at traffic lights, a ladder has bars and lines.
         speed_m_s: Usual speed of crossing vehicles.
     """
 
@@ -56,7 +56,7 @@ class Junction(RoadSurface, Element):
     radius_m: float = Field(7.0, ge=1, le=50)
     crown: float = Field(0.02, ge=0, le=0.08)
     traffic: Literal["right", "left"] = "right"
-    crossings: Literal["zebra", "lines", "none"] = "zebra"
+    crossings: Literal["zebra", "ladder", "lines", "none"] = "zebra"
     speed_m_s: float = Field(8.0, ge=0, le=60)
 
     @property

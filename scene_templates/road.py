@@ -29,10 +29,12 @@ from gen_data.scene_templates.element import (
 
 T = TypeVar("T")
 Width = float
-PARKING_M = 2.2
-"""Width of a parking strip (EAR 05: 2.00 to 2.30 m)."""
+PARKING_M = {"none": 0.0, "parallel": 2.2, "angled": 5.58, "perpendicular": 5.0}
+"""Width of a parking strip: 2.00 to 2.30 m along the kerb, bays of 2.50 x 5.00 m (EAR 05)."""
+BAY_ANGLE_DEG = {"none": 0.0, "parallel": 0.0, "angled": 60.0, "perpendicular": 90.0}
 
 Ground = Literal["grass", "paving", "cobbles", "gravel", "earth", "asphalt"]
+Parking = bool | Literal["none", "parallel", "angled", "perpendicular"]
 
 
 class RoadSurface(Strict):
@@ -42,12 +44,21 @@ class RoadSurface(Strict):
         wear: Wear from 0, new, to 1, worn out: ruts, patches, sealed cracks, flaking paint.
         paving: Material of the sidewalks.
         ground: Material of the land beside.
+        carriageway: Material of the driven surface; gravel and earth have no markings.
+        age_years: Age of the driven surface: asphalt turns from dark to grey; -1 = 20 times the
+            wear.
+        coating: Colour of bicycle lanes.
+        center_color: Colour of the line between the directions.
         seed: Seed of patches, cracks, manhole covers and textures.
     """
 
     wear: float = Field(0.3, ge=0, le=1)
     paving: Ground = "paving"
     ground: Ground = "grass"
+    carriageway: Literal["asphalt", "concrete", "cobbles", "gravel", "earth"] = "asphalt"
+    age_years: float = Field(-1.0, ge=-1, le=100)
+    coating: Literal["none", "red", "green", "blue"] = "none"
+    center_color: Literal["white", "yellow"] = "white"
     seed: int = Field(0, ge=0, le=1_000_000)
 
     def surface_parameters(self) -> dict[str, Any]:
@@ -70,8 +81,12 @@ class Road(RoadSurface, Element):
         lanes: Number of lanes against its direction and along it.
         lane_width_m: Width of each driving lane.
         median_m: Width of the strip between the directions; 0 = only a line.
+        median_kerb_m: Height of the kerbs around that strip; 0 = none. A kerbed median of at least
+            1.2 m is a lane for plants.
         bicycle_m, shoulder_m: Width of bicycle lanes and of hard shoulders; 0 = none.
-        parking: Whether there are parking strips, 2.2 m wide, along the kerb.
+        parking: Parking strips along the kerb: true or ``parallel`` = 2.2 m wide, ``angled`` =
+            bays at 60 degrees, 5.58 m, ``perpendicular`` = 5 m; angled and perpendicular bays are
+            lanes of their own. A single word is for both sides.
         verge_m: Width of planted strips between kerb and sidewalk; 0 = none.
         sidewalk_m: Width of the sidewalks; 0 = none.
         setback_m: Width of the land between sidewalk and house fronts, covered with ``ground``; a
@@ -85,6 +100,8 @@ class Road(RoadSurface, Element):
             roads; 6, 12 on motorways.
         line_m: Width of narrow lines: 0.12; 0.15 on motorways.
         rails: Whether there are guard rails.
+        arrows: Whether lanes that lead to the start and to the end of the road have arrows there.
+        tram: Whether the lanes next to the middle have the rails of a tramway.
         apron_m: Width of the land beside the road that slopes down to the ground.
         speed_m_s: Usual speed.
     """
@@ -98,9 +115,10 @@ class Road(RoadSurface, Element):
     lanes: tuple[int, int] = (1, 1)
     lane_width_m: float = Field(3.5, ge=2, le=6)
     median_m: float = Field(0.0, ge=0, le=30)
+    median_kerb_m: float = Field(0.0, ge=0, le=0.3)
     bicycle_m: tuple[Width, Width] = (0.0, 0.0)
     shoulder_m: tuple[Width, Width] = (0.0, 0.0)
-    parking: tuple[bool, bool] = (False, False)
+    parking: Parking | tuple[Parking, Parking] = (False, False)
     verge_m: tuple[Width, Width] = (0.0, 0.0)
     sidewalk_m: tuple[Width, Width] = (2.5, 2.5)
     setback_m: tuple[Width, Width] = (0.0, 0.0)
@@ -112,6 +130,8 @@ class Road(RoadSurface, Element):
     dash_m: tuple[float, float] = (3.0, 6.0)
     line_m: float = Field(0.12, ge=0.05, le=0.5)
     rails: tuple[bool, bool] = (False, False)
+    arrows: tuple[bool, bool] = (False, False)
+    tram: bool = False
     apron_m: float = Field(6.0, ge=0, le=100)
     speed_m_s: float = Field(13.9, ge=0, le=60)
 
@@ -131,6 +151,8 @@ class Road(RoadSurface, Element):
             "line_m": (self.line_m, 0.12),
             "rails": (_numbers(self.rails), (0.0, 0.0)),
             "apron_m": (self.apron_m, 6.0),
+            "arrows": (_numbers(self.arrows), (0.0, 0.0)),
+            "tram": (float(self.tram), 0.0),
         }
         given = {name: value for name, (value, default) in options.items() if value != default}
         given |= non_default_fields(shape) | self.surface_parameters()
@@ -140,9 +162,12 @@ class Road(RoadSurface, Element):
 
     def shape(self) -> RoadShape:
         """Return its cross section and course. Raises ConfigError if they are impossible."""
-        values = {f.name: getattr(self, f.name) for f in fields(RoadShape) if f.name != "parking_m"}
+        own = set(Road.model_fields)
+        values = {f.name: getattr(self, f.name) for f in fields(RoadShape) if f.name in own}
         values["lanes"] = _numbers(self.lanes)
-        values["parking_m"] = tuple(PARKING_M * flag for flag in self.parking)
+        kinds = self.parking_kinds()
+        values["parking_m"] = (PARKING_M[kinds[0]], PARKING_M[kinds[1]])
+        values["bay_angle_deg"] = (BAY_ANGLE_DEG[kinds[0]], BAY_ANGLE_DEG[kinds[1]])
         shape = RoadShape(**values)
         where = f"elements.{self.name}"
         check_widths(where, shape)
@@ -157,6 +182,12 @@ class Road(RoadSurface, Element):
                 f"{where}.length_m: the bend closes on itself; expected a shorter road"
             )
         return shape
+
+    def parking_kinds(self) -> tuple[str, str]:
+        """Word of ``PARKING_M`` for the left and the right side."""
+        pair = self.parking if isinstance(self.parking, tuple) else (self.parking, self.parking)
+        words = [("parallel" if v else "none") if isinstance(v, bool) else v for v in pair]
+        return (words[0], words[1])
 
     def _find_pose(self, scene: Scene) -> SE3:
         if self.after:

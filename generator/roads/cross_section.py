@@ -6,6 +6,7 @@ gutter is at z = 0; the carriageway rises to its crown in the middle.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Any, Literal
 
@@ -23,6 +24,8 @@ APRON_M, APRON_FALL_M = 6.0, 0.1
 """Width of a road's apron, and depth of its outer edge below the gutter."""
 APRON_STEPS, APRON_DROPS = (0.0, 0.25, 1.0), (0.0, 0.25, 1.0)
 """Profile of the apron as fractions of both."""
+BAY_WIDTH_M = 2.5
+"""Width of bays at an angle to the road (EAR 05: 2.50 m)."""
 FALL = 0.025
 """Slope of sidewalks and verges: 2 to 2.5 % for drainage (EAE/RASt 06, 6.1.1.2)."""
 
@@ -35,7 +38,9 @@ class RoadShape:
         length_m: Length of the reference line, the middle of the road.
         lanes: Numbers of lanes against and along the road's direction.
         median_m: Width of the strip between the two directions.
+        median_kerb_m: Height of the kerbs around that strip; 0 = it is level with the road.
         bicycle_m, shoulder_m, parking_m: Widths of strips beside the lanes; 0 = none.
+        bay_angle_deg: Angle of parking bays to the road; 0 = cars park along the kerb.
         kerb_m: Height of the kerbs; 0 = none.
         verge_m, sidewalk_m: Widths of planting strips and of sidewalks beyond them; 0 = none.
         setback_m: Widths of the land between the sidewalks and the fronts of houses; 0 = none.
@@ -58,6 +63,8 @@ class RoadShape:
     crown: float = 0.02
     traffic: str = "right"
     setback_m: Pair = (0.0, 0.0)
+    median_kerb_m: float = 0.0
+    bay_angle_deg: Pair = (0.0, 0.0)
 
     def line(self) -> ReferenceLine:
         """Reference line, from the origin along +X."""
@@ -129,7 +136,7 @@ def strips(shape: RoadShape, side: int) -> tuple[Strip, ...]:
             z = made[-1].outer_z_m if made else top
             made.append(Strip(kind, side, number, inner, inner + width_m, z, z + rise_m))
 
-    put("median", 0.5 * shape.median_m, -0.5 * shape.median_m * shape.crown)
+    _put_median(made, shape, side, top)
     for number in range(shape.lanes_on(side)):
         put("driving", shape.lane_width_m, -shape.lane_width_m * shape.crown, number)
     put("bicycle", shape.bicycle_m[k], -shape.bicycle_m[k] * shape.crown)
@@ -144,6 +151,37 @@ def strips(shape: RoadShape, side: int) -> tuple[Strip, ...]:
     put("sidewalk", shape.sidewalk_m[k], fall * shape.sidewalk_m[k])
     put("garden", shape.setback_m[k], 0.0)
     return tuple(made)
+
+
+def _put_median(made: list[Strip], shape: RoadShape, side: int, top_m: float) -> None:
+    """Add one half of the strip between the directions, and its kerb."""
+    half = 0.5 * shape.median_m
+    edge = top_m - half * shape.crown
+    if half <= 0.0:
+        return
+    if shape.median_kerb_m <= 0.0 or half <= KERB_WIDTH_M:
+        made.append(Strip("median", side, 0, 0.0, half, top_m, edge))
+        return
+    raised, inside = edge + shape.median_kerb_m, half - KERB_WIDTH_M
+    made.append(Strip("median", side, 0, 0.0, inside, raised, raised))
+    made.append(Strip("kerb", side, 0, inside, half, raised, edge))
+
+
+def bay_borders(shape: RoadShape, strip: Strip) -> list[tuple[Pair, Pair]]:
+    """Lines between the angled bays of a parking strip: near and far end, each (s, t).
+
+    Cars drive in forwards: the bays lean in the direction of travel on their side.
+    """
+    angle = math.radians(shape.bay_angle_deg[side_index(strip.side)])
+    along = 1.0 if shape.forward(strip.side) else -1.0
+    lean = strip.width_m / math.tan(angle) if angle < 1.57 else 0.0
+    pitch = BAY_WIDTH_M / math.sin(angle)
+    count = max(0, math.floor((shape.length_m - lean - 1.0) / pitch))
+    start = 0.5 * (shape.length_m - count * pitch - lean) + (lean if along < 0.0 else 0.0)
+    t0, t1 = strip.side * strip.inner_m, strip.side * strip.outer_m
+    return [
+        ((start + k * pitch, t0), (start + k * pitch + along * lean, t1)) for k in range(count + 1)
+    ]
 
 
 def height_m(shape: RoadShape, t_m: Array) -> Array:

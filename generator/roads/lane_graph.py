@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from gen_data.generator.core.scene import Lane, LaneKind
 from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.roads.cross_section import RoadShape, Strip, strips
+from gen_data.generator.roads.cross_section import (
+    BAY_WIDTH_M,
+    KERB_WIDTH_M,
+    RoadShape,
+    Strip,
+    bay_borders,
+    side_index,
+    strips,
+)
 from gen_data.generator.roads.reference_line import Array, ReferenceLine
 
 FURNITURE_M = 0.5
 """Distance of poles and bins from the kerb."""
+OVERHANG_M = 0.6
+"""Length by which cars in angled bays stand over the kerb (EAR 05: 0.70 m)."""
+PLANTED_MEDIAN_M = 1.2
+"""Kerbed medians from this width on are a lane for plants."""
 MEETING_M = 0.05
 MEETING_RAD = math.radians(8.0)
 """Largest distance and angle between the end of a lane and the start of its successor."""
@@ -40,10 +53,39 @@ def road_lanes(
             bank = round(rise if shape.traffic == "right" else -rise, 9) + 0.0
             lane = Lane(own, "driving", center, strip.width_m, name, (), left, right, speed_m_s)
             lanes.append(replace(lane, bank=bank))
+        angled = shape.bay_angle_deg[side_index(side)] > 0.0
         for kind, t_m, z_m, width_m in _beside(row, side):
+            if kind == "parking" and angled:
+                continue
             center = path(line, t_m, z_m, side < 0, T_world_road)
             lanes.append(Lane(f"{name}/{kind}_{word}", kind, center, width_m, road=name))
+        if angled:
+            lanes += _bays(shape, row, f"{name}/parking_{word}", name, T_world_road)
+    if shape.median_kerb_m > 0.0 and shape.median_m >= PLANTED_MEDIAN_M:
+        z_m = strips(shape, 1)[0].inner_z_m
+        center = path(line, 0.0, z_m, True, T_world_road)
+        width_m = shape.median_m - 2.0 * KERB_WIDTH_M
+        lanes.append(Lane(f"{name}/verge_median", "verge", center, width_m, road=name))
     return tuple(lanes)
+
+
+def _bays(
+    shape: RoadShape, row: Sequence[Strip], prefix: str, name: str, T_world_road: SE3
+) -> Iterator[Lane]:
+    """Make a lane per angled bay, from the street inwards and over the kerb by ``OVERHANG_M``."""
+    line = shape.line()
+    for strip in (strip for strip in row if strip.kind == "parking"):
+        borders = bay_borders(shape, strip)
+        for k, ((near, far), (after_near, after_far)) in enumerate(pairwise(borders)):
+            st = 0.5 * np.array(
+                [[near[0] + after_near[0], near[1] + after_near[1]],
+                 [far[0] + after_far[0], far[1] + after_far[1]]]
+            )  # fmt: skip
+            beyond = st[1] + (st[1] - st[0]) * (OVERHANG_M / math.hypot(*(st[1] - st[0])))
+            flat = line.points(np.array([st[0, 0], beyond[0]]), np.array([st[0, 1], beyond[1]]))
+            ends = np.column_stack([flat, np.full(2, strip.middle_z_m)])
+            center = world_points(ends, T_world_road)
+            yield Lane(f"{prefix}{k}", "parking", center, BAY_WIDTH_M, road=name)
 
 
 def lane_name(road: str, side: int, number: int, shape: RoadShape) -> str:

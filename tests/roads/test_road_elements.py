@@ -116,6 +116,48 @@ def test_cross_section_adds_up(library: Library) -> None:
     assert lanes["main/sidewalk_left"].center_m[0][2] == pytest.approx(0.12 + 0.025 * 1.25)
 
 
+@pytest.mark.parametrize(("kind", "pitch_m"), [("angled", 2.5 / math.sin(math.radians(60.0))),
+                                               ("perpendicular", 2.5)])  # fmt: skip
+@pytest.mark.parametrize("traffic", ["right", "left"])
+def test_angled_bays_are_lanes_that_cars_drive_into(
+    library: Library, kind: str, pitch_m: float, traffic: str
+) -> None:
+    """One lane per bay, 5 m long and 0.6 m over the kerb, turned outwards from the traffic."""
+    scene = built(library, {**ROAD, "parking": kind, "traffic": traffic})
+    driving = by_name(scene)
+    for word, side in (("left", 1.0), ("right", -1.0)):
+        bays = [lane for lane in scene.lanes if lane.name.startswith(f"main/parking_{word}")]
+        beside = "forward0" if (side < 0) == (traffic == "right") else "backward0"
+        angle = math.remainder(
+            heading(bays[0], 0) - heading(driving[f"main/{beside}"], 0), math.tau
+        )
+
+        assert len(bays) >= 30
+        assert {lane.kind for lane in bays} == {"parking"}
+        # Drivers turn to the kerb of their own side.
+        turn = -1.0 if traffic == "right" else 1.0
+        leaning = 60.0 if kind == "angled" else 90.0
+        assert math.degrees(angle) == pytest.approx(turn * leaning, abs=0.1)
+        for lane in bays:
+            assert lane.center_m[0][1] == pytest.approx(side * 3.5)
+            assert abs(lane.center_m[1][1] - lane.center_m[0][1]) == pytest.approx(
+                5.6 if kind == "perpendicular" else 5.58 + 0.6 * math.sin(math.radians(60.0)),
+                abs=0.01,
+            )
+        steps = [b.center_m[0][0] - a.center_m[0][0] for a, b in pairwise(bays)]
+        assert steps == pytest.approx([pitch_m] * len(steps), abs=1e-4)
+
+
+def test_kerbed_median_has_a_lane_for_plants(library: Library) -> None:
+    """In the middle, between the kerbs, on top."""
+    median = {"median_m": 3.0, "median_kerb_m": 0.12}
+    lane = by_name(built(library, {**ROAD, **median}))["main/verge_median"]
+
+    assert (lane.kind, lane.width_m) == ("verge", pytest.approx(2.7))
+    assert lane.center_m[0] == pytest.approx((0.0, 0.0, 0.02 * 3.5 + 0.12))
+    assert "main/verge_median" not in by_name(built(library, {**ROAD, "median_m": 3.0}))
+
+
 @settings(max_examples=25, deadline=None)
 @given(st.floats(-0.05, 0.05), st.floats(5.0, 100.0), st.floats(-180.0, 180.0))
 def test_roads_one_after_the_other_are_one_path(

@@ -13,14 +13,18 @@ from gen_data.generator.roads.parking_shape import ParkingShape
 
 def _surface(path: str, **parameters: object) -> Family:
     build, name = Lazy(f"gen_data.generator.assets.roads.{path}"), path.partition(":")[2]
-    return Family(name, name, ("street",), 0, 0.0, False, 1, parameters, build)
+    return Family(name, name, ("street",), 0, 0.0, False, 2, parameters, build)
 
 
 _SHAPE, _JUNCTION, _PARKING = (
     {field.name: field.default for field in fields(shape)}
     for shape in (RoadShape, JunctionShape, ParkingShape)
 )
-_LOOKS: dict[str, object] = {"seed": 0, "wear": 0.3, "paving": "paving", "ground": "grass"}
+_LOOKS: dict[str, object] = {
+    "seed": 0, "wear": 0.3, "paving": "paving", "ground": "grass", "carriageway": "asphalt",
+    "age_years": -1.0, "coating": "none", "center_color": "white",
+}  # fmt: skip
+"""Fields of ``road_materials.StreetLook``, which needs no import of numpy here."""
 
 FAMILIES: Mapping[str, Family] = {
     family.name: family
@@ -35,9 +39,11 @@ FAMILIES: Mapping[str, Family] = {
             line_m=0.12,
             apron_m=6.0,
             rails=(0.0, 0.0),
+            arrows=(0.0, 0.0),
+            tram=0.0,
         ),
         _surface("junction:junction", **_JUNCTION, **_LOOKS, crossings="zebra"),
-        _surface("road:crosswalk", **_SHAPE, seed=0, wear=0.3, station_m=20.0, width_m=4.0),
+        _surface("road:crosswalk", **_SHAPE, **_LOOKS, station_m=20.0, width_m=4.0, style="zebra"),
         _surface("parking_area:parking_area", **_PARKING, **_LOOKS),
         _surface("ground:ground", seed=0, size_m=(800.0, 800.0), cover="grass", relief_m=0.04),
     )

@@ -10,10 +10,16 @@ from typing import Any
 import numpy as np
 
 from gen_data.generator.assets.procedural.family import Solid
-from gen_data.generator.assets.procedural.patches import Array, Patch, make_solid_in_place
+from gen_data.generator.assets.procedural.patches import Array, Patch
 from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, surface
 from gen_data.generator.assets.roads.markings import NARROW_M, ZEBRA_BAR_M
-from gen_data.generator.assets.roads.road_materials import SCALES_M, street_materials
+from gen_data.generator.assets.roads.road_materials import (
+    SCALES_M,
+    UNPAVED,
+    make_street_solid,
+    number_slots,
+    split_look,
+)
 from gen_data.generator.roads.cross_section import (
     APRON_DROPS,
     APRON_FALL_M,
@@ -35,36 +41,26 @@ _CELL_M = 0.6
 """Markings are cut this small, so that they follow the surface."""
 
 
-def junction(
-    *,
-    seed: int = 0,
-    wear: float = 0.3,
-    paving: str = "paving",
-    ground: str = "grass",
-    crossings: str = "zebra",
-    **shape: Any,
-) -> Solid:
+def junction(*, crossings: str = "zebra", **others: Any) -> Solid:
     """A junction about the origin; slots are those of ``street_materials``.
 
     Args:
-        seed: Of textures.
-        wear: 0 freshly laid to 1 worn out.
-        paving: Cover of the sidewalks, a word of ``GROUNDS``.
-        ground: Cover of the land beside, a word of ``GROUNDS``.
-        crossings: Style of the crosswalks: ``zebra``, ``lines`` or ``none``.
-        shape: Fields of ``JunctionShape``.
+        crossings: Style of the crosswalks: ``zebra``, ``ladder``, ``lines`` or ``none``.
+        others: Fields of ``StreetLook`` and of ``JunctionShape``.
     """
+    look, shape = split_look(others)
     profile = JunctionShape(**shape)
-    materials = street_materials(seed, wear, paving, ground)
-    slots = {name: k for k, name in enumerate(materials)}
+    slots = number_slots(look)
     fan = make_fan(profile)
+    paved = look.carriageway not in UNPAVED
     patches = [_carriageway(fan, slots["asphalt"])]
     for number in range(len(profile.arms_rad())):
         if profile.sidewalk_m > 0.0:
             patches += _corner(profile, number, slots)
         patches.append(_land(profile, number, slots["ground"]))
-        patches += _markings(profile, fan, number, crossings, slots["marking"])
-    return make_solid_in_place(patches, tuple(materials.values()), _hulls(profile, fan))
+        if paved:
+            patches += _markings(profile, fan, number, crossings, slots["marking"])
+    return make_street_solid(patches, look, _hulls(profile, fan))
 
 
 def _carriageway(fan: Fan, slot: int) -> Patch:
@@ -178,12 +174,14 @@ def _markings(
             (stop[0], shape.reach_m()), (middle - 0.5 * NARROW_M, middle + 0.5 * NARROW_M)
         )
     walk = (start + CROSSWALK_M[0], start + CROSSWALK_M[1])
-    if crossings == "zebra":
+    if crossings in ("zebra", "ladder"):
         count = int((2.0 * half - ZEBRA_BAR_M) // (2.0 * ZEBRA_BAR_M)) + 1
         first = -(count - 0.5) * ZEBRA_BAR_M
         for k in range(count):
             t = first + 2.0 * k * ZEBRA_BAR_M
             yield painted(walk, (t, t + ZEBRA_BAR_M))
+        for edge in walk if crossings == "ladder" else ():
+            yield painted((edge - 0.12, edge + 0.12), (0.2 - half, half - 0.2))
     elif crossings == "lines":
         # A signalled crossing: broken lines, dashes of 0.5 m and gaps of 0.2 m (RMS-1).
         for edge in walk:

@@ -7,11 +7,21 @@ the bars of a zebra crossing 0.50 m with gaps of 0.50 m.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
+
+import numpy as np
 
 from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, Deck
-from gen_data.generator.roads.cross_section import RoadShape, Strip, strips
+from gen_data.generator.roads.cross_section import (
+    RoadShape,
+    Strip,
+    bay_borders,
+    side_index,
+    strips,
+)
 
 NARROW_M, BROAD_M = 0.12, 0.25
 STOP_LINE_M, ZEBRA_BAR_M = 0.5, 0.5
@@ -26,12 +36,14 @@ class Stripe:
     Attributes:
         t_m: Its middle.
         dash_m, gap_m: Lengths; a gap of 0 is a solid line.
+        slot: Material: ``center`` between the directions, else ``marking``.
     """
 
     t_m: float
     width_m: float
     dash_m: float = 0.0
     gap_m: float = 0.0
+    slot: str = "marking"
 
 
 def stripes(
@@ -60,33 +72,40 @@ def paint_stripe(deck: Deck, stripe: Stripe, length_m: float) -> list[Patch]:
     half = 0.5 * stripe.width_m
     across = (stripe.t_m - half, stripe.t_m + half)
     if stripe.gap_m == 0.0:
-        return [deck.ribbon((0.0, length_m), across, "marking", PAINT_LIFT_M)]
+        return [deck.ribbon((0.0, length_m), across, stripe.slot, PAINT_LIFT_M)]
     patches, s = [], 0.5 * stripe.gap_m
     while s + 0.3 * stripe.dash_m < length_m:
         end = min(s + stripe.dash_m, length_m)
-        patches.append(deck.ribbon((s, end), across, "marking", PAINT_LIFT_M))
+        patches.append(deck.ribbon((s, end), across, stripe.slot, PAINT_LIFT_M))
         s += stripe.dash_m + stripe.gap_m
     return patches
 
 
-def bay_lines(deck: Deck, strip: Strip, length_m: float) -> list[Patch]:
-    """Lines between the bays of a parking strip."""
-    count = int(length_m // BAY_M)
+def bay_lines(deck: Deck, strip: Strip, shape: RoadShape) -> Iterator[Patch]:
+    """Lines between the bays of a parking strip: across it, or at the angle of the bays."""
+    if shape.bay_angle_deg[side_index(strip.side)] > 0.0:
+        for near, far in bay_borders(shape, strip):
+            line = (np.array(far) - np.array(near)) * 0.97
+            normal = 0.5 * NARROW_M * np.array([-line[1], line[0]]) / math.hypot(*line)
+            corners = np.stack([-normal, line - normal, line + normal, normal])
+            yield from deck.paint([corners], near)
+        return
+    count = int(shape.length_m // BAY_M)
     t0, t1 = sorted((strip.side * strip.inner_m, strip.side * (strip.outer_m - 0.05)))
-    start = 0.5 * (length_m - count * BAY_M)
-    return [
-        deck.ribbon((s, s + NARROW_M), (t0, t1), "marking", PAINT_LIFT_M)
-        for s in (start + k * BAY_M - 0.5 * NARROW_M for k in range(count + 1))
-        if s >= 0.0 and s + NARROW_M <= length_m
-    ]
+    start = 0.5 * (shape.length_m - count * BAY_M)
+    for k in range(count + 1):
+        s = start + k * BAY_M - 0.5 * NARROW_M
+        if s >= 0.0 and s + NARROW_M <= shape.length_m:
+            yield deck.ribbon((s, s + NARROW_M), (t0, t1), "marking", PAINT_LIFT_M)
 
 
 def _center(word: str, dash_m: tuple[float, float], width_m: float) -> list[Stripe]:
     if word == "none":
         return []
     if word == "double":
-        return [Stripe(t, width_m) for t in (-width_m, width_m)]
-    return [Stripe(0.0, width_m, *(dash_m if word == "dashed" else (0.0, 0.0)))]
+        return [Stripe(t, width_m, slot="center") for t in (-width_m, width_m)]
+    dashes = dash_m if word == "dashed" else (0.0, 0.0)
+    return [Stripe(0.0, width_m, *dashes, slot="center")]
 
 
 def _edges(

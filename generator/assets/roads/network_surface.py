@@ -7,16 +7,20 @@ from collections.abc import Iterator
 import numpy as np
 
 from gen_data.generator.assets.procedural.family import Solid
-from gen_data.generator.assets.procedural.patches import Array, Patch, make_solid_in_place
+from gen_data.generator.assets.procedural.patches import Array, Patch
 from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, surface
-from gen_data.generator.assets.roads.road_materials import SLOT_OF, street_materials
+from gen_data.generator.assets.roads.road_materials import (
+    SLOT_OF,
+    StreetLook,
+    make_street_solid,
+    number_slots,
+)
 from gen_data.generator.roads.lane_graph import stations
 from gen_data.generator.roads.opendrive import Network, Road, Section
 from gen_data.generator.roads.opendrive_lanes import heights_m, origin_m
 
 _STEP_M = 2.5
 _DASH_M, _GAP_M = 3.0, 6.0
-_SEED, _WEAR = 0, 0.3
 
 
 def network_solid(network: Network) -> Solid:
@@ -24,8 +28,8 @@ def network_solid(network: Network) -> Solid:
 
     Slots are those of ``street_materials``; the origin is ``origin_m``.
     """
-    materials = street_materials(_SEED, _WEAR, "paving", "grass")
-    slots = {name: k for k, name in enumerate(materials)}
+    look = StreetLook()
+    slots = number_slots(look)
     x, y = origin_m(network)
     patches: list[Patch] = []
     hulls: list[Array] = []
@@ -34,7 +38,7 @@ def network_solid(network: Network) -> Solid:
             patches += (p.moved(-x, -y) for p in _strips(road, section, slots))
             patches += (p.moved(-x, -y) for p in _marks(road, section, slots["marking"]))
             hulls += (hull - np.array([x, y, 0.0]) for hull in _hulls(road, section))
-    return make_solid_in_place(patches, tuple(materials.values()), hulls)
+    return make_street_solid(patches, look, hulls)
 
 
 def _strips(road: Road, section: Section, slots: dict[str, int]) -> Iterator[Patch]:

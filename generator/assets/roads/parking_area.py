@@ -8,38 +8,38 @@ import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
-from gen_data.generator.assets.procedural.patches import Patch, make_solid_in_place
+from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, surface
 from gen_data.generator.assets.roads.markings import NARROW_M
-from gen_data.generator.assets.roads.road_materials import street_materials
+from gen_data.generator.assets.roads.road_materials import (
+    UNPAVED,
+    make_street_solid,
+    number_slots,
+    split_look,
+)
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.roads.parking_shape import EDGE_M, ParkingShape
 
 _APRON_M, _APRON_Z_M = 4.0, -0.12
 
 
-def parking_area(
-    *, seed: int = 0, wear: float = 0.3, paving: str = "paving", ground: str = "grass", **shape: Any
-) -> Solid:
+def parking_area(**parameters: Any) -> Solid:
     """A level car park around the origin; slots are those of ``street_materials``.
 
     Args:
-        seed: Of textures.
-        wear: 0 freshly laid to 1 worn out.
-        paving: A word of ``GROUNDS``; without area here, as all streets share one set of slots.
-        ground: Cover of the land beside, a word of ``GROUNDS``.
-        shape: Fields of ``ParkingShape``.
+        parameters: Fields of ``StreetLook`` and of ``ParkingShape``. Sidewalks have no area here,
+            as all streets share one set of slots.
     """
+    look, shape = split_look(parameters)
     profile = ParkingShape(**{**shape, **_round_counts(shape)})
-    materials = street_materials(seed, wear, paving, ground)
-    slots = {name: k for k, name in enumerate(materials)}
+    slots = number_slots(look)
     x, y = 0.5 * profile.length_m + EDGE_M, 0.5 * profile.width_m + EDGE_M
     patches = [_rectangle((-x, -y), (x, y), 0.0, "asphalt", slots["asphalt"])]
     patches.append(_skirt(x, y, slots["ground"]))
-    for low, high in _lines(profile):
+    for low, high in _lines(profile) if look.carriageway not in UNPAVED else ():
         patches.append(_rectangle(low, high, PAINT_LIFT_M, "marking", slots["marking"]))
     slab = hulls.box((-x, -y, -0.3), (x, y, 0.0))
-    return make_solid_in_place(patches, tuple(materials.values()), [slab])
+    return make_street_solid(patches, look, [slab])
 
 
 def _round_counts(shape: dict[str, Any]) -> dict[str, int]:

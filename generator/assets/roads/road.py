@@ -8,13 +8,22 @@ from typing import Any
 
 import numpy as np
 
-from gen_data.generator.assets.procedural.family import Solid
-from gen_data.generator.assets.procedural.patches import Array, Patch, make_solid_in_place
+from gen_data.generator.assets.procedural.family import Solid, check_option
+from gen_data.generator.assets.procedural.patches import Array, Patch
 from gen_data.generator.assets.procedural.surface_shapes import block
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, Deck, surface
 from gen_data.generator.assets.roads.markings import ZEBRA_BAR_M, bay_lines, paint_stripe, stripes
-from gen_data.generator.assets.roads.road_materials import SLOT_OF, street_materials
+from gen_data.generator.assets.roads.painted_signs import ARROW_M, arrow, bicycle
+from gen_data.generator.assets.roads.road_materials import (
+    SLOT_OF,
+    UNPAVED,
+    StreetLook,
+    make_street_solid,
+    number_slots,
+    split_look,
+)
+from gen_data.generator.assets.roads.road_wear import gutters, lane_tiles, wear_patches
 from gen_data.generator.roads.cross_section import (
     APRON_DROPS,
     APRON_FALL_M,
@@ -34,53 +43,55 @@ _BATTER_M = 0.02
 
 def road(  # noqa: PLR0913 - a family's parameters are its function's
     *,
-    seed: int = 0,
     markings: str = "dashed",
     edge_lines: str = "none",
     dash_m: tuple[float, float] = (3.0, 6.0),
     line_m: float = 0.12,
-    wear: float = 0.3,
-    paving: str = "paving",
-    ground: str = "grass",
     apron_m: float = APRON_M,
     rails: tuple[float, float] = (0.0, 0.0),
-    **shape: Any,
+    arrows: tuple[float, float] = (0.0, 0.0),
+    tram: float = 0.0,
+    **others: Any,
 ) -> Solid:
     """A road from the origin along +X; slots are those of ``street_materials``.
 
     Args:
-        seed: Of patches, cracks and covers.
         markings: Line in the middle: ``solid``, ``dashed``, ``double`` or ``none``.
         edge_lines: ``solid`` or ``none``.
         dash_m: Length of dashes and of the gaps between them.
         line_m: Width of narrow lines.
-        wear: 0 freshly laid to 1 worn out.
-        paving: What sidewalks are covered with, a word of ``GROUNDS``.
-        ground: What the land beside is covered with, a word of ``GROUNDS``.
-        apron_m: Width of that land on each side; 0 = none.
+        apron_m: Width of the land beside it; 0 = none.
         rails: Whether there are guard rails, left and right.
-        shape: Fields of ``RoadShape``.
+        arrows: Whether lanes that lead to its start and to its end have arrows.
+        tram: Whether the lanes next to the middle have the rails of a tramway.
+        others: Fields of ``StreetLook`` and of ``RoadShape``.
     """
+    look, shape = split_look(others)
     profile = RoadShape(**shape)
-    deck = make_deck(profile, seed, wear, paving, ground)
-    rng = variant_rng("road", seed)
-    patches = list(_carriageway(deck, profile))
+    deck = make_deck(profile, look)
+    rng = variant_rng("road", look.seed)
+    paved = look.carriageway not in UNPAVED
+    patches = list(_carriageway(deck, profile, look))
     for side in (1, -1):
         patches += _beside(deck, profile, side, apron_m)
-    for stripe in stripes(profile, markings, edge_lines, dash_m, line_m):
+    for stripe in stripes(profile, markings, edge_lines, dash_m, line_m) if paved else ():
         patches += paint_stripe(deck, stripe, profile.length_m)
-    patches += [*_wear(deck, profile, wear, rng), *_covers(deck, profile, rng)]
+    if paved:
+        patches += [*wear_patches(deck, profile, look.wear, rng), *_covers(deck, profile, rng)]
+        patches += _signs(deck, profile, arrows, markings)
+    patches += gutters(deck, profile, look)
+    if tram:
+        patches += _tram_tracks(deck, profile)
     for side in (1, -1):
-        for strip in strips(profile, side):
+        for strip in strips(profile, side) if paved else ():
             if strip.kind == "parking":
-                patches += bay_lines(deck, strip, profile.length_m)
+                patches += bay_lines(deck, strip, profile)
         if rails[0 if side > 0 else 1]:
             patches += _guard_rail(deck, profile, side)
-    materials = tuple(street_materials(seed, wear, paving, ground).values())
-    return make_solid_in_place(patches, materials, _hulls(deck, profile))
+    return make_street_solid(patches, look, _hulls(deck, profile))
 
 
-def make_deck(profile: RoadShape, seed: int, wear: float, paving: str, ground: str) -> Deck:
+def make_deck(profile: RoadShape, look: StreetLook) -> Deck:
     """The surface of a road with the ruts that traffic has worn into it."""
     t = np.array(sorted({round(v, 6) for v in _columns(profile)}))
     z = height_m(profile, t)
@@ -88,9 +99,8 @@ def make_deck(profile: RoadShape, seed: int, wear: float, paving: str, ground: s
         for strip in strips(profile, side):
             if strip.kind == "driving":
                 for track in (strip.middle_m - _TRACK_M, strip.middle_m + _TRACK_M):
-                    z = z - wear * _RUT_M * np.exp(-(((t - track) / _RUT_WIDTH_M) ** 2))
-    slots = {name: k for k, name in enumerate(street_materials(seed, wear, paving, ground))}
-    return Deck(profile.line(), t, z, abs(profile.curvature_per_m), slots)
+                    z = z - look.wear * _RUT_M * np.exp(-(((t - track) / _RUT_WIDTH_M) ** 2))
+    return Deck(profile.line(), t, z, abs(profile.curvature_per_m), number_slots(look))
 
 
 def _columns(profile: RoadShape) -> Iterator[float]:
@@ -104,13 +114,22 @@ def _columns(profile: RoadShape) -> Iterator[float]:
                 yield side * (strip.inner_m + _BATTER_M)
 
 
-def _carriageway(deck: Deck, profile: RoadShape) -> Iterator[Patch]:
+def _carriageway(deck: Deck, profile: RoadShape, look: StreetLook) -> Iterator[Patch]:
+    whole = (0.0, profile.length_m)
     for side in (1, -1):
         for strip in strips(profile, side):
-            if strip.kind != "kerb":
-                t0, t1 = sorted((side * strip.inner_m, side * strip.outer_m))
-                t = deck.t_m[(deck.t_m >= t0 - 1e-6) & (deck.t_m <= t1 + 1e-6)]
-                yield deck.ribbon((0.0, profile.length_m), tuple(t), SLOT_OF[strip.kind])
+            if strip.kind == "kerb":
+                continue
+            t0, t1 = sorted((side * strip.inner_m, side * strip.outer_m))
+            t = tuple(deck.t_m[(deck.t_m >= t0 - 1e-6) & (deck.t_m <= t1 + 1e-6)])
+            if strip.kind == "driving":
+                rng = variant_rng(f"road/{side}/{strip.number}", look.seed)
+                for span, slot in lane_tiles(profile.length_m, look.wear, rng):
+                    yield deck.lane(span, t, slot)
+            else:
+                slot = SLOT_OF[strip.kind]
+                coated = strip.kind == "bicycle" and look.coating != "none"
+                yield deck.ribbon(whole, t, "coating" if coated else slot)
 
 
 def _beside(deck: Deck, profile: RoadShape, side: int, apron_m: float) -> Iterator[Patch]:
@@ -128,10 +147,14 @@ def _beside(deck: Deck, profile: RoadShape, side: int, apron_m: float) -> Iterat
 
 
 def _kerb(deck: Deck, profile: RoadShape, strip: Strip) -> Patch:
-    """Face and top of a row of kerb stones."""
-    across = strip.inner_m + np.array([0.0, _BATTER_M, _BATTER_M + 0.015, KERB_WIDTH_M])
-    z0, top = strip.inner_z_m, strip.outer_z_m
+    """Face and top of a row of kerb stones; those of a median face outwards."""
+    away = np.array([0.0, _BATTER_M, _BATTER_M + 0.015, KERB_WIDTH_M])
+    z0, top = sorted((strip.inner_z_m, strip.outer_z_m))
     heights = np.array([z0, top - 0.015, top, top])
+    if strip.inner_z_m > strip.outer_z_m:
+        across, heights = strip.outer_m - away[::-1], heights[::-1]
+    else:
+        across = strip.inner_m + away
     return _beyond(deck, profile.length_m, strip.side, across, heights, "kerb")
 
 
@@ -150,42 +173,57 @@ def _beyond(
     return surface(points, plan, slot, deck.slots[slot])
 
 
-def _wear(deck: Deck, profile: RoadShape, wear: float, rng: VariantRng) -> Iterator[Patch]:
-    """Mended patches and sealed cracks."""
-    low, high = -profile.carriageway_m(-1), profile.carriageway_m(1)
-    for _ in range(round(wear * profile.length_m / 18.0)):
-        length, width = rng.between(0.8, 5.0), rng.between(0.6, 1.6)
-        s = rng.between(0.3, max(0.4, profile.length_m - length - 0.3))
-        t = rng.between(low + 0.1, high - width - 0.1)
-        if s + length > profile.length_m or high - low < width + 0.3:
-            continue
-        seam = 0.025
-        across, inner = (t, t + width), (t + seam, t + width - seam)
-        yield deck.ribbon((s, s + length), deck.columns_between(*across), "tar", 0.0012)
-        yield deck.ribbon(
-            (s + seam, s + length - seam), deck.columns_between(*inner), "asphalt_new", 0.0018
-        )
-    for _ in range(round(wear * profile.length_m / 4.5)):
-        yield _crack(deck, profile.length_m, low, high, rng)
+def _signs(
+    deck: Deck, profile: RoadShape, arrows: tuple[float, float], markings: str
+) -> Iterator[Patch]:
+    """Arrows on lanes that lead to an end, and bicycles on bicycle lanes."""
+    for side in (1, -1):
+        row = strips(profile, side)
+        forward = profile.forward(side)
+        lanes = [strip for strip in row if strip.kind == "driving"]
+        if arrows[1 if forward else 0]:
+            for strip, word in zip(lanes, _turns(len(lanes), profile.traffic), strict=True):
+                for before in (8.0, 28.0):
+                    at = profile.length_m - before - ARROW_M if forward else before + ARROW_M
+                    if 0.0 < at < profile.length_m and before + ARROW_M < profile.length_m:
+                        yield from deck.paint(arrow(word), (at, strip.middle_m), not forward)
+        for strip in row if markings != "none" else ():
+            if strip.kind == "bicycle":
+                for s in np.arange(6.0, profile.length_m - 6.0, 25.0):
+                    yield from deck.paint(bicycle(), (float(s), strip.middle_m), not forward)
 
 
-def _crack(deck: Deck, length_m: float, low: float, high: float, rng: VariantRng) -> Patch:
-    """A sealed crack: across the road, or wandering along it."""
-    count = 14
-    steps = np.array([rng.between(-1.0, 1.0) for _ in range(count)])
-    if rng.chance(0.45):
-        t = np.linspace(low + 0.1, low + 0.1 + (high - low - 0.2) * rng.between(0.3, 1.0), count)
-        s = rng.between(1.0, max(1.1, length_m - 1.0)) + 0.12 * np.cumsum(steps)
-    else:
-        reach = min(rng.between(2.0, 10.0), 0.8 * length_m)
-        s = rng.between(0.2, length_m - reach - 0.1) + np.linspace(0.0, reach, count)
-        t = rng.between(low + 0.6, high - 0.6) + 0.1 * np.cumsum(steps)
-    s, t = np.clip(s, 0.05, length_m - 0.05), np.clip(t, low + 0.05, high - 0.05)
-    return deck.path(s, t, rng.between(0.015, 0.05), "tar", 0.002)
+def _turns(count: int, traffic: str) -> list[str]:
+    """Arrow of each lane from the middle outwards, as ``junction_lanes`` connects them."""
+    across, aside = ("left", "right") if traffic == "right" else ("right", "left")
+    if count < 2:
+        return ["straight"] * count
+    return [f"straight_{across}", *["straight"] * (count - 2), f"straight_{aside}"]
+
+
+def _tram_tracks(deck: Deck, profile: RoadShape) -> Iterator[Patch]:
+    """Grooved rails, flush with the surface, in the lanes next to the middle; gauge 1435 mm.
+
+    Head 56 mm, groove 42 mm: rail 60R2 of EN 14811.
+    """
+    whole = (0.0, profile.length_m)
+    for side in (1, -1):
+        lanes = [strip for strip in strips(profile, side) if strip.kind == "driving"]
+        for middle in (lane.middle_m for lane in lanes[:1]):
+            for way in (1.0, -1.0):
+                # The groove lies inside the gauge, with a narrow lip on its other side.
+                face = middle + way * 0.5 * 1.435
+                bands = (
+                    ("rail", 0.0, 0.056), ("groove", -0.042, 0.0), ("rail", -0.056, -0.042),
+                    ("tar", 0.056, 0.08), ("tar", -0.08, -0.056),
+                )  # fmt: skip
+                for slot, low, high in bands:
+                    t0, t1 = sorted((face + way * low, face + way * high))
+                    yield deck.ribbon(whole, deck.columns_between(t0, t1), slot, 0.0035)
 
 
 def _covers(deck: Deck, profile: RoadShape, rng: VariantRng) -> Iterator[Patch]:
-    """Manhole covers in the lanes, and drains in the gutters of roads with kerbs."""
+    """Covers in the lanes and on sidewalks, and drains in the gutters of roads with kerbs."""
     if profile.kerb_m <= 0.0:
         return
     for side in (1, -1):
@@ -195,14 +233,25 @@ def _covers(deck: Deck, profile: RoadShape, rng: VariantRng) -> Iterator[Patch]:
         while driving and s < profile.length_m - 1.0:
             t = driving[0].middle_m + rng.between(-0.5, 0.5)
             yield deck.disc(s, t, 0.40, "tar", 0.0022)
-            yield deck.disc(s, t, 0.3125, "manhole", 0.003)
+            yield deck.disc(s, t, 0.3125, rng.choose(("manhole", "manhole", "manhole_b")), 0.003)
+            # Caps of valves stand in groups near manholes.
+            for _ in range(rng.choose((0, 0, 1, 2))):
+                beside = (s + rng.between(0.9, 3.0), t + rng.between(-0.6, 0.6))
+                yield deck.disc(*beside, 0.09, "manhole_b", 0.003, 12)
             s += rng.between(28.0, 55.0)
         s = rng.between(4.0, 12.0)
-        while any(strip.kind == "kerb" for strip in row) and s < profile.length_m - 1.0:
-            gutter = profile.carriageway_m(side)
+        gutter = profile.carriageway_m(side)
+        kerbed = any(strip.kind == "kerb" and strip.inner_m >= gutter - 1e-6 for strip in row)
+        while kerbed and s < profile.length_m - 1.0:
             t0, t1 = sorted((side * (gutter - 0.34), side * (gutter - 0.02)))
             yield deck.ribbon((s, s + 0.5), (t0, t1), "drain", 0.004)
             s += rng.between(18.0, 30.0)
+        for walk in (strip for strip in row if strip.kind == "sidewalk" and strip.width_m > 1.2):
+            s = rng.between(5.0, 35.0)
+            while s < profile.length_m - 2.0:
+                t0, t1 = sorted((walk.middle_m - 0.3, walk.middle_m + 0.3))
+                yield deck.ribbon((s, s + rng.choose((0.6, 1.2))), (t0, t1), "hatch", 0.002)
+                s += rng.between(25.0, 60.0)
 
 
 def _guard_rail(deck: Deck, profile: RoadShape, side: int) -> Iterator[Patch]:
@@ -251,24 +300,23 @@ def _hulls(deck: Deck, profile: RoadShape) -> list[Array]:
 
 
 def crosswalk(
-    *, seed: int = 0, wear: float = 0.3, station_m: float = 20.0, width_m: float = 4.0, **shape: Any
+    *, station_m: float = 20.0, width_m: float = 4.0, style: str = "zebra", **others: Any
 ) -> Solid:
     """Bars across a road, in the road's frame, over asphalt that hides its other lines.
 
     Args:
-        seed: Of textures; the road's own.
-        wear: 0 freshly painted to 1 worn out; the road's own.
         station_m: Its middle, along the road.
         width_m: Along the road, the length of its bars.
-        shape: Fields of ``RoadShape``.
+        style: ``zebra``, or ``ladder`` with lines at both ends of the bars.
+        others: Fields of ``StreetLook`` and of ``RoadShape``; those of the road.
     """
+    check_option("crosswalk", "style", style, ("zebra", "ladder"))
+    look, shape = split_look(others)
     profile = RoadShape(**shape)
-    deck = make_deck(profile, seed, wear, "paving", "grass")
+    deck = make_deck(profile, look)
     low, high = -profile.carriageway_m(-1), profile.carriageway_m(1)
     span = (station_m - 0.5 * width_m, station_m + 0.5 * width_m)
-    columns = deck.t_m[(deck.t_m > low + 0.4) & (deck.t_m < high - 0.4)]
-    inner = (low + 0.36, *(float(t) for t in columns), high - 0.36)
-    patches = [deck.ribbon(span, inner, "asphalt", PAINT_LIFT_M + 0.0008)]
+    patches = list(_cover_lines(deck, profile, span))
     count = int((high - low - 1.5 * ZEBRA_BAR_M) // (2.0 * ZEBRA_BAR_M)) + 1
     first = 0.5 * (low + high) - (count - 0.5) * ZEBRA_BAR_M
     for k in range(count):
@@ -276,8 +324,27 @@ def crosswalk(
         t1 = t0 + ZEBRA_BAR_M
         bar = deck.columns_between(t0, t1)
         patches.append(deck.ribbon(span, bar, "marking", PAINT_LIFT_M + 0.002))
+    if style == "ladder":
+        across = deck.columns_between(low + 0.2, high - 0.2)
+        for line in ((span[0] - 0.3, span[0]), (span[1], span[1] + 0.3)):
+            patches.append(deck.ribbon(line, across, "marking", PAINT_LIFT_M + 0.002))
     s, t = np.meshgrid(span, [low, high], indexing="ij")
     top = deck.at(s, t).reshape(-1, 3)
     hull = np.concatenate([top, top - np.array([0.0, 0.0, 0.02])])
-    materials = tuple(street_materials(seed, wear, "paving", "grass").values())
-    return make_solid_in_place(patches, materials, [hull])
+    return make_street_solid(patches, look, [hull])
+
+
+def _cover_lines(deck: Deck, profile: RoadShape, span_m: tuple[float, float]) -> Iterator[Patch]:
+    """The carriageway's own surface over its lines, up to the gutters."""
+    lift = PAINT_LIFT_M + 0.0008
+    for side in (1, -1):
+        edge = profile.carriageway_m(side) - 0.36
+        for strip in strips(profile, side):
+            inner, outer = min(strip.inner_m, edge), min(strip.outer_m, edge)
+            if strip.kind not in ("driving", "bicycle", "shoulder", "parking") or outer <= inner:
+                continue
+            t = deck.columns_between(*sorted((side * inner, side * outer)))
+            if strip.kind == "driving":
+                yield deck.lane(span_m, t, "lane", lift)
+            else:
+                yield deck.ribbon(span_m, t, "asphalt", lift)

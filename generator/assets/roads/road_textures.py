@@ -1,11 +1,9 @@
-"""Ground surfaces from above, road paint, and castings. Every image tiles.
+"""Ground surfaces from above, and road paint. Every image tiles.
 
 Grounds have 1024 pixels: 6 mm each at their usual repeat of 5 to 7 m.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
@@ -24,23 +22,22 @@ from gen_data.generator.assets.procedural.textures.texture_images import (
     texture,
 )
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
+from gen_data.generator.assets.roads.lane_textures import asphalt_color
 from gen_data.generator.core.asset_types import Float32, TextureData
 
 GROUND_PX = 1024
 _N = GROUND_PX
 
 
-def asphalt(seed: int, wear: float = 0.3) -> TextureData:
+def asphalt(seed: int, wear: float = 0.3, age_years: float = 6.0) -> TextureData:
     """Dense asphalt: stones of up to 11 mm in bitumen, which wears off them; 6 m per repeat.
 
     Args:
-        seed: Of everything drawn.
-        wear: 0 fresh, dark and even; 1 grey, stony and stained.
+        seed: Of everything drawn, and of the stone.
+        wear: 0 even; 1 stony and stained.
+        age_years: Since it was laid: from dark to grey.
     """
     rng = variant_rng("asphalt", seed)
-    # Mean albedo 0.06 to 0.12 (linear) is 0.27 to 0.38 in sRGB; worn roads reach 0.15.
-    level = 0.315 + 0.09 * wear + rng.between(-0.015, 0.015)
-    warm = np.array([1.0 + 0.012 * wear, 1.0, 0.985 - 0.01 * wear], dtype=np.float32)
     stones = worley((340, 340), rng, size_px=_N)
     tone = stones.of_each(uniform(stones.count, rng) - 0.5)
     grain = (uniform((_N, _N), rng) - 0.5).astype(np.float32)
@@ -48,7 +45,7 @@ def asphalt(seed: int, wear: float = 0.3) -> TextureData:
     shade = 1.0 + (0.16 + 0.24 * wear) * tone + 0.16 * grain + (0.02 + 0.035 * wear) * clouds
     oil = smoothstep(0.45, 1.1, fbm((9, 9), 4, rng, 0.6, _N)) * np.float32(0.1 * wear)
     pale = smoothstep(0.4, 1.0, fbm((7, 7), 4, rng, 0.6, _N)) * np.float32(0.07 * wear)
-    albedo = level * (shade * (1.0 - oil + pale))[..., None] * warm
+    albedo = asphalt_color(seed, age_years) * (shade * (1.0 - oil + pale))[..., None]
     height = 0.35 * tone + 0.35 * blur_image(grain)
     return texture(albedo.astype(np.float32), 0.97 - 0.5 * oil, height.astype(np.float32), 0.8)
 
@@ -145,65 +142,27 @@ def earth(seed: int) -> TextureData:
     return texture(albedo, None, (1.5 * clouds + 2.0 * stone + speck).astype(np.float32), 0.8)
 
 
-def road_paint(seed: int, wear: float = 0.3) -> TextureData:
+def road_paint(seed: int, wear: float = 0.3, age_years: float = 6.0) -> TextureData:
     """White marking: glass beads in paint, dirtied and worn down to the road; 2 m per repeat.
 
     Args:
-        seed: Of everything drawn.
-        wear: 0 fresh to 1 hardly visible in places.
+        seed: Of everything drawn, and of the stone of the asphalt below.
+        wear: 0 fresh to 1 hardly visible in places; 1.6: only traces.
+        age_years: Of the asphalt below.
     """
     rng = variant_rng("road_paint", seed)
     grain = (uniform((512, 512), rng) - 0.5).astype(np.float32)
-    dirt = smoothstep(-0.6, 1.0, fbm((6, 6), 5, rng, 0.6)) * np.float32(0.08 + 0.16 * wear)
+    dirt = smoothstep(-0.6, 1.0, fbm((6, 6), 5, rng, 0.6)) * np.float32(
+        min(0.08 + 0.16 * wear, 0.3)
+    )
     paint = color("#d6d5cf") * (1.0 - dirt + 0.05 * grain)[..., None]
-    bare = color("#57575a") * (1.0 + 0.35 * grain)[..., None]
+    bare = asphalt_color(seed, age_years) * (1.03 + 0.35 * grain)[..., None]
     flaking = fbm((14, 14), 6, rng, 0.7) + 0.9 * grain
     limit = 1.75 - 1.5 * wear
     gone = smoothstep(limit, limit + 0.25, flaking)
     return texture(
         mix_colors(paint.astype(np.float32), bare.astype(np.float32), gone), 0.9 + 0.1 * gone
     )
-
-
-def manhole(seed: int) -> TextureData:
-    """A round cast-iron cover in its frame, once across the image."""
-    rng = variant_rng("manhole", seed)
-    y, x = rows_and_columns()
-    x, y = 2.0 * x - 1.0, 2.0 * y - 1.0
-    radius = np.sqrt(x * x + y * y)
-    studs = smoothstep(0.1, 0.5, np.sin(24.0 * x) * np.sin(24.0 * y)) * smoothstep(
-        0.74, 0.7, radius
-    )
-    rings = smoothstep(0.03, 0.01, np.abs(radius - 0.77)) + smoothstep(
-        0.05, 0.03, np.abs(radius - 0.93)
-    )
-    gap = smoothstep(0.02, 0.008, np.abs(radius - 0.84))
-    turn = np.arctan2(y, x)
-    holes = smoothstep(0.05, 0.03, np.abs(radius - 0.55)) * smoothstep(
-        0.9, 0.97, np.cos(6.0 * turn)
-    )
-    raised = np.clip(studs + rings, 0.0, 1.0)
-    grit = fbm((40, 40), 4, rng, 0.7)
-    level = (0.27 + 0.1 * raised + 0.03 * grit) * (1.0 - 0.85 * np.clip(gap + holes, 0.0, 1.0))
-    albedo = level[..., None] * color("#fff4e6")
-    return texture(albedo.astype(np.float32), (0.95 - 0.25 * raised).astype(np.float32),
-                   blur_image((3.0 * raised - 4.0 * gap).astype(np.float32)))  # fmt: skip
-
-
-def drain(seed: int) -> TextureData:
-    """A grating of a street gully, once across the image; slots run across the gutter."""
-    rng = variant_rng("drain", seed)
-    y, x = rows_and_columns()
-    inside = (
-        smoothstep(0.07, 0.09, x) * smoothstep(0.93, 0.91, x)
-        * smoothstep(0.08, 0.1, y) * smoothstep(0.92, 0.9, y)
-    )  # fmt: skip
-    slots = smoothstep(0.1, 0.35, np.sin(2.0 * math.pi * 7.0 * x)) * inside
-    slots = slots * smoothstep(0.03, 0.05, np.abs(y - 0.5))
-    grit = fbm((40, 40), 4, rng, 0.7)
-    level = (0.34 + 0.04 * grit) * (1.0 - 0.93 * slots)
-    albedo: Float32 = (level[..., None] * color("#fff2e2")).astype(np.float32)
-    return texture(albedo, None, blur_image((-4.0 * slots).astype(np.float32)))
 
 
 def _bond(rows: int, columns: int, shift: float) -> tuple[Float32, np.ndarray]:
