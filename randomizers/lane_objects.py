@@ -18,7 +18,13 @@ from gen_data.generator.core.scene import LaneKind, ObjectGroup, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.asset_groups import CategoryWeights, GroupRandomizer, draw_asset
-from gen_data.randomizers.free_space import Footprint, Ground, make_ground, standing_bodies
+from gen_data.randomizers.free_space import (
+    Footprint,
+    Ground,
+    make_ground,
+    solid_bounds_m,
+    standing_bodies,
+)
 
 COUNT_MAX = 2000
 """Largest count of the template's ``lane_objects`` element."""
@@ -34,8 +40,9 @@ SCATTER_TRIES = 20
 """Attempts to find a free place for one scattered object."""
 
 
-Thing = tuple[str, float, tuple[Vec3, Vec3]]
-"""Asset, scale, and scaled bounds [m]."""
+Bounds = tuple[Vec3, Vec3]
+Thing = tuple[str, float, Bounds, Bounds]
+"""Asset, scale, its scaled bounds [m], and the part of them that nothing else may enter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +149,7 @@ class LaneObjects(GroupRandomizer):
             at_m = float(rng.uniform()) * self.gap_m.draw(rng)
             run = self._draw_run(at_m, weights, assets, rng)
             for _ in range(PER_LANE_MAX):
-                asset, scale, bounds_m = run.thing
+                asset, scale, bounds_m, solid_m = run.thing
                 length_m, width_m = _extent_m(bounds_m, group.facing)
                 room_m = max(0.0, 0.5 * (line.lane.width_m - width_m))
                 left_m = room_m * self.lateral.draw(rng)
@@ -157,7 +164,7 @@ class LaneObjects(GroupRandomizer):
                     place = place @ SE3((0.0, 0.0, -_land_fall_m(behind_m)))
                     pose = pose_on_lane(place, line.lane, bounds_m, group.facing, turn)
                     pose = pose.rounded()
-                    if self._occupy(ground, pose, bounds_m):
+                    if self._occupy(ground, pose, solid_m):
                         yield Member(asset, pose, scale, collides=False)
                 at_m += length_m
                 if at_m < run.end_m:
@@ -188,18 +195,18 @@ class LaneObjects(GroupRandomizer):
         high = [max(point[k] for point in points) for k in range(3)]
         for _ in range(self.count.draw(rng) if self.count is not None else 10):
             for _ in range(SCATTER_TRIES):
-                asset, scale, bounds_m = self._draw_thing(weights, assets, rng)
+                asset, scale, bounds_m, solid_m = self._draw_thing(weights, assets, rng)
                 x, y = (float(rng.uniform(low[k], high[k])) for k in range(2))
                 stand = SE3.about_z(float(rng.uniform(0.0, 2.0 * math.pi)), (x, y, low[2]))
                 pose = (stand @ SE3((0.0, 0.0, -bounds_m[0][2]))).rounded()
-                if self._occupy(ground, pose, bounds_m):
+                if self._occupy(ground, pose, solid_m):
                     yield Member(asset, pose, scale, collides=False)
                     break
             else:
                 remedy = "a smaller count or min_clearance_m"
                 raise self.reject("no free place for a scattered object", remedy)
 
-    def _occupy(self, ground: Ground, pose: SE3, bounds_m: tuple[Vec3, Vec3]) -> bool:
+    def _occupy(self, ground: Ground, pose: SE3, bounds_m: Bounds) -> bool:
         """Occupy the ground under an object if it is free; return whether it was."""
         footprint = Footprint.of(pose, bounds_m)
         if not ground.is_free(footprint.expand(self.min_clearance_m)):
@@ -219,11 +226,13 @@ class LaneObjects(GroupRandomizer):
         """Draw an asset and its scale; also return its scaled bounds."""
         asset = draw_asset(weights, rng)
         scale = round(self.scale.draw(rng), 4)
-        (x0, y0, z0), (x1, y1, z1) = assets.bounds_m(asset)
-        return asset, scale, (
-            (scale * x0, scale * y0, scale * z0),
-            (scale * x1, scale * y1, scale * z1),
-        )  # fmt: skip
+        bounds_m = _scale_bounds(assets.bounds_m(asset), scale)
+        return asset, scale, bounds_m, _scale_bounds(solid_bounds_m(assets, asset), scale)
+
+
+def _scale_bounds(bounds_m: Bounds, scale: float) -> Bounds:
+    (x0, y0, z0), (x1, y1, z1) = bounds_m
+    return (scale * x0, scale * y0, scale * z0), (scale * x1, scale * y1, scale * z1)
 
 
 def _land_fall_m(behind_m: float) -> float:
@@ -231,7 +240,7 @@ def _land_fall_m(behind_m: float) -> float:
     return min(1.0, behind_m / LAND_SLOPE_M) * LAND_FALL_M
 
 
-def _extent_m(bounds_m: tuple[Vec3, Vec3], facing: str) -> tuple[float, float]:
+def _extent_m(bounds_m: Bounds, facing: str) -> tuple[float, float]:
     """Extents along and across the lane."""
     x, y = bounds_m[1][0] - bounds_m[0][0], bounds_m[1][1] - bounds_m[0][1]
     return (x, y) if facing == "along" else (y, x)
