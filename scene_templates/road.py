@@ -19,6 +19,7 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.generator.roads.cross_section import RoadShape, non_default_fields
 from gen_data.generator.roads.junction_shape import JunctionShape, arm_pose
 from gen_data.generator.roads.lane_graph import link_lanes, road_lanes
+from gen_data.generator.roads.roundabout_shape import RoundaboutShape
 from gen_data.scene_templates.element import (
     Element,
     add_background,
@@ -250,19 +251,27 @@ def find_port(scene: Scene, name: str, field: str) -> SE3:
     return T_world_road @ SE3.about_z(heading, (x, y, 0.0))
 
 
+_ARMED: dict[str, type[JunctionShape] | type[RoundaboutShape]] = {
+    "junction": JunctionShape,
+    "roundabout": RoundaboutShape,
+}
+
+
 def _find_arm_end(scene: Scene, name: str, arm: str, field: str) -> SE3:
     for body in scene.bodies:
         parsed = parse_asset_id(body.asset) if body.name == name else None
-        if parsed is not None and parsed.name == "junction":
-            names = {f.name for f in fields(JunctionShape)}
+        if parsed is not None and parsed.name in _ARMED:
+            kind = _ARMED[parsed.name]
+            names = {f.name for f in fields(kind)}
             given: dict[str, Any] = {k: v for k, v in parsed.parameters.items() if k in names}
-            shape = JunctionShape(**given)
+            shape = kind(**given)
             count = len(shape.arms_rad())
             if arm.isdecimal() and int(arm) < count:
                 return body.T_world_body @ arm_pose(shape, int(arm))
             raise ConfigError(f"{field}: '{name}' has no arm '{arm}'; expected 0 to {count - 1}")
     raise ConfigError(
-        f"{field}: there is no junction '{name}'; list it before the roads that start at it"
+        f"{field}: there is no junction or roundabout '{name}'; list it before the roads that "
+        "start at it"
     )
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 
@@ -88,8 +90,85 @@ class JunctionShape:
             (after - arm) % math.tau for arm, after in zip(arms, (*arms[1:], arms[0]), strict=True)
         )
 
+    def corner_line(self, number: int, offset_m: float) -> Array:
+        """As ``corner``."""
+        return _junction_corner(self, number, offset_m)
 
-def corner(shape: JunctionShape, number: int, offset_m: float) -> Array:
+    def height_m(self, xy: Array) -> Array:
+        """Heights [n] of the carriageway at points [n, 2]."""
+        return make_fan(self).height_m(xy)
+
+
+class ArmsShape(Protocol):
+    """Arms from a centre, and kerbs and sidewalks around the corners between them."""
+
+    @property
+    def traffic(self) -> str:
+        """Side on which vehicles drive."""
+        ...
+
+    @property
+    def lanes(self) -> int:
+        """Number of lanes per arm and direction."""
+        ...
+
+    @property
+    def lane_width_m(self) -> float:
+        """Width of each lane."""
+        ...
+
+    @property
+    def half_m(self) -> float:
+        """Distance from an arm's middle to its kerb."""
+        ...
+
+    @property
+    def kerb_m(self) -> float:
+        """Height of the kerbs."""
+        ...
+
+    @property
+    def sidewalk_m(self) -> float:
+        """Width of the sidewalks; 0 = none."""
+        ...
+
+    @property
+    def beside_m(self) -> float:
+        """Width between kerb and sidewalk."""
+        ...
+
+    @property
+    def border_m(self) -> float:
+        """Distance from the kerb's face to the outer edge of the sidewalk."""
+        ...
+
+    @property
+    def edge_z_m(self) -> float:
+        """Height of the outer edge of the sidewalk."""
+        ...
+
+    def arms_rad(self) -> tuple[float, ...]:
+        """Directions of the arms, ascending."""
+        ...
+
+    def curve_end_m(self) -> float:
+        """Distance from the centre to the end of the longest corner's curve on its arm."""
+        ...
+
+    def reach_m(self) -> float:
+        """Length of every arm."""
+        ...
+
+    def corner_line(self, number: int, offset_m: float) -> Array:
+        """As ``corner``."""
+        ...
+
+    def height_m(self, xy: Array) -> Array:
+        """Heights [n] of the carriageway at points [n, 2]."""
+        ...
+
+
+def corner(shape: ArmsShape, number: int, offset_m: float) -> Array:
     """Line [n, 2] parallel to the kerb, from the end of an arm to the end of the next one.
 
     Args:
@@ -97,17 +176,21 @@ def corner(shape: JunctionShape, number: int, offset_m: float) -> Array:
         number: Number of the first arm, on its left side seen from the centre.
         offset_m: Distance behind the kerb's face; n is the same for all distances.
     """
+    return shape.corner_line(number, offset_m)
+
+
+def _junction_corner(shape: JunctionShape, number: int, offset_m: float) -> Array:
     arms, gap = shape.arms_rad(), shape.gaps_rad()[number]
     here, after = arms[number], arms[(number + 1) % len(arms)]
     away, reach = shape.half_m + offset_m, shape.reach_m()
-    first = _on_arm(here, reach, away)
-    last = _on_arm(after, reach, -away)
+    first = on_arm(here, reach, away)
+    last = on_arm(after, reach, -away)
     if abs(gap - math.pi) <= 1e-3:
         share = np.linspace(0.0, 1.0, 9)[:, None]
         return first + share * (last - first)
     radius = shape.radius_m - offset_m
     # The centre of the arc is one radius away from both edges.
-    middle = _on_arm(here, (shape.half_m + shape.radius_m) / math.tan(0.5 * gap), 0.0)
+    middle = on_arm(here, (shape.half_m + shape.radius_m) / math.tan(0.5 * gap), 0.0)
     middle = middle + (shape.half_m + shape.radius_m) * _left_of(here)
     turn = math.pi - gap
     count = max(2, math.ceil(turn / _ARC_STEP_RAD) + 1)
@@ -149,7 +232,7 @@ def make_fan(shape: JunctionShape) -> Fan:
     parts = []
     for number, arm in enumerate(shape.arms_rad()):
         t = np.linspace(-shape.half_m, shape.half_m, 9)
-        mouth = np.array([_on_arm(arm, shape.reach_m(), float(v)) for v in t])
+        mouth = np.array([on_arm(arm, shape.reach_m(), float(v)) for v in t])
         z = shape.crown * (shape.half_m - np.abs(t))
         parts.append(np.column_stack([mouth, z])[:-1])
         kerb = corner(shape, number, 0.0)[:-1]
@@ -157,14 +240,14 @@ def make_fan(shape: JunctionShape) -> Fan:
     return Fan(np.concatenate(parts), shape.top_m)
 
 
-def arm_pose(shape: JunctionShape, number: int) -> SE3:
+def arm_pose(shape: ArmsShape, number: int) -> SE3:
     """Pose of the end of an arm, with X pointing away from the junction."""
     arm = shape.arms_rad()[number]
-    x, y = (float(v) for v in _on_arm(arm, shape.reach_m(), 0.0))
+    x, y = (float(v) for v in on_arm(arm, shape.reach_m(), 0.0))
     return SE3.about_z(arm, (x, y, 0.0))
 
 
-def arm_points(shape: JunctionShape, number: int, r_m: Array, t_m: Array) -> Array:
+def arm_points(shape: ArmsShape, number: int, r_m: Array, t_m: Array) -> Array:
     """Points [..., 2] at distances along an arm and to its left."""
     arm = shape.arms_rad()[number]
     c, s = math.cos(arm), math.sin(arm)
@@ -177,9 +260,16 @@ def junction_lanes(
     """Make the paths of all turns, sidewalks and frontages around the corners, and crosswalks."""
     lanes = []
     for i, j, k in _list_turns(shape):
-        center = _to_world(_turn_path(shape, i, j, k), shape, T_world_junction)
+        center = lane_points(_turn_path(shape, i, j, k), shape, T_world_junction)
         lane = Lane(f"{name}/{i}to{j}_{k}", "driving", center, shape.lane_width_m, road=name)
         lanes.append(replace(lane, speed_m_s=speed_m_s, junction=True))
+    return (*lanes, *corner_lanes(shape, name, T_world_junction, crosswalks))
+
+
+def corner_lanes(
+    shape: ArmsShape, name: str, T_world_junction: SE3, crosswalks: bool
+) -> Iterator[Lane]:
+    """Make sidewalks, furniture lanes and frontages around the corners, and crosswalks."""
     inner = KERB_WIDTH_M + shape.beside_m
     into = inner + min(FURNITURE_M, 0.5 * shape.sidewalk_m)
     beside: tuple[tuple[LaneKind, float, float], ...] = (
@@ -198,16 +288,15 @@ def junction_lanes(
             rise = (shape.edge_z_m - shape.kerb_m) * sloping_m
             z = shape.kerb_m + rise / (shape.border_m - KERB_WIDTH_M)
             center = world_points(np.column_stack([line, np.full(len(line), z)]), T_world_junction)
-            lanes.append(Lane(f"{name}/{kind}{number}", kind, center, width_m, road=name))
+            yield Lane(f"{name}/{kind}{number}", kind, center, width_m, road=name)
         if crosswalks:
-            lanes.append(_crosswalk(shape, name, number, T_world_junction))
-    return tuple(lanes)
+            yield _crosswalk(shape, name, number, T_world_junction)
 
 
-def _crosswalk(shape: JunctionShape, name: str, number: int, T_world_junction: SE3) -> Lane:
+def _crosswalk(shape: ArmsShape, name: str, number: int, T_world_junction: SE3) -> Lane:
     r = shape.curve_end_m() + 0.5 * sum(CROSSWALK_M)
     t = np.linspace(-shape.half_m, shape.half_m, 5)
-    center = _to_world(arm_points(shape, number, np.full(5, r), t), shape, T_world_junction)
+    center = lane_points(arm_points(shape, number, np.full(5, r), t), shape, T_world_junction)
     width_m = CROSSWALK_M[1] - CROSSWALK_M[0]
     own = f"{name}/crosswalk{number}"
     return Lane(own, "crosswalk", center, width_m, road=name, junction=True)
@@ -231,24 +320,29 @@ def _turn_path(shape: JunctionShape, start: int, end: int, lane: int) -> Array:
     """Path [n, 2] from the end of one arm to another: a cubic close to a circular arc."""
     away = (lane + 0.5) * shape.lane_width_m * (1.0 if shape.traffic == "right" else -1.0)
     arms = shape.arms_rad()
-    a = _on_arm(arms[start], shape.reach_m(), away)
-    b = _on_arm(arms[end], shape.reach_m(), -away)
-    inward, outward = -_direction(arms[start]), _direction(arms[end])
-    turn = math.remainder(arms[end] - arms[start] - math.pi, math.tau)
+    a = on_arm(arms[start], shape.reach_m(), away)
+    b = on_arm(arms[end], shape.reach_m(), -away)
+    return curve(a, arms[start] + math.pi, b, arms[end])
+
+
+def curve(a: Array, heading_a_rad: float, b: Array, heading_b_rad: float) -> Array:
+    """Path [n, 2] from one point and heading to another: a cubic close to a circular arc."""
+    turn = math.remainder(heading_b_rad - heading_a_rad, math.tau)
     chord = math.hypot(*(b - a))
     # Bezier handles of a circular arc: 4/3 tan(turn / 4) times the radius.
     handle = (2.0 / 3.0) * chord / (1.0 + math.cos(0.5 * turn))
     count = max(2, math.ceil(1.2 * chord / 0.8))
     p = np.linspace(0.0, 1.0, count + 1)[:, None]
-    c0, c1 = a + handle * inward, b - handle * outward
+    c0, c1 = a + handle * _direction(heading_a_rad), b - handle * _direction(heading_b_rad)
     path: Array = (1 - p) ** 3 * a + 3 * (1 - p) ** 2 * p * c0 + 3 * (1 - p) * p**2 * c1 + p**3 * b
     return path
 
 
-def _to_world(
-    line: Array, shape: JunctionShape, T_world_junction: SE3
+def lane_points(
+    line: Array, shape: ArmsShape, T_world_junction: SE3
 ) -> tuple[tuple[float, float, float], ...]:
-    return world_points(np.column_stack([line, make_fan(shape).height_m(line)]), T_world_junction)
+    """Points of a line [n, 2] on the carriageway, in the world."""
+    return world_points(np.column_stack([line, shape.height_m(line)]), T_world_junction)
 
 
 def _direction(arm_rad: float) -> Array:
@@ -259,6 +353,7 @@ def _left_of(arm_rad: float) -> Array:
     return np.array([-math.sin(arm_rad), math.cos(arm_rad)])
 
 
-def _on_arm(arm_rad: float, r_m: float, t_m: float) -> Array:
+def on_arm(arm_rad: float, r_m: float, t_m: float) -> Array:
+    """Point [2] at a distance along an arm and to its left."""
     point: Array = r_m * _direction(arm_rad) + t_m * _left_of(arm_rad)
     return point

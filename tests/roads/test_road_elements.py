@@ -153,7 +153,8 @@ def test_kerbed_median_has_a_lane_for_plants(library: Library) -> None:
     median = {"median_m": 3.0, "median_kerb_m": 0.12}
     lane = by_name(built(library, {**ROAD, **median}))["main/verge_median"]
 
-    assert (lane.kind, lane.width_m) == ("verge", pytest.approx(2.7))
+    assert lane.kind == "verge"
+    assert lane.width_m == pytest.approx(2.7)
     assert lane.center_m[0] == pytest.approx((0.0, 0.0, 0.02 * 3.5 + 0.12))
     assert "main/verge_median" not in by_name(built(library, {**ROAD, "median_m": 3.0}))
 
@@ -174,7 +175,9 @@ def test_roads_one_after_the_other_are_one_path(
 
 
 @pytest.mark.parametrize("lanes", [1, 2])
-@pytest.mark.parametrize("arms", [[0, 90, 180, 270], [0, 180, 270], [0, 70, 180, 300]])
+@pytest.mark.parametrize(
+    "arms", [[0, 90, 180, 270], [0, 180, 270], [0, 70, 180, 300], [0, 140, 220], [0, 140, 180]]
+)
 def test_every_way_into_a_junction_leads_out_again(
     library: Library, arms: list[float], lanes: int
 ) -> None:
@@ -241,6 +244,7 @@ def test_car_park_has_a_lane_per_bay(library: Library) -> None:
         ({"type": "junction", "name": "x", "arms_deg": [0, 20, 180]}, "40 to 180"),
         ({"type": "junction", "name": "x", "radius_m": 2.0}, "too tight for the sidewalk"),
         ({"type": "crosswalk", "name": "z", "road": "main"}, "there is no road 'main'"),
+        ({"type": "road_marking", "name": "m", "road": "main"}, "there is no road 'main'"),
     ],
 )
 def test_what_makes_no_street_is_refused(
@@ -249,3 +253,106 @@ def test_what_makes_no_street_is_refused(
     """One message that names field and remedy."""
     with pytest.raises(ConfigError, match=message):
         built(library, line)
+
+
+@pytest.mark.parametrize("traffic", ["right", "left"])
+@pytest.mark.parametrize("arms", [[0, 90, 180, 270], [0, 120, 240], [90, 180, 270]])
+def test_roundabout_leads_from_every_arm_to_every_other(
+    library: Library, arms: list[float], traffic: str
+) -> None:
+    """Paths link the roads, keep to the ring's circle, and turn the way of their traffic."""
+    roads = [
+        {"type": "road", "name": f"arm{k}", "after": f"ring/{k}", "length_m": 30,
+         "traffic": traffic}
+        for k in range(len(arms))
+    ]  # fmt: skip
+    ring = {"type": "roundabout", "name": "ring", "arms_deg": arms, "traffic": traffic}
+    scene = built(library, ring, *roads)
+    named = by_name(scene)
+    check_links(scene)
+
+    for k in range(len(arms)):
+        paths = [named[after] for after in named[f"arm{k}/backward0"].successors]
+        ways = {path.successors[0].split("/")[0] for path in paths}
+        assert ways == {f"arm{j}" for j in range(len(arms)) if j != k}
+        for path in paths:
+            xy = np.array(path.center_m)[:, :2]
+            radius = np.hypot(xy[:, 0], xy[:, 1])
+            assert radius.min() == pytest.approx(15.0 - 0.5 * (7.0 - 1.6), abs=0.05)
+            # The step about the centre has one sign on the ring.
+            a, b = xy[:-1][radius[:-1] < 12.6], xy[1:][radius[:-1] < 12.6]
+            turn = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+            assert ((turn if traffic == "right" else -turn) > 0.0).all()
+    assert len([lane for lane in scene.lanes if lane.kind == "crosswalk"]) == len(arms)
+
+
+def test_roundabout_meets_the_road_before_it(library: Library) -> None:
+    """``after``: its arm at 180 degrees begins at the road's end, without a step in height."""
+    ring = {"type": "roundabout", "name": "ring", "after": "main", "arms_deg": [0, 90, 180]}
+    scene = built(library, ROAD, ring)
+    lanes = by_name(scene)
+
+    ways = lanes["main/forward0"].successors
+    assert len(ways) == 2
+    assert lanes[ways[0]].center_m[0] == pytest.approx(
+        lanes["main/forward0"].center_m[-1], abs=1e-4
+    )
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"arms_deg": [0, 50, 180]}, "larger diameter_m"),
+        ({"ring_m": 4.5, "truck_apron_m": 2.0}, "elements.ring.ring_m"),
+        ({"radius_m": 6.0, "sidewalk_m": 8.0}, "too tight for the sidewalk"),
+        ({"arms_deg": [0, 180, 90]}, "ascending"),
+    ],
+)
+def test_impossible_roundabouts_are_refused(
+    library: Library, changed: dict[str, Any], message: str
+) -> None:
+    """One message that names field and remedy."""
+    with pytest.raises(ConfigError, match=message):
+        built(library, {"type": "roundabout", "name": "ring", **changed})
+
+
+@pytest.mark.parametrize(
+    ("sign", "lane", "low", "high"),
+    [
+        ("left", "forward0", (40.0, -3.5), (45.1, 0.0)),
+        ("word", "backward0", (37.3, 0.0), (40.2, 3.5)),
+        ("blocked_area", "middle", (40.0, -1.1), (52.0, 1.1)),
+        ("zigzag", "parking", (40.0, -5.7), (52.1, -3.5)),
+        ("give_way", "forward0", (40.0, -3.5), (40.61, 0.0)),
+    ],
+)
+def test_painted_signs_lie_in_their_lane(
+    library: Library, sign: str, lane: str, low: tuple[float, float], high: tuple[float, float]
+) -> None:
+    """From their foot in the direction of travel, within the lane."""
+    line = {"type": "road_marking", "name": "m", "road": "main", "sign": sign, "lane": lane,
+            "station_m": 40, "length_m": 12, "text": "30"}  # fmt: skip
+    scene = built(library, {**ROAD, "parking": "parallel"}, line)
+    (x0, y0, _), (x1, y1, _) = library.bounds_m(scene.body("m").asset)
+
+    assert x0 >= low[0] - 0.2
+    assert y0 >= low[1]
+    assert x1 <= high[0] + 0.2
+    assert y1 <= high[1]
+    assert x1 - x0 > 0.5
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"lane": "forward1"}, "has no lane 'forward1'"),
+        ({"sign": "word", "text": "ÖL"}, "cannot be painted"),
+        ({"station_m": 98}, "elements.m.station_m"),
+    ],
+)
+def test_impossible_signs_are_refused(
+    library: Library, changed: dict[str, Any], message: str
+) -> None:
+    """One message that names field and remedy."""
+    with pytest.raises(ConfigError, match=message):
+        built(library, ROAD, {"type": "road_marking", "name": "m", "road": "main", **changed})

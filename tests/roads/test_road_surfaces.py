@@ -15,6 +15,7 @@ from gen_data.generator.core.asset_types import MeshData
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.roads.cross_section import RoadShape, height_m
 from gen_data.generator.roads.junction_shape import JunctionShape, make_fan
+from gen_data.generator.roads.roundabout_shape import RoundaboutShape
 
 SLOTS = ("asphalt", "asphalt_new", "marking", "kerb", "pavement", "verge", "ground")
 
@@ -133,6 +134,8 @@ def test_junction_has_the_area_of_its_plan() -> None:
     [
         *((name, {}) for name in sorted(set(FAMILIES) - {"ground"})),
         ("junction", {"arms_deg": (90.0, 180.0, 270.0, -1.0)}),
+        ("junction", {"arms_deg": (0.0, 140.0, 220.0, -1.0)}),
+        ("roundabout", {"arms_deg": (0.0, 120.0, 240.0, -1.0), "traffic": "left"}),
         ("road", {"curvature_per_m": -0.03, "traffic": "left", "rails": (0.0, 1.0)}),
     ],
 )
@@ -256,3 +259,17 @@ def test_kerbed_median_stands_above_the_lanes() -> None:
     assert heights[0] == heights[1] == pytest.approx(heights[2] + 0.12)
     assert heights[2] == pytest.approx(0.02 * 3.5)
     assert heights[3] == pytest.approx(0.0)
+
+
+def test_roundabout_has_the_area_of_its_plan() -> None:
+    """Its ring without apron and island, and what arms and corners add; the island stands above."""
+    mesh = mesh_of("roundabout", crossings="none", splitter=0.0)
+    shape = RoundaboutShape()
+    line = shape.outline()
+    after = np.roll(line, -1, axis=0)
+    whole = 0.5 * float((line[:, 0] * after[:, 1] - line[:, 1] * after[:, 0]).sum())
+    inner = 0.5 * 104 * 9.6**2 * math.sin(math.tau / 104)
+
+    assert area_m2(mesh, "asphalt") == pytest.approx(whole - inner, rel=5e-3)
+    assert whole > math.pi * 15.0**2 + 4 * 7.0 * (shape.reach_m() - 15.0) - 4.0
+    assert mesh.vertices_m[:, 2].max() == pytest.approx(0.175 + 0.14 + 0.7, abs=0.01)

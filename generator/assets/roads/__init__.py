@@ -9,6 +9,7 @@ from gen_data.generator.assets.procedural.family import Family, Lazy, load_famil
 from gen_data.generator.roads.cross_section import RoadShape
 from gen_data.generator.roads.junction_shape import JunctionShape
 from gen_data.generator.roads.parking_shape import ParkingShape
+from gen_data.generator.roads.roundabout_shape import RoundaboutShape
 
 
 def _surface(path: str, **parameters: object) -> Family:
@@ -16,9 +17,9 @@ def _surface(path: str, **parameters: object) -> Family:
     return Family(name, name, ("street",), 0, 0.0, False, 2, parameters, build)
 
 
-_SHAPE, _JUNCTION, _PARKING = (
+_SHAPE, _JUNCTION, _ROUNDABOUT, _PARKING = (
     {field.name: field.default for field in fields(shape)}
-    for shape in (RoadShape, JunctionShape, ParkingShape)
+    for shape in (RoadShape, JunctionShape, RoundaboutShape, ParkingShape)
 )
 _LOOKS: dict[str, object] = {
     "seed": 0, "wear": 0.3, "paving": "paving", "ground": "grass", "carriageway": "asphalt",
@@ -43,7 +44,20 @@ FAMILIES: Mapping[str, Family] = {
             tram=0.0,
         ),
         _surface("junction:junction", **_JUNCTION, **_LOOKS, crossings="zebra"),
+        _surface("roundabout:roundabout", **_ROUNDABOUT, **_LOOKS, crossings="zebra"),
         _surface("road:crosswalk", **_SHAPE, **_LOOKS, station_m=20.0, width_m=4.0, style="zebra"),
+        _surface(
+            "road_marking:road_marking",
+            **_SHAPE,
+            **_LOOKS,
+            sign="straight",
+            text="_STOP",
+            station_m=20.0,
+            across_m=0.0,
+            turned=0.0,
+            area_m=8.0,
+            width_m=2.8,
+        ),
         _surface("parking_area:parking_area", **_PARKING, **_LOOKS),
         _surface("ground:ground", seed=0, size_m=(800.0, 800.0), cover="grass", relief_m=0.04),
     )

@@ -30,6 +30,7 @@ from gen_data.generator.roads.cross_section import (
 from gen_data.generator.roads.junction_shape import (
     CROSSWALK_M,
     STOP_LINE_M,
+    ArmsShape,
     Fan,
     JunctionShape,
     arm_points,
@@ -56,10 +57,10 @@ def junction(*, crossings: str = "zebra", **others: Any) -> Solid:
     patches = [_carriageway(fan, slots["asphalt"])]
     for number in range(len(profile.arms_rad())):
         if profile.sidewalk_m > 0.0:
-            patches += _corner(profile, number, slots)
+            patches += corner_patches(profile, number, slots)
         patches.append(_land(profile, number, slots["ground"]))
         if paved:
-            patches += _markings(profile, fan, number, crossings, slots["marking"])
+            patches += arm_paint(profile, number, crossings, slots["marking"])
     return make_street_solid(patches, look, _hulls(profile, fan))
 
 
@@ -75,7 +76,7 @@ def _fan_patch(center: Array, line: Array, name: str, slot: int) -> Patch:
     )
 
 
-def _corner(shape: JunctionShape, number: int, slots: dict[str, int]) -> Iterator[Patch]:
+def corner_patches(shape: ArmsShape, number: int, slots: dict[str, int]) -> Iterator[Patch]:
     """Kerb and sidewalk from one arm's end to the next one's, closed at both ends."""
     top, b = shape.kerb_m, 0.02
     yield _band(
@@ -96,7 +97,7 @@ def _corner(shape: JunctionShape, number: int, slots: dict[str, int]) -> Iterato
 
 
 def _band(
-    shape: JunctionShape, number: int, profile: Sequence[tuple[float, float]], name: str, slot: int
+    shape: ArmsShape, number: int, profile: Sequence[tuple[float, float]], name: str, slot: int
 ) -> Patch:
     """A profile of (distance behind the kerb's face, height) drawn around a corner."""
     lines = [
@@ -156,18 +157,20 @@ def _land(shape: JunctionShape, number: int, slot: int) -> Patch:
     return _fan_patch(center, loop, "ground", slot).flipped()
 
 
-def _markings(
-    shape: JunctionShape, fan: Fan, arm: int, crossings: str, slot: int
+def arm_paint(
+    shape: ArmsShape, arm: int, crossings: str, slot: int, *, stop_line: bool = True
 ) -> Iterator[Patch]:
+    """Lines of an arm: stop line, lines between its lanes, crosswalk."""
     start, half = shape.curve_end_m(), shape.half_m
     side = 1.0 if shape.traffic == "right" else -1.0
     stop = (start + STOP_LINE_M[0], start + STOP_LINE_M[1])
 
     def painted(r: tuple[float, float], t: tuple[float, float]) -> Patch:
-        return _drape(shape, fan, arm, r, t, slot)
+        return _drape(shape, arm, r, t, slot)
 
-    inner, outer = sorted((side * 0.06, side * (half - 0.15)))
-    yield painted(stop, (inner, outer))
+    if stop_line:
+        inner, outer = sorted((side * 0.06, side * (half - 0.15)))
+        yield painted(stop, (inner, outer))
     for k in range(1 - shape.lanes, shape.lanes):
         middle = k * shape.lane_width_m
         yield painted(
@@ -190,12 +193,7 @@ def _markings(
 
 
 def _drape(
-    shape: JunctionShape,
-    fan: Fan,
-    arm: int,
-    r_m: tuple[float, float],
-    t_m: tuple[float, float],
-    slot: int,
+    shape: ArmsShape, arm: int, r_m: tuple[float, float], t_m: tuple[float, float], slot: int
 ) -> Patch:
     """A rectangle of an arm's frame laid on the carriageway."""
     r, t = (
@@ -207,7 +205,7 @@ def _drape(
         t = np.unique(np.append(t, 0.0))
     grid = np.stack(np.meshgrid(r, t, indexing="ij"), axis=2)
     xy = arm_points(shape, arm, grid[..., 0], grid[..., 1])
-    z = fan.height_m(xy.reshape(-1, 2)).reshape(xy.shape[:2]) + PAINT_LIFT_M
+    z = shape.height_m(xy.reshape(-1, 2)).reshape(xy.shape[:2]) + PAINT_LIFT_M
     return surface(np.concatenate([xy, z[..., None]], axis=2), grid, "marking", slot)
 
 

@@ -24,7 +24,8 @@ ARROW_M = 5.0
 LETTER_M, STROKE_M = 2.4, 0.3
 _SHAFT_M, _HEAD_M = 0.15, (0.75, 1.5)
 _STROKES: dict[str, str] = {
-    "A": "00-06 06-28 28-46 46-40 03-43", "B": "00-08 08-37 37-35 35-04 04-33 33-31 31-00",
+    "A": "00-06 06-28 28-46 46-40 03-43",
+    "B": "00-08 08-38 38-47 47-45 45-34 34-04 34-43 43-41 41-30 30-00",
     "C": "41-30 30-10 10-01 01-07 07-18 18-38 38-47", "D": "00-08 08-28 28-46 46-42 42-20 20-00",
     "E": "40-00 00-08 08-48 04-34", "F": "00-08 08-48 04-34",
     "G": "24-44 44-41 41-30 30-10 10-01 01-07 07-18 18-38 38-47", "H": "00-08 40-48 04-44",
@@ -43,6 +44,7 @@ _STROKES: dict[str, str] = {
     "9": "01-10 10-30 30-41 41-47 47-38 38-18 18-07 07-05 05-14 14-44",
 }  # fmt: skip
 """Strokes of a letter: from and to, each a column 0 to 4 and a row 0 to 8 from its foot."""
+LETTERS = frozenset(_STROKES)
 
 
 def arrow(word: str) -> list[Array]:
@@ -71,7 +73,7 @@ def _turning(start_m: float, side: float) -> Iterator[Array]:
     path = [(start_m, 0.0), (start_m + 0.75, 0.09), (start_m + 1.15, 0.27), (start_m + 1.4, 0.5)]
     for (x0, y0), (x1, y1) in pairwise(path):
         yield _stroke((x0, side * y0), (x1, side * y1), 1.6 * _SHAFT_M)
-    head = np.array([[0.95, 0.42], [2.45, 0.5], [1.5, 1.15]]) + np.array([start_m, 0.0])
+    head = np.array([[0.7, 0.46], [2.3, 0.46], [1.75, 1.2]]) + np.array([start_m, 0.0])
     yield _wind(head * np.array([1.0, side]))
 
 
