@@ -21,7 +21,7 @@ ACROSS = (
     "skip_container",
 )
 """Families that run along Y, beside a street."""
-ALONG = ("parked_bicycle", "kick_scooter", "trailer")
+ALONG = ("parked_bicycle", "kick_scooter", "trailer", "dog", "pram")
 """Families that point along X, as vehicles do."""
 
 

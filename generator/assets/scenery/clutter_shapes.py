@@ -74,6 +74,12 @@ def hopper(
     return join_patches([*walls, *lids])
 
 
+def on_ground(parts: Sequence[Patch]) -> list[Patch]:
+    """The parts, moved so that the lowest point of all is at z = 0."""
+    low = min(float(part.bounds_m()[0][2]) for part in parts)
+    return [part.moved(z=-low) for part in parts]
+
+
 def bar(start: Vec3, end: Vec3, radius_m: float, sides: int = 4, slot: int = 0) -> Patch:
     """A straight round (or square) bar between two points."""
     return rod([start, end], radius_m, sides, slot)

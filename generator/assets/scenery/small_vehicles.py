@@ -17,7 +17,14 @@ from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block, cone, rounded_box
 from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import facing_rectangle, make_solid, post
-from gen_data.generator.assets.scenery.clutter_shapes import Rectangle, bar, hopper, rod, worn_paint
+from gen_data.generator.assets.scenery.clutter_shapes import (
+    Rectangle,
+    bar,
+    hopper,
+    on_ground,
+    rod,
+    worn_paint,
+)
 from gen_data.generator.assets.scenery.street_furniture import GALVANISED
 from gen_data.generator.assets.vehicles.bicycle import bicycle_parts
 from gen_data.generator.assets.vehicles.wheels import wheel
@@ -55,12 +62,11 @@ def parked_bicycle(seed: int) -> Solid:
         pieces.append((_rack(count), steel))
     parts, materials = _stack(pieces)
     corners = np.concatenate([part.corners_m.reshape(-1, 3) for part in parts])
-    parts = [part.moved(z=-float(corners[:, 2].min())) for part in parts]
     # Without the ends of handlebars and tyres.
     (x0, y0, _), (x1, y1, _) = (0.9 * edge for edge in (corners.min(axis=0), corners.max(axis=0)))
     top = 0.3 if kind == "fallen" else 0.8
     hull = hulls.box((float(x0), float(y0), 0.0), (float(x1), float(y1), top))
-    return make_solid(parts, materials, [hull])
+    return make_solid(on_ground(parts), materials, [hull])
 
 
 def parked_bicycle_facts(seed: int) -> Facts:
@@ -135,8 +141,6 @@ def kick_scooter(seed: int) -> Solid:
     fallen = seed % 5 == 4
     lean = 1.42 if fallen else -0.12
     body = join_patches(parts).rotated("x", lean)
-    low = body.bounds_m()[0]
-    body = body.moved(z=-float(low[2]))
     color = in_turn(("#2fb35a", "#17181a", "#e9e9e4", "#e0622a", "#1fa0a8", "#7fc31f"), seed)
     materials = (
         worn_paint((color,), 0.35, rng),
@@ -148,7 +152,7 @@ def kick_scooter(seed: int) -> Solid:
     )
     half_y = 0.4 if fallen else 0.1
     hull = hulls.box((-0.5, -half_y, 0.0), (0.5, half_y, 0.25))
-    return make_solid([body], materials, [hull])
+    return make_solid(on_ground([body]), materials, [hull])
 
 
 def kick_scooter_facts(seed: int) -> Facts:
@@ -208,8 +212,6 @@ def trailer(seed: int) -> Solid:
         .rotated("z", math.pi)
         .moved(-2.0 * half - 0.04)
     )
-    low = join_patches(parts).bounds_m()[0]
-    parts = [part.moved(z=-float(low[2])) for part in parts]
     body_color = rng.choose(("#c9cccd", "#6a6e70", "#2f4f7a", "#7a2f2a", "#3f4a3f"))
     sheet = rng.choose(("#22406f", "#8d9091", "#2f5f3a", "#26282a", "#b0392c"))
     materials = (
@@ -223,7 +225,9 @@ def trailer(seed: int) -> Solid:
         printed_material(f"texture/licence_plate?seed={seed % 12}", 0.4),
         patterned_material("texture/wood_planks?seed=2", 1.2, 0.8, (0.55, 0.5, 0.45)),
     )
-    return make_solid(parts, materials, [hulls.box((-half, -wide, 0.2), (half, wide, floor + 0.4))])
+    return make_solid(
+        on_ground(parts), materials, [hulls.box((-half, -wide, 0.2), (half, wide, floor + 0.4))]
+    )
 
 
 def trailer_facts(seed: int) -> Facts:

@@ -29,7 +29,14 @@ from gen_data.generator.assets.procedural.surface_shapes import (
 )
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import facing_rectangle, make_solid, post
-from gen_data.generator.assets.scenery.clutter_shapes import bar, rod, wire, worn_paint, worn_steel
+from gen_data.generator.assets.scenery.clutter_shapes import (
+    bar,
+    on_ground,
+    rod,
+    wire,
+    worn_paint,
+    worn_steel,
+)
 from gen_data.generator.core.asset_types import Material
 
 CONES = ("cone", "cone", "beacon", "cone", "fallen", "post")
@@ -206,9 +213,7 @@ def _boards(trestle: bool, rng: VariantRng) -> tuple[list[Patch], np.ndarray]:
         parts.append(block((-0.4, y - 0.14, 0.0), (0.4, y + 0.14, 0.1), 0.015, 2))
         if rng.chance(0.5):
             parts += _lamp(y, 1.15)
-    low = join_patches(parts).bounds_m()[0]
-    parts = [part.moved(z=-float(low[2])) for part in parts]
-    return parts, hulls.box((-0.1, -half, 0.0), (0.1, half, high))
+    return on_ground(parts), hulls.box((-0.1, -half, 0.0), (0.1, half, high))
 
 
 def _lamp(y: float, z: float) -> list[Patch]:
@@ -321,7 +326,7 @@ def scaffold(seed: int) -> Solid:
         parts += [net, net.flipped().moved(-0.006)]
     planks = patterned_material("texture/wood_planks?seed=2", 1.4, 0.85, (0.6, 0.53, 0.46))
     boards = rng.choose((painted_material("#d9a520", 0.6), planks))
-    net_color = rng.choose(("#3f7a54", "#d5d6d2", "#2f5f8f"))
+    net_color = rng.choose(("#6f9a7c", "#d5d6d2", "#7f97ab"))
     cloth = Material(draw_linear((net_color,), 0.15, rng), roughness=0.9, opacity=0.75)
     steel = worn_steel(rng)
     decks = rng.choose((planks, steel))
