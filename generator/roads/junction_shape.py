@@ -83,6 +83,10 @@ class JunctionShape:
         """Length of every arm."""
         return self.curve_end_m() + SETBACK_M
 
+    def is_straight(self, number: int) -> bool:
+        """Whether the kerb runs straight on from an arm to the next one."""
+        return abs(self.gaps_rad()[number] - math.pi) <= 1e-3
+
     def gaps_rad(self) -> tuple[float, ...]:
         """Angles from each arm to the next one counter-clockwise."""
         arms = self.arms_rad()
@@ -138,6 +142,11 @@ class ArmsShape(Protocol):
         ...
 
     @property
+    def setback_m(self) -> float:
+        """Width of the land between the sidewalks and the fronts of houses."""
+        ...
+
+    @property
     def border_m(self) -> float:
         """Distance from the kerb's face to the outer edge of the sidewalk."""
         ...
@@ -145,6 +154,10 @@ class ArmsShape(Protocol):
     @property
     def edge_z_m(self) -> float:
         """Height of the outer edge of the sidewalk."""
+        ...
+
+    def is_straight(self, number: int) -> bool:
+        """Whether the kerb runs straight on from an arm to the next one."""
         ...
 
     def arms_rad(self) -> tuple[float, ...]:
@@ -280,7 +293,7 @@ def corner_lanes(
     for number in range(len(shape.arms_rad())):
         for kind, offset_m, width_m in beside if shape.sidewalk_m > 0.0 else ():
             set_back = kind == "frontage" and shape.setback_m > 0.0
-            if set_back and abs(shape.gaps_rad()[number] - math.pi) > 1e-3:
+            if set_back and not shape.is_straight(number):
                 # The fronts of the arms' houses meet in a corner of their own.
                 continue
             line = corner(shape, number, offset_m + (shape.setback_m if set_back else 0.0))

@@ -130,7 +130,7 @@ def test_every_district_and_junction_is_drawn() -> None:
     assert names == {
         *("old_town", "residential", "leafy_suburb", "garden_villas", "arterial", "industrial"),
         *("campus", "park_edge", "village", "country_road", "motorway"),
-        *("x", "t_left", "t_right", "t_end", "y", "none"),
+        *("x", "t_left", "t_right", "t_end", "y", "roundabout", "none"),
     }
 
 
