@@ -15,10 +15,6 @@ from gen_data.generator.core.se3 import SE3, Array, Vec3
 
 _GRID = (16, 9)
 """Columns and rows of the rays that test a view."""
-OVERHEAD = frozenset({"utility_pole"})
-"""Categories whose bounds include cables overhead, under which everything may stand."""
-POLE_M = 0.3
-"""Half extents of their poles."""
 _PARALLEL = 1e-9
 """Smallest component of a direction, instead of 0."""
 
@@ -87,22 +83,21 @@ def standing_bodies(scene: Scene) -> Iterator[Body]:
             yield body
 
 
-def solid_bounds_m(assets: AssetIndex, asset_id: str) -> tuple[Vec3, Vec3]:
-    """Bounds of an asset in its own frame [m]; of what has cables overhead, those of its pole."""
-    low, high = assets.bounds_m(asset_id)
-    if assets.get(asset_id).category not in OVERHEAD:
-        return low, high
-    x, y = (0.5 * (low[k] + high[k]) for k in (0, 1))
-    return (x - POLE_M, y - POLE_M, low[2]), (x + POLE_M, y + POLE_M, high[2])
-
-
 def make_ground(bodies: Iterable[Body], assets: AssetIndex) -> Ground:
     """Collect the footprints of bodies."""
     ground = Ground()
     for body in bodies:
-        bounds_m = solid_bounds_m(assets, body.asset)
+        bounds_m = standing_bounds_m(assets, body.asset)
         ground.add(Footprint.of(body.T_world_body, bounds_m, body.scale))
     return ground
+
+
+def standing_bounds_m(assets: AssetIndex, asset: str) -> tuple[Vec3, Vec3]:
+    """Bounds of an asset [m] without the cables that hang between poles, far above all others."""
+    body_m = assets.body_bounds_m(asset)
+    if body_m is None or assets.get(asset).category != "utility_pole":
+        return assets.bounds_m(asset)
+    return body_m
 
 
 def is_inside(point_m: Vec3, low_m: Vec3, high_m: Vec3) -> bool:
@@ -129,7 +124,7 @@ def hidden_share(camera: Camera, scene: Scene, assets: AssetIndex, near_m: float
     eye_m = camera.T_world_camera.translation_m
     hidden = np.zeros(len(rays), np.bool_)
     for body in _solid_bodies(scene):
-        low, high = (body.scale * np.array(edge) for edge in solid_bounds_m(assets, body.asset))
+        low, high = (body.scale * np.array(edge) for edge in standing_bounds_m(assets, body.asset))
         T_body_world = body.T_world_body.inverse()
         start = np.array((T_body_world @ SE3(eye_m)).translation_m)
         if (np.maximum(low - start, start - high) > near_m).any():
@@ -151,7 +146,7 @@ def is_clear(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: float) -
     """
     for body in _solid_bodies(scene):
         local = (body.T_world_body.inverse() @ SE3(point_m)).translation_m
-        low, high = solid_bounds_m(assets, body.asset)
+        low, high = standing_bounds_m(assets, body.asset)
         grown_low = tuple(body.scale * v - margin_m for v in low)
         grown_high = tuple(body.scale * v + margin_m for v in high)
         if all(a <= p <= b for p, a, b in zip(local, grown_low, grown_high, strict=True)):

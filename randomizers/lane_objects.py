@@ -22,8 +22,8 @@ from gen_data.randomizers.free_space import (
     Footprint,
     Ground,
     make_ground,
-    solid_bounds_m,
     standing_bodies,
+    standing_bounds_m,
 )
 
 COUNT_MAX = 2000
@@ -227,7 +227,7 @@ class LaneObjects(GroupRandomizer):
         asset = draw_asset(weights, rng)
         scale = round(self.scale.draw(rng), 4)
         bounds_m = _scale_bounds(assets.bounds_m(asset), scale)
-        return asset, scale, bounds_m, _scale_bounds(solid_bounds_m(assets, asset), scale)
+        return asset, scale, bounds_m, _scale_bounds(standing_bounds_m(assets, asset), scale)
 
 
 def _scale_bounds(bounds_m: Bounds, scale: float) -> Bounds:

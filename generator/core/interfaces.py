@@ -91,7 +91,7 @@ class AssetIndex(Protocol):
         ...
 
     def body_bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3] | None:
-        """The same without a vehicle's exterior mirrors; None if it has none."""
+        """The same without a vehicle's exterior mirrors or a pole's cables; None without such."""
         ...
 
     def vertices_m(self, asset_id: str) -> Float32:

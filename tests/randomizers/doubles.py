@@ -127,7 +127,7 @@ class FakeAssets:
             return THINGS[asset_id].materials
         return (Material(),) * SLOTS.get(parse_asset_id(asset_id).name, 1)
 
-    def body_bounds_m(self, asset_id: str) -> None:
+    def body_bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3] | None:
         """None: there are no mirrors."""
 
     def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:

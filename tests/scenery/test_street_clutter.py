@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.scenery import FAMILIES
 from gen_data.generator.assets.scenery.utility_lines import utility_pole
+from gen_data.generator.core.asset_types import Asset
 from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.randomizers.free_space import Footprint, is_clear, make_ground
+from tests.randomizers.doubles import FakeAssets
 from tests.scenery.clutter_limits import CLUTTER
 from tests.scenery.test_scenery_families import digest, variant
 
@@ -91,13 +98,56 @@ def test_a_pole_without_cables_is_as_wide_as_its_cross_arm() -> None:
     """A span of 0 leaves the cables out."""
     low, high = utility_pole(0, 0.0).mesh.bounds_m()
 
-    assert high[1] - low[1] < 0.6
+    assert high[0] - low[0] < 0.6
+
+
+def test_the_body_of_a_pole_leaves_out_its_cables() -> None:
+    """Its bounds do not depend on the span, and lie symmetrically across the line."""
+    for seed in range(6):
+        with_cables, alone = utility_pole(seed, 35.0), utility_pole(seed, 0.0)
+        assert with_cables.body_bounds_m == alone.mesh.bounds_m()
+        low, high = with_cables.mesh.bounds_m()
+        assert low[:2] == pytest.approx((-high[0], -high[1]), abs=1e-6), seed
+
+
+class PoleAssets(FakeAssets):
+    """Every asset is a pole of 0.4 m whose cables reach 17.5 m on both sides."""
+
+    category = "utility_pole"
+
+    def get(self, asset_id: str) -> Asset:
+        return replace(super().get("brick"), category=self.category)
+
+    def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
+        return (-17.5, -0.9, 0.0), (17.5, 0.9, 9.0)
+
+    def body_bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
+        return (-0.2, -0.2, 0.0), (0.2, 0.2, 9.0)
+
+
+class VehicleAssets(PoleAssets):
+    """The same shape as a vehicle's, whose mirrors do take room."""
+
+    category = "truck"
+
+
+@pytest.mark.parametrize(("assets", "is_free"), [(PoleAssets(), True), (VehicleAssets(), False)])
+def test_things_may_stand_and_cameras_be_below_the_cables_of_poles(
+    assets: PoleAssets, is_free: bool
+) -> None:
+    """Only the pole itself takes room, of the ground and of views."""
+    body = Body("pole", "pole", SE3(), instance_id=1)
+    ground = make_ground((body,), assets)
+
+    assert not ground.is_free(Footprint(0.0, 0.0, 0.1, 0.1, 0.0))
+    assert ground.is_free(Footprint(5.0, 0.0, 0.1, 0.1, 0.0)) == is_free
+    assert is_clear((5.0, 0.0, 1.5), Scene("test", bodies=(body,)), assets, 0.1) == is_free
 
 
 def cable_ends(solid: Solid, half_m: float) -> list[tuple[float, float]]:
-    """Middles (x, z) of the cables' ends at +Y, sorted by x."""
+    """Middles (y, z) of the cables' ends at +X, sorted by y."""
     points = solid.mesh.vertices_m.astype(np.float64)
-    at_end = np.unique(points[np.abs(points[:, 1] - half_m) < 1e-4][:, ::2].round(5), axis=0)
+    at_end = np.unique(points[np.abs(points[:, 0] - half_m) < 1e-4][:, 1:].round(5), axis=0)
     groups: list[list[np.ndarray]] = []
     for point in at_end:
         near = [group for group in groups if np.abs(group[0] - point).max() < 0.05]

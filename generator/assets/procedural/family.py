@@ -27,8 +27,8 @@ class Solid:
         mesh: Visual geometry in the object's frame.
         collision: Convex parts in the same frame.
         keypoints: Named points in the same frame.
-        body_bounds_m: Bounds of the mesh without a vehicle's exterior mirrors, smallest and largest
-            coordinates [m]; None if it has none.
+        body_bounds_m: Bounds of the mesh without a vehicle's exterior mirrors or a pole's cables,
+            smallest and largest coordinates [m]; None if it has none.
     """
 
     mesh: MeshData

@@ -45,8 +45,9 @@ _CONDUCTOR_RADIUS_M, _BUNDLE_RADIUS_M = 0.0055, 0.011
 def utility_pole(seed: int, span_m: float) -> Solid:
     """A pole with cross-arm, insulators and the halves of the two spans that meet at it.
 
-    Cables run along Y; they are level at mid-span, at the same places for every variant: poles
-    ``span_m`` apart join. Slots: pole, insulators, steel, cables, lamp.
+    Cables run along X, past the street on the left; they are level at mid-span, at the same places
+    for every variant: poles ``span_m`` apart, as rows without gaps are, join. The body without
+    cables has bounds of its own. Slots: pole, insulators, steel, cables, lamp.
 
     Args:
         seed: Of the variant.
@@ -68,8 +69,8 @@ def utility_pole(seed: int, span_m: float) -> Solid:
         pole = cone((radii[0], 0.0), (radii[1], high), 12)
     parts = [pole, *_cross_arms(kind.endswith("double"), radii[1])]
     parts += _fittings(kind, radii[1], rng)
-    if span_m:
-        parts += _half_spans(span_m, radii[1])
+    cables = _half_spans(span_m, radii[1]) if span_m else []
+    body, cables = ([part.rotated("z", 0.5 * np.pi) for part in piece] for piece in (parts, cables))
     wood = patterned_material("texture/bark?seed=1", 1.0, 0.9, rng.choose(((0.17, 0.13, 0.1),
         (0.3, 0.25, 0.2))))  # fmt: skip
     stone = patterned_material("texture/concrete?seed=3", 2.0, 0.9, (0.8, 0.79, 0.76))
@@ -80,7 +81,8 @@ def utility_pole(seed: int, span_m: float) -> Solid:
         painted_material("#202122", 0.6),
         Material((0.75, 0.76, 0.74), roughness=0.2, role="lamp"),
     )
-    return make_solid(parts, materials, [hulls.frustum((radii[0], 0.0), (radii[1], high), 12)])
+    hull = hulls.frustum((radii[0], 0.0), (radii[1], high), 12)
+    return make_solid([*body, *cables], materials, [hull], body=body)
 
 
 def utility_pole_facts(seed: int, span_m: float) -> Facts:
@@ -90,7 +92,7 @@ def utility_pole_facts(seed: int, span_m: float) -> Facts:
 
 
 def _cross_arms(double: bool, radius: float) -> list[Patch]:
-    """Cross-arms along X with insulators and braces; a second one 0.6 m lower on some."""
+    """Cross-arms with insulators and braces; a second one 0.6 m lower on some."""
     parts = []
     for z in (_ARM_M - 0.14, _ARM_M - 0.8)[: 2 if double else 1]:
         parts.append(block((-0.95, radius, z - 0.05), (0.95, radius + 0.09, z + 0.05), 0.0, 2))
@@ -117,10 +119,11 @@ def _fittings(kind: str, radius: float, rng: VariantRng) -> list[Patch]:
         parts += [_insulator().scaled(1.2, 1.2, 1.8).moved(0.3 + x, 0.0, 7.4) for x in (0.0, 0.2)]
         parts += [block((0.0, -0.03, z), (0.2, 0.03, z + 0.05), 0.0, 2) for z in (6.7, 7.1)]
     if kind.endswith("lamp"):
-        arm = [(0.0, 0.0, 6.6), (0.6, 0.0, 7.0), (1.3, 0.0, 7.05)]
+        # No further out than the cross-arm: the middle of every variant is the same.
+        arm = [(0.0, 0.0, 6.7), (0.2, 0.0, 7.0), (0.5, 0.0, 7.05)]
         parts.append(rod(arm, 0.025, 6, 2))
-        parts.append(rounded_box((0.6, 0.24, 0.1), 0.03, 1).moved(1.5, 0.0, 7.05).painted(2))
-        parts.append(block((1.25, -0.09, 6.985), (1.75, 0.09, 7.0), 0.0, 4))
+        parts.append(rounded_box((0.5, 0.24, 0.1), 0.03, 1).moved(0.69, 0.0, 7.05).painted(2))
+        parts.append(block((0.48, -0.09, 6.985), (0.9, 0.09, 7.0), 0.0, 4))
     if rng.chance(0.6):
         z = rng.between(2.2, 3.2)
         parts.append(block((radius, -0.14, z), (radius + 0.16, 0.14, z + 0.4), 0.01, 2))
@@ -133,7 +136,7 @@ def _fittings(kind: str, radius: float, rng: VariantRng) -> list[Patch]:
 
 
 def _half_spans(span_m: float, radius: float) -> list[Patch]:
-    """Cables from the pole to the middle of the span on both sides, as parabolas."""
+    """Cables along Y from the pole to the middle of the span on both sides, as parabolas."""
     grips: list[tuple[Vec3, float, float]] = [
         ((x, radius + 0.045, _ARM_M), _CONDUCTOR_RADIUS_M, x) for x in _CONDUCTORS
     ]
