@@ -7,13 +7,14 @@ is lit as a whole. Its texture has ``TILES`` by ``TILES`` tiles (``textures.leav
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.noise import uniform
 from gen_data.generator.assets.procedural.patches import GRID_M, Array, Indices, round_values, unit
+from gen_data.generator.assets.scenery.foliage import Sprays, directions
 from gen_data.generator.assets.scenery.textures.leaves import TILES
 from gen_data.generator.core.asset_types import Material, MeshData
 from gen_data.generator.core.se3 import Vec3
@@ -104,9 +105,22 @@ def cards_about(
 
 def join_cards(parts: Sequence[Cards]) -> Cards:
     """All cards as one."""
-    names = ("foot_m", "along", "across", "outward", "length_m", "width_m", "slots")
+    names = [field.name for field in fields(Cards)]
     joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
     return Cards(**joined)
+
+
+def spray_cards(sprays: Sprays, rng: Rng) -> Cards:
+    """A card per spray, turned about its own axis by chance."""
+    aside = sprays.outward + 0.9 * directions(len(sprays.slots), rng)
+    across = unit(np.cross(sprays.along, aside))
+    size = sprays.length_m
+    return Cards(sprays.at_m, sprays.along, across, sprays.outward, size, size, sprays.slots)
+
+
+def first_cards(cards: Cards, count: int) -> Cards:
+    """The first of the cards."""
+    return Cards(**{field.name: getattr(cards, field.name)[:count] for field in fields(Cards)})
 
 
 def moved_cards(cards: Cards, offset_m: Sequence[float]) -> Cards:

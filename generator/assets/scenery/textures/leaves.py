@@ -92,7 +92,8 @@ class Kind:
         count: Leaves per tile.
         blades: Blades per leaf.
         habit: ``palm``: blades fan out from one point; ``feather``: they stand on both sides of a
-            stalk; ``tuft``: they radiate around it.
+            stalk; ``tuft``: they radiate around it; ``grass``: blades rise from the tile's lower
+            border.
         spray: True: leaves stand along a twig that grows up the tile; false: they fill a clump.
     """
 
@@ -120,7 +121,8 @@ KINDS: Mapping[str, Kind] = {
     "clump": Kind("ovate", 0.066, 0.046, 620, spray=False),
     "pine_clump": Kind("strip", 0.11, 0.013, 120, 12, "tuft", spray=False),
     "ivy": Kind("round", 0.1, 0.09, 190, spray=False),
-    "twigs": Kind("strip", 0.15, 0.011, 62, 5, "feather", spray=False),
+    "blades": Kind("strip", 0.62, 0.022, 90, habit="grass", spray=False),
+    "twigs": Kind("strip", 0.17, 0.007, 70, 5, "feather", spray=False),
     "blossom": Kind("round", 0.042, 0.04, 130, 5),
 }
 """Leaves of the texture ``leaves``."""
@@ -178,6 +180,9 @@ def _twigs(rng: VariantRng) -> list[Blade]:
 
 def _place(kind: Kind, share: float, rng: VariantRng) -> tuple[tuple[float, float], float]:
     """Foot and direction of a leaf."""
+    if kind.habit == "grass":
+        across = rng.between(0.2, 0.8)
+        return (across, 0.999), -0.5 * math.pi + 1.1 * (across - 0.5) + rng.between(-0.25, 0.25)
     if kind.spray:
         up = 0.06 + 0.8 * float(rng.random()) ** 0.9
         # A spray is broad at half of its length.
