@@ -135,15 +135,15 @@ def chair(kind: str, seat_m: float, frame: int, seat: int) -> list[Patch]:
     return parts
 
 
-def lump(half_m: Vec3, roughness: float, rng: VariantRng, rings: int = 10) -> Patch:
+def lump(half_m: Vec3, roughness: float, rng: VariantRng, rings: int = 12) -> Patch:
     """A crumpled ball with a flat foot on the ground, as of a full bag; its middle above x = y = 0.
 
     ``roughness`` is the size of its dents as a share of the radius.
     """
-    # Large dents first, then the folds of the foil, half as deep.
+    # Large dents first, then the folds of the foil, less deep.
     waves = [
-        ([rng.between(-k, k) for _ in range(3)], rng.between(0.0, 2.0 * math.pi), 4.0 / (k + 2.0))
-        for k in (3.0, 4.0, 5.0, 9.0, 10.0, 11.0)
+        ([rng.between(-k, k) for _ in range(3)], rng.between(0.0, 2.0 * math.pi), 6.0 / (k + 5.0))
+        for k in (3.0, 4.0, 9.0, 10.0, 11.0, 12.0)
     ]
 
     def shape(direction: Array) -> Array:

@@ -87,7 +87,7 @@ def _kind(seed: int) -> tuple[str, str]:
     return in_turn(BREEDS, seed), in_turn(POSES, seed + seed // len(BREEDS))
 
 
-def _limb(path: list[Vec3], radii: list[float], slot: int = _COAT, sides: int = 8) -> Patch:
+def _limb(path: list[Vec3], radii: list[float], slot: int = _COAT, sides: int = 10) -> Patch:
     """A tapering round limb through points."""
     rows = spline([(*p, r) for p, r in zip(path, radii, strict=True)], 2 * len(path) - 1)
     return sweep(rows[:, :3], circle(1.0, sides), up=(0.0, 1.0, 0.0), scale=rows[:, 3], slot=slot)
@@ -101,7 +101,7 @@ def _blob(at: Vec3, half: Vec3, slot: int = _COAT) -> Patch:
 def _trunk(points: list[Vec3], sizes: list[tuple[float, float]]) -> Patch:
     """The body along a path; sizes are half the width and half the height."""
     rows: Array = spline([(*p, *s) for p, s in zip(points, sizes, strict=True)], 9)
-    return sweep(rows[:, :3], circle(1.0, 10), up=(0.0, 1.0, 0.0), scale=rows[:, 3:], slot=_COAT)
+    return sweep(rows[:, :3], circle(1.0, 12), up=(0.0, 1.0, 0.0), scale=rows[:, 3:], slot=_COAT)
 
 
 def _stand(breed: _Breed, walking: bool, rng: VariantRng) -> list[Patch]:
@@ -130,14 +130,14 @@ def _stand(breed: _Breed, walking: bool, rng: VariantRng) -> list[Patch]:
 
 def _fore_leg(breed: _Breed, x: float, y: float, step: float) -> Patch:
     r, elbow = breed.leg, 0.52
-    path = [(x, y, 0.68), (x - 0.05, y, elbow), (x + 0.5 * step, y, 0.24), (x + step, y, 0.03)]
+    path = [(x, 0.5 * y, 0.7), (x - 0.05, y, elbow), (x + 0.5 * step, y, 0.24), (x + step, y, 0.03)]
     return _limb(path, [1.9 * r, 1.5 * r, r, 0.95 * r])
 
 
 def _hind_leg(breed: _Breed, x: float, y: float, step: float) -> Patch:
     r = breed.leg
     path = [
-        (x, y, 0.7),
+        (x, 0.5 * y, 0.72),
         (x + 0.06, y, 0.45),
         (x - 0.13 + 0.5 * step, y, 0.24),
         (x - 0.06 + step, y, 0.03),
@@ -221,7 +221,7 @@ def _sit(breed: _Breed) -> list[Patch]:
     for side in (1.0, -1.0):
         y = side * 0.6 * c
         x = 0.2
-        path = [(x - 0.1, y, 0.74), (x - 0.06, y, 0.48), (x, y, 0.22), (x + 0.02, y, 0.03)]
+        path = [(x - 0.16, 0.5 * y, 0.76), (x - 0.07, y, 0.48), (x, y, 0.22), (x + 0.02, y, 0.03)]
         legs.append(_limb(path, [1.8 * breed.leg, 1.4 * breed.leg, breed.leg, 0.95 * breed.leg]))
         parts.append(_blob((hip[0] + 0.1, 1.25 * y, 0.75 * c), (0.2, 0.4 * c, 0.75 * c)))
         parts.append(_blob((hip[0] + 0.32, 1.3 * y, 0.04), (0.13, 0.05, 0.04), _MARKS))
