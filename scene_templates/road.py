@@ -46,7 +46,7 @@ class RoadSurface(Strict):
         paving: Material of the sidewalks.
         ground: Material of the land beside.
         carriageway: Material of the driven surface; gravel and earth have no markings.
-        age_years: Age of the driven surface: asphalt turns from dark to grey; -1 = 20 times the
+        age_years: Age of the driven surface: asphalt turns from dark to grey; -1 = 40 times the
             wear.
         coating: Colour of bicycle lanes.
         center_color: Colour of the line between the directions.

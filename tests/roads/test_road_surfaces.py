@@ -273,3 +273,12 @@ def test_roundabout_has_the_area_of_its_plan() -> None:
     assert area_m2(mesh, "asphalt") == pytest.approx(whole - inner, rel=5e-3)
     assert whole > math.pi * 15.0**2 + 4 * 7.0 * (shape.reach_m() - 15.0) - 4.0
     assert mesh.vertices_m[:, 2].max() == pytest.approx(0.175 + 0.14 + 0.7, abs=0.01)
+
+
+def test_land_between_close_arms_stays_between_them() -> None:
+    """Arms 40 degrees apart: nothing reaches beyond the square of arms and aprons."""
+    mesh = mesh_of("junction", arms_deg=(0.0, 140.0, 180.0, -1.0))
+    reach = JunctionShape((0.0, 140.0, 180.0, -1.0)).reach_m()
+
+    assert -mesh.vertices_m[:, 0].min() < reach + 0.01
+    assert area_m2(mesh, "ground") > 0.0

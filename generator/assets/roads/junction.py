@@ -40,6 +40,7 @@ from gen_data.generator.roads.junction_shape import (
 
 _CELL_M = 0.6
 """Markings are cut this small, so that they follow the surface."""
+_TIP_RAD = math.radians(60.0)
 
 
 def junction(*, crossings: str = "zebra", **others: Any) -> Solid:
@@ -151,7 +152,12 @@ def _land(shape: JunctionShape, number: int, slot: int) -> Patch:
         flat = arm_points(shape, arm, np.full(len(out), shape.reach_m()), out)
         fall = np.array(APRON_DROPS[1:]) * (z + APRON_FALL_M)
         ends.append(np.column_stack([flat, z - fall])[:: -1 if end == 0 else 1])
-    loop = np.concatenate([ends[0], edge, ends[1], tip[None]])
+    # The tip between arms close to each other lies far out, beyond the land of their roads.
+    loop = np.concatenate([ends[0], edge, ends[1], *([tip[None]] if gap > _TIP_RAD else [])])
+    (ax, ay, _), (bx, by, _) = ends[0][0], ends[1][-1]
+    if ax * by - ay * bx <= 0.0:
+        # Aprons that overlap cover the land between the arms.
+        loop = edge
     # The land is convex. It runs clockwise: with the street on its left.
     center = np.array([*loop[:, :2].mean(axis=0), 0.0])
     return _fan_patch(center, loop, "ground", slot).flipped()

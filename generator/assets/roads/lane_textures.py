@@ -77,8 +77,8 @@ def asphalt_lane(seed: int, age_years: float = 6.0, damage: str = "none") -> Tex
     blotches = fbm((60, 30), 4, rng, 0.6, _N)
     clouds = fbm((4, 2), 4, rng, 0.55, _N)
     streaks = fbm((2, 48), 3, rng, 0.6, _N)
-    shade = 1.0 + (0.22 + 0.28 * aged) * stones + (0.03 + 0.03 * aged) * blotches
-    shade += (0.02 + 0.02 * aged) * clouds + (0.02 + 0.025 * aged) * streaks
+    shade = 1.0 + (0.3 + 0.6 * aged) * stones + (0.04 + 0.06 * aged) * blotches
+    shade += (0.02 + 0.03 * aged) * clouds + (0.02 + 0.035 * aged) * streaks
     # Tyres uncover stones; oil drips on the middle of the lane; dust settles beside the tracks.
     polish = tracks * np.float32(0.05 + 0.05 * aged)
     oil = np.exp(-(((x - 0.5) / 0.1) ** 2)) * (0.75 + 0.25 * smoothstep(-0.6, 0.6, streaks))

@@ -68,7 +68,7 @@ class StreetLook:
         paving: Cover of the sidewalks, a word of ``GROUNDS``.
         ground: Cover of the land beside, a word of ``GROUNDS``.
         carriageway: Driven surface, a word of ``CARRIAGEWAYS``.
-        age_years: Of the carriageway's surface; negative = 20 years times the wear.
+        age_years: Of the carriageway's surface; negative = 40 years times the wear.
         coating: Colour of bicycle lanes and of areas laid out with them; ``none`` = asphalt.
         center_color: Colour of the line between the directions, ``white`` or ``yellow`` (MUTCD).
     """
@@ -85,7 +85,7 @@ class StreetLook:
     @property
     def age_shown_years(self) -> float:
         """Age of the textures."""
-        age = 20.0 * self.wear if self.age_years < 0.0 else self.age_years
+        age = 40.0 * self.wear if self.age_years < 0.0 else self.age_years
         return min(AGES_YEARS, key=lambda known: abs(known - age))
 
 

@@ -42,7 +42,7 @@ def asphalt(seed: int, wear: float = 0.3, age_years: float = 6.0) -> TextureData
     tone = stones.of_each(uniform(stones.count, rng) - 0.5)
     grain = (uniform((_N, _N), rng) - 0.5).astype(np.float32)
     clouds = fbm((5, 5), 5, rng, 0.55, _N)
-    shade = 1.0 + (0.16 + 0.24 * wear) * tone + 0.16 * grain + (0.02 + 0.035 * wear) * clouds
+    shade = 1.0 + (0.24 + 0.3 * wear) * tone + 0.26 * grain + (0.03 + 0.035 * wear) * clouds
     oil = smoothstep(0.45, 1.1, fbm((9, 9), 4, rng, 0.6, _N)) * np.float32(0.1 * wear)
     pale = smoothstep(0.4, 1.0, fbm((7, 7), 4, rng, 0.6, _N)) * np.float32(0.07 * wear)
     albedo = asphalt_color(seed, age_years) * (shade * (1.0 - oil + pale))[..., None]
