@@ -32,7 +32,7 @@ class GroupRandomizer(RandomizerBase):
         self.find_group(scene, assets)
 
     def find_group(self, scene: Scene, assets: AssetIndex) -> tuple[ObjectGroup, CategoryWeights]:
-        """Find the group and weigh the categories of its assets.
+        """Find the group and weigh the categories of its assets: none if its element is absent.
 
         Raises:
             ConfigError: the group or a category of the weights is unknown, or every weight is 0.
@@ -43,6 +43,8 @@ class GroupRandomizer(RandomizerBase):
         members: dict[str, list[str]] = {}
         for asset_id in groups[name].assets:
             members.setdefault(assets.get(asset_id).category, []).append(asset_id)
+        if not members:
+            return groups[name], ()
         for category in self.weights:
             check_known(category, sorted(members), f"{field}.weights: the group has no category")
         weighted = ((self.weights.get(key, 1.0), tuple(members[key])) for key in sorted(members))

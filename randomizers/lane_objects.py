@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -31,8 +32,30 @@ PER_LANE_MAX = 20_000
 """Largest number of places along one lane: one every 50 cm for 10 km."""
 SCALE = dist.Bounds(0.001, 1000.0)
 """Scales are rounded to four decimals: none in this range becomes 0."""
+LAND_FALL_M, LAND_SLOPE_M = 0.25, 6.0
+"""The land slopes down by about this much behind a sidewalk, over this distance."""
+JOINT_M = 0.01
+"""Gap between the objects of a run."""
 SCATTER_TRIES = 20
 """Attempts to find a free place for one scattered object."""
+
+
+Bounds = tuple[Vec3, Vec3]
+Thing = tuple[str, float, Bounds, Bounds]
+"""Asset, scale, its scaled bounds [m], and the part of them that nothing else may enter."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """Equal objects in a row, up to an arc length of the lane.
+
+    Attributes:
+        used: Whether their places are occupied; None = drawn place by place.
+    """
+
+    thing: Thing
+    end_m: float
+    used: bool | None
 
 
 class LaneObjects(GroupRandomizer):
@@ -44,12 +67,16 @@ class LaneObjects(GroupRandomizer):
     Attributes:
         lanes: Kinds of lanes to use; empty = those of the group.
         roads: Names of the elements whose lanes to use; empty = all.
-        gap_m: Gap between neighbours along a lane.
+        gap_m: Gap between neighbours along a lane, or between runs.
+        run_m: Length of a run: the same asset again and again without gaps, such as the fence of
+            one garden; 0 = every object is drawn by itself.
         passes: Number of times to fill every lane: several passes let people walk abreast.
         occupancy: Whether a place is occupied; its probability is how full a parking lane is.
         count: Largest number of objects, chosen at random from all places; null = no limit.
         min_count: Smallest number of free places; a layout with fewer is rejected.
         lateral: Position across the free width of the lane: -1 right edge, 0 middle, 1 left edge.
+        behind_m: Distance to the right of the lane, which is away from the street on lanes beside
+            it: second rows of houses, trees behind them.
         yaw_deg: Rotation from the lane's direction.
         reversed: Whether an object faces against the lane's direction.
         scale: Factor on an object's size.
@@ -65,11 +92,13 @@ class LaneObjects(GroupRandomizer):
     lanes: tuple[LaneKind, ...] = ()
     roads: tuple[str, ...] = ()
     gap_m: dist.NonNegative = dist.Uniform(3.0, 30.0)
+    run_m: dist.NonNegative = dist.Constant(0.0)
     passes: int = Field(1, ge=1, le=8)
     occupancy: dist.Flag = dist.Constant(True)
     count: Annotated[dist.Count, dist.Bounds(0, COUNT_MAX)] | None = None
     min_count: int = Field(0, ge=0, le=COUNT_MAX)
     lateral: Annotated[dist.Scalar, dist.Bounds(-1, 1)] = dist.Constant(0.0)
+    behind_m: dist.NonNegative = dist.Constant(0.0)
     yaw_deg: dist.Scalar = dist.Constant(0.0)
     reversed: dist.Flag = dist.Constant(False)
     scale: Annotated[dist.Scalar, SCALE] = dist.Constant(1.0)
@@ -80,6 +109,8 @@ class LaneObjects(GroupRandomizer):
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with the group's members replaced."""
         group, weights = self.find_group(scene, assets)
+        if not weights:
+            return scene
         scene = remove_members(scene, group.name)
         lines = self._select_lanes(scene, group)
         ground = make_ground(standing_bodies(scene), assets)
@@ -116,23 +147,31 @@ class LaneObjects(GroupRandomizer):
         """Alternate objects and gaps along every lane, once per pass."""
         for line in lines * self.passes:
             at_m = float(rng.uniform()) * self.gap_m.draw(rng)
+            run = self._draw_run(at_m, weights, assets, rng)
             for _ in range(PER_LANE_MAX):
-                asset, scale, bounds_m = self._draw_thing(weights, assets, rng)
+                asset, scale, bounds_m, solid_m = run.thing
                 length_m, width_m = _extent_m(bounds_m, group.facing)
                 room_m = max(0.0, 0.5 * (line.lane.width_m - width_m))
                 left_m = room_m * self.lateral.draw(rng)
+                behind_m = self.behind_m.draw(rng)
                 turn = math.radians(self.yaw_deg.draw(rng))
                 turn += math.pi if self.reversed.draw(rng) else 0.0
-                used = self.occupancy.draw(rng)
+                used = run.used if run.used is not None else self.occupancy.draw(rng)
                 if at_m + length_m > line.length_m:
                     break
                 if used:
-                    place = line.pose(at_m + 0.5 * length_m, left_m)
+                    place = line.pose(at_m + 0.5 * length_m, left_m - behind_m)
+                    place = place @ SE3((0.0, 0.0, -_land_fall_m(behind_m)))
                     pose = pose_on_lane(place, line.lane, bounds_m, group.facing, turn)
                     pose = pose.rounded()
-                    if self._occupy(ground, pose, scale, standing_bounds_m(assets, asset)):
+                    if self._occupy(ground, pose, solid_m):
                         yield Member(asset, pose, scale, collides=False)
-                at_m += length_m + self.gap_m.draw(rng)
+                at_m += length_m
+                if at_m < run.end_m:
+                    at_m += JOINT_M
+                else:
+                    at_m += self.gap_m.draw(rng)
+                    run = self._draw_run(at_m, weights, assets, rng)
             else:
                 raise ConfigError(
                     f"randomizers.{self.name}.gap_m: objects and gaps are so short that a lane of "
@@ -156,39 +195,52 @@ class LaneObjects(GroupRandomizer):
         high = [max(point[k] for point in points) for k in range(3)]
         for _ in range(self.count.draw(rng) if self.count is not None else 10):
             for _ in range(SCATTER_TRIES):
-                asset, scale, bounds_m = self._draw_thing(weights, assets, rng)
+                asset, scale, bounds_m, solid_m = self._draw_thing(weights, assets, rng)
                 x, y = (float(rng.uniform(low[k], high[k])) for k in range(2))
                 stand = SE3.about_z(float(rng.uniform(0.0, 2.0 * math.pi)), (x, y, low[2]))
                 pose = (stand @ SE3((0.0, 0.0, -bounds_m[0][2]))).rounded()
-                if self._occupy(ground, pose, scale, standing_bounds_m(assets, asset)):
+                if self._occupy(ground, pose, solid_m):
                     yield Member(asset, pose, scale, collides=False)
                     break
             else:
                 remedy = "a smaller count or min_clearance_m"
                 raise self.reject("no free place for a scattered object", remedy)
 
-    def _occupy(self, ground: Ground, pose: SE3, scale: float, bounds_m: tuple[Vec3, Vec3]) -> bool:
+    def _occupy(self, ground: Ground, pose: SE3, bounds_m: Bounds) -> bool:
         """Occupy the ground under an object if it is free; return whether it was."""
-        footprint = Footprint.of(pose, bounds_m, scale)
+        footprint = Footprint.of(pose, bounds_m)
         if not ground.is_free(footprint.expand(self.min_clearance_m)):
             return False
         ground.add(footprint)
         return True
 
-    def _draw_thing(
-        self, weights: CategoryWeights, assets: AssetIndex, rng: Rng
-    ) -> tuple[str, float, tuple[Vec3, Vec3]]:
+    def _draw_run(
+        self, at_m: float, weights: CategoryWeights, assets: AssetIndex, rng: Rng
+    ) -> _Run:
+        """Draw the next object, or run of equal ones."""
+        thing = self._draw_thing(weights, assets, rng)
+        reach_m = self.run_m.draw(rng)
+        return _Run(thing, at_m + reach_m, self.occupancy.draw(rng) if reach_m > 0.0 else None)
+
+    def _draw_thing(self, weights: CategoryWeights, assets: AssetIndex, rng: Rng) -> Thing:
         """Draw an asset and its scale; also return its scaled bounds."""
         asset = draw_asset(weights, rng)
         scale = round(self.scale.draw(rng), 4)
-        (x0, y0, z0), (x1, y1, z1) = assets.bounds_m(asset)
-        return asset, scale, (
-            (scale * x0, scale * y0, scale * z0),
-            (scale * x1, scale * y1, scale * z1),
-        )  # fmt: skip
+        bounds_m = _scale_bounds(assets.bounds_m(asset), scale)
+        return asset, scale, bounds_m, _scale_bounds(standing_bounds_m(assets, asset), scale)
 
 
-def _extent_m(bounds_m: tuple[Vec3, Vec3], facing: str) -> tuple[float, float]:
+def _scale_bounds(bounds_m: Bounds, scale: float) -> Bounds:
+    (x0, y0, z0), (x1, y1, z1) = bounds_m
+    return (scale * x0, scale * y0, scale * z0), (scale * x1, scale * y1, scale * z1)
+
+
+def _land_fall_m(behind_m: float) -> float:
+    """Depth of the land below a lane beside a road, at a distance away from the street."""
+    return min(1.0, behind_m / LAND_SLOPE_M) * LAND_FALL_M
+
+
+def _extent_m(bounds_m: Bounds, facing: str) -> tuple[float, float]:
     """Extents along and across the lane."""
     x, y = bounds_m[1][0] - bounds_m[0][0], bounds_m[1][1] - bounds_m[0][1]
     return (x, y) if facing == "along" else (y, x)

@@ -37,6 +37,8 @@ class Objects(GroupRandomizer):
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with the group's objects replaced."""
         group, weights = self.find_group(scene, assets)
+        if not weights:
+            return scene
         scene = remove_members(scene, group.name)
         count = self.count.draw(rng)
         chosen = [assets.get(draw_asset(weights, rng)) for _ in range(count)]

@@ -20,7 +20,7 @@ from gen_data.randomizers.free_space import Footprint, standing_bodies
 from gen_data.randomizers.traffic_lights import Signal, runs_along
 
 PERSON = "person"
-POSTS = ("street_light", "traffic_light", "traffic_sign", "tree")
+POSTS = ("street_light", "traffic_light", "traffic_sign", "tree", "utility_pole")
 POST_M = 0.12
 """Half width of the post at the origin of ``POSTS``; only parts above head height reach further."""
 SIGNAL_REACH_M = 30.0

@@ -14,6 +14,7 @@ TABLE = PluginTable[Element](
         "crosswalk": "gen_data.scene_templates.crosswalk:Crosswalk",
         "ego": "gen_data.scene_templates.ego:Ego",
         "ground": "gen_data.scene_templates.ground:GroundElement",
+        "horizon": "gen_data.scene_templates.horizon:Horizon",
         "junction": "gen_data.scene_templates.junction:Junction",
         "light": "gen_data.scene_templates.light:LightElement",
         "objects": "gen_data.scene_templates.objects:Objects",

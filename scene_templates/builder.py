@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from gen_data.generator.core.interfaces import AssetIndex, Element
 from gen_data.generator.core.plates import has_plate
 from gen_data.generator.core.scene import Lane, Light, Region, Scene, SupportSurface
 from gen_data.generator.core.se3 import Vec3
+from gen_data.scene_templates.element import Element as TemplateElement
 
 CONTENT_HEIGHT_M = 0.25
 """Height above a surface that belongs to the focus region."""
@@ -29,13 +30,15 @@ def build_scene(name: str, elements: Sequence[Element], assets: AssetIndex) -> S
     other elements on their surfaces.
 
     Raises:
-        ConfigError: a relation names an unknown element, or is impossible.
+        ConfigError: a relation names an unknown or absent element, or is impossible.
         AssetError: an asset is unknown or unsuitable.
     """
     _check_names(elements)
+    absent = [e for e in elements if isinstance(e, TemplateElement) and not e.present]
+    _check_relations(elements, {element.name for element in absent})
     scene = Scene(template=name)
     for element in sorted(elements, key=lambda element: element.follows_others):
-        scene = element.add(scene, assets)
+        scene = element.leave_out(scene) if element in absent else element.add(scene, assets)
     if not scene.lights and not has_plate(scene):
         scene = replace(scene, lights=(DEFAULT_LIGHT,))
     if scene.lanes:
@@ -74,6 +77,19 @@ def _check_names(elements: Sequence[Element]) -> None:
                 f"elements.{element.name}: two elements have this name; names must be unique"
             )
         seen.add(element.name)
+
+
+def _check_relations(elements: Sequence[Element], absent: Collection[str]) -> None:
+    """Raise ConfigError if an element of the scene needs an absent one."""
+    for element in elements:
+        if not isinstance(element, TemplateElement) or not element.present:
+            continue
+        for field, name in element.relations.items():
+            if name in absent:
+                raise ConfigError(
+                    f"elements.{element.name}.{field}: the element '{name}' is absent from this "
+                    f"scene; expected one that is present, or present: false for '{element.name}'"
+                )
 
 
 def _content_corners(surface: SupportSurface) -> np.ndarray:

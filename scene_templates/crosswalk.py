@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -12,7 +13,7 @@ from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Lane, Scene
 from gen_data.generator.roads.cross_section import height_m, non_default_fields
 from gen_data.generator.roads.lane_graph import world_points
-from gen_data.scene_templates.element import Element, parametric_id
+from gen_data.scene_templates.element import Element, name_relations, parametric_id
 from gen_data.scene_templates.road import add_street, find_road
 
 
@@ -31,6 +32,11 @@ class Crosswalk(Element):
     station_m: float = Field(40.0, ge=0)
     width_m: float = Field(4.0, ge=1.5, le=20)
     style: Literal["zebra", "ladder"] = "zebra"
+
+    @property
+    def relations(self) -> Mapping[str, str]:
+        """The road."""
+        return name_relations(road=self.road)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the markings on the road, and the lane of the pedestrians."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal
 
@@ -12,7 +13,7 @@ from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.lane_geometry import LaneLine
 from gen_data.generator.core.scene import Body, Instance, Rig, Scene
 from gen_data.generator.traffic.axles import find_axles
-from gen_data.scene_templates.element import Element, next_instance_id
+from gen_data.scene_templates.element import Element, name_relations, next_instance_id
 
 CATEGORY = "ego"
 """Category of its pixels; no data set lists it, so that they have no category id."""
@@ -34,6 +35,11 @@ class Ego(Element):
     asset: str = ""
     tags: tuple[str, ...] = Field(("car",), min_length=1)
     lane: str = ""
+
+    @property
+    def relations(self) -> Mapping[str, str]:
+        """The road of its lane."""
+        return name_relations(lane=self.lane)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the vehicle and its rig."""

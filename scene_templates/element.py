@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -23,14 +24,26 @@ class Element(Strict):
 
     Attributes:
         name: Name for other elements, randomizers and labels; unique in the template.
+        present: Whether the scene contains it; with ``switch``, districts have their own roads and
+            groups. Randomizers leave an absent group alone.
     """
 
     name: str = Field(pattern=NAME_PATTERN)
+    present: bool = True
 
     @property
     def follows_others(self) -> bool:
         """Whether it is added after all elements for which this is False."""
         return False
+
+    @property
+    def relations(self) -> Mapping[str, str]:
+        """Names of the elements that it needs, by the field that names them; no empty names."""
+        return {}
+
+    def leave_out(self, scene: Scene) -> Scene:
+        """Return the scene of an absent element: unchanged, or with its group of no objects."""
+        return scene
 
     @abstractmethod
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
@@ -55,6 +68,11 @@ class PlacedElement(Element):
     at_m: tuple[float, float] | tuple[float, float, float] = (0.0, 0.0)
     yaw_deg: float = 0.0
 
+    @property
+    def relations(self) -> Mapping[str, str]:
+        """The element that supports it."""
+        return name_relations(on=self.on)
+
     def pose(self, scene: Scene) -> SE3:
         """``T_world_element``: origin on the support, Z up."""
         local = level_pose(self.at_m, self.yaw_deg)
@@ -76,6 +94,15 @@ class PlacedElement(Element):
         pose = (self.pose(scene) @ SE3((0.0, 0.0, height_m))).rounded()
         own = {"name": self.name, "body": self.name, "T_world_surface": pose, "size_m": size_m}
         return replace(scene, surfaces=(*scene.surfaces, SupportSurface(**{**own, **fields})))
+
+
+def name_relations(**names: str) -> dict[str, str]:
+    """Elements by field: the part of each name before a slash; fields without a name are left out.
+
+    Args:
+        names: Names of elements, or of their parts such as ``cross/0``, by field.
+    """
+    return {field: name.partition("/")[0] for field, name in names.items() if name}
 
 
 def level_pose(at_m: tuple[float, float] | tuple[float, float, float], yaw_deg: float) -> SE3:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -14,7 +15,7 @@ from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.roads.cross_section import non_default_fields
 from gen_data.generator.roads.junction_shape import ABSENT, JunctionShape, junction_lanes
-from gen_data.scene_templates.element import Element, level_pose, parametric_id
+from gen_data.scene_templates.element import Element, level_pose, name_relations, parametric_id
 from gen_data.scene_templates.road import RoadSurface, add_street, find_port
 
 
@@ -30,6 +31,7 @@ class Junction(RoadSurface, Element):
         lane_width_m: Width of each lane.
         sidewalk_m: Width of the sidewalks; 0 = none.
         beside_m: Width between kerb and sidewalk, to match roads with verges or parking strips.
+        setback_m: Width of the land between sidewalk and house fronts, to match that of the roads.
         kerb_m: Height of the kerbs.
         radius_m: Radius of the kerb at the corners.
         crown: Cross slope of the arms, from their middle to their gutters.
@@ -49,12 +51,18 @@ class Junction(RoadSurface, Element):
     lane_width_m: float = Field(3.5, ge=2, le=6)
     sidewalk_m: float = Field(2.5, ge=0, le=20)
     beside_m: float = Field(0.0, ge=0, le=10)
+    setback_m: float = Field(0.0, ge=0, le=50)
     kerb_m: float = Field(0.12, ge=0, le=0.3)
     radius_m: float = Field(7.0, ge=1, le=50)
     crown: float = Field(0.02, ge=0, le=0.08)
     traffic: Literal["right", "left"] = "right"
     crossings: Literal["zebra", "ladder", "lines", "none"] = "zebra"
     speed_m_s: float = Field(8.0, ge=0, le=60)
+
+    @property
+    def relations(self) -> Mapping[str, str]:
+        """The road that leads to it."""
+        return name_relations(after=self.after)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the junction as background, and link its lanes to the roads that it meets."""
@@ -76,6 +84,7 @@ class Junction(RoadSurface, Element):
         shape = JunctionShape(
             (first, second, third, fourth), self.lanes, self.lane_width_m, self.kerb_m,
             self.sidewalk_m, self.beside_m, self.radius_m, self.crown, self.traffic,
+            self.setback_m,
         )  # fmt: skip
         rising = all(a < b for a, b in pairwise(arms))
         gaps = shape.gaps_rad()

@@ -13,7 +13,7 @@ from gen_data.generator.core.lane_geometry import LaneLine, pose_on_lane
 from gen_data.generator.core.members import Member, add_members
 from gen_data.generator.core.scene import LaneKind, ObjectGroup, Scene
 from gen_data.scene_templates.element import Element
-from gen_data.scene_templates.objects import AssetChoice
+from gen_data.scene_templates.objects import AssetChoice, empty_group
 
 
 class LaneObjects(Element):
@@ -34,6 +34,10 @@ class LaneObjects(Element):
     count: int = Field(0, ge=0, le=2000)
     facing: Literal["along", "left"] = "along"
     annotate: bool = True
+
+    def leave_out(self, scene: Scene) -> Scene:
+        """Return the scene with a group of no objects, so that randomizers know its name."""
+        return replace(scene, groups=(*scene.groups, empty_group(self.name, "along")))
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the group, and its objects evenly along the lanes."""

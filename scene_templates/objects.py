@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -17,7 +17,13 @@ from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.members import Member, add_members
 from gen_data.generator.core.scene import ObjectGroup, Placement, Scene, SupportSurface
 from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.scene_templates.element import Element, extent_m, find_surfaces, stand_upright
+from gen_data.scene_templates.element import (
+    Element,
+    extent_m,
+    find_surfaces,
+    name_relations,
+    stand_upright,
+)
 
 LAYERS: dict[Placement, int] = {"drop": 4, "scatter": 1, "grid": 1, "stack": 4}
 """Largest number of objects that start above one another, by placement."""
@@ -115,6 +121,15 @@ class Objects(Element):
         """True: objects keep clear of all other elements on their surfaces."""
         return True
 
+    @property
+    def relations(self) -> Mapping[str, str]:
+        """The element that supports them."""
+        return name_relations(on=self.on)
+
+    def leave_out(self, scene: Scene) -> Scene:
+        """Return the scene with a group of no objects, so that randomizers know its name."""
+        return replace(scene, groups=(*scene.groups, empty_group(self.name, self.placement)))
+
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the group, and its objects in rows on its surfaces, clear of other elements."""
         surfaces = find_surfaces(scene, self.on, f"elements.{self.name}.on")
@@ -176,6 +191,11 @@ class Objects(Element):
                 "expected fewer objects or a larger surface"
             )
         return points
+
+
+def empty_group(name: str, placement: Placement) -> ObjectGroup:
+    """The group of an absent element: it has no assets, and gets no objects."""
+    return ObjectGroup(name, (), (), 0, placement, annotated=False)
 
 
 def find_keep_out_discs(

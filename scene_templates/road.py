@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any, Literal, TypeVar
 
@@ -19,7 +20,13 @@ from gen_data.generator.roads.cross_section import RoadShape, non_default_fields
 from gen_data.generator.roads.junction_shape import JunctionShape, arm_pose
 from gen_data.generator.roads.lane_graph import link_lanes, road_lanes
 from gen_data.generator.roads.roundabout_shape import RoundaboutShape
-from gen_data.scene_templates.element import Element, add_background, level_pose, parametric_id
+from gen_data.scene_templates.element import (
+    Element,
+    add_background,
+    level_pose,
+    name_relations,
+    parametric_id,
+)
 
 T = TypeVar("T")
 Width = float
@@ -83,6 +90,8 @@ class Road(RoadSurface, Element):
             lanes of their own. A single word is for both sides.
         verge_m: Width of planted strips between kerb and sidewalk; 0 = none.
         sidewalk_m: Width of the sidewalks; 0 = none.
+        setback_m: Width of the land between sidewalk and house fronts, covered with ``ground``; a
+            lane of kind ``garden``; 0 = none.
         kerb_m: Height of the kerbs; 0 = none, as on country roads and motorways.
         crown: Cross slope of the carriageway, from its middle to its gutters.
         traffic: Side on which vehicles drive.
@@ -113,6 +122,7 @@ class Road(RoadSurface, Element):
     parking: Parking | tuple[Parking, Parking] = (False, False)
     verge_m: tuple[Width, Width] = (0.0, 0.0)
     sidewalk_m: tuple[Width, Width] = (2.5, 2.5)
+    setback_m: tuple[Width, Width] = (0.0, 0.0)
     kerb_m: float = Field(0.12, ge=0, le=0.3)
     crown: float = Field(0.02, ge=0, le=0.08)
     traffic: Literal["right", "left"] = "right"
@@ -125,6 +135,11 @@ class Road(RoadSurface, Element):
     tram: bool = False
     apron_m: float = Field(6.0, ge=0, le=100)
     speed_m_s: float = Field(13.9, ge=0, le=60)
+
+    @property
+    def relations(self) -> Mapping[str, str]:
+        """The road or junction that it continues."""
+        return name_relations(after=self.after)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the road as background, and link its lanes to those of the roads that it meets."""
@@ -185,7 +200,7 @@ def check_widths(where: str, shape: RoadShape) -> None:
     """Raise ConfigError if a cross section has no lane or a negative width."""
     if shape.lanes[0] + shape.lanes[1] < 1 or min(shape.lanes) < 0 or max(shape.lanes) > 8:
         raise ConfigError(f"{where}.lanes: {shape.lanes[0]:g}, {shape.lanes[1]:g}; expected 1 to 8")
-    for name in ("bicycle_m", "shoulder_m", "verge_m", "sidewalk_m"):
+    for name in ("bicycle_m", "shoulder_m", "verge_m", "sidewalk_m", "setback_m"):
         if not all(0.0 <= width <= 50.0 for width in getattr(shape, name)):
             raise ConfigError(f"{where}.{name}: expected two widths from 0 to 50 m")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Literal
 
 from pydantic import Field
@@ -11,7 +12,7 @@ from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.roads.cross_section import RoadShape, non_default_fields, strips
-from gen_data.scene_templates.element import Element, add_background, parametric_id
+from gen_data.scene_templates.element import Element, add_background, name_relations, parametric_id
 from gen_data.scene_templates.road import find_road
 
 Sign = Literal[
@@ -46,6 +47,11 @@ class RoadMarking(Element):
     offset_m: float = Field(0.0, ge=-10, le=10)
     length_m: float = Field(8.0, ge=1, le=100)
     width_m: float | None = Field(None, ge=0.5, le=12)
+
+    @property
+    def relations(self) -> Mapping[str, str]:
+        """The road."""
+        return name_relations(road=self.road)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the paint as background."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -15,7 +16,7 @@ from gen_data.generator.core.se3 import SE3
 from gen_data.generator.roads.cross_section import non_default_fields
 from gen_data.generator.roads.junction_shape import ABSENT
 from gen_data.generator.roads.roundabout_shape import RoundaboutShape, roundabout_lanes
-from gen_data.scene_templates.element import Element, level_pose, parametric_id
+from gen_data.scene_templates.element import Element, level_pose, name_relations, parametric_id
 from gen_data.scene_templates.road import RoadSurface, add_street, find_port
 
 _SPARE_RAD = math.radians(4.0)
@@ -37,6 +38,7 @@ class Roundabout(RoadSurface, Element):
         lane_width_m: Width of each lane of the arms.
         sidewalk_m: Width of the sidewalks; 0 = none.
         beside_m: Width between kerb and sidewalk, to match roads with verges or parking strips.
+        setback_m: Width of the land between sidewalk and house fronts, to match that of the roads.
         kerb_m: Height of the kerbs.
         radius_m: Radius of the kerb at the corners.
         splitters: Whether raised islands part the lanes of every arm.
@@ -59,6 +61,7 @@ class Roundabout(RoadSurface, Element):
     lane_width_m: float = Field(3.5, ge=2.5, le=5)
     sidewalk_m: float = Field(2.5, ge=0, le=10)
     beside_m: float = Field(0.0, ge=0, le=10)
+    setback_m: float = Field(0.0, ge=0, le=50)
     kerb_m: float = Field(0.12, ge=0, le=0.3)
     radius_m: float = Field(12.0, ge=6, le=40)
     splitters: bool = True
@@ -66,6 +69,11 @@ class Roundabout(RoadSurface, Element):
     traffic: Literal["right", "left"] = "right"
     crossings: Literal["zebra", "ladder", "lines", "none"] = "zebra"
     speed_m_s: float = Field(7.0, ge=0, le=30)
+
+    @property
+    def relations(self) -> Mapping[str, str]:
+        """The road that leads to it."""
+        return name_relations(after=self.after)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add the roundabout as background, and link its lanes to the roads that it meets."""
@@ -90,6 +98,7 @@ class Roundabout(RoadSurface, Element):
             (*arms[:3], arms[3] if len(arms) == 4 else ABSENT), self.lane_width_m, self.kerb_m,
             self.sidewalk_m, self.beside_m, self.radius_m, self.crown, self.traffic,
             self.diameter_m, self.ring_m, self.truck_apron_m, float(self.splitters),
+            self.setback_m,
         )  # fmt: skip
         if self.ring_m < self.truck_apron_m + self.lane_width_m or shape.island_m < 2.0:
             raise ConfigError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Literal
 
 from pydantic import Field
@@ -12,7 +13,13 @@ from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.lane_geometry import LaneLine
 from gen_data.generator.core.scene import Lane, Scene
 from gen_data.generator.core.se3 import SE3
-from gen_data.scene_templates.element import Element, add_static, parametric_id, stand_upright
+from gen_data.scene_templates.element import (
+    Element,
+    add_static,
+    name_relations,
+    parametric_id,
+    stand_upright,
+)
 
 SIGNAL_M = 0.6
 """Distance of the pole from the kerb."""
@@ -35,6 +42,11 @@ class Signals(Element):
     beside_m: float = Field(0.0, ge=0, le=20)
     seed: int = Field(0, ge=0, le=1_000_000)
     annotate: bool = False
+
+    @property
+    def relations(self) -> Mapping[str, str]:
+        """The junction."""
+        return name_relations(junction=self.junction)
 
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add one light per incoming road."""

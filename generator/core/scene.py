@@ -27,7 +27,15 @@ PANEL_KINDS: tuple[PanelKind, ...] = get_args(PanelKind)
 LIGHT_KINDS: tuple[LightKind, ...] = get_args(LightKind)
 """On the device, kinds are represented by their index in this list."""
 LaneKind = Literal[
-    "driving", "parking", "bicycle", "sidewalk", "crosswalk", "verge", "furniture", "frontage"
+    "driving",
+    "parking",
+    "bicycle",
+    "sidewalk",
+    "crosswalk",
+    "verge",
+    "furniture",
+    "garden",
+    "frontage",
 ]
 
 
@@ -140,8 +148,8 @@ class Lane:
 
     Attributes:
         kind: ``driving``, ``parking``, ``bicycle``; ``sidewalk`` and ``crosswalk`` for people;
-            ``verge`` for plants, ``furniture`` for lamps and bins, ``frontage`` for the line of
-            house fronts, with the street on its left.
+            ``verge`` for plants, ``furniture`` for lamps and bins, ``garden`` for the land before
+            houses, ``frontage`` for the line of house fronts, with the street on its left.
         center_m: Points of the centre line, world, in the direction of travel, at most 2 m apart
             in bends; Z is the height of the ground.
         width_m: Across the centre line.

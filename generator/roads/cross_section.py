@@ -15,7 +15,7 @@ import numpy as np
 from gen_data.generator.roads.reference_line import Array, ReferenceLine, bend_line
 
 StripKind = Literal[
-    "median", "driving", "bicycle", "shoulder", "parking", "kerb", "verge", "sidewalk"
+    "median", "driving", "bicycle", "shoulder", "parking", "kerb", "verge", "sidewalk", "garden"
 ]
 Pair = tuple[float, float]
 
@@ -43,6 +43,7 @@ class RoadShape:
         bay_angle_deg: Angle of parking bays to the road; 0 = cars park along the kerb.
         kerb_m: Height of the kerbs; 0 = none.
         verge_m, sidewalk_m: Widths of planting strips and of sidewalks beyond them; 0 = none.
+        setback_m: Widths of the land between the sidewalks and the fronts of houses; 0 = none.
         curvature_per_m: Curvature of the reference line, positive to the left.
         crown: Cross slope of the carriageway, from the middle to the gutters.
         traffic: Side on which vehicles drive, ``right`` or ``left``.
@@ -61,6 +62,7 @@ class RoadShape:
     curvature_per_m: float = 0.0
     crown: float = 0.02
     traffic: str = "right"
+    setback_m: Pair = (0.0, 0.0)
     median_kerb_m: float = 0.0
     bay_angle_deg: Pair = (0.0, 0.0)
 
@@ -147,6 +149,7 @@ def strips(shape: RoadShape, side: int) -> tuple[Strip, ...]:
     fall = FALL if shape.kerb_m > 0.0 else -FALL
     put("verge", shape.verge_m[k], fall * shape.verge_m[k])
     put("sidewalk", shape.sidewalk_m[k], fall * shape.sidewalk_m[k])
+    put("garden", shape.setback_m[k], 0.0)
     return tuple(made)
 
 

@@ -33,6 +33,7 @@ class JunctionShape:
         lanes: Number of lanes per arm and direction.
         beside_m: Width between kerb and sidewalk (verge, or the road's parking).
         radius_m: Radius of the kerb at the corners.
+        setback_m: Width of the land between the sidewalks and the fronts of houses.
     """
 
     arms_deg: tuple[float, float, float, float] = (0.0, 90.0, 180.0, 270.0)
@@ -44,6 +45,7 @@ class JunctionShape:
     radius_m: float = 7.0
     crown: float = 0.02
     traffic: str = "right"
+    setback_m: float = 0.0
 
     @property
     def half_m(self) -> float:
@@ -80,6 +82,10 @@ class JunctionShape:
     def reach_m(self) -> float:
         """Length of every arm."""
         return self.curve_end_m() + SETBACK_M
+
+    def is_straight(self, number: int) -> bool:
+        """Whether the kerb runs straight on from an arm to the next one."""
+        return abs(self.gaps_rad()[number] - math.pi) <= 1e-3
 
     def gaps_rad(self) -> tuple[float, ...]:
         """Angles from each arm to the next one counter-clockwise."""
@@ -136,6 +142,11 @@ class ArmsShape(Protocol):
         ...
 
     @property
+    def setback_m(self) -> float:
+        """Width of the land between the sidewalks and the fronts of houses."""
+        ...
+
+    @property
     def border_m(self) -> float:
         """Distance from the kerb's face to the outer edge of the sidewalk."""
         ...
@@ -143,6 +154,10 @@ class ArmsShape(Protocol):
     @property
     def edge_z_m(self) -> float:
         """Height of the outer edge of the sidewalk."""
+        ...
+
+    def is_straight(self, number: int) -> bool:
+        """Whether the kerb runs straight on from an arm to the next one."""
         ...
 
     def arms_rad(self) -> tuple[float, ...]:
@@ -277,8 +292,13 @@ def corner_lanes(
     )
     for number in range(len(shape.arms_rad())):
         for kind, offset_m, width_m in beside if shape.sidewalk_m > 0.0 else ():
-            line = corner(shape, number, offset_m)
-            rise = (shape.edge_z_m - shape.kerb_m) * (offset_m - KERB_WIDTH_M)
+            set_back = kind == "frontage" and shape.setback_m > 0.0
+            if set_back and not shape.is_straight(number):
+                # The fronts of the arms' houses meet in a corner of their own.
+                continue
+            line = corner(shape, number, offset_m + (shape.setback_m if set_back else 0.0))
+            sloping_m = min(offset_m, shape.border_m) - KERB_WIDTH_M
+            rise = (shape.edge_z_m - shape.kerb_m) * sloping_m
             z = shape.kerb_m + rise / (shape.border_m - KERB_WIDTH_M)
             center = world_points(np.column_stack([line, np.full(len(line), z)]), T_world_junction)
             yield Lane(f"{name}/{kind}{number}", kind, center, width_m, road=name)

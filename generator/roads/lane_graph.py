@@ -152,7 +152,7 @@ def _beside(row: Sequence[Strip], side: int) -> list[tuple[LaneKind, float, floa
     """Kind, t, height and width of all lanes of one side except driving lanes."""
     by_kind = {strip.kind: strip for strip in row}
     made: list[tuple[LaneKind, float, float, float]] = []
-    whole: tuple[LaneKind, ...] = ("bicycle", "parking", "verge", "sidewalk")
+    whole: tuple[LaneKind, ...] = ("bicycle", "parking", "verge", "sidewalk", "garden")
     for kind in whole:
         if kind in by_kind:
             strip = by_kind[kind]

@@ -36,6 +36,7 @@ class RoundaboutShape:
         ring_m: Width of the ring, with the truck apron.
         truck_apron_m: Width of the ring's inner, rough part.
         radius_m: Radius of the kerb at the corners.
+        setback_m: Width of the land between the sidewalks and the fronts of houses.
         splitter: 1 = raised islands between both lanes of every arm, 0 = none.
     """
 
@@ -51,6 +52,7 @@ class RoundaboutShape:
     ring_m: float = 7.0
     truck_apron_m: float = 1.6
     splitter: float = 1.0
+    setback_m: float = 0.0
 
     @property
     def lanes(self) -> int:
@@ -90,6 +92,11 @@ class RoundaboutShape:
     def arms_rad(self) -> tuple[float, ...]:
         """Directions of the existing arms, ascending."""
         return tuple(math.radians(arm) for arm in self.arms_deg if arm != ABSENT)
+
+    def is_straight(self, number: int) -> bool:
+        """Never: kerbs follow the ring."""
+        del number
+        return False
 
     def gaps_rad(self) -> tuple[float, ...]:
         """Angles from each arm to the next one counter-clockwise."""

@@ -227,3 +227,51 @@ def test_overlap_agrees_with_points_inside_both(
     reach = math.hypot(a, b) + math.hypot(c, d)
     if math.hypot(x, y) > reach:
         assert ground.is_free(other)
+
+
+def test_runs_repeat_an_asset_without_gaps() -> None:
+    """Bricks of 6 cm in runs of at least 1 m, 5 m apart."""
+    scene = drawn(street(), run_m=Constant(1.0), gap_m=Constant(5.0), min_clearance_m=0.0)
+    row = sorted(
+        b.T_world_body.translation_m[0]
+        for b in scene.bodies
+        if b.T_world_body.translation_m[1] == pytest.approx(-1.5)
+    )
+    steps = np.diff(row)
+
+    assert set(np.round(steps, 3)) == {0.07, 5.06}
+    assert 6 <= (steps > 1.0).sum() <= 7
+    # 15 bricks with 14 joints of 1 cm reach 1.04 m.
+    assert np.diff(np.flatnonzero(steps > 1.0)).tolist() == [15] * ((steps > 1.0).sum() - 1)
+
+
+def test_occupancy_is_drawn_once_per_run() -> None:
+    """Half of the runs are missing as a whole."""
+    scene = drawn(
+        street(),
+        run_m=Constant(1.0),
+        gap_m=Constant(0.5),
+        occupancy=Probability(0.5),
+        min_clearance_m=0.0,
+    )
+    for y in (-1.5, 1.5):
+        row = sorted(
+            b.T_world_body.translation_m[0]
+            for b in scene.bodies
+            if b.T_world_body.translation_m[1] == pytest.approx(y)
+        )
+        ends = [0, *(np.flatnonzero(np.diff(row) > 0.1) + 1).tolist(), len(row)]
+        lengths = np.diff(ends)
+        assert 5 < len(lengths) < 25
+        assert set(lengths[1:-1]) == {15}
+
+
+def test_second_rows_stand_behind_their_lane_on_lower_land() -> None:
+    """To the right of the lane, sunk by the fall of the land: 0.25 m from 6 m on."""
+    for behind_m, fall_m in ((3.0, 0.125), (20.0, 0.25)):
+        near = drawn(street())
+        far = drawn(street(), behind_m=Constant(behind_m))
+        a, b = near.bodies[0], far.bodies[0]
+        local = a.T_world_body.inverse().apply(np.array([b.T_world_body.translation_m]))[0]
+
+        assert local == pytest.approx([0.0, -behind_m, -fall_m], abs=1e-5)

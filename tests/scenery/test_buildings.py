@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import hashlib
+
 import numpy as np
 import pytest
 
 from gen_data.generator.assets.procedural.family import Solid
-from gen_data.generator.assets.scenery.building_designs import STYLES, draw_design
+from gen_data.generator.assets.scenery.building_designs import (
+    REGIONS,
+    STYLES,
+    building_materials,
+    draw_design,
+)
 from gen_data.generator.assets.scenery.buildings import building, building_facts
 from tests.scenery.rays import cast
 
-SEEDS = (0, 1, 2, 5, 9)
+SEEDS = (0, 1, 5)
 
 
 @pytest.fixture(params=[(s, k) for s in STYLES for k in SEEDS], ids=str, scope="module")
@@ -43,24 +50,24 @@ def test_panes_lie_behind_the_front_wall_by_a_real_recess(built: tuple[str, int,
     depth = distance[seen] - 6.0
 
     assert len(centres) >= 6
-    # Balconies, awnings, shutters and railings hide some.
-    assert seen.mean() > 0.4
+    # Balconies, awnings, shutters and railings hide many.
+    assert seen.mean() > 0.2
     assert depth.min() > 0.1
     assert depth.max() < 0.36
 
 
 def test_windows_have_the_size_and_sills_of_real_ones(built: tuple[str, int, Solid]) -> None:
-    """German building practice: 1.0-2.9 m wide, 1.2-2.4 m high, storeys of 2.7-4.7 m."""
+    """Building practice: 1.0-2.9 m wide, 1.2-2.6 m high, storeys of 2.7-4.7 m; halls to 6.5 m."""
     style, seed, _ = built
     plan = draw_design(style, seed)
 
     assert 1.0 <= plan.window_m[0] <= 2.95
-    assert 1.2 <= plan.window_m[1] <= 2.4
+    assert 1.2 <= plan.window_m[1] <= 2.6
     assert 2.7 <= plan.storey_m <= 3.8
-    assert 2.8 <= plan.ground_m <= 4.7
-    assert 8.0 <= plan.width_m <= 24.0
-    assert 8.0 <= plan.depth_m <= 14.0
-    assert 1 <= plan.floors <= 7
+    assert 2.8 <= plan.ground_m <= 6.5
+    assert 8.0 <= plan.width_m <= 30.0
+    assert 8.0 <= plan.depth_m <= 22.0
+    assert 1 <= plan.floors <= 13
 
 
 def test_who_looks_at_it_from_outside_never_sees_an_inside(built: tuple[str, int, Solid]) -> None:
@@ -127,4 +134,45 @@ def test_facts_name_style_and_floors() -> None:
     facts = building_facts(3, "old_town")
 
     assert facts.subcategory == "old_town"
-    assert facts.attributes == {"floors": str(draw_design("old_town", 3).floors)}
+    assert facts.attributes["floors"] == str(draw_design("old_town", 3).floors)
+    assert facts.attributes["region"] in REGIONS
+
+
+@pytest.mark.parametrize("style", STYLES)
+def test_no_two_variants_have_the_same_design_and_materials(style: str) -> None:
+    """Sixty seeds of a style; wall, roof, joinery and views of rooms are part of it."""
+    drawn = [draw_design(style, seed) for seed in range(60)]
+    looks = {(plan, building_materials(plan, seed)) for seed, plan in enumerate(drawn)}
+
+    assert len(looks) == 60
+
+
+@pytest.mark.slow
+def test_no_two_of_200_buildings_have_the_same_mesh() -> None:
+    """Digest of the vertices, over all styles."""
+    digests = {
+        hashlib.sha256(building(seed, style).mesh.vertices_m.tobytes()).hexdigest()
+        for style in STYLES
+        for seed in range(200 // len(STYLES) + 1)
+    }
+
+    assert len(digests) == len(STYLES) * (200 // len(STYLES) + 1)
+
+
+def test_front_stays_on_its_plot(built: tuple[str, int, Solid]) -> None:
+    """Fences reach at most 3 m beyond the side walls, wings and porches 5 m before the front."""
+    style, seed, solid = built
+    plan = draw_design(style, seed)
+    (x0, y0, _), (x1, y1, _) = solid.mesh.bounds_m()
+
+    assert 0.5 * plan.width_m + 0.7 + plan.gate_m >= max(-y0, y1)
+    assert x1 <= 0.5 * plan.depth_m + plan.wing_out_m + 2.5
+    assert x0 >= -0.5 * plan.depth_m - 2.0
+
+
+def test_a_region_changes_colours_but_no_shape() -> None:
+    """The same house in the north and in the south."""
+    north, south = (building(4, "house", region) for region in ("north", "south"))
+
+    assert (north.mesh.vertices_m == south.mesh.vertices_m).all()
+    assert north.mesh.materials != south.mesh.materials

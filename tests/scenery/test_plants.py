@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.branching import Lobe, grow_skeleton, points_in
-from gen_data.generator.assets.scenery.trees import SPECIES, tree
+from gen_data.generator.assets.scenery.textures.leaves import leaves
+from gen_data.generator.assets.scenery.trees import SPECIES, tree, tree_facts
 from gen_data.generator.core.asset_types import MeshData
 from tests.scenery.rays import cast
 
@@ -27,23 +30,91 @@ def test_leaves_come_and_go_but_the_trunk_stays(species: str) -> None:
 
     assert leaves_of(half).sum() == pytest.approx(0.5 * leaves_of(full).sum(), abs=2)
     assert not leaves_of(bare).any()
-    trunks = [m.vertices_m[m.vertices_m[:, 2] < 0.01] for m in (full, bare)]
+    trunks = [foot_of(m) for m in (full, bare)]
     assert np.allclose(trunks[0], trunks[1])
 
 
+def foot_of(mesh: MeshData) -> np.ndarray:
+    """Vertices of the trunk on the ground."""
+    slots = [k for k, m in enumerate(mesh.materials) if m.texture.startswith("texture/bark")]
+    wood = mesh.vertices_m[np.unique(mesh.faces[np.isin(mesh.face_slots, slots)])]
+    return wood[wood[:, 2] < 0.01]
+
+
+@pytest.mark.parametrize(
+    ("species", "season", "foliage"),
+    [("oak", "winter", "bare"), ("pine", "winter", "leafy"), ("oak", "autumn", "leafy")],
+)
+def test_deciduous_trees_are_bare_in_winter(species: str, season: str, foliage: str) -> None:
+    """The facts agree with the mesh; the wood does not depend on the season."""
+    mesh = tree(2, species, 1.0, season).mesh
+
+    assert dict(tree_facts(2, species, 1.0, season).attributes)["foliage"] == foliage
+    assert leaves_of(mesh).any() == (foliage == "leafy")
+
+
+def test_autumn_is_redder_than_summer_and_spring_blossoms() -> None:
+    """Mean colours of the leaf materials, and white petals on half of a cherry's sprays."""
+    summer, autumn, spring = (
+        tree(0, "cherry", 1.0, season).mesh for season in ("summer", "autumn", "spring")
+    )
+
+    def red_to_green(mesh: MeshData) -> float:
+        colors = [m.base_color for m in mesh.materials if m.role == "leaf"]
+        return float(np.mean([r / g for r, g, _ in colors]))
+
+    assert red_to_green(autumn) > 1.4
+    assert red_to_green(summer) < 1.1
+    petals = [k for k, m in enumerate(spring.materials) if "blossom" in m.texture]
+    share = np.isin(spring.face_slots, petals).sum() / leaves_of(spring).sum()
+    assert share == pytest.approx(0.5, abs=0.01)
+
+
 @pytest.mark.parametrize("species", LEAFY)
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_a_crown_is_dense_but_not_a_ball(species: str, seed: int) -> None:
-    """Level rays through the middle of the crown: most meet a leaf, some pass."""
-    mesh = tree(seed, species, 1.0).mesh
+def test_a_crown_is_dense_but_not_a_ball(species: str) -> None:
+    """Level rays through the middle of the crown: most meet a leaf, some pass by all holes."""
+    mesh = tree(1, species, 1.0).mesh
     crown = mesh.vertices_m[mesh.faces[leaves_of(mesh)]].reshape(-1, 3).astype(np.float64)
     middle, spread = crown.mean(axis=0), crown.std(axis=0)
     y, z = (g.ravel() for g in np.meshgrid(np.linspace(-1, 1, 25), np.linspace(-1, 1, 25)))
     eyes = np.column_stack([0 * y + 20.0, middle[1] + y * spread[1], middle[2] + z * spread[2]])
 
-    _, face, _ = cast(mesh, eyes, np.tile([-1.0, 0.0, 0.0], (len(eyes), 1)))
+    assert 0.5 < blocked_share(mesh, eyes) < 0.995
 
-    assert 0.6 < (face >= 0).mean() < 0.995
+
+def blocked_share(mesh: MeshData, eyes: np.ndarray) -> float:
+    """Share of rays along -X that meet wood, or a leaf and not a hole between leaves."""
+    alphas = {m.texture: cover_of(m.texture) for m in mesh.materials if "leaves" in m.texture}
+    blocked, going, eyes = 0, np.ones(len(eyes), dtype=bool), eyes.copy()
+    for _ in range(40):
+        far, face, _ = cast(mesh, eyes, np.tile([-1.0, 0.0, 0.0], (len(eyes), 1)))
+        going &= face >= 0
+        for k in np.flatnonzero(going):
+            texture = mesh.materials[mesh.face_slots[face[k]]].texture
+            at = eyes[k] - [far[k], 0.0, 0.0]
+            if texture not in alphas or is_leaf(alphas[texture], mesh, int(face[k]), at):
+                blocked, going[k] = blocked + 1, False
+        eyes[:, 0] -= np.where(going, far + 1e-4, 0.0)
+    return blocked / len(eyes)
+
+
+@cache
+def cover_of(texture: str) -> np.ndarray:
+    """Coverage of a texture of leaves."""
+    alpha = leaves(0, texture.partition("kind=")[2].partition("&")[0]).alpha
+    assert alpha is not None
+    return alpha
+
+
+def is_leaf(alpha: np.ndarray, mesh: MeshData, face: int, at: np.ndarray) -> bool:
+    """Whether a point of a face lies on a leaf; the nearest texel decides."""
+    a, b, c = mesh.vertices_m[mesh.faces[face]].astype(np.float64)
+    frame = np.stack([b - a, c - a], axis=1)
+    u, v = np.linalg.lstsq(frame, at - a, rcond=None)[0]
+    uv = np.array([1.0 - u - v, u, v]) @ mesh.uvs[mesh.faces[face]]
+    size = len(alpha)
+    column, row = (np.clip((uv[0], 1.0 - uv[1]), 0.0, 0.999) * size).astype(int)
+    return bool(alpha[row, column] >= 128)
 
 
 @pytest.mark.parametrize("species", SPECIES)

@@ -22,7 +22,13 @@ from gen_data.generator.core.streams import Streams
 from gen_data.randomizers.free_space import Footprint, Ground
 from gen_data.randomizers.traffic_flow import TrafficFlow
 
-SMALL = ("sensors[0].size_px=[64, 32]", "sensors[0].channels=[rgb, depth, instance]")
+SMALL = (
+    "sensors[0].size_px=[64, 32]",
+    "sensors[0].channels=[rgb, depth, instance]",
+    "shared.district=residential",
+    "shared.junction=x",
+    "shared.crossing=lines",
+)
 STEPS, STEP_S = 40, 0.1
 FLAT = ("tree", "street_light", "traffic_light", "traffic_sign")
 """Things whose bounding boxes reach over the road above what drives there."""
@@ -231,7 +237,7 @@ BAD = {
         "flow", "routes={ego: [main/forward0, left/backward0]}",
     ),
     "there is no driving lane 'main/forwerd0'": ("flow", "routes={ego: [main/forwerd0]}"),
-    r"\(-75, 90\) is .* m from the middle": ("flow", "routes={ego: [[-75, 90]]}"),
+    r"\(-75, 300\) is .* m from the middle": ("flow", "routes={ego: [[-75, 300]]}"),
     "no driving lane on roof": ("ego_on_lane", "roads=[roof]"),
     "no ego vehicle 'ega'": ("ego_on_lane", "ego=ega"),
 }  # fmt: skip

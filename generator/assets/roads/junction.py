@@ -117,7 +117,10 @@ def _band(
 
 
 def _land(shape: JunctionShape, number: int, slot: int) -> Patch:
-    """Land between two arms, from the sidewalk to the land beside the arms."""
+    """Land between two arms, from the sidewalk to the land beside the arms.
+
+    With gardens before the houses it is level, as they are.
+    """
     offset = shape.border_m if shape.sidewalk_m > 0.0 else 0.0
     z = shape.edge_z_m if shape.sidewalk_m > 0.0 else 0.0
     line = corner(shape, number, offset)
@@ -125,15 +128,23 @@ def _land(shape: JunctionShape, number: int, slot: int) -> Patch:
     gap = shape.gaps_rad()[number]
     # The outer edges of arms in line are parallel: they do not meet in a tip.
     if abs(gap - math.pi) <= 1e-3:
-        far = corner(shape, number, offset + APRON_M)
-        outer = np.column_stack([far, np.full(len(far), -APRON_FALL_M)])
+        far = corner(shape, number, offset + shape.setback_m + APRON_M)
+        rows, plan = [np.column_stack([far, np.full(len(far), -APRON_FALL_M)])], [far]
+        if shape.setback_m > 0.0:
+            front = corner(shape, number, offset + shape.setback_m)
+            rows.append(np.column_stack([front, np.full(len(front), z)]))
+            plan.append(front)
         return surface(
-            np.stack([outer, edge], axis=1), np.stack([far, line], axis=1), "ground", slot
+            np.stack([*rows, edge], axis=1), np.stack([*plan, line], axis=1), "ground", slot
         )
     away = shape.half_m + offset
     meeting = away / math.tan(0.5 * gap)
     cross = arm_points(shape, number, np.array(meeting), np.array(away))
-    tip = np.array([*(line[0] + line[-1] - cross), -APRON_FALL_M])
+    tip = np.array([*(line[0] + line[-1] - cross), z if shape.setback_m > 0.0 else -APRON_FALL_M])
+    if shape.setback_m > 0.0:
+        loop = np.concatenate([edge, tip[None]])
+        center = np.array([*loop[:, :2].mean(axis=0), z])
+        return _fan_patch(center, loop, "ground", slot).flipped()
     ends = []
     for end, arm, side in ((0, number, 1.0), (-1, (number + 1) % len(shape.arms_rad()), -1.0)):
         # The same profile as beside the road that goes on here.

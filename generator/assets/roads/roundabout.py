@@ -150,7 +150,9 @@ def _land(shape: RoundaboutShape, number: int, slot: int) -> Patch:
     for arm, side in ((number, 1.0), ((number + 1) % len(shape.arms_rad()), -1.0)):
         out = side * (away + APRON_M * np.array(APRON_STEPS[1:]))
         flat = arm_points(shape, arm, np.full(len(out), shape.reach_m()), out)
-        fall = np.array(APRON_DROPS[1:]) * (z + APRON_FALL_M)
+        # Gardens before houses are level.
+        drop_m = 0.0 if shape.setback_m > 0.0 else z + APRON_FALL_M
+        fall = np.array(APRON_DROPS[1:]) * drop_m
         ends.append(np.column_stack([flat, z - fall]))
     a, b = ends[0][-1, :2], ends[1][-1, :2]
     start = math.atan2(a[1], a[0])

@@ -15,16 +15,21 @@ from gen_data.generator.assets.procedural.family import check_option
 from gen_data.generator.assets.procedural.material_presets import (
     draw_linear,
     hex_to_linear,
-    jitter_color,
+    patterned_material,
     printed_material,
 )
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
 
-STYLES = ("residential", "old_town", "modern", "commercial", "house")
+STYLES = (
+    "residential", "old_town", "modern", "commercial", "house", "villa", "farmhouse", "warehouse",
+    "office", "campus", "tower",
+)  # fmt: skip
+REGIONS = ("central", "north", "south", "nordic", "east")
+"""Palettes of walls and roofs; ``any`` leaves the choice to the seed."""
 RoofKind = Literal["gable", "hip", "mansard", "flat"]
-Cladding = Literal["plaster", "brick", "concrete", "stone"]
+Cladding = Literal["plaster", "brick", "concrete", "stone", "boards", "sheet", "panels"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +50,19 @@ class Design:
         sided: Whether side walls have windows.
         oriel: Number of the bay that projects over the pavement on the upper floors; -1 = none.
         gable_front: Whether the ridge runs across the street and the gable looks at it.
+        ground: What the ground floor has: ``dwelling`` (windows and a door), ``lobby`` (glass),
+            ``garage`` (a garage door beside the windows) or ``gates``; shops if ``shops``.
+        ribbons: Whether windows of a floor are one band around the building.
+        surround: What borders windows: ``none``, ``border`` or ``pediment``.
+        arched: Whether windows have arches.
+        timbered: Whether posts and beams show in the upper floors.
+        quoins: Whether stones mark the corners.
+        wing: Number of bays that stand out from the ground up, at one end; 0 = none.
+        wing_out_m: How far they stand out.
+        porch: What covers the entrance: ``none``, ``canopy`` or ``columns``.
+        age: 0 (new) to 1 (neglected): stains, repairs, cables, graffiti.
+        fittings: 0 to 1: how many dishes, air conditioners and boxes of flowers there are.
+        gate_m: Width of a fence between the building and its neighbour; 0 = none.
     """
 
     style: str
@@ -70,6 +88,18 @@ class Design:
     sided: bool = False
     oriel: int = -1
     gable_front: bool = False
+    ground: Literal["dwelling", "lobby", "garage", "gates"] = "dwelling"
+    ribbons: bool = False
+    surround: Literal["none", "border", "pediment"] = "none"
+    arched: bool = False
+    timbered: bool = False
+    quoins: bool = False
+    wing: int = 0
+    wing_out_m: float = 0.0
+    porch: Literal["none", "canopy", "columns"] = "none"
+    age: float = 0.0
+    fittings: float = 0.5
+    gate_m: float = 0.0
 
     @property
     def eaves_m(self) -> float:
@@ -90,6 +120,8 @@ def draw_design(style: str, seed: int) -> Design:
     values["width_m"] = round(min(high, max(low, bays * bay_m)), 2)
     if "pier_m" in values:
         values["window_m"] = (round(bay_m - values.pop("pier_m"), 2), values["window_m"][1])
+    if values.get("wing", 0) >= bays:
+        values["wing"] = 0
     values["oriel"] = {"middle": bays // 2, "last": bays - 2}.get(values.get("oriel", ""), -1)
     return Design(style=style, **values)
 
@@ -118,45 +150,87 @@ def _draw_value(item: Any, rng: VariantRng) -> Any:
     return round(value, item["digits"]) if "digits" in item else value
 
 
-def building_materials(plan: Design, seed: int) -> tuple[Material, ...]:
-    """The materials of a building, one per slot of ``facade``."""
+def building_materials(plan: Design, seed: int, region: str = "any") -> tuple[Material, ...]:
+    """The materials of a building, one per slot of ``facade``. Raises AssetError for a region."""
+    place = choose_region(plan.style, seed, region)
     rng = variant_rng(f"building/{plan.style}/materials", seed)
-    wall = _wall(plan.cladding, _COLORS[f"plaster_{plan.style}"], rng)
-    base = _base(plan, wall, rng)
-    trim_code = rng.choose(("#d9d4c8", "#c9bfae", "#b5a592", "#e3e0d8"))
-    trim_code = rng.choose(("#a98d7c", "#b3a48e", trim_code)) if plan.trimmed else trim_code
+    tints = _COLORS.get(f"plaster_{plan.style}", ())
+    # Buildings of these styles look alike in all regions.
+    if plan.style not in ("modern", "commercial", "office", "tower") and rng.chance(0.7):
+        tints = _COLORS[f"plaster_{place}"]
+    wall = _wall(plan, tints or _COLORS[f"plaster_{place}"], rng)
+    trim_code = rng.choose(_COLORS["trims_plain"])
+    trim_code = rng.choose((*_COLORS["trims"], trim_code)) if plan.trimmed else trim_code
+    trim_code = rng.choose(_COLORS["beams"]) if plan.timbered else trim_code
     frame = rng.choose(_COLORS.get(f"frames_{plan.style}", _COLORS["frames"]))
-    curtains = [jitter_color(hex_to_linear(code), 0.1, rng) for code in ("#8d8a82", "#6a6862")]
     cloth = _COLORS["cloth_" + ("shops" if plan.shops else plan.shutters)]
-    seam = "#77797a" if plan.roof == "flat" else rng.choose(("#8a8c8d", "#7d5f4c", "#9a9c9b"))
+    seam = rng.choose(_COLORS["seams_flat" if plan.roof == "flat" else "seams"])
+    kind = "office" if plan.style in ("office", "campus", "tower", "commercial") else "home"
+    views = [int(rng.random() * VIEWS) for _ in range(2)]
+    prints = [f"texture/{name}?seed={int(rng.random() * PRINTS)}" for name in
+              ("shop_sign", "wall_advert", "graffiti")]  # fmt: skip
+    display = int(rng.random() * VIEWS)
     return (
         wall,
-        base,
+        _base(plan, wall, rng),
         _plain_material(trim_code, 0.85, "trim"),
         _plain_material(frame, 0.45, "trim"),
-        _glass_material((0.012, 0.016, 0.019), 0.04),
-        _glass_material((0.03, 0.034, 0.036), 0.06),
-        _glass_material(curtains[0], 0.08),
-        _glass_material(curtains[1], 0.08),
+        Material((0.012, 0.016, 0.019), roughness=0.04, specular=1.0, role="window"),
+        _glass_material(f"texture/window_view?seed={views[0]}&kind={kind}"),
+        _glass_material(f"texture/window_view?seed={views[1]}&kind=home"),
+        _glass_material(f"texture/window_view?seed={display}&kind=shop"),
         _plain_material(rng.choose(_COLORS["doors"]), 0.5, "trim"),
         Material(hex_to_linear(seam), roughness=0.5, metallic=0.6, role="chrome"),
-        _roof(rng),
-        replace(printed_material(f"texture/shop_sign?seed={seed % 12}", 0.5), role="sign"),
+        _roof(place, plan, rng),
+        replace(printed_material(prints[0], 0.5), role="trim"),
         _plain_material(rng.choose(cloth), 0.7, "trim"),
         _textured_material("brick", 4, (0.8, 0.78, 0.76), 1.1, "trim"),
+        _plain_material(rng.choose(_COLORS["accents"]), 0.55, "trim"),
+        patterned_material(
+            "texture/foliage?seed=0", 0.8, 0.8, hex_to_linear(rng.choose(_COLORS["plants"]))
+        ),
+        _plain_material(rng.choose(_COLORS["flowers"]), 0.8, "trim"),
+        replace(printed_material(prints[1], 0.6), role="trim"),
+        replace(printed_material(prints[2], 0.7), role="trim"),
+        _plain_material(rng.choose(("#1d1f22", "#2a2826", "#22303c")), 0.4, "trim"),
+        _textured_material("concrete", 3, (0.8, 0.79, 0.77), 2.2, "trim"),
+        _plain_material(rng.choose(("#e6e5e0", "#d8d6ce", "#cfd0cf")), 0.5, "trim"),
     )
 
 
-def _wall(cladding: Cladding, tints: Sequence[str], rng: VariantRng) -> Material:
+VIEWS, PRINTS = 8, 24
+"""Textures of rooms, and of boards and adverts, that buildings share."""
+
+
+def choose_region(style: str, seed: int, region: str) -> str:
+    """The region of a variant. Raises AssetError for an unknown one."""
+    if region == "any":
+        return variant_rng(f"building/{style}/region", seed).choose(REGIONS)
+    check_option("building", "region", region, ("any", *REGIONS))
+    return region
+
+
+def _wall(plan: Design, tints: Sequence[str], rng: VariantRng) -> Material:
+    cladding = plan.cladding
     if cladding == "brick":
-        seed, level = rng.choose((4, 9, 12)), rng.between(0.75, 1.0)
+        seed, level = rng.choose((1, 4, 6, 9, 12, 15)), rng.between(0.75, 1.0)
         return _textured_material("brick", seed, (level, level, level), 1.1)
     if cladding == "concrete":
         level = rng.between(0.8, 1.0)
         return _textured_material("concrete", rng.choose((0, 3)), (level, level, level), 2.6)
     if cladding == "stone":
         return _textured_material("ashlar", 0, draw_linear(_COLORS["stones"], 0.06, rng), 2.4)
-    return _textured_material("plaster", 5, draw_linear(tints, 0.05, rng), 2.5)
+    if cladding == "boards":
+        color = draw_linear(_COLORS["boards"], 0.1, rng)
+        return _textured_material("wall_boards", rng.choose((0, 1, 2, 3)), color, 2.0)
+    if cladding in ("sheet", "panels"):
+        color = draw_linear(_COLORS["sheets"], 0.08, rng)
+        name = "profiled_sheet" if cladding == "sheet" else "concrete"
+        return _textured_material(name, rng.choose((0, 1, 2, 3)), color, 3.0)
+    oldest = 1 + int(7.0 * plan.age)
+    name = f"texture/weathered_plaster?seed={int(rng.random() * (oldest + 0.999))}"
+    color = draw_linear(tints, 0.08, rng)
+    return Material(color, roughness=0.92, texture=name, role="facade")
 
 
 def _base(plan: Design, wall: Material, rng: VariantRng) -> Material:
@@ -166,13 +240,19 @@ def _base(plan: Design, wall: Material, rng: VariantRng) -> Material:
         return _textured_material("concrete", 3, (0.72, 0.71, 0.7), 2.2)
     darker = rng.between(0.5, 0.7)
     r, g, b = wall.base_color
-    color = (darker * r, darker * g, darker * b)
-    return Material(color, 0.9, texture=wall.texture, texture_scale_m=wall.texture_scale_m)
+    return _textured_material("plaster", 5, (darker * r, darker * g, darker * b), 2.5)
 
 
-def _roof(rng: VariantRng) -> Material:
-    color = draw_linear(_COLORS["roofs"], 0.08, rng)
-    texture = f"texture/roof_tiles?seed={rng.choose((0, 1))}"
+def _roof(place: str, plan: Design, rng: VariantRng) -> Material:
+    if plan.cladding == "sheet" or rng.chance(0.08):
+        color = draw_linear(_COLORS["sheets"], 0.08, rng)
+        texture = f"texture/profiled_sheet?seed={rng.choose((0, 1, 2, 3))}"
+    elif rng.chance(0.25):
+        color = draw_linear(_COLORS["slates"], 0.08, rng)
+        texture = f"texture/slates?seed={rng.choose((0, 1, 2))}"
+    else:
+        color = draw_linear(_COLORS[f"roofs_{place}"], 0.1, rng)
+        texture = f"texture/roof_tiles?seed={rng.choose((0, 1, 2, 3))}"
     return Material(color, roughness=0.85, texture=texture, role="roof")
 
 
@@ -180,8 +260,9 @@ def _plain_material(code: str, roughness: float, role: str) -> Material:
     return Material(hex_to_linear(code), roughness=roughness, role=role)
 
 
-def _glass_material(color: Vec3, roughness: float) -> Material:
-    return Material(color, roughness=roughness, specular=0.7, role="window")
+def _glass_material(texture: str) -> Material:
+    # Clear double glazing reflects about 15 % of daylight; the strongest dielectric here 8 %.
+    return Material((1.0, 1.0, 1.0), roughness=0.05, specular=1.0, texture=texture, role="window")
 
 
 def _textured_material(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -17,11 +17,19 @@ from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block, grid
 from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.assets.scenery.basic_shapes import Span, facing_rectangle, quad
+from gen_data.generator.assets.scenery.facade_shapes import (
+    Bounds,
+    ledges,
+    polygon,
+    rectangles,
+    without_slivers,
+)
+from gen_data.generator.assets.scenery.textures.window_views import CELLS
 
 (
-    FACADE, BASE, TRIM, FRAME, GLASS, GLASS_TOO, CURTAIN, CURTAIN_TOO, DOOR, METAL, ROOF,
-    SIGN, AWNING, CHIMNEY,
-) = range(14)  # fmt: skip
+    FACADE, BASE, TRIM, FRAME, GLASS, VIEW, VIEW_TOO, DISPLAY, DOOR, METAL, ROOF, SIGN, AWNING,
+    CHIMNEY, ACCENT, PLANT, FLOWER, PRINT, GRAFFITI, DARK, CEMENT, WHITE,
+) = range(22)  # fmt: skip
 
 GLASS_SETBACK_M = 0.03
 """Panes lie this far behind the front of their frame."""
@@ -36,6 +44,7 @@ class Opening:
         y_m, z_m: Its extent in the wall's frame.
         recess_m: How far the frame lies behind the wall's plane.
         upright, level: Number of panes beside and above one another.
+        arch_m: Rise of the arch at its top; 0 = flat.
     """
 
     y_m: Span
@@ -43,6 +52,7 @@ class Opening:
     recess_m: float = 0.16
     upright: int = 2
     level: int = 1
+    arch_m: float = 0.0
 
     @property
     def width_m(self) -> float:
@@ -74,15 +84,37 @@ def cut_openings(
     levels = [z for o in openings for z in o.z_m] + ([base[0]] if base else [])
     y = np.unique([*y_m, *(side for o in openings for side in o.y_m)])
     z = np.unique([*z_m, *(level for level in levels if z_m[0] < level < z_m[1])])
-    cells = []
+    cells: dict[int, list[Bounds]] = {slot: []}
     for z0, z1 in pairwise(z.tolist()):
         row = base[1] if base and z1 <= base[0] + 1e-9 else slot
-        cells += [
-            facing_rectangle(0.0, (y0, y1), (z0, z1), row)
-            for y0, y1 in pairwise(y.tolist())
-            if not any(_holds(o, 0.5 * (y0 + y1), 0.5 * (z0 + z1)) for o in openings)
-        ]
-    return join_patches(cells)
+        middle = 0.5 * (z0 + z1)
+        holes = [o.y_m for o in openings if o.z_m[0] < middle < o.z_m[1]]
+        # Cells of a row that touch are one rectangle.
+        for y0, y1 in _gaps(y.tolist(), holes):
+            cells.setdefault(row, []).append((y0, y1, z0, z1))
+    parts = [rectangles(0.0, places, of) for of, places in cells.items() if places]
+    return join_patches([*parts, *(_spandrels(o, slot) for o in openings if o.arch_m > 0.0)])
+
+
+def _gaps(y: Sequence[float], holes: Sequence[Span]) -> list[Span]:
+    """Stretches between neighbouring values of y that no hole covers."""
+    return [
+        (y0, y1) for y0, y1 in pairwise(y) if not any(a < 0.5 * (y0 + y1) < b for a, b in holes)
+    ]
+
+
+def _spandrels(opening: Opening, slot: int) -> Patch:
+    """What an arch leaves of the two upper corners of a hole, and the arch's underside."""
+    (y0, y1), top = opening.y_m, opening.z_m[1]
+    turn = np.linspace(math.pi, 0.0, 7)
+    y = 0.5 * (y0 + y1) + 0.5 * (y1 - y0) * np.cos(turn)
+    z = top - opening.arch_m * (1.0 - np.sin(turn))
+    rows = [[(0.0, a, b) for a, b in zip(y, z, strict=True)], [(0.0, a, top) for a in y]]
+    # The two triangles at the sides have no upper edge, the middle one no height.
+    face = grid(np.array(rows), slot=slot)
+    depth_m = opening.recess_m + 0.5 * GLASS_SETBACK_M
+    soffit = [[(x, a, b) for a, b in zip(y, z, strict=True)] for x in (-depth_m, 0.0)]
+    return join_patches([without_slivers(face), grid(np.array(soffit), slot=slot)])
 
 
 def reveal(opening: Opening, depth_m: float, slot: int = FACADE) -> Patch:
@@ -104,39 +136,49 @@ def frame(opening: Opening) -> Patch:
     (y0, y1), (z0, z1) = opening.y_m, opening.z_m
     x, w = -opening.recess_m, min(_FRAME_WIDTH_M, 0.2 * opening.width_m)
     across, upright = (y0 + w, y1 - w), (z0 + w, z1 - w)
-    bars = [(x, (y0, y0 + w), (z0, z1)), (x, (y1 - w, y1), (z0, z1)),
-            (x, across, (z0, z0 + w)), (x, across, (z1 - w, z1))]  # fmt: skip
+    bars = [(y0, y0 + w, z0, z1), (y1 - w, y1, z0, z1), (*across, z0, z0 + w),
+            (*across, z1 - w, z1)]  # fmt: skip
     for k in range(1, opening.upright):
         y = y0 + opening.width_m * k / opening.upright
-        bars.append((x, (y - 0.5 * w, y + 0.5 * w), upright))
+        bars.append((y - 0.4 * w, y + 0.4 * w, *upright))
+    transoms = []
     for k in range(1, opening.level):
         # Transoms sit high: the lower sash is the tall one.
         z = z0 + opening.height_m * (0.42 + 0.58 * k / opening.level)
-        bars.append((x + 0.004, across, (z - 0.4 * w, z + 0.4 * w)))
-    return join_patches([facing_rectangle(*bar, FRAME) for bar in bars])
+        transoms.append((*across, z - 0.4 * w, z + 0.4 * w))
+    parts = [rectangles(x, bars, FRAME)]
+    parts += [rectangles(x + 0.004, transoms, FRAME)] if transoms else []
+    return join_patches(parts)
 
 
-def panes(opening: Opening, rng: VariantRng, x: float) -> Patch:
-    """Glass: dark where a room lies behind, lighter where a curtain hangs."""
+def panes(opening: Opening, rng: VariantRng, x: float, slot: int | None = None) -> Patch:
+    """Glass with a view of a room, or of goods if ``slot`` is ``DISPLAY``."""
     (y0, y1), z = opening.y_m, opening.z_m
-    glass, curtain = rng.choose((GLASS, GLASS, GLASS_TOO)), rng.choose((CURTAIN, CURTAIN_TOO))
-    drawn = rng.choose(("open", "open", "sides", "all", "blind"))
-    if drawn == "sides":
-        w = rng.between(0.12, 0.3) * opening.width_m
-        strips = ((y0, y0 + w, curtain), (y0 + w, y1 - w, glass), (y1 - w, y1, curtain))
-        return join_patches([facing_rectangle(x, (a, b), z, slot) for a, b, slot in strips])
-    if drawn == "blind":
-        level = z[1] - rng.between(0.15, 0.6) * opening.height_m
-        bands = (((z[0], level), glass), ((level, z[1]), curtain))
-        return join_patches([facing_rectangle(x, (y0, y1), span, slot) for span, slot in bands])
-    return facing_rectangle(x, (y0, y1), z, curtain if drawn == "all" else glass)
+    if slot is None:
+        slot = rng.choose((VIEW, VIEW, VIEW_TOO))
+        if rng.chance(0.05):
+            return rectangles(x, [(y0, y1, *z)], GLASS)
+    count = max(1, round((y1 - y0) / (2.0 if slot == DISPLAY else 1.7)))
+    cells = CELLS["shop" if slot == DISPLAY else "home"]
+    edges = np.linspace(y0, y1, count + 1).tolist()
+    places = [(a, b, *z) for a, b in pairwise(edges)]
+    return rectangles(x, places, slot, [_draw_cell(cells, rng) for _ in places])
+
+
+def _draw_cell(cells: int, rng: VariantRng) -> Bounds:
+    """One cell of an atlas of ``cells`` by ``cells``, mirrored or not, without its rim."""
+    column, row = int(rng.random() * cells), int(rng.random() * cells)
+    left, right = (column + 0.02) / cells, (column + 0.98) / cells
+    if rng.chance(0.5):
+        left, right = right, left
+    return (left, right, (row + 0.02) / cells, (row + 0.98) / cells)
 
 
 def sill(opening: Opening) -> Patch:
     """A ledge below a window; its back lies in the recess."""
     (y0, y1), z0 = opening.y_m, opening.z_m[0]
     x, top = -opening.recess_m, z0 + 0.005
-    ledge = block((0.0, y0 - 0.06, z0 - 0.06), (0.05, y1 + 0.06, top), slot=TRIM)
+    ledge = ledges([(0.0, 0.05, y0 - 0.06, y1 + 0.06, z0 - 0.06, top)], TRIM)
     back = quad([(0.0, y0, top), (0.0, y1, top), (x, y1, top), (x, y0, top)], TRIM)
     return join_patches([ledge, back])
 
@@ -144,7 +186,28 @@ def sill(opening: Opening) -> Patch:
 def lintel(opening: Opening) -> Patch:
     """A stone band above an opening."""
     (y0, y1), z1 = opening.y_m, opening.z_m[1]
-    return block((0.0, y0 - 0.12, z1), (0.05, y1 + 0.12, z1 + 0.16), slot=TRIM)
+    return ledges([(0.0, 0.05, y0 - 0.12, y1 + 0.12, z1, z1 + 0.16)], TRIM)
+
+
+def surround(opening: Opening, wide_m: float) -> Patch:
+    """A flat border around an opening."""
+    (y0, y1), (z0, z1) = opening.y_m, opening.z_m
+    x, w = 0.035, wide_m
+    boxes = [(0.0, x, y0 - w, y0, z0, z1), (0.0, x, y1, y1 + w, z0, z1),
+             (0.0, x, y0 - w, y1 + w, z1, z1 + w)]  # fmt: skip
+    return ledges(boxes, TRIM)
+
+
+def pediment(opening: Opening) -> Patch:
+    """A shallow gable on a ledge above an opening."""
+    (y0, y1), z = opening.y_m, opening.z_m[1] + 0.14
+    a, b, rise = y0 - 0.15, y1 + 0.15, 0.2 * (y1 - y0)
+    peak, x = (0.5 * (a + b), z + 0.08 + rise), 0.12
+    ledge = ledges([(0.0, 0.16, a, b, z, z + 0.08)], TRIM)
+    face = polygon(x, np.array([(a, z + 0.08), (b, z + 0.08), peak]), TRIM)
+    left = quad([(0.0, a, z + 0.08), (x, a, z + 0.08), (x, *peak), (0.0, *peak)], TRIM)
+    right = quad([(x, b, z + 0.08), (0.0, b, z + 0.08), (0.0, *peak), (x, *peak)], TRIM)
+    return join_patches([ledge, face, left, right])
 
 
 def leaves(opening: Opening) -> Patch:
@@ -152,7 +215,7 @@ def leaves(opening: Opening) -> Patch:
     (y0, y1), z = opening.y_m, opening.z_m
     w = 0.5 * opening.width_m
     sides = ((y0 - w, y0 - 0.02), (y1 + 0.02, y1 + w))
-    return join_patches([block((0.005, a, z[0]), (0.045, b, z[1]), slot=AWNING) for a, b in sides])
+    return ledges([(0.005, 0.045, a, b, *z) for a, b in sides], AWNING)
 
 
 def roller(opening: Opening, share: float) -> Patch:
@@ -184,23 +247,6 @@ def door(opening: Opening, rng: VariantRng, slot: int = FACADE) -> Patch:
     return join_patches([step, *parts] if z0 > 0.05 else parts)
 
 
-def shop_front(opening: Opening, rng: VariantRng, slot: int = FACADE) -> Patch:
-    """A display window: stall riser, frame, large panes."""
-    (y0, y1), (z0, z1) = opening.y_m, opening.z_m
-    riser = z0 + rng.between(0.12, 0.5)
-    depth_m = opening.recess_m + GLASS_SETBACK_M
-    shown, level = rng.choose((GLASS_TOO, CURTAIN)), riser + 0.28 * (z1 - riser)
-    return join_patches(
-        [
-            reveal(opening, depth_m, slot),
-            facing_rectangle(-opening.recess_m, (y0, y1), (z0, riser), FRAME),
-            frame(replace(opening, z_m=(riser, z1))),
-            facing_rectangle(-depth_m, (y0, y1), (level, z1), GLASS),
-            facing_rectangle(-depth_m, (y0, y1), (riser, level), shown),
-        ]
-    )
-
-
 def garage_door(opening: Opening) -> Patch:
     """An up-and-over door of level panels."""
     x, rows = -opening.recess_m, 5
@@ -213,11 +259,11 @@ def garage_door(opening: Opening) -> Patch:
     return join_patches([reveal(opening, opening.recess_m + 0.01), back, *panels])
 
 
-def railing(y_m: Span, z0: float, x: float, pitch_m: float = 0.14) -> Patch:
+def railing(y_m: Span, z0: float, x: float, pitch_m: float = 0.17) -> Patch:
     """Upright bars between two rails, in the plane x."""
     (y0, y1), top = y_m, z0 + 0.95
     at = np.linspace(y0 + 0.02, y1 - 0.02, max(2, round((y1 - y0) / pitch_m)))
-    bars = [facing_rectangle(x, (y - 0.008, y + 0.008), (z0 + 0.08, top), METAL) for y in at]
+    bars = [rectangles(x, [(y - 0.008, y + 0.008, z0 + 0.08, top) for y in at.tolist()], METAL)]
     for z in (z0 + 0.06, top):
         bars.append(block((x - 0.02, y0, z), (x + 0.02, y1, z + 0.035), slot=METAL))
     return join_patches(bars)
@@ -226,12 +272,12 @@ def railing(y_m: Span, z0: float, x: float, pitch_m: float = 0.14) -> Patch:
 def balcony(y_m: Span, z0: float, out_m: float, *, solid: bool) -> Patch:
     """A slab with a parapet or a railing on its three open sides; its back is the wall."""
     (y0, y1), t = y_m, 0.06
-    slab = block((0.0, y0, z0 - 0.18), (out_m, y1, z0), slot=TRIM)
+    slab = ledges([(0.0, out_m, y0, y1, z0 - 0.18, z0)], TRIM)
     if solid:
         x, top = out_m - t, z0 + 0.95
-        sides = (((x, y0, z0), (out_m, y1, top)), ((0.0, y0, z0), (x, y0 + t, top)),
-                 ((0.0, y1 - t, z0), (x, y1, top)))  # fmt: skip
-        return join_patches([slab, *(block(*side, slot=AWNING) for side in sides)])
+        sides = [(x, out_m, y0, y1, z0, top), (0.0, x, y0, y0 + t, z0, top),
+                 (0.0, x, y1 - t, y1, z0, top)]  # fmt: skip
+        return join_patches([slab, ledges(sides, AWNING)])
     side = railing((-out_m + 0.04, 0.0), z0, 0.0, pitch_m=0.2).rotated("z", 0.5 * math.pi)
     ends = [side.moved(y=y) for y in (y0 + 0.02, y1 - 0.02)]
     return join_patches([slab, railing(y_m, z0, out_m - 0.04), *ends])
@@ -261,24 +307,3 @@ def attic_window(y_m: Span, z_m: Span, rng: VariantRng) -> Patch:
     bars += [((y0 + 0.08, y1 - 0.08), span) for span in ((z0, z0 + 0.08), (z1 - 0.08, z1))]
     frames = [block((0.0, a, c), (0.06, b, d), slot=FRAME) for (a, b), (c, d) in bars]
     return join_patches([*frames, panes(Opening(y_m, z_m, 0.0), rng, 0.012)])
-
-
-def awning(y_m: Span, z1: float, out_m: float) -> Patch:
-    """A cloth roof over a shop window, with a short valance."""
-    (y0, y1), low = y_m, z1 - 0.32 * out_m
-    cloth = [(0.02, y0, z1), (out_m, y0, low), (out_m, y1, low), (0.02, y1, z1)]
-    lip = facing_rectangle(out_m, y_m, (low - 0.18, low), AWNING)
-    end = [(0.02, z1 - 0.12), (out_m, low - 0.18), (out_m, low), (0.02, z1)]
-    ends = [quad([(x, y, z) for x, z in end], AWNING) for y in y_m]
-    return join_patches([quad(cloth, AWNING), lip, *ends])
-
-
-def sign_board(y_m: Span, z_m: Span) -> Patch:
-    """A shop's name on a board; the whole image lies on its front."""
-    board = block((0.0, y_m[0], z_m[0]), (0.1, y_m[1], z_m[1]), slot=METAL)
-    return join_patches([board, facing_rectangle(0.104, y_m, z_m, SIGN)])
-
-
-def _holds(opening: Opening, y: float, z: float) -> bool:
-    (y0, y1), (z0, z1) = opening.y_m, opening.z_m
-    return y0 < y < y1 and z0 < z < z1

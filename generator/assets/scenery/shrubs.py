@@ -1,4 +1,4 @@
-"""Hedges, bushes and planters: a dense dark core under a skin of leaves."""
+"""Bushes and planters: a dense dark core under a skin of leaves."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ import numpy as np
 from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear, patterned_material
-from gen_data.generator.assets.procedural.noise import uniform
 from gen_data.generator.assets.procedural.patches import Array, Patch, finish_mesh, join_patches
-from gen_data.generator.assets.procedural.surface_shapes import ball, block, rounded_box
+from gen_data.generator.assets.procedural.surface_shapes import ball, block
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.assets.scenery.foliage import (
     Habit,
@@ -30,17 +29,6 @@ _GREENS = (
     ("#2a3324", "#3b4632", "#4e5a42", "#636f54"),
 )
 _FLOWERS = ("#b33a4a", "#d8c7d9", "#d9b23a", "#9a4f9c", "#e6e2dc")
-
-
-def hedge(seed: int) -> Solid:
-    """A clipped hedge along Y, 1.5-4 m long. Slots: core, then shades of leaf."""
-    rng = variant_rng("hedge", seed)
-    size = (rng.between(0.5, 0.9), rng.between(1.5, 4.0), rng.between(0.8, 1.8))
-    core = rounded_box((size[0] - 0.1, size[1] - 0.08, size[2] - 0.05), 0.12, 2)
-    core = core.moved(z=0.5 * (size[2] - 0.05))
-    anchors = _skin(size, 700, rng)
-    hull = hulls.box((-0.5 * size[0], -0.5 * size[1], 0.0), (0.5 * size[0], 0.5 * size[1], size[2]))
-    return _leafy(core, anchors, 0.4 * size[2], Habit(2600, 0.1, 0.6 * 0.1), hull, rng)
 
 
 def bush(seed: int) -> Solid:
@@ -113,20 +101,6 @@ def _core_material(greens: tuple[Material, ...]) -> Material:
     color = (1.1 * r, 1.1 * g, 1.1 * b)
     plain = patterned_material("texture/foliage?seed=0", 0.8, 0.9, color)
     return replace(plain, specular=0.2, role="leaf")
-
-
-def _skin(size: tuple[float, float, float], count: int, rng: VariantRng) -> Array:
-    """Points on the sides and the top of a box that stands on the ground, by area."""
-    x, y, z = size
-    areas = np.array([x * y, x * z, x * z, y * z, y * z])
-    ends = np.cumsum(areas) / areas.sum()
-    face = np.minimum(np.searchsorted(ends, uniform(count, rng), side="right"), 4)
-    a, b = uniform((2, count), rng)
-    sign = np.where(face % 2 == 0, 1.0, -1.0)
-    px = np.where(face >= 3, 0.5 * x * sign, (a - 0.5) * x)
-    py = np.where((face == 1) | (face == 2), 0.5 * y * sign, (np.where(face >= 3, a, b) - 0.5) * y)
-    pz = np.where(face == 0, z, b * z)
-    return np.stack([px, py, pz], axis=1)
 
 
 def _shell(x: float, y: float, z: float, r: float, count: int, rng: VariantRng) -> Array:

@@ -1,4 +1,8 @@
-"""Trees: trunk and branches that grow into a crown, leaves in clusters at the twigs' ends."""
+"""Trees: trunk and branches that grow into a crown, and sprays of leaves at the twigs' ends.
+
+Each spray is a card that shows some hundred leaves of their true size (``leaf_cards``), with holes
+between them: light falls through a crown in spots, and the sky shows through.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +22,7 @@ from gen_data.generator.assets.procedural.material_presets import (
 from gen_data.generator.assets.procedural.noise import uniform
 from gen_data.generator.assets.procedural.patches import Array, Patch, finish_mesh, unit
 from gen_data.generator.assets.procedural.surface_shapes import circle, sweep
-from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.assets.scenery.branching import (
     Lobe,
     Skeleton,
@@ -27,21 +31,32 @@ from gen_data.generator.assets.scenery.branching import (
     wood,
 )
 from gen_data.generator.assets.scenery.foliage import (
+    OUTWARD,
     Habit,
     Sprays,
-    leaf_mesh,
+    directions,
     merge_meshes,
     sprays_about,
+)
+from gen_data.generator.assets.scenery.leaf_cards import (
+    Cards,
+    card_mesh,
+    drop_unused_slots,
+    first_cards,
+    leaf_material,
+    spray_cards,
 )
 from gen_data.generator.core.asset_types import ConvexParts, Material, MeshData
 from gen_data.generator.core.errors import AssetError
 
-_LEAVES = 4200
-"""Triangles of foliage on a tree in full leaf."""
-_TWIGS = 2400
-_OPTICAL_DEPTH = 2.3
-"""Layers of leaves that a line of sight meets on its way through a crown."""
-_LEAF_WIDTH = 0.62
+SEASONS = ("spring", "summer", "autumn", "winter")
+_CARDS_MAX = 2600
+"""Sprays on a tree in full leaf; larger crowns have larger ones."""
+_TWIGS = 1100
+_COVER = 0.42
+"""Share of a card that leaves cover (mean of ``textures.leaves``)."""
+_LEAF_LEVEL = 1.45
+"""Leaves in the textures have this part of the colours in ``species.yaml``, inverted."""
 _ATTRACTORS = 900
 _STEP = 0.12
 """Length of an internode, of the widest lobe's radius."""
@@ -58,6 +73,13 @@ class Species:
         boughs: Number of lobes around a body, whose middle lies ``middle`` of the crown below
             the top; 0 = none.
         stacked: (height, width) of lobes above one another, as shares of the crown's.
+        leader: How far the trunk runs up into the crown, as a share of the crown's height.
+        leaf: Kind of leaves: a word of ``textures.leaves.KINDS``.
+        spray_m: Length of a spray of leaves.
+        depth: Layers of leaves that a line of sight meets on its way through the crown.
+        autumn: Colours as in ``greens``; empty = they stay green.
+        blossom: Colour of the flowers in spring; empty = none that are seen from afar.
+        evergreen: Whether it keeps its leaves in winter.
     """
 
     height_m: tuple[float, float]
@@ -71,6 +93,13 @@ class Species:
     boughs: int = 0
     middle: float = 0.5
     stacked: tuple[tuple[float, float], ...] = ()
+    leader: float = 0.4
+    leaf: str = "ovate"
+    spray_m: float = 0.5
+    depth: float = 2.2
+    autumn: tuple[str, ...] = ()
+    blossom: str = ""
+    evergreen: bool = False
 
 
 _SPECIES = load_table(__package__, "species", Species)
@@ -99,82 +128,146 @@ class Shape:
     droop: float
 
 
-def tree(seed: int, species: str, leaves: float) -> Solid:
-    """A tree; its trunk stands on the origin. Slots: bark, then four shades of leaf.
+def tree(seed: int, species: str, leaves: float, season: str = "summer") -> Solid:
+    """A tree; its trunk stands on the origin. Slots: bark, then shades of leaf, then blossom.
 
     Args:
         seed: Variant.
         species: One of ``SPECIES``.
-        leaves: Share of the leaves that it wears, 0 in winter to 1 in summer.
+        leaves: Share of the leaves that it wears, 0 to 1, on top of the season's.
+        season: One of ``SEASONS``; deciduous trees are bare in winter.
 
     Raises:
-        AssetError: for an unknown species or a share outside of [0, 1].
+        AssetError: for an unknown species or season, or a share outside of [0, 1].
     """
     check_option("tree", "species", species, SPECIES)
+    check_option("tree", "season", season, SEASONS)
     if not 0.0 <= leaves <= 1.0:
         raise AssetError(f"tree: leaves={leaves} is not a share between 0 and 1")
     rng = variant_rng(f"tree/{species}", seed)
     if species == "conifer":
         return _conifer(rng)
-    return _broadleaf(_draw_shape(_SPECIES[species], rng), leaves, rng)
+    kind = _SPECIES[species]
+    share = leaves * _worn(kind, season)
+    return _broadleaf(kind, _draw_shape(kind, rng), share, season, rng)
 
 
-def tree_facts(seed: int, species: str, leaves: float) -> Facts:  # noqa: ARG001
+def tree_facts(seed: int, species: str, leaves: float, season: str = "summer") -> Facts:  # noqa: ARG001
     """Species, and whether it is bare."""
-    return Facts(species, {"foliage": "bare" if leaves < 0.05 else "leafy"})
+    kind = _SPECIES.get(species)
+    share = leaves * (_worn(kind, season) if kind else 1.0)
+    return Facts(species, {"foliage": "bare" if share < 0.05 else "leafy"})
 
 
-def _broadleaf(shape: Shape, leaves: float, rng: VariantRng) -> Solid:
-    trunk = _trunk(shape, rng)
-    points = points_in(shape.lobes, _ATTRACTORS, rng)
+def seasonal_tree(seed: int, season: str) -> Solid:
+    """A tree of a season; species take turns. Raises AssetError for an unknown season."""
+    return tree(seed, _species_of(seed, season), 1.0, season)
+
+
+def seasonal_tree_facts(seed: int, season: str) -> Facts:
+    """Species, and whether it is bare."""
+    return tree_facts(seed, _species_of(seed, season), 1.0, season)
+
+
+def _species_of(seed: int, season: str) -> str:
+    """Deciduous species in turn; in spring, those that blossom every other time."""
+    listed = [name for name, kind in _SPECIES.items() if not kind.evergreen]
+    blossoming = [name for name in listed if _SPECIES[name].blossom]
+    if season == "spring" and seed % 2 == 0:
+        return in_turn(blossoming, seed // 2)
+    return in_turn(listed, seed)
+
+
+def _worn(kind: Species, season: str) -> float:
+    """Share of the leaves that a species wears in a season."""
+    if kind.evergreen:
+        return 1.0
+    return {"spring": 0.8, "autumn": 0.8, "winter": 0.0}.get(season, 1.0)
+
+
+def _broadleaf(kind: Species, shape: Shape, leaves: float, season: str, rng: VariantRng) -> Solid:
+    trunk = _trunk(shape, kind.leader, rng)
+    points = _without_gaps(points_in(shape.lobes, _ATTRACTORS, rng), shape, rng)
     step_m = min(max(0.1, _STEP * max(lobe.axes_m[0] for lobe in shape.lobes)), 0.35)
     skeleton = grow_skeleton(trunk, points, step_m, shape.trunk_m)
     bark = _bark(shape.bark)
     # Thin twigs hide behind leaves; without leaves they are the crown.
-    thinnest = 0.0 if leaves < 0.05 else 0.2 * shape.trunk_m
+    thinnest = 0.0 if leaves < 0.05 else 0.13 * shape.trunk_m
     mesh = finish_mesh(_flare_roots(wood(skeleton, thinnest, 2)), (bark,), 60.0)
     hull = hulls.frustum((shape.trunk_m, 0.0), (0.7 * shape.trunk_m, shape.clear_m), 10)
-    count = round(_LEAVES * leaves)
+    foliage = _season_leaves(kind, shape, season, rng)
+    cards = _crown(kind, shape, skeleton, len(foliage) - bool(kind.blossom), rng)
+    count = round(leaves * len(cards.slots))
     if count:
-        greens = leaf_greens(shape.green, rng)
-        sprays = _crown(shape, skeleton, count, len(greens), rng)
-        mesh = merge_meshes(mesh, leaf_mesh(sprays, greens, _LEAF_WIDTH, rng))
+        if season == "spring" and kind.blossom:
+            cards = replace(cards, slots=np.where(np.arange(len(cards.slots)) % 4 < 2,
+                                                  len(foliage) - 1, cards.slots))  # fmt: skip
+        crown = card_mesh(first_cards(cards, count), foliage, OUTWARD, rng)
+        mesh = merge_meshes(mesh, crown)
     else:
-        mesh = merge_meshes(mesh, _bare_twigs(shape, skeleton, bark, rng))
-    return Solid(mesh, ConvexParts((np.round(hull, 6),)))
+        mesh = merge_meshes(mesh, _bare_twigs(shape, skeleton, rng))
+    return Solid(drop_unused_slots(mesh), ConvexParts((np.round(hull, 6),)))
 
 
-def _crown(shape: Shape, skeleton: Skeleton, count: int, shades: int, rng: VariantRng) -> Sprays:
-    """Leaves at the twigs' ends, as large as it takes to fill the crown."""
+def _season_leaves(
+    kind: Species, shape: Shape, season: str, rng: VariantRng
+) -> tuple[Material, ...]:
+    """Shades of leaf from the crown's depth to its surface, then blossom where there is any."""
+    warm, level = rng.between(0.88, 1.14), rng.between(0.88, 1.14) * _LEAF_LEVEL
+    codes = kind.autumn if season == "autumn" and kind.autumn else shape.green
+    if season == "spring":
+        level *= 1.25
+    made = [leaf_material(kind.leaf, code, level, warm) for code in codes]
+    if kind.blossom:
+        made.append(leaf_material("blossom", kind.blossom, 1.1))
+    return tuple(made)
+
+
+def _without_gaps(points: Array, shape: Shape, rng: VariantRng) -> Array:
+    """Attraction points without those in a few holes at the crown's surface."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    kept = np.ones(len(points), dtype=np.bool_)
+    for at in directions(6, rng):
+        centre = 0.5 * (low + high) + 0.42 * (high - low) * at
+        radius = rng.between(0.1, 0.19) * float((high - low).min())
+        kept &= ((points - centre) ** 2).sum(axis=1) > radius * radius
+    return points[kept] if int(kept.sum()) > len(shape.lobes) * 8 else points
+
+
+def _crown(kind: Species, shape: Shape, skeleton: Skeleton, shades: int, rng: VariantRng) -> Cards:
+    """Sprays at the twigs' ends, as many as it takes to fill the crown."""
     outer = np.array([lobe.centre_m for lobe in shape.lobes]).mean(axis=0)
     radius = math.sqrt(math.prod(max(lobe.axes_m[i] for lobe in shape.lobes) for i in (0, 2)))
     width = max(abs(lobe.centre_m[0]) + lobe.axes_m[0] for lobe in shape.lobes)
     area = math.pi * max(radius, 0.7 * width) ** 2
     # Half of a leaf's area faces a line of sight, on average.
-    each = 2.0 * _OPTICAL_DEPTH * area / _LEAVES
-    length = math.sqrt(2.0 * each / _LEAF_WIDTH)
+    wanted = 2.0 * kind.depth * area / _COVER
+    count = min(_CARDS_MAX, max(300, round(wanted / kind.spray_m**2)))
+    length = min(math.sqrt(wanted / count), 1.8 * kind.spray_m)
     middle = outer - np.array([0.0, 0.0, 0.25 * radius])
-    habit = Habit(count, length, 1.6 * length, shades, shape.droop)
-    return sprays_about(skeleton.twigs(), middle, habit, rng)
+    habit = Habit(count, length, 1.1 * length, shades, kind.droop)
+    return spray_cards(sprays_about(skeleton.twigs(), middle, habit, rng), rng)
 
 
-def _bare_twigs(shape: Shape, skeleton: Skeleton, bark: Material, rng: VariantRng) -> MeshData:
-    """The finest twigs of a winter crown, each a thin sliver."""
+def _bare_twigs(shape: Shape, skeleton: Skeleton, rng: VariantRng) -> MeshData:
+    """The finest twigs of a winter crown."""
     middle = np.array([0.0, 0.0, shape.clear_m])
-    length = 0.1 * (shape.height_m - shape.clear_m)
-    habit = Habit(_TWIGS, length, 0.1 * length, 1, -0.3)
-    sprays = sprays_about(skeleton.twigs(), middle, habit, rng)
-    return leaf_mesh(sprays, (bark,), 0.03, rng)
+    length = min(0.11 * (shape.height_m - shape.clear_m), 1.1)
+    habit = Habit(_TWIGS, length, 0.25 * length, 1, -0.3)
+    cards = spray_cards(sprays_about(skeleton.twigs(), middle, habit, rng), rng)
+    twigs = replace(leaf_material("twigs", shape.bark, 0.8), role="bark")
+    return card_mesh(cards, (twigs,), 0.5, rng)
 
 
-def _trunk(shape: Shape, rng: VariantRng) -> Array:
-    """Centre line from the ground to the first branches, gently bent."""
-    count = max(4, round(shape.clear_m / 0.4))
+def _trunk(shape: Shape, leader: float, rng: VariantRng) -> Array:
+    """Centre line from the ground up into the crown, gently bent."""
+    length = shape.clear_m + 0.85 * leader * (shape.height_m - shape.clear_m)
+    count = max(5, round(length / 0.4))
     t = np.linspace(0.0, 1.0, count)
-    sway = 0.05 * shape.clear_m
-    x = sway * (uniform(1, rng) - 0.5) * np.sin(2.4 * t) * t
-    y = sway * (uniform(1, rng) - 0.5) * np.sin(2.9 * t) * t
-    return np.stack([np.round(axis, 4) for axis in (x, y, t * shape.clear_m)], axis=1)
+    sway = 0.12 * shape.clear_m
+    x = sway * (uniform(1, rng) - 0.5) * np.sin(3.4 * t + 6.0 * uniform(1, rng)) * t
+    y = sway * (uniform(1, rng) - 0.5) * np.sin(4.1 * t + 6.0 * uniform(1, rng)) * t
+    return np.stack([np.round(axis, 4) for axis in (x, y, t * length)], axis=1)
 
 
 def _flare_roots(patch: Patch) -> Patch:
@@ -200,6 +293,7 @@ def _conifer(rng: VariantRng) -> Solid:
         for k in range(9):
             turn = 2.0 * math.pi * (k + 0.5 * (level % 2) + 0.5 * rng.between(-0.5, 0.5)) / 9
             fans.append(_fan(z, turn, reach * rng.between(0.75, 1.1), 0.5 - share, rng))
+    fans.append(_tip(height, rng))
     places, growth, reach_m = (np.concatenate(part) for part in zip(*fans, strict=True))
     # The lowest sprays rest on the ground.
     growth[:, 2] = np.maximum(growth[:, 2], (0.03 - places[:, 2]) / reach_m)
@@ -208,18 +302,29 @@ def _conifer(rng: VariantRng) -> Solid:
     depth = np.sqrt((axis**2).sum(axis=1)) / (spread * np.clip(1 - places[:, 2] / height, 0.1, 1.0))
     slots = np.clip(np.floor(depth * 3.2 + uniform(len(depth), rng) - 0.5), 0, 3).astype(np.int64)
     sprays = Sprays(places, outward, growth, reach_m, slots)
-    greens = leaf_greens(("#1f2b1c", "#2a3a25", "#35472d", "#425537"), rng)
+    warm = rng.between(0.9, 1.1)
+    codes = ("#2a3926", "#364a30", "#435839", "#526845")
+    greens = tuple(leaf_material("needle", code, _LEAF_LEVEL, warm) for code in codes)
     wooden = finish_mesh(trunk, (_bark("#6a5a4c"),), 60.0)
-    mesh = merge_meshes(wooden, leaf_mesh(sprays, greens, 0.42, rng))
+    mesh = merge_meshes(wooden, card_mesh(spray_cards(sprays, rng), greens, OUTWARD, rng))
     hull = hulls.frustum((base_m, 0.0), (0.6 * base_m, 0.5 * height), 10)
     return Solid(mesh, ConvexParts((np.round(hull, 6),)))
+
+
+def _tip(height: float, rng: VariantRng) -> tuple[Array, Array, Array]:
+    """Sprays that rise around the top of a spruce: feet, directions and lengths."""
+    count = 10
+    t = np.arange(count) / count
+    around = directions(count, rng) * np.array([1.0, 1.0, 0.0])
+    at = np.stack([0.0 * t, 0.0 * t, height - 1.1 + 0.8 * t], axis=1)
+    return at, unit(0.35 * around + np.array([0.0, 0.0, 1.0])), 0.75 - 0.35 * t
 
 
 def _fan(
     z: float, turn: float, reach: float, sag: float, rng: VariantRng
 ) -> tuple[Array, Array, Array]:
     """Sprays of needles along one branch: feet, directions and lengths."""
-    count = 24
+    count = 15
     t = np.sqrt(np.arange(1, count + 1) / count)
     out = np.array([math.cos(turn), math.sin(turn), 0.0])
     side = np.array([-math.sin(turn), math.cos(turn), 0.0])
@@ -229,7 +334,7 @@ def _fan(
     at = (reach * t)[:, None] * out + spread + np.stack([0 * t, 0 * t, z + dip], axis=1)
     fall = np.array([0.0, 0.0, -0.45]) * (0.4 + uniform((count, 1), rng))
     growth = unit(out + 0.9 * wing[:, None] * side + fall)
-    return at, growth, (0.22 + 0.2 * reach) * (0.7 + 0.5 * uniform(count, rng))
+    return at, growth, (0.34 + 0.26 * reach) * (0.7 + 0.5 * uniform(count, rng))
 
 
 def _bark(code: str) -> Material:

@@ -213,8 +213,12 @@ def capture_photograph(
     channels: frozenset[Channel],
     pipeline: ImagePipeline,
     rng: Rng,
+    settings_rng: Rng | None = None,
 ) -> SensorReading:
-    """Render the channels of a camera and, if RGB is among them, develop its photograph."""
+    """Render the channels of a camera and, if RGB is among them, develop its photograph.
+
+    ``rng`` and ``settings_rng`` are those of ``develop``.
+    """
     if Channel.RGB not in channels:
         return renderer.render(scene, camera, channels)
     needed = (channels - {Channel.RGB}) | {Channel.RADIANCE}
@@ -225,7 +229,7 @@ def capture_photograph(
     reading = renderer.render(scene, camera, needed)
     radiance = reading.channels[Channel.RADIANCE]
     depth_m = reading.channels.get(depth)
-    photo = develop(radiance, depth_m, camera, scene.weather, pipeline, rng)
+    photo = develop(radiance, depth_m, camera, scene.weather, pipeline, rng, settings_rng)
     images = {k: image for k, image in reading.channels.items() if k in channels}
     return replace(reading, channels={**images, Channel.RGB: photo.rgb}, ev100=photo.ev100)
 
@@ -237,12 +241,14 @@ def develop(
     weather: Weather,
     pipeline: ImagePipeline,
     rng: Rng,
+    settings_rng: Rng | None = None,
 ) -> Photograph:
     """Develop a photograph: meter the exposure, then apply all of ``STAGES`` in order.
 
-    Arguments are as in ``Shot``; the depth is needed only by a pipeline with a focus.
+    Arguments are as in ``Shot``; the depth is needed only by a pipeline with a focus. ``rng`` draws
+    the noise, and the settings too unless another camera's stream is given for them.
     """
-    noise_rng, rng = rng, rng.of_sequence()
+    noise_rng, rng = rng, (settings_rng or rng).of_sequence()
     ev100 = meter_ev100(radiance) if camera.ev100 is None else camera.ev100
     wanted = ev100 - pipeline.exposure_compensation_ev.draw(rng)
     wanted -= pipeline.exposure_error_ev.draw(rng)

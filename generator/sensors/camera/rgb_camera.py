@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import replace
 from typing import Annotated, Literal
 
@@ -67,6 +68,8 @@ class RgbCamera(Mounted):
         rgb_encoding: Files of the rgb channel: lossless PNG, or smaller JPEG or WebP.
         stereo_with: For the channels ``disparity`` and ``disparity_visible``: name of the camera
             to its right that forms a rectified pair with it.
+        settings_of: Name of the camera whose drawn settings of the image pipeline it shares, as
+            the cameras of one rig do; each meters its own image. Empty = settings of its own.
     """
 
     type: Literal["rgb_camera"] = "rgb_camera"
@@ -83,6 +86,7 @@ class RgbCamera(Mounted):
     image_pipeline: ImagePipeline = ImagePipeline()
     rgb_encoding: RgbEncoding = RgbEncoding()
     stereo_with: str = ""
+    settings_of: str = ""
 
     @model_validator(mode="after")
     def _has_a_partner(self) -> RgbCamera:
@@ -151,19 +155,26 @@ class RgbCamera(Mounted):
         paired = bool(self.stereo_with and PAIRED & requested)
         seen = (requested - PAIRED) | {Channel.Z_DEPTH} if paired else requested
         camera = scene.camera(self.name)
-        reading = capture_photograph(scene, renderer, camera, seen, self.image_pipeline, rng)
+        settings_rng = self._settings_rng(scene, rng)
+        reading = capture_photograph(
+            scene, renderer, camera, seen, self.image_pipeline, rng, settings_rng
+        )
         return self._add_disparity(scene, renderer, reading) if paired else reading
+
+    def _settings_rng(self, scene: Scene, rng: Rng) -> Rng:
+        """Stream of the camera whose settings it has."""
+        if not self.settings_of:
+            return rng
+        known = [camera.name for camera in scene.cameras]
+        check_camera(self.name, "settings_of", self.settings_of, known)
+        return rng.streams.rng(f"{rng.name.rpartition('/')[0]}/{self.settings_of}")
 
     def _add_disparity(
         self, scene: Scene, renderer: Renderer, reading: SensorReading
     ) -> SensorReading:
         """Add disparities to the camera on the right to a reading."""
         known = {camera.name: camera for camera in scene.cameras}
-        if self.stereo_with not in known:
-            raise ConfigError(
-                f"sensor '{self.name}': stereo_with: there is no camera '{self.stereo_with}'; "
-                f"expected one of {', '.join(known)}{did_you_mean(self.stereo_with, known)}"
-            )
+        check_camera(self.name, "stereo_with", self.stereo_with, known)
         left, right = known[self.name], known[self.stereo_with]
         try:
             scale = left.intrinsics.fx_px * baseline_m(left, right)
@@ -181,6 +192,15 @@ class RgbCamera(Mounted):
             Channel.DISPARITY_VISIBLE: np.where(visible, left_px, np.float32(0.0)),
         }
         return replace(reading, channels={**reading.channels, **pair})
+
+
+def check_camera(name: str, field: str, other: str, known: Collection[str]) -> None:
+    """Raise ConfigError if the camera that a camera's field names is not among the known ones."""
+    if other not in known:
+        raise ConfigError(
+            f"sensor '{name}': {field}: there is no camera '{other}'; "
+            f"expected one of {', '.join(known)}{did_you_mean(other, known)}"
+        )
 
 
 def add_camera(

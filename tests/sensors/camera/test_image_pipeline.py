@@ -26,6 +26,7 @@ from gen_data.generator.sensors.camera.image_pipeline import (
     develop,
 )
 from gen_data.generator.sensors.camera.isp import display_values, to_bytes
+from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
 from gen_data.generator.sensors.device_presets import preset_names
 
 LENS = Intrinsics(64, 48, 60.0, 60.0, 32.0, 24.0)
@@ -220,3 +221,27 @@ def test_properties_of_cameras_are_refused_under_render(tmp_path: Path, key: str
     assert f"own.yaml:4:3: render.{key}: " in first
     assert f"sensors[].image_pipeline.{key}" in first
     assert "unknown key" not in str(refused.value)
+
+
+def test_cameras_of_a_rig_share_the_settings_of_one() -> None:
+    """Grey images of two cameras agree with ``settings_of`` up to their noise, and differ without.
+
+    A name that no camera has is refused.
+    """
+    left = Camera("left", SE3(), LENS, ev100=8.0)
+    scene = Scene("t", cameras=(left, Camera("right", SE3(), LENS, ev100=8.0)))
+    drawn = ImagePipeline.model_validate_json('{"exposure_error_ev": {"uniform": [-3, 0]}}')
+    grey = Rendering(np.full((48, 64, 3), 0.2 * WHITE_CD_M2, np.float32))
+
+    def level(name: str, settings_of: str = "") -> float:
+        sensor = RgbCamera(
+            name=name, channels=(Channel.RGB,), image_pipeline=drawn, settings_of=settings_of
+        )
+        own = Streams(seed=5, scene=0).rng(f"sensor/{name}")
+        reading = sensor.capture(scene, grey, frozenset(), own)
+        return float(reading.channels[Channel.RGB].mean())
+
+    assert level("right", "left") == level("left")
+    assert level("right") != level("left")
+    with pytest.raises(ConfigError, match=r"settings_of: there is no camera 'lefd'.*'left'"):
+        level("right", "lefd")

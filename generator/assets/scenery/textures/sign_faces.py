@@ -1,8 +1,8 @@
-"""Faces of traffic signs, drawn from discs, polygons and strokes; and boards above shops.
+"""Faces of traffic signs, drawn from discs, polygons and strokes.
 
 Coordinates of a face: x to the right and y up in [-0.5, 0.5], as ``signs.plate_outline`` has them.
 Colours are the sRGB values of RAL 3020, 5017, 1023, 9017 and 9016, which EN 12899-1 signs are made
-in. Names of shops are all invented or plain words of the trade.
+in.
 """
 
 from __future__ import annotations
@@ -14,11 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gen_data.generator.assets.procedural.data_tables import load_table
-from gen_data.generator.assets.procedural.material_presets import hex_to_srgb8
 from gen_data.generator.assets.procedural.noise import fbm, smoothstep
 from gen_data.generator.assets.procedural.textures import artwork as art
-from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
 from gen_data.generator.assets.scenery.signs import SIGNS, Shape, plate_outline, sign_name
 from gen_data.generator.core.asset_types import TextureData
 
@@ -170,20 +168,3 @@ def traffic_sign(seed: int, sign: str) -> TextureData:
     streaks = smoothstep(0.1, 0.9, fbm((3, 24), 4, rng, size_px=SIZE_PX))
     dirt = 1.0 - rng.between(0.02, 0.1) * streaks
     return TextureData(np.round(clean * dirt[..., None]).astype(np.uint8))
-
-
-_WORDS = load_table(__package__, "shop_signs", tuple[str, ...])
-
-
-def shop_sign(seed: int) -> TextureData:
-    """A word on a coloured board about five times as wide as high."""
-    rng = variant_rng("shop_sign", seed)
-    ground, ink, line = (hex_to_srgb8(code) for code in rng.choose(_WORDS["schemes"]).split())
-    image = art.canvas(1024, 200, ground)
-    draw = art.pen(image)
-    if rng.choose((True, False)):
-        draw.rectangle([14, 14, 1009, 185], outline=line, width=6)
-    else:
-        draw.rectangle([0, 176, 1024, 190], fill=line)
-    art.text(image, (0.12, 0.18, 0.88, 0.8), in_turn(_WORDS["trades"], seed), ink, 1)
-    return art.resize_texture(image, 512, 128)

@@ -1,0 +1,350 @@
+"""What ends a view: tree lines, forests, hills and skylines, in pieces that stand side by side.
+
+Pieces run along Y and face +X, the side from which they are seen; their origin is below their
+middle. They are meant for distances from 40 m on.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from gen_data.generator.assets.procedural import collision_hulls as hulls
+from gen_data.generator.assets.procedural.family import Solid, check_option
+from gen_data.generator.assets.procedural.material_presets import hex_to_linear, patterned_material
+from gen_data.generator.assets.procedural.noise import uniform
+from gen_data.generator.assets.procedural.patches import Array, Patch, finish_mesh, join_patches
+from gen_data.generator.assets.procedural.surface_shapes import ball, block, cone, grid
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
+from gen_data.generator.assets.scenery.foliage import directions, merge_meshes
+from gen_data.generator.assets.scenery.leaf_cards import (
+    Cards,
+    card_mesh,
+    cards_about,
+    drop_unused_slots,
+    join_cards,
+    leaf_material,
+)
+from gen_data.generator.core.asset_types import ConvexParts, Material, MeshData
+
+SEASONS = ("spring", "summer", "autumn", "winter")
+TREE_LINE_M, FOREST_M, HILL_M, SKYLINE_M = 32.0, 48.0, 240.0, 90.0
+"""Lengths of the pieces along Y."""
+_COLORS = {
+    "spring": ("#93a85c", "#a1b364", "#879c54", "#b0c074"),
+    "summer": ("#708749", "#7d9250", "#667b45", "#8b9e5a"),
+    "autumn": ("#b0954a", "#bf8a44", "#8f8c4a", "#cda552"),
+    "winter": ("#8d8477", "#988f82", "#827a6f", "#a39a8c"),
+}
+_EVERGREEN = ("#52694a", "#5d7350")
+_SOFTNESS = 0.72
+
+
+@dataclass(frozen=True, slots=True)
+class _Crown:
+    """A tree far away: where it stands, its height and radius [m]."""
+
+    x: float
+    y: float
+    height: float
+    radius: float
+    is_conifer: bool
+    slot: int
+
+
+def tree_line(seed: int, season: str) -> Solid:
+    """A row of trees over bushes, 32 m long and 9-17 m high.
+
+    Raises:
+        AssetError: the season is unknown.
+    """
+    check_option("horizon/trees", "season", season, SEASONS)
+    rng = variant_rng("horizon/trees", seed)
+    crowns, y = [], -0.5 * TREE_LINE_M
+    tall = rng.between(9.0, 14.0)
+    while y < 0.5 * TREE_LINE_M:
+        height = tall * rng.between(0.7, 1.25)
+        radius = height * rng.between(0.24, 0.36)
+        y += 0.8 * radius
+        conifer = rng.chance(0.12)
+        if conifer:
+            radius *= 0.6
+        at = -rng.between(0.5, 6.0) - radius
+        crowns.append(_Crown(at, y, height, radius, conifer, int(rng.between(0, 4))))
+        y += rng.between(0.6, 1.5) * radius
+    count = round(0.9 * TREE_LINE_M)
+    bushes = [
+        _Crown(-rng.between(0.5, 5.0), (k / count - 0.5) * TREE_LINE_M, h, 0.75 * h, False,
+               int(rng.between(0, 4)))
+        for k, h in enumerate(rng.between(1.5, 4.0) for _ in range(count))
+    ]  # fmt: skip
+    return _stand(crowns, bushes, season, (1.9, 38), rng)
+
+
+def forest(seed: int, season: str) -> Solid:
+    """An edge of a forest with the tops behind it, 48 m long and 14-24 m high.
+
+    Raises:
+        AssetError: the season is unknown.
+    """
+    check_option("horizon/forest", "season", season, SEASONS)
+    rng = variant_rng("horizon/forest", seed)
+    firs = rng.choose((0.08, 0.3, 0.75))
+    crowns = []
+    for row in range(3):
+        y = -0.5 * FOREST_M
+        while y < 0.5 * FOREST_M:
+            conifer = rng.chance(firs)
+            height = (13.0 + 2.5 * row) * rng.between(0.8, 1.25)
+            radius = height * (rng.between(0.15, 0.2) if conifer else rng.between(0.2, 0.3))
+            y += 0.75 * radius
+            x = -3.0 - 7.0 * row - rng.between(0.0, 4.0)
+            crowns.append(_Crown(x, y, height, radius, conifer, int(rng.between(0, 4))))
+            y += rng.between(0.5, 0.9) * radius
+    count = round(0.5 * FOREST_M)
+    edge = [
+        _Crown(-rng.between(0.5, 4.0), (k / count - 0.5) * FOREST_M, h, 0.8 * h, False,
+               int(rng.between(0, 4)))
+        for k, h in enumerate(rng.between(2.0, 6.0) for _ in range(count))
+    ]  # fmt: skip
+    return _stand(crowns, edge, season, (2.8, 22), rng)
+
+
+def hill(seed: int, season: str) -> Solid:
+    """Rising land with fields, hedgerows and woods, 240 m long, 25-85 m high, 260 m deep.
+
+    Raises:
+        AssetError: the season is unknown.
+    """
+    check_option("horizon/hills", "season", season, SEASONS)
+    rng = variant_rng("horizon/hills", seed)
+    across, along = 27, 33
+    peak = rng.between(25.0, 85.0)
+    x = -260.0 * np.linspace(0.0, 1.0, across)[:, None]
+    y = np.linspace(-0.75, 0.75, along)[None, :] * HILL_M
+    lumps = [
+        (rng.between(-180.0, -90.0), rng.between(-0.3, 0.3) * HILL_M, rng.between(50.0, 90.0),
+         rng.between(0.5, 1.0))
+        for _ in range(4)
+    ]  # fmt: skip
+    z = np.zeros((across, along))
+    for cx, cy, r, share in lumps:
+        z = np.maximum(z, share * np.exp(-(((x - cx) / r) ** 2 + ((y - cy) / (1.6 * r)) ** 2)))
+    # The land falls to its foot on all four sides.
+    sides = np.clip((0.75 * HILL_M - np.abs(y)) / (0.4 * HILL_M), 0.0, 1.0)
+    z = peak * z * sides * sides * (3.0 - 2.0 * sides) * np.clip(-x / 70.0, 0.0, 1.0)
+    points = np.stack(np.broadcast_arrays(x, y, z), axis=2)
+    # Fields of about 50 m.
+    land = grid(points[:, ::-1], np.linspace(1.2, 0.0, along), np.linspace(0.0, 0.9, across))
+    level = {"spring": 1.05, "summer": 1.0, "autumn": 0.9, "winter": 0.72}[season]
+    fields = Material(
+        (level, level, level), 0.95, specular=0.2, role="grass",
+        texture=f"texture/farmland?seed={seed % 2}",
+    )  # fmt: skip
+    green = {"spring": "#6f8248", "summer": "#566b3b", "autumn": "#86733f", "winter": "#6b6459"}
+    # Crowns this far away need no holes, which cost every ray a test.
+    crowns = Material(hex_to_linear(green[season]), 0.95, specular=0.2, role="leaf")
+    patch = join_patches([land, *(wood.painted(1) for wood in _woods_on(points, rng))])
+    return _solid(finish_mesh(patch, (fields, crowns), 60.0))
+
+
+def skyline(seed: int) -> Solid:
+    """Plain buildings of a town, 90 m long and 12-70 m high."""
+    rng = variant_rng("horizon/skyline", seed)
+    tall = rng.chance(0.4)
+    bodies: list[Patch] = []
+    for row in range(2):
+        y = -0.5 * SKYLINE_M
+        while y < 0.5 * SKYLINE_M - 9.0:
+            width = min(rng.between(12.0, 30.0), 0.5 * SKYLINE_M - y)
+            depth = rng.between(12.0, 18.0)
+            storeys = round(rng.between(4, 8) + (rng.between(0, 14) if tall else 0.0) + 2 * row)
+            x = -20.0 * row - rng.between(0.0, 4.0)
+            bodies += _tower((x - depth, y, x, y + width), storeys, int(rng.between(0, 5)), rng)
+            y += width + rng.between(-0.5, 7.0)
+    colors = rng.shuffled(("#c9c2b4", "#b3a596", "#d6d2c8", "#9c9c9c", "#b98f78", "#a7adb0"))
+    facades = [
+        Material(
+            hex_to_linear(color), 0.85, specular=0.4, role="facade",
+            texture=f"texture/window_grid?seed={k % 4}",
+        )
+        for k, color in enumerate(colors[:5])
+    ]  # fmt: skip
+    roof = Material(hex_to_linear("#6d6a68"), 0.9, role="roof")
+    tiles = patterned_material("texture/roof_tiles?seed=0", 1.8, 0.85, hex_to_linear("#9a5a44"))
+    mesh = finish_mesh(join_patches(bodies), (*facades, roof, replace(tiles, role="roof")), 30.0)
+    return _solid(mesh)
+
+
+def _stand(
+    crowns: Sequence[_Crown],
+    bushes: Sequence[_Crown],
+    season: str,
+    clumps: tuple[float, int],
+    rng: VariantRng,
+) -> Solid:
+    """Trees with opaque cores over bushes; clumps as (size [m], number per tree)."""
+    size, count = clumps
+    is_bare = season == "winter"
+    # Trunks of rows behind the first are hidden.
+    trunks = [_trunk(crown) for crown in crowns if crown.x > -9.0]
+    cores = [
+        _core(crown, 0.62 if crown in bushes else 0.7).painted(1)
+        for crown in (*crowns, *bushes)
+        if not is_bare or crown.is_conifer
+    ]
+    bark = Material(hex_to_linear("#5b5046"), 0.95, specular=0.2, role="bark")
+    dark = patterned_material("texture/foliage?seed=0", 1.6, 0.95, hex_to_linear("#6d8049"))
+    wood = finish_mesh(
+        join_patches([*trunks, *cores]), (bark, replace(dark, specular=0.2, role="leaf")), 70.0
+    )
+    parts = [_clumps(c, size, count * 2 // 3 if c.is_conifer else count, rng) for c in crowns]
+    parts += [_clumps(bush, 0.75 * size, 8, rng) for bush in bushes]
+    leaves = card_mesh(join_cards(parts), _foliage(season, rng), _SOFTNESS, rng)
+    return _solid(merge_meshes(wood, leaves))
+
+
+def _solid(mesh: MeshData) -> Solid:
+    """The mesh with its middle above the origin and without unused slots, and a box around it."""
+    (x0, _, _), (x1, _, _) = mesh.bounds_m()
+    shift = np.array([round(0.5 * (x0 + x1), 2), 0.0, 0.0])
+    moved = replace(mesh, vertices_m=(mesh.vertices_m - shift).astype(np.float32))
+    (x0, y0, z0), (x1, y1, z1) = moved.bounds_m()
+    hull = hulls.box((x0, y0, z0), (x1, y1, z1))
+    return Solid(drop_unused_slots(moved), ConvexParts((np.round(hull, 6),)))
+
+
+def _foliage(season: str, rng: VariantRng) -> tuple[Material, ...]:
+    """Four shades of deciduous trees, then two of conifers."""
+    level, warm = rng.between(0.88, 1.12), rng.between(0.92, 1.1)
+    kind = "twigs" if season == "winter" else "clump"
+    return (
+        *(leaf_material(kind, color, level, warm) for color in _COLORS[season]),
+        *(leaf_material("pine_clump", color, level) for color in _EVERGREEN),
+    )
+
+
+def _trunk(crown: _Crown) -> Patch:
+    foot, top = 0.02 * crown.height, 0.45 * crown.height
+    return cone((foot, 0.0), (0.6 * foot, top), 5).moved(crown.x, crown.y)
+
+
+def _core(crown: _Crown, share: float) -> Patch:
+    """The opaque depth of a crown, within its clumps."""
+    low, r = _crown_foot(crown), share * crown.radius
+    half = 0.5 * (crown.height - low)
+    if crown.is_conifer:
+        return cone((r, low + 0.1 * half), (0.05, crown.height - 0.3 * half), 7).moved(
+            crown.x, crown.y
+        )
+    axes = np.array([r, r, share * half])
+    middle = np.array([crown.x, crown.y, low + half])
+    return ball(lambda d: d * axes + middle, 4, 7)
+
+
+def _crown_foot(crown: _Crown) -> float:
+    if crown.radius > 0.6 * crown.height:
+        return 0.0
+    return (0.08 if crown.is_conifer else 0.25) * crown.height
+
+
+def _clumps(crown: _Crown, size: float, count: int, rng: VariantRng) -> Cards:
+    """Cards over the surface of a crown."""
+    low = _crown_foot(crown)
+    half = 0.5 * (crown.height - low)
+    at = directions(count, rng)
+    depth = 0.72 + 0.28 * uniform(count, rng)
+    if crown.is_conifer:
+        up = uniform(count, rng) ** 1.4
+        reach = crown.radius * (1.0 - 0.95 * up) * depth
+        place = np.stack([reach * at[:, 0], reach * at[:, 1], low + 2.0 * half * up], axis=1)
+        outward = at * np.array([1.0, 1.0, 0.0]) + np.array([0.0, 0.0, 0.45])
+        slots = 4 + (uniform(count, rng) < 0.5).astype(np.int64)
+        scale = size * (0.9 - 0.4 * up)
+    else:
+        # Boughs: a crown of several lobes and not an egg.
+        lobe = 1.0 + 0.16 * np.sin(3.0 * np.arctan2(at[:, 1], at[:, 0]) + 2.0 * crown.height)
+        lobe *= 1.0 + 0.12 * np.sin(5.0 * at[:, 2] + crown.y)
+        axes = np.array([crown.radius, crown.radius, half])
+        place = at * axes * (depth * lobe)[:, None] + np.array([0.0, 0.0, low + half])
+        outward = at
+        lit = (uniform(count, rng) < 0.5).astype(np.int64)
+        slots = (crown.slot + lit) % 4
+        scale = np.full(count, size)
+    scale = scale * (0.75 + 0.5 * uniform(count, rng))
+    place[:, 2] = np.maximum(place[:, 2], 0.3 * scale)
+    middle = place + np.array([crown.x, crown.y, 0.0])
+    return cards_about(middle, outward, scale, slots, 0.35, rng)
+
+
+def _woods_on(points: Array, rng: VariantRng) -> list[Patch]:
+    """Crowns on a hill: along hedgerows, and in woods near its top."""
+    rows, columns = points.shape[:2]
+    places = []
+    for _ in range(5):
+        column = int(rng.between(2, columns - 2))
+        drift = rng.between(-0.35, 0.35)
+        t = np.linspace(rng.between(0.05, 0.2), rng.between(0.5, 0.9), 16)
+        places.append(_points_on(points, t * (rows - 1), column + drift * t * rows))
+    for _ in range(3):
+        u = rng.between(0.25, 0.55) * (rows - 1)
+        v = rng.between(0.15, 0.85) * (columns - 1)
+        turn, r = 2.0 * math.pi * uniform(36, rng), np.sqrt(uniform(36, rng))
+        wide, deep = rng.between(2.0, 6.0), rng.between(1.5, 4.0)
+        places.append(_points_on(points, u + deep * r * np.sin(turn), v + wide * r * np.cos(turn)))
+    return [_lump(at, rng.between(3.0, 6.5), rng) for at in np.concatenate(places)]
+
+
+def _lump(foot_m: Array, radius_m: float, rng: VariantRng) -> Patch:
+    """A crown of few faces that stands on a slope; no two are alike."""
+    x, y, z = foot_m.tolist()
+    high = rng.between(0.9, 1.5)
+    made = ball(lambda d: d * radius_m * np.array([1.0, 1.0, high]), 3, 5)
+    placed = made.rotated("z", rng.between(0.0, 6.2)).moved(x, y, z + 0.6 * radius_m)
+    return replace(placed, corners_m=np.maximum(placed.corners_m, np.array([-1e3, -1e3, 0.0])))
+
+
+def _points_on(points: Array, row: Array, column: Array) -> Array:
+    """Points of a grid [rows, columns, 3] at fractional rows and columns, clamped to it."""
+    r = np.clip(row, 0.0, points.shape[0] - 1.001)
+    c = np.clip(column, 0.0, points.shape[1] - 1.001)
+    i, j = r.astype(np.int64), c.astype(np.int64)
+    u, v = (r - i)[:, None], (c - j)[:, None]
+    upper = points[i, j] * (1 - v) + points[i, j + 1] * v
+    lower = points[i + 1, j] * (1 - v) + points[i + 1, j + 1] * v
+    on: Array = upper * (1 - u) + lower * u
+    return on
+
+
+def _tower(
+    plan: tuple[float, float, float, float], storeys: int, slot: int, rng: VariantRng
+) -> list[Patch]:
+    """A building over (x0, y0, x1, y1): four walls with windows, and a flat or a pitched roof."""
+    x0, y0, x1, y1 = plan
+    h, bay, storey = 3.1 * storeys, 3.2, 3.1
+    walls = []
+    corners = [(x1, y0), (x1, y1), (x0, y1), (x0, y0), (x1, y0)]
+    for (ax, ay), (bx, by) in pairwise(corners):
+        bays = max(1, round(math.hypot(bx - ax, by - ay) / bay)) / 4.0
+        wall = np.array([[(ax, ay, 0.0), (bx, by, 0.0)], [(ax, ay, h), (bx, by, h)]])
+        walls.append(grid(wall, np.array([0.0, bays]), np.array([0.0, h / storey / 4.0]), slot))
+    if storeys > 6 or rng.chance(0.4):
+        hut = block((x0 + 3.0, y0 + 3.0, h), (x0 + 6.0, y0 + 7.0, h + 2.6)).painted(5)
+        flat = np.array([[(x1, y0, h), (x1, y1, h)], [(x0, y0, h), (x0, y1, h)]])
+        return [*walls, grid(flat).painted(5), hut]
+    mid, top = 0.5 * (x0 + x1), h + 0.32 * (x1 - x0)
+    slopes = [
+        np.array([[(x1 + 0.4, y0, h), (x1 + 0.4, y1, h)], [(mid, y0, top), (mid, y1, top)]]),
+        np.array([[(x0 - 0.4, y1, h), (x0 - 0.4, y0, h)], [(mid, y1, top), (mid, y0, top)]]),
+    ]
+    # A gable is a rectangle without an upper edge: its two upper corners coincide.
+    gables = [
+        np.array([[(x0, y0, h), (x1, y0, h)], [(mid, y0, top), (mid, y0, top)]]),
+        np.array([[(x1, y1, h), (x0, y1, h)], [(mid, y1, top), (mid, y1, top)]]),
+    ]
+    plain = [grid(gable, np.array([0.0, 0.02]), np.array([0.0, 0.02]), slot) for gable in gables]
+    return [*walls, *(grid(slope).painted(6) for slope in slopes), *plain]

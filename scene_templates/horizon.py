@@ -1,0 +1,171 @@
+"""The end of the view around a street: tree lines, forests, hills and skylines."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+from pydantic import Field
+
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
+from gen_data.generator.assets.scenery.horizons import (
+    FOREST_M,
+    HILL_M,
+    SKYLINE_M,
+    TREE_LINE_M,
+)
+from gen_data.generator.config.base_model import NAME_PATTERN
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Lane, Scene
+from gen_data.generator.core.se3 import SE3, Array
+from gen_data.scene_templates.element import Element, add_background, parametric_id
+
+HorizonKind = Literal["trees", "forest", "skyline", "hills"]
+Season = Literal["spring", "summer", "autumn", "winter"]
+
+_PIECE_M: dict[HorizonKind, float] = {
+    "trees": TREE_LINE_M,
+    "forest": FOREST_M,
+    "skyline": SKYLINE_M,
+    "hills": HILL_M,
+}
+_FAR: dict[HorizonKind, float] = {"trees": 1.0, "forest": 1.5, "skyline": 3.0, "hills": 4.0}
+"""Distance of each layer, as a multiple of ``distance_m``."""
+_VARIANTS: dict[HorizonKind, int] = {"trees": 8, "forest": 6, "skyline": 8, "hills": 6}
+_SUNK_M: dict[HorizonKind, float] = {"trees": 0.12, "forest": 0.12, "skyline": 0.12, "hills": 1.0}
+"""Pieces stand this far below z = 0, so that no gap shows under them."""
+
+
+class Horizon(Element):
+    """A ring of scenery around all roads that ends the view; background, without labels.
+
+    Each kind is a layer of pieces that face the roads. The ring follows the convex outline of all
+    lanes, so that no piece stands on a road.
+
+    Attributes:
+        kinds: Layers: rows of trees, forests, buildings of a town, hills with fields.
+        distance_m: Distance of the layer ``trees`` from the nearest lane; forests stand 1.5 times,
+            skylines 3 times and hills 4 times as far away.
+        coverage: Share of the ring that trees and forests occupy; through their gaps, farther
+            layers are seen.
+        season: Foliage.
+        arcs_deg: Directions from the middle of the roads to fill, each (from, to),
+            counter-clockwise from world +X; empty = all around.
+        seed: Seed of the choice and the places of pieces.
+    """
+
+    type: Literal["horizon"] = "horizon"
+    kinds: tuple[HorizonKind, ...] = Field(("trees", "hills"), min_length=1)
+    distance_m: float = Field(70.0, ge=20, le=1000)
+    coverage: float = Field(0.85, ge=0, le=1)
+    season: Season = "summer"
+    arcs_deg: tuple[tuple[float, float], ...] = ()
+    seed: int = Field(0, ge=0, le=1_000_000)
+    name: str = Field("horizon", pattern=NAME_PATTERN)
+
+    @property
+    def follows_others(self) -> bool:
+        """True: it surrounds every road."""
+        return True
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """Add a static body per piece; background has no instance."""
+        if not scene.lanes:
+            raise ConfigError(
+                f"elements.{self.name}: there is no lane to surround; expected a road, a junction "
+                "or a road network among the elements"
+            )
+        hull = convex_outline(_lane_points(scene.lanes))
+        for kind in dict.fromkeys(self.kinds):
+            rng = variant_rng(f"horizon/{kind}", self.seed)
+            for number, place in enumerate(self._places(hull, kind, rng)):
+                parameters: dict[str, str | int] = {"seed": int(rng.random() * _VARIANTS[kind])}
+                if kind != "skyline" and self.season != "summer":
+                    parameters["season"] = self.season
+                asset = parametric_id(f"horizon/{kind}", **parameters)
+                front = assets.bounds_m(asset)[1][0]
+                pose = place @ SE3((-front, 0.0, -_SUNK_M[kind]))
+                scene = add_background(scene, assets, f"{self.name}/{kind}/{number}", asset, pose)
+        return scene
+
+    def _places(self, hull_m: Array, kind: HorizonKind, rng: VariantRng) -> list[SE3]:
+        """Poses of the middles of the fronts of one layer's pieces; X towards the roads."""
+        far_m = self.distance_m * _FAR[kind]
+        outline = offset_outline(hull_m, far_m)
+        steps = np.sqrt(((np.roll(outline, -1, axis=0) - outline) ** 2).sum(axis=1))
+        perimeter = float(steps.sum())
+        count = max(3, math.ceil(perimeter / (0.94 * _PIECE_M[kind])))
+        start = np.concatenate([[0.0], np.cumsum(steps)])
+        closed = np.concatenate([outline, outline[:1]])
+        centre = 0.5 * (hull_m.min(axis=0) + hull_m.max(axis=0))
+        made = []
+        for k in range(count):
+            at = perimeter * (k + rng.between(-0.06, 0.06) + 0.5) / count
+            kept = rng.chance(self.coverage) or kind in ("hills", "skyline")
+            back = rng.between(0.0, 0.12) * far_m
+            turn = rng.between(-0.08, 0.08)
+            before, here, after = (
+                np.array([np.interp(a, start, closed[:, i]) for i in (0, 1)])
+                for a in (max(at - 4.0, 0.0), at, min(at + 4.0, perimeter))
+            )
+            # The outline runs counter-clockwise: outside is on its right.
+            yaw = math.atan2(*(after - before)[::-1]) + 0.5 * math.pi
+            place = here - back * np.array([math.cos(yaw), math.sin(yaw)])
+            if kept and self._is_in_arc(place - centre):
+                made.append(SE3.about_z(yaw + turn, (float(place[0]), float(place[1]), 0.0)))
+        return made
+
+    def _is_in_arc(self, offset_m: Array) -> bool:
+        """Whether the direction of a place from the middle of the roads is to be filled."""
+        if not self.arcs_deg:
+            return True
+        bearing = math.degrees(math.atan2(float(offset_m[1]), float(offset_m[0])))
+        return any((bearing - low) % 360.0 <= (high - low) for low, high in self.arcs_deg)
+
+
+def convex_outline(points_m: Array) -> Array:
+    """Corners of the convex hull of points [n, 2], counter-clockwise, [k, 2].
+
+    Source: Andrew, "Another efficient algorithm for convex hulls in two dimensions", Information
+    Processing Letters 9, 1979.
+    """
+    ordered = np.unique(np.round(points_m, 6), axis=0).tolist()
+    chains = [_half_hull(ordered), _half_hull(ordered[::-1])]
+    return np.array([*chains[0][:-1], *chains[1][:-1]] or ordered)
+
+
+def _half_hull(ordered: Sequence[Sequence[float]]) -> list[Sequence[float]]:
+    chain: list[Sequence[float]] = []
+    for p in ordered:
+        while len(chain) > 1 and _turn(chain[-2], chain[-1], p) <= 0.0:
+            chain.pop()
+        chain.append(p)
+    return chain
+
+
+def _turn(a: Sequence[float], b: Sequence[float], c: Sequence[float]) -> float:
+    """Twice the signed area of a triangle; positive for a turn to the left."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def offset_outline(hull_m: Array, distance_m: float) -> Array:
+    """Points on the line at a distance around a convex hull [k, 2], counter-clockwise, [n, 2]."""
+    turn = 2.0 * math.pi * np.arange(360) / 360
+    outward = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    corner = (hull_m @ outward.T).argmax(axis=0)
+    points: Array = hull_m[corner] + distance_m * outward
+    return points
+
+
+def _lane_points(lanes: Sequence[Lane]) -> Array:
+    """Points of both borders of all lanes, [n, 2]."""
+    points = [np.asarray(lane.center_m, dtype=np.float64)[:, :2] for lane in lanes]
+    square = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
+    wide = [
+        (p[:, None, :] + 0.5 * lane.width_m * square).reshape(-1, 2)
+        for p, lane in zip(points, lanes, strict=True)
+    ]
+    return np.concatenate(wide)

@@ -1,0 +1,168 @@
+"""Districts: elements that a scene lacks, land before houses, and the streets of the template."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import pytest
+
+from gen_data.generator.assemble.config import Config, load_config
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.scene import Scene, SharedValue
+from gen_data.generator.core.streams import Streams
+from gen_data.randomizers.lane_objects import LaneObjects as DrawLaneObjects
+from gen_data.scene_templates.builder import build_scene
+from gen_data.scene_templates.crosswalk import Crosswalk
+from gen_data.scene_templates.element import Element
+from gen_data.scene_templates.junction import Junction
+from gen_data.scene_templates.lane_objects import LaneObjects
+from gen_data.scene_templates.objects import AssetChoice
+from gen_data.scene_templates.road import Road
+from gen_data.scene_templates.signals import Signals
+from tests.randomizers.doubles import rng_of
+
+BENCHES = LaneObjects(
+    name="benches",
+    lanes=("furniture",),
+    count=4,
+    assets=AssetChoice(ids=("bench",)),
+    present=False,
+)
+
+
+@cache
+def library() -> Library:
+    """Procedural assets."""
+    return open_library(())
+
+
+@cache
+def street() -> Config:
+    """The shipped street."""
+    return load_config("street")
+
+
+def built(*elements: Element) -> Scene:
+    """The nominal scene of some elements."""
+    return build_scene("test", elements, library())
+
+
+def test_absent_elements_leave_nothing_but_the_names_of_their_groups() -> None:
+    """A randomizer of the group changes nothing; unknown groups are still refused."""
+    scene = built(Road(name="main"), Road(name="side", at_m=(0.0, 50.0), present=False), BENCHES)
+    draw = DrawLaneObjects(name="benches", weights={"bench": 2.0})
+    draw.check(scene, library())
+
+    assert {lane.road for lane in scene.lanes} == {"main"}
+    assert [body.name for body in scene.bodies] == ["main"]
+    assert draw(scene, library(), rng_of("stream")) is scene
+    with pytest.raises(ConfigError, match="no object group 'bench'"):
+        DrawLaneObjects(name="bench").check(scene, library())
+
+
+@pytest.mark.parametrize(
+    ("element", "place"),
+    [
+        (Road(name="on", after="cross/0"), "elements.on.after: the element 'cross' is absent"),
+        (Signals(name="signals", junction="cross"), "elements.signals.junction: the element"),
+        (Crosswalk(name="zebra", road="side"), "elements.zebra.road: the element 'side'"),
+    ],
+)
+def test_relations_to_absent_elements_are_one_clear_error(element: Element, place: str) -> None:
+    """The error names the field, the absent element and the remedy; absent ones may refer to it."""
+    absent = (Junction(name="cross", present=False), Road(name="side", present=False))
+    with pytest.raises(ConfigError, match=place) as caught:
+        built(Road(name="main"), *absent, element)
+    assert f"or present: false for '{element.name}'" in str(caught.value)
+    assert built(Road(name="main"), *absent, element.model_copy(update={"present": False})).lanes
+
+
+def test_houses_stand_behind_the_setback() -> None:
+    """Garden and frontage are level with the sidewalk's outer edge, at the widths of the road."""
+    lanes = {lane.name: lane for lane in built(Road(name="main", setback_m=(5.0, 0.0))).lanes}
+    garden, front = lanes["main/garden_left"], lanes["main/frontage_left"]
+    edge_m = 3.5 + 0.15 + 2.5
+
+    assert garden.width_m == 5.0
+    assert garden.center_m[0][1] == pytest.approx(edge_m + 2.5)
+    assert front.center_m[0][1] == pytest.approx(edge_m + 5.0)
+    assert garden.center_m[0][2] == pytest.approx(0.12 + 0.025 * 2.5)
+    assert front.center_m[0][2] == garden.center_m[0][2]
+    assert "main/garden_right" not in lanes
+    assert lanes["main/frontage_right"].center_m[0][1] == pytest.approx(-edge_m)
+
+
+def test_fronts_go_on_past_a_side_road_opposite() -> None:
+    """The straight side of a T has houses as far back as the roads have; its corners have none."""
+    scene = built(
+        Road(name="main", length_m=40.0, setback_m=(5.0, 5.0)),
+        Junction(name="cross", after="main", arms_deg=(0.0, 90.0, 180.0), setback_m=5.0),
+        Road(name="on", after="cross/0", length_m=40.0, setback_m=(5.0, 5.0)),
+    )
+    lanes = {lane.name: lane for lane in scene.lanes}
+    fronts = [name for name, lane in lanes.items() if lane.kind == "frontage"]
+
+    assert sorted(name for name in fronts if name.startswith("cross")) == ["cross/frontage2"]
+    assert lanes["main/frontage_right"].successors == ("cross/frontage2",)
+    assert lanes["cross/frontage2"].successors == ("on/frontage_right",)
+
+
+@cache
+def districts() -> dict[tuple[SharedValue, SharedValue], Scene]:
+    """Roads by district and junction: each district and each junction at least once."""
+    config, scenes = street(), {}
+    seen: set[SharedValue] = set()
+    for number in range(300):
+        shared = config.shared(Streams(3, number, index=number))
+        key = (dict(shared)["district"], dict(shared)["junction"])
+        if not seen.issuperset(key):
+            seen.update(key)
+            elements = config.scene_config(shared).elements
+            roads = [e for e in elements if not isinstance(e, LaneObjects)]
+            scenes[key] = build_scene("street", roads, library())
+    return scenes
+
+
+def test_every_district_and_junction_is_drawn() -> None:
+    """All outcomes of both shared values."""
+    names = {name for key in districts() for name in key}
+    assert names == {
+        *("old_town", "residential", "leafy_suburb", "garden_villas", "arterial", "industrial"),
+        *("campus", "park_edge", "village", "country_road", "motorway"),
+        *("x", "t_left", "t_right", "t_end", "y", "roundabout", "none"),
+    }
+
+
+def test_traffic_can_go_on_where_roads_meet() -> None:
+    """In every district, the lanes of roads that lead to a junction or another road continue."""
+    for key, scene in districts().items():
+        driving = {lane.name: lane for lane in scene.lanes if lane.kind == "driving"}
+        along = [lane for name, lane in driving.items() if name.startswith("main/forward")]
+        assert along and all(lane.successors for lane in along), key
+        back = [lane for lane in driving.values() if lane.name.startswith("on/backward")]
+        assert all(lane.successors for lane in back), key
+        crossing = [lane for lane in driving.values() if lane.junction]
+        assert bool(crossing) == (key[1] != "none"), key
+        assert all(lane.successors for lane in crossing), key
+
+
+def test_sections_differ_by_district() -> None:
+    """What each district is known for."""
+    by_district = {key[0]: scene for key, scene in districts().items()}
+    kinds = {
+        name: {lane.kind for lane in scene.lanes if lane.road == "main"}
+        for name, scene in by_district.items()
+    }
+    lanes_m = {
+        name: {lane.width_m for lane in scene.lanes if lane.kind == "driving"}
+        for name, scene in by_district.items()
+    }
+
+    assert "sidewalk" not in kinds["country_road"] | kinds["motorway"]
+    assert "garden" not in kinds["old_town"]
+    assert "garden" in kinds["garden_villas"] & kinds["village"] & kinds["industrial"]
+    assert lanes_m["motorway"] == {3.75}
+    assert max(lanes_m["village"]) < max(lanes_m["arterial"])
+    forward = [lane for lane in by_district["arterial"].lanes if "main/forward" in lane.name]
+    assert len(forward) >= 2
