@@ -38,6 +38,7 @@ from tests.randomizers.doubles import FakeAssets, rng_of
 
 GIVEN: dict[str, dict[str, Any]] = {
     "ceiling_lights": {"visible": True},
+    "companions": {"group": "lane_objects", "size": 4, "gap_m": {"uniform": [3, 5]}},
     "distractors": {"count": {"uniform_integer": [1, 4]}},
     "colors": {"probability": True},
     "materials": {"probability": True},
@@ -47,8 +48,8 @@ GIVEN: dict[str, dict[str, Any]] = {
 """Fields that a randomizer requires, or that ensure that it changes the scene."""
 
 PHYSICS_BOUND = (
-    "arm_configuration", "arm_motion", "distractors", "ego_on_lane", "lane_objects", "objects",
-    "physics_properties", "plate", "traffic_flow",
+    "arm_configuration", "arm_motion", "companions", "distractors", "ego_on_lane", "lane_objects",
+    "objects", "physics_properties", "plate", "traffic_flow",
 )  # fmt: skip
 """Randomizers that must run before physics."""
 
