@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import Point2, block
 from gen_data.generator.assets.scenery.basic_shapes import make_solid
-from gen_data.generator.assets.vehicles import body_shell, car_ends, car_fittings
+from gen_data.generator.assets.vehicles import body_shell, car_ends, car_fittings, car_interior
 from gen_data.generator.assets.vehicles.body_shell import (
     BODY_ROWS,
     BodyOutline,
@@ -25,6 +25,9 @@ from gen_data.generator.assets.vehicles.vehicle_materials import SIDES
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
 from gen_data.generator.core.asset_types import Keypoint, Material
 
+PANES_OPACITY = 0.5
+"""Windscreens let at least 70 % of the light through (UN Regulation 43), tinted rear panes a
+fifth: half is assumed for all, with the dark tint of the slot."""
 _CUT = len(Slot)
 """Slot of triangles that are taken away."""
 
@@ -56,6 +59,7 @@ def make_vehicle(
         *car_ends.fit_middle(design),
         *car_fittings.fit_wipers(design),
         *car_fittings.fit_extras(design),
+        *car_interior.fit_interior(design),
         *design.axles.wheels(steer_deg),
         *additions.parts,
     ]
@@ -68,7 +72,11 @@ def make_vehicle(
     body = both_sides(half, middle)
     mirrors = list(car_fittings.fit_mirror(design))
     shown = both_sides([*panels, *mirrors, *half[len(panels) :]], [*middle, *beyond])
-    return make_solid(shown, finish, _collision(design), _keypoints(design), body)
+    # Only cars have something to see behind their panes.
+    clear = tuple(
+        replace(m, opacity=PANES_OPACITY) if k == Slot.GLASS else m for k, m in enumerate(finish)
+    )
+    return make_solid(shown, clear, _collision(design), _keypoints(design), body)
 
 
 def _panels(design: Design, additions: Additions) -> list[Patch]:

@@ -224,7 +224,7 @@ class Design:
         across = min(abs(y_m) / (share * self.half_m), 1.0)
         reach = (1.0 - across**q) ** (1.0 / p)
         end, far = 0.5 * self.length_m - stand_m, 0.5 * self.length_m
-        x_m = 0.5 * (end - far) + 0.5 * (end + far) * reach
+        x_m = float(0.5 * (end - far) + 0.5 * (end + far) * reach)
         return x_m if front else -x_m
 
 

@@ -86,7 +86,8 @@ def fit_antenna(design: Design) -> Iterator[Patch]:
 def fit_extras(design: Design) -> Iterator[Patch]:
     """What the design has beyond other cars, roofs excepted."""
     for word in design.extras:
-        yield from _EXTRAS.get(word, lambda _: iter(()))(design)
+        if word in _EXTRAS:
+            yield from _EXTRAS[word](design)
 
 
 def _roof_bars(design: Design) -> Iterator[Patch]:

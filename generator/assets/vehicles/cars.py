@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from gen_data.generator.assets.procedural.family import Facts, Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
+from gen_data.generator.assets.procedural.surface_shapes import Point2
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.assets.vehicles.bodywork import Additions, make_vehicle
 from gen_data.generator.assets.vehicles.car_design import DESIGNS, ERAS, MODELS, Design
@@ -105,8 +106,6 @@ def draw_car(body: str, era: str, rng: VariantRng) -> Design:
     )
     extras = tuple(word for word, share in words if rng.chance(share) and not design.soft_top)
     bare = rng.chance(time.bare_bumpers)
-    ends = [tuple((p * time.ends, q * time.ends) for p, q in pair)
-            for pair in (design.body_ends, design.house_ends)]  # fmt: skip
     return replace(
         design,
         length_m=design.length_m * long,
@@ -118,8 +117,8 @@ def draw_car(body: str, era: str, rng: VariantRng) -> Design:
         wheel=rng.choose(time.wheels),
         rows=time.rows,
         house_rows=time.house_rows,
-        body_ends=ends[0],
-        house_ends=ends[1],
+        body_ends=_square(design.body_ends, time.ends),
+        house_ends=_square(design.house_ends, time.ends),
         roof_share=design.roof_share + time.roof_share,
         nose_m=design.nose_m + rise,
         cowl_m=design.cowl_m + 0.3 * rise,
@@ -161,6 +160,12 @@ def draw_van(body: str, era: str, rng: VariantRng) -> Design:
         strip=rng.chance(0.5),
         extras=("antenna",) if rng.chance(0.4) else (),
     )
+
+
+def _square(ends: tuple[Point2, Point2], factor: float) -> tuple[Point2, Point2]:
+    """Exponents of a plan times a factor: above 1 its corners are squarer."""
+    (a, b), (c, d) = ends
+    return (factor * a, factor * b), (factor * c, factor * d)
 
 
 def _draw_face(body: str, faces: tuple[str, ...], rng: VariantRng) -> str:

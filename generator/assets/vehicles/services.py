@@ -11,15 +11,20 @@ from gen_data.generator.assets.procedural.surface_shapes import Point2, block
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import tube
 from gen_data.generator.assets.vehicles.bodywork import Additions, make_vehicle
-from gen_data.generator.assets.vehicles.car_design import Design
+from gen_data.generator.assets.vehicles.car_design import Design, read_models
 from gen_data.generator.assets.vehicles.cars import draw_car, draw_van, van_image_m
 from gen_data.generator.assets.vehicles.liveries import livery_ground, livery_id
 from gen_data.generator.assets.vehicles.vehicle_materials import COLORS, Print, materials
 from gen_data.generator.assets.vehicles.vehicle_materials import VehicleSlot as Slot
+from gen_data.generator.core.asset_types import Material
 
-_TAXIS = ("executive 2010s", "sedan 2010s", "estate 2010s", "mpv 2010s", "box_mpv 2020s",
-          "hatchback 2020s", "sedan 2000s", "suv 2020s")  # fmt: skip
-_POLICE = ("estate 2010s", "sedan 2010s", "suv 2020s", "hatchback 2020s", "mpv 2010s")
+_TAXIS = read_models(
+    (
+        "executive 2010s, sedan 2010s, estate 2010s, mpv 2010s, box_mpv 2020s",
+        "hatchback 2020s, sedan 2000s, suv 2020s",
+    )
+)
+_POLICE = read_models(("estate 2010s, sedan 2010s, suv 2020s, hatchback 2020s, mpv 2010s",))
 _PATROLS = ("police_check", "police_blue", "police_dark")
 _AMBULANCES = ("ambulance_check", "ambulance_red", "ambulance_blue")
 _CARRIERS = ("post_yellow", "parcel_brown", "post_red", "parcel_blue")
@@ -29,7 +34,7 @@ _FOODS = ("snacks", "coffee", "ices")
 def taxi(seed: int, steer_deg: float) -> Solid:
     """A taxi with its sign on the roof, in colours of one of several countries."""
     rng = variant_rng("taxi", seed)
-    design = _without_roof_load(draw_car(*in_turn(_TAXIS, seed).split(), rng))
+    design = _without_roof_load(draw_car(*in_turn(_TAXIS, seed), rng))
     paint, sign = (hex_to_linear(code) for code in in_turn(COLORS["taxis"], seed).split())
     finish = materials(rng, paint, printed=Print(fixed=True, sign=sign))
     middle, top = _roof_m(design, 0.35), design.height_m
@@ -44,7 +49,7 @@ def taxi(seed: int, steer_deg: float) -> Solid:
 def police_car(seed: int, steer_deg: float) -> Solid:
     """A police car with a light bar."""
     rng = variant_rng("police_car", seed)
-    design = _without_roof_load(draw_car(*in_turn(_POLICE, seed).split(), rng))
+    design = _without_roof_load(draw_car(*in_turn(_POLICE, seed), rng))
     kind = in_turn(_PATROLS, seed)
     finish = _printed(kind, seed, rng)
     image = (
@@ -111,7 +116,7 @@ def _service_van(
     return make_vehicle(design, steer_deg, _printed(kind, seed, rng), additions)
 
 
-def _printed(kind: str, seed: int, rng: VariantRng) -> tuple:
+def _printed(kind: str, seed: int, rng: VariantRng) -> tuple[Material, ...]:
     """Materials in the colours of a service."""
     second = hex_to_linear(rng.choose(COLORS["awnings"]))
     printed = Print(livery_id(kind, seed), fixed=True)
