@@ -105,7 +105,7 @@ def street_materials(look: StreetLook) -> dict[str, Material]:
     white = textured_material(line, "marking", 0.75)
     base = textured_material(f"asphalt?{age}&seed={stone}&wear={worn}", "asphalt", 0.92)
     newer = textured_material(
-        f"asphalt?age_years=1.5&seed={(stone + 1) % 4}&wear=0", "asphalt", 0.88
+        f"asphalt?{_repaired(look)}&seed={(stone + 1) % 4}&wear=0", "asphalt", 0.88
     )
     slots = {
         "asphalt": _driven(look, base),
@@ -156,9 +156,14 @@ def _lane_slots(look: StreetLook, base: Material, stone: int, age: str) -> dict[
         track = textured_material(f"track_lane?material={kind}&seed={stone}", "asphalt", 0.97)
         return dict.fromkeys(LANE_SLOTS, track)
     ids = [f"{kind}_lane?{age}&damage={damage}&seed={stone}" for damage in DAMAGES]
-    ids.append(f"{kind}_lane?age_years=1.5&damage=none&seed={(stone + 1) % 4}")
+    ids.append(f"{kind}_lane?{_repaired(look)}&damage=none&seed={(stone + 1) % 4}")
     made = (textured_material(name, "asphalt", 0.92) for name in ids)
     return dict(zip(LANE_SLOTS, made, strict=True))
+
+
+def _repaired(look: StreetLook) -> str:
+    """Age of patches and stretches paved anew, as a parameter."""
+    return f"age_years={(1.5, 3.0)[look.seed % 2]:g}"
 
 
 def _tinted(material: Material, color: Vec3) -> Material:

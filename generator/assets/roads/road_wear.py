@@ -62,7 +62,8 @@ def wear_patches(deck: Deck, profile: RoadShape, wear: float, rng: VariantRng) -
         if high - low > 1.5:
             yield _crack(deck, profile.length_m, low, high, rng)
     yield from _seams(deck, profile, wear, rng)
-    if wear > 0.25 and rng.chance(wear) and profile.lanes_on(1) and profile.lanes_on(-1):
+    two_way = profile.lanes_on(1) and profile.lanes_on(-1) and profile.median_m <= 0.0
+    if wear > 0.25 and rng.chance(wear) and two_way:
         # The middle was elsewhere once: its line is ground off, its trace is left.
         t = rng.choose((-1.0, 1.0)) * rng.between(0.3, 0.9)
         for patch in paint_stripe(deck, Stripe(t, NARROW_M, 3.0, 6.0), profile.length_m):
