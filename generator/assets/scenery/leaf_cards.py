@@ -123,11 +123,6 @@ def first_cards(cards: Cards, count: int) -> Cards:
     return Cards(**{field.name: getattr(cards, field.name)[:count] for field in fields(Cards)})
 
 
-def moved_cards(cards: Cards, offset_m: Sequence[float]) -> Cards:
-    """The cards translated [m]."""
-    return replace(cards, foot_m=cards.foot_m + np.array(offset_m))
-
-
 def leaf_material(kind: str, color: str, level: float = 1.0, warm: float = 1.0) -> Material:
     """Leaves of ``textures.leaves`` in an sRGB colour.
 

@@ -15,7 +15,13 @@ from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Facts, Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear, patterned_material
 from gen_data.generator.assets.procedural.noise import uniform
-from gen_data.generator.assets.procedural.patches import Array, Patch, finish_mesh, join_patches
+from gen_data.generator.assets.procedural.patches import (
+    Array,
+    Indices,
+    Patch,
+    finish_mesh,
+    join_patches,
+)
 from gen_data.generator.assets.procedural.surface_shapes import ball, block
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.assets.scenery.foliage import directions, merge_meshes
@@ -42,6 +48,8 @@ leaf, hazel, copper beech."""
 _PETALS = ("#d8505c", "#e8d4ea", "#ecc04a", "#b060b4", "#f2efe8", "#e07a3c", "#7a6cc8")
 _STRAW = ("#8f9a58", "#a39c62", "#7d8f4c", "#b3a672", "#6f8546")
 _SOFTNESS = 0.6
+_Ball = tuple[float, float, float, float]
+"""Centre and radius [m]."""
 
 
 def hedge(seed: int) -> Solid:
@@ -196,16 +204,14 @@ def _wild_hedge(long: float, rng: VariantRng) -> Solid:
 
 
 def _lobed(
-    lobes: Sequence[tuple[float, float, float, float]],
+    lobes: Sequence[_Ball],
     height: float,
     green: int,
     flowers: str,
     rng: VariantRng,
 ) -> Solid:
     """A plant that fills balls (x, y, z, radius), with opaque cores inside them."""
-    cores = [
-        ball(lambda d, r=r, at=(x, y, z): 0.72 * r * d + np.array(at), 5, 7) for x, y, z, r in lobes
-    ]
+    cores = [ball(lambda d: d, 5, 7).scaled(k, k, k).moved(x, y, z) for x, y, z, k in _inner(lobes)]
     size = min(0.42, 0.16 + 0.16 * height)
     parts = []
     for x, y, z, r in lobes:
@@ -220,6 +226,11 @@ def _lobed(
         parts.append(cards_about(at, outward, sizes, slots, 0.35, rng))
     low = [replace(core, corners_m=np.maximum(core.corners_m, [-9.0, -9.0, 0.0])) for core in cores]
     return _planted(low, join_cards(parts), _GREENS[green], rng, flowers)
+
+
+def _inner(lobes: Sequence[_Ball]) -> list[_Ball]:
+    """The opaque balls inside of balls of leaves."""
+    return [(x, y, z, 0.72 * r) for x, y, z, r in lobes]
 
 
 def _planted(
@@ -240,7 +251,7 @@ def _leaves(kind: str, codes: Sequence[str], rng: VariantRng) -> tuple[Material,
     return tuple(leaf_material(kind, code, level, warm) for code in codes)
 
 
-def _shades(count: int, rng: VariantRng) -> Array:
+def _shades(count: int, rng: VariantRng) -> Indices:
     return (uniform(count, rng) * 3.0).astype(np.int64)
 
 
