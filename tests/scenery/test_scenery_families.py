@@ -16,8 +16,8 @@ from tests.scenery.clutter_limits import CLUTTER
 
 # Height range [m] of real ones, and the largest number of triangles that a street affords.
 LIMITS = {
-    "building/residential": (8.0, 24.0, 6000), "building/old_town": (12.0, 28.0, 6000),
-    "building/modern": (9.0, 24.0, 6000), "building/commercial": (7.0, 30.0, 6000),
+    "building/residential": (8.0, 24.0, 6000), "building/old_town": (12.0, 28.0, 6500),
+    "building/modern": (9.0, 24.0, 6500), "building/commercial": (7.0, 30.0, 6500),
     "building/house": (5.0, 14.0, 6000), "garage": (2.5, 3.2, 6000),
     "building/villa": (7.0, 22.0, 6000), "building/farmhouse": (5.0, 19.0, 6000),
     "building/warehouse": (4.5, 22.0, 6000), "building/office": (9.0, 34.0, 7000),

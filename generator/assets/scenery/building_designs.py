@@ -107,6 +107,8 @@ class Design:
         return self.ground_m + (self.floors - 1) * self.storey_m
 
 
+_PLAIN_FROM = 19
+"""Fronts of more windows than this have plainer ones, so that no mesh is large."""
 _STYLES = load_table(__package__, "building_styles", dict)
 _COLORS = load_table(__package__, "building_colors", tuple[str, ...])
 
@@ -120,6 +122,12 @@ def draw_design(style: str, seed: int) -> Design:
     values["width_m"] = round(min(high, max(low, bays * bay_m)), 2)
     if "pier_m" in values:
         values["window_m"] = (round(bay_m - values.pop("pier_m"), 2), values["window_m"][1])
+    if values["cladding"] in ("sheet", "panels", "boards"):
+        values["arched"] = False
+    if bays * values["floors"] > _PLAIN_FROM:
+        panes = (min(2, values["panes"][0]), min(2, values["panes"][1]))
+        values |= {"arched": False, "fittings": min(0.2, values["fittings"]), "panes": panes}
+        values["surround"] = "none" if values.get("trimmed") else values.get("surround", "none")
     if values.get("wing", 0) >= bays:
         values["wing"] = 0
     values["oriel"] = {"middle": bays // 2, "last": bays - 2}.get(values.get("oriel", ""), -1)
@@ -166,6 +174,7 @@ def building_materials(plan: Design, seed: int, region: str = "any") -> tuple[Ma
     cloth = _COLORS["cloth_" + ("shops" if plan.shops else plan.shutters)]
     seam = rng.choose(_COLORS["seams_flat" if plan.roof == "flat" else "seams"])
     kind = "office" if plan.style in ("office", "campus", "tower", "commercial") else "home"
+    other = "office" if plan.style in ("office", "campus") else "home"
     views = [int(rng.random() * VIEWS) for _ in range(2)]
     prints = [f"texture/{name}?seed={int(rng.random() * PRINTS)}" for name in
               ("shop_sign", "wall_advert", "graffiti")]  # fmt: skip
@@ -177,7 +186,7 @@ def building_materials(plan: Design, seed: int, region: str = "any") -> tuple[Ma
         _plain_material(frame, 0.45, "trim"),
         Material((0.012, 0.016, 0.019), roughness=0.04, specular=1.0, role="window"),
         _glass_material(f"texture/window_view?seed={views[0]}&kind={kind}"),
-        _glass_material(f"texture/window_view?seed={views[1]}&kind=home"),
+        _glass_material(f"texture/window_view?seed={views[1]}&kind={other}"),
         _glass_material(f"texture/window_view?seed={display}&kind=shop"),
         _plain_material(rng.choose(_COLORS["doors"]), 0.5, "trim"),
         Material(hex_to_linear(seam), roughness=0.5, metallic=0.6, role="chrome"),

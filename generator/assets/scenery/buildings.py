@@ -11,10 +11,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.family import Facts, Solid
-from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
+from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.assets.scenery import facade, other_sides, roofs, street_side
@@ -89,8 +90,9 @@ def _map_gables(roof: Patch) -> Patch:
     return Patch(roof.corners_m, np.where(_is_wall(roof), uvs, roof.uvs), roof.slots)
 
 
-def _is_wall(patch: Patch) -> Array:
-    return (patch.slots == FACADE)[:, None, None]
+def _is_wall(patch: Patch) -> NDArray[np.bool_]:
+    walls: NDArray[np.bool_] = patch.slots == FACADE
+    return walls[:, None, None]
 
 
 def _mirrored(patch: Patch) -> Patch:

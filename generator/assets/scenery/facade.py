@@ -259,7 +259,7 @@ def garage_door(opening: Opening) -> Patch:
     return join_patches([reveal(opening, opening.recess_m + 0.01), back, *panels])
 
 
-def railing(y_m: Span, z0: float, x: float, pitch_m: float = 0.17) -> Patch:
+def railing(y_m: Span, z0: float, x: float, pitch_m: float = 0.2) -> Patch:
     """Upright bars between two rails, in the plane x."""
     (y0, y1), top = y_m, z0 + 0.95
     at = np.linspace(y0 + 0.02, y1 - 0.02, max(2, round((y1 - y0) / pitch_m)))
@@ -278,7 +278,7 @@ def balcony(y_m: Span, z0: float, out_m: float, *, solid: bool) -> Patch:
         sides = [(x, out_m, y0, y1, z0, top), (0.0, x, y0, y0 + t, z0, top),
                  (0.0, x, y1 - t, y1, z0, top)]  # fmt: skip
         return join_patches([slab, ledges(sides, AWNING)])
-    side = railing((-out_m + 0.04, 0.0), z0, 0.0, pitch_m=0.2).rotated("z", 0.5 * math.pi)
+    side = railing((-out_m + 0.04, 0.0), z0, 0.0, pitch_m=0.25).rotated("z", 0.5 * math.pi)
     ends = [side.moved(y=y) for y in (y0 + 0.02, y1 - 0.02)]
     return join_patches([slab, railing(y_m, z0, out_m - 0.04), *ends])
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gen_data.generator.assets.procedural.patches import Patch, join_patches
+from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import circle, fan, grid, lathe
 from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.assets.scenery.basic_shapes import Span, post, quad
@@ -228,7 +228,7 @@ def _tag(y: float, rng: VariantRng) -> Patch:
     return join_patches(strokes)
 
 
-def _stroke(y: np.ndarray, z: np.ndarray, width_m: float, slot: int) -> Patch:
+def _stroke(y: Array, z: Array, width_m: float, slot: int) -> Patch:
     """A straight stroke between two points, facing +X."""
     along = np.array([y[1] - y[0], z[1] - z[0]])
     along = along / max(1e-6, math.hypot(*along))
@@ -239,24 +239,33 @@ def _stroke(y: np.ndarray, z: np.ndarray, width_m: float, slot: int) -> Patch:
 
 
 def ivy(y_m: Span, top_m: float, rng: VariantRng) -> Patch:
-    """A climber from the ground: ragged leaves in layers, denser below."""
+    """A climber from the ground up: rows of overlapping cushions, ragged and narrower above."""
     (y0, y1), parts = y_m, []
-    for _ in range(rng.choose((12, 18, 26))):
-        # Spread over the wall, sparser and smaller towards the top.
-        share = rng.random() ** 1.5
-        z = 0.3 + share * (top_m - 0.8)
-        size = rng.between(0.9, 2.4) * (1.1 - 0.6 * share)
-        reach = 0.5 * (y1 - y0) * (1.0 - 0.5 * share)
-        y = 0.5 * (y0 + y1) + rng.between(-1.0, 1.0) * max(0.1, reach - 0.5 * size)
-        outline = blotch(y, z, (size, 1.2 * size), rng)
-        outline[:, 1] = np.clip(outline[:, 1], 0.0, top_m)
-        centre = outline.mean(axis=0)
-        bulge = rng.between(0.06, 0.14)
-        ring = np.insert(outline, 0, 0.01, axis=1)
-        inner = np.insert(centre + 0.6 * (outline - centre), 0, bulge, axis=1)
-        rows = np.stack([np.concatenate([loop, loop[:1]]) for loop in (ring, inner)])
-        parts += [without_slivers(grid(rows, slot=PLANT)), without_slivers(fan(inner, PLANT))]
+    middle, rows = 0.5 * (y0 + y1), max(3, min(7, round(top_m / 1.1)))
+    for row in range(rows):
+        share = row / rows
+        wide = (y1 - y0) * (1.0 - 0.6 * share * rng.between(0.5, 1.0))
+        drift = 0.15 * (y1 - y0) * rng.between(-1.0, 1.0) * share
+        count = max(2, min(4, round(wide / 0.9)))
+        for k in range(count):
+            y = middle + drift + wide * ((k + rng.between(0.3, 0.7)) / count - 0.5)
+            z = top_m * share + rng.between(0.1, 0.6)
+            size = (1.7 * wide / count, rng.between(1.6, 2.4) * top_m / rows)
+            # No leaf hangs in the air beyond the end of the wall.
+            y = min(max(y, y0 + 0.5 * size[0]), max(y0 + 0.5 * size[0], y1 - 0.5 * size[0]))
+            outline = blotch(y, z, size, rng)
+            outline[:, 1] = np.clip(outline[:, 1], 0.0, top_m)
+            parts += _cushion(outline, rng.between(0.05, 0.14))
     return join_patches(parts)
+
+
+def _cushion(outline: Array, bulge_m: float) -> list[Patch]:
+    """Leaves over an outline (y, z), which stand off the wall in the middle."""
+    centre = outline.mean(axis=0)
+    ring = np.insert(outline, 0, 0.01, axis=1)
+    inner = np.insert(centre + 0.6 * (outline - centre), 0, bulge_m, axis=1)
+    rim = np.stack([np.concatenate([loop, loop[:1]]) for loop in (ring, inner)])
+    return [without_slivers(grid(rim, slot=PLANT)), without_slivers(fan(inner, PLANT))]
 
 
 def aerial(rng: VariantRng) -> Patch:

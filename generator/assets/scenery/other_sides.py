@@ -22,7 +22,7 @@ def side(plan: Design, rng: VariantRng) -> Patch:
     extras = []
     half = 0.5 * plan.depth_m
     if rng.chance(0.3 * plan.age):
-        extras.append(fittings.ivy((-half, rng.between(-0.4, 0.2) * half), 0.7 * plan.eaves_m, rng))
+        extras.append(fittings.ivy((-half, rng.between(-0.3, 0.3) * half), 0.7 * plan.eaves_m, rng))
     if plan.style == "warehouse" and rng.chance(0.5):
         extras += fittings.graffiti((-half + 0.5, half - 0.5), rng)
     return join_patches([wall, *extras])
@@ -51,10 +51,9 @@ def _firewall(plan: Design, rng: VariantRng) -> Patch:
             rim = [(0.0, 0.06, y - 0.1, y + size + 0.1, z - 0.1, z + size + 0.1)]
             parts += [ledges(rim, METAL), shop_fronts.poster(0.065, at, size, rng)]
     elif kind == "ivy":
-        a = rng.between(-half, 0.0)
-        parts.append(
-            fittings.ivy((a, rng.between(a + 2.5, half)), rng.between(0.5, 0.95) * top, rng)
-        )
+        wide = rng.between(0.5, 1.6) * half
+        a = rng.between(-half, half - wide)
+        parts.append(fittings.ivy((a, a + wide), rng.between(0.5, 0.95) * top, rng))
     else:
         parts += fittings.repairs((-half + 0.3, half - 0.3), (0.4, top - 0.4), 1.0 + plan.age, rng)
     if rng.chance(0.4) and kind != "ivy":

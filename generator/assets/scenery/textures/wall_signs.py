@@ -6,6 +6,7 @@ Names are invented or plain words of a trade.
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from gen_data.generator.assets.procedural.noise import fbm, smoothstep
 from gen_data.generator.assets.procedural.textures import artwork as art
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import TextureData
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 BOARDS, ADVERTS = 4, 2
 """Boards above one another in ``shop_sign``; adverts along each side of ``wall_advert``."""
@@ -30,7 +34,7 @@ def shop_sign(seed: int) -> TextureData:
     return _soiled(art.resize_texture(sheet, 512, 512), 0.06, rng)
 
 
-def _board(rng: VariantRng) -> art.Image:
+def _board(rng: VariantRng) -> Image:
     """One board: a name, and a frame, a line or a mark."""
     ground, ink, line = (hex_to_srgb8(code) for code in rng.choose(_WORDS["schemes"]).split())
     image = art.canvas(1024, 256, ground)
@@ -65,7 +69,7 @@ def wall_advert(seed: int) -> TextureData:
     return _soiled(art.resize_texture(sheet, 512, 512), 0.12, rng)
 
 
-def _advert(rng: VariantRng) -> art.Image:
+def _advert(rng: VariantRng) -> Image:
     ground, other, ink = (hex_to_srgb8(code) for code in rng.choose(_WORDS["boards"]).split())
     image = art.canvas(512, 512, ground)
     art.gradient(image, ground, other if rng.chance(0.5) else ground)

@@ -57,12 +57,14 @@ class View:
     def box(self, x0: float, y0: float, x1: float, y1: float) -> Float32:
         """Cover of a rectangle."""
         inside = (self.x >= x0) & (self.x < x1) & (self.y >= y0) & (self.y < y1)
-        return inside.astype(np.float32)
+        cover: Float32 = inside.astype(np.float32)
+        return cover
 
     def disc(self, x: float, y: float, rx: float, ry: float) -> Float32:
         """Cover of an ellipse with a soft rim."""
         away = ((self.x - x) / rx) ** 2 + ((self.y - y) / ry) ** 2
-        return np.clip((1.0 - away) * 3.0, 0.0, 1.0).astype(np.float32)
+        cover: Float32 = np.clip((1.0 - away) * 3.0, 0.0, 1.0).astype(np.float32)
+        return cover
 
     def glow(self, x: float, y: float, radius: float, level: float, tint: Float32) -> None:
         """Add light around a lamp."""
