@@ -180,7 +180,7 @@ def trailer(seed: int) -> Solid:
                 6,
             )
         )
-        made = _paint_wheel(wheel(0.29, 0.16, 0))
+        made = _paint_wheel(wheel(0.29, 0.16, "steel"))
         placed = made if side > 0 else made.rotated("z", math.pi)
         parts.append(placed.moved(-0.1, side * (wide + 0.12), 0.29))
         turn = np.linspace(0.15 * math.pi, 0.85 * math.pi, 6)
