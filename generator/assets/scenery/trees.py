@@ -54,8 +54,8 @@ _CARDS_MAX = 2600
 """Sprays on a tree in full leaf; larger crowns have larger ones."""
 _TWIGS = 1100
 _COVER = 0.58
-"""Share of a card that counts as leaf, fitted so that 0.9 to 0.99 of level rays through the middle of
-a crown meet one."""
+"""Share of a card that counts as leaf, fitted so that 0.9 to 0.99 of level rays through the middle
+of a crown meet one."""
 _LEAF_LEVEL = 1.45
 """Leaves in the textures have this part of the colours in ``species.yaml``, inverted."""
 _ATTRACTORS = 900
