@@ -33,7 +33,7 @@ from gen_data.generator.renderers.warp.scene.environment_maps import (
 from gen_data.generator.renderers.warp.visibility.distortion_lut import DeviceOptics, upload_optics
 
 _MESH_BYTES = 176 << 20
-_TEXTURE_BYTES = 160 << 20
+_TEXTURE_BYTES = 384 << 20
 _ENVIRONMENT_BYTES = 32 << 20
 _OPTICS_BYTES = 192 << 20
 _LENSES = 64

@@ -5,6 +5,7 @@ Bodies with cut-outs are ray-traced into the z-buffer of rasterised images.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -19,6 +20,8 @@ from gen_data.generator.renderers.warp.scene.kernels import ray_queries, records
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
 from gen_data.generator.renderers.warp.visibility.kernels import label_resolve, rasterizer
 
+_ROUNDING = 1e-4
+"""Relative error of depths in single precision, and a margin."""
 CORNERS = np.array([[(k >> axis) & 1 for axis in range(3)] for k in range(8)])
 """For each corner of a box, whether it is at the high end of each axis, [8, 3]."""
 
@@ -43,11 +46,15 @@ def trace_over(
     from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
 
     device = hits.device
-    boxes = [project_window(world.body_records, number, view) for number in seen.tolist()]
-    rows = [
-        (number, (box.x_min, box.y_min, box.width_px, box.height_px))
-        for number, box in zip(seen.tolist(), boxes, strict=True)
-    ]
+    # Nearest first, so that whatever hides the bodies behind is known before their turn.
+    near_m = box_corners(world.body_records[seen], view)[:, 2].min(axis=1)
+    order = np.argsort(near_m, kind="stable")
+    rows = []
+    for number, z_m in zip(seen[order].tolist(), near_m[order].tolist(), strict=True):
+        box = project_window(world.body_records, number, view)
+        nearness_max = 1.0 / (z_m * (1.0 - _ROUNDING)) if z_m > rasterizer.Z_NEAR_M else math.inf
+        window = (box.x_min, box.y_min, box.width_px, box.height_px)
+        rows.append((number, window, nearness_max))
     values = np.array(rows, dtype=alpha_cutouts.CutoutBody.numpy_dtype())
     bodies = wp.array(values, dtype=alpha_cutouts.CutoutBody, device=device)
     inputs = [view, world.record, bodies, rasterizer.Z_NEAR_M]

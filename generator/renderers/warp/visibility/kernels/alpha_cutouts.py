@@ -25,10 +25,11 @@ FARTHEST = wp.constant(1.0e6)
 
 @wp.struct
 class CutoutBody:
-    """A body with cut-outs and the window of pixels that it may cover."""
+    """A body with cut-outs, the window of pixels that it may cover, and its largest 1/z."""
 
     body: int
     window: Window
+    nearness_max: float
 
 
 @wp.func
@@ -80,12 +81,13 @@ def trace_centres(
         if y >= window.y0 and y < window.y0 + window.height:
             for x in range(wp.max(window.x0, 0), wp.min(window.x0 + window.width, view.width)):
                 i = y * view.width + x
-                near, face = trace_nearness(
-                    view, world, b, float(x) + 0.5, float(y) + 0.5, z_near_m, nearness[i]
-                )
-                if near > nearness[i]:
-                    nearness[i] = near
-                    hits[i] = wp.vec2i(b, face)
+                if nearness[i] < bodies[k].nearness_max:
+                    near, face = trace_nearness(
+                        view, world, b, float(x) + 0.5, float(y) + 0.5, z_near_m, nearness[i]
+                    )
+                    if near > nearness[i]:
+                        nearness[i] = near
+                        hits[i] = wp.vec2i(b, face)
 
 
 @wp.kernel
@@ -111,12 +113,15 @@ def trace_samples(
         b = bodies[k].body
         if is_in_window(bodies[k].window, x, y):
             for s in range(offsets.shape[0]):
-                x_px = float(x) + offsets[s][0]
-                y_px = float(y) + offsets[s][1]
-                near, face = trace_nearness(view, world, b, x_px, y_px, z_near_m, nearness[row, s])
-                if near > nearness[row, s]:
-                    nearness[row, s] = near
-                    hits[row, s] = wp.vec2i(b, face)
+                if nearness[row, s] < bodies[k].nearness_max:
+                    x_px = float(x) + offsets[s][0]
+                    y_px = float(y) + offsets[s][1]
+                    near, face = trace_nearness(
+                        view, world, b, x_px, y_px, z_near_m, nearness[row, s]
+                    )
+                    if near > nearness[row, s]:
+                        nearness[row, s] = near
+                        hits[row, s] = wp.vec2i(b, face)
 
 
 @wp.kernel
