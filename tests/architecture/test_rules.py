@@ -51,6 +51,7 @@ UNBOUNDED_CACHES = {
     "image_pipeline.py: _preset",
     "label_map.py: public_classes",
     "nuscenes_classes.py: _index",
+    "person.py: _pose_lots",
     "plugins.py: third_party",
     # By a setting of the run.
     "device.py: compile_kernels",
