@@ -76,12 +76,7 @@ def tree_line(seed: int, season: str) -> Solid:
         at = -rng.between(0.5, 6.0) - radius
         crowns.append(_Crown(at, y, height, radius, conifer, int(rng.between(0, 4))))
         y += rng.between(0.6, 1.5) * radius
-    count = round(0.9 * TREE_LINE_M)
-    bushes = [
-        _Crown(-rng.between(0.5, 5.0), (k / count - 0.5) * TREE_LINE_M, h, 0.75 * h, False,
-               int(rng.between(0, 4)))
-        for k, h in enumerate(rng.between(1.5, 4.0) for _ in range(count))
-    ]  # fmt: skip
+    bushes = _draw_bushes(TREE_LINE_M, 0.9, (1.5, 4.0), 0.75, 5.0, rng)
     return _stand(crowns, bushes, season, (1.9, 38), rng)
 
 
@@ -105,13 +100,25 @@ def forest(seed: int, season: str) -> Solid:
             x = -3.0 - 7.0 * row - rng.between(0.0, 4.0)
             crowns.append(_Crown(x, y, height, radius, conifer, int(rng.between(0, 4))))
             y += rng.between(0.5, 0.9) * radius
-    count = round(0.5 * FOREST_M)
-    edge = [
-        _Crown(-rng.between(0.5, 4.0), (k / count - 0.5) * FOREST_M, h, 0.8 * h, False,
-               int(rng.between(0, 4)))
-        for k, h in enumerate(rng.between(2.0, 6.0) for _ in range(count))
-    ]  # fmt: skip
+    edge = _draw_bushes(FOREST_M, 0.5, (2.0, 6.0), 0.8, 4.0, rng)
     return _stand(crowns, edge, season, (2.8, 22), rng)
+
+
+def _draw_bushes(
+    length_m: float,
+    per_m: float,
+    heights_m: tuple[float, float],
+    radius_share: float,
+    depth_m: float,
+    rng: VariantRng,
+) -> list[_Crown]:
+    """Bushes evenly along the front; their radius is a share of their height."""
+    count = round(per_m * length_m)
+    return [
+        _Crown(-rng.between(0.5, depth_m), (k / count - 0.5) * length_m, height,
+               radius_share * height, False, int(rng.between(0, 4)))
+        for k, height in enumerate(rng.between(*heights_m) for _ in range(count))
+    ]  # fmt: skip
 
 
 def hill(seed: int, season: str) -> Solid:
