@@ -26,6 +26,7 @@ def pipeline() -> Iterator[Pipeline]:
     """With small images of a clear day."""
     overrides = [
         "sensors.dash.size_px=[240, 136]",
+        "shared.district=arterial",
         "shared.weather=CloudyNoon",
         "randomizers.people.count=4",
     ]
@@ -88,9 +89,7 @@ def test_a_drive_bends_the_image_and_blurs_it(pipeline: Pipeline, sample: Sample
     others = rolled.channels[Channel.INSTANCE] != instant.channels[Channel.INSTANCE]
     middle = SIZE_PX[1] // 2
     assert others.sum() > 100
-    # Rows away from the middle, with as many edges, were exposed 2 ms earlier or later.
-    away = np.concatenate([others[middle - 14 : middle - 6], others[middle + 6 : middle + 14]])
-    assert others[middle - 1 : middle + 1].mean() < 0.5 * away.mean()
+    assert others[middle - 1 : middle + 1].sum() <= 4
     assert detail(rolled.channels[Channel.RGB]) < 0.95 * detail(instant.channels[Channel.RGB])
 
 
