@@ -85,7 +85,7 @@ def test_whatever_is_drawn_was_projected() -> None:
         projected = project_vertices(world, view, cache)
         narrow = bodies_within(world.body_records, view, 0.0)
         apart += len(np.setdiff1d(narrow, projected.reached))
-        assert np.isin(projected.in_view, projected.reached).all()
+        assert np.isin(projected.in_view.numpy()["body"], projected.reached).all()
     assert apart > 0
 
 

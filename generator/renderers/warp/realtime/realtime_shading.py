@@ -43,11 +43,7 @@ from gen_data.generator.renderers.warp.scene.light_selection import (
     extract_sky_lights,
     keep_main_lamps,
 )
-from gen_data.generator.renderers.warp.visibility.gbuffer import (
-    Projected,
-    has_cutouts,
-    trace_over,
-)
+from gen_data.generator.renderers.warp.visibility.gbuffer import Projected
 from gen_data.generator.renderers.warp.visibility.kernels import (
     distortion,
     edge_antialiasing,
@@ -177,14 +173,9 @@ def _draw_samples(
     hits = wp.full(shape, wp.vec2i(-1, -1), dtype=wp.vec2i, device=cache.device)
     window = rasterizer.Window()
     window.width, window.height = view.width, view.height
-    cutouts = has_cutouts(world.body_records)[projected.in_view]
-    bodies = wp.array(projected.in_view[~cutouts], dtype=wp.int32, device=cache.device)
-    inputs = [view, window, world.record, bodies, projected.p_camera, projected.xy]
+    inputs = [view, window, world.record, projected.in_view, projected.p_camera, projected.xy]
     inputs += [numbers, floors, cache.constant(wp.vec2i, _offsets, samples)]
-    frame.launch(mixing.draw_samples, len(bodies), inputs, [nearness, hits])
-    if cutouts.any():
-        traced = (pixels, pixel_samples(samples))
-        trace_over(world, view, projected.in_view[cutouts], nearness, hits, traced)
+    frame.launch(mixing.draw_samples, len(projected.in_view), inputs, [nearness, hits])
     return hits
 
 

@@ -33,9 +33,7 @@ from gen_data.generator.renderers.warp.visibility.gbuffer import (
     CORNERS,
     Projected,
     canvas_box,
-    has_cutouts,
     project_vertices,
-    trace_outlines,
 )
 from gen_data.generator.renderers.warp.visibility.kernels.amodal import draw_silhouettes
 from gen_data.generator.renderers.warp.visibility.kernels.amodal_lens import trace_silhouettes
@@ -79,13 +77,9 @@ def _rasterize_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.ui
     }
     outlines, size = _outline_records(scene, boxes, whole)
     mask = wp.zeros(size, dtype=wp.uint8, device=cache.device)
-    cutouts = has_cutouts(world.body_records)[outlines["body"]]
-    if not cutouts.all():
-        drawn_into = wp.array(outlines[~cutouts], dtype=Outline, device=cache.device)
-        inputs = [view, world.record, projected.p_camera, projected.xy, drawn_into]
-        frame.launch(draw_silhouettes, len(drawn_into), inputs, [mask])
-    if cutouts.any():
-        trace_outlines(world, view, outlines[cutouts], mask)
+    outlines_ = wp.array(outlines, dtype=Outline, device=cache.device)
+    inputs = [view, world.record, projected.p_camera, projected.xy, outlines_]
+    frame.launch(draw_silhouettes, len(outlines), inputs, [mask])
     drawn: NDArray[np.uint8] = mask.numpy()
     return boxes, drawn
 

@@ -1,11 +1,7 @@
-"""G-buffer: the visible surface at every pixel centre.
-
-Bodies with cut-outs are ray-traced into the z-buffer of rasterised images.
-"""
+"""G-buffer: the visible surface at every pixel centre."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -31,57 +27,24 @@ def has_cutouts(body_records: NDArray[np.void]) -> NDArray[np.bool_]:
     return np.asarray((body_records["cutouts"] & int(records.HOLES)) != 0)
 
 
-def trace_over(
-    world: PackedWorld,
-    view: records.View,
-    seen: NDArray[np.int32],
-    nearness: wp.array,
-    hits: wp.array,
-    samples: tuple[wp.array, Array] | None = None,
-) -> None:
-    """Add listed bodies to a z-buffer of pixel centres, or of samples, in place.
+def list_drawn(
+    world: PackedWorld, view: records.View, seen: NDArray[np.int32], device: wp.Device
+) -> wp.array:
+    """DrawnBody records of bodies, in the order of drawing.
 
-    ``samples`` are listed pixels and the positions of samples in each.
+    Bodies with cut-outs come last, nearest first: few of their pixels then need the alpha test.
     """
-    from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
-
-    device = hits.device
-    # Nearest first, so that whatever hides the bodies behind is known before their turn.
-    near_m = box_corners(world.body_records[seen], view)[:, 2].min(axis=1)
-    order = np.argsort(near_m, kind="stable")
-    rows = []
-    for number, z_m in zip(seen[order].tolist(), near_m[order].tolist(), strict=True):
-        box = project_window(world.body_records, number, view)
-        nearness_max = 1.0 / (z_m * (1.0 - _ROUNDING)) if z_m > rasterizer.Z_NEAR_M else math.inf
-        window = (box.x_min, box.y_min, box.width_px, box.height_px)
-        rows.append((number, window, nearness_max))
-    values = np.array(rows, dtype=alpha_cutouts.CutoutBody.numpy_dtype())
-    bodies = wp.array(values, dtype=alpha_cutouts.CutoutBody, device=device)
-    inputs = [view, world.record, bodies, rasterizer.Z_NEAR_M]
-    kernel, count = alpha_cutouts.trace_centres, view.height
-    if samples is not None:
-        pixels, parts = samples
-        inputs += [pixels, wp.array(parts, dtype=wp.vec2, device=device)]
-        kernel, count = alpha_cutouts.trace_samples, len(pixels)
-    wp.launch(kernel, count, inputs, [nearness, hits], device=device)
-
-
-def trace_outlines(
-    world: PackedWorld, view: records.View, outlines: NDArray[np.void], mask: wp.array
-) -> None:
-    """Draw silhouettes of bodies with cut-outs into the mask pixels of their Outline records."""
-    from gen_data.generator.renderers.warp.visibility.kernels import alpha_cutouts
-
-    for outline in outlines:
-        x0, y0, width, height = outline["window"].tolist()
-        around = BoxPx(x0, y0, x0 + width, y0 + height)
-        box = project_window(world.body_records, outline["body"], view).intersection(around)
-        outline["first_pixel"] += (box.y_min - y0) * outline["stride"] + box.x_min - x0
-        outline["window"] = (box.x_min, box.y_min, box.width_px, box.height_px)
-    shape = (len(outlines), int(outlines["window"]["height"].max(initial=0)))
-    listed = wp.array(outlines, dtype=rasterizer.Outline, device=mask.device)
-    inputs = [view, world.record, listed, rasterizer.Z_NEAR_M]
-    wp.launch(alpha_cutouts.trace_outlines, shape, inputs, [mask], device=mask.device)
+    windows, near_m = project_windows(world.body_records[seen], view)
+    values = np.zeros(len(seen), dtype=rasterizer.DrawnBody.numpy_dtype())
+    values["body"] = seen
+    for name, column in zip(("x0", "y0", "width", "height"), windows.T, strict=True):
+        values["window"][name] = column
+    with np.errstate(divide="ignore"):
+        nearness_max = 1.0 / (np.maximum(near_m, 0.0) * (1.0 - _ROUNDING))
+    values["nearness_max"] = np.where(near_m > rasterizer.Z_NEAR_M, nearness_max, np.inf)
+    cutouts = has_cutouts(world.body_records[seen])
+    order = np.lexsort((np.where(cutouts, near_m, 0.0), cutouts))
+    return wp.array(values[order], dtype=rasterizer.DrawnBody, device=device)
 
 
 def canvas_box(view: records.View) -> BoxPx:
@@ -97,16 +60,28 @@ def box_corners(body_records: NDArray[np.void], view: records.View) -> Array:
     return np.asarray(np.einsum("nki,ij->njk", corners, R_world_camera, optimize=False))
 
 
-def project_window(body_records: NDArray[np.void], body: int, view: records.View) -> BoxPx:
-    """Pixels that a body may cover before a pinhole; may lie outside the image."""
-    ((x, y, z),) = box_corners(body_records[[body]], view)
-    if z.min() < rasterizer.Z_NEAR_M:
-        return canvas_box(view)
+def project_windows(
+    body_records: NDArray[np.void], view: records.View
+) -> tuple[NDArray[np.int64], Array]:
+    """Pixels that bodies may cover before a pinhole, and their least depths [m].
+
+    Returns:
+        Windows (x0, y0, width, height), int [n, 4], which may lie outside the image but not
+        beyond the canvas; and the depths, [n], which are negative behind the camera.
+    """
+    canvas = canvas_box(view)
+    x, y, z = np.moveaxis(box_corners(body_records, view), 1, 0)
+    near_m = z.min(axis=1)
+    # A body that reaches behind the camera may cover anything.
+    cut = near_m < rasterizer.Z_NEAR_M
+    z = np.where(cut[:, None], 1.0, z)
     x_px, y_px = view.fx * x / z + view.cx, view.fy * y / z + view.cy
-    low = np.floor([x_px.min(), y_px.min()]) - 1.0
-    high = np.ceil([x_px.max(), y_px.max()]) + 1.0
-    box = BoxPx(int(low[0]), int(low[1]), int(high[0]), int(high[1]))
-    return box.intersection(canvas_box(view))
+    lows = np.floor(np.stack([x_px.min(axis=1), y_px.min(axis=1)], axis=1)) - 1.0
+    highs = np.ceil(np.stack([x_px.max(axis=1), y_px.max(axis=1)], axis=1)) + 1.0
+    least, most = (canvas.x_min, canvas.y_min), (canvas.x_max, canvas.y_max)
+    lows = np.where(cut[:, None], least, np.clip(lows, least, most)).astype(np.int64)
+    highs = np.where(cut[:, None], most, np.clip(highs, least, most)).astype(np.int64)
+    return np.concatenate([lows, highs - lows], axis=1), near_m
 
 
 Method = Literal["auto", "raster", "rays"]
@@ -120,14 +95,14 @@ class Projected:
     Attributes:
         reached: Numbers of the bodies that may lie on a canvas of three by three images; vertices
             of other bodies are stale.
-        in_view: Numbers of the bodies that may lie in the image.
+        in_view: DrawnBody records of the bodies that may lie in the image.
         p_camera: Vertices in the camera frame [m].
         xy: Vertices snapped to the image plane; see
             gen_data.generator.renderers.warp.visibility.kernels.rasterizer.
     """
 
     reached: NDArray[np.int32]
-    in_view: NDArray[np.int32]
+    in_view: wp.array
     p_camera: wp.array
     xy: wp.array
 
@@ -196,7 +171,7 @@ def project_vertices(world: PackedWorld, view: records.View, cache: DeviceCache)
     in_view = np.intersect1d(reached, bodies_within(world.body_records, view, 0.0))
     projected = Projected(
         reached,
-        in_view,
+        list_drawn(world, view, in_view, cache.device),
         cache.scratch("p camera", count, wp.vec3),
         cache.scratch("xy", count, wp.vec2i),
     )
@@ -236,9 +211,6 @@ def _rasterise(
     hits.fill_(wp.vec2i(-1, -1))
     window = rasterizer.Window()
     window.width, window.height = view.width, view.height
-    cutouts = has_cutouts(world.body_records)[projected.in_view]
-    bodies = wp.array(projected.in_view[~cutouts], dtype=wp.int32, device=cache.device)
+    bodies = projected.in_view
     inputs = [view, window, world.record, bodies, projected.p_camera, projected.xy]
     wp.launch(rasterizer.draw_bodies, len(bodies), inputs, [nearness, hits], device=cache.device)
-    if cutouts.any():
-        trace_over(world, view, projected.in_view[cutouts], nearness, hits)

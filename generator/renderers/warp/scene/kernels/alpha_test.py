@@ -35,6 +35,18 @@ FACES_MAX = wp.constant(64)
 
 
 @wp.func
+def dominant_axis(normal: wp.vec3):
+    """Number of the largest component of a normal, which selects a texture's projection."""
+    n = wp.abs(normal)
+    axis = int(1)
+    if n[0] > n[1] and n[0] > n[2]:
+        axis = 0
+    elif n[2] > n[1]:
+        axis = 2
+    return axis
+
+
+@wp.func
 def project_uv(p: wp.vec3, axis: int):
     """Texture coordinates along one axis; X and Y faces keep Z upright."""
     u = p[0]
@@ -61,11 +73,11 @@ def is_covered(world: World, texture: int, uv: wp.vec2):
     y0 = floor_int(y)
     right = x - float(x0)
     down = y - float(y0)
-    # x0 may be -1 or width - 1: adding the width keeps the remainder non-negative.
-    xa = (x0 + width) % width
-    xb = (x0 + 1 + width) % width
-    top = ((y0 + height) % height) * width
-    below = ((y0 + 1 + height) % height) * width
+    # x0 lies from -1 to width - 1: comparisons replace a remainder.
+    xa = wp.where(x0 < 0, width - 1, x0)
+    xb = wp.where(x0 + 1 >= width, 0, x0 + 1)
+    top = wp.where(y0 < 0, height - 1, y0) * width
+    below = wp.where(y0 + 1 >= height, 0, y0 + 1) * width
     c = world.textures[texture].cover
     upper = float(c[top + xa]) * (1.0 - right) + float(c[top + xb]) * right
     lower = float(c[below + xa]) * (1.0 - right) + float(c[below + xb]) * right
@@ -90,13 +102,7 @@ def uv_at(world: World, surface: int, b: int, face: int, weights: wp.vec3):
         p0 = vertex_at(world, g, corner[0])
         p1 = vertex_at(world, g, corner[1])
         p2 = vertex_at(world, g, corner[2])
-        # The largest component of the face's normal selects the projection.
-        n = wp.abs(wp.cross(p1 - p0, p2 - p0))
-        axis = int(1)
-        if n[0] > n[1] and n[0] > n[2]:
-            axis = 0
-        elif n[2] > n[1]:
-            axis = 2
+        axis = dominant_axis(wp.cross(p1 - p0, p2 - p0))
         p = p0 * weights[0] + p1 * weights[1] + p2 * weights[2]
         uv = project_uv(p * (world.bodies[b].scale / scale_m), axis)
     return uv

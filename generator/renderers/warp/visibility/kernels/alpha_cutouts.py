@@ -1,144 +1,110 @@
-"""Ray-traced bodies with cut-outs, merged into the rasteriser's z-buffer.
+"""Holes of rasterised triangles: the alpha test at points of an image.
 
-Loaded only if a scene has such a body.
+Texture coordinates are linear on a triangle, so over 1/z they are linear in the image of a pinhole.
+Source: Heckbert and Moreton, "Interpolation for polygon texture mapping and shading", 1991.
 """
 
 from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.alpha_test import closest_solid_hit
+from gen_data.generator.renderers.warp.scene.kernels.alpha_test import (
+    dominant_axis,
+    is_covered,
+    project_uv,
+)
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     HOLES,
     View,
     World,
-    pixel_direction,
-    to_mesh_point,
-    to_mesh_vector,
+    face_vertices,
+    vertex_at,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Outline, Window
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-FARTHEST = wp.constant(1.0e6)
-
 
 @wp.struct
-class CutoutBody:
-    """A body with cut-outs, the window of pixels that it may cover, and its largest 1/z."""
+class Cutout:
+    """Where a triangle has holes.
 
-    body: int
-    window: Window
-    nearness_max: float
+    The coordinate u at image point (x, y) and depth z is ``u + (c_u + x * dx_u + y * dy_u) * z``,
+    with x and y in pixels and z in metres; v likewise.
+
+    Attributes:
+        texture: The texture that cuts the holes; -1 for a solid triangle.
+    """
+
+    texture: int
+    u: float
+    v: float
+    c_u: float
+    c_v: float
+    dx_u: float
+    dx_v: float
+    dy_u: float
+    dy_v: float
 
 
 @wp.func
-def is_in_window(window: Window, x: int, y: int):
-    """Whether a pixel lies in a window."""
-    right = x - window.x0
-    down = y - window.y0
-    return right >= 0 and right < window.width and down >= 0 and down < window.height
+def make_cutout(view: View, world: World, b: int, face: int):
+    """Where a face of a body has holes, before a pinhole."""
+    cutout = Cutout()
+    cutout.texture = -1
+    if (world.bodies[b].cutouts & HOLES) == 0:
+        return cutout
+    g = world.bodies[b].geometry
+    surface = world.bodies[b].first_material + world.geometries[g].face_slots[face]
+    texture = world.surfaces[surface].texture
+    if texture < 0:
+        return cutout
+    if world.textures[texture].has_cover == 0:
+        return cutout
+    corner = face_vertices(world, g, face)
+    p = vertex_at(world, g, corner[0])
+    e1 = vertex_at(world, g, corner[1]) - p
+    e2 = vertex_at(world, g, corner[2]) - p
+    n = wp.cross(e1, e2)
+    squared = wp.dot(n, n)
+    if squared == 0.0:
+        return cutout
+    # Gradients of the barycentric weights of the second and third corner.
+    along_1 = wp.cross(e2, n) * (1.0 / squared)
+    along_2 = wp.cross(n, e1) * (1.0 / squared)
+    uv = world.geometries[g].uvs[corner[0]]
+    d1 = world.geometries[g].uvs[corner[1]] - uv
+    d2 = world.geometries[g].uvs[corner[2]] - uv
+    scale_m = world.surfaces[surface].texture_scale_m
+    if scale_m > 0.0:
+        axis = dominant_axis(n)
+        scale = world.bodies[b].scale / scale_m
+        uv = project_uv(p * scale, axis)
+        d1 = project_uv(e1 * scale, axis)
+        d2 = project_uv(e2 * scale, axis)
+    cutout.texture = texture
+    eye = world.bodies[b].eye_mesh - p
+    cutout.u = uv[0] + wp.dot(along_1 * d1[0] + along_2 * d2[0], eye)
+    cutout.v = uv[1] + wp.dot(along_1 * d1[1] + along_2 * d2[1], eye)
+    # Along directions (x, y, 1) of the camera frame.
+    to_camera = wp.transpose(world.bodies[b].B_mesh_camera)
+    u = to_camera @ (along_1 * d1[0] + along_2 * d2[0])
+    v = to_camera @ (along_1 * d1[1] + along_2 * d2[1])
+    cutout.dx_u = u[0] * view.inverse_fx
+    cutout.dx_v = v[0] * view.inverse_fx
+    cutout.dy_u = u[1] * view.inverse_fy
+    cutout.dy_v = v[1] * view.inverse_fy
+    cutout.c_u = u[2] - view.cx * cutout.dx_u - view.cy * cutout.dy_u
+    cutout.c_v = v[2] - view.cx * cutout.dx_v - view.cy * cutout.dy_v
+    return cutout
 
 
 @wp.func
-def trace_nearness(
-    view: View, world: World, b: int, x_px: float, y_px: float, z_near_m: float, behind: float
-):
-    """1/z of a body at a point of the image, and its face; (0, -1) if not in front.
-
-    Args:
-        behind: 1/z of the nearest surface so far; 0 for none.
-    """
-    nearness = float(0.0)
-    face = int(-1)
-    d = view.R_world_camera @ pixel_direction(view, x_px, y_px)
-    o = to_mesh_point(world, b, view.eye_m + d * z_near_m)
-    reach = float(FARTHEST)
-    if behind > 0.0:
-        # With z = 1 in the direction, the ray's parameter is z-depth, counted from the near plane.
-        reach = 1.0 / behind - z_near_m
-    answer = closest_solid_hit(world, b, o, to_mesh_vector(world, b, d), reach, HOLES)
-    if answer.face >= 0:
-        nearness = 1.0 / (answer.t + z_near_m)
-        face = answer.face
-    return nearness, face
-
-
-@wp.kernel
-def trace_centres(
-    view: View,
-    world: World,
-    bodies: wp.array[CutoutBody],
-    z_near_m: float,
-    nearness: wp.array[float],
-    hits: wp.array[wp.vec2i],
-):
-    """Z-buffer over pixel centres, as rasterizer.draw_bodies; one image row per thread."""
-    y = wp.tid()
-    for k in range(bodies.shape[0]):
-        window = bodies[k].window
-        b = bodies[k].body
-        if y >= window.y0 and y < window.y0 + window.height:
-            for x in range(wp.max(window.x0, 0), wp.min(window.x0 + window.width, view.width)):
-                i = y * view.width + x
-                if nearness[i] < bodies[k].nearness_max:
-                    near, face = trace_nearness(
-                        view, world, b, float(x) + 0.5, float(y) + 0.5, z_near_m, nearness[i]
-                    )
-                    if near > nearness[i]:
-                        nearness[i] = near
-                        hits[i] = wp.vec2i(b, face)
-
-
-@wp.kernel
-def trace_samples(
-    view: View,
-    world: World,
-    bodies: wp.array[CutoutBody],
-    z_near_m: float,
-    pixels: wp.array[int],
-    offsets: wp.array[wp.vec2],
-    nearness: wp.array2d[float],
-    hits: wp.array2d[wp.vec2i],
-):
-    """Z-buffer over samples of listed pixels, as msaa.draw_samples.
-
-    Args:
-        offsets: Sample positions within a pixel, [0, 1).
-    """
-    row = wp.tid()
-    x = pixels[row] % view.width
-    y = pixels[row] / view.width
-    for k in range(bodies.shape[0]):
-        b = bodies[k].body
-        if is_in_window(bodies[k].window, x, y):
-            for s in range(offsets.shape[0]):
-                if nearness[row, s] < bodies[k].nearness_max:
-                    x_px = float(x) + offsets[s][0]
-                    y_px = float(y) + offsets[s][1]
-                    near, face = trace_nearness(
-                        view, world, b, x_px, y_px, z_near_m, nearness[row, s]
-                    )
-                    if near > nearness[row, s]:
-                        nearness[row, s] = near
-                        hits[row, s] = wp.vec2i(b, face)
-
-
-@wp.kernel
-def trace_outlines(
-    view: View, world: World, outlines: wp.array[Outline], z_near_m: float, mask: wp.array[wp.uint8]
-):
-    """Write 1 at every pixel centre that a body covers, for a pinhole; one row per thread."""
-    k, row = wp.tid()
-    window = outlines[k].window
-    if row >= window.height:
-        return
-    for column in range(window.width):
-        i = outlines[k].first_pixel + row * outlines[k].stride + column
-        # Another body of the same instance may have covered the pixel already.
-        if mask[i] == wp.uint8(0):
-            x_px = float(window.x0 + column) + 0.5
-            y_px = float(window.y0 + row) + 0.5
-            near, _face = trace_nearness(view, world, outlines[k].body, x_px, y_px, z_near_m, 0.0)
-            if near > 0.0:
-                mask[i] = wp.uint8(1)
+def is_solid_at(world: World, cutout: Cutout, x_px: float, y_px: float, nearness: float):
+    """Whether a triangle has no hole at a point of the image; nearness is 1/z [1/m]."""
+    solid = bool(True)
+    if cutout.texture >= 0:
+        z_m = 1.0 / nearness
+        u = cutout.u + (cutout.c_u + x_px * cutout.dx_u + y_px * cutout.dy_u) * z_m
+        v = cutout.v + (cutout.c_v + x_px * cutout.dx_v + y_px * cutout.dy_v) * z_m
+        solid = is_covered(world, cutout.texture, wp.vec2(u, v))
+    return solid

@@ -5,10 +5,14 @@ from __future__ import annotations
 import warp as wp
 
 from gen_data.generator.renderers.warp.scene.kernels.records import View, World
+from gen_data.generator.renderers.warp.visibility.kernels.alpha_cutouts import make_cutout
 from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
     UNSNAPPED,
+    Z_NEAR_M,
+    DepthPlane,
     Outline,
     clip,
+    depth_plane,
     draw_coverage,
     fan_edges,
     is_beyond_guard,
@@ -41,11 +45,18 @@ def draw_silhouettes(
         if xy[i][0] != UNSNAPPED and xy[j][0] != UNSNAPPED and xy[k][0] != UNSNAPPED:
             e = make_edges(xy[i], xy[j], xy[k], outline.window)
             if e.covers != 0:
-                draw_coverage(e, outline.first_pixel, outline.stride, mask)
+                cutout = make_cutout(view, world, outline.body, f)
+                plane = DepthPlane()
+                if cutout.texture >= 0:
+                    plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], outline.window)
+                draw_coverage(world, e, plane, cutout, outline, mask)
         elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
             # A vertex lies outside the snapping range: clip first, then draw the polygon as a fan.
             polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
+            cutout = make_cutout(view, world, outline.body, f)
+            plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], outline.window)
+            plane.high = 1.0 / Z_NEAR_M
             for t in range(1, corners - 1):
                 e = fan_edges(view, polygon, t, outline.window)
                 if e.covers != 0:
-                    draw_coverage(e, outline.first_pixel, outline.stride, mask)
+                    draw_coverage(world, e, plane, cutout, outline, mask)

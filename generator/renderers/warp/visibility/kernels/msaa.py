@@ -16,6 +16,11 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     flat_normal,
     min_of_two,
 )
+from gen_data.generator.renderers.warp.visibility.kernels.alpha_cutouts import (
+    Cutout,
+    is_solid_at,
+    make_cutout,
+)
 from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import (
     most_similar_normal,
     neighbour_pixel,
@@ -24,10 +29,12 @@ from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
     UNSNAPPED,
     Z_NEAR_M,
     DepthPlane,
+    DrawnBody,
     Window,
     clip,
     depth_plane,
     is_beyond_guard,
+    is_hidden,
     snap_to_grid,
     span_end,
     span_start,
@@ -76,6 +83,19 @@ class Side:
     dx: wp.int64
     dy: wp.int64
     reach: wp.int64
+
+
+@wp.struct
+class Triangle:
+    """A face of a body with its corners snapped to the image plane."""
+
+    body: int
+    face: int
+    p: wp.vec2i
+    q: wp.vec2i
+    r: wp.vec2i
+    plane: DepthPlane
+    cutout: Cutout
 
 
 @wp.func
@@ -132,20 +152,20 @@ def covers(ea: Side, eb: Side, ec: Side, a: wp.int64, b: wp.int64, c: wp.int64, 
 
 @wp.func
 def draw_triangle_samples(
+    world: World,
     numbers: wp.array[int],
     floors: wp.array[float],
     window: Window,
     offsets: wp.array[wp.vec2i],
-    p: wp.vec2i,
-    q: wp.vec2i,
-    r: wp.vec2i,
-    plane: DepthPlane,
-    body: int,
-    face: int,
+    triangle: Triangle,
     nearness: wp.array2d[float],
     hits: wp.array2d[wp.vec2i],
 ):
     """Write (body, face) into the samples of numbered pixels where a triangle is nearest."""
+    p = triangle.p
+    q = triangle.q
+    r = triangle.r
+    plane = triangle.plane
     area = wp.int64(q[0] - p[0]) * wp.int64(r[1] - p[1])
     area -= wp.int64(r[0] - p[0]) * wp.int64(q[1] - p[1])
     if area == wp.int64(0):
@@ -189,13 +209,16 @@ def draw_triangle_samples(
                         at = offsets[s]
                         if covers(ea, eb, ec, a, b, c, at):
                             # 1 / 256: offsets are in snapped units.
-                            w = row + 0.00390625 * (
-                                float(at[0]) * plane.dx + float(at[1]) * plane.dy
-                            )
+                            right = 0.00390625 * float(at[0])
+                            down = 0.00390625 * float(at[1])
+                            w = row + (right * plane.dx + down * plane.dy)
                             w = wp.clamp(w, plane.low, plane.high)
                             if w > nearness[k, s]:
-                                nearness[k, s] = w
-                                hits[k, s] = wp.vec2i(body, face)
+                                x_px = float(x) + 0.5 + right
+                                y_px = float(y) + 0.5 + down
+                                if is_solid_at(world, triangle.cutout, x_px, y_px, w):
+                                    nearness[k, s] = w
+                                    hits[k, s] = wp.vec2i(triangle.body, triangle.face)
                         s += 1
             a += pixel * ea.dx
             b += pixel * eb.dx
@@ -227,7 +250,7 @@ def draw_samples(
     view: View,
     window: Window,
     world: World,
-    bodies: wp.array[int],
+    bodies: wp.array[DrawnBody],
     p_camera: wp.array[wp.vec3],
     xy: wp.array[wp.vec2i],
     numbers: wp.array[int],
@@ -245,7 +268,10 @@ def draw_samples(
         nearness: 1/z [1/m]; must be 0 on entry.
         hits: Unchanged where nothing is hit.
     """
-    b = bodies[wp.tid()]
+    drawn = bodies[wp.tid()]
+    if is_hidden(drawn, window.width, window.height, floors):
+        return
+    b = drawn.body
     geometry = world.geometries[world.bodies[b].geometry]
     first = world.bodies[b].first_vertex
     for f in range(geometry.face_slots.shape[0]):
@@ -260,23 +286,31 @@ def draw_samples(
                 # Skip triangles that are entirely behind everything visible nearby.
                 near = floor * z <= 1.0
             if near:
-                p = xy[i]
-                q = xy[j]
-                r = xy[k]
-                plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
+                triangle = Triangle()
+                triangle.body = b
+                triangle.face = f
+                triangle.p = xy[i]
+                triangle.q = xy[j]
+                triangle.r = xy[k]
+                triangle.plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
+                triangle.cutout = make_cutout(view, world, b, f)
                 draw_triangle_samples(
-                    numbers, floors, window, offsets, p, q, r, plane, b, f, nearness, hits
+                    world, numbers, floors, window, offsets, triangle, nearness, hits
                 )
         elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
             polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
-            plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
-            plane.high = 1.0 / Z_NEAR_M
+            triangle = Triangle()
+            triangle.body = b
+            triangle.face = f
+            triangle.plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
+            triangle.plane.high = 1.0 / Z_NEAR_M
+            triangle.cutout = make_cutout(view, world, b, f)
             for t in range(1, corners - 1):
-                p = snap_to_grid(view, polygon[0])
-                q = snap_to_grid(view, polygon[t])
-                r = snap_to_grid(view, polygon[t + 1])
+                triangle.p = snap_to_grid(view, polygon[0])
+                triangle.q = snap_to_grid(view, polygon[t])
+                triangle.r = snap_to_grid(view, polygon[t + 1])
                 draw_triangle_samples(
-                    numbers, floors, window, offsets, p, q, r, plane, b, f, nearness, hits
+                    world, numbers, floors, window, offsets, triangle, nearness, hits
                 )
 
 

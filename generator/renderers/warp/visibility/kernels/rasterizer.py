@@ -11,6 +11,11 @@ from __future__ import annotations
 import warp as wp
 
 from gen_data.generator.renderers.warp.scene.kernels.records import View, World
+from gen_data.generator.renderers.warp.visibility.kernels.alpha_cutouts import (
+    Cutout,
+    is_solid_at,
+    make_cutout,
+)
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -34,6 +39,15 @@ class Window:
     y0: int
     width: int
     height: int
+
+
+@wp.struct
+class DrawnBody:
+    """A body, the pixels that it may cover, and its largest 1/z [1/m]."""
+
+    body: int
+    window: Window
+    nearness_max: float
 
 
 @wp.struct
@@ -246,15 +260,20 @@ def depth_plane(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3, window: Windo
 
 @wp.func
 def draw_nearest(
+    world: World,
     e: Edges,
     plane: DepthPlane,
+    cutout: Cutout,
     body: int,
     face: int,
     stride: int,
     nearness: wp.array[float],
     hits: wp.array[wp.vec2i],
 ):
-    """Write (body, face) where the triangle is nearer than the buffer."""
+    """Write (body, face) where the triangle has no hole and is nearer than the buffer.
+
+    The window's first pixel must be the image's.
+    """
     a = e.a.value
     b = e.b.value
     c = e.c.value
@@ -278,8 +297,9 @@ def draw_nearest(
             if (a_here | b_here | c_here) >= wp.int64(0):
                 w = wp.clamp(row + float(x) * plane.dx, plane.low, plane.high)
                 if w > nearness[pixel]:
-                    nearness[pixel] = w
-                    hits[pixel] = wp.vec2i(body, face)
+                    if is_solid_at(world, cutout, float(x) + 0.5, float(y) + 0.5, w):
+                        nearness[pixel] = w
+                        hits[pixel] = wp.vec2i(body, face)
             a_here += e.a.dx
             b_here += e.b.dx
             c_here += e.c.dx
@@ -291,8 +311,19 @@ def draw_nearest(
 
 
 @wp.func
-def draw_coverage(e: Edges, first_pixel: int, stride: int, mask: wp.array[wp.uint8]):
-    """Write 1 where the triangle covers a pixel centre."""
+def draw_coverage(
+    world: World,
+    e: Edges,
+    plane: DepthPlane,
+    cutout: Cutout,
+    outline: Outline,
+    mask: wp.array[wp.uint8],
+):
+    """Write 1 where the triangle covers a pixel centre and has no hole.
+
+    Args:
+        plane: Needed only for a cutout with a texture.
+    """
     a = e.a.value
     b = e.b.value
     c = e.c.value
@@ -306,15 +337,22 @@ def draw_coverage(e: Edges, first_pixel: int, stride: int, mask: wp.array[wp.uin
         a_here = a + wp.int64(first) * e.a.dx
         b_here = b + wp.int64(first) * e.b.dx
         c_here = c + wp.int64(first) * e.c.dx
-        pixel = int(first_pixel + y * stride + e.x_first + first)
+        pixel = int(outline.first_pixel + y * outline.stride + e.x_first + first)
         end = pixel + last - first
+        row = plane.c + float(y) * plane.dy
+        x = int(e.x_first + first)
         while pixel <= end:
             if (a_here | b_here | c_here) >= wp.int64(0):
-                mask[pixel] = wp.uint8(1)
+                w = wp.clamp(row + float(x) * plane.dx, plane.low, plane.high)
+                x_px = float(x + outline.window.x0) + 0.5
+                y_px = float(y + outline.window.y0) + 0.5
+                if is_solid_at(world, cutout, x_px, y_px, w):
+                    mask[pixel] = wp.uint8(1)
             a_here += e.a.dx
             b_here += e.b.dx
             c_here += e.c.dx
             pixel += 1
+            x += 1
         a += e.a.dy
         b += e.b.dy
         c += e.c.dy
@@ -378,12 +416,29 @@ def is_beyond_guard(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3):
     return outside
 
 
+@wp.func
+def is_hidden(drawn: DrawnBody, width: int, height: int, nearness: wp.array[float]):
+    """Whether nearer surfaces fill all pixels of an image that a body may cover."""
+    hidden = bool(True)
+    y = int(wp.max(drawn.window.y0, 0))
+    y_end = wp.min(drawn.window.y0 + drawn.window.height, height)
+    x_first = wp.max(drawn.window.x0, 0)
+    x_end = wp.min(drawn.window.x0 + drawn.window.width, width)
+    while hidden and y < y_end:
+        x = int(x_first)
+        while hidden and x < x_end:
+            hidden = nearness[y * width + x] >= drawn.nearness_max
+            x += 1
+        y += 1
+    return hidden
+
+
 @wp.kernel
 def draw_bodies(
     view: View,
     window: Window,
     world: World,
-    bodies: wp.array[int],
+    bodies: wp.array[DrawnBody],
     p_camera: wp.array[wp.vec3],
     xy: wp.array[wp.vec2i],
     nearness: wp.array[float],
@@ -391,11 +446,16 @@ def draw_bodies(
 ):
     """Z-buffer of listed bodies: the nearest (body, face) at every pixel centre.
 
+    Bodies with cut-outs come last, so that few of their pixels need the alpha test.
+
     Args:
         nearness: 1/z [1/m]; must be 0 on entry.
         hits: Unchanged where nothing is hit.
     """
-    b = bodies[wp.tid()]
+    drawn = bodies[wp.tid()]
+    if is_hidden(drawn, window.width, window.height, nearness):
+        return
+    b = drawn.body
     geometry = world.geometries[world.bodies[b].geometry]
     first = world.bodies[b].first_vertex
     for f in range(geometry.face_slots.shape[0]):
@@ -406,14 +466,16 @@ def draw_bodies(
             e = make_edges(xy[i], xy[j], xy[k], window)
             if e.covers != 0:
                 plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
-                draw_nearest(e, plane, b, f, window.width, nearness, hits)
+                cutout = make_cutout(view, world, b, f)
+                draw_nearest(world, e, plane, cutout, b, f, window.width, nearness, hits)
         # A vertex lies outside the guard band: clip, and draw the polygon as a fan.
         elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
             polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
             plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
             # Corners behind the near plane bound nothing: the visible part ends at the near plane.
             plane.high = 1.0 / Z_NEAR_M
+            cutout = make_cutout(view, world, b, f)
             for t in range(1, corners - 1):
                 e = fan_edges(view, polygon, t, window)
                 if e.covers != 0:
-                    draw_nearest(e, plane, b, f, window.width, nearness, hits)
+                    draw_nearest(world, e, plane, cutout, b, f, window.width, nearness, hits)
