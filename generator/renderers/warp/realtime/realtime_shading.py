@@ -166,15 +166,18 @@ def _draw_samples(
     numbers = cache.scratch("numbers", frame.pixels, wp.int32)
     floors = cache.scratch("floors", frame.pixels, float)
     floors.fill_(mixing.UNLISTED)
+    blocks = view.height * -(-view.width // mixing.BLOCK_PX)
+    block_floors = cache.scratch("block floors", blocks, float)
+    block_floors.fill_(mixing.UNLISTED)
     inputs = [view, frame.gbuffer.record, pixels]
-    frame.launch(mixing.number_pixels, len(pixels), inputs, [numbers, floors])
+    frame.launch(mixing.number_pixels, len(pixels), inputs, [numbers, floors, block_floors])
     shape = (max(len(pixels), 1), samples)
     nearness = wp.zeros(shape, dtype=float, device=cache.device)
     hits = wp.full(shape, wp.vec2i(-1, -1), dtype=wp.vec2i, device=cache.device)
     window = rasterizer.Window()
     window.width, window.height = view.width, view.height
     inputs = [view, window, world.record, projected.in_view, projected.p_camera, projected.xy]
-    inputs += [numbers, floors, cache.constant(wp.vec2i, _offsets, samples)]
+    inputs += [numbers, floors, block_floors, cache.constant(wp.vec2i, _offsets, samples)]
     frame.launch(mixing.draw_samples, len(projected.in_view), inputs, [nearness, hits])
     return hits
 

@@ -44,6 +44,17 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 # Larger than the nearness of any surface.
 UNLISTED = wp.constant(1.0e30)
+# A block is a run of 2^4 pixels of a row.
+BLOCK_SHIFT = wp.constant(4)
+BLOCK_PX = wp.constant(16)
+# Triangles whose boxes span more blocks than this are not tested as a whole.
+BLOCKS_MAX = wp.constant(32)
+
+
+@wp.func
+def blocks_per_row(width: int):
+    """Number of blocks that hold a row of pixels."""
+    return (width + BLOCK_PX - 1) >> BLOCK_SHIFT
 
 
 @wp.kernel
@@ -53,6 +64,7 @@ def number_pixels(
     pixels: wp.array[int],
     numbers: wp.array[int],
     floors: wp.array[float],
+    block_floors: wp.array[float],
 ):
     """Position in the list of every listed pixel, and the least nearness that matters there.
 
@@ -60,6 +72,7 @@ def number_pixels(
 
     Args:
         floors: 1/z [1/m]; must be UNLISTED on entry.
+        block_floors: The least floor of each block, row by row; must be UNLISTED on entry.
     """
     k = wp.tid()
     i = pixels[k]
@@ -70,6 +83,8 @@ def number_pixels(
     numbers[i] = k
     # Two percent of slack: a surface's depth changes within a pixel.
     floors[i] = 0.98 / farthest
+    row = (i / view.width) * blocks_per_row(view.width)
+    wp.atomic_min(block_floors, row + ((i % view.width) >> BLOCK_SHIFT), floors[i])
 
 
 @wp.struct
@@ -155,6 +170,7 @@ def draw_triangle_samples(
     world: World,
     numbers: wp.array[int],
     floors: wp.array[float],
+    block_floors: wp.array[float],
     window: Window,
     offsets: wp.array[wp.vec2i],
     triangle: Triangle,
@@ -194,40 +210,58 @@ def draw_triangle_samples(
         a += wp.int64(start) * pixel * ea.dx
         b += wp.int64(start) * pixel * eb.dx
         c += wp.int64(start) * pixel * ec.dx
-        # A while loop: Warp's range loops cost more than this body.
+        blocks = y * blocks_per_row(window.width)
+        # While loops: Warp's range loops cost more than their bodies.
         x = int(x_first + start)
         while x <= x_first + end:
-            i = y * window.width + x
-            if plane.high >= floors[i] and (
-                (a + ea.reach) | (b + eb.reach) | (c + ec.reach)
-            ) >= wp.int64(0):
-                row = plane.c + float(y) * plane.dy + float(x) * plane.dx
-                if row + slack >= floors[i]:
-                    k = numbers[i]
-                    s = int(0)
-                    while s < samples:
-                        at = offsets[s]
-                        if covers(ea, eb, ec, a, b, c, at):
-                            # 1 / 256: offsets are in snapped units.
-                            right = 0.00390625 * float(at[0])
-                            down = 0.00390625 * float(at[1])
-                            w = row + (right * plane.dx + down * plane.dy)
-                            w = wp.clamp(w, plane.low, plane.high)
-                            if w > nearness[k, s]:
-                                x_px = float(x) + 0.5 + right
-                                y_px = float(y) + 0.5 + down
-                                if is_solid_at(world, triangle.cutout, x_px, y_px, w):
-                                    nearness[k, s] = w
-                                    hits[k, s] = wp.vec2i(triangle.body, triangle.face)
-                        s += 1
-            a += pixel * ea.dx
-            b += pixel * eb.dx
-            c += pixel * ec.dx
-            x += 1
+            last = wp.min(x | (BLOCK_PX - 1), x_first + end)
+            near = plane.c + float(y) * plane.dy
+            near += wp.max(float(x) * plane.dx, float(last) * plane.dx) + slack
+            if wp.min(near, plane.high) < block_floors[blocks + (x >> BLOCK_SHIFT)]:
+                # Nothing of the block is listed, or all of it is hidden there.
+                run = wp.int64(last + 1 - x) * pixel
+                a += run * ea.dx
+                b += run * eb.dx
+                c += run * ec.dx
+                x = last + 1
+            while x <= last:
+                i = y * window.width + x
+                if plane.high >= floors[i] and (
+                    (a + ea.reach) | (b + eb.reach) | (c + ec.reach)
+                ) >= wp.int64(0):
+                    row = plane.c + float(y) * plane.dy + float(x) * plane.dx
+                    if row + slack >= floors[i]:
+                        k = numbers[i]
+                        s = int(0)
+                        while s < samples:
+                            at = offsets[s]
+                            if covers(ea, eb, ec, a, b, c, at):
+                                # 1 / 256: offsets are in snapped units.
+                                right = 0.00390625 * float(at[0])
+                                down = 0.00390625 * float(at[1])
+                                w = row + (right * plane.dx + down * plane.dy)
+                                w = wp.clamp(w, plane.low, plane.high)
+                                if w > nearness[k, s]:
+                                    x_px = float(x) + 0.5 + right
+                                    y_px = float(y) + 0.5 + down
+                                    if is_solid_at(world, triangle.cutout, x_px, y_px, w):
+                                        nearness[k, s] = w
+                                        hits[k, s] = wp.vec2i(triangle.body, triangle.face)
+                            s += 1
+                a += pixel * ea.dx
+                b += pixel * eb.dx
+                c += pixel * ec.dx
+                x += 1
 
 
 @wp.func
-def floor_below(floors: wp.array[float], window: Window, p: wp.vec2i, q: wp.vec2i, r: wp.vec2i):
+def floor_below(
+    floors: wp.array[float],
+    window: Window,
+    p: wp.vec2i,
+    q: wp.vec2i,
+    r: wp.vec2i,
+):
     """Lowest floor within a triangle's box; 0 if the box is too large to scan."""
     x_first = wp.max(wp.min(p[0], wp.min(q[0], r[0])) >> 8, 0)
     x_last = wp.min(wp.max(p[0], wp.max(q[0], r[0])) >> 8, window.width - 1)
@@ -255,6 +289,7 @@ def draw_samples(
     xy: wp.array[wp.vec2i],
     numbers: wp.array[int],
     floors: wp.array[float],
+    block_floors: wp.array[float],
     offsets: wp.array[wp.vec2i],
     nearness: wp.array2d[float],
     hits: wp.array2d[wp.vec2i],
@@ -264,6 +299,7 @@ def draw_samples(
     Args:
         numbers: Row of each pixel in the outputs.
         floors: Nearness below which a pixel takes nothing; UNLISTED for unlisted pixels.
+        block_floors: The least floor of each block.
         offsets: Sample positions, from the middle of a pixel [1/256 px].
         nearness: 1/z [1/m]; must be 0 on entry.
         hits: Unchanged where nothing is hit.
@@ -295,7 +331,7 @@ def draw_samples(
                 triangle.plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
                 triangle.cutout = make_cutout(view, world, b, f)
                 draw_triangle_samples(
-                    world, numbers, floors, window, offsets, triangle, nearness, hits
+                    world, numbers, floors, block_floors, window, offsets, triangle, nearness, hits
                 )
         elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
             polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
@@ -310,7 +346,7 @@ def draw_samples(
                 triangle.q = snap_to_grid(view, polygon[t])
                 triangle.r = snap_to_grid(view, polygon[t + 1])
                 draw_triangle_samples(
-                    world, numbers, floors, window, offsets, triangle, nearness, hits
+                    world, numbers, floors, block_floors, window, offsets, triangle, nearness, hits
                 )
 
 
