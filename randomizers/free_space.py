@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import InitVar, dataclass, field
 
 import numpy as np
 
-from gen_data.generator.core.boxes import rectangles_overlap
+from gen_data.generator.core.boxes import Rectangle, overlap_of
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Camera, Scene
-from gen_data.generator.core.se3 import SE3, Array, Vec3
+from gen_data.generator.core.se3 import SE3, Array, Vec3, rotate_by_quaternion
 
 _GRID = (16, 9)
 """Columns and rows of the rays that test a view."""
@@ -33,46 +33,66 @@ class Footprint:
     def of(cls, T_world_body: SE3, bounds_m: tuple[Vec3, Vec3], scale: float = 1.0) -> Footprint:
         """Footprint of an upright body with these bounds in its own frame."""
         (x0, y0, _), (x1, y1, _) = bounds_m
-        w, _, _, z = T_world_body.quaternion_wxyz
-        center = T_world_body @ SE3((0.5 * scale * (x0 + x1), 0.5 * scale * (y0 + y1), 0.0))
-        x, y, _ = center.translation_m
-        return cls(x, y, 0.5 * scale * (x1 - x0), 0.5 * scale * (y1 - y0), 2.0 * math.atan2(z, w))
+        q = T_world_body.quaternion_wxyz
+        middle = (0.5 * scale * (x0 + x1), 0.5 * scale * (y0 + y1), 0.0)
+        tx, ty, _ = T_world_body.translation_m
+        x, y, _ = rotate_by_quaternion(q, middle)
+        half_x_m, half_y_m = 0.5 * scale * (x1 - x0), 0.5 * scale * (y1 - y0)
+        return cls(tx + x, ty + y, half_x_m, half_y_m, 2.0 * math.atan2(q[3], q[0]))
 
     def expand(self, margin_m: float) -> Footprint:
         """Return the rectangle with a margin on every side."""
         half_x_m, half_y_m = self.half_x_m + margin_m, self.half_y_m + margin_m
         return Footprint(self.x_m, self.y_m, half_x_m, half_y_m, self.yaw_rad)
 
-    def as_row(self) -> tuple[float, ...]:
-        """Centre, cosine and sine of the yaw, half extents, half diagonal."""
+    def rectangle(self) -> Rectangle:
+        """Centre, cosine and sine of the yaw, half extents."""
         c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        reach_m = math.hypot(self.half_x_m, self.half_y_m)
-        return (self.x_m, self.y_m, c, s, self.half_x_m, self.half_y_m, reach_m)
+        return (self.x_m, self.y_m, c, s, self.half_x_m, self.half_y_m)
 
 
 @dataclass
 class Ground:
-    """Footprints of existing objects."""
+    """Footprints of existing objects.
 
-    _rows: Array = field(default_factory=lambda: np.zeros((64, 7)))
-    _count: int = 0
+    Attributes:
+        footprints: At first; ``add`` adds others.
+    """
+
+    footprints: InitVar[Sequence[Footprint]] = ()
+    _rectangles: list[Rectangle] = field(init=False)
+    _discs: Array = field(init=False)
+
+    def __post_init__(self, footprints: Sequence[Footprint]) -> None:
+        """Collect rectangles, and a table of their centres and half diagonals [m], [3, n]."""
+        self._rectangles = [footprint.rectangle() for footprint in footprints]
+        self._discs = np.zeros((3, 2 * len(footprints) + 64))
+        rows = [(footprint.x_m, footprint.y_m, _reach_m(footprint)) for footprint in footprints]
+        self._discs[:, : len(rows)] = np.reshape(rows, (len(rows), 3)).T
 
     def add(self, footprint: Footprint) -> None:
         """Add a footprint."""
-        if self._count == len(self._rows):
-            self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
-        self._rows[self._count] = footprint.as_row()
-        self._count += 1
+        count = len(self._rectangles)
+        if count == self._discs.shape[1]:
+            self._discs = np.concatenate([self._discs, np.zeros_like(self._discs)], axis=1)
+        self._rectangles.append(footprint.rectangle())
+        self._discs[:, count] = footprint.x_m, footprint.y_m, _reach_m(footprint)
 
     def is_free(self, footprint: Footprint) -> bool:
         """Whether a rectangle overlaps no footprint."""
-        others = self._rows[: self._count]
-        own = np.array(footprint.as_row())
-        delta = others[:, :2] - own[:2]
-        reach = others[:, 6] + own[6]
-        dx, dy = delta.T
-        near = others[dx * dx + dy * dy < reach * reach]
-        return not rectangles_overlap(own[:4], own[4:6], near[:, :4], near[:, 4:6]).any()
+        x, y, reach = self._discs[:, : len(self._rectangles)]
+        dx, dy, reach = x - footprint.x_m, y - footprint.y_m, reach + _reach_m(footprint)
+        # Few are near: for them, numbers are quicker than arrays.
+        near = np.flatnonzero(dx * dx + dy * dy < reach * reach).tolist()
+        if not near:
+            return True
+        own = footprint.rectangle()
+        return not any(overlap_of(own, self._rectangles[k]) for k in near)
+
+
+def _reach_m(footprint: Footprint) -> float:
+    """Half of the diagonal."""
+    return math.hypot(footprint.half_x_m, footprint.half_y_m)
 
 
 def standing_bodies(scene: Scene) -> Iterator[Body]:
@@ -85,11 +105,9 @@ def standing_bodies(scene: Scene) -> Iterator[Body]:
 
 def make_ground(bodies: Iterable[Body], assets: AssetIndex) -> Ground:
     """Collect the footprints of bodies."""
-    ground = Ground()
-    for body in bodies:
-        bounds_m = standing_bounds_m(assets, body.asset)
-        ground.add(Footprint.of(body.T_world_body, bounds_m, body.scale))
-    return ground
+    bodies = list(bodies)
+    bounds_m = {name: standing_bounds_m(assets, name) for name in {b.asset for b in bodies}}
+    return Ground([Footprint.of(b.T_world_body, bounds_m[b.asset], b.scale) for b in bodies])
 
 
 def standing_bounds_m(assets: AssetIndex, asset: str) -> tuple[Vec3, Vec3]:
@@ -144,14 +162,21 @@ def is_clear(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: float) -
     Bodies are tested by their bounding boxes. The background (the room itself) is ignored, except
     for the fixtures of lights.
     """
-    for body in _solid_bodies(scene):
-        local = (body.T_world_body.inverse() @ SE3(point_m)).translation_m
-        low, high = standing_bounds_m(assets, body.asset)
-        grown_low = tuple(body.scale * v - margin_m for v in low)
-        grown_high = tuple(body.scale * v + margin_m for v in high)
-        if all(a <= p <= b for p, a, b in zip(local, grown_low, grown_high, strict=True)):
-            return False
-    return True
+    bodies = list(_solid_bodies(scene))
+    if not bodies:
+        return True
+    bounds_m = {name: standing_bounds_m(assets, name) for name in {b.asset for b in bodies}}
+    scales = np.array([body.scale for body in bodies])
+    boxes_m = np.array([bounds_m[body.asset] for body in bodies]) * scales[:, None, None]
+    w, x, y, z = np.array([body.T_world_body.quaternion_wxyz for body in bodies]).T
+    shift_m = tuple(-np.array([body.T_world_body.translation_m for body in bodies]).T)
+    # The products and sums of ``SE3.inverse() @ SE3(point_m)``, for all bodies at once.
+    inverse = (w, -x, -y, -z)
+    local_m = np.array(rotate_by_quaternion(inverse, shift_m)) + np.array(
+        rotate_by_quaternion(inverse, point_m)
+    )
+    low, high = boxes_m[:, 0].T - margin_m, boxes_m[:, 1].T + margin_m
+    return not ((low <= local_m) & (local_m <= high)).all(axis=0).any()
 
 
 def _solid_bodies(scene: Scene) -> Iterator[Body]:

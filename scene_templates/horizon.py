@@ -35,6 +35,10 @@ _PIECE_M: dict[HorizonKind, float] = {
 _FAR: dict[HorizonKind, float] = {"trees": 1.0, "forest": 1.5, "skyline": 3.0, "hills": 4.0}
 """Distance of each layer, as a multiple of ``distance_m``."""
 _VARIANTS: dict[HorizonKind, int] = {"trees": 8, "forest": 6, "skyline": 8, "hills": 6}
+_OUTWARD = 16
+"""Directions in which outermost points are sought."""
+_INSIDE_M = 0.01
+"""Depth below which a point is no corner of the outline, whatever rounding does."""
 _SUNK_M: dict[HorizonKind, float] = {"trees": 0.12, "forest": 0.12, "skyline": 0.12, "hills": 1.0}
 """Pieces stand this far below z = 0, so that no gap shows under them."""
 
@@ -132,9 +136,28 @@ def convex_outline(points_m: Array) -> Array:
     Source: Andrew, "Another efficient algorithm for convex hulls in two dimensions", Information
     Processing Letters 9, 1979.
     """
-    ordered = np.unique(np.round(points_m, 6), axis=0).tolist()
+    ordered = np.unique(_near_hull(np.round(points_m, 6)), axis=0).tolist()
     chains = [_half_hull(ordered), _half_hull(ordered[::-1])]
     return np.array([*chains[0][:-1], *chains[1][:-1]] or ordered)
+
+
+def _near_hull(points_m: Array) -> Array:
+    """The points but those well inside the polygon of the outermost ones in some directions.
+
+    Most points of a street are inside; numpy leaves them out faster than Python visits them.
+    Source: Akl and Toussaint, "A fast convex hull algorithm", Information Processing Letters 7,
+    1978.
+    """
+    turn = 2.0 * math.pi * np.arange(_OUTWARD) / _OUTWARD
+    x, y = points_m.T
+    corners = [int((x * math.cos(a) + y * math.sin(a)).argmax()) for a in turn]
+    inside = np.ones(len(points_m), np.bool_)
+    for a, b in zip(corners, corners[1:] + corners[:1], strict=True):
+        along_x, along_y = x[b] - x[a], y[b] - y[a]
+        margin = _INSIDE_M * math.hypot(along_x, along_y)
+        if margin > 0.0:
+            inside &= along_x * (y - y[a]) - along_y * (x - x[a]) > margin
+    return points_m[~inside] if len(set(corners)) > 2 else points_m
 
 
 def _half_hull(ordered: Sequence[Sequence[float]]) -> list[Sequence[float]]:

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.asset_types import Asset
+from gen_data.generator.core.bounded_cache import ObjectCache
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.members import Member, add_members
@@ -31,6 +32,8 @@ MARGIN_M = 0.02
 """Gap between objects and other elements on the surface."""
 _GAPS_M = (0.24, 0.18, 0.12, 0.08, 0.05, 0.03, 0.015, 0.005)
 _STEP_M = 0.02
+_FAMILIES: ObjectCache[Mapping[str, list[Asset]]] = ObjectCache(1)
+"""Of the latest library: a street has dozens of groups, and a library thousands of assets."""
 _TURNS_MAX = 100_000
 """Limit on the steps, rows and layers tried for one object; large surfaces need fewer."""
 
@@ -69,9 +72,9 @@ class AssetChoice(Strict):
         found = {a.asset_id: a for a in assets.find(self.tags)} if self.tags else {}
         for tag in self.any_of:
             found |= {a.asset_id: a for a in assets.find((tag,))}
+        families = _group_by_family(assets.find(())) if self.ids else {}
         for asset_id in self.ids:
-            family = [a for a in assets.find(()) if a.asset_id.partition("?")[0] == asset_id]
-            members = family or [assets.get(asset_id)]
+            members = families.get(asset_id) or [assets.get(asset_id)]
             found |= {a.asset_id: a for a in members}
         fitting = [
             asset
@@ -191,6 +194,18 @@ class Objects(Element):
                 "expected fewer objects or a larger surface"
             )
         return points
+
+
+def _group_by_family(every: tuple[Asset, ...]) -> Mapping[str, list[Asset]]:
+    """Assets by the part of their ids before the parameters."""
+
+    def group() -> Mapping[str, list[Asset]]:
+        families: dict[str, list[Asset]] = {}
+        for asset in every:
+            families.setdefault(asset.asset_id.partition("?")[0], []).append(asset)
+        return families
+
+    return _FAMILIES.get(every, group)
 
 
 def empty_group(name: str, placement: Placement) -> ObjectGroup:

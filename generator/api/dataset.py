@@ -21,6 +21,8 @@ from gen_data.generator.core.errors import ConfigError, SampleIndexError, did_yo
 from gen_data.generator.runner.stored_objects import open_stored
 
 if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
+
     from gen_data.generator.core.capture import Channel
     from gen_data.generator.pipeline import Pipeline
     from gen_data.generator.runner.stored import StoredSamples
@@ -214,14 +216,13 @@ class GeneratedSamples:
 
         self._make_pipeline = PipelineFactory(config, n=1, extra_channels=channels)
         self._pipeline: Pipeline | None = None
+        self._thread_pools: tuple[int, ThreadpoolController] | None = None
         self._resources = ExitStack()
 
     def sample(self, index: int) -> SampleRecord:
         """Return the sample of that number."""
-        from threadpoolctl import threadpool_limits
-
         # The last bits of sums in BLAS, and so of poses, depend on the number of threads.
-        with threadpool_limits(limits=1):
+        with self._find_thread_pools().limit(limits=1):
             return self._open_pipeline().sample(index)
 
     @property
@@ -239,6 +240,15 @@ class GeneratedSamples:
         self._pipeline = None
         self._resources.close()
 
+    def _find_thread_pools(self) -> ThreadpoolController:
+        """Thread pools of the loaded libraries; sought again when modules have been imported."""
+        from threadpoolctl import ThreadpoolController
+
+        modules = len(sys.modules)
+        if self._thread_pools is None or self._thread_pools[0] != modules:
+            self._thread_pools = modules, ThreadpoolController()
+        return self._thread_pools[1]
+
     def _open_pipeline(self) -> Pipeline:
         if self._pipeline is None:
             self._pipeline = self._resources.enter_context(self._make_pipeline())
@@ -246,7 +256,8 @@ class GeneratedSamples:
 
     def __getstate__(self) -> dict[str, Any]:
         """Engines stay in their process."""
-        return {**self.__dict__, "_pipeline": None, "_resources": ExitStack()}
+        kept = {"_pipeline": None, "_thread_pools": None, "_resources": ExitStack()}
+        return {**self.__dict__, **kept}
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from functools import lru_cache
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from gen_data.generator.core.serialization import canonical_json, from_plain
 
 _MESH_ARRAYS = ("vertices_m", "faces", "normals", "uvs", "face_slots")
 _IMAGE = "image/"
+_MATERIALS_KEPT = 4096
 
 
 def pack_imported(imported: ImportedMesh) -> Arrays:
@@ -49,10 +51,9 @@ def unpack_imported(arrays: Arrays) -> ImportedMesh:
     """
     mesh = collision = None
     if "materials" in arrays:
-        materials = json.loads(arrays["materials"].tobytes())
         mesh = MeshData(
             **{name: arrays[name] for name in _MESH_ARRAYS},
-            materials=from_plain(tuple[Material, ...], materials),
+            materials=_decode_materials(arrays["materials"].tobytes()),
         )
     if "part_sizes" in arrays:
         ends = np.cumsum(arrays["part_sizes"])[:-1]
@@ -67,6 +68,12 @@ def unpack_imported(arrays: Arrays) -> ImportedMesh:
     if "body_bounds_m" in arrays:
         bounds_m = from_plain(tuple[Vec3, Vec3], arrays["body_bounds_m"].tolist())
     return ImportedMesh(mesh, collision, images, keypoints, bounds_m)
+
+
+@lru_cache(maxsize=_MATERIALS_KEPT)
+def _decode_materials(text: bytes) -> tuple[Material, ...]:
+    """Materials in canonical JSON; an asset that is loaded again has the same ones."""
+    return from_plain(tuple[Material, ...], json.loads(text))
 
 
 _OPTIONAL_IMAGES = ("roughness", "normal", "metallic", "occlusion", "emission", "alpha")

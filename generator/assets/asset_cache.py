@@ -22,7 +22,7 @@ import struct
 import tempfile
 import zlib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
@@ -30,7 +30,7 @@ from typing import Any, BinaryIO, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.core.bounded_cache import ByteCache, Sized
+from gen_data.generator.core.bounded_cache import ByteCache, CountCache, Sized
 from gen_data.generator.core.serialization import canonical_json
 
 S = TypeVar("S", bound=Sized)
@@ -46,6 +46,7 @@ _ALIGNMENT = 64
 # A mapping occupies whole pages, and a process may have 65,530 mappings.
 _MAPPED_BYTES_MIN = 64 * 1024
 _CHUNK_BYTES = 256 * 1024
+_INTACT_FILES = 16_384
 
 
 def content_key(description: Mapping[str, Any]) -> str:
@@ -62,11 +63,14 @@ class DiskCache:
     """
 
     folder: Path
+    _intact: CountCache[None] = field(
+        default_factory=lambda: CountCache(_INTACT_FILES), init=False, repr=False, compare=False
+    )
 
     def arrays(self, key: str, compute: Callable[[], Arrays]) -> Arrays:
         """Load the arrays of a content key, read-only; compute and store them if missing."""
         path = self.folder / key[:2] / f"{key}.arrays"
-        stored = _load(path, key)
+        stored = _load(path, key, self._intact)
         if stored is not None:
             return stored
         arrays = compute()
@@ -74,7 +78,7 @@ class DiskCache:
         with contextlib.suppress(OSError):
             _store(path, key, arrays)
             if sum(array.nbytes for array in arrays.values()) >= _MAPPED_BYTES_MIN:
-                return _load(path, key) or arrays
+                return _load(path, key, self._intact) or arrays
         return arrays
 
     def load_json(self, name: str) -> dict[str, Any]:
@@ -184,14 +188,22 @@ def _decode_checked(data: bytes | mmap.mmap, key: str) -> Arrays | None:
     return arrays
 
 
-def _load(path: Path, key: str) -> Arrays | None:
-    """Load the arrays of a file; None if it is missing, damaged, or has another key."""
+def _load(path: Path, key: str, intact: CountCache[None]) -> Arrays | None:
+    """Load the arrays of a file; None if it is missing, damaged, or has another key.
+
+    Files with a right checksum are noted in ``intact``: later loads, of which there are hundreds
+    per scene, need not read them as a whole again unless they have been replaced.
+    """
     try:
         with path.open("rb") as file:
-            if os.fstat(file.fileno()).st_size < _MAPPED_BYTES_MIN:
+            facts = os.fstat(file.fileno())
+            version = f"{key} {facts.st_ino} {facts.st_size} {facts.st_mtime_ns}"
+            if facts.st_size < _MAPPED_BYTES_MIN:
                 return decode_arrays(file.read(), key)
-            if not _is_intact(file):
-                return None
+            if version not in intact:
+                if not _is_intact(file):
+                    return None
+                intact.get(version, lambda: None)
             return _decode_checked(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), key)
     except OSError:
         return None

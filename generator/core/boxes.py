@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,19 +113,32 @@ def rectangles_overlap(a: Array, half_a_m: Array, b: Array, half_b_m: Array) -> 
     ``a`` and ``b`` are their centres [m] and the directions of their first half extents: x, y,
     cosine, sine; shape [..., 4]. Half extents have the shape [..., 2].
     """
-    dx, dy = b[..., 0] - a[..., 0], b[..., 1] - a[..., 1]
-    cos_a, sin_a, cos_b, sin_b = a[..., 2], a[..., 3], b[..., 2], b[..., 3]
-    ax, ay, bx, by = half_a_m[..., 0], half_a_m[..., 1], half_b_m[..., 0], half_b_m[..., 1]
-    # Of the angle between both: how much of one's extents counts along the other's axes.
-    c = np.abs(cos_a * cos_b + sin_a * sin_b)
-    s = np.abs(cos_a * sin_b - sin_a * cos_b)
-    overlap: NDArray[np.bool_] = (
-        (np.abs(dx * cos_a + dy * sin_a) < ax + bx * c + by * s)
-        & (np.abs(dy * cos_a - dx * sin_a) < ay + bx * s + by * c)
-        & (np.abs(dx * cos_b + dy * sin_b) < bx + ax * c + ay * s)
-        & (np.abs(dy * cos_b - dx * sin_b) < by + ax * s + ay * c)
+    first, second = (
+        (of[..., 0], of[..., 1], of[..., 2], of[..., 3], half_m[..., 0], half_m[..., 1])
+        for of, half_m in ((a, half_a_m), (b, half_b_m))
     )
+    overlap: NDArray[np.bool_] = overlap_of(first, second)
     return overlap
+
+
+Rectangle = tuple[Any, Any, Any, Any, Any, Any]
+"""Centre x, y [m], direction of the first half extent (cosine, sine), half extents [m]; numbers, or
+arrays of one shape."""
+
+
+def overlap_of(a: Rectangle, b: Rectangle) -> Any:
+    """``rectangles_overlap`` of rectangles in components: numbers give a bool, arrays an array."""
+    (x_a, y_a, cos_a, sin_a, ax, ay), (x_b, y_b, cos_b, sin_b, bx, by) = a, b
+    dx, dy = x_b - x_a, y_b - y_a
+    # Of the angle between both: how much of one's extents counts along the other's axes.
+    c = abs(cos_a * cos_b + sin_a * sin_b)
+    s = abs(cos_a * sin_b - sin_a * cos_b)
+    return (
+        (abs(dx * cos_a + dy * sin_a) < ax + bx * c + by * s)
+        & (abs(dy * cos_a - dx * sin_a) < ay + bx * s + by * c)
+        & (abs(dx * cos_b + dy * sin_b) < bx + ax * c + ay * s)
+        & (abs(dy * cos_b - dx * sin_b) < by + ax * s + ay * c)
+    )
 
 
 def boxes_touch(T_world_a: SE3, half_a_m: Vec3, T_world_b: SE3, half_b_m: Vec3) -> bool:

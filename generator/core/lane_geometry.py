@@ -10,11 +10,14 @@ from typing import Literal
 
 import numpy as np
 
+from gen_data.generator.core.bounded_cache import ObjectCache
 from gen_data.generator.core.scene import Lane
 from gen_data.generator.core.se3 import SE3, Array, Vec3
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, Side] = ("left", "right")
+_ARC_LENGTHS: ObjectCache[tuple[float, ...]] = ObjectCache(1024)
+"""Of the points of the latest lanes: a street has about a hundred."""
 MEETING_M = 0.25
 """Borders with ends nearer to each other than this are the same."""
 
@@ -31,10 +34,9 @@ class LaneLine:
     at_m: tuple[float, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        """Measure the line."""
-        points = np.asarray(self.lane.center_m, dtype=np.float64)
-        steps = np.sqrt(np.sum(np.diff(points, axis=0) ** 2, axis=1))
-        object.__setattr__(self, "at_m", tuple(np.concatenate([[0.0], np.cumsum(steps)]).tolist()))
+        """Measure the line; two dozen randomizers ask for that of the same lane."""
+        arc_m = _ARC_LENGTHS.get(self.lane, lambda: _arc_lengths_m(self.lane))
+        object.__setattr__(self, "at_m", arc_m)
 
     @property
     def length_m(self) -> float:
@@ -54,6 +56,12 @@ class LaneLine:
         yaw = math.atan2(b[1] - a[1], b[0] - a[0])
         x, y, z = (p + t * (q - p) for p, q in zip(a, b, strict=True))
         return SE3.about_z(yaw, (x - left_m * math.sin(yaw), y + left_m * math.cos(yaw), z))
+
+
+def _arc_lengths_m(lane: Lane) -> tuple[float, ...]:
+    points = np.asarray(lane.center_m, dtype=np.float64)
+    steps = np.sqrt(np.sum(np.diff(points, axis=0) ** 2, axis=1))
+    return tuple(np.concatenate([[0.0], np.cumsum(steps)]).tolist())
 
 
 def pose_on_lane(

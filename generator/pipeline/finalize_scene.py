@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from gen_data.generator.core.asset_types import Keypoint
 from gen_data.generator.core.interfaces import AssetLibrary
 from gen_data.generator.core.scene import Body, Box3dExtent, Instance, Scene
 from gen_data.generator.core.scene_time import add_twists, scene_at
@@ -97,10 +98,10 @@ def _measure(
             box_max_m=_scale(high, body.scale),
             body_bounds_m=_body_bounds(body, assets) if box3d == "body" else None,
             keypoints=tuple(
-                replace(
-                    point,
-                    position_m=_scale(point.position_m, body.scale),
-                    radius_m=point.radius_m * body.scale,
+                Keypoint(
+                    point.name,
+                    _scale(point.position_m, body.scale),
+                    point.radius_m * body.scale,
                 )
                 for point in assets.keypoints(body.asset)
             ),
@@ -131,7 +132,8 @@ def _body_bounds(body: Body, assets: AssetLibrary) -> tuple[Vec3, Vec3] | None:
 
 
 def _scale(corner_m: Vec3, scale: float) -> Vec3:
-    return _round_to_micrometre(np.asarray(corner_m) * scale)
+    x, y, z = corner_m
+    return (round(x * scale, 6), round(y * scale, 6), round(z * scale, 6))
 
 
 def _round_to_micrometre(corner_m: Array) -> Vec3:

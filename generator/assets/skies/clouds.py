@@ -56,7 +56,9 @@ def cloud_layer(
         if rows.size:
             flat_m = _HEIGHT_M / (up[rows, None, None] + _HEAPING)
             place = d[rows, :, :2] * (flat_m / _TILE_M)
-            seen[rows] += near[rows, None, None].astype(np.float32) * _sample(level, place)
+            sample = _sample(level, place)
+            sample *= near[rows, None, None].astype(np.float32)
+            seen[rows] += sample
     clear = np.exp(-way_m / _HAZE_M)[:, None].astype(np.float32)
     brightness = seen[..., 1] / np.maximum(seen[..., 0], np.float32(1e-6))
     return seen[..., 0] * clear, brightness
@@ -125,17 +127,24 @@ def _mip_chain(layer: Float32) -> list[Float32]:
 
 
 def _sample(layer: Float32, place: Array) -> Float32:
-    """The repeating layer at places in units of its length, bilinear."""
+    """The repeating layer at places in units of its length, bilinear; its size is a power of 2."""
     size = layer.shape[0]
     position = place * size - 0.5
     floor = np.floor(position)
     part = (position - floor).astype(np.float32)
     first = floor.astype(np.int32)
-    (x0, y0), (x1, y1) = (((first[..., 0] + s) % size, (first[..., 1] + s) % size) for s in (0, 1))
-    fx, fy = part[..., 0, None], part[..., 1, None]
+    # For powers of 2, the bits under a mask are the remainder, which takes ten times as long.
+    x0, x1, y0, y1 = ((first[..., k] + step) & (size - 1) for k in (0, 1) for step in (0, 1))
     cells = layer.reshape(size * size, -1)
     a, b, c, d = (cells.take(y * size + x, axis=0) for y in (y0, y1) for x in (x0, x1))
-    lower = a + (b - a) * fx
-    upper = c + (d - c) * fx
-    mixed: Float32 = lower + (upper - lower) * fy
-    return mixed
+    # Repeated, since numpy is slow on broadcasts to two neighbours.
+    fx, fy = (np.repeat(part[..., k : k + 1], cells.shape[1], axis=-1) for k in (0, 1))
+    return _interpolate(_interpolate(a, b, fx), _interpolate(c, d, fx), fy)
+
+
+def _interpolate(first: Float32, second: Float32, share: Float32) -> Float32:
+    """``first + (second - first) * share``, in the memory of ``second``."""
+    second -= first
+    second *= share
+    second += first
+    return second

@@ -35,8 +35,13 @@ from gen_data.generator.sensors.camera.exposure import (
     meter_ev100,
     saturation_cd_m2,
 )
-from gen_data.generator.sensors.camera.image_sensor import ImageSensor, expose, filter_at, mosaic
-from gen_data.generator.sensors.camera.isp import Tone, to_bytes, tone_to_bytes, tone_to_display
+from gen_data.generator.sensors.camera.image_sensor import (
+    ImageSensor,
+    expose,
+    mosaic,
+    scale_filters,
+)
+from gen_data.generator.sensors.camera.isp import Tone, tone_to_bytes, tone_to_display
 from gen_data.generator.sensors.camera.lens_drops import lens_drops, refract_in_drops
 from gen_data.generator.sensors.camera.optics import add_flare, add_glare
 from gen_data.generator.sensors.device_presets import check_preset, preset_path
@@ -294,7 +299,7 @@ def _vignetting(light: Light, shot: Shot) -> Light:
     values = optics.apply_vignetting(light.values, loss) if loss > 0.0 else light.values
     if shot.pipeline.natural_vignetting:
         falloff = optics.natural_falloff(shot.camera.intrinsics, shot.pipeline.fisheye_pupil)
-        values = values * falloff[..., None]
+        values = optics.scale_pixels(values, falloff)
     return replace(light, values=values)
 
 
@@ -319,7 +324,7 @@ def _image_sensor(light: Light, shot: Shot) -> Light:
     share, warmth_ev = pipeline.white_balance.draw(shot.rng), pipeline.warmth_ev.draw(shot.rng)
     if sensor.pattern != "mono":
         gains = isp.white_balance_gains(_illuminant(image, pipeline), share, warmth_ev)
-        raw = raw * gains[filter_at(sensor.pattern, *raw.shape)]
+        raw = scale_filters(raw, sensor.pattern, gains)
     white = 2.0 * pipeline.headroom
     image = isp.demosaic(raw, sensor.pattern, pipeline.demosaic, white)
     return Light(isp.transform_colors(image, srgb_from_camera), 1.0)
@@ -389,7 +394,7 @@ def _tone(light: Light, shot: Shot) -> NDArray[np.uint8]:
     if amount <= 0.0:
         return tone_to_bytes(light.values, scale, *curve)
     display = tone_to_display(light.values, scale, *curve)
-    return to_bytes(isp.sharpen(display, amount, pipeline.sharpening_px))
+    return isp.sharpen_to_bytes(display, amount, pipeline.sharpening_px)
 
 
 def _compress(image: NDArray[np.uint8], shot: Shot) -> NDArray[np.uint8]:

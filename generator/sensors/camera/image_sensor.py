@@ -10,7 +10,6 @@ from functools import lru_cache
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from gen_data.generator.config.base_model import Strict
@@ -72,13 +71,13 @@ def mosaic(image: Float32, pattern: Pattern) -> Float32:
     return raw
 
 
-def filter_at(pattern: Pattern, height: int, width: int) -> NDArray[np.intp]:
-    """Channel of every pixel's filter, [h, w]; 1 everywhere for ``mono``."""
-    filters = np.ones((height, width), np.intp)
-    if pattern != "mono":
-        for k, channel in enumerate(_FILTERS[pattern]):
-            filters[k // 2 :: 2, k % 2 :: 2] = channel
-    return filters
+def scale_filters(raw: Float32, pattern: Pattern, gains: Float32) -> Float32:
+    """Raw values [h, w] times the gain, of [3], of their pixels' filters; green's for ``mono``."""
+    scaled = np.empty_like(raw)
+    for k, channel in enumerate(_FILTERS.get(pattern, (1, 1, 1, 1))):
+        phase = np.s_[k // 2 :: 2, k % 2 :: 2]
+        np.multiply(raw[phase], gains[channel], out=scaled[phase])
+    return scaled
 
 
 def expose(light: Float32, gain: float, time_s: float, sensor: ImageSensor, rng: Rng) -> Float32:
@@ -108,13 +107,21 @@ def _expose_once(
     response, offset_e, dark = _fixed_pattern(light.shape, sensor)
     dark_e = sensor.dark_current_e_s.draw(rng) * time_s
     # Beyond eight full wells all pixels saturate: the bound keeps the draw in its range.
-    mean_e = np.clip(light, 0.0, 8.0) * response * np.float32(well_e) + np.float32(dark_e) * dark
+    mean_e = np.clip(light, 0.0, 8.0)
+    mean_e *= response
+    mean_e *= np.float32(well_e)
+    mean_e += np.float32(dark_e) * dark
     electrons = _draw_electrons(mean_e, rng)
-    noise = rng.standard_normal(light.shape, dtype=np.float32)
-    level = electrons + np.float32(sensor.read_noise_e.draw(rng)) * noise
+    level = rng.standard_normal(light.shape, dtype=np.float32)
+    level *= np.float32(sensor.read_noise_e.draw(rng))
+    level += electrons
     level += offset_e - np.float32(dark_e)
     steps = np.float32((1 << sensor.bits) - 1)
-    return np.asarray(np.clip(np.rint(level / well_e * steps), 0, steps) / steps, np.float32)
+    level /= np.float32(well_e)
+    level *= steps
+    np.clip(np.rint(level, out=level), 0, steps, out=level)
+    level /= steps
+    return level
 
 
 def _draw_electrons(mean_e: Float32, rng: Rng) -> Float32:

@@ -69,7 +69,15 @@ def apply_vignetting(image: Float32, corner_loss: float) -> Float32:
     y = np.arange(height, dtype=np.float32) + np.float32(0.5 - 0.5 * height)
     r2 = x[None, :] ** 2 + y[:, None] ** 2
     gain = 1.0 - corner_loss * r2 / (0.25 * (width * width + height * height))
-    return np.asarray(image * gain[..., None].astype(np.float32), np.float32)
+    return scale_pixels(image, gain.astype(np.float32, copy=False))
+
+
+def scale_pixels(image: Float32, gain: Float32) -> Float32:
+    """Multiply all channels of an image [h, w, 3] by one factor per pixel [h, w]."""
+    # Merged first: numpy broadcasts over a last axis of three in a third of this speed.
+    scaled: Float32 = cv2.merge([gain, gain, gain])
+    scaled *= image
+    return scaled
 
 
 def natural_falloff(camera: Intrinsics, pupil_power: float) -> Float32:
@@ -125,13 +133,17 @@ def apply_chromatic_aberration(image: Float32, corner_px: float) -> Float32:
     """Scale red up and blue down by ``corner_px`` at the corners: lateral chromatic aberration."""
     height, width = image.shape[:2]
     share = corner_px / (0.5 * math.hypot(width, height))
-    out = image.copy()
-    for channel, scale in ((0, 1.0 + share), (2, 1.0 - share)):
-        shift = _scale_about_middle(scale, width, height)
-        out[..., channel] = cv2.warpAffine(
-            image[..., channel], shift, (width, height), borderMode=cv2.BORDER_REPLICATE
+    red, green, blue = cv2.split(image)
+    red, blue = (
+        cv2.warpAffine(
+            channel,
+            _scale_about_middle(scale, width, height),
+            (width, height),
+            borderMode=cv2.BORDER_REPLICATE,
         )
-    return np.asarray(out, np.float32)
+        for channel, scale in ((red, 1.0 + share), (blue, 1.0 - share))
+    )
+    return np.asarray(cv2.merge([red, green, blue]), np.float32)
 
 
 def _scale_about_middle(scale: float, width: int, height: int) -> Array:
@@ -189,10 +201,22 @@ def _gaussian(image: Float32, sigma_px: float) -> Float32:
 def halve(image: Float32, times: int) -> Float32:
     """Average squares of ``2 ** times`` pixels; edges are replicated."""
     for _ in range(times):
-        image = np.pad(image, ((0, image.shape[0] % 2), (0, image.shape[1] % 2), (0, 0)), "edge")
-        rows = image[0::2] + image[1::2]
-        image = np.float32(0.25) * (rows[:, 0::2] + rows[:, 1::2])
+        rows = _sum_pairs(image, np.zeros(((len(image) + 1) // 2, *image.shape[1:]), np.float32))
+        image = np.zeros((len(rows), (rows.shape[1] + 1) // 2, image.shape[2]), np.float32)
+        # Channel by channel: numpy is slow on loops over three neighbours.
+        for channel in range(image.shape[2]):
+            _sum_pairs(rows[..., channel].T, image[..., channel].T)
+        image *= np.float32(0.25)
     return image
+
+
+def _sum_pairs(image: Float32, out: Float32) -> Float32:
+    """Sums of pairs of rows, in ``out``; an odd last row counts twice."""
+    pairs = len(image) // 2
+    np.add(image[0 : 2 * pairs : 2], image[1::2], out=out[:pairs])
+    if len(image) % 2:
+        np.add(image[-1], image[-1], out=out[-1])
+    return out
 
 
 def blur(image: Float32) -> Float32:
