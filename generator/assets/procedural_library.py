@@ -23,7 +23,7 @@ from gen_data.generator.assets.procedural.family import (
     TextureFamily,
 )
 from gen_data.generator.core.asset_types import Asset, Float32, Symmetry, TextureData
-from gen_data.generator.core.bounded_cache import Sized
+from gen_data.generator.core.bounded_cache import CountCache, Sized
 from gen_data.generator.core.errors import AssetError, ConfigError, did_you_mean
 from gen_data.generator.core.plugins import loaded, package_of, third_party
 
@@ -44,6 +44,9 @@ TABLES = (
 """Packages with tables ``FAMILIES``, ``TEXTURES`` or ``ENVIRONMENTS``."""
 KIND = "asset_family"
 """Third-party packages add families through the entry-point group ``gen_data.asset_family``."""
+_offered: CountCache[tuple[AnyFamily, Asset]] = CountCache(16384)
+"""Descriptions of assets offered for selection, about 1 kB each: every library of a process has the
+same, each search by tags finds many of them, and their facts take a millisecond."""
 S = TypeVar("S", bound=Sized)
 F = TypeVar("F", Family, TextureFamily, EnvironmentFamily)
 
@@ -84,6 +87,13 @@ class ProceduralLibrary:
     def get(self, asset_id: AssetId) -> Asset:
         """Describe the asset of an id with a known name. Raises AssetError on wrong parameters."""
         family = self._families[asset_id.name]
+        if not _is_offered(asset_id, family):
+            return self._describe(asset_id, family)
+        # The family is held beside its id(), which no other object can have as long.
+        name = f"{id(family)}/{asset_id}"
+        return _offered.get(name, lambda: (family, self._describe(asset_id, family)))[1]
+
+    def _describe(self, asset_id: AssetId, family: AnyFamily) -> Asset:
         facts = _read_facts(asset_id, family)
         origin = family.origin
         return Asset(
@@ -193,6 +203,12 @@ def _load_third_party() -> tuple[tuple[str, AnyFamily, str], ...]:
             )
         found.append((name, family, package_of(entry)))
     return tuple(found)
+
+
+def _is_offered(asset_id: AssetId, family: AnyFamily) -> bool:
+    """Whether an asset is one of the family's seeds that are offered for selection."""
+    seed = asset_id.parameters.get("seed")
+    return len(asset_id.parameters) == 1 and type(seed) is int and 0 <= seed < family.variants
 
 
 def _read_facts(asset_id: AssetId, family: AnyFamily) -> Facts:

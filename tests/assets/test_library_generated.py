@@ -45,6 +45,16 @@ def test_seeds_are_listed_and_parametric_families_are_not(library: Library) -> N
     assert not [a for a in library.find({"procedural"}) if a.asset_id.startswith("table")]
 
 
+def test_libraries_of_a_process_share_descriptions_of_offered_assets(tmp_path: Path) -> None:
+    """A command opens several, and each search by tags finds many of them."""
+    one, two = (open_library(cache_dir=tmp_path / name) for name in "ab")
+    mug = one.get("mug?seed=1")
+
+    assert two.get("mug?seed=1") is mug
+    assert any(found is mug for found in two.find({"mug"}))
+    assert one.get("mug?seed=123456") is not two.get("mug?seed=123456")
+
+
 def test_made_and_cached_solids_are_equal(library: Library, tmp_path: Path) -> None:
     """Bit by bit, materials included."""
     made = library.mesh("mug?seed=2")

@@ -17,6 +17,12 @@ from tests.scenery.rays import cast
 LEAFY = [name for name in SPECIES if name != "conifer"]
 
 
+@cache
+def summer_mesh(species: str) -> MeshData:
+    """The tree of seed 1 with all of its leaves."""
+    return tree(1, species, 1.0).mesh
+
+
 def leaves_of(mesh: MeshData) -> np.ndarray:
     """Whether each face is a leaf."""
     slots = [k for k, m in enumerate(mesh.materials) if m.role == "leaf"]
@@ -26,7 +32,7 @@ def leaves_of(mesh: MeshData) -> np.ndarray:
 @pytest.mark.parametrize("species", LEAFY)
 def test_leaves_come_and_go_but_the_trunk_stays(species: str) -> None:
     """The share of leaves is what it says; the trunk of the same tree is the same."""
-    full, half, bare = (tree(3, species, share).mesh for share in (1.0, 0.5, 0.0))
+    full, half, bare = summer_mesh(species), *(tree(1, species, k).mesh for k in (0.5, 0.0))
 
     assert leaves_of(half).sum() == pytest.approx(0.5 * leaves_of(full).sum(), abs=2)
     assert not leaves_of(bare).any()
@@ -73,7 +79,7 @@ def test_autumn_is_redder_than_summer_and_spring_blossoms() -> None:
 @pytest.mark.parametrize("species", LEAFY)
 def test_a_crown_is_dense_but_not_a_ball(species: str) -> None:
     """Level rays through the middle of the crown: most meet a leaf, some pass by all holes."""
-    mesh = tree(1, species, 1.0).mesh
+    mesh = summer_mesh(species)
     crown = mesh.vertices_m[mesh.faces[leaves_of(mesh)]].reshape(-1, 3).astype(np.float64)
     middle, spread = crown.mean(axis=0), crown.std(axis=0)
     y, z = (g.ravel() for g in np.meshgrid(np.linspace(-1, 1, 25), np.linspace(-1, 1, 25)))
@@ -84,17 +90,17 @@ def test_a_crown_is_dense_but_not_a_ball(species: str) -> None:
 
 def blocked_share(mesh: MeshData, eyes: np.ndarray) -> float:
     """Share of rays along -X that meet wood, or a leaf and not a hole between leaves."""
-    alphas = {m.texture: cover_of(m.texture) for m in mesh.materials if "leaves" in m.texture}
-    blocked, going, eyes = 0, np.ones(len(eyes), dtype=bool), eyes.copy()
+    going = eyes.copy()
+    blocked = 0
     for _ in range(40):
-        far, face, _ = cast(mesh, eyes, np.tile([-1.0, 0.0, 0.0], (len(eyes), 1)))
-        going &= face >= 0
-        for k in np.flatnonzero(going):
-            texture = mesh.materials[mesh.face_slots[face[k]]].texture
-            at = eyes[k] - [far[k], 0.0, 0.0]
-            if texture not in alphas or is_leaf(alphas[texture], mesh, int(face[k]), at):
-                blocked, going[k] = blocked + 1, False
-        eyes[:, 0] -= np.where(going, far + 1e-4, 0.0)
+        far, face, _ = cast(mesh, going, np.tile([-1.0, 0.0, 0.0], (len(going), 1)))
+        met = face >= 0
+        at = going[met] - np.outer(far[met], [1.0, 0.0, 0.0])
+        opaque = is_opaque(mesh, face[met], at)
+        blocked += int(opaque.sum())
+        going = at[~opaque] - [1e-4, 0.0, 0.0]
+        if not len(going):
+            break
     return blocked / len(eyes)
 
 
@@ -106,21 +112,30 @@ def cover_of(texture: str) -> np.ndarray:
     return alpha
 
 
-def is_leaf(alpha: np.ndarray, mesh: MeshData, face: int, at: np.ndarray) -> bool:
-    """Whether a point of a face lies on a leaf; the nearest texel decides."""
-    a, b, c = mesh.vertices_m[mesh.faces[face]].astype(np.float64)
-    frame = np.stack([b - a, c - a], axis=1)
-    u, v = np.linalg.lstsq(frame, at - a, rcond=None)[0]
-    uv = np.array([1.0 - u - v, u, v]) @ mesh.uvs[mesh.faces[face]]
-    size = len(alpha)
-    column, row = (np.clip((uv[0], 1.0 - uv[1]), 0.0, 0.999) * size).astype(int)
-    return bool(alpha[row, column] >= 128)
+def is_opaque(mesh: MeshData, face: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Whether points [n, 3] of faces [n] lie on wood or a leaf; the nearest texel decides."""
+    corners = mesh.vertices_m[mesh.faces[face]].astype(np.float64)
+    frame = corners[:, 1:] - corners[:, :1]
+    normal = np.einsum("nik,njk->nij", frame, frame)
+    offset = np.einsum("nik,nk->ni", frame, at - corners[:, 0])
+    u, v = np.linalg.solve(normal, offset[..., None])[..., 0].T
+    weights = np.stack([1.0 - u - v, u, v], axis=1)
+    uv = np.einsum("nk,nkc->nc", weights, mesh.uvs[mesh.faces[face]])
+    opaque = np.ones(len(face), dtype=bool)
+    for slot, material in enumerate(mesh.materials):
+        if "leaves" in material.texture:
+            here = mesh.face_slots[face] == slot
+            alpha = cover_of(material.texture)
+            places = np.clip(np.stack([uv[here, 0], 1.0 - uv[here, 1]]), 0.0, 0.999)
+            column, row = (places * len(alpha)).astype(int)
+            opaque[here] = alpha[row, column] >= 128
+    return opaque
 
 
 @pytest.mark.parametrize("species", SPECIES)
 def test_leaf_normals_point_away_from_the_crowns_middle(species: str) -> None:
     """Soft shading: normals lean outward, and lie on their face's front."""
-    mesh = tree(1, species, 1.0).mesh
+    mesh = summer_mesh(species)
     faces = mesh.faces[leaves_of(mesh)]
     corners = mesh.vertices_m[faces].astype(np.float64)
     axis = corners.mean(axis=1) * [1.0, 1.0, 0.0]
