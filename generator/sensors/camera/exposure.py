@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass
 from typing import Literal
 
@@ -19,6 +20,8 @@ from gen_data.generator.core.shutter import Shutter
 # scenes stay dark.
 _EV100_RANGE = (1.0, 17.0)
 _METERED_EVERY = 4
+_EV100_STEPS = 256.0
+"""Steps per exposure value: on a grid, as the last bit of a sum differs between processors."""
 
 
 class ExposureControl(Strict):
@@ -84,8 +87,31 @@ def meter_ev100(radiance: Float32) -> float:
     logs = np.log2(levels[counted])
     average = float((logs * weights[counted]).sum() / weights[counted].sum())
     ev100 = average - math.log2(1.2 * MIDDLE_GREY)
-    # On a grid, as the last bit of a logarithm differs between processors.
-    return round(min(max(ev100, _EV100_RANGE[0]), _EV100_RANGE[1]) * 256.0) / 256.0
+    ev100 = min(max(ev100, _EV100_RANGE[0]), _EV100_RANGE[1])
+    return round(ev100 * _EV100_STEPS) / _EV100_STEPS
+
+
+def meter_mean_ev100(radiance: Float32, mean: float) -> float:
+    """The exposure value at which the image has this mean, where what saturates counts as 1.
+
+    Automatic exposure of machine vision cameras: "to achieve a specific average image intensity"
+    of the whole image (Point Grey, Flea3 FL3-U3 Technical Reference, section 7.10). Bright surfaces
+    lower the exposure until they saturate, dark ones hardly count; a log-average does the opposite.
+
+    Args:
+        radiance: Linear RGB [cd/m^2], shape [h, w, 3].
+        mean: Share of saturation, above 0 and below 1.
+    """
+    levels = np.sort(luminance(radiance[::_METERED_EVERY, ::_METERED_EVERY]).ravel())
+    below = np.concatenate([[0.0], np.cumsum(levels, dtype=np.float64)])
+
+    def is_dark_enough(step: int) -> bool:
+        white = saturation_cd_m2(step / _EV100_STEPS)
+        lit = int(np.searchsorted(levels, white))
+        return float(below[lit]) / white + len(levels) - lit <= mean * len(levels)
+
+    steps = range(*(round(ev100 * _EV100_STEPS) for ev100 in _EV100_RANGE))
+    return (steps.start + bisect_left(steps, True, key=is_dark_enough)) / _EV100_STEPS
 
 
 def exposure_settings(ev100: float, control: ExposureControl) -> ExposureSettings:

@@ -33,6 +33,7 @@ from gen_data.generator.sensors.camera.exposure import (
     ExposureSettings,
     exposure_settings,
     meter_ev100,
+    meter_mean_ev100,
     saturation_cd_m2,
 )
 from gen_data.generator.sensors.camera.image_sensor import (
@@ -85,6 +86,9 @@ class ImagePipeline(Strict):
             power of its cosine, for fisheyes as ``fisheye_pupil`` defines.
         fisheye_pupil: Power of the cosine of a fisheye's pupil: 0 turns to the light, 1 is flat.
         vignetting: Share of the light that the barrel blocks at the corners.
+        metered_mean: Mean of the linear image that automatic exposure sets, as a share of
+            saturation, where what saturates counts as 1; null = the log-average luminance becomes
+            middle grey.
         exposure_compensation_ev: Added to the exposure, in stops; positive is brighter.
         exposure_error_ev: Error of metering, in stops; positive is brighter.
         exposure_control: Limits of aperture, time and gain of an image sensor; without a sensor
@@ -97,7 +101,8 @@ class ImagePipeline(Strict):
         white_balance_tint_ev: Largest difference of the estimate from the colours of lamps and
             daylight, between green and magenta, in stops; null = any estimate.
         warmth_ev: Error of the white balance: red over blue, in stops.
-        demosaic: Method of demosaicing.
+        demosaic: Method of demosaicing: ``edge_aware`` as in good cameras, ``bilinear`` as in cheap
+            ones, with coloured edges.
         saturation: Factor on saturation.
         contrast: Slope of the tone at middle grey on logarithmic axes: 1 adds none, 1.3 suits
             most cameras.
@@ -117,6 +122,7 @@ class ImagePipeline(Strict):
     natural_vignetting: bool = False
     fisheye_pupil: float = Field(0.0, ge=0, le=1)
     vignetting: UnitInterval = NONE
+    metered_mean: float | None = Field(None, gt=0, lt=1)
     exposure_compensation_ev: Annotated[Scalar, Bounds(-10, 10)] = NONE
     exposure_error_ev: Annotated[Scalar, Bounds(-8, 8)] = NONE
     exposure_control: ExposureControl = ExposureControl()
@@ -254,7 +260,7 @@ def develop(
     the noise, and the settings too unless another camera's stream is given for them.
     """
     noise_rng, rng = rng, (settings_rng or rng).of_sequence()
-    ev100 = meter_ev100(radiance) if camera.ev100 is None else camera.ev100
+    ev100 = _metered(radiance, pipeline) if camera.ev100 is None else camera.ev100
     wanted = ev100 - pipeline.exposure_compensation_ev.draw(rng)
     wanted -= pipeline.exposure_error_ev.draw(rng)
     exposure = ExposureSettings(0.0, 1.0, wanted)
@@ -265,6 +271,12 @@ def develop(
     for stage in STAGES:
         light = stage(light, shot)
     return Photograph(_compress(_tone(light, shot), shot), ev100)
+
+
+def _metered(radiance: Float32, pipeline: ImagePipeline) -> float:
+    """The exposure value by the pipeline's meter."""
+    mean = pipeline.metered_mean
+    return meter_ev100(radiance) if mean is None else meter_mean_ev100(radiance, mean)
 
 
 def _lens_drops(light: Light, shot: Shot) -> Light:
@@ -324,9 +336,9 @@ def _image_sensor(light: Light, shot: Shot) -> Light:
     share, warmth_ev = pipeline.white_balance.draw(shot.rng), pipeline.warmth_ev.draw(shot.rng)
     if sensor.pattern != "mono":
         gains = isp.white_balance_gains(_illuminant(image, pipeline), share, warmth_ev)
-        raw = scale_filters(raw, sensor.pattern, gains)
-    white = 2.0 * pipeline.headroom
-    image = isp.demosaic(raw, sensor.pattern, pipeline.demosaic, white)
+        # No gain is below 1, and the result is clipped: what saturates all channels stays white.
+        raw = scale_filters(raw, sensor.pattern, gains / gains.min())
+    image = isp.demosaic(raw, sensor.pattern, pipeline.demosaic, pipeline.headroom)
     return Light(isp.transform_colors(image, srgb_from_camera), 1.0)
 
 

@@ -39,6 +39,7 @@ from gen_data.generator.core.colorimetry import (
     temperature_to_chromaticity,
 )
 from gen_data.generator.core.se3 import Array
+from gen_data.generator.sensors.camera.demosaicing import demosaic_along_edges
 from gen_data.generator.sensors.camera.image_sensor import Pattern
 
 Demosaic = Literal["bilinear", "edge_aware"]
@@ -55,8 +56,9 @@ def demosaic(raw: Float32, pattern: Pattern, method: Demosaic, white: float) -> 
     """
     if pattern == "mono":
         return np.asarray(np.repeat(raw[..., None], 3, axis=-1), np.float32)
-    suffix = "_EA" if method == "edge_aware" else ""
-    code = getattr(cv2, f"COLOR_Bayer{_BAYER[pattern]}2RGB{suffix}")
+    if method == "edge_aware":
+        return demosaic_along_edges(np.minimum(raw, np.float32(white)), pattern)
+    code = getattr(cv2, f"COLOR_Bayer{_BAYER[pattern]}2RGB")
     steps = np.rint(np.clip(raw / white, 0.0, 1.0) * _DEPTH).astype(np.uint16)
     return np.asarray(cv2.cvtColor(steps, code) * np.float32(white / _DEPTH), np.float32)
 

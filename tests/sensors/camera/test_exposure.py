@@ -7,7 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from gen_data.generator.sensors.camera.exposure import meter_ev100, saturation_cd_m2
+from gen_data.generator.sensors.camera.exposure import (
+    meter_ev100,
+    meter_mean_ev100,
+    saturation_cd_m2,
+)
 
 
 def test_the_saturation_luminance_is_that_of_iso_12232() -> None:
@@ -50,6 +54,37 @@ def test_black_pixels_are_not_metered() -> None:
 def test_metering_of_darkness_is_finite() -> None:
     """A black view does not divide by zero: it is exposed as long as a camera can."""
     assert meter_ev100(np.zeros((4, 4, 3), np.float32)) == 1.0
+
+
+@pytest.mark.parametrize("mean", [0.18, 0.36, 0.6])
+def test_metering_of_the_mean_reaches_it(mean: float) -> None:
+    """The mean of what the sensor records: 1 where it saturates; within a step of 1/256 EV."""
+    view = np.repeat(np.geomspace(3.0, 30_000.0, 4096).reshape(64, 64, 1), 3, axis=2)
+
+    exposed = view / saturation_cd_m2(meter_mean_ev100(view.astype(np.float32), mean))
+
+    assert np.minimum(exposed[::4, ::4], 1.0).mean() == pytest.approx(mean, rel=0.004)
+
+
+def test_metering_of_the_mean_keeps_sunlit_ground_below_white() -> None:
+    """A street, half of it in shade: the log-average, brightened by 0.8 stops, loses its road.
+
+    By hand: 0.4 road of 5000, 0.1 sky of 8000, 0.5 shade of 300 cd/m^2 have a mean of 0.36 at a
+    white of 8194 cd/m^2.
+    """
+    view = np.full((80, 80, 3), 300.0, np.float32)
+    view[:32], view[32:40] = 5000.0, 8000.0
+
+    white = saturation_cd_m2(meter_mean_ev100(view, 0.36))
+
+    assert white == pytest.approx((0.4 * 5000 + 0.1 * 8000 + 0.5 * 300) / 0.36, rel=0.004)
+    assert saturation_cd_m2(meter_ev100(view) - 0.8) < 5000.0 < white
+
+
+def test_metering_of_the_mean_stops_where_cameras_do() -> None:
+    """Darkness and endless light meet the ends of the range."""
+    assert meter_mean_ev100(np.zeros((8, 8, 3), np.float32), 0.36) == 1.0
+    assert meter_mean_ev100(np.full((8, 8, 3), 1e9, np.float32), 0.36) == 17.0
 
 
 @pytest.mark.parametrize(("lux", "ev100"), [(2.5, 0.0), (2500.0, 9.966), (80_000.0, 14.966)])

@@ -80,9 +80,13 @@ def test_every_stage_of_a_camera_with_all_errors_changes_its_picture() -> None:
         "jpeg_quality": 40,
     }  # fmt: skip
 
+    # Half of it in shade: what saturates shows no balance.
+    radiance = speckled() * np.where(np.arange(64) < 32, np.float32(0.05), 1.0)[None, :, None]
+
     def picture(given: dict[str, Any], weather: Weather) -> Any:
         pipeline = ImagePipeline.model_validate_json(json.dumps(given))
-        return develop(speckled(), np.full((48, 64), 2.0), CAMERA, weather, pipeline, rng()).rgb
+        depth_m = np.full((48, 64), 2.0)
+        return develop(np.float32(radiance), depth_m, CAMERA, weather, pipeline, rng()).rgb
 
     wet = Weather(lens_drops=0.3, seed=3)
     whole = picture(everything, wet)

@@ -172,6 +172,30 @@ def test_demosaicing_gives_flat_colours_back(pattern: Pattern, method: Any) -> N
     np.testing.assert_allclose(image[4:-4, 4:-4], flat(0.8, 0.4, 0.1)[4:-4, 4:-4], atol=2e-4)
 
 
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_demosaicing_gives_even_gradients_back(pattern: Pattern) -> None:
+    """Colours that change evenly, each at its own rate, have no second derivative."""
+    y, x = np.mgrid[0:40, 0:48] / 48.0
+    ramp = np.stack([0.2 + 0.4 * x, 0.3 + 0.4 * x, 0.1 + 0.4 * x], axis=-1).astype(np.float32)
+    ramp[..., 2] += 0.2 * y
+    image = isp.demosaic(mosaic(ramp, pattern), pattern, "edge_aware", 1.0)
+    np.testing.assert_allclose(image[6:-6, 6:-6], ramp[6:-6, 6:-6], atol=0.01)
+
+
+@pytest.mark.parametrize("angle_deg", [8.0, 25.0, 50.0, 80.0, 110.0, 150.0])
+def test_thin_white_lines_stay_white_behind_a_bayer_pattern(angle_deg: float) -> None:
+    """Half a pixel wide, through a lens of 0.5 px: no colour beyond a tenth of full scale."""
+    finer, turn = 8, math.radians(angle_deg)
+    y, x = (np.mgrid[0:512, 0:512] - 255.5) / finer
+    line = np.abs(x * math.sin(turn) - y * math.cos(turn)) < 0.25
+    covered = line.reshape(64, finer, 64, finer).mean(axis=(1, 3))
+    grey = (0.15 + 1.05 * covered)[..., None] * np.ones(3)
+    scene = optics.apply_blur(grey.astype(np.float32), 0.5)
+    image = isp.demosaic(mosaic(scene, "rggb"), "rggb", "edge_aware", 1.0)
+    assert np.ptp(image, axis=-1).max() < 0.1
+    assert np.abs(image.mean(axis=-1) - scene[..., 0]).max() < 0.25
+
+
 def eye(lens: Lens, focal_px: float, width_px: int = 401) -> Intrinsics:
     """A camera whose axis meets the middle of pixel (50, 200)."""
     return Intrinsics(width_px, 101, focal_px, focal_px, 200.5, 50.5, lens)
@@ -319,6 +343,18 @@ def test_an_ideal_camera_shows_luminance_by_its_curve() -> None:
     """IEC 61966-2-1: a quarter of white is byte 137."""
     photo = photograph(flat(0.25, 0.25, 0.25) * WHITE_CD_M2, made(tone="srgb"))
     assert (photo == 137).all()
+
+
+@pytest.mark.parametrize("warmth_ev", [-0.6, 0.6])
+def test_what_saturates_the_sensor_stays_white_in_any_balance(warmth_ev: float) -> None:
+    """Half of the image is far beyond white: all of its channels read 255."""
+    scene = flat(200.0, 200.0, 200.0)
+    scene[:24] = 50.0 * WHITE_CD_M2
+    matrix = [[1.6, -0.45, -0.15], [-0.2, 1.4, -0.2], [0.0, -0.45, 1.45]]
+    made_up = made(image_sensor={}, warmth_ev=warmth_ev, color_matrix=matrix, tone="linear")
+    image = photograph(scene, made_up)
+    assert (image[:20] == 255).all()
+    assert np.ptp(image[30:].reshape(-1, 3).mean(axis=0)) > 20
 
 
 def test_white_balance_takes_out_the_light_of_a_lamp() -> None:
