@@ -23,6 +23,7 @@ from gen_data.generator.renderers.warp.scene.struct_dtypes import stack_records,
 _TABLES = load_table(__package__, "infrared", dict[str, float])
 DIFFUSE, RETRO = _TABLES["diffuse"], _TABLES["retro"]
 CLEAR, MIRRORS = _TABLES["clear"], _TABLES["mirrors"]
+FILLED = _TABLES["filled"]
 TEXTILES = frozenset({"top", "bottom", "bag"})
 ROUGH = frozenset(
     {"asphalt", "pavement", "kerb", "grass", "marking", "leaf", "bark", "facade", "roof", *TEXTILES}
@@ -48,12 +49,15 @@ def _pack_infrared(materials: Sequence[Material], cache: DeviceCache) -> NDArray
         color = np.asarray(material.base_color, dtype=np.float64)
         if material.texture:
             color = color * mean_albedo(cache, material.texture)
-        values[k] = infrared_fields(material, color)
+        values[k] = (*infrared_fields(material, color), FILLED.get(material.role, 1.0))
     return values
 
 
 def infrared_fields(material: Material, color: Array) -> tuple[float, ...]:
-    """The Infrared record of a material, given its mean linear RGB, texture included."""
+    """The Infrared record of a material without ``filled``.
+
+    ``color`` is its mean linear RGB, texture included.
+    """
     red = float(0.7 * color[0] + 0.2 * color[1] + 0.1 * color[2])
     diffuse = DIFFUSE.get(material.role, red)
     if material.role in TEXTILES:
