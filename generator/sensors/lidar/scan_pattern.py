@@ -137,7 +137,9 @@ class LidarModel(Strict):
         if self.response and self.response.range_exponent > 0 and self.near_m == 0:
             raise ValueError("response.range_exponent needs near_m above 0")
         if self.seen_far and self.loss_per_m < 0:
-            raise ValueError("seen_far must be farther and brighter than seen, got more light there")
+            raise ValueError(
+                "seen_far must be farther and brighter than seen, got more light there"
+            )
         low, high = self.range_m
         if not 0 <= low < high:
             raise ValueError(f"range_m must rise from 0 or more, got [{low:g}, {high:g}]")
