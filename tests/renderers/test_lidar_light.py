@@ -108,6 +108,18 @@ def test_black_paint_is_black_to_a_laser_too() -> None:
     assert even == pytest.approx(0.02) and rim == 0.0
 
 
+def test_colourful_paint_is_brighter_than_grey_of_its_darkness() -> None:
+    """Blue pigment lets the infrared pass; white and grey are as they look."""
+
+    def even(*color: float) -> float:
+        return infrared_fields(Material(role="paint"), np.array(color))[0]
+
+    assert even(0.01, 0.05, 0.16) > 3.0 * even(0.05, 0.05, 0.05)
+    assert even(0.006, 0.017, 0.05) < even(0.01, 0.05, 0.16)
+    assert even(0.8, 0.8, 0.8) == pytest.approx(0.8)
+    assert even(0.0, 0.0, 0.0) == 0.0
+
+
 def test_surfaces_are_numbered_by_role() -> None:
     """Roles without a number are 0."""
     for role, number in (("asphalt", SURFACES.index("asphalt")), ("eyes", 0)):

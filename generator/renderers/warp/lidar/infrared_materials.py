@@ -6,6 +6,7 @@ precedence, and colour decides for all others. Sources and values are in ``infra
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -24,12 +25,14 @@ _TABLES = load_table(__package__, "infrared", dict[str, float])
 DIFFUSE, RETRO = _TABLES["diffuse"], _TABLES["retro"]
 CLEAR, MIRRORS = _TABLES["clear"], _TABLES["mirrors"]
 FILLED = _TABLES["filled"]
-TEXTILES = frozenset({"top", "bottom", "bag"})
+TEXTILES = frozenset({"top", "bottom", "bag", "hat", "canvas"})
 ROUGH = frozenset(
     {"asphalt", "pavement", "kerb", "grass", "marking", "leaf", "bark", "facade", "roof", *TEXTILES}
 )
 SLOPE_RAD = 0.5
 """Spread of the facets of rough surfaces."""
+BELOW_PIGMENT = 0.45
+"""Reflectance of the coats below colourful paint: aluminium flakes, filler; assumed within 0.15."""
 ALPHA_MIN = 0.03
 """Smallest width of a specular lobe: no glass is flat to a milliradian."""
 
@@ -62,6 +65,8 @@ def infrared_fields(material: Material, color: Array) -> tuple[float, ...]:
     diffuse = DIFFUSE.get(material.role, red)
     if material.role in TEXTILES:
         diffuse = 0.45 + 0.4 * red
+    if material.role == "paint":
+        diffuse = max(red, below_pigment(color))
     diffuse *= 1.0 - material.metallic
     # Panes of known roles go by their role, other clear materials by their visible transmittance.
     passed = material.transmission * red * material.opacity + 1.0 - material.opacity
@@ -75,6 +80,15 @@ def infrared_fields(material: Material, color: Array) -> tuple[float, ...]:
     alpha = max(material.roughness * material.roughness, ALPHA_MIN)
     retro = RETRO.get(material.role, 0.0)
     return (diffuse * even, diffuse * rim, specular, alpha, retro, mirror, clear)
+
+
+def below_pigment(color: Array) -> float:
+    """Infrared reflectance of paint by its chroma; dark colours also contain carbon black."""
+    brightest = float(color.max())
+    if brightest <= 0.0:
+        return 0.0
+    chroma = 1.0 - float(color.min()) / brightest
+    return BELOW_PIGMENT * chroma * math.sqrt(brightest)
 
 
 def oren_nayar(slope_rad: float) -> tuple[float, float]:
