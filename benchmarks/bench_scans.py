@@ -1,8 +1,8 @@
 """Figures of laser scans beside those of real ones: ``python -m benchmarks.bench_scans --n 12``.
 
-Scans come from samples of a configuration, each of another scene, or (``--kitti FOLDER``) from the
-folders ``velodyne``, ``label_2`` and ``calib`` of KITTI's object format: real frames, or the
-``kitti/training`` of a finished data set. The table's first column is of KITTI's scanner, an
+Scans come from the first and the last step of a configuration's scenes, or (``--kitti FOLDER``)
+from the folders ``velodyne``, ``label_2`` and ``calib`` of KITTI's object format: real frames, or
+the ``kitti/training`` of a finished data set. The table's first column is of KITTI's scanner, an
 HDL-64E S2. Definitions, the same for all sources:
 
 * **cells**: 64 x 512 cells of the field between +3 and -25 degrees of elevation and 45 degrees to
@@ -134,7 +134,10 @@ class Scan:
 
 
 def scans_of_config(name: str, n: int, overrides: list[str]) -> Iterator[Scan]:
-    """Scans of ``n`` scenes of a configuration; its cameras are made tiny."""
+    """Scans of ``n`` scenes of a configuration, two of each; its cameras are made tiny.
+
+    Building a scene takes most of the time; in its last step objects are at other ranges.
+    """
     config = load_config(name, overrides=overrides)
     steps = config.general.views_per_scene * config.general.steps_per_scene
     tiny = [
@@ -144,7 +147,8 @@ def scans_of_config(name: str, n: int, overrides: list[str]) -> Iterator[Scan]:
     ]
     with open_pipeline(load_config(name, overrides=[*overrides, *tiny])) as pipeline:
         for scene in range(n):
-            yield scan_of_sample(pipeline.sample(scene * steps))
+            for step in sorted({0, config.general.steps_per_scene - 1}):
+                yield scan_of_sample(pipeline.sample(scene * steps + step))
 
 
 def scan_of_sample(sample: Sample) -> Scan:
@@ -314,7 +318,7 @@ def main() -> None:
     source = parser.add_mutually_exclusive_group()
     source.add_argument("--config", default="kitti_rig.yaml")
     source.add_argument("--kitti", type=Path, help="folder with velodyne, label_2 and calib")
-    parser.add_argument("--n", type=int, default=12, help="number of scans")
+    parser.add_argument("--n", type=int, default=12, help="number of scenes, or of frames of KITTI")
     parser.add_argument(
         "--set",
         action="append",

@@ -61,6 +61,28 @@ def test_a_glossy_surface_shines_square_on_and_vanishes_aslant() -> None:
     assert aslant < 0.02
 
 
+def test_a_wide_beam_fills_with_a_part_of_the_foliage() -> None:
+    """Beyond a few leaves' width the echo of leaves fades to its share; walls keep theirs."""
+    ranges_m, divergence_rad = (1.0, 30.0, 1000.0), 2e-3
+
+    def seen(role: str, subrays: int) -> np.ndarray:
+        library = FakeLibrary({"plane": plane_mesh(400.0, (Material(role=role),))})
+        renderer = WarpRenderer(library, "cpu")
+        down = LidarRays(np.float32([[0.0, 0.0, -1.0]]), divergence_rad, subrays, 2000.0)
+        scene = Scene("plane", (Body("plane", "plane"),))
+        above = (Lidar("top", "color", T_world_lidar=SE3((0.0, 0.0, r))) for r in ranges_m)
+        return np.array([renderer.scan(scene, top, down).reflectance[0, 0] for top in above])
+
+    leaves, walls = seen("leaf", 1), seen("facade", 1)
+
+    np.testing.assert_allclose(walls, walls[0], rtol=1e-4)
+    width2 = (0.01 + divergence_rad * np.array(ranges_m)) ** 2
+    filled = 0.36 + 0.64 * 0.07**2 / (0.07**2 + width2)
+    np.testing.assert_allclose(leaves / leaves[0], filled / filled[0], rtol=1e-4)
+    assert 0.36 < leaves[2] / leaves[0] < 0.38
+    assert seen("leaf", 7)[1] > leaves[1]
+
+
 def test_signs_are_retro_reflectors() -> None:
     """Hundreds of times white, also at 40 degrees; no retro-reflection at 75."""
     sign = Material(base_color=(0.5, 0.1, 0.1), roughness=0.8, role="sign")
@@ -84,6 +106,18 @@ def test_black_paint_is_black_to_a_laser_too() -> None:
     even, rim, *_ = infrared_fields(Material(role="paint"), np.full(3, 0.02))
 
     assert even == pytest.approx(0.02) and rim == 0.0
+
+
+def test_colourful_paint_is_brighter_than_grey_of_its_darkness() -> None:
+    """Blue pigment lets the infrared pass; white and grey are as they look."""
+
+    def even(*color: float) -> float:
+        return infrared_fields(Material(role="paint"), np.array(color))[0]
+
+    assert even(0.01, 0.05, 0.16) > 3.0 * even(0.05, 0.05, 0.05)
+    assert even(0.006, 0.017, 0.05) < even(0.01, 0.05, 0.16)
+    assert even(0.8, 0.8, 0.8) == pytest.approx(0.8)
+    assert even(0.0, 0.0, 0.0) == 0.0
 
 
 def test_surfaces_are_numbered_by_role() -> None:

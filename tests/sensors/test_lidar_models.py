@@ -137,6 +137,9 @@ def test_a_scanner_either_turns_or_draws_a_rosette() -> None:
     old = lidar_model("HDL-64E").model_dump()
     with pytest.raises(ValidationError, match="range_exponent needs near_m"):
         LidarModel.model_validate({**old, "near_m": 0.0})
+    for far in ({"reflectance": 0.8, "range_m": 40.0}, {"reflectance": 0.1, "range_m": 120.0}):
+        with pytest.raises(ValidationError, match="seen_far must be farther and brighter"):
+            LidarModel.model_validate({**old, "seen_far": far})
 
 
 @pytest.mark.parametrize("name", ["HDL-64E", "OS1-64", "VLP-16"])

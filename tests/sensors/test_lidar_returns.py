@@ -306,7 +306,7 @@ def measured(reflectance: list[float], range_m: float, **changes: float) -> np.n
 
 def test_a_receiver_focused_at_a_distance_collects_less_nearby() -> None:
     """1 / (range^2 + near^2), and 1 at the sensitivity's own range."""
-    model = lidar_model("HDL-64E")
+    model = lidar_model("HDL-64E").model_copy(update={"near_m": 12.0, "seen_far": None})
     r = np.array([2.0, 12.0, 50.0, 120.0], np.float32)
     light = received_light(np.full(4, model.seen.reflectance, np.float32), r, model)
 
@@ -315,13 +315,30 @@ def test_a_receiver_focused_at_a_distance_collects_less_nearby() -> None:
 
 
 def test_the_range_of_an_hdl64_follows_the_reflectance() -> None:
-    """The range equation, solved for range: 10 % near 50 m, 80 % beyond the 120 m it reports."""
+    """As its manual says: 10 % at 50 m, 80 % at 120 m. Without a loss it would be 151 m."""
     model = lidar_model("HDL-64E")
-    for reflectance, range_m in ((0.09, 50.0), (0.10, 52.9), (0.8, 152.9)):
-        reach = math.sqrt(reflectance / 0.09 * (50.0**2 + 12.0**2) - 12.0**2)
-        assert reach == pytest.approx(range_m, abs=0.1)
-        light = received_light(np.float32([reflectance]), np.float32([reach]), model)
-        assert light[0] == pytest.approx(1.0, rel=1e-4)
+    light = received_light(np.float32([0.1, 0.8]), np.float32([50.0, 120.0]), model)
+    np.testing.assert_allclose(light, 1.0, rtol=1e-5)
+
+    plain = model.model_copy(update={"seen_far": None})
+    reach = math.sqrt(0.8 / 0.1 * (50.0**2 + 20.0**2) - 20.0**2)
+    assert reach == pytest.approx(151.0, abs=0.1)
+    assert received_light(np.float32([0.8]), np.float32([reach]), plain)[0] == pytest.approx(1.0)
+
+
+def test_a_far_sensitivity_adds_an_exponential_loss() -> None:
+    """Equal steps of range divide light by equal factors, beside the lidar equation's."""
+    model = lidar_model("HDL-64E")
+    plain = model.model_copy(update={"seen_far": None})
+    r = np.array([0.0, 50.0, 60.0, 70.0, np.inf], np.float32)
+    seen = np.full(5, 0.3, np.float32)
+
+    lossy, full = (received_light(seen, r, device) for device in (model, plain))
+
+    ratio = lossy[:4] / full[:4]
+    assert ratio[1] == pytest.approx(1.0) and ratio[0] > 1.0
+    assert ratio[2] / ratio[1] == pytest.approx(ratio[3] / ratio[2], rel=1e-5)
+    assert ratio[2] < 1.0 and lossy[4] == 0.0
 
 
 def test_intensities_are_compressed_and_zero_in_the_dark() -> None:
@@ -341,10 +358,12 @@ def test_intensities_are_compressed_and_zero_in_the_dark() -> None:
 
 
 def test_range_is_compensated_in_part() -> None:
-    """At range 12 sqrt(3) m, c is 4^-0.5 times the reflectance: half of it."""
-    far = measured([0.2, 0.05], 12.0 * math.sqrt(3.0), range_exponent=0.5)
+    """At range sqrt(3) near_m, c is 4^-0.5 times the reflectance: half of it."""
+    range_m = lidar_model("HDL-64E").near_m * math.sqrt(3.0)
+    far = measured([0.4, 0.2], range_m, range_exponent=0.5)
 
-    np.testing.assert_allclose(far, measured([0.1, 0.025], 1.0), atol=1e-5)
+    assert far.min() > 0.1
+    np.testing.assert_allclose(far, measured([0.2, 0.1], 1.0), atol=1e-5)
 
 
 def test_noise_spread_and_steps_of_intensities() -> None:

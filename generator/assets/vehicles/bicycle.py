@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +16,7 @@ from gen_data.generator.assets.procedural.patches import Array, Patch, join_patc
 from gen_data.generator.assets.procedural.surface_shapes import block, circle, cone, lathe, sweep
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.assets.scenery.basic_shapes import make_solid
+from gen_data.generator.assets.vehicles import luggage
 from gen_data.generator.assets.vehicles import rider as people
 from gen_data.generator.assets.vehicles.body_shell import drop_uvs
 from gen_data.generator.assets.vehicles.rider import Seat, blob, limb
@@ -27,6 +28,8 @@ from gen_data.generator.core.se3 import Vec3
 STYLES = ("city", "mountain", "road")
 
 _CRANK_M = 0.17
+_BULK = (1.0, 1.22)
+"""Girth of a clothed cyclist, from tight to loose or padded, relative to a lean one's; assumed."""
 
 
 @dataclass(frozen=True)
@@ -79,12 +82,17 @@ def bicycle_facts(seed: int) -> Facts:
 def cyclist(seed: int) -> Solid:
     """A bicycle with its rider."""
     rng = variant_rng("cyclist", seed)
-    frame, turn = _FRAMES[in_turn(STYLES, seed)], rng.between(0.0, 2.0 * math.pi)
-    parts = _machine(in_turn(STYLES, seed), frame, turn, rng)
-    parts += people.rider(_seat(frame, turn), rng)
+    style = in_turn(STYLES, seed)
+    frame, turn = _FRAMES[style], rng.between(0.0, 2.0 * math.pi)
+    parts, seat = _machine(style, frame, turn, rng), _seat(frame, turn)
+    nod_rad = people.draw_nod(rng)
     paint = hex_to_linear(rng.choose(COLORS["bicycles"]))
-    finish = materials(rng, paint, clothes=people.draw_clothes(rng))
-    return _solid(parts, frame, finish, 1.7)
+    finish = list(materials(rng, paint, clothes=people.draw_clothes(rng)))
+    parts += people.rider(seat, nod_rad, rng.between(*_BULK))
+    parts += _luggage(style, frame, seat, rng)
+    bag = finish[Slot.SOFT_TOP]
+    finish[Slot.SOFT_TOP] = replace(bag, base_color=luggage.draw_color(rng))
+    return _solid(parts, frame, tuple(finish), 1.7)
 
 
 def cyclist_facts(seed: int) -> Facts:
@@ -222,8 +230,17 @@ def _mudguard(frame: _Frame, sign: float, arc_rad: tuple[float, float]) -> Patch
     )
 
 
+def _luggage(style: str, frame: _Frame, seat: Seat, rng: VariantRng) -> list[Patch]:
+    """Bags of the rider and of the machine; racing bicycles have no carrier."""
+    parts = [luggage.backpack(seat, rng)] if rng.chance(luggage.BACKPACK) else []
+    if style != "road" and rng.chance(luggage.PANNIERS):
+        parts += luggage.panniers(luggage.rear_carrier(frame.axle, frame.wheel_m), rng)
+        parts += _rack(frame) if style != "city" else []
+    return parts
+
+
 def _rack(frame: _Frame) -> list[Patch]:
-    x, z = -frame.axle, 2.0 * frame.wheel_m + 0.07
+    x, _, z = luggage.rear_carrier(frame.axle, frame.wheel_m)
     top = block((x - 0.2, -0.06, z), (x + 0.2, 0.06, z + 0.015), 0.0, Slot.TRIM)
     ends = [[(x, s * 0.07, frame.wheel_m), (x - 0.1, s * 0.06, z)] for s in (1.0, -1.0)]
     return [top, *(limb(stay, (0.006, 0.006), Slot.TRIM, 4) for stay in ends)]

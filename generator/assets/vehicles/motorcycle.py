@@ -53,7 +53,7 @@ def motorcycle(seed: int) -> Solid:
     above = [*_lamps(style, build), *_bodies(style, build)]
     ridden = _is_ridden(seed)
     if ridden:
-        above += people.rider(_seat(build), rng)
+        above += people.rider(_seat(build), people.draw_nod(rng))
     parts, body = (
         [drop_uvs(part) for part in (*_running_gear(build, mirrors=mirrors), *above)]
         for mirrors in (True, False)

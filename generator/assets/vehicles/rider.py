@@ -49,16 +49,21 @@ def draw_clothes(rng: VariantRng) -> tuple[Vec3, ...]:
     return tuple(hex_to_linear(rng.choose(COLORS[kind])) for kind in kinds)
 
 
-def rider(seat: Seat, rng: VariantRng) -> list[Patch]:
-    """The rider's body."""
+def draw_nod(rng: VariantRng) -> float:
+    """How far a rider's face is lowered [rad]."""
+    return rng.between(-0.1, 0.15)
+
+
+def rider(seat: Seat, nod_rad: float, bulk: float = 1.0) -> list[Patch]:
+    """The rider's body; ``bulk`` is the girth of trunk and limbs relative to a lean body."""
     hips = np.array(seat.hips)
     spine = np.array([math.sin(seat.lean_rad), 0.0, math.cos(seat.lean_rad)])
     neck = hips + (_TORSO_M + 0.05) * spine
-    parts = [*_trunk(hips, spine), *_head(neck, seat, rng.between(-0.1, 0.15))]
+    parts = [*_trunk(hips, spine, bulk), *_head(neck, seat, nod_rad)]
     for sign, grip, sole in zip((1.0, -1.0), seat.grips, seat.soles, strict=True):
         shoulder = hips + _TORSO_M * spine + np.array([0.0, sign * 0.175, 0.0])
-        parts += _arm(shoulder, np.array(grip), sign)
-        parts += _leg(hips + np.array([0.0, sign * 0.09, 0.0]), np.array(sole), sign)
+        parts += _arm(shoulder, np.array(grip), sign, bulk)
+        parts += _leg(hips + np.array([0.0, sign * 0.09, 0.0]), np.array(sole), sign, bulk)
     return parts
 
 
@@ -95,11 +100,12 @@ def joint(start: Array, end: Array, first_m: float, second_m: float, towards: Ar
     return bent
 
 
-def _trunk(hips: Array, spine: Array) -> list[Patch]:
+def _trunk(hips: Array, spine: Array, bulk: float) -> list[Patch]:
     path = [hips + share * _TORSO_M * spine for share in (-0.16, 0.0, 0.4, 0.8, 1.02, 1.12)]
     # Half width across, half depth.
     sizes = np.array([(0.1, 0.09), (0.17, 0.125), (0.155, 0.11), (0.185, 0.115), (0.14, 0.08),
                       (0.06, 0.06)])  # fmt: skip
+    sizes *= bulk
     points = np.array(path)
     top = sweep(points[1:], circle(1.0, 10), up=(0.0, 1.0, 0.0), scale=sizes[1:], slot=Slot.TOP)
     seat = sweep(points[:3], circle(1.0, 10), up=(0.0, 1.0, 0.0), scale=0.98 * sizes[:3],
@@ -122,18 +128,18 @@ def _head(neck: Array, seat: Seat, nod_rad: float) -> list[Patch]:
     return [throat, face, helmet]
 
 
-def _arm(shoulder: Array, grip: Array, sign: float) -> list[Patch]:
+def _arm(shoulder: Array, grip: Array, sign: float, bulk: float) -> list[Patch]:
     out = np.array([-0.3, 0.8 * sign, -0.8])
     elbow = joint(shoulder, grip, _UPPER_ARM_M, _FOREARM_M, out)
     wrist = elbow + 0.85 * (grip - elbow)
-    sleeve = limb([shoulder, elbow, wrist], (0.062, 0.047, 0.036), Slot.TOP)
+    sleeve = limb([shoulder, elbow, wrist], (0.062 * bulk, 0.047 * bulk, 0.036 * bulk), Slot.TOP)
     return [sleeve, blob(grip + 0.02 * (wrist - grip), (0.045, 0.045, 0.04), Slot.SKIN)]
 
 
-def _leg(hip: Array, sole: Array, sign: float) -> list[Patch]:
+def _leg(hip: Array, sole: Array, sign: float, bulk: float) -> list[Patch]:
     ankle = sole + np.array([-0.09, 0.0, 0.085])
     knee = joint(hip, ankle, _THIGH_M, _SHIN_M, np.array([1.0, 0.12 * sign, 0.5]))
-    trouser = limb([hip, knee, ankle], (0.088, 0.062, 0.045), Slot.BOTTOM)
+    trouser = limb([hip, knee, ankle], (0.088 * bulk, 0.062 * bulk, 0.045 * bulk), Slot.BOTTOM)
     heel, toe = ankle + np.array([-0.05, 0.0, -0.05]), sole + np.array([0.13, 0.0, 0.03])
     path = [heel, 0.5 * (heel + toe) + (0.0, 0.0, 0.012), toe]
     return [trouser, limb(path, (0.045, 0.05, 0.032), Slot.SHOES)]

@@ -115,7 +115,8 @@ def add_atmosphere(
     count = len(pulses.range_m)
     # Receivers of Hahner et al. (2021 and 2022) see the whole beam from 1 m on. Their strengths of
     # fog and snow hold with that; ``near_m`` is known for solid targets only.
-    model = model.model_copy(update={"seen": model.seen_air or model.seen, "near_m": 0.0})
+    solid = {"near_m": 0.0, "seen_far": None}
+    model = model.model_copy(update={"seen": model.seen_air or model.seen, **solid})
     nearest_m = pulses.range_m.min(axis=1, keepdims=True)
     fog = weather.fog_extinction_per_m
     if weather.fog_height_m > 0.0:

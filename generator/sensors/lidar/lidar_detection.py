@@ -3,8 +3,9 @@
 Received light is ``reflectance / (range^2 + near^2) * exp(-2 * optical depth)``: the lidar equation
 of an extended target (Wandinger, "Introduction to Lidar", 2005), whose overlap function
 ``range^2 / (range^2 + near^2)`` is that of a receiver focused at a distance: the blur of a near
-target is larger than the detector, in proportion to 1 / range. The scanner's sensitivity sets the
-unit: light of 1 is detected half of the time.
+target is larger than the detector, in proportion to 1 / range. A device with a second sensitivity,
+far away, also loses light exponentially (``LidarModel.loss_per_m``). The scanner's sensitivity sets
+the unit: light of 1 is detected half of the time.
 """
 
 from __future__ import annotations
@@ -88,7 +89,10 @@ def received_light(reflectance: Float32, range_m: Float32, model: LidarModel) ->
     near2 = np.float32(model.near_m**2)
     unit = np.float32((model.seen.range_m**2 + model.near_m**2) / model.seen.reflectance)
     away = np.maximum(range_m, np.float32(1e-3))
-    return np.asarray(reflectance * (unit / (away * away + near2)))
+    light = reflectance * (unit / (away * away + near2))
+    if model.loss_per_m > 0.0:
+        light *= np.exp(np.float32(-model.loss_per_m) * (away - np.float32(model.seen.range_m)))
+    return np.asarray(light)
 
 
 def join_pulses(pulses: Pulses, more: Pulses) -> Pulses:

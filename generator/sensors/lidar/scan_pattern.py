@@ -99,6 +99,9 @@ class LidarModel(Strict):
         pulse_m: Returns of one pulse that are closer than this merge.
         wavelength_nm: Of the laser.
         seen: Sensitivity.
+        seen_far: Sensitivity to a brighter surface, farther away; null = light falls as within
+            ``seen``. The range of data sheets grows less than with the square root of reflectance:
+            receivers that are aligned for near targets lose light from far ones.
         near_m: Range within which the receiver, focused at a distance, collects less: received
             light is proportional to ``1 / (range^2 + near_m^2)``. Not applied to the air.
         seen_air: Sensitivity to fog, drops and flakes; null = ``seen``.
@@ -121,6 +124,7 @@ class LidarModel(Strict):
     pulse_m: float = Field(gt=0, le=10)
     wavelength_nm: float = Field(ge=400, le=2000)
     seen: Sensitivity
+    seen_far: Sensitivity | None = None
     near_m: float = Field(0.0, ge=0, le=1000)
     seen_air: Sensitivity | None = None
     white_intensity: float = Field(gt=0, le=1)
@@ -132,10 +136,30 @@ class LidarModel(Strict):
             raise ValueError("expected either elevations_deg or prisms")
         if self.response and self.response.range_exponent > 0 and self.near_m == 0:
             raise ValueError("response.range_exponent needs near_m above 0")
+        if self.seen_far and self.loss_per_m < 0:
+            raise ValueError(
+                "seen_far must be farther and brighter than seen, got more light there"
+            )
         low, high = self.range_m
         if not 0 <= low < high:
             raise ValueError(f"range_m must rise from 0 or more, got [{low:g}, {high:g}]")
         return self
+
+    @property
+    def loss_per_m(self) -> float:
+        """Decay of received light with range, beyond the lidar equation's; 0 without ``seen_far``.
+
+        It makes the equation (``lidar_detection.received_light``) hold at both sensitivities.
+        """
+        near, far = self.seen, self.seen_far
+        if far is None:
+            return 0.0
+        if far.range_m <= near.range_m:
+            return -math.inf
+        near2 = self.near_m**2
+        light = far.reflectance / near.reflectance
+        light *= (near.range_m**2 + near2) / (far.range_m**2 + near2)
+        return math.log(light) / (far.range_m - near.range_m)
 
     def with_beams(self, beams: Sequence[tuple[float, float]]) -> LidarModel:
         """The same device with other lasers: (elevation, azimuth offset) [deg] in any order."""

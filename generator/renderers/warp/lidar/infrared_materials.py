@@ -6,6 +6,7 @@ precedence, and colour decides for all others. Sources and values are in ``infra
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -23,12 +24,15 @@ from gen_data.generator.renderers.warp.scene.struct_dtypes import stack_records,
 _TABLES = load_table(__package__, "infrared", dict[str, float])
 DIFFUSE, RETRO = _TABLES["diffuse"], _TABLES["retro"]
 CLEAR, MIRRORS = _TABLES["clear"], _TABLES["mirrors"]
-TEXTILES = frozenset({"top", "bottom", "bag"})
+FILLED = _TABLES["filled"]
+TEXTILES = frozenset({"top", "bottom", "bag", "hat", "canvas"})
 ROUGH = frozenset(
     {"asphalt", "pavement", "kerb", "grass", "marking", "leaf", "bark", "facade", "roof", *TEXTILES}
 )
 SLOPE_RAD = 0.5
 """Spread of the facets of rough surfaces."""
+BELOW_PIGMENT = 0.45
+"""Reflectance of the coats below colourful paint: aluminium flakes, filler; assumed within 0.15."""
 ALPHA_MIN = 0.03
 """Smallest width of a specular lobe: no glass is flat to a milliradian."""
 
@@ -48,16 +52,21 @@ def _pack_infrared(materials: Sequence[Material], cache: DeviceCache) -> NDArray
         color = np.asarray(material.base_color, dtype=np.float64)
         if material.texture:
             color = color * mean_albedo(cache, material.texture)
-        values[k] = infrared_fields(material, color)
+        values[k] = (*infrared_fields(material, color), FILLED.get(material.role, 1.0))
     return values
 
 
 def infrared_fields(material: Material, color: Array) -> tuple[float, ...]:
-    """The Infrared record of a material, given its mean linear RGB, texture included."""
+    """The Infrared record of a material without ``filled``.
+
+    ``color`` is its mean linear RGB, texture included.
+    """
     red = float(0.7 * color[0] + 0.2 * color[1] + 0.1 * color[2])
     diffuse = DIFFUSE.get(material.role, red)
     if material.role in TEXTILES:
         diffuse = 0.45 + 0.4 * red
+    if material.role == "paint":
+        diffuse = max(red, below_pigment(color))
     diffuse *= 1.0 - material.metallic
     # Panes of known roles go by their role, other clear materials by their visible transmittance.
     passed = material.transmission * red * material.opacity + 1.0 - material.opacity
@@ -71,6 +80,15 @@ def infrared_fields(material: Material, color: Array) -> tuple[float, ...]:
     alpha = max(material.roughness * material.roughness, ALPHA_MIN)
     retro = RETRO.get(material.role, 0.0)
     return (diffuse * even, diffuse * rim, specular, alpha, retro, mirror, clear)
+
+
+def below_pigment(color: Array) -> float:
+    """Infrared reflectance of paint by its chroma; dark colours also contain carbon black."""
+    brightest = float(color.max())
+    if brightest <= 0.0:
+        return 0.0
+    chroma = 1.0 - float(color.min()) / brightest
+    return BELOW_PIGMENT * chroma * math.sqrt(brightest)
 
 
 def oren_nayar(slope_rad: float) -> tuple[float, float]:

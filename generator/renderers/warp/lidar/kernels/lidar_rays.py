@@ -49,6 +49,9 @@ DROWNED = wp.constant(0.75)
 FACES_MAX = wp.constant(9)
 # Two faces of glass closer than this form one pane.
 PANE_M = wp.constant(0.05)
+# Width of a leaf, and of a beam at the scanner.
+LEAF_M = wp.constant(0.07)
+APERTURE_M = wp.constant(0.01)
 
 
 @wp.struct
@@ -63,6 +66,8 @@ class Infrared:
             incidence.
         mirror: Fresnel reflectance at normal incidence of a mirror; 0 for all other surfaces.
         clear: Transmittance of one passage at normal incidence.
+        filled: Share of a beam much wider than a leaf that a surface returns as one echo; 1 for
+            whatever has no gaps.
     """
 
     even: float
@@ -72,6 +77,7 @@ class Infrared:
     retro: float
     mirror: float
     clear: float
+    filled: float
 
 
 @wp.struct
@@ -167,6 +173,23 @@ def backscatter(light: Infrared, cosine: float):
     lobe = a2 / (base * base) * light.specular * g1 * g1 / (4.0 * c)
     diffuse = light.even * c + light.rim * (1.0 - c2)
     return diffuse + lobe + light.retro * c * wp.clamp((c - 0.35) * 4.0, 0.0, 1.0)
+
+
+@wp.func
+def echo_share(scan: Scan, light: Infrared, range_m: float):
+    """Share of a ray's light that returns as one echo, by the width of what the ray stands for.
+
+    A beam narrower than a leaf meets a leaf or a gap. A wider one meets leaves at several depths
+    and gaps between them, so that its echo is fainter: scanners lose trees before walls of the same
+    reflectance.
+    """
+    share = float(1.0)
+    if light.filled < 1.0:
+        width_m = APERTURE_M + scan.divergence_rad * range_m
+        # Several rays share the beam's area.
+        area_m2 = width_m * width_m / float(scan.subrays)
+        share = light.filled + (1.0 - light.filled) * LEAF_M * LEAF_M / (LEAF_M * LEAF_M + area_m2)
+    return share
 
 
 @wp.struct
@@ -415,12 +438,13 @@ def scan_beams(
                 cosines[i] = cosine
                 if lights[material].mirror > 0.0 or world.ground.covered != 0:
                     normals[i] = n_lidar
+                share = echo_share(scan, lights[material], hit.range_m)
                 if world.ground.covered == 0:
-                    reflectances[i] = backscatter(lights[material], cosine)
+                    reflectances[i] = share * backscatter(lights[material], cosine)
                 else:
                     coat = coat_at_hit(scan, world, ray, hit.range_m, material, n_lidar)
                     light = apply_weather(world, lights[material], coat, material, cosine)
-                    reflectances[i] = backscatter(light, cosine)
+                    reflectances[i] = share * backscatter(light, cosine)
                     puddles[i] = coat.puddle * (1.0 - wp.min(coat.snow, 1.0))
 
 
@@ -469,7 +493,9 @@ def trace_behind_panes(
                             # A pane's echo is overwritten by that of the surface behind it, if any.
                             hits[j] = wp.vec2i(hit.body, material)
                             ranges_m[j] = way_m - LASER_OFFSET_M
-                            reflectances[j] = passed * backscatter(lights[material], cosine)
+                            reflected = backscatter(lights[material], cosine)
+                            share = echo_share(scan, lights[material], way_m)
+                            reflectances[j] = passed * share * reflected
                         if clear == 0.0:
                             passed = 0.0
                         elif face == 0 or hit.range_m > PANE_M:
@@ -543,4 +569,5 @@ def trace_mirrors(
                 hits[j] = wp.vec2i(hit.body, material)
                 ranges_m[j] = first_m[i] + LASER_OFFSET_M + hit.range_m
                 cosine = wp.min(wp.abs(wp.dot(n, ray.direction)), 1.0)
-                reflectances[j] = kept * kept * backscatter(lights[material], cosine)
+                kept *= kept * echo_share(scan, lights[material], ranges_m[j])
+                reflectances[j] = kept * backscatter(lights[material], cosine)

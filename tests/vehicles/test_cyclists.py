@@ -1,0 +1,54 @@
+"""Riders of bicycles: girth and luggage."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gen_data.generator.assets.vehicles import FAMILIES
+from gen_data.generator.assets.vehicles.bicycle import cyclist, cyclist_facts
+from gen_data.generator.core.asset_types import MeshData
+
+VARIANTS = [cyclist(seed).mesh for seed in range(FAMILIES["cyclist"].variants)]
+
+
+def with_role(mesh: MeshData, role: str) -> np.ndarray:
+    """Corners of the triangles of a role, metres [n, 3]."""
+    slots = [k for k, material in enumerate(mesh.materials) if material.role == role]
+    faces = mesh.faces[np.isin(mesh.face_slots, slots)]
+    return np.asarray(mesh.vertices_m[faces.ravel()], np.float64)
+
+
+def test_some_carry_bags_of_several_colours() -> None:
+    """About two thirds; backpacks are above the saddle, panniers beside the rear wheel."""
+    bags = [with_role(mesh, "canvas") for mesh in VARIANTS]
+    floors = [mesh.bounds_m()[0][2] for mesh in VARIANTS]
+    carried = [(b, z) for b, z in zip(bags, floors, strict=True) if len(b)]
+    materials = [material for mesh in VARIANTS for material in mesh.materials]
+    colors = {material.base_color for material in materials if material.role == "canvas"}
+
+    assert 0.4 < len(carried) / len(VARIANTS) < 0.9
+    assert len(colors) > 3
+    backs = [bag[:, 2].max() - floor > 1.2 for bag, floor in carried]
+    panniers = [bag[:, 2].min() - floor < 0.6 for bag, floor in carried]
+    assert any(backs) and any(panniers)
+    assert all(back or pannier for back, pannier in zip(backs, panniers, strict=True))
+    for bag, floor in carried:
+        low = bag[bag[:, 2] - floor < 0.75]
+        assert (np.abs(low[:, 1]) > 0.03).all() and (low[:, 0] < -0.2).all()
+
+
+def test_racing_bicycles_have_no_panniers() -> None:
+    """Their bags are all on backs."""
+    for seed, mesh in enumerate(VARIANTS):
+        bag = with_role(mesh, "canvas")
+        if "road" in str(cyclist_facts(seed)) and len(bag):
+            assert bag[:, 2].min() - mesh.bounds_m()[0][2] > 0.9
+
+
+def test_girth_varies() -> None:
+    """Widths of trunks in their clothes, from lean to padded: within the drawn fifth."""
+    widths = [np.ptp(with_role(mesh, "top")[:, 1]) for mesh in VARIANTS]
+
+    assert max(widths) / min(widths) > 1.05
+    assert max(widths) == pytest.approx(0.6, abs=0.15)
