@@ -1,4 +1,4 @@
-"""The end of the view around a street: tree lines, forests, hills and skylines."""
+"""The end of the view around a street: tree lines, forests, hills, towns and skylines."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant
 from gen_data.generator.assets.scenery.horizons import (
     FOREST_M,
     HILL_M,
-    SKYLINE_M,
     TREE_LINE_M,
 )
+from gen_data.generator.assets.scenery.townscapes import SKYLINE_M, TOWN_M
 from gen_data.generator.config.base_model import NAME_PATTERN
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
@@ -23,23 +23,28 @@ from gen_data.generator.core.scene import Lane, Scene
 from gen_data.generator.core.se3 import SE3, Array
 from gen_data.scene_templates.element import Element, add_background, parametric_id
 
-HorizonKind = Literal["trees", "forest", "skyline", "hills"]
+HorizonKind = Literal["trees", "forest", "town", "skyline", "hills"]
 Season = Literal["spring", "summer", "autumn", "winter"]
 
 _PIECE_M: dict[HorizonKind, float] = {
     "trees": TREE_LINE_M,
     "forest": FOREST_M,
+    "town": TOWN_M,
     "skyline": SKYLINE_M,
     "hills": HILL_M,
 }
-_FAR: dict[HorizonKind, float] = {"trees": 1.0, "forest": 1.5, "skyline": 3.0, "hills": 4.0}
+_FAR: dict[HorizonKind, float] = {
+    "trees": 1.0, "forest": 1.5, "town": 1.4, "skyline": 3.0, "hills": 4.0,
+}  # fmt: skip
 """Distance of each layer, as a multiple of ``distance_m``."""
-_VARIANTS: dict[HorizonKind, int] = {"trees": 8, "forest": 6, "skyline": 8, "hills": 6}
+_VARIANTS: dict[HorizonKind, int] = {"trees": 8, "forest": 6, "town": 8, "skyline": 8, "hills": 6}
 _OUTWARD = 16
 """Directions in which outermost points are sought."""
 _INSIDE_M = 0.01
 """Depth below which a point is no corner of the outline, whatever rounding does."""
-_SUNK_M: dict[HorizonKind, float] = {"trees": 0.12, "forest": 0.12, "skyline": 0.12, "hills": 1.0}
+_SUNK_M: dict[HorizonKind, float] = {
+    "trees": 0.12, "forest": 0.12, "town": 0.12, "skyline": 0.12, "hills": 1.0,
+}  # fmt: skip
 """Pieces stand this far below z = 0, so that no gap shows under them."""
 
 
@@ -50,9 +55,9 @@ class Horizon(Element):
     lanes, so that no piece stands on a road.
 
     Attributes:
-        kinds: Layers: rows of trees, forests, buildings of a town, hills with fields.
-        distance_m: Distance of the layer ``trees`` from the nearest lane; forests stand 1.5 times,
-            skylines 3 times and hills 4 times as far away.
+        kinds: Layers: rows of trees, forests, roofs of a town, skylines, hills with fields.
+        distance_m: Distance of the layer ``trees`` from the nearest lane; towns stand 1.4 times,
+            forests 1.5 times, skylines 3 times and hills 4 times as far away.
         coverage: Share of the ring that trees and forests occupy; through their gaps, farther
             layers are seen.
         season: Foliage.
@@ -87,7 +92,7 @@ class Horizon(Element):
             rng = variant_rng(f"horizon/{kind}", self.seed)
             for number, place in enumerate(self._places(hull, kind, rng)):
                 parameters: dict[str, str | int] = {"seed": int(rng.random() * _VARIANTS[kind])}
-                if kind != "skyline" and self.season != "summer":
+                if kind not in ("town", "skyline") and self.season != "summer":
                     parameters["season"] = self.season
                 asset = parametric_id(f"horizon/{kind}", **parameters)
                 front = assets.bounds_m(asset)[1][0]
@@ -108,7 +113,7 @@ class Horizon(Element):
         made = []
         for k in range(count):
             at = perimeter * (k + rng.between(-0.06, 0.06) + 0.5) / count
-            kept = rng.chance(self.coverage) or kind in ("hills", "skyline")
+            kept = rng.chance(self.coverage) or kind in ("hills", "town", "skyline")
             back = rng.between(0.0, 0.12) * far_m
             turn = rng.between(-0.08, 0.08)
             before, here, after = (

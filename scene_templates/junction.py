@@ -12,6 +12,7 @@ from gen_data.generator.core.scene import Lane
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.roads.junction_shape import JunctionShape, junction_lanes
 from gen_data.scene_templates.intersection import Intersection
+from gen_data.scene_templates.road import TURN_LANE_M
 
 
 class Junction(Intersection):
@@ -20,6 +21,9 @@ class Junction(Intersection):
     Attributes:
         lanes: Number of lanes per arm and direction.
         lane_width_m: Width of each lane.
+        median_m: Width of the strip between the directions, to match that of the roads.
+        turn_lane: Whether that strip, at least 2.5 m wide, is a lane for those who turn across.
+            Roads continue it by ``turn_m``.
         speed_m_s: Usual speed of crossing vehicles.
     """
 
@@ -28,6 +32,8 @@ class Junction(Intersection):
     type: Literal["junction"] = "junction"
     lanes: int = Field(1, ge=1, le=4)
     lane_width_m: float = Field(3.5, ge=2, le=6)
+    median_m: float = Field(0.0, ge=0, le=12)
+    turn_lane: bool = False
     speed_m_s: float = Field(8.0, ge=0, le=60)
 
     def shape(self) -> JunctionShape:
@@ -35,7 +41,13 @@ class Junction(Intersection):
         shape = JunctionShape(
             self.arms(), self.lanes, self.lane_width_m, self.kerb_m, self.sidewalk_m,
             self.beside_m, self.radius_m, self.crown, self.traffic, self.setback_m,
+            self.median_m, float(self.turn_lane),
         )  # fmt: skip
+        if self.turn_lane and self.median_m < TURN_LANE_M:
+            raise ConfigError(
+                f"elements.{self.name}.median_m: {self.median_m:g} m; a lane for turning vehicles "
+                f"needs at least {TURN_LANE_M:g}"
+            )
         gaps = shape.gaps_rad()
         if min(gaps) < math.radians(40.0) or max(gaps) > math.pi + 1e-3:
             raise ConfigError(

@@ -32,6 +32,8 @@ T = TypeVar("T")
 Width = float
 PARKING_M = {"none": 0.0, "parallel": 2.2, "angled": 5.58, "perpendicular": 5.0}
 """Width of a parking strip: 2.00 to 2.30 m along the kerb, bays of 2.50 x 5.00 m (EAR 05)."""
+TURN_LANE_M = 2.5
+"""Smallest width of a lane for turning vehicles (assumed; RASt 06 plans 2.75 to 3.25 m)."""
 BAY_ANGLE_DEG = {"none": 0.0, "parallel": 0.0, "angled": 60.0, "perpendicular": 90.0}
 
 Ground = Literal["grass", "paving", "cobbles", "gravel", "earth", "asphalt"]
@@ -84,6 +86,9 @@ class Road(RoadSurface, Element):
         median_m: Width of the strip between the directions; 0 = only a line.
         median_kerb_m: Height of the kerbs around that strip; 0 = none. A kerbed median of at least
             1.2 m is a lane for plants.
+        turn_m: Length of lanes in the median for those who turn across, at the start and at the
+            end; 0 = none. They need a median of at least 2.5 m without kerbs, the rest of which is
+            a blocked area.
         bicycle_m, shoulder_m: Width of bicycle lanes and of hard shoulders; 0 = none.
         parking: Parking strips along the kerb: true or ``parallel`` = 2.2 m wide, ``angled`` =
             bays at 60 degrees, 5.58 m, ``perpendicular`` = 5 m; angled and perpendicular bays are
@@ -117,6 +122,7 @@ class Road(RoadSurface, Element):
     lane_width_m: float = Field(3.5, ge=2, le=6)
     median_m: float = Field(0.0, ge=0, le=30)
     median_kerb_m: float = Field(0.0, ge=0, le=0.3)
+    turn_m: tuple[Width, Width] = (0.0, 0.0)
     bicycle_m: tuple[Width, Width] = (0.0, 0.0)
     shoulder_m: tuple[Width, Width] = (0.0, 0.0)
     parking: Parking | tuple[Parking, Parking] = (False, False)
@@ -203,6 +209,15 @@ def check_widths(where: str, shape: RoadShape) -> None:
     for name in ("bicycle_m", "shoulder_m", "verge_m", "sidewalk_m", "setback_m"):
         if not all(0.0 <= width <= 50.0 for width in getattr(shape, name)):
             raise ConfigError(f"{where}.{name}: expected two widths from 0 to 50 m")
+    if any(shape.turn_m) and (shape.median_m < TURN_LANE_M or shape.median_kerb_m > 0.0):
+        raise ConfigError(
+            f"{where}.turn_m: lanes for turning vehicles need median_m of at least {TURN_LANE_M:g} "
+            "and median_kerb_m: 0"
+        )
+    if min(shape.turn_m) < 0.0 or sum(shape.turn_m) > shape.length_m:
+        raise ConfigError(
+            f"{where}.turn_m: expected two lengths of together at most {shape.length_m:g} m"
+        )
 
 
 def add_street(

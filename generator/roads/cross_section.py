@@ -47,6 +47,8 @@ class RoadShape:
         curvature_per_m: Curvature of the reference line, positive to the left.
         crown: Cross slope of the carriageway, from the middle to the gutters.
         traffic: Side on which vehicles drive, ``right`` or ``left``.
+        turn_m: Lengths of the lanes in the median for those who turn across, at the start and at
+            the end; 0 = none. With such a lane, the rest of the median is a blocked area.
     """
 
     length_m: float = 100.0
@@ -65,6 +67,7 @@ class RoadShape:
     setback_m: Pair = (0.0, 0.0)
     median_kerb_m: float = 0.0
     bay_angle_deg: Pair = (0.0, 0.0)
+    turn_m: Pair = (0.0, 0.0)
 
     def line(self) -> ReferenceLine:
         """Reference line, from the origin along +X."""
@@ -83,6 +86,12 @@ class RoadShape:
         k = side_index(side)
         beside = self.bicycle_m[k] + self.shoulder_m[k] + self.parking_m[k]
         return 0.5 * self.median_m + self.lanes_on(side) * self.lane_width_m + beside
+
+    def turn_spans(self) -> tuple[tuple[float, float, bool], ...]:
+        """Lanes in the median: from where to where [m], and whether they lead to the end."""
+        start, end = self.turn_m
+        spans = ((0.0, start, False), (self.length_m - end, self.length_m, True))
+        return tuple(span for span in spans if span[1] > span[0])
 
     def crowned_m(self, side: int) -> float:
         """Distance from the middle to the end of the cross slope; parking strips are level."""

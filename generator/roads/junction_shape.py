@@ -21,90 +21,25 @@ CROSSWALK_M = (0.5, 3.5)
 STOP_LINE_M = (4.5, 5.0)
 SETBACK_M = 6.5
 ABSENT = -1.0
+TURN_LANE = -1
+"""Number of the lane in the median for those who turn across."""
+_STRAIGHT_RAD = math.radians(30.0)
+"""Ways that change direction by less go straight on."""
 _ARC_STEP_RAD = math.radians(7.5)
 
 
-@dataclass(frozen=True, slots=True)
-class JunctionShape:
-    """Arms with equal numbers of lanes in and out, all of one width.
+class ArmsShape(Protocol):
+    """Arms from a centre, and kerbs and sidewalks around the corners between them.
 
-    Attributes:
-        arms_deg: Directions of the arms from the centre, ascending; ``ABSENT`` = no such arm.
-        lanes: Number of lanes per arm and direction.
-        beside_m: Width between kerb and sidewalk (verge, or the road's parking).
-        radius_m: Radius of the kerb at the corners.
-        setback_m: Width of the land between the sidewalks and the fronts of houses.
+    The base of all shapes of intersections; what it cannot derive, they define.
     """
 
-    arms_deg: tuple[float, float, float, float] = (0.0, 90.0, 180.0, 270.0)
-    lanes: int = 1
-    lane_width_m: float = 3.5
-    kerb_m: float = 0.12
-    sidewalk_m: float = 2.5
-    beside_m: float = 0.0
-    radius_m: float = 7.0
-    crown: float = 0.02
-    traffic: str = "right"
-    setback_m: float = 0.0
+    __slots__ = ()
 
     @property
-    def half_m(self) -> float:
-        """Distance from an arm's middle to its kerb."""
-        return self.lanes * self.lane_width_m
-
-    @property
-    def border_m(self) -> float:
-        """Distance from the kerb's face to the outer edge of the sidewalk."""
-        return KERB_WIDTH_M + self.beside_m + self.sidewalk_m
-
-    @property
-    def top_m(self) -> float:
-        """Height of the middle above the gutters."""
-        return self.crown * self.half_m
-
-    @property
-    def edge_z_m(self) -> float:
-        """Height of the outer edge of the sidewalk."""
-        return self.kerb_m + FALL * self.sidewalk_m
-
-    def arms_rad(self) -> tuple[float, ...]:
-        """Directions of the existing arms, ascending."""
-        return tuple(math.radians(arm) for arm in self.arms_deg if arm != ABSENT)
-
-    def curve_end_m(self) -> float:
-        """Distance from the centre to the end of the longest corner's curve on its arm."""
-        ends = [self.half_m]
-        for gap in self.gaps_rad():
-            if abs(gap - math.pi) > 1e-3:
-                ends.append((self.half_m + self.radius_m) / math.tan(0.5 * gap))
-        return max(ends)
-
-    def reach_m(self) -> float:
-        """Length of every arm."""
-        return self.curve_end_m() + SETBACK_M
-
-    def is_straight(self, number: int) -> bool:
-        """Whether the kerb runs straight on from an arm to the next one."""
-        return abs(self.gaps_rad()[number] - math.pi) <= 1e-3
-
-    def gaps_rad(self) -> tuple[float, ...]:
-        """Angles from each arm to the next one counter-clockwise."""
-        arms = self.arms_rad()
-        return tuple(
-            (after - arm) % math.tau for arm, after in zip(arms, (*arms[1:], arms[0]), strict=True)
-        )
-
-    def corner_line(self, number: int, offset_m: float) -> Array:
-        """As ``corner``."""
-        return _junction_corner(self, number, offset_m)
-
-    def height_m(self, xy: Array) -> Array:
-        """Heights [n] of the carriageway at points [n, 2]."""
-        return make_fan(self).height_m(xy)
-
-
-class ArmsShape(Protocol):
-    """Arms from a centre, and kerbs and sidewalks around the corners between them."""
+    def arms_deg(self) -> tuple[float, float, float, float]:
+        """Directions of the arms from the centre, ascending; ``ABSENT`` = no such arm."""
+        ...
 
     @property
     def traffic(self) -> str:
@@ -119,11 +54,6 @@ class ArmsShape(Protocol):
     @property
     def lane_width_m(self) -> float:
         """Width of each lane."""
-        ...
-
-    @property
-    def half_m(self) -> float:
-        """Distance from an arm's middle to its kerb."""
         ...
 
     @property
@@ -147,29 +77,51 @@ class ArmsShape(Protocol):
         ...
 
     @property
+    def median_m(self) -> float:
+        """Width of the strip between the directions of an arm; 0 = none."""
+        return 0.0
+
+    @property
+    def half_m(self) -> float:
+        """Distance from an arm's middle to its kerb."""
+        return 0.5 * self.median_m + self.lanes * self.lane_width_m
+
+    @property
     def border_m(self) -> float:
         """Distance from the kerb's face to the outer edge of the sidewalk."""
-        ...
+        return KERB_WIDTH_M + self.beside_m + self.sidewalk_m
 
     @property
     def edge_z_m(self) -> float:
         """Height of the outer edge of the sidewalk."""
-        ...
+        return self.kerb_m + FALL * self.sidewalk_m
+
+    def arms_rad(self) -> tuple[float, ...]:
+        """Directions of the existing arms, ascending."""
+        return tuple(math.radians(arm) for arm in self.arms_deg if arm != ABSENT)
+
+    def gaps_rad(self) -> tuple[float, ...]:
+        """Angles from each arm to the next one counter-clockwise."""
+        arms = self.arms_rad()
+        return tuple(
+            (after - arm) % math.tau for arm, after in zip(arms, (*arms[1:], arms[0]), strict=True)
+        )
+
+    def reach_m(self) -> float:
+        """Length of every arm."""
+        return self.curve_end_m() + SETBACK_M
+
+    def has_turn_lane(self, number: int) -> bool:
+        """Whether the median of an arm is a lane for those who turn across."""
+        del number
+        return False
 
     def is_straight(self, number: int) -> bool:
         """Whether the kerb runs straight on from an arm to the next one."""
         ...
 
-    def arms_rad(self) -> tuple[float, ...]:
-        """Directions of the arms, ascending."""
-        ...
-
     def curve_end_m(self) -> float:
         """Distance from the centre to the end of the longest corner's curve on its arm."""
-        ...
-
-    def reach_m(self) -> float:
-        """Length of every arm."""
         ...
 
     def corner_line(self, number: int, offset_m: float) -> Array:
@@ -179,6 +131,65 @@ class ArmsShape(Protocol):
     def height_m(self, xy: Array) -> Array:
         """Heights [n] of the carriageway at points [n, 2]."""
         ...
+
+
+@dataclass(frozen=True, slots=True)
+class JunctionShape(ArmsShape):
+    """Arms with equal numbers of lanes in and out, all of one width.
+
+    Attributes:
+        arms_deg: Directions of the arms from the centre, ascending; ``ABSENT`` = no such arm.
+        lanes: Number of lanes per arm and direction.
+        beside_m: Width between kerb and sidewalk (verge, or the road's parking).
+        radius_m: Radius of the kerb at the corners.
+        setback_m: Width of the land between the sidewalks and the fronts of houses.
+        median_m: Width of the strip between the directions of every arm.
+        turn_lane: 1 = on arms from which vehicles can turn across, this strip is a lane for them.
+    """
+
+    arms_deg: tuple[float, float, float, float] = (0.0, 90.0, 180.0, 270.0)
+    lanes: int = 1
+    lane_width_m: float = 3.5
+    kerb_m: float = 0.12
+    sidewalk_m: float = 2.5
+    beside_m: float = 0.0
+    radius_m: float = 7.0
+    crown: float = 0.02
+    traffic: str = "right"
+    setback_m: float = 0.0
+    median_m: float = 0.0
+    turn_lane: float = 0.0
+
+    @property
+    def top_m(self) -> float:
+        """Height of the middle above the gutters."""
+        return self.crown * self.half_m
+
+    def curve_end_m(self) -> float:
+        """Distance from the centre to the end of the longest corner's curve on its arm."""
+        ends = [self.half_m]
+        for gap in self.gaps_rad():
+            if abs(gap - math.pi) > 1e-3:
+                ends.append((self.half_m + self.radius_m) / math.tan(0.5 * gap))
+        return max(ends)
+
+    def is_straight(self, number: int) -> bool:
+        """Whether the kerb runs straight on from an arm to the next one."""
+        return abs(self.gaps_rad()[number] - math.pi) <= 1e-3
+
+    def has_turn_lane(self, number: int) -> bool:
+        """Whether the median of an arm is a lane for those who turn across."""
+        if self.turn_lane <= 0.0:
+            return False
+        return any(_is_across(self, number, j) for j in range(len(self.arms_rad())))
+
+    def corner_line(self, number: int, offset_m: float) -> Array:
+        """As ``corner``."""
+        return _junction_corner(self, number, offset_m)
+
+    def height_m(self, xy: Array) -> Array:
+        """Heights [n] of the carriageway at points [n, 2]."""
+        return make_fan(self).height_m(xy)
 
 
 def corner(shape: ArmsShape, number: int, offset_m: float) -> Array:
@@ -274,7 +285,8 @@ def junction_lanes(
     lanes = []
     for i, j, k in _list_turns(shape):
         center = lane_points(_turn_path(shape, i, j, k), shape, T_world_junction)
-        lane = Lane(f"{name}/{i}to{j}_{k}", "driving", center, shape.lane_width_m, road=name)
+        word = "turn" if k == TURN_LANE else str(k)
+        lane = Lane(f"{name}/{i}to{j}_{word}", "driving", center, shape.lane_width_m, road=name)
         lanes.append(replace(lane, speed_m_s=speed_m_s, junction=True))
     return (*lanes, *corner_lanes(shape, name, T_world_junction, crosswalks))
 
@@ -316,26 +328,50 @@ def _crosswalk(shape: ArmsShape, name: str, number: int, T_world_junction: SE3) 
 
 
 def _list_turns(shape: JunctionShape) -> list[tuple[int, int, int]]:
-    """Arms and lane of every turn: the outer lane turns to its side, the inner one across."""
+    """Arms and lane of every turn: the outer lane turns to its side, the inner one across.
+
+    Where there is a lane for those who turn across, ``TURN_LANE``, they take it.
+    """
     arms = shape.arms_rad()
     turns = []
     for i, j in ((i, j) for i in range(len(arms)) for j in range(len(arms)) if i != j):
-        change = math.remainder(arms[j] - arms[i] - math.pi, math.tau)
-        to_inner = change > 0 if shape.traffic == "right" else change < 0
-        straight = abs(change) < math.radians(30.0)
+        if _is_across(shape, i, j) and shape.has_turn_lane(i):
+            turns.append((i, j, TURN_LANE))
+            continue
+        straight = abs(_change_rad(shape, i, j)) < _STRAIGHT_RAD
         for k in range(shape.lanes):
-            if straight or k == (0 if to_inner else shape.lanes - 1):
+            if straight or k == (0 if _is_across(shape, i, j) else shape.lanes - 1):
                 turns.append((i, j, k))
     return turns
 
 
+def _change_rad(shape: ArmsShape, start: int, end: int) -> float:
+    """Change of direction from one arm to another, positive to the left."""
+    arms = shape.arms_rad()
+    return math.remainder(arms[end] - arms[start] - math.pi, math.tau)
+
+
+def _is_across(shape: ArmsShape, start: int, end: int) -> bool:
+    """Whether the way from one arm to another turns across the oncoming traffic."""
+    change = _change_rad(shape, start, end)
+    if start == end or abs(change) < _STRAIGHT_RAD:
+        return False
+    return change > 0.0 if shape.traffic == "right" else change < 0.0
+
+
 def _turn_path(shape: JunctionShape, start: int, end: int, lane: int) -> Array:
     """Path [n, 2] from the end of one arm to another: a cubic close to a circular arc."""
-    away = (lane + 0.5) * shape.lane_width_m * (1.0 if shape.traffic == "right" else -1.0)
+    way = 1.0 if shape.traffic == "right" else -1.0
+    away = way * lane_middle_m(shape, max(lane, 0))
     arms = shape.arms_rad()
-    a = on_arm(arms[start], shape.reach_m(), away)
+    a = on_arm(arms[start], shape.reach_m(), 0.0 if lane == TURN_LANE else away)
     b = on_arm(arms[end], shape.reach_m(), -away)
     return curve(a, arms[start] + math.pi, b, arms[end])
+
+
+def lane_middle_m(shape: ArmsShape, lane: int) -> float:
+    """Distance of a lane's middle from the middle of its arm."""
+    return 0.5 * shape.median_m + (lane + 0.5) * shape.lane_width_m
 
 
 def curve(a: Array, heading_a_rad: float, b: Array, heading_b_rad: float) -> Array:

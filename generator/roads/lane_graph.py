@@ -61,12 +61,28 @@ def road_lanes(
             lanes.append(Lane(f"{name}/{kind}_{word}", kind, center, width_m, road=name))
         if angled:
             lanes += _bays(shape, row, f"{name}/parking_{word}", name, T_world_road)
+    lanes += _turn_lanes(shape, name, T_world_road, speed_m_s)
     if shape.median_kerb_m > 0.0 and shape.median_m >= PLANTED_MEDIAN_M:
         z_m = strips(shape, 1)[0].inner_z_m
         center = path(line, 0.0, z_m, True, T_world_road)
         width_m = shape.median_m - 2.0 * KERB_WIDTH_M
         lanes.append(Lane(f"{name}/verge_median", "verge", center, width_m, road=name))
     return tuple(lanes)
+
+
+def _turn_lanes(shape: RoadShape, name: str, T_world_road: SE3, speed_m_s: float) -> Iterator[Lane]:
+    """Make the lanes in the median for those who turn across; nothing leads into them."""
+    line, z_m = shape.line(), strips(shape, 1)[0].middle_z_m if shape.median_m else 0.0
+    for start, end, is_forward in shape.turn_spans():
+        s = stations(start, end, _STEP_M)
+        s = s if is_forward else s[::-1]
+        flat = line.points(s, np.zeros(len(s)))
+        center = world_points(np.column_stack([flat, np.full(len(s), z_m)]), T_world_road)
+        word = "forward" if is_forward else "backward"
+        beside = f"{name}/{word}0"
+        left, right = ("", beside) if shape.traffic == "right" else (beside, "")
+        own, width_m = f"{name}/turn_{word}", shape.median_m
+        yield Lane(own, "driving", center, width_m, name, (), left, right, speed_m_s)
 
 
 def _bays(

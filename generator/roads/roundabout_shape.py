@@ -9,10 +9,8 @@ import numpy as np
 
 from gen_data.generator.core.scene import Lane
 from gen_data.generator.core.se3 import SE3
-from gen_data.generator.roads.cross_section import FALL, KERB_WIDTH_M
 from gen_data.generator.roads.junction_shape import (
-    ABSENT,
-    SETBACK_M,
+    ArmsShape,
     corner_lanes,
     curve,
     lane_points,
@@ -27,7 +25,7 @@ _FALL_OUTWARDS = 0.025
 
 
 @dataclass(frozen=True, slots=True)
-class RoundaboutShape:
+class RoundaboutShape(ArmsShape):
     """A ring of one lane, and arms of one lane in and one lane out.
 
     Attributes:
@@ -60,21 +58,6 @@ class RoundaboutShape:
         return 1
 
     @property
-    def half_m(self) -> float:
-        """Distance from an arm's middle to its kerb."""
-        return self.lane_width_m
-
-    @property
-    def border_m(self) -> float:
-        """Distance from the kerb's face to the outer edge of the sidewalk."""
-        return KERB_WIDTH_M + self.beside_m + self.sidewalk_m
-
-    @property
-    def edge_z_m(self) -> float:
-        """Height of the outer edge of the sidewalk."""
-        return self.kerb_m + FALL * self.sidewalk_m
-
-    @property
     def outer_m(self) -> float:
         """Radius of the ring's outer edge."""
         return 0.5 * self.diameter_m
@@ -89,30 +72,15 @@ class RoundaboutShape:
         """Radius of the ring lane's centre line."""
         return self.outer_m - 0.5 * (self.ring_m - self.truck_apron_m)
 
-    def arms_rad(self) -> tuple[float, ...]:
-        """Directions of the existing arms, ascending."""
-        return tuple(math.radians(arm) for arm in self.arms_deg if arm != ABSENT)
-
     def is_straight(self, number: int) -> bool:
         """Never: kerbs follow the ring."""
         del number
         return False
 
-    def gaps_rad(self) -> tuple[float, ...]:
-        """Angles from each arm to the next one counter-clockwise."""
-        arms = self.arms_rad()
-        return tuple(
-            (after - arm) % math.tau for arm, after in zip(arms, (*arms[1:], arms[0]), strict=True)
-        )
-
     def curve_end_m(self) -> float:
         """Distance from the centre to the end of the corners' curves on every arm."""
         reach, away = self.outer_m + self.radius_m, self.half_m + self.radius_m
         return math.sqrt(max(0.0, reach * reach - away * away))
-
-    def reach_m(self) -> float:
-        """Length of every arm."""
-        return self.curve_end_m() + SETBACK_M
 
     def mouth_rad(self) -> float:
         """Angle between an arm and the point where its corner's curve meets the ring."""

@@ -15,6 +15,7 @@ from gen_data.randomizers.lane_objects import LaneObjects as DrawLaneObjects
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.crosswalk import Crosswalk
 from gen_data.scene_templates.element import Element
+from gen_data.scene_templates.horizon import Horizon
 from gen_data.scene_templates.junction import Junction
 from gen_data.scene_templates.lane_objects import LaneObjects
 from gen_data.scene_templates.objects import AssetChoice
@@ -166,3 +167,20 @@ def test_sections_differ_by_district() -> None:
     assert max(lanes_m["village"]) < max(lanes_m["arterial"])
     forward = [lane for lane in by_district["arterial"].lanes if "main/forward" in lane.name]
     assert len(forward) >= 2
+
+
+def test_towers_stand_where_one_sees_a_city() -> None:
+    """Often at arterials, seldom in suburbs, never in villages; never on more than a third."""
+    config = street()
+    seen: dict[SharedValue, list[bool]] = {}
+    for number in range(400):
+        shared = config.shared(Streams(5, number, index=number))
+        elements = {e.name: e for e in config.scene_config(shared).elements}
+        city = elements["city"]
+        assert isinstance(city, Horizon)
+        assert sum(high - low for low, high in city.arcs_deg) <= 120.0
+        seen.setdefault(dict(shared)["district"], []).append(city.present)
+    share = {name: sum(flags) / len(flags) for name, flags in seen.items()}
+
+    assert share["village"] == share["country_road"] == share["garden_villas"] == 0.0
+    assert share["leafy_suburb"] < share["residential"] < 0.5 < share["arterial"] < 0.9

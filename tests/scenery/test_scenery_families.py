@@ -54,6 +54,8 @@ LIMITS = {
     "bush": (0.6, 2.2, 6000), "planter": (0.5, 1.2, 1500),
     "horizon/trees": (6.0, 22.0, 3000), "horizon/forest": (12.0, 30.0, 5000),
     "horizon/hills": (12.0, 100.0, 6000), "horizon/skyline": (12.0, 90.0, 1500),
+    "horizon/town": (7.0, 50.0, 1500),
+    "straw_bale": (0.85, 2.0, 900), "power_pylon": (26.0, 36.0, 2000),
     "street_light": (6.0, 9.0, 1500), "litter_bin": (0.8, 1.4, 1500), "bench": (0.4, 1.0, 1500),
     "hydrant": (0.7, 1.0, 1500), "bollard": (0.6, 1.1, 1500), "cone": (0.45, 0.8, 1500),
     "post_box": (1.1, 1.6, 1500), "bus_stop": (2.3, 2.8, 1500),

@@ -21,6 +21,11 @@ _SHAPE, _JUNCTION, _ROUNDABOUT, _PARKING = (
     {field.name: field.default for field in fields(shape)}
     for shape in (RoadShape, JunctionShape, RoundaboutShape, ParkingShape)
 )
+_FIELDS: dict[str, object] = {
+    "length_m": 150.0, "curvature_per_m": 0.0, "side": 1.0, "inner_m": 8.0, "depth_m": 80.0,
+    "crops": "maize_wheat_meadow", "seed": 0,
+}  # fmt: skip
+"""Fields of ``fields.FieldsShape``, which needs no import of numpy here."""
 _LOOKS: dict[str, object] = {
     "seed": 0, "wear": 0.3, "paving": "paving", "ground": "grass", "carriageway": "asphalt",
     "age_years": -1.0, "coating": "none", "center_color": "white",
@@ -59,6 +64,7 @@ FAMILIES: Mapping[str, Family] = {
             width_m=2.8,
         ),
         _surface("parking_area:parking_area", **_PARKING, **_LOOKS),
+        _surface("fields:fields", **_FIELDS),
         _surface("ground:ground", seed=0, size_m=(800.0, 800.0), cover="grass", relief_m=0.04),
     )
 }

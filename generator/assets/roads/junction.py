@@ -12,6 +12,7 @@ import numpy as np
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import Array, Patch
 from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, surface
+from gen_data.generator.assets.roads.junction_wear import worn_surface
 from gen_data.generator.assets.roads.markings import NARROW_M, ZEBRA_BAR_M
 from gen_data.generator.assets.roads.road_materials import (
     SCALES_M,
@@ -55,7 +56,7 @@ def junction(*, crossings: str = "zebra", **others: Any) -> Solid:
     slots = number_slots(look)
     fan = make_fan(profile)
     paved = look.carriageway not in UNPAVED
-    patches = [_carriageway(fan, slots["asphalt"])]
+    patches = [_carriageway(fan, slots["asphalt"]), *worn_surface(profile, fan, look, slots)]
     for number in range(len(profile.arms_rad())):
         if profile.sidewalk_m > 0.0:
             patches += corner_patches(profile, number, slots)
@@ -174,14 +175,16 @@ def arm_paint(
     def painted(r: tuple[float, float], t: tuple[float, float]) -> Patch:
         return _drape(shape, arm, r, t, slot)
 
+    middle, turning = 0.5 * shape.median_m, shape.has_turn_lane(arm)
     if stop_line:
-        inner, outer = sorted((side * 0.06, side * (half - 0.15)))
-        yield painted(stop, (inner, outer))
-    for k in range(1 - shape.lanes, shape.lanes):
-        middle = k * shape.lane_width_m
-        yield painted(
-            (stop[0], shape.reach_m()), (middle - 0.5 * NARROW_M, middle + 0.5 * NARROW_M)
-        )
+        first = (-middle if turning else middle) + 0.06
+        yield painted(stop, _ordered(side * first, side * (half - 0.15)))
+    offsets = [middle + k * shape.lane_width_m for k in range(shape.lanes)]
+    for t in sorted({way * offset for offset in offsets for way in (1.0, -1.0)}):
+        yield painted((stop[0], shape.reach_m()), (t - 0.5 * NARROW_M, t + 0.5 * NARROW_M))
+    if middle > 0.0 and not turning:
+        for low in np.arange(stop[0] + 0.3, shape.reach_m() - 0.6, 1.4).tolist():
+            yield painted((low, low + 0.5), (0.2 - middle, middle - 0.2))
     walk = (start + CROSSWALK_M[0], start + CROSSWALK_M[1])
     if crossings in ("zebra", "ladder"):
         count = int((2.0 * half - ZEBRA_BAR_M) // (2.0 * ZEBRA_BAR_M)) + 1
@@ -196,6 +199,11 @@ def arm_paint(
         for edge in walk:
             for t in np.arange(-half + 0.2, half - 0.5, 0.7):
                 yield painted((edge, edge + NARROW_M), (float(t), float(t) + 0.5))
+
+
+def _ordered(a: float, b: float) -> tuple[float, float]:
+    """Both numbers, the smaller one first."""
+    return (min(a, b), max(a, b))
 
 
 def _drape(

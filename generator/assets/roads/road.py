@@ -14,7 +14,7 @@ from gen_data.generator.assets.procedural.surface_shapes import block
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.assets.roads.deck import PAINT_LIFT_M, Deck, surface
 from gen_data.generator.assets.roads.markings import ZEBRA_BAR_M, bay_lines, paint_stripe, stripes
-from gen_data.generator.assets.roads.painted_signs import ARROW_M, arrow, bicycle
+from gen_data.generator.assets.roads.painted_signs import ARROW_M, arrow, bicycle, hatching
 from gen_data.generator.assets.roads.road_materials import (
     SLOT_OF,
     UNPAVED,
@@ -79,7 +79,9 @@ def road(  # noqa: PLR0913 - a family's parameters are its function's
     if paved:
         patches += [*wear_patches(deck, profile, look.wear, rng), *_covers(deck, profile, rng)]
         patches += _signs(deck, profile, arrows, markings)
+        patches += _turn_lane_paint(deck, profile, line_m) if any(profile.turn_m) else ()
     patches += gutters(deck, profile, look)
+    patches += _median_ends(deck, profile)
     if tram:
         patches += _tram_tracks(deck, profile)
     for side in (1, -1):
@@ -116,9 +118,11 @@ def _columns(profile: RoadShape) -> Iterator[float]:
 
 def _carriageway(deck: Deck, profile: RoadShape, look: StreetLook) -> Iterator[Patch]:
     whole = (0.0, profile.length_m)
+    if any(profile.turn_m):
+        yield from _turn_lanes(deck, profile)
     for side in (1, -1):
         for strip in strips(profile, side):
-            if strip.kind == "kerb":
+            if strip.kind == "kerb" or (strip.kind == "median" and any(profile.turn_m)):
                 continue
             t0, t1 = sorted((side * strip.inner_m, side * strip.outer_m))
             t = tuple(deck.t_m[(deck.t_m >= t0 - 1e-6) & (deck.t_m <= t1 + 1e-6)])
@@ -130,6 +134,47 @@ def _carriageway(deck: Deck, profile: RoadShape, look: StreetLook) -> Iterator[P
                 slot = SLOT_OF[strip.kind]
                 coated = strip.kind == "bicycle" and look.coating != "none"
                 yield deck.ribbon(whole, t, "coating" if coated else slot)
+
+
+def _turn_lanes(deck: Deck, profile: RoadShape) -> Iterator[Patch]:
+    """The median as driven surface, with lanes for those who turn across at its ends."""
+    half = 0.5 * profile.median_m
+    t = tuple(deck.t_m[np.abs(deck.t_m) <= half + 1e-6])
+    start, end = profile.turn_m
+    for low, high, _ in profile.turn_spans():
+        yield deck.lane((low, high), t, "lane")
+    if profile.length_m - end > start:
+        yield deck.ribbon((start, profile.length_m - end), t, "asphalt")
+
+
+def _turn_lane_paint(deck: Deck, profile: RoadShape, line_m: float) -> Iterator[Patch]:
+    """Lines and arrows of the lanes in the median, and the blocked area between them."""
+    half, sign = 0.5 * profile.median_m, 1.0 if profile.traffic == "right" else -1.0
+    word = "left" if profile.traffic == "right" else "right"
+    for low, high, is_forward in profile.turn_spans():
+        # Solid towards oncoming traffic, broken towards the lane that it leaves.
+        oncoming = sign * half if is_forward else -sign * half
+        yield deck.ribbon((low, high), _about(oncoming, line_m), "marking", PAINT_LIFT_M)
+        for s in np.arange(low, high - 1.0, 6.0):
+            span = (float(s), min(float(s) + 3.0, high))
+            yield deck.ribbon(span, _about(-oncoming, line_m), "marking", PAINT_LIFT_M)
+        for before in (6.0, 20.0):
+            at = high - before - ARROW_M if is_forward else low + before + ARROW_M
+            if low < at < high:
+                yield from deck.paint(arrow(word), (at, 0.0), not is_forward)
+    start, end = profile.turn_m
+    free = profile.length_m - end - start
+    if free > 2.0:
+        bars = hatching(free, 2.0 * half - 0.3, 0.5)
+        yield from deck.paint(bars, (start, 0.0))
+        for edge in (-half, half):
+            span = (start, profile.length_m - end)
+            yield deck.ribbon(span, _about(edge, line_m), "marking", PAINT_LIFT_M)
+
+
+def _about(t_m: float, width_m: float) -> tuple[float, float]:
+    """Edges of a line."""
+    return (t_m - 0.5 * width_m, t_m + 0.5 * width_m)
 
 
 def _beside(deck: Deck, profile: RoadShape, side: int, apron_m: float) -> Iterator[Patch]:
@@ -158,6 +203,22 @@ def _kerb(deck: Deck, profile: RoadShape, strip: Strip) -> Patch:
     return _beyond(deck, profile.length_m, strip.side, across, heights, "kerb")
 
 
+def _median_ends(deck: Deck, profile: RoadShape) -> Iterator[Patch]:
+    """Upright faces that close a kerbed median at both ends of the road."""
+    if profile.median_kerb_m <= 0.0 or profile.median_m <= 2.0 * KERB_WIDTH_M:
+        return
+    half = 0.5 * profile.median_m
+    z = float(np.interp(half, deck.t_m, deck.z_m))
+    for s, turn in ((0.0, 1.0), (profile.length_m, -1.0)):
+        t = turn * np.array([half, -half])
+        flat = deck.line.points(np.full(2, s), t)
+        points = np.array(
+            [[[*flat[k], low] for k in (0, 1)] for low in (z - 0.05, z + profile.median_kerb_m)]
+        )
+        plan = np.array([[[v, low] for v in t] for low in (0.0, profile.median_kerb_m)])
+        yield surface(points, plan, "kerb", deck.slots["kerb"])
+
+
 def _beyond(
     deck: Deck, length_m: float, side: int, across_m: Array, z_m: Array, slot: str
 ) -> Patch:
@@ -182,7 +243,9 @@ def _signs(
         forward = profile.forward(side)
         lanes = [strip for strip in row if strip.kind == "driving"]
         if arrows[1 if forward else 0]:
-            for strip, word in zip(lanes, _turns(len(lanes), profile.traffic), strict=True):
+            apart = profile.turn_m[1 if forward else 0] > 0.0
+            words = _turns(len(lanes), profile.traffic, apart=apart)
+            for strip, word in zip(lanes, words, strict=True):
                 for before in (8.0, 28.0):
                     at = profile.length_m - before - ARROW_M if forward else before + ARROW_M
                     if 0.0 < at < profile.length_m and before + ARROW_M < profile.length_m:
@@ -193,12 +256,16 @@ def _signs(
                     yield from deck.paint(bicycle(), (float(s), strip.middle_m), not forward)
 
 
-def _turns(count: int, traffic: str) -> list[str]:
-    """Arrow of each lane from the middle outwards, as ``junction_lanes`` connects them."""
+def _turns(count: int, traffic: str, *, apart: bool) -> list[str]:
+    """Arrow of each lane from the middle outwards, as ``junction_lanes`` connects them.
+
+    ``apart`` = those who turn across have a lane of their own.
+    """
     across, aside = ("left", "right") if traffic == "right" else ("right", "left")
     if count < 2:
         return ["straight"] * count
-    return [f"straight_{across}", *["straight"] * (count - 2), f"straight_{aside}"]
+    inner = "straight" if apart else f"straight_{across}"
+    return [inner, *["straight"] * (count - 2), f"straight_{aside}"]
 
 
 def _tram_tracks(deck: Deck, profile: RoadShape) -> Iterator[Patch]:

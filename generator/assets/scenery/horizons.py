@@ -1,7 +1,7 @@
-"""What ends a view: tree lines, forests, hills and skylines, in pieces that stand side by side.
+"""What ends a view: tree lines, forests and hills, in pieces that stand side by side.
 
 Pieces run along Y and face +X, the side from which they are seen; their origin is below their
-middle. They are meant for distances from 40 m on.
+middle. They are meant for distances from 40 m on; ``townscapes`` has towns.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -18,7 +17,7 @@ from gen_data.generator.assets.procedural.family import Solid, check_option
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear, patterned_material
 from gen_data.generator.assets.procedural.noise import uniform
 from gen_data.generator.assets.procedural.patches import Array, Patch, finish_mesh, join_patches
-from gen_data.generator.assets.procedural.surface_shapes import ball, block, cone, grid
+from gen_data.generator.assets.procedural.surface_shapes import ball, cone, grid
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.assets.scenery.foliage import directions, merge_meshes
 from gen_data.generator.assets.scenery.leaf_cards import (
@@ -32,7 +31,7 @@ from gen_data.generator.assets.scenery.leaf_cards import (
 from gen_data.generator.core.asset_types import ConvexParts, Material, MeshData
 
 SEASONS = ("spring", "summer", "autumn", "winter")
-TREE_LINE_M, FOREST_M, HILL_M, SKYLINE_M = 32.0, 48.0, 240.0, 90.0
+TREE_LINE_M, FOREST_M, HILL_M = 32.0, 48.0, 240.0
 """Lengths of the pieces along Y."""
 _COLORS = {
     "spring": ("#93a85c", "#a1b364", "#879c54", "#b0c074"),
@@ -156,35 +155,7 @@ def hill(seed: int, season: str) -> Solid:
     # Crowns this far away need no holes, which cost every ray a test.
     crowns = Material(hex_to_linear(green[season]), 0.95, specular=0.2, role="leaf")
     patch = join_patches([land, *(wood.painted(1) for wood in _woods_on(points, rng))])
-    return _solid(finish_mesh(patch, (fields, crowns), 60.0))
-
-
-def skyline(seed: int) -> Solid:
-    """Plain buildings of a town, 90 m long and 12-70 m high."""
-    rng = variant_rng("horizon/skyline", seed)
-    tall = rng.chance(0.4)
-    bodies: list[Patch] = []
-    for row in range(2):
-        y = -0.5 * SKYLINE_M
-        while y < 0.5 * SKYLINE_M - 9.0:
-            width = min(rng.between(12.0, 30.0), 0.5 * SKYLINE_M - y)
-            depth = rng.between(12.0, 18.0)
-            storeys = round(rng.between(4, 8) + (rng.between(0, 14) if tall else 0.0) + 2 * row)
-            x = -20.0 * row - rng.between(0.0, 4.0)
-            bodies += _tower((x - depth, y, x, y + width), storeys, int(rng.between(0, 5)), rng)
-            y += width + rng.between(-0.5, 7.0)
-    colors = rng.shuffled(("#c9c2b4", "#b3a596", "#d6d2c8", "#9c9c9c", "#b98f78", "#a7adb0"))
-    facades = [
-        Material(
-            hex_to_linear(color), 0.85, specular=0.4, role="facade",
-            texture=f"texture/window_grid?seed={k % 4}",
-        )
-        for k, color in enumerate(colors[:5])
-    ]  # fmt: skip
-    roof = Material(hex_to_linear("#6d6a68"), 0.9, role="roof")
-    tiles = patterned_material("texture/roof_tiles?seed=0", 1.8, 0.85, hex_to_linear("#9a5a44"))
-    mesh = finish_mesh(join_patches(bodies), (*facades, roof, replace(tiles, role="roof")), 30.0)
-    return _solid(mesh)
+    return centred_piece(finish_mesh(patch, (fields, crowns), 60.0))
 
 
 def _stand(
@@ -212,10 +183,10 @@ def _stand(
     parts = [_clumps(c, size, count * 2 // 3 if c.is_conifer else count, rng) for c in crowns]
     parts += [_clumps(bush, 0.75 * size, 8, rng) for bush in bushes]
     leaves = card_mesh(join_cards(parts), _foliage(season, rng), _SOFTNESS, rng)
-    return _solid(merge_meshes(wood, leaves))
+    return centred_piece(merge_meshes(wood, leaves))
 
 
-def _solid(mesh: MeshData) -> Solid:
+def centred_piece(mesh: MeshData) -> Solid:
     """The mesh with its middle above the origin and without unused slots, and a box around it."""
     (x0, _, _), (x1, _, _) = mesh.bounds_m()
     shift = np.array([round(0.5 * (x0 + x1), 2), 0.0, 0.0])
@@ -325,33 +296,3 @@ def _points_on(points: Array, row: Array, column: Array) -> Array:
     lower = points[i + 1, j] * (1 - v) + points[i + 1, j + 1] * v
     on: Array = upper * (1 - u) + lower * u
     return on
-
-
-def _tower(
-    plan: tuple[float, float, float, float], storeys: int, slot: int, rng: VariantRng
-) -> list[Patch]:
-    """A building over (x0, y0, x1, y1): four walls with windows, and a flat or a pitched roof."""
-    x0, y0, x1, y1 = plan
-    h, bay, storey = 3.1 * storeys, 3.2, 3.1
-    walls = []
-    corners = [(x1, y0), (x1, y1), (x0, y1), (x0, y0), (x1, y0)]
-    for (ax, ay), (bx, by) in pairwise(corners):
-        bays = max(1, round(math.hypot(bx - ax, by - ay) / bay)) / 4.0
-        wall = np.array([[(ax, ay, 0.0), (bx, by, 0.0)], [(ax, ay, h), (bx, by, h)]])
-        walls.append(grid(wall, np.array([0.0, bays]), np.array([0.0, h / storey / 4.0]), slot))
-    if storeys > 6 or rng.chance(0.4):
-        hut = block((x0 + 3.0, y0 + 3.0, h), (x0 + 6.0, y0 + 7.0, h + 2.6)).painted(5)
-        flat = np.array([[(x1, y0, h), (x1, y1, h)], [(x0, y0, h), (x0, y1, h)]])
-        return [*walls, grid(flat).painted(5), hut]
-    mid, top = 0.5 * (x0 + x1), h + 0.32 * (x1 - x0)
-    slopes = [
-        np.array([[(x1 + 0.4, y0, h), (x1 + 0.4, y1, h)], [(mid, y0, top), (mid, y1, top)]]),
-        np.array([[(x0 - 0.4, y1, h), (x0 - 0.4, y0, h)], [(mid, y1, top), (mid, y0, top)]]),
-    ]
-    # A gable is a rectangle without an upper edge: its two upper corners coincide.
-    gables = [
-        np.array([[(x0, y0, h), (x1, y0, h)], [(mid, y0, top), (mid, y0, top)]]),
-        np.array([[(x1, y1, h), (x0, y1, h)], [(mid, y1, top), (mid, y1, top)]]),
-    ]
-    plain = [grid(gable, np.array([0.0, 0.02]), np.array([0.0, 0.02]), slot) for gable in gables]
-    return [*walls, *(grid(slope).painted(6) for slope in slopes), *plain]
