@@ -15,6 +15,7 @@ from gen_data.generator.core.streams import Streams
 
 PRINTED = {"label", "can_label", "carton", "milk_label", "book_cover"}
 FOOD = {"apple_skin", "citrus_peel", "banana_peel", "pear_skin", "ball_cover"}
+TABLEWARE = {"ceramic_decor", "drink_surface"}
 RELIEF = (
     "brick",
     "brushed_metal",
@@ -30,7 +31,7 @@ RELIEF = (
     "wood_grain",
     "wood_planks",
 )
-TILING = sorted(set(TEXTURES) - PRINTED - FOOD)
+TILING = sorted(set(TEXTURES) - PRINTED - FOOD - TABLEWARE)
 
 
 @cache
