@@ -19,12 +19,14 @@ OBJECTS = sorted(name for name, family in FAMILIES.items() if family.variants)
 
 # Longest side of real ones [m]: catalogues of tableware, ISO 4014/4032/7089, fruit grading rules.
 LONGEST_SIDE_M = {
-    "apple": (0.05, 0.1), "ball": (0.03, 0.25), "banana": (0.14, 0.24), "book": (0.15, 0.32),
+    "apple": (0.05, 0.1), "ball": (0.03, 0.25), "banana": (0.14, 0.28), "book": (0.15, 0.32),
     "bottle": (0.15, 0.34), "bowl": (0.08, 0.28), "bracket": (0.03, 0.1), "can": (0.06, 0.18),
     "candle": (0.05, 0.2), "carton": (0.1, 0.32), "connector": (0.02, 0.08), "cup": (0.07, 0.25),
     "flange": (0.05, 0.12), "fork": (0.15, 0.23), "gear": (0.02, 0.1), "hammer": (0.25, 0.36),
-    "hex_bolt": (0.015, 0.13), "jar": (0.08, 0.16), "knife": (0.18, 0.26), "lemon": (0.06, 0.11),
-    "milk_carton": (0.1, 0.26), "mug": (0.09, 0.16), "nut": (0.012, 0.04), "orange": (0.06, 0.1),
+    "hex_bolt": (0.015, 0.13), "lime": (0.04, 0.07), "kiwi": (0.045, 0.085),
+    "tomato": (0.025, 0.1), "bell_pepper": (0.07, 0.12), "peach": (0.05, 0.09), "plum": (0.03, 0.065),
+    "jar": (0.08, 0.16), "knife": (0.18, 0.26), "lemon": (0.05, 0.11),
+    "milk_carton": (0.1, 0.26), "mug": (0.09, 0.16), "nut": (0.012, 0.04), "orange": (0.05, 0.1),
     "pear": (0.08, 0.13), "pipe_elbow": (0.03, 0.09), "plate": (0.15, 0.34),
     "screwdriver": (0.14, 0.28), "spoon": (0.11, 0.23), "stepped_shaft": (0.04, 0.2),
     "toy_block": (0.03, 0.1), "tumbler": (0.05, 0.21), "vase": (0.13, 0.3),

@@ -201,6 +201,9 @@ def _vessel(group: str, seed: int) -> Solid:
     others = [make for is_wanted, make in _PARTS if is_wanted(choice)]
     left = _PARTS_MAX - len(grip) - len(filling.parts) - len(others)
     parts = [*vessels.hollow_hulls(walls, filling.solid_to_m, 4 if stem else 2, left), *grip]
+    if group == "vase":
+        # Nothing falls into a narrow neck.
+        parts = vessels.solid_hulls(walls)
     for make in others:
         more, material, hull = make(choice, walls, rng)
         patches += [patch.painted(len(materials)) for patch in more]
@@ -307,7 +310,7 @@ def _handle(style: Handle, walls: Walls, rng: VariantRng) -> tuple[Patch, list[A
     section = shapes.circle(1.0, 12) * np.array((thick, wide))
     flare = 1.0 + 0.35 * np.abs(np.linspace(-1.0, 1.0, len(path))) ** 6
     bar = shapes.sweep(path, section, scale=flare)
-    return bar, hulls.tube(path[[0, 5, 10, 15, 20]], 0.8 * wide)
+    return bar, hulls.tube(path[[0, 5, 10, 15, 20]], 0.4 * (thick + wide))
 
 
 Part = tuple[list[Patch], Material, Array]
@@ -372,7 +375,7 @@ def _straw(choice: Choice, walls: Walls, rng: VariantRng) -> Part:
 def _saucer(_: Choice, walls: Walls, rng: VariantRng) -> Part:
     """A saucer whose well holds the foot; the cup keeps its place, the saucer is below."""
     foot, wide = walls.outer[0][0], walls.outer[-1][0]
-    radius, rise = wide * rng.between(1.55, 1.8), rng.between(0.011, 0.014)
+    radius, rise = wide * rng.between(1.55, 1.8), rng.between(0.0105, 0.013)
     low = -0.003
     profile = [(0.0, low - 0.002), (0.8 * foot, low - 0.002), (0.82 * foot, low - 0.004),
                (foot, low - 0.004), (1.3 * foot, low - 0.001), (radius, low + rise - 0.002),
@@ -381,7 +384,7 @@ def _saucer(_: Choice, walls: Walls, rng: VariantRng) -> Part:
                (0.0, low + 0.0028)]  # fmt: skip
     rounding = [0.0, 0.0, 0.0, 0.002, 0.02, 0.001, 0.001, 0.001, 0.02, 0.004, 0.0]
     plate = shapes.lathe(shapes.fillet(profile, rounding, 2), 48)
-    hull = hulls.frustum((foot, low - 0.004), (radius, low + 0.0085), 24)
+    hull = hulls.frustum((foot, low - 0.004), (radius, low + 0.0095), 24)
     return [plate], ceramic_material(rng, GLAZES[:2]), hull
 
 

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.material_presets import (
@@ -185,8 +184,11 @@ def _heap(food: Food, walls: Walls, level: float, rng: VariantRng, slot: int) ->
         places = _places(count, edge - 0.9 * size, level, rise, rng)
         pieces.append(_strew(shape(size), places, food.shape in _LYING, rng).painted(slot + 1 + i))
         tints.append(Material(draw_linear((code,), 0.1, rng), rng.between(0.3, 0.6), printed=True))
-    cloud = join_patches(pieces).corners_m
-    return Filling([bed, *pieces], [ground, *tints], [hulls.extreme(cloud, 40)], level)
+    high = float(join_patches(pieces).corners_m[..., 2].max())
+    crest = [(s, level + (high - level) * (1.0 - s * s)) for s in (0.95, 0.62, 0.3)]
+    hull = [np.insert(shapes.circle(s * edge, 14), 2, z, axis=1) for s, z in crest]
+    peak = np.array([[0.0, 0.0, high]])
+    return Filling([bed, *pieces], [ground, *tints], [np.concatenate([*hull, peak])], level)
 
 
 def _places(count: int, radius: float, level: float, rise: float, rng: VariantRng) -> Array:

@@ -214,7 +214,8 @@ def hollow_hulls(walls: Walls, solid_to_m: float, slices: int, count: int) -> li
         count: Largest number of all parts, at least 14.
     """
     rings = 3 if count - slices >= 18 else 2
-    sides = min(8, (count - slices) // rings)
+    # An even number: wedges then reach as far along Y as along X.
+    sides = min(8, (count - slices) // rings // 2 * 2)
     floor = max(walls.floor_m, solid_to_m)
     top = max(z for _, z in walls.inner)
     below = _simplify([(r, z) for r, z in walls.outer if z < floor - 1e-4], slices)
@@ -227,6 +228,12 @@ def hollow_hulls(walls: Walls, solid_to_m: float, slices: int, count: int) -> li
         part for low, high in itertools.pairwise(outside) for part in hulls.ring(low, high, sides)
     ]
     return [*hulls.stack(below), *wedges]
+
+
+def solid_hulls(walls: Walls) -> list[Array]:
+    """At most 12 frustums as if the vessel were full."""
+    top = max(z for _, z in walls.inner)
+    return hulls.stack(_simplify([*walls.outer, (walls.outer[-1][0], top)], 13))
 
 
 def _simplify(profile: Sequence[Point2], count: int) -> list[Point2]:
