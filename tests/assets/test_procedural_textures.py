@@ -13,7 +13,7 @@ from gen_data.generator.assets.procedural.packaging import can_size
 from gen_data.generator.core.asset_types import TextureData
 from gen_data.generator.core.streams import Streams
 
-PRINTED = {"label", "can_label", "carton", "milk_label", "book_cover"}
+PRINTED = {"label", "front_label", "can_label", "carton", "milk_label", "book_cover"}
 FOOD = {"apple_skin", "citrus_peel", "banana_peel", "pear_skin", "ball_cover"}
 FRUIT = {"fruit_skin", "fruit_cut"}
 TABLEWARE = {"ceramic_decor", "drink_surface"}

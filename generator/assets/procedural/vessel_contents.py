@@ -21,8 +21,8 @@ from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.assets.procedural.vessels import Point2, Walls, radius_at, subdivide
 from gen_data.generator.core.asset_types import Material
 
-DRINK = "drink"
-"""Role of the slots of drinks, which are no obstacle in physics."""
+CONTENTS = "contents"
+"""Role of the slots of what is in vessels and is no obstacle in physics."""
 # Contents keep this distance from walls, so that surfaces do not coincide.
 _GAP_M = 0.0003
 _WATER_IOR, _ICE_IOR = 1.33, 1.31
@@ -101,32 +101,33 @@ def _pour(
         shapes.lathe([(0.0, side[0][1]), *side], 40, slot),
         shapes.lathe(_surface(edge, top), 40, slot + 1),
     ]
-    body = _liquid(drink, rng)
+    body = liquid(drink, rng)
     above = body
     if drink.surface:
         seed = int(rng.between(0, 24))
         rough = 0.12 if drink.surface == "coffee" else 0.35
         froth = f"texture/drink_surface?kind={drink.surface}&seed={seed}"
-        above = Material((1.0, 1.0, 1.0), rough, texture=froth, printed=True, role=DRINK)
+        above = Material((1.0, 1.0, 1.0), rough, texture=froth, printed=True, role=CONTENTS)
     materials = [body, above]
     if drink.foam:
         patches.append(_foam(walls, top, drink.foam * rng.between(0.5, 1.4), slot + 2))
-        materials.append(Material(hex_to_linear("#f3ead2"), 0.8, printed=True, role=DRINK))
+        materials.append(Material(hex_to_linear("#f3ead2"), 0.8, printed=True, role=CONTENTS))
     elif rng.chance(drink.ice):
         patches += _ice(edge, top, rng, slot + 2)
         materials.append(
             Material((0.96, 0.98, 0.98), 0.05, transmission=1.0, ior=_ICE_IOR, thin=False,
-                     printed=True, role=DRINK)
+                     printed=True, role=CONTENTS)
         )  # fmt: skip
     return Filling(patches, materials, [], 0.0)
 
 
-def _liquid(drink: Drink, rng: VariantRng) -> Material:
+def liquid(drink: Drink, rng: VariantRng) -> Material:
+    """Material of a drink."""
     color = jitter_color(hex_to_linear(drink.color), 0.12, rng)
     if not drink.clear:
-        return Material(color, 0.1, printed=True, role=DRINK)
+        return Material(color, 0.1, printed=True, role=CONTENTS)
     return Material(
-        color, 0.04, transmission=1.0, ior=_WATER_IOR, thin=False, printed=True, role=DRINK
+        color, 0.04, transmission=1.0, ior=_WATER_IOR, thin=False, printed=True, role=CONTENTS
     )
 
 
