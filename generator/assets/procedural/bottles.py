@@ -183,7 +183,7 @@ def jar(seed: int) -> Solid:
     top, lid_radius, mouth = height - 0.014, 0.93 * radius, 0.88 * radius
     neck = rng.choose((0.74, 0.8, 0.84))
     upper = [(radius, neck * height), (mouth, top - 0.003), (mouth, top + 0.004)]
-    style = rng.choose(("wrap", "wrap", "front", "front", "none"))
+    style = rng.choose(("wrap", "front"))
     wall = _Wall(radius, (0.2 * height, (neck - 0.14) * height), upper, [0.02, 0.006])
     patches = [
         *_make_wall(wall, style, 0),

@@ -21,7 +21,13 @@ from gen_data.generator.assets.procedural.material_presets import (
     hex_to_linear,
     printed_material,
 )
-from gen_data.generator.assets.procedural.patches import Array, Patch, make_centred_solid, rotate
+from gen_data.generator.assets.procedural.patches import (
+    Array,
+    Patch,
+    join_patches,
+    make_centred_solid,
+    rotate,
+)
 from gen_data.generator.assets.procedural.surface_shapes import Point2
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.core.asset_types import Material
@@ -243,7 +249,7 @@ def _calyx(top: float, radius: float, rng: VariantRng) -> Stalk:
         turn = 2 * math.pi * i / count + rng.between(-0.2, 0.2)
         blades.append(blade.rotated("z", turn).moved(z=top + 0.0012))
     green = Material(draw_linear(_GREENS, 0.1, rng), 0.7, printed=True)
-    return shapes.join_patches(blades), green
+    return join_patches(blades), green
 
 
 def _stump(top: float, radius: float, rng: VariantRng) -> Stalk:

@@ -213,9 +213,11 @@ def hollow_hulls(walls: Walls, solid_to_m: float, slices: int, count: int) -> li
         slices: Largest number of frustums.
         count: Largest number of all parts, at least 14.
     """
-    rings = 3 if count - slices >= 18 else 2
+    # Wide walls need more wedges around, curved ones more rings.
+    is_wide = max(r for r, _ in walls.outer) > 0.07
+    rings = 3 if count - slices >= 18 and not is_wide else 2
     # An even number: wedges then reach as far along Y as along X.
-    sides = min(8, (count - slices) // rings // 2 * 2)
+    sides = min(10, (count - slices) // rings // 2 * 2)
     floor = max(walls.floor_m, solid_to_m)
     top = max(z for _, z in walls.inner)
     below = _simplify([(r, z) for r, z in walls.outer if z < floor - 1e-4], slices)

@@ -294,7 +294,8 @@ def _specks(count: int, radius_px: tuple[float, float], rng: VariantRng) -> Floa
     sizes = (low + (high - low) * uniform(count, rng) ** 3) * 16
     for (x, y), r in zip(places.astype(int).tolist(), sizes.astype(int).tolist(), strict=True):
         cv2.circle(mask, (x, y), r, 255, -1, cv2.LINE_AA, 4)
-    return mask.astype(np.float32) / np.float32(255.0)
+    specks: Float32 = mask.astype(np.float32) / np.float32(255.0)
+    return specks
 
 
 def _label(albedo: Float32, rng: VariantRng) -> Float32:
@@ -306,4 +307,5 @@ def _label(albedo: Float32, rng: VariantRng) -> Float32:
     cv2.ellipse(made, (x, y), (26, 18), 0, 0, 360, ink, 2, cv2.LINE_AA)
     code = str(int(rng.between(3000, 4999)))
     cv2.putText(made, code, (x - 19, y + 5), cv2.FONT_HERSHEY_DUPLEX, 0.45, ink, 1, cv2.LINE_AA)
-    return made.astype(np.float32) / np.float32(255.0)
+    labelled: Float32 = made.astype(np.float32) / np.float32(255.0)
+    return labelled

@@ -244,17 +244,17 @@ def _willow(rng: VariantRng, ground: Color) -> Image:
     image = art.canvas(_WIDTH_PX, _HEIGHT_PX, ground)
     pen = art.pen(image)
     pale = art.blend(ground, blue, 0.35)
-    for x in range(-40, _WIDTH_PX + 40, 15):
-        pen.line([(x, 4), (x + 26, 36)], fill=blue, width=2)
-        pen.line([(x + 26, 4), (x, 36)], fill=blue, width=2)
+    for left in range(-40, _WIDTH_PX + 40, 15):
+        pen.line([(left, 4), (left + 26, 36)], fill=blue, width=2)
+        pen.line([(left + 26, 4), (left, 36)], fill=blue, width=2)
     for y in (2, 38, 246):
         pen.rectangle([0, y, _WIDTH_PX, y + 4], fill=blue)
     for i in range(-1, 7):
-        x, y = i * 120 + rng.between(0, 30), rng.between(100, 150)
-        pen.arc([x - 60, y - 50, x + 90, y + 90], 190, 330, fill=blue, width=4)
+        x, top = i * 120 + rng.between(0, 30), rng.between(100, 150)
+        pen.arc([x - 60, top - 50, x + 90, top + 90], 190, 330, fill=blue, width=4)
         for k in range(7):
             turn = rng.between(0.0, 6.3)
-            tip = x + 40 * k / 3 - 20, y + 24 * math.sin(turn)
+            tip = x + 40 * k / 3 - 20, top + 24 * math.sin(turn)
             art.leaf(pen, tip, (tip[0] + 20 * math.cos(turn), tip[1] + 20 * math.sin(turn)), blue)
         for k in range(3):
             wave = [x - 50, 185 + 16 * k, x + 60, 225 + 16 * k]
@@ -327,28 +327,26 @@ def drink_surface(seed: int, kind: str = "latte") -> TextureData:
 def _figure(x: Float32, y: Float32, rng: VariantRng) -> Float32:
     """A heart, a leaf, a ring or plain foam, poured with milk: 1 where it is white."""
     kind = rng.choose(("heart", "leaf", "leaf", "rings", "foam"))
-    if kind == "foam":
-        return smoothstep(0.9, 0.8, np.hypot(x, y)).astype(np.float32)
-    if kind == "rings":
-        away = np.hypot(x, y - 0.1)
-        return (smoothstep(0.0, 0.5, np.sin(26 * away)) * smoothstep(0.7, 0.6, away)).astype(
-            np.float32
-        )
+    away = np.hypot(x, y - 0.1)
     u, v = 1.5 * x, 1.5 * (y + 0.12)
-    heart = smoothstep(0.05, -0.05, (u * u + v * v - 0.7) ** 3 - 2.2 * u * u * v**3)
-    if kind == "heart":
-        return heart.astype(np.float32)
-    ribs = smoothstep(-0.1, 0.3, np.sin(24 * (y - 0.55 * np.abs(x))) + 0.5 * (np.abs(x) < 0.02))
-    leaf = smoothstep(0.04, -0.04, np.abs(x) - 0.55 * np.sqrt(np.clip(0.62 - y * y, 0, 1)))
-    return (ribs * leaf).astype(np.float32)
+    shape: Float32 = smoothstep(0.05, -0.05, (u * u + v * v - 0.7) ** 3 - 2.2 * u * u * v**3)
+    if kind == "foam":
+        shape = smoothstep(0.9, 0.8, np.hypot(x, y))
+    elif kind == "rings":
+        shape = smoothstep(0.0, 0.5, np.sin(26 * away)) * smoothstep(0.7, 0.6, away)
+    elif kind == "leaf":
+        ribs = np.sin(24 * (y - 0.55 * np.abs(x))) + 0.5 * (np.abs(x) < 0.02)
+        inside = np.abs(x) - 0.55 * np.sqrt(np.clip(0.62 - y * y, 0, 1))
+        shape = smoothstep(-0.1, 0.3, ribs) * smoothstep(0.04, -0.04, inside)
+    return shape
 
 
 def _bubbles(albedo: Float32, light: Float32, rng: VariantRng) -> Float32:
     """Small bubbles, most of them near the wall."""
-    made = albedo.copy()
+    made: Float32 = albedo.copy()
     for _ in range(int(rng.between(30, 160))):
         row = int(255 - 40 * rng.between(0.0, 1.0) ** 2)
         column, size = int(rng.between(0, 508)), rng.choose((1, 2, 3))
         patch = made[max(0, row - size) : row + 1, column : column + size]
-        patch += 0.35 * (light - patch)
+        patch += np.float32(0.35) * (light - patch)
     return made
