@@ -27,10 +27,10 @@ LONGEST_SIDE_M = {
     "tomato": (0.025, 0.1), "bell_pepper": (0.07, 0.12), "peach": (0.05, 0.09),
     "plum": (0.03, 0.065), "cell_phone": (0.13, 0.18), "remote": (0.12, 0.24),
     "mouse": (0.09, 0.13), "keyboard": (0.27, 0.42), "scissors": (0.09, 0.27),
-    "jar": (0.065, 0.16), "knife": (0.18, 0.26), "lemon": (0.05, 0.11),
+    "jar": (0.065, 0.16), "knife": (0.15, 0.37), "lemon": (0.05, 0.11),
     "milk_carton": (0.1, 0.26), "mug": (0.09, 0.16), "nut": (0.012, 0.04), "orange": (0.05, 0.1),
     "pear": (0.08, 0.13), "pipe_elbow": (0.03, 0.09), "plate": (0.15, 0.34),
-    "screwdriver": (0.14, 0.28), "spoon": (0.11, 0.23), "stepped_shaft": (0.04, 0.2),
+    "screwdriver": (0.14, 0.28), "spoon": (0.11, 0.26), "stepped_shaft": (0.04, 0.2),
     "toy_block": (0.03, 0.1), "tumbler": (0.05, 0.21), "vase": (0.13, 0.3),
     "washer": (0.014, 0.04), "wine_glass": (0.13, 0.245), "wrench": (0.1, 0.26),
 }  # fmt: skip

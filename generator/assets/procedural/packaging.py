@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +35,7 @@ from gen_data.generator.assets.procedural.surface_shapes import (
     rounded_box,
 )
 from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
+from gen_data.generator.assets.procedural.vessels import subdivide
 from gen_data.generator.core.se3 import Vec3
 
 _SIZES = load_table(__package__, "package_sizes", tuple[tuple[float, ...], ...])
@@ -75,8 +77,25 @@ def can(seed: int) -> Solid:
         patches, stages = _drink_can(r, h)
         lid = [piece.moved(z=h - 0.0045) for piece in _tab(0.68 * r)]
     body = metal_material(STEEL if size.food else ALUMINIUM, rng.between(0.22, 0.35))
+    # Three in ten cans are dented (assumed, 0.1 to 0.5).
+    for _ in range(rng.choose((0, 0, 0, 0, 0, 0, 0, 1, 1, 3))):
+        place = rng.between(-3.1, 3.1), h * rng.between(0.25, 0.75)
+        depth, width = rng.between(0.001, 0.0028), rng.between(0.006, 0.016)
+        patches = [_press(patch, place, depth, width) for patch in patches]
     materials = (print_, body, metal_material(ALUMINIUM, 0.3))
     return make_centred_solid([*patches, *lid], materials, hulls.stack(stages))
+
+
+def _press(patch: Patch, place: Point2, depth: float, width: float) -> Patch:
+    """The patch with a dent at an angle about Z [rad] and a height [m]."""
+    corners = patch.corners_m.copy()
+    turn = np.arctan2(corners[..., 1], corners[..., 0]) - place[0]
+    radius = np.sqrt(corners[..., 0] ** 2 + corners[..., 1] ** 2)
+    along = radius * (np.mod(turn + math.pi, 2.0 * math.pi) - math.pi)
+    away = np.sqrt(along**2 + (0.6 * (corners[..., 2] - place[1])) ** 2) / width
+    push = depth * np.exp(-(away**2)) * (radius > 0.5 * radius.max())
+    corners[..., :2] *= (1.0 - push / np.maximum(radius, 1e-6))[..., None]
+    return replace(patch, corners_m=corners)
 
 
 def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
@@ -90,10 +109,10 @@ def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
     top = fillet([*taper, *lid], [0.0, 0.02, 0.004, 0.0, 0.0006, 0.0006, 0.0008, 0.0], 2)
     split = next(i for i, (_, z) in enumerate(top) if z > h - 0.0045)
     patches = [
-        lathe(fillet(dome, [0.0, 0.03, 0.001, 0.002, 0.012, 0.0], 2), 32, 1),
-        lathe([(r, z0), (r, z1)], 32, 0, v=(0.0, v1)),
-        lathe(top[: split + 1], 32, 0, v=(v1, 1.0)),
-        lathe(top[split:], 32, 1),
+        lathe(fillet(dome, [0.0, 0.03, 0.001, 0.002, 0.012, 0.0], 2), 40, 1),
+        lathe(subdivide([(r, z0), (r, z1)], 0.006), 40, 0, v=(0.0, v1)),
+        lathe(top[: split + 1], 40, 0, v=(v1, 1.0)),
+        lathe(top[split:], 40, 1),
     ]
     stages = [(0.76 * r, 0.0), (r, 0.012), (r, h - 0.015), (neck, h - 0.0035), (rim, h)]
     return patches, stages
@@ -107,7 +126,11 @@ def _food_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
     wall = r - 0.001
     body = [(wall, seam + 0.001), (wall, h - seam - 0.001)]
     top = [(radius, h - z) for radius, z in end[::-1]]
-    patches = [lathe(end, 36, 1), lathe(body, 36, 0, v=(0.0, 1.0)), lathe(top, 36, 1)]
+    patches = [
+        lathe(end, 36, 1),
+        lathe(subdivide(body, 0.006), 36, 0, v=(0.0, 1.0)),
+        lathe(top, 36, 1),
+    ]
     return patches, [(r, 0.0), (r, h)]
 
 
