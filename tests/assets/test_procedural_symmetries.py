@@ -21,7 +21,7 @@ ANY_ANGLE_RAD = 1.0
 
 STATED = {
     "bollard": {0},
-    "bowl": {0},
+    "bowl": {0, 16},
     "candle": {0},
     "cone": {4},
     "connector": {2, 4},
@@ -35,7 +35,7 @@ STATED = {
     "screwdriver": {0, 2, 6, 8},
     "stepped_shaft": {0},
     "toy_block": {2},
-    "tumbler": {0},
+    "tumbler": {0, 8, 10, 12, 16},
     "vase": {0},
     "washer": {0, 2},
     "wine_glass": {0},

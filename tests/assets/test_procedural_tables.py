@@ -8,8 +8,8 @@ import pytest
 import yaml
 
 from gen_data.generator import assets
+from gen_data.generator.assets.procedural.bottles import BOTTLES, BottleStyle
 from gen_data.generator.assets.procedural.data_tables import load_table
-from gen_data.generator.assets.procedural.packaging import BOTTLES, BottleStyle
 from gen_data.generator.assets.vehicles.car_design import DESIGNS, Design
 
 VEHICLES = "gen_data.generator.assets.vehicles"
@@ -28,7 +28,10 @@ def test_rows_have_the_type_of_the_table() -> None:
 
 def test_rows_keep_the_order_of_the_file() -> None:
     """Seeds take the styles in turn, so the order is part of every variant."""
-    assert list(BOTTLES) == ["wine", "beer", "water", "soda", "ketchup", "detergent"]
+    assert " ".join(BOTTLES) == (
+        "wine beer water soda ketchup detergent burgundy champagne white_wine longneck stubby "
+        "ribbed family juice milk oil spirit sauce shampoo soap spray flask sport medicine squeeze"
+    )
 
 
 def test_a_row_takes_the_fields_that_it_leaves_out_from_another() -> None:

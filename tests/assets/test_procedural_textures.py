@@ -13,8 +13,11 @@ from gen_data.generator.assets.procedural.packaging import can_size
 from gen_data.generator.core.asset_types import TextureData
 from gen_data.generator.core.streams import Streams
 
-PRINTED = {"label", "can_label", "carton", "milk_label", "book_cover"}
+PRINTED = {"label", "front_label", "can_label", "carton", "milk_label", "book_cover"}
 FOOD = {"apple_skin", "citrus_peel", "banana_peel", "pear_skin", "ball_cover"}
+FRUIT = {"fruit_skin", "fruit_cut"}
+DEVICES = {"phone_screen", "key_legends"}
+TABLEWARE = {"ceramic_decor", "drink_surface"}
 RELIEF = (
     "brick",
     "brushed_metal",
@@ -30,7 +33,7 @@ RELIEF = (
     "wood_grain",
     "wood_planks",
 )
-TILING = sorted(set(TEXTURES) - PRINTED - FOOD)
+TILING = sorted(set(TEXTURES) - PRINTED - FOOD - FRUIT - TABLEWARE - DEVICES)
 
 
 @cache

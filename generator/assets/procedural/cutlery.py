@@ -6,13 +6,15 @@ middle lies, how thick it is, and how deep it is hollowed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
-from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.data_tables import load_table
+from gen_data.generator.assets.procedural.family import Facts, Solid
 from gen_data.generator.assets.procedural.material_presets import (
     STAINLESS,
     metal_material,
@@ -25,8 +27,9 @@ from gen_data.generator.assets.procedural.patches import (
     make_centred_solid,
 )
 from gen_data.generator.assets.procedural.surface_shapes import fan, grid, spline
-from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.se3 import Vec3
 
 Station = tuple[float, float, float, float, float, float]
 """A cross-section [mm]: place along the length (x), reach towards -Y and towards +Y, height of the
@@ -34,10 +37,10 @@ middle of the sheet (z), thickness, and how far the middle lies below the rims."
 
 
 def spoon(seed: int) -> Solid:
-    """A table, dessert or coffee spoon. Slots: head, handle."""
+    """A table, dessert, coffee or serving spoon. Slots: head, handle."""
     rng = variant_rng("spoon", seed)
-    size = (1.0, 0.86, 0.66)[seed % 3] * rng.between(0.96, 1.04)
-    wide, tail = rng.between(0.93, 1.07), rng.between(0.85, 1.2)
+    size = in_turn((1.0, 0.86, 0.66, 1.0, 1.18), seed) * rng.between(0.96, 1.04)
+    wide, tail = rng.between(0.88, 1.1), rng.between(0.7, 1.35)
     bowl = [(-32, 3.0, 12.0, 0.5), (-22, 12.0, 9.5, 4.0), (-8, 19.5, 7.0, 7.5),
             (8, 21.0, 6.5, 8.0), (20, 17.5, 7.5, 6.5), (28, 10.5, 9.0, 3.0),
             (31.5, 4.0, 10.0, 0.5)]  # fmt: skip
@@ -50,7 +53,7 @@ def fork(seed: int) -> Solid:
     """A table or dessert fork with three or four tines. Slots: head, handle."""
     rng = variant_rng("fork", seed)
     size = (1.0, 0.86)[seed % 2] * rng.between(0.97, 1.03)
-    tail, half = rng.between(0.85, 1.2), rng.between(11.5, 13.0)
+    tail, half = rng.between(0.7, 1.35), rng.between(11.0, 13.5)
     count = 3 if rng.chance(0.25) else 4
     head = [(40, 4.0, 4.0, 14.5, 2.2, 0.0), (48, 10.5, 10.5, 12.0, 2.0, 1.0),
             (56, half, half, 9.0, 1.9, 2.0), (63, half, half, 6.0, 1.9, 2.0)]  # fmt: skip
@@ -69,19 +72,57 @@ def fork(seed: int) -> Solid:
     return _cutlery([root, *tines], size, 36.0, rng)
 
 
+@dataclass(frozen=True, slots=True)
+class KnifeStyle:
+    """One kind of knife [mm]; see ``knives.yaml``.
+
+    Attributes:
+        z: Height of the blade's middle above the table.
+        size: Range of the factor on everything.
+        grips: Kinds of handles besides steel: ``dark``, ``bright`` or ``wood``; empty = cutlery.
+    """
+
+    handle: tuple[tuple[float, float, float, float], ...]
+    blade: tuple[tuple[float, float, float, float], ...]
+    z: float
+    size: tuple[float, float]
+    grips: tuple[str, ...] = ()
+
+
+KNIVES: Mapping[str, KnifeStyle] = load_table(__package__, "knives", KnifeStyle)
+
+
 def knife(seed: int) -> Solid:
-    """A table knife lying on its side, edge towards -Y. Slots: blade, handle."""
+    """A table or kitchen knife lying on its side, edge towards -Y. Slots: blade, handle."""
     rng = variant_rng("knife", seed)
-    size = rng.between(0.94, 1.06)
-    grip, tip = rng.between(0.9, 1.15), rng.between(0.0, 5.0)
-    wide, middle = 8.0 * grip, 8.8 * grip
-    handle = _even((-112, 3.0, 3.2, 3.4), (-108, wide, 3.4, 5.0), (-80, middle, 3.6, 6.4),
-                   (-40, wide, 3.6, 6.2), (-8, 6.6, 3.4, 5.4), (-2, 6.2, 3.2, 4.2))  # fmt: skip
-    blade = [(-4, 6.0, 6.0, 3.0, 2.4, 0.0), (4, 7.5, 7.0, 3.0, 1.8, 0.0),
-             (30, 11.0, 8.5, 3.0, 1.5, 0.0), (70, 11.5, 9.0, 3.0, 1.3, 0.0),
-             (95, 9.0 - tip, 9.0, 3.0, 1.2, 0.0), (107, 2.0 - tip, 8.0, 3.0, 1.1, 0.0),
-             (112, -4.5, 6.0, 3.0, 1.0, 0.0)]  # fmt: skip
-    return _cutlery([_sheet(handle, 22), _sheet(blade, 26)], size, -3.0, rng)
+    style = KNIVES[knife_kind(seed)]
+    size, grip, deep = rng.between(*style.size), rng.between(0.9, 1.15), rng.between(0.88, 1.1)
+    handle = _even(*((x, grip * wide, z, thick) for x, wide, z, thick in style.handle))
+    blade = [(x, deep * low, high, style.z, thick, 0.0) for x, low, high, thick in style.blade]
+    finish = _GRIPS[rng.choose(style.grips)](rng) if style.grips else None
+    return _cutlery([_sheet(handle, 22), _sheet(blade, 30)], size, -3.0, rng, finish)
+
+
+def knife_kind(seed: int) -> str:
+    """Key in ``knives.yaml``: every other knife is a table knife."""
+    return in_turn(("table", "chef", "table", "paring", "table", "steak", "butter", "bread"), seed)
+
+
+def knife_facts(seed: int) -> Facts:
+    """Kind of knife."""
+    return Facts(knife_kind(seed))
+
+
+def _wood(rng: VariantRng) -> Material:
+    texture, tint = f"texture/wood_grain?seed={int(rng.between(0, 18))}", rng.between(0.5, 1.0)
+    return Material((tint, tint, tint), 0.55, texture=texture, texture_scale_m=0.12, printed=True)
+
+
+_GRIPS: Mapping[str, Callable[[VariantRng], Material]] = {
+    "dark": lambda rng: plastic_material(rng, ("#151516", "#202124", "#2a2c30")),
+    "bright": plastic_material,
+    "wood": _wood,
+}
 
 
 def _handle(tail: float, neck_z: float, neck_x: float, rng: VariantRng) -> list[Station]:
@@ -111,18 +152,44 @@ def _sheet(stations: Sequence[Station], count: int, across: int = 6) -> Patch:
     return join_patches([grid(loop), fan(loop[0, :0:-1]), fan(loop[-1, :-1])])
 
 
-def _cutlery(sheets: list[Patch], size: float, cut_mm: float, rng: VariantRng) -> Solid:
+def _cutlery(
+    sheets: list[Patch],
+    size: float,
+    cut_mm: float,
+    rng: VariantRng,
+    grip: Material | None = None,
+) -> Solid:
     """The finished piece: scaled to metres, slot 1 behind the cut, collision in slices."""
     scale = 0.001 * size
     patch = join_patches(sheets)
     behind = patch.corners_m.mean(axis=1)[:, 0] < cut_mm - 6.0
     patch = Patch(patch.corners_m * scale, patch.uvs, behind.astype(np.int64))
-    steel = metal_material(STAINLESS, rng.between(0.12, 0.28))
-    handle: Material = plastic_material(rng) if rng.chance(0.2) else steel
+    head, handle = _finishes(rng)
     low, high = patch.bounds_m()
     edges = np.linspace(float(low[0]), float(high[0]), 8)
     parts = [hulls.extreme(_slice(patch, a, b)) for a, b in pairwise(edges.tolist())]
-    return make_centred_solid([patch], (steel, handle), parts)
+    return make_centred_solid([patch], (head, grip or handle), parts)
+
+
+def _finishes(rng: VariantRng) -> tuple[Material, Material]:
+    """Materials of head and handle; shares are assumed, within 10 %."""
+    steel = metal_material(STAINLESS, rng.between(0.1, 0.34))
+    share = rng.between(0.0, 1.0)
+    if share < 0.66:
+        return steel, steel
+    if share < 0.82:
+        return steel, plastic_material(rng)
+    if share < 0.88:
+        return steel, _wood(rng)
+    if share < 0.94:
+        white = plastic_material(rng, ("#f0f0ec", "#f0f0ec", "#202124", "#e8e4da"))
+        return white, white
+    plated = metal_material(rng.choose(_PLATED), rng.between(0.15, 0.3))
+    return plated, plated
+
+
+# Gold, copper and black coatings of steel: linear RGB.
+_PLATED: tuple[Vec3, ...] = ((0.9, 0.68, 0.32), (0.8, 0.5, 0.36), (0.05, 0.05, 0.055))
 
 
 def _slice(patch: Patch, a: float, b: float) -> Array:

@@ -1,9 +1,9 @@
-"""Packaging: bottles, jars, drink and food cans, folding boxes and milk cartons."""
+"""Packaging: drink and food cans, folding boxes and milk cartons."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +14,7 @@ from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     ALUMINIUM,
     CAPS,
-    PALETTES,
     STEEL,
-    draw_linear,
     metal_material,
     plastic_material,
     printed_material,
@@ -37,136 +35,10 @@ from gen_data.generator.assets.procedural.surface_shapes import (
     rounded_box,
 )
 from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
-from gen_data.generator.core.asset_types import Material
+from gen_data.generator.assets.procedural.vessels import subdivide
 from gen_data.generator.core.se3 import Vec3
 
-# Width by height of the unrolled label; its texture is drawn at this aspect.
-LABEL_ASPECT = 2.6
-
-_WATER_IOR = 1.33
-# Label paper stands this much proud of the wall.
-_PROUD_M = 0.0003
-
-
-@dataclass(frozen=True, slots=True)
-class BottleStyle:
-    """Ranges of the measures of one kind of bottle.
-
-    Attributes:
-        shoulder: (radius as a share of the body's beyond the neck's, height as a share of the way
-            from label to neck) of the points between body and neck.
-        depth: Extent along Y as a share of that along X.
-        colors: Of the body; of a clear bottle, the tint of light that has passed through it.
-        caps: Of the cap.
-        clear: Whether it is transparent and full of water: body and filling refract as one.
-    """
-
-    height_m: tuple[float, float]
-    radius_m: tuple[float, float]
-    neck_m: float
-    neck_share: tuple[float, float]
-    label_share: tuple[float, float]
-    shoulder: tuple[Point2, ...]
-    cap_m: tuple[float, float]
-    depth: float
-    colors: tuple[str, ...]
-    caps: tuple[str, ...]
-    gloss: tuple[float, float] = (0.06, 0.15)
-    clear: bool = False
-
-
-BOTTLES = load_table(__package__, "bottles", BottleStyle)
 _SIZES = load_table(__package__, "package_sizes", tuple[tuple[float, ...], ...])
-
-
-def bottle(seed: int) -> Solid:
-    """A bottle of one of the styles in ``BOTTLES``. Slots: body, label, cap."""
-    rng = variant_rng("bottle", seed)
-    style = BOTTLES[in_turn(tuple(BOTTLES), seed)]
-    height, radius = rng.between(*style.height_m), rng.between(*style.radius_m)
-    neck_z = height * rng.between(*style.neck_share)
-    z0, z1 = height * style.label_share[0], min(height * style.label_share[1], neck_z - 0.01)
-    shoulder = [
-        (style.neck_m + r * (radius - style.neck_m), z1 + t * (neck_z - z1))
-        for r, t in style.shoulder
-    ]
-    cap_radius, cap_height = style.cap_m
-    cap_z, neck_top = height - cap_height, height - 0.4 * cap_height
-    upper = [*shoulder, (style.neck_m, neck_z), (style.neck_m, neck_top)]
-    patches = [
-        *_wall_with_label(radius, (z0, z1), upper, [0.06] * (len(upper) - 1)),
-        lathe([(style.neck_m, neck_top), (0.0, neck_top)], 32, 0),
-        _cap(cap_radius, cap_z, height),
-    ]
-    foot = [(0.93 * radius, 0.0), (radius, 0.008), (radius, z1)]
-    mouth = (max(style.neck_m, 0.96 * cap_radius), neck_z + 0.004)
-    stages = [*foot, *shoulder, mouth, (cap_radius, cap_z), (0.97 * cap_radius, height)]
-    flat = np.array([1.0, style.depth, 1.0])
-    parts = [hull * flat for hull in hulls.stack(_drop_level_stages(stages))]
-    body = Material(draw_linear(style.colors, 0.1, rng), rng.between(*style.gloss))
-    if style.clear:
-        body = replace(body, roughness=0.04, transmission=1.0, ior=_WATER_IOR, thin=False)
-    label = printed_material(f"texture/label?seed={seed}", rng.between(0.35, 0.6))
-    flattened = [patch.scaled(1.0, style.depth, 1.0) for patch in patches]
-    return make_centred_solid(flattened, (body, label, plastic_material(rng, style.caps)), parts)
-
-
-def jar(seed: int) -> Solid:
-    """A filled preserving jar with a twist-off lid. Slots: body, label, lid."""
-    rng = variant_rng("jar", seed)
-    radius, height = rng.between(0.031, 0.043), rng.between(0.085, 0.14)
-    top, lid_radius, mouth = height - 0.014, 0.9 * radius, 0.86 * radius
-    upper = [(radius, 0.8 * height), (mouth, top - 0.003), (mouth, top + 0.004)]
-    patches = [
-        *_wall_with_label(radius, (0.2 * height, 0.66 * height), upper, [0.02, 0.006]),
-        lathe([(mouth, top + 0.004), (0.0, top + 0.004)], 32, 0),
-        _lid(lid_radius, top, height),
-    ]
-    glass = Material(draw_linear(PALETTES["fillings"], 0.15, rng), rng.between(0.06, 0.12))
-    label = printed_material(f"texture/label?seed={seed + 1000}", rng.between(0.45, 0.65))
-    metals = (metal_material(color, 0.3) for color in ((0.83, 0.69, 0.35), STEEL))
-    lid = rng.choose((*metals, plastic_material(rng, CAPS)))
-    stages = [(0.92 * radius, 0.0), (radius, 0.008), (radius, 0.8 * height), (lid_radius, top),
-              (lid_radius, height)]  # fmt: skip
-    return make_centred_solid(patches, (glass, label, lid), hulls.stack(stages))
-
-
-def _wall_with_label(
-    radius: float, label: Point2, upper: list[Point2], radii: list[float]
-) -> list[Patch]:
-    """Bottom and wall up to the last point of ``upper``, with a label between two heights."""
-    z0, z1 = label
-    proud = radius + _PROUD_M
-    foot = [(0.0, 0.004), (0.6 * radius, 0.003), (0.72 * radius, 0.0), (0.93 * radius, 0.0)]
-    lower = [*foot, (radius, 0.008), (radius, z0 - _PROUD_M), (proud, z0)]
-    rest = [(proud, z1), (radius, z1 + _PROUD_M), *upper]
-    return [
-        lathe(fillet(lower, [0.0, 0.0, 0.0, 0.004, 0.01, 0.0, 0.0], 3), 32, 0),
-        lathe([(proud, z0), (proud, z1)], 32, 1, v=(0.0, 1.0)),
-        lathe(fillet(rest, [0.0, 0.0, *radii, 0.0], 3), 32, 0),
-    ]
-
-
-def _cap(radius: float, low: float, high: float) -> Patch:
-    """A screw cap, closed below."""
-    profile = [(0.0, low), (radius, low), (0.97 * radius, high), (0.0, high)]
-    return lathe(fillet(profile, [0.0, 0.0008, 0.002, 0.0], 2), 24, 2)
-
-
-def _lid(radius: float, low: float, high: float) -> Patch:
-    """A twist-off lid with a sunken panel."""
-    profile = [(0.0, low), (radius, low), (radius, high), (radius - 0.006, high),
-               (radius - 0.008, high - 0.0012), (0.0, high - 0.0012)]  # fmt: skip
-    return lathe(fillet(profile, [0.0, 0.001, 0.002, 0.0, 0.0, 0.0], 2), 32, 2)
-
-
-def _drop_level_stages(stages: list[Point2]) -> list[Point2]:
-    """Return the stages that lie above the one before."""
-    kept = stages[:1]
-    for stage in stages[1:]:
-        if stage[1] > kept[-1][1] + 1e-4:
-            kept.append(stage)
-    return kept
 
 
 class CanSize(NamedTuple):
@@ -205,8 +77,25 @@ def can(seed: int) -> Solid:
         patches, stages = _drink_can(r, h)
         lid = [piece.moved(z=h - 0.0045) for piece in _tab(0.68 * r)]
     body = metal_material(STEEL if size.food else ALUMINIUM, rng.between(0.22, 0.35))
+    # Three in ten cans are dented (assumed, 0.1 to 0.5).
+    for _ in range(rng.choose((0, 0, 0, 0, 0, 0, 0, 1, 1, 3))):
+        place = rng.between(-3.1, 3.1), h * rng.between(0.25, 0.75)
+        depth, width = rng.between(0.001, 0.0028), rng.between(0.006, 0.016)
+        patches = [_press(patch, place, depth, width) for patch in patches]
     materials = (print_, body, metal_material(ALUMINIUM, 0.3))
     return make_centred_solid([*patches, *lid], materials, hulls.stack(stages))
+
+
+def _press(patch: Patch, place: Point2, depth: float, width: float) -> Patch:
+    """The patch with a dent at an angle about Z [rad] and a height [m]."""
+    corners = patch.corners_m.copy()
+    turn = np.arctan2(corners[..., 1], corners[..., 0]) - place[0]
+    radius = np.sqrt(corners[..., 0] ** 2 + corners[..., 1] ** 2)
+    along = radius * (np.mod(turn + math.pi, 2.0 * math.pi) - math.pi)
+    away = np.sqrt(along**2 + (0.6 * (corners[..., 2] - place[1])) ** 2) / width
+    push = depth * np.exp(-(away**2)) * (radius > 0.5 * radius.max())
+    corners[..., :2] *= (1.0 - push / np.maximum(radius, 1e-6))[..., None]
+    return replace(patch, corners_m=corners)
 
 
 def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
@@ -220,10 +109,10 @@ def _drink_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
     top = fillet([*taper, *lid], [0.0, 0.02, 0.004, 0.0, 0.0006, 0.0006, 0.0008, 0.0], 2)
     split = next(i for i, (_, z) in enumerate(top) if z > h - 0.0045)
     patches = [
-        lathe(fillet(dome, [0.0, 0.03, 0.001, 0.002, 0.012, 0.0], 2), 32, 1),
-        lathe([(r, z0), (r, z1)], 32, 0, v=(0.0, v1)),
-        lathe(top[: split + 1], 32, 0, v=(v1, 1.0)),
-        lathe(top[split:], 32, 1),
+        lathe(fillet(dome, [0.0, 0.03, 0.001, 0.002, 0.012, 0.0], 2), 40, 1),
+        lathe(subdivide([(r, z0), (r, z1)], 0.006), 40, 0, v=(0.0, v1)),
+        lathe(top[: split + 1], 40, 0, v=(v1, 1.0)),
+        lathe(top[split:], 40, 1),
     ]
     stages = [(0.76 * r, 0.0), (r, 0.012), (r, h - 0.015), (neck, h - 0.0035), (rim, h)]
     return patches, stages
@@ -237,7 +126,11 @@ def _food_can(r: float, h: float) -> tuple[list[Patch], list[Point2]]:
     wall = r - 0.001
     body = [(wall, seam + 0.001), (wall, h - seam - 0.001)]
     top = [(radius, h - z) for radius, z in end[::-1]]
-    patches = [lathe(end, 36, 1), lathe(body, 36, 0, v=(0.0, 1.0)), lathe(top, 36, 1)]
+    patches = [
+        lathe(end, 36, 1),
+        lathe(subdivide(body, 0.006), 36, 0, v=(0.0, 1.0)),
+        lathe(top, 36, 1),
+    ]
     return patches, [(r, 0.0), (r, h)]
 
 

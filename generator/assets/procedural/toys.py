@@ -1,4 +1,4 @@
-"""Toy blocks, balls, candles and vases."""
+"""Toy blocks, balls and candles."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from gen_data.generator.assets.procedural import material_presets as presets
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.patches import make_centred_solid, make_solid_in_place
 from gen_data.generator.assets.procedural.surface_shapes import ball as sphere
-from gen_data.generator.assets.procedural.surface_shapes import fillet, lathe, rounded_box, spline
+from gen_data.generator.assets.procedural.surface_shapes import fillet, lathe, rounded_box
 from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.core.asset_types import Material, Symmetry
 
@@ -81,23 +81,3 @@ def candle(seed: int) -> Solid:
     tip = hulls.frustum((0.001, height), (0.001, height + 0.0075), 6)
     parts = [hulls.frustum((radius, 0.0), (radius, height)), tip]
     return make_centred_solid([lathe(wax, 32), wick], (material, soot), parts)
-
-
-def vase(seed: int) -> Solid:
-    """A ceramic vase, hollow to look at. Slots: outside, inside."""
-    rng = variant_rng("vase", seed)
-    height, belly = rng.between(0.15, 0.27), rng.between(0.04, 0.06)
-    foot, neck = belly * rng.between(0.55, 0.75), belly * rng.between(0.3, 0.6)
-    mouth, widest = neck * rng.between(1.1, 1.6), rng.between(0.3, 0.55)
-    waist = (0.5 * (belly + neck), 0.5 * (widest + 0.8) * height)
-    knots = [(foot, 0.004), (belly, widest * height), waist, (neck, 0.82 * height), (mouth, height)]
-    wall = 0.004
-    outer = [(float(r), float(z)) for r, z in spline(knots, 17)]
-    inner = [(r - wall, z) for r, z in outer[::-1] if z > 0.02]
-    profile = [(0.0, 0.001), (foot - 0.004, 0.001), (foot - 0.003, 0.0), (foot, 0.0), *outer]
-    outside = presets.ceramic_material(rng, presets.GLAZES)
-    inside = Material(outside.base_color, 0.4)
-    stages = [(foot, 0.0), *outer[2:16:2], (mouth, height + 0.0015)]
-    within = [outer[-1], (mouth - 0.5 * wall, height + 0.0015), *inner, (0.0, 0.018)]
-    patches = [lathe(profile, 32), lathe(within, 32, 1)]
-    return make_centred_solid(patches, (outside, inside), hulls.stack(stages))

@@ -6,7 +6,7 @@ Boxes are (left, top, right, bottom) as fractions of the image, y down.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -88,32 +88,65 @@ def text(image: Image, box: Box, text: str, fill: Color, bold: int) -> None:
     image.paste(fill, ((x0 + x1 - w) // 2, (y0 + y1 - h) // 2), small)
 
 
-def lines(image: Image, box: Box, ink: Color, ground: Color, rng: VariantRng) -> None:
-    """Text too small to read: words as dashes."""
+def lettering(image: Image, box: Box, text: str, fill: Color, face: str, bold: int) -> None:
+    """Text of another face, fitted into a box like ``text``: ``serif``, ``script`` or ``wide``."""
+    import cv2
+    from PIL.Image import Resampling, fromarray
+
+    x0, y0, x1, y1 = pixels(image, box)
+    if x1 - x0 < 4 or y1 - y0 < 3:
+        return
+    font = {
+        "serif": cv2.FONT_HERSHEY_TRIPLEX,
+        "script": cv2.FONT_HERSHEY_SCRIPT_COMPLEX,
+        "wide": cv2.FONT_HERSHEY_DUPLEX,
+    }[face]
+    (w, h), below = cv2.getTextSize(text, font, 2.0, bold)
+    mask = np.zeros((h + below + 16, w + 16), np.uint8)
+    cv2.putText(mask, text, (8, h + 8), font, 2.0, 255, bold, cv2.LINE_AA)
+    scale = min((x1 - x0) / mask.shape[1], (y1 - y0) / mask.shape[0])
+    size = max(1, int(scale * mask.shape[1])), max(1, int(scale * mask.shape[0]))
+    small = fromarray(mask).resize(size, Resampling.BOX)
+    image.paste(fill, ((x0 + x1 - size[0]) // 2, (y0 + y1 - size[1]) // 2), small)
+
+
+def lines(image: Image, box: Box, ink: Color, ground: Color, words: Sequence[str]) -> None:
+    """Small print: words set in lines that fill a box; they begin again where they end."""
+    from PIL import ImageFont
+
     draw = pen(image)
     x0, y0, x1, y1 = pixels(image, box)
-    pitch = max(5, image.height // 45)
-    for y in range(y0, y1 - pitch, pitch):
-        x = float(x0)
-        while x < x1 - 6:
-            word = rng.between(4, 22)
-            dash = [x, y, min(x + word, x1), y + max(1, pitch // 3)]
-            draw.rectangle(dash, fill=blend(ink, ground, 0.25))
-            x += word + 4
+    pitch = max(8, image.height // 26)
+    font = ImageFont.load_default(size=pitch - 1)
+    fill, i = blend(ink, ground, 0.15), 0
+    for y in range(y0, y1 - pitch + 1, pitch):
+        line = words[i % len(words)]
+        i += 1
+        while font.getlength(f"{line} {words[i % len(words)]}") < x1 - x0:
+            line, i = f"{line} {words[i % len(words)]}", i + 1
+        draw.text((x0, y), line, fill=fill, font=font)
+
+
+NUTRIENTS = ("Energy", "Fat", "  saturates", "Carbohydrate", "  sugars", "Protein", "Salt")
 
 
 def table(image: Image, box: Box, ink: Color, rng: VariantRng) -> None:
-    """Nutrition facts."""
+    """Nutrition facts: names and drawn amounts."""
+    from PIL import ImageFont
+
     draw = pen(image)
     x0, y0, x1, y1 = pixels(image, box)
     draw.rectangle([x0, y0, x1, y1], outline=ink, fill=(248, 248, 246))
-    rows = 7
-    for i in range(1, rows):
-        y = y0 + (y1 - y0) * i // rows
-        draw.line([x0, y, x1, y], fill=(40, 40, 40), width=1)
-        h, name = max(1, (y1 - y0) // rows // 4), rng.between(0.2, 0.5)
-        for a, b in ((x0 + 4, x0 + 4 + name * (x1 - x0)), (x1 - 0.2 * (x1 - x0), x1 - 4)):
-            draw.rectangle([a, y + h, b, y + 2 * h], fill=(60, 60, 60))
+    pitch = (y1 - y0) / (len(NUTRIENTS) + 1)
+    font = ImageFont.load_default(size=max(5.0, 0.8 * pitch))
+    for i, name in enumerate(("per 100 g", *NUTRIENTS)):
+        y = y0 + i * pitch
+        draw.line([x0, y + pitch, x1, y + pitch], fill=(60, 60, 60), width=1)
+        draw.text((x0 + 3, y), name, fill=(30, 30, 30), font=font)
+        amount = f"{int(rng.between(20, 2200))} kJ" if i == 1 else f"{rng.between(0, 60):.1f} g"
+        if i:
+            at = x1 - 3 - font.getlength(amount)
+            draw.text((at, y), amount, fill=(30, 30, 30), font=font)
 
 
 def barcode(image: Image, box: Box, rng: VariantRng) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from gen_data.generator.assets.procedural import packaging
+from gen_data.generator.assets.procedural import bottles, packaging
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.material_presets import hex_to_srgb8
 from gen_data.generator.assets.procedural.textures import artwork as art
@@ -48,7 +48,7 @@ def label(seed: int) -> TextureData:
     """Wrap-around label of a bottle or jar; the front is in the middle. 512 x 256."""
     rng = variant_rng("label", seed)
     image = _wrap(
-        int(art.SIZE_PX * 1.5), packaging.LABEL_ASPECT, _design(seed, rng, _WORDS["volumes"]), rng
+        int(art.SIZE_PX * 1.5), bottles.LABEL_ASPECT, _design(seed, rng, _WORDS["volumes"]), rng
     )
     return art.resize_texture(image, art.SIZE_PX, art.SIZE_PX // 2)
 
@@ -89,6 +89,82 @@ def book_cover(seed: int) -> TextureData:
         "back": _back_cover(w, h, design, rng),
     }
     return art.atlas(faces, books.COVER_ATLAS, design.ground)
+
+
+def front_label(seed: int) -> TextureData:
+    """A label on the front of a bottle: of wine or spirits, cosmetics, or as on packages."""
+    rng = variant_rng("front_label", seed)
+    design = _design(seed, rng, _WORDS["volumes"])
+    make = in_turn((_estate_label, _plain_label, _front, _badge_label), seed // 2)
+    return art.resize_texture(make(512, 560, design, rng), art.SIZE_PX, art.SIZE_PX)
+
+
+def _estate_label(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
+    """Paper with a frame, a picture, a name in serifs, region, year and volume."""
+    paper = rng.choose(((245, 240, 226), (250, 248, 242), (232, 224, 204), (28, 26, 26)))
+    dark = art.brightness(paper) < 90
+    ink = (226, 206, 150) if dark else rng.choose(((40, 30, 26), (110, 24, 34), (30, 52, 40)))
+    image = art.canvas(w, h, paper)
+    draw = art.pen(image)
+    for inset in rng.choose(((14,), (10, 18), ())):
+        draw.rectangle([inset, inset, w - inset, h - inset], outline=ink, width=3)
+    top = rng.chance(0.5)
+    picture = (0.28, 0.1, 0.72, 0.42) if top else (0.2, 0.36, 0.8, 0.66)
+    _picture(image, picture, replace(design, picture=rng.choose((2, 3, 3, 4)), accent=ink), rng)
+    face = rng.choose(("serif", "script", "serif"))
+    name = design.brand.title() if face == "script" else design.brand.upper()
+    brand = (0.1, 0.45, 0.9, 0.6) if top else (0.1, 0.12, 0.9, 0.3)
+    art.lettering(image, brand, name, ink, face, 4)
+    region = rng.choose(_WORDS["regions"])
+    art.lettering(image, (0.15, 0.68, 0.85, 0.75), region, ink, "serif", 2)
+    art.lettering(
+        image, (0.35, 0.78, 0.65, 0.86), str(int(rng.between(1998, 2026))), ink, "serif", 3
+    )
+    art.text(image, (0.12, 0.89, 0.42, 0.935), design.size, ink, 0)
+    art.text(image, (0.58, 0.89, 0.88, 0.935), f"{rng.between(4.0, 15.0):.1f} % vol", ink, 0)
+    return image
+
+
+def _plain_label(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
+    """As on cosmetics and medicine: a name, a line, what it is, small print."""
+    paper = rng.choose(((250, 250, 248), (245, 243, 238), design.ground))
+    ink = max(
+        (design.ink, (40, 42, 46)), key=lambda c: abs(art.brightness(c) - art.brightness(paper))
+    )
+    image = art.canvas(w, h, paper)
+    if rng.chance(0.6):
+        y = int(rng.choose((0.0, 0.34, 0.8)) * h)
+        art.pen(image).rectangle([0, y, w, y + int(0.09 * h)], fill=design.second)
+    art.lettering(image, (0.1, 0.14, 0.9, 0.3), design.brand, ink, rng.choose(("wide", "serif")), 5)
+    art.text(image, (0.15, 0.46, 0.85, 0.53), rng.choose(_WORDS["products"]), ink, 1)
+    art.text(image, (0.2, 0.55, 0.8, 0.6), design.note, ink, 0)
+    art.lines(image, (0.14, 0.63, 0.86, 0.79), ink, paper, _small_print(rng))
+    art.text(image, (0.35, 0.91, 0.65, 0.96), design.size, ink, 0)
+    return image
+
+
+def _badge_label(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
+    """As on beer: an oval badge with the name across."""
+    image = art.canvas(w, h, design.ground)
+    draw = art.pen(image)
+    draw.ellipse([0.06 * w, 0.08 * h, 0.94 * w, 0.92 * h], fill=design.second)
+    draw.ellipse([0.1 * w, 0.115 * h, 0.9 * w, 0.885 * h], outline=design.accent, width=8)
+    _picture(image, (0.36, 0.16, 0.64, 0.4), design, rng)
+    draw.rectangle([0, 0.43 * h, w, 0.63 * h], fill=design.accent)
+    ink = _readable(design, design.accent)
+    face = rng.choose(("serif", "wide", "script"))
+    art.lettering(image, (0.06, 0.44, 0.94, 0.62), design.brand, ink, face, 6)
+    under = _readable(design, design.second)
+    art.text(image, (0.24, 0.67, 0.76, 0.73), rng.choose(_WORDS["beers"]), under, 1)
+    art.text(image, (0.38, 0.77, 0.62, 0.82), design.size, under, 0)
+    return image
+
+
+def _small_print(rng: VariantRng) -> list[str]:
+    """Words of a list of ingredients and of advice."""
+    listed = ", ".join(rng.shuffled(_WORDS["ingredients"])[:14])
+    advice = ". ".join(rng.shuffled(_WORDS["advice"])[:3])
+    return f"INGREDIENTS: {listed}. {advice}.".split()
 
 
 def _design(seed: int, rng: VariantRng, sizes: Sequence[str] = _WORDS["weights"]) -> _Design:
@@ -252,7 +328,7 @@ def _info(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     image = art.canvas(w, h, paper)
     ink = (25, 25, 28) if sum(paper) > 330 else (240, 240, 240)
     art.text(image, (0.08, 0.03, 0.92, 0.11), design.brand, ink, 1)
-    art.lines(image, (0.08, 0.14, 0.92, 0.32), ink, paper, rng)
+    art.lines(image, (0.08, 0.13, 0.92, 0.34), ink, paper, _small_print(rng))
     art.table(image, (0.08, 0.36, 0.92, 0.66), ink, rng)
     art.barcode(image, (0.1, 0.72, 0.9, 0.95), rng)
     return image
@@ -265,7 +341,7 @@ def _side(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     turned = art.canvas(int(0.62 * h), max(8, int(0.7 * w)), design.second)
     art.text(turned, (0.0, 0.1, 1.0, 0.9), design.brand, ink, design.bold)
     image.paste(turned.rotate(90, expand=True), (int(0.15 * w), int(0.04 * h)))
-    art.lines(image, (0.1, 0.72, 0.9, 0.95), ink, design.second, rng)
+    art.lines(image, (0.1, 0.7, 0.9, 0.97), ink, design.second, _small_print(rng))
     return image
 
 
@@ -301,7 +377,8 @@ def _spine(w: int, h: int, design: _Design) -> Image:
 def _back_cover(w: int, h: int, design: _Design, rng: VariantRng) -> Image:
     image = art.canvas(w, h, design.ground)
     art.text(image, (0.1, 0.08, 0.9, 0.15), f"“{design.note}”", design.ink, 1)
-    art.lines(image, (0.1, 0.2, 0.9, 0.62), design.ink, design.ground, rng)
+    words = " ".join(rng.shuffled(_WORDS["blurbs"])).split()
+    art.lines(image, (0.1, 0.2, 0.9, 0.62), design.ink, design.ground, words)
     art.barcode(image, (0.52, 0.8, 0.92, 0.94), rng)
     return image
 
