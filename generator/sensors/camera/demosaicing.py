@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from gen_data.generator.core.asset_types import Float32
-from gen_data.generator.sensors.camera.image_sensor import Pattern, filter_at
+from gen_data.generator.sensors.camera.image_sensor import FILTERS, Pattern
 
 _MEDIAN_PX = 5
 """Width of the median filter: false colours of a line repeat at every second pixel."""
@@ -25,9 +25,8 @@ _BETWEEN = np.array(((0.25, 0.5, 0.25), (0.5, 1.0, 0.5), (0.25, 0.5, 0.25)), np.
 
 def demosaic_along_edges(raw: Float32, pattern: Pattern) -> Float32:
     """Linear RGB, float32 [h, w, 3] from 0, of the values behind a Bayer pattern, [h, w]."""
-    sites = [divmod(k, 2) for k in range(4)]
-    colors = filter_at(pattern, 2, 2).ravel().tolist()
-    red_blue = [(color, site) for color, site in zip(colors, sites, strict=True) if color != 1]
+    filters = enumerate(FILTERS[pattern])
+    red_blue = [(color, divmod(k, 2)) for k, color in filters if color != 1]
     green = raw.copy()
     padded = cv2.copyMakeBorder(raw, *(_REACH_PX,) * 4, cv2.BORDER_REFLECT_101)
     for _, site in red_blue:

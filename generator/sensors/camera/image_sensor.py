@@ -21,7 +21,8 @@ from gen_data.generator.core.streams import Rng, Streams
 
 Pattern = Literal["rggb", "bggr", "grbg", "gbrg", "mono"]
 
-_FILTERS = {"rggb": (0, 1, 1, 2), "bggr": (2, 1, 1, 0), "grbg": (1, 0, 2, 1), "gbrg": (1, 2, 0, 1)}
+FILTERS = {"rggb": (0, 1, 1, 2), "bggr": (2, 1, 1, 0), "grbg": (1, 0, 2, 1), "gbrg": (1, 2, 0, 1)}
+"""Channels of the filters of two by two pixels, row by row."""
 
 _NORMAL_FROM_E = 64.0
 
@@ -66,7 +67,7 @@ def mosaic(image: Float32, pattern: Pattern) -> Float32:
     if pattern == "mono":
         return np.asarray(luminance(image), np.float32)
     raw = np.empty_like(image[..., 0])
-    for k, channel in enumerate(_FILTERS[pattern]):
+    for k, channel in enumerate(FILTERS[pattern]):
         raw[k // 2 :: 2, k % 2 :: 2] = image[k // 2 :: 2, k % 2 :: 2, channel]
     return raw
 
@@ -74,7 +75,7 @@ def mosaic(image: Float32, pattern: Pattern) -> Float32:
 def scale_filters(raw: Float32, pattern: Pattern, gains: Float32) -> Float32:
     """Raw values [h, w] times the gain, of [3], of their pixels' filters; green's for ``mono``."""
     scaled = np.empty_like(raw)
-    for k, channel in enumerate(_FILTERS.get(pattern, (1, 1, 1, 1))):
+    for k, channel in enumerate(FILTERS.get(pattern, (1, 1, 1, 1))):
         phase = np.s_[k // 2 :: 2, k % 2 :: 2]
         np.multiply(raw[phase], gains[channel], out=scaled[phase])
     return scaled
