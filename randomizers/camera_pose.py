@@ -29,6 +29,8 @@ from gen_data.randomizers.framing import (
 from gen_data.randomizers.free_space import is_in_the_open
 
 TRIES = 48
+_MEASURED_MAX = 160
+"""Largest number of a group's meshes that are measured before a run."""
 _LENS_CHANGE = 2.0
 """Largest factor by which other randomizers are assumed to change a camera's focal length."""
 
@@ -208,10 +210,13 @@ class CameraPose(RandomizerBase):
             )
 
     def _sizes_m(self, scene: Scene, assets: AssetIndex) -> Iterator[Vec3]:
-        """Sizes of all that may be aimed at, along its axes [m]."""
+        """Sizes of things that may be aimed at, along their axes [m]."""
         groups = {group.name: group.assets for group in scene.groups}
         for name in self.aim.outcomes():
-            for asset in groups.get(name, ()):
+            listed = groups.get(name, ())
+            # Any of hundreds of meshes may have to be made: an even selection has every family.
+            step = max(1.0, len(listed) / _MEASURED_MAX)
+            for asset in (listed[int(i * step)] for i in range(min(len(listed), _MEASURED_MAX))):
                 yield _extent_m(np.array(assets.bounds_m(asset)))
             for found in () if name in groups else candidates(scene, name):
                 yield _extent_m(measure(found, assets).points_m)
