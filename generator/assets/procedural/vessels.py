@@ -245,11 +245,14 @@ def _simplify(profile: Sequence[Point2], count: int) -> list[Point2]:
     while len(kept) < min(count, len(profile)):
         worst, at = 0.0, -1
         for i, j in itertools.pairwise(kept):
+            if j == i + 1:
+                continue
             along = unit((p[j] - p[i])[None])[0]
-            away = p[i : j + 1] - p[i]
+            # Without the ends, which rounding may place beside the line between them.
+            away = p[i + 1 : j] - p[i]
             off = np.abs(away[:, 1] * along[0] - away[:, 0] * along[1])
             if float(off.max()) > worst:
-                worst, at = float(off.max()), i + int(off.argmax())
+                worst, at = float(off.max()), i + 1 + int(off.argmax())
         if at < 0:
             break
         kept = sorted({*kept, at})
