@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TypedDict, TypeVar, cast
 
@@ -31,6 +32,8 @@ from gen_data.generator.config.paths import PLAN, find_path
 from gen_data.generator.config.problems import Problems
 from gen_data.generator.config.shared_values import (
     draw_shared,
+    is_reference,
+    names_in,
     probe_values,
     refers,
     resolve_shared,
@@ -238,7 +241,7 @@ class Config:
         if not shared:
             return self.probes[0]
         problems = Problems()
-        config = _scene_config(self.document, dict(shared), problems)
+        config = _scene_config(self.document, dict(shared), problems, _Known())
         problems.raise_if_any()
         return config
 
@@ -332,7 +335,7 @@ def _make_config(document: Node, name: str, changes: Changes) -> Config:
             fact = f"cannot depend on shared values; expected them in {', '.join(VARYING)} only"
             problems.add(node.position, key, fact)
     render = _plugin(sections["render"], "render", RENDERERS, problems, DEFAULT_RENDERER)
-    exporters = _plugins(sections["exporters"], "exporters", EXPORTERS, problems)
+    exporters = _plugins(sections["exporters"], "exporters", EXPORTERS, problems, _Known())
     annotations = _annotations(sections["annotations"], problems)
     if not sections["sensors"].content and not len(problems):
         problems.add(document.position, "sensors", "at least one sensor is needed")
@@ -376,9 +379,10 @@ def _probe(document: Node, seed: int, problems: Problems) -> tuple[SceneConfig, 
     section = document.entries["shared"]
     every = list(probe_values(section, seed)) if section.content else [{}]
     configs: list[SceneConfig] = []
+    known = _Known()
     for shared in every:
         found = Problems()
-        config = _scene_config(document, shared, found)
+        config = _scene_config(document, shared, found, known)
         if len(found):
             problems.extend(found)
             break
@@ -387,19 +391,65 @@ def _probe(document: Node, seed: int, problems: Problems) -> tuple[SceneConfig, 
     return tuple(configs)
 
 
+@dataclass(frozen=True)
+class _Known:
+    """Parts of scenes of one document that were made before: most are the same in most scenes.
+
+    Attributes:
+        names: Names of the shared values that an item depends on, by its ``id()``.
+        items: Resolved items, by the ``id()`` of the document's own and the values of these names.
+        plugins: Plug-ins and their resolved items, by the list and the item's ``id()``.
+    """
+
+    names: dict[int, list[str]] = field(default_factory=dict)
+    items: dict[tuple[int, str], Node] = field(default_factory=dict)
+    plugins: dict[tuple[str, int], tuple[Node, Any]] = field(default_factory=dict)
+
+    def resolve(self, listed: Node, shared: Mapping[str, SharedValue], key: str) -> Node:
+        """Replace the shared values in a list of the document.
+
+        Raises:
+            ConfigError: a name is unknown, or a ``switch`` has no entry for its value.
+        """
+        if is_reference(listed):
+            return resolve_shared(listed, shared, key)
+
+        def resolve_item(number: str | int, item: Node) -> Node:
+            if id(item) not in self.names:
+                self.names[id(item)] = sorted(names_in(item))
+            # As text: 1, 1.0 and true are equal, but not the same value.
+            place = id(item), repr([shared.get(name) for name in self.names[id(item)]])
+            if place not in self.items:
+                self.items[place] = resolve_shared(item, shared, key, number)
+            return self.items[place]
+
+        return listed.with_children(resolve_item)
+
+    def plugin(self, key: str, node: Node, make: Callable[[], P | None]) -> P | None:
+        """The plug-in of an item; None if it has errors."""
+        source, plugin = self.plugins.get((key, id(node)), (None, None))
+        if source is not node:
+            plugin = make()
+            if plugin is not None:
+                self.plugins[key, id(node)] = node, plugin
+        return plugin
+
+
 def _scene_config(
-    document: Node, shared: Mapping[str, SharedValue], problems: Problems
+    document: Node, shared: Mapping[str, SharedValue], problems: Problems, known: _Known
 ) -> SceneConfig:
-    lists = {key: resolve_shared(document.entries[key], shared, key) for key in VARYING}
+    lists = {key: known.resolve(document.entries[key], shared, key) for key in VARYING}
     return SceneConfig(
         tuple(sorted(shared.items())),
-        _plugins(lists["elements"], "elements", ELEMENTS, problems),
-        _plugins(lists["randomizers"], "randomizers", RANDOMIZERS, problems),
-        _plugins(lists["sensors"], "sensors", SENSORS, problems),
+        _plugins(lists["elements"], "elements", ELEMENTS, problems, known),
+        _plugins(lists["randomizers"], "randomizers", RANDOMIZERS, problems, known),
+        _plugins(lists["sensors"], "sensors", SENSORS, problems, known),
     )
 
 
-def _plugins(listed: Node, key: str, table: PluginTable[P], problems: Problems) -> tuple[P, ...]:
+def _plugins(
+    listed: Node, key: str, table: PluginTable[P], problems: Problems, known: _Known
+) -> tuple[P, ...]:
     """Make the plug-in of each item without errors; names, if they have one, must be unique."""
     if not isinstance(listed.content, tuple):
         problems.add(listed.position, key, f"expected a list of {table.kind}s")
@@ -407,7 +457,8 @@ def _plugins(listed: Node, key: str, table: PluginTable[P], problems: Problems) 
     names: set[str] = set()
     tag = "name" if key in VARYING else "type"
     for number, node in enumerate(listed.items):
-        plugin = _plugin(node, f"{key}[{number}]", table, problems)
+        make = partial(_plugin, node, f"{key}[{number}]", table, problems)
+        plugin = known.plugin(key, node, make)
         name = getattr(plugin, tag, None)
         if name is not None and name in names:
             fact = f"the name '{name}' is taken; expected a name of its own"

@@ -31,6 +31,7 @@ from gen_data.generator.config.distributions.base import Kind, Malformed, read_d
 from gen_data.generator.config.problems import FieldPath, Position, refuse
 from gen_data.generator.config.yaml_scalars import abbreviate, quote_value, resolve_scalar
 from gen_data.generator.config.yaml_tree import Node, is_distribution
+from gen_data.generator.core.bounded_cache import ObjectCache
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.scene import SharedValue
 from gen_data.generator.core.streams import Streams
@@ -41,6 +42,9 @@ DEFAULT = "default"
 _PROBED_SCENES = 8
 
 Shared = Mapping[str, SharedValue]
+
+_NEEDS: ObjectCache[dict[str, set[str]]] = ObjectCache(4)
+"""Names that each entry depends on, of the latest sections: all are drawn for every scene."""
 
 
 def refers(node: Node) -> bool:
@@ -118,10 +122,11 @@ def _evaluate(section: Node, streams: Streams, fixed: Shared) -> dict[str, Share
     if not isinstance(section.content, Mapping):
         fact = "expected a mapping of names to values or distributions"
         refuse(section.position, "shared", fact)
+    needs = _NEEDS.get(section, lambda: {n: names_in(node) for n, node in section.entries.items()})
     shared: dict[str, SharedValue] = {}
     waiting = dict(section.content)
     while waiting:
-        ready = [n for n, node in waiting.items() if not _names_in(node) & waiting.keys()]
+        ready = [name for name in waiting if not needs[name] & waiting.keys()]
         if not ready:
             name, node = next(iter(waiting.items()))
             fact = f"depends on itself: {', '.join(sorted(waiting))} need one another"
@@ -146,9 +151,9 @@ def _read_entry(name: str, node: Node, shared: Shared) -> Distribution[Any]:
         refuse(entry.position, f"shared.{name}", error.fact)
 
 
-def _names_in(node: Node) -> set[str]:
+def names_in(node: Node) -> set[str]:
     """Names of the shared values that a node depends on."""
-    names = {name for child in node.children.values() for name in _names_in(child)}
+    names = {name for child in node.children.values() for name in names_in(child)}
     if SWITCH in node.entries:
         names.add(str(node.entries[SWITCH].content))
     elif is_reference(node):

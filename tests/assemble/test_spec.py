@@ -117,6 +117,17 @@ def test_resolved_document_makes_the_same_spec_again(tmp_path: Path) -> None:
     assert again == first
 
 
+@pytest.mark.parametrize("name", ["parking", "tabletop"])
+def test_probes_are_the_configurations_that_their_shared_values_give_alone(name: str) -> None:
+    """Plug-ins made for an earlier probe are used again only where they are the same."""
+    config = load_config(name)
+
+    assert len(config.probes) > 1
+    assert len({repr(probe) for probe in config.probes}) == len(config.probes)
+    for probe in config.probes:
+        assert repr(config.scene_config(probe.shared)) == repr(probe)
+
+
 def test_spec_crosses_process_borders() -> None:
     """A worker process gets the Config itself, not a path that may change meanwhile."""
     spec = load_config("tabletop.yaml")
