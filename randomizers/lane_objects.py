@@ -226,8 +226,10 @@ class LaneObjects(GroupRandomizer):
         """Draw an asset and its scale; also return its scaled bounds."""
         asset = draw_asset(weights, rng)
         scale = round(self.scale.draw(rng), 4)
-        bounds_m = _scale_bounds(assets.bounds_m(asset), scale)
-        return asset, scale, bounds_m, _scale_bounds(standing_bounds_m(assets, asset), scale)
+        bounds_m, standing_m = assets.bounds_m(asset), standing_bounds_m(assets, asset)
+        scaled_m = _scale_bounds(bounds_m, scale)
+        solid_m = scaled_m if standing_m == bounds_m else _scale_bounds(standing_m, scale)
+        return asset, scale, scaled_m, solid_m
 
 
 def _scale_bounds(bounds_m: Bounds, scale: float) -> Bounds:

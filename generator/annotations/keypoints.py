@@ -46,7 +46,7 @@ class Keypoints(Strict):
         T_camera_world = reading.camera.T_world_camera.inverse()
         T_camera_instance = T_camera_world @ instance.T_world_instance
         places_m = np.array([point.position_m for point in instance.keypoints])
-        p_camera = np.stack([T_camera_instance.apply(place_m) for place_m in places_m])
+        p_camera = T_camera_instance.apply(places_m)
         p_seen, image_px = p_camera, reading.camera.intrinsics.project(p_camera)
         if reading.camera.shutter.rolls:
             p_seen, image_px = project_rolling_shutter(scene, reading.camera, places_m, instance)

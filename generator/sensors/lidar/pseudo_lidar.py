@@ -86,7 +86,8 @@ class PseudoLidar(Mounted):
         # One ray per selected pixel costs far less than an image of its own. All rays leave at
         # one instant, whatever the camera's shutter, as a cloud has a single pose.
         rays = intrinsics.pixel_rays().reshape(-1, 3)
-        in_field = np.flatnonzero(np.isfinite(rays).all(axis=1))
+        x, y, z = rays.T
+        in_field = np.flatnonzero(np.isfinite(x) & np.isfinite(y) & np.isfinite(z))
         beams = LidarRays(rays[in_field].astype(np.float32), 0.0, 1, self.range_max_m)
         eye = Lidar(self.name, self.camera, T_world_lidar=camera.T_world_camera)
         hits = renderer.scan(scene, eye, beams)

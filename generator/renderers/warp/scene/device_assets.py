@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -21,9 +21,18 @@ from gen_data.generator.renderers.warp.scene import bvh
 from gen_data.generator.renderers.warp.scene.bvh import face_boxes, mesh_tree
 from gen_data.generator.renderers.warp.scene.kernels import bvh_build
 from gen_data.generator.renderers.warp.scene.kernels.records import Geometry, TextureRecord
-from gen_data.generator.renderers.warp.scene.struct_dtypes import to_record
+from gen_data.generator.renderers.warp.scene.struct_dtypes import struct_dtype
 
 Arrays = dict[str, NDArray[Any]]
+
+_HOST_DTYPES: dict[Any, type[np.generic]] = {
+    wp.vec3: np.float32,
+    wp.vec2: np.float32,
+    wp.float32: np.float32,
+    wp.int32: np.int32,
+    wp.uint32: np.uint32,
+    wp.uint8: np.uint8,
+}
 
 # Cells along the longest side of the grid that groups faces into boxes.
 _CELLS = 6
@@ -83,36 +92,74 @@ def upload_mesh(data: MeshData, prepared: Arrays, device: wp.Device) -> DeviceMe
         prepared: Arrays of ``prepare_mesh``; on the CPU, with a tree.
         device: On the CPU, arrays are not copied: they must not change.
     """
-    vertices, normals = (_upload(v, wp.vec3, device) for v in (data.vertices_m, data.normals))
-    uvs = _upload(data.uvs, wp.vec2, device)
-    faces = _upload(data.faces.reshape(-1), wp.int32, device)
-    slots = _upload(data.face_slots, wp.int32, device)
-    lows, highs = (_upload(prepared[k], wp.vec3, device) for k in ("box_lows_m", "box_highs_m"))
-    low, high = (np.asarray(bound, dtype=np.float64) for bound in data.bounds_m())
-    record = Geometry()
+    low, high = data.bounds_m()
+    arrays = {
+        "vertices_m": _upload(data.vertices_m, wp.vec3, device),
+        "normals": _upload(data.normals, wp.vec3, device),
+        "uvs": _upload(data.uvs, wp.vec2, device),
+        "faces": _upload(data.faces.reshape(-1), wp.int32, device),
+        "face_slots": _upload(data.face_slots, wp.int32, device),
+        "box_lows_m": _upload(prepared["box_lows_m"], wp.vec3, device),
+        "box_highs_m": _upload(prepared["box_highs_m"], wp.vec3, device),
+    }
     if device.is_cuda:
-        hierarchy = wp.Mesh(points=vertices, indices=faces)
-        record.mesh = hierarchy.id
+        arrays["tree"] = _upload(np.zeros(0, np.float32), wp.float32, device)
+        points, indices = arrays["vertices_m"].held, arrays["faces"].held
+        hierarchy = wp.Mesh(points=points, indices=indices)
+        number = hierarchy.id
         # Warp's hierarchy has two 16-byte nodes per triangle, built from 24-byte boxes.
         hierarchy_nbytes = (64 + 24) * len(data.faces)
     else:
-        hierarchy = record.tree = _upload(prepared["tree"], wp.float32, device)
-        hierarchy_nbytes = prepared["tree"].nbytes
-    record.vertices_m, record.normals, record.uvs = vertices, normals, uvs
-    record.faces, record.face_slots = faces, slots
-    record.box_lows_m, record.box_highs_m = lows, highs
-    record.low_m, record.high_m = wp.vec3(*low), wp.vec3(*high)
-    record.convex = int(prepared["convex"][0])
+        arrays["tree"] = _upload(prepared["tree"], wp.float32, device)
+        hierarchy, number, hierarchy_nbytes = None, 0, prepared["tree"].nbytes
+    fields: dict[str, object] = {name: array.field for name, array in arrays.items()}
+    fields |= {"mesh": number, "low_m": low, "high_m": high, "convex": prepared["convex"][0]}
     nbytes = 32 * len(data.vertices_m) + 16 * len(data.faces) + hierarchy_nbytes
-    keep = (vertices, normals, uvs, faces, slots, lows, highs, hierarchy)
     return DeviceMesh(
-        to_record(record, Geometry), keep, low, high, len(data.vertices_m), data.materials, nbytes
+        _make_record(Geometry, fields),
+        (hierarchy, *(array.held for array in arrays.values())),
+        np.array(low),
+        np.array(high),
+        len(data.vertices_m),
+        data.materials,
+        nbytes,
     )
 
 
-def _upload(values: NDArray[Any], dtype: Any, device: wp.Device) -> wp.array:
-    """An array on the device; on the CPU, the array itself, which stays alive as long."""
-    return wp.array(values, dtype=dtype, device=device, copy=False)
+class _Uploaded(NamedTuple):
+    """An array on a device.
+
+    Attributes:
+        held: The array, which has to stay alive.
+        field: Value of the field of a record that points to it.
+    """
+
+    held: Any
+    field: tuple[object, ...]
+
+
+def _upload(values: NDArray[Any], dtype: Any, device: wp.Device) -> _Uploaded:
+    """Upload an array; on the CPU, records point to the array itself.
+
+    A scene uploads a thousand arrays: wrapping each in an array of Warp would take longer than
+    reading them.
+    """
+    values = np.ascontiguousarray(values, _HOST_DTYPES[dtype])
+    if device.is_cpu:
+        held, address = values, values.__array_interface__["data"][0]
+    else:
+        held = wp.array(values, dtype=dtype, device=device)
+        address = held.ptr or 0
+    # Address, address of a gradient, shape, strides [bytes], dimensions, flags.
+    field = (address, 0, (len(values), 0, 0, 0), (values.strides[0], 0, 0, 0), 1, 0)
+    return _Uploaded(held, field)
+
+
+def _make_record(struct: Any, fields: Mapping[str, object]) -> NDArray[np.void]:
+    """A record [1] of a Warp struct from the values of all its fields."""
+    dtype = struct_dtype(struct)
+    assert dtype.names is not None
+    return np.array([tuple(fields[name] for name in dtype.names)], dtype)
 
 
 def boxes_around(
@@ -183,6 +230,7 @@ class DeviceTexture:
 
 
 _IMAGES = ("texels", "bumps", "shares", "glow")
+_OPTIONAL = ("bumps", "shares", "glow", "cover")
 
 
 def prepare_texture(data: TextureData) -> Arrays:
@@ -217,24 +265,24 @@ def prepare_texture(data: TextureData) -> Arrays:
 
 def upload_texture(prepared: Arrays, device: wp.Device) -> DeviceTexture:
     """Upload the arrays of ``prepare_texture``; on the CPU, they are not copied."""
-    record = TextureRecord()
-    record.height, record.width, record.levels = (int(value) for value in prepared["size"])
-    record.has_bumps, record.has_shares, record.has_glow, record.has_cover = (
-        int(name in prepared) for name in ("bumps", "shares", "glow", "cover")
-    )
-    images = [prepared.get(name, _NO_TEXELS) for name in _IMAGES]
+    images = {name: prepared.get(name, _NO_TEXELS) for name in _IMAGES}
     cover = prepared.get("cover", _NO_HOLE)
-    on_device = [_upload(values, wp.uint32, device) for values in images]
-    record.texels, record.bumps, record.shares, record.glow = on_device
-    record.cover = _upload(cover, wp.uint8, device)
-    record.offsets = _upload(prepared["offsets"], wp.int32, device)
+    arrays = {name: _upload(values, wp.uint32, device) for name, values in images.items()}
+    arrays["cover"] = _upload(cover, wp.uint8, device)
+    arrays["offsets"] = _upload(prepared["offsets"], wp.int32, device)
+    fields: dict[str, object] = {name: array.field for name, array in arrays.items()}
+    fields |= dict(zip(("height", "width", "levels"), prepared["size"], strict=True))
+    fields |= {f"has_{name}": int(name in prepared) for name in _OPTIONAL}
+    texels = arrays["texels"].held
+    if device.is_cpu:
+        texels = wp.array(texels, dtype=wp.uint32, device=device, copy=False)
     return DeviceTexture(
-        to_record(record, TextureRecord),
-        (*on_device, record.cover, record.offsets),
-        on_device[0],
-        sum(values.nbytes for values in images) + cover.nbytes,
-        layered=bool(record.has_shares or record.has_glow),
-        has_cutouts=bool(record.has_cover),
+        _make_record(TextureRecord, fields),
+        tuple(array.held for array in arrays.values()),
+        texels,
+        sum(values.nbytes for values in images.values()) + cover.nbytes,
+        layered="shares" in prepared or "glow" in prepared,
+        has_cutouts="cover" in prepared,
     )
 
 
