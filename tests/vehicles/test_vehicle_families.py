@@ -32,13 +32,14 @@ LIMITS = {
     "delivery_van": ((4.1, 6.6), (1.78, 2.1), (1.78, 2.75), 8900),
     "food_truck": ((5.6, 6.5), (1.95, 2.1), (2.5, 2.75), 8900),
     "fire_engine": ((7.1, 8.6), (2.2, 2.6), (2.7, 3.5), 8190),
+    "tractor": ((4.0, 5.0), (2.3, 2.55), (2.7, 3.1), 6000),
     "bus": ((11.0, 12.4), (2.5, 2.6), (2.95, 3.25), 8190),
     "motorcycle": ((1.7, 2.2), (0.2, 0.6), (1.0, 1.8), 7150),
     "bicycle": ((1.6, 1.9), (0.05, 0.3), (0.9, 1.2), 4000),
     "cyclist": ((1.6, 1.9), (0.05, 0.3), (1.6, 1.95), 4000),
 }
 FROM_CARS = ("car", "van", "taxi", "police_car", "ambulance", "delivery_van", "food_truck")
-FOUR_WHEELED = (*FROM_CARS, "truck", "fire_engine", "bus")
+FOUR_WHEELED = (*FROM_CARS, "truck", "fire_engine", "tractor", "bus")
 LAMPS = {"headlight", "taillight"}
 ROLES = {
     *LAMPS, "paint", "glass", "tyre", "rim", "brakelight", "indicator_left", "indicator_right",
@@ -94,7 +95,7 @@ def test_every_variant_is_as_big_as_real_ones_and_within_its_budget(name: str) -
         body = side[np.abs(painted[..., 0]) < 0.1 * (high[0] - low[0])]
         assert lengths[0] <= high[0] - low[0] <= lengths[1], seed
         assert heights[0] <= high[2] <= heights[1], seed
-        if name in FOUR_WHEELED and name not in ("truck", "fire_engine"):
+        if name in FOUR_WHEELED and name not in ("truck", "fire_engine", "tractor"):
             assert widths[0] <= 2.0 * np.quantile(body, 0.97) <= widths[1], seed
         assert 1000 <= len(mesh.faces) <= triangles, seed
 
@@ -382,7 +383,13 @@ def test_text_on_the_sides_reads_from_left_to_right() -> None:
         assert u.max() <= 1.001
 
 
-MIRROR_M = {**dict.fromkeys(FROM_CARS, 0.25), "truck": 0.2, "fire_engine": 0.2, "bus": 0.3}
+MIRROR_M = {
+    **dict.fromkeys(FROM_CARS, 0.25),
+    "truck": 0.2,
+    "fire_engine": 0.2,
+    "bus": 0.3,
+    "tractor": 0.3,
+}
 """Width of both mirrors beside the body: at least this [m]."""
 
 

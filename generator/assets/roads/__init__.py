@@ -65,6 +65,8 @@ FAMILIES: Mapping[str, Family] = {
         ),
         _surface("parking_area:parking_area", **_PARKING, **_LOOKS),
         _surface("fields:fields", **_FIELDS),
+        _surface("paved_area:paved_area", size_m=(30.0, 20.0), cover="paving", seed=0),
+        _surface("level_crossing:level_crossing", **_SHAPE, **_LOOKS, station_m=60.0),
         _surface("ground:ground", seed=0, size_m=(800.0, 800.0), cover="grass", relief_m=0.04),
     )
 }
