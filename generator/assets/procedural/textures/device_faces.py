@@ -45,7 +45,7 @@ def phone_screen(seed: int, kind: str = "lit") -> TextureData:
     make = rng.choose((_home, _home, _chat, _lock, _map, _page))
     image = make(rng).rotate(-90, expand=True)
     made = art.resize_texture(image, 512, 512)
-    dark: TextureData = TextureData((made.albedo // 12).astype(np.uint8), emission=made.albedo)
+    dark: TextureData = TextureData((made.albedo // 12 + 9).astype(np.uint8), emission=made.albedo)
     return dark
 
 
