@@ -88,7 +88,8 @@ def _advert(rng: VariantRng) -> Image:
         else:
             draw.polygon(corners, fill=fill)
     art.text(image, (0.06, 0.06, 0.94, 0.27), rng.choose(_WORDS["adverts"]), ink, 6)
-    art.lines(image, (0.08, 0.86, 0.7, 0.95), ink, ground, rng)
+    words = [rng.choose(_WORDS["adverts"]).capitalize() for _ in range(12)]
+    art.lines(image, (0.08, 0.86, 0.7, 0.95), ink, ground, words)
     return image
 
 
