@@ -128,6 +128,7 @@ def test_every_new_word_is_one_of_its_plugin_and_no_old_one_is() -> None:
 
 def test_the_command_line_shows_a_warning_as_one_plain_line(tmp_path: Path) -> None:
     """On standard error, before anything else; no source line of Python's."""
+    inherited = len(load_config("street.yaml").resolved["randomizers"])
     path = tmp_path / "mine.yaml"
     path.write_text("extends: street.yaml\nrandomizers: [{type: along, name: x, sped: 1}]\n")
 
@@ -144,7 +145,8 @@ def test_the_command_line_shows_a_warning_as_one_plain_line(tmp_path: Path) -> N
     assert lines[0].startswith(
         f"gen-data: warning: {path}:2:22: randomizers[0].type: 'along' is called 'lane_objects'"
     )
-    assert lines[1].startswith(f"gen-data: {path}:2:38: randomizers[30].sped: unknown key")
+    where = f"{path}:2:38: randomizers[{inherited}].sped"
+    assert lines[1].startswith(f"gen-data: {where}: unknown key")
 
 
 def test_an_override_without_a_type_may_use_old_words(tmp_path: Path) -> None:

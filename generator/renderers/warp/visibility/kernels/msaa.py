@@ -166,6 +166,39 @@ def covers(ea: Side, eb: Side, ec: Side, a: wp.int64, b: wp.int64, c: wp.int64, 
 
 
 @wp.func
+def draw_sample(
+    world: World,
+    triangle: Triangle,
+    x: int,
+    y: int,
+    centre: float,
+    at: wp.vec2i,
+    k: int,
+    s: int,
+    nearness: wp.array2d[float],
+    hits: wp.array2d[wp.vec2i],
+):
+    """Write (body, face) into sample s of row k where a triangle that covers it is nearest.
+
+    Args:
+        x, y: The pixel.
+        centre: 1/z of the triangle's plane at the pixel's centre [1/m].
+        at: Position of the sample from the centre [1/256 px].
+    """
+    plane = triangle.plane
+    # 1 / 256: offsets are in snapped units.
+    right = 0.00390625 * float(at[0])
+    down = 0.00390625 * float(at[1])
+    w = wp.clamp(centre + (right * plane.dx + down * plane.dy), plane.low, plane.high)
+    if w > nearness[k, s]:
+        x_px = float(x) + 0.5 + right
+        y_px = float(y) + 0.5 + down
+        if is_solid_at(world, triangle.cutout, x_px, y_px, w):
+            nearness[k, s] = w
+            hits[k, s] = wp.vec2i(triangle.body, triangle.face)
+
+
+@wp.func
 def draw_triangle_samples(
     world: World,
     numbers: wp.array[int],
@@ -199,7 +232,6 @@ def draw_triangle_samples(
     pixel = wp.int64(256)
     # Largest change of 1/z from a pixel's centre to its corner.
     slack = 0.5 * (wp.abs(plane.dx) + wp.abs(plane.dy))
-    samples = offsets.shape[0]
     for y in range(y_first, y_last + 1):
         rows = wp.int64(y - y_first) * pixel
         a = ea.value + rows * ea.dy
@@ -233,20 +265,10 @@ def draw_triangle_samples(
                     if row + slack >= floors[i]:
                         k = numbers[i]
                         s = int(0)
-                        while s < samples:
+                        while s < offsets.shape[0]:
                             at = offsets[s]
                             if covers(ea, eb, ec, a, b, c, at):
-                                # 1 / 256: offsets are in snapped units.
-                                right = 0.00390625 * float(at[0])
-                                down = 0.00390625 * float(at[1])
-                                w = row + (right * plane.dx + down * plane.dy)
-                                w = wp.clamp(w, plane.low, plane.high)
-                                if w > nearness[k, s]:
-                                    x_px = float(x) + 0.5 + right
-                                    y_px = float(y) + 0.5 + down
-                                    if is_solid_at(world, triangle.cutout, x_px, y_px, w):
-                                        nearness[k, s] = w
-                                        hits[k, s] = wp.vec2i(triangle.body, triangle.face)
+                                draw_sample(world, triangle, x, y, row, at, k, s, nearness, hits)
                             s += 1
                 a += pixel * ea.dx
                 b += pixel * eb.dx
