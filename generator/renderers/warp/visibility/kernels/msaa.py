@@ -224,11 +224,10 @@ def draw_triangle_samples(
     y_first = wp.max(wp.min(p[1], wp.min(q[1], r[1])) >> 8, 0)
     y_last = wp.min(wp.max(p[1], wp.max(q[1], r[1])) >> 8, window.height - 1)
     # Edge values at the first pixel's centre.
-    x_middle = (x_first << 8) + 128
-    y_middle = (y_first << 8) + 128
-    ea = make_side(p, q, area, x_middle, y_middle)
-    eb = make_side(q, r, area, x_middle, y_middle)
-    ec = make_side(r, p, area, x_middle, y_middle)
+    x_px, y_px = (x_first << 8) + 128, (y_first << 8) + 128
+    ea = make_side(p, q, area, x_px, y_px)
+    eb = make_side(q, r, area, x_px, y_px)
+    ec = make_side(r, p, area, x_px, y_px)
     pixel = wp.int64(256)
     # Largest change of 1/z from a pixel's centre to its corner.
     slack = 0.5 * (wp.abs(plane.dx) + wp.abs(plane.dy))
