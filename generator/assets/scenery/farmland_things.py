@@ -128,8 +128,8 @@ def power_pylon(seed: int, span_m: float) -> Solid:
                 y = side * reach * place
                 parts.append(wire((0.0, y, z), (0.0, y, z - 1.6), 0.08, 2))
                 grips.append((0.0, y, z - 1.6))
-    cables = [*(_half_spans(grips, span_m) if span_m else ()),
-              *(_half_spans([(0.0, 0.0, high)], span_m) if span_m else ())]  # fmt: skip
+    grips.append((0.0, 0.0, high))
+    cables = list(_half_spans(grips, span_m)) if span_m else []
     materials = (
         GALVANISED,
         patterned_material("texture/concrete?seed=3", 2.0, 0.9),

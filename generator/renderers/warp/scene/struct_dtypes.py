@@ -18,11 +18,6 @@ def struct_dtype(struct: Any) -> np.dtype[Any]:
     return dtype
 
 
-def to_record(instance: Any, struct: Any) -> NDArray[np.void]:
-    """An instance of a Warp struct as an array [1]."""
-    return np.array([instance.numpy_value()], dtype=struct_dtype(struct))
-
-
 def stack_records(records: Sequence[NDArray[np.void]], struct: Any) -> NDArray[np.void]:
     """Concatenated records of one struct; a single record of zeros if there are none."""
     dtype = struct_dtype(struct)

@@ -77,8 +77,8 @@ def _rasterize_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.ui
     }
     outlines, size = _outline_records(scene, boxes, whole)
     mask = wp.zeros(size, dtype=wp.uint8, device=cache.device)
-    outlines_ = wp.array(outlines, dtype=Outline, device=cache.device)
-    inputs = [view, world.record, projected.p_camera, projected.xy, outlines_]
+    listed = wp.array(outlines, dtype=Outline, device=cache.device)
+    inputs = [view, world.record, projected.p_camera, projected.xy, listed]
     frame.launch(draw_silhouettes, len(outlines), inputs, [mask])
     drawn: NDArray[np.uint8] = mask.numpy()
     return boxes, drawn

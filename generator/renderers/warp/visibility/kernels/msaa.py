@@ -276,13 +276,7 @@ def draw_triangle_samples(
 
 
 @wp.func
-def floor_below(
-    floors: wp.array[float],
-    window: Window,
-    p: wp.vec2i,
-    q: wp.vec2i,
-    r: wp.vec2i,
-):
+def floor_below(floors: wp.array[float], window: Window, p: wp.vec2i, q: wp.vec2i, r: wp.vec2i):
     """Lowest floor within a triangle's box; 0 if the box is too large to scan."""
     x_first = wp.max(wp.min(p[0], wp.min(q[0], r[0])) >> 8, 0)
     x_last = wp.min(wp.max(p[0], wp.max(q[0], r[0])) >> 8, window.width - 1)
