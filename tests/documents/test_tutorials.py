@@ -46,7 +46,7 @@ SMALLER = {
         "--n 200": "--n 2", "[960, 540]": "[192, 108]",
     },
     "train_a_detector": {
-        "examples/detector.yaml": "examples/detector.yaml --set sensors.color.size_px=[96,72]",
+        "examples/detector.yaml": "examples/detector.yaml --set sensors.color.size_px=[160,120]",
         "--n 1000": "--n 8",
         "{train: 0.8, val: 0.2, test: 0}": "{train: 0.5, val: 0.5, test: 0, assign: round_robin}",
         "--n 800": "--n 8", "--n 200": "--n 4",
