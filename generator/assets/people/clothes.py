@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -53,9 +54,26 @@ def layers(person: Person) -> tuple[Layer, ...]:
     return (_skin(person), *_hair(person), *_bottoms(outfit), *_tops(outfit), _shoes(outfit))
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Region:
+    """The part of a template that a layer covers; the same for everyone.
+
+    Attributes:
+        used: Points of the template, int64 [n].
+        faces: Triangles of these points, [m, 3].
+        slots: Index of each triangle's zone, [m].
+        border: Those of these points that lie on a border, [k].
+    """
+
+    used: Indices
+    faces: Indices
+    slots: Indices
+    border: Indices
+
+
 def displace_layer(
     body: BodyTemplate, layer: Layer, points_m: Array, phases: Array
-) -> tuple[Indices, Array, Indices, Indices]:
+) -> tuple[Region, Array]:
     """One layer on a body that is not posed yet.
 
     Args:
@@ -65,29 +83,34 @@ def displace_layer(
         phases: Of the wrinkles [rad], shape [7].
 
     Returns:
-        Points used, int64 [n]; their places [m], [n, 3]; faces into them, [m, 3]; the index
-        into ``layer.zones`` of each face, [m].
+        The region that the layer covers, and the places of its points [m], shape [n, 3].
     """
-    parts = [(k, body.faces[zone]) for k, (zone, _) in enumerate(layer.zones) if zone in body.faces]
-    faces = np.concatenate([part for _, part in parts])
-    slots = np.concatenate([np.full(len(part), k, dtype=np.int64) for k, part in parts])
-    used = np.zeros(len(body.points_m), dtype=bool)
-    used[faces] = True
-    number = np.cumsum(used) - 1
-    local = number[faces]
-    places = points_m[used]
+    region = find_region(body, tuple(zone for zone, _ in layer.zones))
+    places = points_m[region.used]
     if layer.smoothings:
-        places = _smooth(places, local, layer.smoothings)
+        places = _smooth(places, region, layer.smoothings)
     if any(distance for _, distance in layer.profile):
         heights, distances = zip(*layer.profile, strict=True)
-        template = body.points_m[used]
+        template = body.points_m[region.used]
         off = np.interp(template[:, 2], heights, distances)
         if layer.folds_m:
             off += layer.folds_m * _wrinkles(template * layer.waves_per_m, phases)
         if layer.tapered:
-            off[_border(local)] = 0.0
-        places = places + off[:, None] * vertex_normals(places, local)
-    return np.flatnonzero(used), places, local, slots
+            off[region.border] = 0.0
+        places = places + off[:, None] * vertex_normals(places, region.faces)
+    return region, places
+
+
+@lru_cache(maxsize=256)
+def find_region(body: BodyTemplate, zones: tuple[str, ...]) -> Region:
+    """The part of a template in some zones; zones that it does not have stay out."""
+    parts = [(k, body.faces[zone]) for k, zone in enumerate(zones) if zone in body.faces]
+    faces = np.concatenate([part for _, part in parts])
+    slots = np.concatenate([np.full(len(part), k, dtype=np.int64) for k, part in parts])
+    used = np.zeros(len(body.points_m), dtype=bool)
+    used[faces] = True
+    local = (np.cumsum(used) - 1)[faces]
+    return Region(np.flatnonzero(used), local, slots, _border(local))
 
 
 def _skin(person: Person) -> Layer:
@@ -207,22 +230,26 @@ def _shoes(outfit: Outfit) -> Layer:
     return Layer(zones[0 if outfit.bottom == "trousers" else 1 :], ((-0.8, 0.012), (-0.74, 0.006)))
 
 
-def _smooth(places: Array, faces: Indices, times: int) -> Array:
+def _smooth(places: Array, region: Region, times: int) -> Array:
     """Smooth points along their normals without shrinking (Taubin); vertices on borders stay.
 
     Source: Taubin, "A signal processing approach to fair surface design", SIGGRAPH 1995.
     """
+    faces = region.faces
     start, end = faces.T.reshape(-1), np.roll(faces, -1, axis=1).T.reshape(-1)
-    counts = np.bincount(start, minlength=len(places))[:, None]
-    inner = np.ones((len(places), 1))
-    inner[_border(faces)] = 0.0
-    normals = inner * vertex_normals(places, faces)
+    counts = np.bincount(start, minlength=len(places))
+    normals = vertex_normals(places, faces)
+    normals[region.border] = 0.0
+    # Column by column: rows of three numbers are slow to gather.
+    columns, directions = list(places.T.copy()), normals.T.copy()
     for step in _SMOOTHING * times:
-        sums = [np.bincount(start, places[end, axis], len(places)) for axis in range(3)]
-        toward = np.stack(sums, axis=1) / counts - places
+        sums = [np.bincount(start, column[end], len(column)) for column in columns]
+        toward = [total / counts - column for total, column in zip(sums, columns, strict=True)]
         # Along the normal only: where triangles are uneven, seams would drift sideways.
-        places = places + step * (toward * normals).sum(axis=1, keepdims=True) * normals
-    return places
+        x, y, z = (way * part for way, part in zip(toward, directions, strict=True))
+        rise = step * (x + y + z)
+        columns = [c + rise * part for c, part in zip(columns, directions, strict=True)]
+    return np.stack(columns, axis=1)
 
 
 def _wrinkles(p: Array, phases: Array) -> Array:

@@ -20,7 +20,7 @@ from gen_data.generator.assets.people.body import (
     load,
 )
 from gen_data.generator.assets.people.carried_things import STRAPPED, Carrier, Sheet, make_things
-from gen_data.generator.assets.people.clothes import Layer, displace_layer, layers
+from gen_data.generator.assets.people.clothes import Layer, displace_layer, find_region, layers
 from gen_data.generator.assets.people.garment_layout import lay_out
 from gen_data.generator.assets.people.person import Person, draw_person
 from gen_data.generator.assets.people.posing import (
@@ -104,13 +104,22 @@ def dress_person(person: Person, body: BodyTemplate) -> Figure:
 
 
 def _make_piece(body: BodyTemplate, layer: Layer, points: Array, phases: Array) -> _Piece:
-    used, places, faces, slots = displace_layer(body, layer, points, phases)
+    region, places = displace_layer(body, layer, points, phases)
     zones, materials = zip(*layer.zones, strict=True)
-    corners, corner_faces, uvs = np.arange(len(used)), faces, np.zeros((len(used), 2))
+    used, faces, slots = region.used, region.faces, region.slots
     if layer.mapped:
-        corners, corner_faces, uvs = lay_out(body.points_m[used], faces, zones, slots)
-    rounded = np.round(uvs, 5).astype(np.float32)
-    return _Piece(used, places, faces, slots, materials, corners, corner_faces, rounded)
+        corners, corner_faces, uvs = _lay_out(body, zones)
+    else:
+        corners, corner_faces, uvs = np.arange(len(used)), faces, np.zeros((len(used), 2), np.float32)
+    return _Piece(used, places, faces, slots, materials, corners, corner_faces, uvs)
+
+
+@lru_cache(maxsize=64)
+def _lay_out(body: BodyTemplate, zones: tuple[str, ...]) -> tuple[Indices, Indices, Float32]:
+    """As ``lay_out`` of a garment in some zones of a template; the same for everyone."""
+    region = find_region(body, zones)
+    corners, faces, uvs = lay_out(body.points_m[region.used], region.faces, zones, region.slots)
+    return corners, faces, np.round(uvs, 5).astype(np.float32)
 
 
 def build_person(person: Person, figure: Figure) -> Solid:

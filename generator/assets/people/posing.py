@@ -261,21 +261,18 @@ def skin_points(points_m: Array, bones: Indices, weights: Array, transforms: Arr
 
 def vertex_normals(points_m: Array, faces: Indices) -> Array:
     """Unit normals [n, 3], weighted by the area of the faces; (0, 0, 1) where there is none."""
-    a, b, c = (points_m[faces[:, i]] for i in range(3))
-    crosses = _cross(b - a, c - a)
-    corners = faces.T.reshape(-1)
-    weights = np.tile(crosses, (3, 1)).T
-    sums = np.stack([np.bincount(corners, w, minlength=len(points_m)) for w in weights], axis=1)
-    lengths = np.sqrt((sums * sums).sum(axis=1, keepdims=True))
-    unit: Array = np.where(lengths > 1e-12, sums / np.maximum(lengths, 1e-12), (0.0, 0.0, 1.0))
-    return unit
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """``np.cross`` of rows, without its overhead."""
-    ax, ay, az = a.T
-    bx, by, bz = b.T
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
+    corners = np.ascontiguousarray(faces.T)
+    # Column by column: rows of three numbers are slow to gather.
+    (ax, bx, cx), (ay, by, cy), (az, bz, cz) = (column[corners] for column in points_m.T.copy())
+    bx, by, bz = bx - ax, by - ay, bz - az
+    cx, cy, cz = cx - ax, cy - ay, cz - az
+    crosses = (by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx)
+    ends = corners.reshape(-1)
+    sums = [np.bincount(ends, np.tile(part, 3), minlength=len(points_m)) for part in crosses]
+    lengths = np.sqrt(sums[0] * sums[0] + sums[1] * sums[1] + sums[2] * sums[2])
+    normals: Array = np.stack(sums, axis=1) / np.maximum(lengths, 1e-12)[:, None]
+    normals[lengths <= 1e-12] = (0.0, 0.0, 1.0)
+    return normals
 
 
 _FINGERS = ("index", "middle", "ring", "pinky")
@@ -396,20 +393,29 @@ def _roll(angle_deg: float) -> Array:
 
 def _about(axis: Array, angle_deg: float) -> Array:
     """Rotation about a unit axis (Rodrigues 1840)."""
-    angle, k = math.radians(angle_deg), _cross_matrix(axis)
-    rotation: Array = np.eye(3) + math.sin(angle) * k + (1.0 - math.cos(angle)) * (k @ k)
-    return rotation
+    x, y, z = axis.tolist()
+    angle = math.radians(angle_deg)
+    s, c = math.sin(angle), 1.0 - math.cos(angle)
+    # Written out: a figure takes sixty of these, and each operation of small arrays a microsecond.
+    return np.array(
+        [
+            [1.0 - c * (z * z + y * y), c * (x * y) - s * z, c * (x * z) + s * y],
+            [c * (x * y) + s * z, 1.0 - c * (z * z + x * x), c * (y * z) - s * x],
+            [c * (x * z) - s * y, c * (y * z) + s * x, 1.0 - c * (y * y + x * x)],
+        ]
+    )
 
 
 def _between(start: Array, end: Array) -> Array:
     """The smallest rotation that turns one direction into another; not for opposite ones."""
     a, b = _unit(start), _unit(end)
-    k = _cross_matrix(np.cross(a, b))
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    k = _cross_matrix((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx))
     rotation: Array = np.eye(3) + k + (k @ k) / (1.0 + float((a * b).sum()))
     return rotation
 
 
-def _cross_matrix(vector: Array) -> Array:
+def _cross_matrix(vector: tuple[float, float, float]) -> Array:
     """Matrix of the cross product with a vector."""
     x, y, z = vector
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
