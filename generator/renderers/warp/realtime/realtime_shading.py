@@ -217,6 +217,8 @@ def _shade(frame: CameraView, lattice: Lattice) -> wp.array:
     probe = lattice_lighting.Probe()
     probe.parts = cache.constant(wp.vec2, lamp_samples, 4, settings.shadows)
     probe.disc = cache.constant(wp.vec2, sunflower, 4)
+    probe.centre = cache.constant(wp.vec2, lamp_samples, 1, "hard")
+    probe.pair = cache.constant(wp.vec2, sunflower, 2)
     probe.radius_m = settings.ambient_occlusion_radius_m
     frame.launch(lattice_lighting.find_pixel_visibility, number, [*seen, probe, listed])
     frame.launch(lattice_lighting.shade_points, number, [*frame.inputs, listed], [radiance])

@@ -91,6 +91,8 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 1})
 
 # Ambient occlusion is traced only where a ray's end contributes more than this share of the pixel.
 AMBIENT_SHARE = wp.constant(0.2)
+# Ends of rays that contribute less than this share take fewer samples of each light.
+SAMPLED_SHARE = wp.constant(0.6)
 # Surfaces clearer than this show little but highlights: their shadows are not traced.
 MOSTLY_CLEAR = wp.constant(0.9)
 # Neighbours on a layered surface with more contrast than this are supersampled.
@@ -273,16 +275,21 @@ def light_at_hit(
         clear: Share of clear glass, whose highlights need no shadows.
     """
     origin = ray_origin(world, m.hit, m.weight, p, d)
+    parts = probe.parts
+    disc = probe.disc
+    if share < SAMPLED_SHARE:
+        parts = probe.centre
+        disc = probe.pair
     for j in range(world.lamps.shape[0]):
         # Scratch memory holds values of earlier rays: set every lamp.
         probe.lit[j, k] = 1.0
         if clear < MOSTLY_CLEAR:
             probe.lit[j, k] = visible_lamp_fraction(
-                world, world.lamps[j], origin, m.normal, probe.parts
+                world, world.lamps[j], origin, m.normal, parts
             )
     open_sky = occlusion
     if share > AMBIENT_SHARE and clear < MOSTLY_CLEAR:
-        open_sky *= visible_sky_fraction(world, origin, m.normal, probe.disc, probe.radius_m)
+        open_sky *= visible_sky_fraction(world, origin, m.normal, disc, probe.radius_m)
     surface = surface_index(world, m.hit)
     return light_at(world, surface, material, p, -d, probe.lit, open_sky, k)
 
