@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import InitVar, dataclass, field
+from functools import cached_property
 
 import numpy as np
 
+from gen_data.generator.core.bounded_cache import ObjectCache
 from gen_data.generator.core.boxes import Rectangle, overlap_of
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Camera, Scene
@@ -19,7 +21,7 @@ _PARALLEL = 1e-9
 """Smallest component of a direction, instead of 0."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Footprint:
     """A rectangle on the ground: centre [m], half extents [m] and yaw of its X axis."""
 
@@ -45,10 +47,16 @@ class Footprint:
         half_x_m, half_y_m = self.half_x_m + margin_m, self.half_y_m + margin_m
         return Footprint(self.x_m, self.y_m, half_x_m, half_y_m, self.yaw_rad)
 
+    @cached_property
     def rectangle(self) -> Rectangle:
         """Centre, cosine and sine of the yaw, half extents."""
         c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         return (self.x_m, self.y_m, c, s, self.half_x_m, self.half_y_m)
+
+    @cached_property
+    def disc(self) -> tuple[float, float, float]:
+        """Centre and half of the diagonal [m]."""
+        return (self.x_m, self.y_m, math.hypot(self.half_x_m, self.half_y_m))
 
 
 @dataclass
@@ -65,9 +73,9 @@ class Ground:
 
     def __post_init__(self, footprints: Sequence[Footprint]) -> None:
         """Collect rectangles, and a table of their centres and half diagonals [m], [3, n]."""
-        self._rectangles = [footprint.rectangle() for footprint in footprints]
+        self._rectangles = [footprint.rectangle for footprint in footprints]
         self._discs = np.zeros((3, 2 * len(footprints) + 64))
-        rows = [(footprint.x_m, footprint.y_m, _reach_m(footprint)) for footprint in footprints]
+        rows = [footprint.disc for footprint in footprints]
         self._discs[:, : len(rows)] = np.reshape(rows, (len(rows), 3)).T
 
     def add(self, footprint: Footprint) -> None:
@@ -75,24 +83,20 @@ class Ground:
         count = len(self._rectangles)
         if count == self._discs.shape[1]:
             self._discs = np.concatenate([self._discs, np.zeros_like(self._discs)], axis=1)
-        self._rectangles.append(footprint.rectangle())
-        self._discs[:, count] = footprint.x_m, footprint.y_m, _reach_m(footprint)
+        self._rectangles.append(footprint.rectangle)
+        self._discs[:, count] = footprint.disc
 
     def is_free(self, footprint: Footprint) -> bool:
         """Whether a rectangle overlaps no footprint."""
         x, y, reach = self._discs[:, : len(self._rectangles)]
-        dx, dy, reach = x - footprint.x_m, y - footprint.y_m, reach + _reach_m(footprint)
+        own_x, own_y, own_reach = footprint.disc
+        dx, dy, reach = x - own_x, y - own_y, reach + own_reach
         # Few are near: for them, numbers are quicker than arrays.
         near = np.flatnonzero(dx * dx + dy * dy < reach * reach).tolist()
         if not near:
             return True
-        own = footprint.rectangle()
+        own = footprint.rectangle
         return not any(overlap_of(own, self._rectangles[k]) for k in near)
-
-
-def _reach_m(footprint: Footprint) -> float:
-    """Half of the diagonal."""
-    return math.hypot(footprint.half_x_m, footprint.half_y_m)
 
 
 def standing_bodies(scene: Scene) -> Iterator[Body]:
@@ -105,9 +109,20 @@ def standing_bodies(scene: Scene) -> Iterator[Body]:
 
 def make_ground(bodies: Iterable[Body], assets: AssetIndex) -> Ground:
     """Collect the footprints of bodies."""
-    bodies = list(bodies)
-    bounds_m = {name: standing_bounds_m(assets, name) for name in {b.asset for b in bodies}}
-    return Ground([Footprint.of(b.T_world_body, bounds_m[b.asset], b.scale) for b in bodies])
+    return Ground([_standing_footprint(body, assets) for body in bodies])
+
+
+_footprints: ObjectCache[tuple[AssetIndex, Footprint]] = ObjectCache(4096)
+"""Of the latest bodies: each of a street's randomizers collects those of all before it."""
+
+
+def _standing_footprint(body: Body, assets: AssetIndex) -> Footprint:
+    def find() -> tuple[AssetIndex, Footprint]:
+        bounds_m = standing_bounds_m(assets, body.asset)
+        return assets, Footprint.of(body.T_world_body, bounds_m, body.scale)
+
+    library, footprint = _footprints.get(body, find)
+    return footprint if library is assets else find()[1]
 
 
 def standing_bounds_m(assets: AssetIndex, asset: str) -> tuple[Vec3, Vec3]:

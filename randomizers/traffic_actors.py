@@ -169,7 +169,7 @@ def find_obstacles(scene: Scene, moving: Iterable[Body], assets: AssetIndex) -> 
         else:
             bounds_m = assets.bounds_m(body.asset)
             footprint = Footprint.of(body.T_world_body, bounds_m, body.scale)
-            x, y, cos_yaw, sin_yaw, half_x_m, half_y_m = footprint.rectangle()
+            x, y, cos_yaw, sin_yaw, half_x_m, half_y_m = footprint.rectangle
             rows.append((x, y, half_x_m, half_y_m, cos_yaw, sin_yaw))
         names.append(body.name)
         categories.append(category)
