@@ -16,7 +16,6 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-import mmap
 import os
 import struct
 import tempfile
@@ -31,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.core.bounded_cache import ByteCache, CountCache, Sized
+from gen_data.generator.core.mapped_files import map_file, owned_bytes
 from gen_data.generator.core.serialization import canonical_json
 
 S = TypeVar("S", bound=Sized)
@@ -41,6 +41,8 @@ FORMAT = 2
 """Increased whenever the same sources are stored as different arrays."""
 # Small, since renderers and physics engines keep their own copies.
 _MEMORY_BYTES = 24 * 1024 * 1024
+_RESULTS = 1024
+"""Kept in memory, a few kilobytes each beside their arrays."""
 _PREFIX = struct.Struct("<II")
 _ALIGNMENT = 64
 # A mapping occupies whole pages, and a process may have 65,530 mappings.
@@ -108,12 +110,13 @@ class _CachedValue:
 class Store:
     """Results by content key, looked up in memory, then on disk, else computed.
 
-    Memory is bounded by total size; the least recently used results are evicted first.
+    Memory is bounded by number and total size, views of mapped files aside; the least recently used
+    results are evicted first.
     """
 
     def __init__(self, disk: DiskCache, max_bytes: int = _MEMORY_BYTES) -> None:
         self._disk = disk
-        self._memory: ByteCache[_CachedValue] = ByteCache(max_bytes)
+        self._memory: ByteCache[_CachedValue] = ByteCache(max_bytes, _RESULTS)
 
     def get(self, key: str, compute: Callable[[], Arrays], view: Callable[[Arrays], T]) -> T:
         """Look up or compute a result.
@@ -126,7 +129,7 @@ class Store:
 
         def read() -> _CachedValue:
             arrays = self._disk.arrays(key, compute)
-            return _CachedValue(view(arrays), sum(array.nbytes for array in arrays.values()))
+            return _CachedValue(view(arrays), owned_bytes(*arrays.values()))
 
         value: T = self._memory.get(key, read).value
         return value
@@ -171,11 +174,11 @@ def _matches_checksum(body: memoryview, checksum: bytes) -> bool:
     return zlib.crc32(body) == int.from_bytes(checksum, "little")
 
 
-def _decode_checked(data: bytes | mmap.mmap, key: str) -> Arrays | None:
+def _decode_checked(data: bytes | memoryview, key: str) -> Arrays | None:
     """Decode the arrays of a file whose checksum is right; None if they have another key."""
     _, size = _PREFIX.unpack_from(data)
     try:
-        head = json.loads(data[_PREFIX.size : _PREFIX.size + size])
+        head = json.loads(bytes(data[_PREFIX.size : _PREFIX.size + size]))
     except ValueError:
         return None
     if head["key"] != key:
@@ -204,7 +207,7 @@ def _load(path: Path, key: str, intact: CountCache[None]) -> Arrays | None:
                 if not _is_intact(file):
                     return None
                 intact.get(version, lambda: None)
-            return _decode_checked(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), key)
+            return _decode_checked(map_file(file.fileno(), facts.st_size), key)
     except OSError:
         return None
 

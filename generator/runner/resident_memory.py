@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import ctypes
 import gc
-import resource
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+
+from gen_data.generator.core.mapped_files import limit_mapped_pages, read_statm
 
 MADV_DONTNEED = 4  # <asm-generic/mman-common.h>
 FILE_BYTES_KEPT = 96 * 1024 * 1024
@@ -20,20 +21,12 @@ FILE_BYTES_KEPT = 96 * 1024 * 1024
 
 def resident_bytes() -> int:
     """Resident memory of this process; 0 without procfs."""
-    return _read_statm(1)
+    return read_statm(1)
 
 
 def resident_file_bytes() -> int:
     """The part of it that consists of pages of files, which other processes may share."""
-    return _read_statm(2)
-
-
-def _read_statm(column: int) -> int:
-    try:
-        pages = int(Path("/proc/self/statm").read_text().split()[column])
-    except OSError:
-        return 0
-    return pages * resource.getpagesize()
+    return read_statm(2)
 
 
 def release_memory(file_bytes_kept: int = FILE_BYTES_KEPT) -> None:
@@ -48,6 +41,8 @@ def release_memory(file_bytes_kept: int = FILE_BYTES_KEPT) -> None:
     trim = getattr(libc, "malloc_trim", None)
     if trim is not None:
         trim(0)
+    limit_mapped_pages(file_bytes_kept)
+    # Listing all maps takes tens of milliseconds, and most pages of libraries are gone after once.
     if resident_file_bytes() <= file_bytes_kept:
         return
     with suppress(OSError):

@@ -107,10 +107,10 @@ def _make_piece(body: BodyTemplate, layer: Layer, points: Array, phases: Array) 
     region, places = displace_layer(body, layer, points, phases)
     zones, materials = zip(*layer.zones, strict=True)
     used, faces, slots = region.used, region.faces, region.slots
+    corners, corner_faces = np.arange(len(used)), faces
+    uvs = np.zeros((len(used), 2), np.float32)
     if layer.mapped:
         corners, corner_faces, uvs = _lay_out(body, zones)
-    else:
-        corners, corner_faces, uvs = np.arange(len(used)), faces, np.zeros((len(used), 2), np.float32)
     return _Piece(used, places, faces, slots, materials, corners, corner_faces, uvs)
 
 

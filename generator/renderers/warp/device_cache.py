@@ -32,8 +32,12 @@ from gen_data.generator.renderers.warp.scene.environment_maps import (
 )
 from gen_data.generator.renderers.warp.visibility.distortion_lut import DeviceOptics, upload_optics
 
-_MESH_BYTES = 176 << 20
-_TEXTURE_BYTES = 384 << 20
+_MESH_BYTES, _TEXTURE_BYTES = 176 << 20, 384 << 20
+"""Of a GPU."""
+_OWN_MESH_BYTES, _OWN_TEXTURE_BYTES = 96 << 20, 64 << 20
+"""On the CPU, where most are views of files and take no memory that could not be dropped."""
+_MESHES, _TEXTURES = 4096, 2048
+"""Some kilobytes each beside their arrays, and up to two maps of files."""
 _ENVIRONMENT_BYTES = 32 << 20
 _OPTICS_BYTES = 192 << 20
 _LENSES = 64
@@ -64,8 +68,10 @@ class DeviceCache:
         self.scenes: ObjectCache[Any] = ObjectCache(1)
         self.material_records: ObjectCache[Any] = ObjectCache(_BODIES)
         self.infrared: ObjectCache[NDArray[np.void]] = ObjectCache(_BODIES)
-        self._meshes: ByteCache[DeviceMesh] = ByteCache(_MESH_BYTES)
-        self._textures: ByteCache[DeviceTexture] = ByteCache(_TEXTURE_BYTES)
+        mesh_bytes = _OWN_MESH_BYTES if device.is_cpu else _MESH_BYTES
+        texture_bytes = _OWN_TEXTURE_BYTES if device.is_cpu else _TEXTURE_BYTES
+        self._meshes: ByteCache[DeviceMesh] = ByteCache(mesh_bytes, _MESHES)
+        self._textures: ByteCache[DeviceTexture] = ByteCache(texture_bytes, _TEXTURES)
         self._environments: ByteCache[DeviceEnvironment] = ByteCache(_ENVIRONMENT_BYTES)
         self._optics: ByteCache[DeviceOptics] = ByteCache(_OPTICS_BYTES, _LENSES)
         self._scratch: ByteCache[_Scratch] = ByteCache(_SCRATCH_BYTES)

@@ -16,6 +16,7 @@ from gen_data.generator.core import colorimetry
 from gen_data.generator.core.asset_types import Material, MeshData, TextureData, UInt8
 from gen_data.generator.core.code_digests import code_digest
 from gen_data.generator.core.colorimetry import srgb_decode
+from gen_data.generator.core.mapped_files import owned_bytes
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.scene import bvh
 from gen_data.generator.renderers.warp.scene.bvh import face_boxes, mesh_tree
@@ -108,13 +109,13 @@ def upload_mesh(data: MeshData, prepared: Arrays, device: wp.Device) -> DeviceMe
         hierarchy = wp.Mesh(points=points, indices=indices)
         number = hierarchy.id
         # Warp's hierarchy has two 16-byte nodes per triangle, built from 24-byte boxes.
-        hierarchy_nbytes = (64 + 24) * len(data.faces)
+        nbytes = 32 * len(data.vertices_m) + (16 + 64 + 24) * len(data.faces)
     else:
         arrays["tree"] = _upload(prepared["tree"], wp.float32, device)
-        hierarchy, number, hierarchy_nbytes = None, 0, prepared["tree"].nbytes
+        hierarchy, number = None, 0
+        nbytes = owned_bytes(*(array.held for array in arrays.values()))
     fields: dict[str, object] = {name: array.field for name, array in arrays.items()}
     fields |= {"mesh": number, "low_m": low, "high_m": high, "convex": prepared["convex"][0]}
-    nbytes = 32 * len(data.vertices_m) + 16 * len(data.faces) + hierarchy_nbytes
     return DeviceMesh(
         _make_record(Geometry, fields),
         (hierarchy, *(array.held for array in arrays.values())),
@@ -274,13 +275,15 @@ def upload_texture(prepared: Arrays, device: wp.Device) -> DeviceTexture:
     fields |= dict(zip(("height", "width", "levels"), prepared["size"], strict=True))
     fields |= {f"has_{name}": int(name in prepared) for name in _OPTIONAL}
     texels = arrays["texels"].held
+    nbytes = sum(values.nbytes for values in images.values()) + cover.nbytes
     if device.is_cpu:
+        nbytes = owned_bytes(*(array.held for array in arrays.values()))
         texels = wp.array(texels, dtype=wp.uint32, device=device, copy=False)
     return DeviceTexture(
         _make_record(TextureRecord, fields),
         tuple(array.held for array in arrays.values()),
         texels,
-        sum(values.nbytes for values in images.values()) + cover.nbytes,
+        nbytes,
         layered="shares" in prepared or "glow" in prepared,
         has_cutouts="cover" in prepared,
     )

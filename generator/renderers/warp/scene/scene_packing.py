@@ -11,6 +11,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from gen_data.generator.core.lens import LensModel
+from gen_data.generator.core.mapped_files import limit_mapped_pages
 from gen_data.generator.core.scene import (
     LIGHT_KINDS,
     PANEL_KINDS,
@@ -110,8 +111,13 @@ class _PackedScene:
     layered: bool
 
 
+_FILE_BYTES = 192 << 20
+"""Pages of files that stay in memory from frame to frame; a frame reads about as many."""
+
+
 def pack_world(scene: Scene, camera: Camera, cache: DeviceCache) -> PackedWorld:
     """Pack a scene for one camera. Cheap enough for every frame."""
+    limit_mapped_pages(_FILE_BYTES)
     packed: _PackedScene = cache.scenes.get(scene, lambda: _pack_scene(scene, cache))
     return _pack_for_camera(camera, packed, scene.weather, cache)
 

@@ -284,9 +284,7 @@ def light_at_hit(
         # Scratch memory holds values of earlier rays: set every lamp.
         probe.lit[j, k] = 1.0
         if clear < MOSTLY_CLEAR:
-            probe.lit[j, k] = visible_lamp_fraction(
-                world, world.lamps[j], origin, m.normal, parts
-            )
+            probe.lit[j, k] = visible_lamp_fraction(world, world.lamps[j], origin, m.normal, parts)
     open_sky = occlusion
     if share > AMBIENT_SHARE and clear < MOSTLY_CLEAR:
         open_sky *= visible_sky_fraction(world, origin, m.normal, disc, probe.radius_m)

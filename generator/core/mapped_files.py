@@ -1,0 +1,109 @@
+"""Read-only views of files, which processes share and the system may drop.
+
+``mmap.mmap`` keeps a descriptor open for as long as the map lives; a street maps more files than
+the 1,024 descriptors that most systems allow a process. Maps made here keep none.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import mmap
+import weakref
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+_FAILED = ctypes.c_void_p(-1).value
+_MADV_DONTNEED = getattr(mmap, "MADV_DONTNEED", 4)
+
+_mapped: dict[int, int] = {}
+"""Size of each map by its address [bytes]."""
+
+
+def map_file(descriptor: int, size: int) -> memoryview:
+    """The content of an open file, mapped; the descriptor may be closed.
+
+    The map lives as long as views of it. The file must not become shorter meanwhile.
+
+    Args:
+        descriptor: Of a file that can be read.
+        size: Of the file [bytes], not 0.
+
+    Raises:
+        OSError: the system cannot map the file.
+    """
+    libc = _libc()
+    if libc is None:
+        return memoryview(mmap.mmap(descriptor, size, access=mmap.ACCESS_READ))
+    pages = -(-size // mmap.PAGESIZE)
+    length = pages * mmap.PAGESIZE
+    address = libc.mmap(None, length, mmap.PROT_READ, mmap.MAP_SHARED, descriptor, 0)
+    if address == _FAILED:
+        number = ctypes.get_errno()
+        raise OSError(number, "cannot map a file")
+    # Whole pages: ctypes keeps the key of every array type, and so of every length.
+    content = (ctypes.c_ubyte * length).from_address(address)
+    _mapped[address] = length
+    # At exit, the system unmaps everything; other threads may still read.
+    weakref.finalize(content, _unmap, address, length).atexit = False
+    return memoryview(content).cast("B")[:size].toreadonly()
+
+
+def owned_bytes(*arrays: Any) -> int:
+    """Bytes of NumPy arrays that are no views of mapped files."""
+    return sum(array.nbytes for array in arrays if not _is_mapped(array))
+
+
+def _is_mapped(array: Any) -> bool:
+    while hasattr(array, "base"):
+        array = array.base
+    return isinstance(array, memoryview) and isinstance(array.obj, ctypes.Array | mmap.mmap)
+
+
+def release_mapped_pages() -> None:
+    """Drop the pages of all maps from this process; they come back when they are read."""
+    libc = _libc()
+    if libc is not None:
+        for address, length in list(_mapped.items()):
+            # It fails for locked memory, which then simply stays.
+            libc.madvise(address, length, _MADV_DONTNEED)
+
+
+def limit_mapped_pages(kept_bytes: int) -> None:
+    """Drop the pages of all maps if more bytes of files than these are resident."""
+    if read_statm(2) > kept_bytes:
+        release_mapped_pages()
+
+
+def read_statm(column: int) -> int:
+    """A column of procfs's ``statm`` of this process [bytes]; 0 without procfs.
+
+    Column 1 is the resident memory, column 2 the part of it that consists of pages of files.
+    """
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[column])
+    except OSError:
+        return 0
+    return pages * mmap.PAGESIZE
+
+
+def _unmap(address: int, length: int) -> None:
+    _mapped.pop(address, None)
+    libc = _libc()
+    assert libc is not None
+    libc.munmap(address, length)
+
+
+@cache
+def _libc() -> Any:
+    """The C library; None where it has no ``mmap``."""
+    try:
+        libc = ctypes.CDLL(None, use_errno=True)
+        number, size, place = ctypes.c_int, ctypes.c_size_t, ctypes.c_void_p
+        libc.mmap.argtypes = (place, size, number, number, number, ctypes.c_long)
+        libc.mmap.restype = place
+        libc.munmap.argtypes = (place, size)
+        libc.madvise.argtypes = (place, size, number)
+    except (AttributeError, OSError, TypeError):
+        return None
+    return libc
