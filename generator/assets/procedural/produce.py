@@ -185,7 +185,8 @@ def broccoli(seed: int) -> Solid:
         plain_food(("#9fb56a", "#b5c484", "#8fa85a"), 0.55, rng),
     ]
     points = crown.corners_m.reshape(-1, 3)
-    return make_centred_solid([crown, stalk], materials, [wrap(points), wrap(stalk.corners_m)])
+    parts = [wrap(points), wrap(stalk.corners_m)]
+    return make_centred_solid([crown, stalk], materials, parts, 80.0)
 
 
 def broccoli_kind(seed: int) -> str:
