@@ -27,6 +27,7 @@ TABLE = PluginTable[Randomizer](
         "objects": "gen_data.randomizers.objects:Objects",
         "physics_properties": "gen_data.randomizers.physics_properties:PhysicsProperties",
         "plate": "gen_data.randomizers.plate:PhotoPlate",
+        "reaching_hand": "gen_data.randomizers.reaching_hand:ReachingHand",
         "rig_calibration": "gen_data.randomizers.rig_calibration:RigCalibration",
         "street_lights": "gen_data.randomizers.street_lights:StreetLights",
         "textures": "gen_data.randomizers.textures:Textures",

@@ -54,7 +54,17 @@ CYCLIST = _parse_skeleton(
 )
 """A rider with a two-wheeler."""
 
-KNOWN = (PERSON, VEHICLE, TWO_WHEELER, CYCLIST)
+HAND = _parse_skeleton(
+    "wrist thumb_1 thumb_2 thumb_3 thumb_4 index_1 index_2 index_3 index_4 middle_1 middle_2 "
+    "middle_3 middle_4 ring_1 ring_2 ring_3 ring_4 little_1 little_2 little_3 little_4",
+    "wrist-thumb_1 thumb_1-thumb_2 thumb_2-thumb_3 thumb_3-thumb_4 wrist-index_1 index_1-index_2 "
+    "index_2-index_3 index_3-index_4 wrist-middle_1 middle_1-middle_2 middle_2-middle_3 "
+    "middle_3-middle_4 wrist-ring_1 ring_1-ring_2 ring_2-ring_3 ring_3-ring_4 wrist-little_1 "
+    "little_1-little_2 little_2-little_3 little_3-little_4",
+)
+"""The 21 points and 20 bones of a hand in COCO-WholeBody (Jin et al., ECCV 2020)."""
+
+KNOWN = (PERSON, VEHICLE, TWO_WHEELER, CYCLIST, HAND)
 
 
 def find_skeleton(names: Iterable[str]) -> Skeleton:

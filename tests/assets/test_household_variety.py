@@ -18,6 +18,8 @@ OF_COCO = {
     "banana": ["banana"], "apple": ["apple"], "orange": ["orange"], "book": ["book"],
     "cell phone": ["cell_phone"], "remote": ["remote"], "mouse": ["mouse"],
     "keyboard": ["keyboard"], "scissors": ["scissors"], "vase": ["vase"],
+    "sandwich": ["sandwich"], "broccoli": ["broccoli"], "carrot": ["carrot"], "pizza": ["pizza"],
+    "donut": ["donut"], "cake": ["cake"],
 }  # fmt: skip
 GROUPS = ["bowl", "cup", "mug", "tumbler", "vase", "wine_glass"]
 

@@ -32,6 +32,10 @@ LONGEST_SIDE_M = {
     "pear": (0.08, 0.13), "pipe_elbow": (0.03, 0.09), "plate": (0.15, 0.34),
     "screwdriver": (0.14, 0.28), "spoon": (0.11, 0.26), "stepped_shaft": (0.04, 0.2),
     "toy_block": (0.03, 0.1), "tumbler": (0.05, 0.21), "vase": (0.13, 0.3),
+    "strawberry": (0.025, 0.06), "carrot": (0.08, 0.26), "grapes": (0.09, 0.24),
+    "broccoli": (0.04, 0.18), "mushroom": (0.025, 0.075), "sandwich": (0.09, 0.21),
+    "pizza": (0.1, 0.34), "cake": (0.055, 0.26), "donut": (0.08, 0.11), "hot_dog": (0.13, 0.21),
+    "hand": (0.47, 0.65),
     "washer": (0.014, 0.04), "wine_glass": (0.13, 0.245), "wrench": (0.1, 0.26),
 }  # fmt: skip
 

@@ -16,6 +16,7 @@ from gen_data.generator.core.streams import Streams
 PRINTED = {"label", "front_label", "can_label", "carton", "milk_label", "book_cover"}
 FOOD = {"apple_skin", "citrus_peel", "banana_peel", "pear_skin", "ball_cover"}
 FRUIT = {"fruit_skin", "fruit_cut"}
+SKIN = {"hand_skin"}
 DEVICES = {"phone_screen", "key_legends"}
 TABLEWARE = {"ceramic_decor", "drink_surface"}
 RELIEF = (
@@ -33,7 +34,7 @@ RELIEF = (
     "wood_grain",
     "wood_planks",
 )
-TILING = sorted(set(TEXTURES) - PRINTED - FOOD - FRUIT - TABLEWARE - DEVICES)
+TILING = sorted(set(TEXTURES) - PRINTED - FOOD - FRUIT - SKIN - TABLEWARE - DEVICES)
 
 
 @cache

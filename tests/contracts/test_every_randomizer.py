@@ -42,6 +42,7 @@ GIVEN: dict[str, dict[str, Any]] = {
     "distractors": {"count": {"uniform_integer": [1, 4]}},
     "colors": {"probability": True},
     "materials": {"probability": True},
+    "reaching_hand": {"group": "objects", "things": "objects", "probability": True},
     "street_lights": {"when": "always"},
     "textures": {"textures": ["wood"], "probability": True},
 }
@@ -49,7 +50,7 @@ GIVEN: dict[str, dict[str, Any]] = {
 
 PHYSICS_BOUND = (
     "arm_configuration", "arm_motion", "companions", "distractors", "ego_on_lane", "lane_objects",
-    "objects", "physics_properties", "plate", "traffic_flow",
+    "objects", "physics_properties", "plate", "reaching_hand", "traffic_flow",
 )  # fmt: skip
 """Randomizers that must run before physics."""
 

@@ -127,6 +127,16 @@ def plum(seed: int) -> Solid:
     return _round_fruit("plum", seed)
 
 
+def strawberry(seed: int) -> Solid:
+    """A strawberry, most of them on their side. Slots: skin, calyx."""
+    return _round_fruit("strawberry", seed)
+
+
+def carrot(seed: int) -> Solid:
+    """A carrot lying along X. Slots: skin, stump of the leaves."""
+    return _round_fruit("carrot", seed)
+
+
 def fruit_kind(group: str, seed: int) -> str:
     """Key in ``fruits.yaml`` of a variant of a group."""
     return in_turn([name for name in STYLES if name.startswith(f"{group}/")], seed)

@@ -30,6 +30,7 @@ from gen_data.generator.assets.procedural.material_presets import (
     printed_material,
 )
 from gen_data.generator.assets.procedural.patches import Array, Patch, make_centred_solid
+from gen_data.generator.assets.procedural.plated_food import SMALL, meal_on_plate, serve
 from gen_data.generator.assets.procedural.textures.tableware_prints import decor_ground
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.assets.procedural.vessel_contents import FOODS, Filling, fill
@@ -66,6 +67,8 @@ class Handle:
     wide_m: Point2
 
 
+# Food keeps this distance from a plate, so that surfaces do not coincide.
+_ON_PLATE_M = 0.0001
 # Limit on the convex parts of an object.
 _PARTS_MAX = 24
 HANDLES: Mapping[str, Handle] = load_table(__package__, "handles", Handle)
@@ -397,10 +400,13 @@ _PARTS: tuple[tuple[Callable[[Choice], bool], Callable[[Choice, Walls, VariantRn
 
 
 def plate(seed: int) -> Solid:
-    """A plate, plain or with a painted rim, some with crumbs. Slots: outside, inside, rim, food."""
-    rng = variant_rng("plate", seed)
+    """A plate, clean or with a meal. Slots: outside, inside, rim, then food."""
+    rng, meal = variant_rng("plate", seed), meal_on_plate(seed)
     # Side, dessert, dinner, pizza plates (assumed, within 5 %).
-    radius = in_turn((0.085, 0.105, 0.13, 0.14, 0.12, 0.155), seed) * rng.between(0.96, 1.04)
+    sizes: tuple[float, ...] = (0.085, 0.105, 0.13, 0.14, 0.12, 0.155)
+    if meal:
+        sizes = (0.105, 0.11) if meal in SMALL else (0.13, 0.14, 0.135, 0.155)
+    radius = in_turn(sizes, seed) * rng.between(0.96, 1.04)
     rise, wall = rng.between(0.016, 0.026), rng.between(0.0035, 0.005)
     well, foot = radius * rng.between(0.58, 0.86), radius * rng.between(0.48, 0.56)
     step = rise * rng.between(0.35, 0.7)
@@ -426,7 +432,18 @@ def plate(seed: int) -> Solid:
         *hulls.wedges([(well - 0.004, 0.0015), (well - 0.004, floor), (bend, step + 0.002),
                        (edge, rise), (edge, rise - 0.8 * wall)], 20),
     ]  # fmt: skip
+    if meal:
+        served = serve(meal, seed, 0.94 * well, len(materials), variant_rng("plate/meal", seed))
+        patches += [patch.moved(z=floor + _ON_PLATE_M) for patch in served.patches]
+        materials += served.materials
+        parts += [hull + np.array([0.0, 0.0, floor]) for hull in served.hulls]
     return make_centred_solid(patches, materials, parts)
+
+
+def plate_facts(seed: int) -> Facts:
+    """The meal on it."""
+    meal = meal_on_plate(seed)
+    return Facts("", {"contents": meal} if meal else {})
 
 
 def _plate_decor(seed: int) -> str:
@@ -436,8 +453,9 @@ def _plate_decor(seed: int) -> str:
 
 
 def plate_symmetries(seed: int) -> tuple[Symmetry, ...]:
-    """Any turn about Z of plates whose rim is plain or has lines."""
-    return axis_symmetries(z=0) if _plate_decor(seed) in ("plain", "bands", "rim") else ()
+    """Any turn about Z of clean plates whose rim is plain or has lines."""
+    is_even = _plate_decor(seed) in ("plain", "bands", "rim") and not meal_on_plate(seed)
+    return axis_symmetries(z=0) if is_even else ()
 
 
 def _plate_materials(seed: int, rng: VariantRng) -> list[Material]:
