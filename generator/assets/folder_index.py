@@ -116,6 +116,8 @@ class Finish(Strict):
     thin: bool | None = None
     """True: transmission as through a thin pane; false: through a refracting solid."""
     opacity: Fraction | None = None
+    diffuse_transmission: tuple[Fraction, Fraction, Fraction] | None = None
+    """Albedo of the light that a thin sheet, such as a leaf, scatters to its other side."""
     emission_cd_m2: tuple[Luminance, Luminance, Luminance] | None = None
     printed: bool | None = None
     """The image identifies the object; randomizers do not change it."""

@@ -321,7 +321,8 @@ def _apply_finish(material: Material, finish: Finish, owner: str) -> Material:
             if maps.orm or image:
                 changes.setdefault(factor, 1.0)
     if "base_color" in changes:
-        changes = {"opacity": 1.0, "transmission": 0.0, **changes}
+        clear = {"transmission": 0.0, "diffuse_transmission": (0.0, 0.0, 0.0)}
+        changes = {"opacity": 1.0, **clear, **changes}
     if changes.pop("textured", None) is False:
         changes["texture"] = ""
     return replace(material, **changes)

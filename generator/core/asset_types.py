@@ -36,6 +36,9 @@ class Material:
         ior: Refractive index of what transmits.
         thin: Whether a transmitting slot is a pane without refraction; else a solid that refracts.
         opacity: Share in [0, 1] of the background that it hides; labels treat it as solid.
+        diffuse_transmission: Albedo of the light that a thin sheet such as a leaf scatters to its
+            other side, linear RGB in [0, 1]; multiplies the texture. Renderers reduce it where it
+            and the base colour exceed 1 together. Metals have none.
         printed: The texture is part of what the object *is* (a label, a book cover);
             randomizers leave colour and texture alone.
         role: Function of the slot on its object, for randomizers that target it:
@@ -56,6 +59,7 @@ class Material:
     ior: float = 1.5
     thin: bool = True
     opacity: float = 1.0
+    diffuse_transmission: Vec3 = (0.0, 0.0, 0.0)
     printed: bool = False
     role: str = ""
 

@@ -102,6 +102,44 @@ def test_gltf_extensions_become_coat_glass_and_light(folder: Path) -> None:
     assert material.base_color == (1.0, 1.0, 1.0)
 
 
+def test_gltf_leaves_reflect_what_they_do_not_transmit(folder: Path) -> None:
+    """KHR_materials_diffuse_transmission: reflection (1 - f) base, transmission f colour."""
+    extension = {
+        "diffuseTransmissionFactor": 0.4,
+        "diffuseTransmissionColorFactor": [0.5, 1.0, 0.25],
+    }
+    gltf(folder, {
+        "pbrMetallicRoughness": {"baseColorFactor": [0.2, 0.5, 0.1, 1], "metallicFactor": 0},
+        "extensions": {"KHR_materials_diffuse_transmission": extension},
+    })  # fmt: skip
+
+    material, _ = loaded(folder)
+
+    assert material.base_color == pytest.approx((0.12, 0.3, 0.06))
+    assert material.diffuse_transmission == pytest.approx((0.2, 0.4, 0.1))
+
+
+def test_the_mean_of_a_gltf_image_of_transmitted_light_is_kept(folder: Path) -> None:
+    """Materials multiply transmission by the base colour's image: its mean must not count twice."""
+    base = np.dstack([checker(188, 255), checker(0, 188), checker(255, 255)])
+    passed = np.full((4, 4, 3), 188, np.uint8)
+    gltf(folder, {
+        "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0},
+        "extensions": {"KHR_materials_diffuse_transmission": {
+            "diffuseTransmissionFactor": 0.2, "diffuseTransmissionColorTexture": {"index": 1}}},
+    }, base=base, passed=passed)  # fmt: skip
+
+    material, texture = loaded(folder)
+
+    # sRGB 188 is 0.5029 in linear light (IEC 61966-2-1).
+    half = ((188 / 255 + 0.055) / 1.055) ** 2.4
+    assert texture is not None
+    means = np.array([0.5 * (half + 1.0), 0.5 * half, 1.0])
+    np.testing.assert_allclose(
+        np.array(material.diffuse_transmission) * means, 0.2 * half, atol=2e-4
+    )
+
+
 def test_gltf_images_become_maps(folder: Path) -> None:
     """Roughness from green, metal from blue, occlusion from red, coverage from alpha."""
     orm = np.dstack([checker(100, 200), checker(0, 255), checker(255, 0)])

@@ -1,8 +1,9 @@
 """Materials of glTF 2.0 and of the extensions that this project's materials can express.
 
 Supported are pbrMetallicRoughness, normal, occlusion and emissive textures, alpha modes, and
-KHR_materials_emissive_strength, _clearcoat, _transmission, _volume and _ior. An extension's factor
-is multiplied by the mean of its image, if it has one. Uniform images become a number.
+KHR_materials_emissive_strength, _clearcoat, _transmission, _diffuse_transmission, _volume and _ior.
+An extension's factor is multiplied by the mean of its image, if it has one. Uniform images become a
+number.
 """
 
 from __future__ import annotations
@@ -16,9 +17,12 @@ import numpy as np
 from gen_data.generator.assets.readers.mesh_source import EVEN, clamp_min, fraction
 from gen_data.generator.assets.texture_maps import TextureMaps
 from gen_data.generator.core.asset_types import Material, UInt8
+from gen_data.generator.core.colorimetry import srgb_decode
 
 _MIN_COVERAGE = 8
 """Texels of a blended image with less coverage [1/255] are holes."""
+_LINEAR = np.array([srgb_decode(level / 255.0) for level in range(256)])
+"""Linear values of sRGB in eight bits."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,9 @@ def gltf_material(description: Mapping[str, Any], images: Images) -> Material:
     pbr = description.get("pbrMetallicRoughness", {})
     further = description.get("extensions", {})
     *color, alpha = (float(c) for c in pbr.get("baseColorFactor", (1.0, 1.0, 1.0, 1.0)))
-    red, green, blue = (fraction(c, "baseColorFactor") for c in color)
+    passed, transmitted = _read_diffuse_transmission(further, pbr, images)
+    # What a thin sheet transmits is missing in its reflection.
+    red, green, blue = (fraction(c, "baseColorFactor") * (1.0 - passed) for c in color)
     surface = _image_name(pbr, "metallicRoughnessTexture", images)
     roughness, roughness_map = _read_channel(pbr, "roughnessFactor", surface, 1, images)
     metallic, metallic_map = _read_channel(pbr, "metallicFactor", surface, 2, images)
@@ -76,6 +82,7 @@ def gltf_material(description: Mapping[str, Any], images: Images) -> Material:
         ior=ior,
         thin=not thickness > 0.0,
         opacity=opacity,
+        diffuse_transmission=transmitted,
     )
 
 
@@ -129,6 +136,45 @@ def _read_emission(
     red, green, blue = (clamp_min(0.0, c, "emissiveFactor") * strength for c in factors)
     glows = max(red, green, blue) > 0.0
     return (red, green, blue), _image_name(description, "emissiveTexture", images) if glows else ""
+
+
+def _read_diffuse_transmission(
+    further: Mapping[str, Any], pbr: Mapping[str, Any], images: Images
+) -> tuple[float, tuple[float, float, float]]:
+    """Share of the diffuse light that is transmitted, and the albedo of transmission.
+
+    Materials multiply that albedo by the image of the base colour, glTF by an image of its own: the
+    albedo is scaled such that its mean is the file's.
+    """
+    extension = further.get("KHR_materials_diffuse_transmission", {})
+    share = fraction(extension.get("diffuseTransmissionFactor", 0.0), "diffuseTransmissionFactor")
+    name = _image_name(extension, "diffuseTransmissionTexture", images)
+    if name and images.pixels(name).shape[2] == 4:
+        share *= float(np.mean(images.pixels(name)[..., 3])) / 255.0
+    if share == 0.0:
+        return 0.0, (0.0, 0.0, 0.0)
+    factors = extension.get("diffuseTransmissionColorFactor", (1.0, 1.0, 1.0))
+    own = _mean_color(_image_name(extension, "diffuseTransmissionColorTexture", images), images)
+    base = _mean_color(_image_name(pbr, "baseColorTexture", images), images)
+    red, green, blue = (
+        round(min(share * fraction(c, "diffuseTransmissionColorFactor") * part / whole, 1.0), 4)
+        for c, part, whole in zip(factors, own, base, strict=True)
+    )
+    return share, (red, green, blue)
+
+
+def _mean_color(name: str, images: Images) -> tuple[float, float, float]:
+    """Mean linear colour of an image where it covers, at least 1/255; white for none."""
+    if not name:
+        return (1.0, 1.0, 1.0)
+    pixels = images.pixels(name)
+    covered = pixels[..., 3] >= _MIN_COVERAGE if pixels.shape[2] == 4 else np.True_
+    colors = pixels[..., :3][covered].reshape(-1, 3)
+    if not len(colors):
+        return (1.0, 1.0, 1.0)
+    counts = (np.bincount(channel, minlength=256) for channel in colors.T)
+    red, green, blue = (max(float(c @ _LINEAR) / len(colors), 1.0 / 255.0) for c in counts)
+    return (red, green, blue)
 
 
 def _occlusion_channel(description: Mapping[str, Any], images: Images) -> str:

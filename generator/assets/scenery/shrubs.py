@@ -20,6 +20,7 @@ from gen_data.generator.assets.scenery.foliage import (
     merge_meshes,
     sprays_about,
 )
+from gen_data.generator.assets.scenery.leaf_cards import PETAL, transmitting
 from gen_data.generator.assets.scenery.trees import leaf_greens
 from gen_data.generator.core.asset_types import ConvexParts, Material
 
@@ -74,7 +75,7 @@ def planter(seed: int) -> Solid:
     greens = _shades(rng)
     if rng.chance(0.6):
         blossom = Material(hex_to_linear(rng.choose(_FLOWERS)), roughness=0.8, role="leaf")
-        greens = (*greens[:3], blossom)
+        greens = (*greens[:3], transmitting(blossom, PETAL))
     mesh = finish_mesh(core, (rng.choose(stuff), _core_material(greens)), 50.0)
     sprays = sprays_about(anchors, np.array([0.0, 0.0, h - 0.2]), Habit(620, 0.095, 0.07), rng)
     leaves = leaf_mesh(sprays, greens, 0.7, rng)

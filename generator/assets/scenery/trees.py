@@ -39,12 +39,14 @@ from gen_data.generator.assets.scenery.foliage import (
     sprays_about,
 )
 from gen_data.generator.assets.scenery.leaf_cards import (
+    BROAD,
     Cards,
     card_mesh,
     drop_unused_slots,
     first_cards,
     leaf_material,
     spray_cards,
+    transmitting,
 )
 from gen_data.generator.core.asset_types import ConvexParts, Material, MeshData
 from gen_data.generator.core.errors import AssetError
@@ -351,7 +353,8 @@ def leaf_greens(codes: tuple[str, ...], rng: VariantRng) -> tuple[Material, ...]
         (level * warm * c[0] * r, level * c[1] * g, level * c[2] * b)
         for c in map(hex_to_linear, codes)
     )
-    return tuple(Material(c, roughness=0.75, specular=0.35, role="leaf") for c in colors)
+    plain = (Material(c, roughness=0.75, specular=0.35, role="leaf") for c in colors)
+    return tuple(transmitting(leaf, BROAD) for leaf in plain)
 
 
 def _draw_shape(species: Species, rng: VariantRng) -> Shape:

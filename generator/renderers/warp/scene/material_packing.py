@@ -20,6 +20,8 @@ _COLUMNS = (
     "base_color", "roughness", "metallic", "specular", "texture_scale_m", "emission_cd_m2", "coat",
     "coat_roughness", "transmission", "ior", "thin", "opacity",
 )  # fmt: skip
+_REFLECTANCE_MIN = 1e-3
+"""Smallest reflectance of a sheet that transmits: kernels know the ratio of both only."""
 _SURFACE = {role: number for number, role in enumerate(SURFACES)}
 
 
@@ -56,8 +58,19 @@ def _pack_materials(materials: tuple[Material, ...]) -> BodyMaterials:
         values["texture"] = [textures.index(m.texture) if m.texture else -1 for m in materials]
         for name in _COLUMNS:
             values[name] = [getattr(m, name) for m in materials]
+        for k, material in enumerate(materials):
+            if any(material.diffuse_transmission):
+                _pack_transmission(material, values[k])
     roles = np.array([_SURFACE.get(m.role, 0) for m in materials], np.uint8)
     return BodyMaterials(materials, values, textures, roles)
+
+
+def _pack_transmission(material: Material, record: np.void) -> None:
+    """Set colour and translucency of a thin sheet; it scatters at most the light it receives."""
+    reflected = np.maximum(material.base_color, _REFLECTANCE_MIN)
+    passed = np.minimum(material.diffuse_transmission, np.maximum(1.0 - reflected, 0.0))
+    record["base_color"] = reflected
+    record["translucency"] = passed / reflected * (1.0 - material.metallic)
 
 
 def surface_records(

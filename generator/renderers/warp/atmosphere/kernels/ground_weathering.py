@@ -191,7 +191,14 @@ def bump_visibility(mixable: wp.vec4):
 @wp.func
 def apply_coat(world: World, surface: int, material: SurfaceMaterial, coat: Coat, n: wp.vec3):
     """The material under water and snow; ``n`` is its normal without bumps."""
+    own = material.albedo
     material.albedo = albedo_below_coat(coat.mixable, material.albedo)
+    if coat.snow > 0.0 and wp.max(material.translucency) > 0.0:
+        # Snow lets no light through: the share of the sheet's own albedo still transmits.
+        bare = own * (coat.mixable[0] * wp.max(1.0 - mixed_snow(coat.mixable), 0.0))
+        material.translucency = wp.cw_mul(
+            material.translucency, wp.cw_div(bare, wp.max(material.albedo, wp.vec3(1.0e-6)))
+        )
     bumps = bump_visibility(coat.mixable)
     material.roughness *= 1.0 - 0.4 * estimate_porosity(world, surface) * coat.wet
     # The water reflects instead; the ground below it has no highlights.

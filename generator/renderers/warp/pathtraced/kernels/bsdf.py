@@ -2,7 +2,10 @@
 
 All directions are in the shading frame, whose Z axis is the normal; ``v`` points to where the path
 comes from, ``l`` to where it continues. The model is that of ``brdf`` with Smith's exact
-height-correlated masking instead of its approximation, and a coat above it.
+height-correlated masking instead of its approximation, and a coat above it. Thin sheets also
+transmit diffusely: their face, not their smooth normal, tells both sides apart, and either side
+counts by the absolute cosine of the smooth normal, whose mean over one side is the same for all
+normals.
 
 Sources: those of ``brdf``; Heitz, "Sampling the GGX distribution of visible normals", JCGT 7(4),
 2018; Dupuy and Benyoub, "Sampling visible GGX normals with spherical caps", HPG 2023 (the same
@@ -37,6 +40,8 @@ class Bsdf:
     Attributes:
         v: Direction to where the path comes from; Z > 0.
         diffuse: Albedo of the diffuse layer, attenuated by those above it.
+        passed: Albedo of diffuse transmission, attenuated likewise.
+        flat: Normal of the face on the side of ``v``, for sheets; else 0.
         f0, f90: Reflectance of the specular layer (Schlick); ``scale`` contains the coat's
             attenuation and multiple scattering.
         ior: If not 0, a dielectric interface: only a specular layer, which reflects by Fresnel's
@@ -45,11 +50,14 @@ class Bsdf:
         coat: Weight of the clear coat, multiple scattering included.
         coat_f0: Its reflectance at normal incidence.
         coat_alpha: Width of its lobe.
-        p_coat, p_shine: Probabilities of sampling the coat and the specular layer.
+        p_coat, p_shine, p_passed: Probabilities of sampling the coat, the specular layer and
+            diffuse transmission.
     """
 
     v: wp.vec3
     diffuse: wp.vec3
+    passed: wp.vec3
+    flat: wp.vec3
     f0: wp.vec3
     f90: float
     scale: wp.vec3
@@ -60,6 +68,7 @@ class Bsdf:
     coat_alpha: float
     p_coat: float
     p_shine: float
+    p_passed: float
 
 
 @wp.struct
@@ -98,6 +107,8 @@ def make_bsdf(
     table: wp.array2d[wp.vec2],
     v: wp.vec3,
     albedo: wp.vec3,
+    translucency: wp.vec3,
+    flat: wp.vec3,
     roughness: float,
     metallic: float,
     specular: float,
@@ -105,12 +116,14 @@ def make_bsdf(
     coat_f0: float,
     coat_roughness: float,
 ):
-    """BSDF of an opaque surface.
+    """BSDF of a surface that transmits nothing, or only diffusely.
 
     Args:
         table: Directional albedo of GGX lobes, see
             gen_data.generator.renderers.warp.scene.brdf_albedo_lut.smith_albedo.
         v: Unit direction to the viewer.
+        translucency: Ratio of diffuse transmittance to ``albedo``.
+        flat: Normal of the face on the side of ``v``.
         albedo, roughness, metallic, specular: As of gen_data.generator.core.asset_types.Material.
         coat, coat_f0, coat_roughness: Weight of the coat above it, its reflectance at normal
             incidence, and its roughness.
@@ -144,9 +157,15 @@ def make_bsdf(
         shine = shine * (1.0 - coated)
         s.p_coat = coated
     total = s.p_coat + shine + luminance(s.diffuse)
+    if wp.max(translucency) > 0.0:
+        s.passed = wp.cw_mul(s.diffuse, translucency)
+        s.flat = flat
+        s.p_passed = luminance(s.passed)
+        total += s.p_passed
     if total > 0.0:
         s.p_coat = s.p_coat / total
         s.p_shine = shine / total
+        s.p_passed = s.p_passed / total
     return s
 
 
@@ -196,9 +215,14 @@ def evaluate(s: Bsdf, l: wp.vec3):  # noqa: E741
     """BSDF times cosine for one direction, and the density with which ``scatter`` samples it."""
     n_l = l[2]
     n_v = s.v[2]
-    diffuse = n_l * (1.0 / wp.pi)
+    diffuse = wp.abs(n_l) * (1.0 / wp.pi)
+    if wp.dot(s.flat, l) < 0.0:
+        return s.passed * diffuse, diffuse * s.p_passed
     f = s.diffuse * diffuse
-    density = diffuse * (1.0 - s.p_coat - s.p_shine)
+    density = diffuse * (1.0 - s.p_coat - s.p_shine - s.p_passed)
+    # Only sheets are lit from below the smooth horizon, and there by diffuse light alone.
+    if n_l <= 0.0:
+        return f, density
     # Purely diffuse surfaces are the most common: they skip the half vector.
     if s.p_shine == 0.0 and s.coat == 0.0:
         return f, density
@@ -260,16 +284,23 @@ def scatter(s: Bsdf, choice: float, u: wp.vec2):
         u: In [0, 1), select the direction.
     """
     out = Scattering()
+    usable = bool(True)
     if choice < s.p_coat + s.p_shine:
         alpha = s.alpha
         if choice < s.p_coat:
             alpha = s.coat_alpha
         h = sample_visible_normal(s.v, alpha, u)
         out.l = h * (2.0 * wp.dot(s.v, h)) - s.v
+        usable = out.l[2] > 0.0 and wp.dot(s.flat, out.l) >= 0.0
     else:
         out.l = sample_cosine(u)
+        # A direction and its opposite have the same absolute cosine: one of both is on the side
+        # that is sampled.
+        wanted = wp.where(choice >= 1.0 - s.p_passed, -1.0, 1.0)
+        if wp.dot(s.flat, out.l) * wanted < 0.0:
+            out.l = -out.l
     # The weight contains all layers, whichever was sampled: a one-sample mixture.
-    if out.l[2] > 0.0:
+    if usable:
         f, density = evaluate(s, out.l)
         out.density = density
         if density > 0.0:

@@ -145,6 +145,24 @@ def sky_weight(sky: EnvironmentRecord, table: SkyTable, n: wp.vec3):
 
 
 @wp.func
+def lamp_weight_at(lamp: LightRecord, p: wp.vec3, n: wp.vec3, sheet: int):
+    """As ``lamp_weight``; for a sheet (1) the sum over both of its sides."""
+    weight = lamp_weight(lamp, p, n)
+    if sheet != 0:
+        weight += lamp_weight(lamp, p, -n)
+    return weight
+
+
+@wp.func
+def sky_weight_at(sky: EnvironmentRecord, table: SkyTable, n: wp.vec3, sheet: int):
+    """As ``sky_weight``; for a sheet (1) the sum over both of its sides."""
+    weight = sky_weight(sky, table, n)
+    if sheet != 0:
+        weight += sky_weight(sky, table, -n)
+    return weight
+
+
+@wp.func
 def sample_cone(axis: wp.vec3, sine_squared: float, u: wp.vec2):
     """A direction sampled uniformly from a cone, and one minus its cosine to the axis."""
     # Uniform in solid angle is uniform in the cosine (Shirley, Wang and Zimmerman 1996).
@@ -360,16 +378,16 @@ class SourceChoice:
 
 
 @wp.func
-def choose_source(world: World, table: SkyTable, p: wp.vec3, n: wp.vec3, u: float):
+def choose_source(world: World, table: SkyTable, p: wp.vec3, n: wp.vec3, sheet: int, u: float):
     """Sample one source, approximately in proportion to its unshadowed light."""
     c = SourceChoice()
     c.source = SKY
-    weight = sky_weight(world.sky, table, n)
+    weight = sky_weight_at(world.sky, table, n, sheet)
     c.total = weight
     # Weighted reservoir sampling: one pass, without a table of weights.
     rest = u
     for j in range(world.lamps.shape[0]):
-        w = lamp_weight(world.lamps[j], p, n)
+        w = lamp_weight_at(world.lamps[j], p, n, sheet)
         if w > 0.0:
             c.total += w
             part = w / c.total

@@ -40,12 +40,12 @@ from gen_data.generator.renderers.warp.pathtraced.kernels.emitters import (
     draw_panel,
     draw_sky,
     intersect_lamp,
-    lamp_weight,
+    lamp_weight_at,
     power_heuristic,
     sky_density,
     sky_light,
     sky_place,
-    sky_weight,
+    sky_weight_at,
 )
 from gen_data.generator.renderers.warp.pathtraced.kernels.sampler import (
     hash_bits,
@@ -172,6 +172,7 @@ class Anchor:
     Attributes:
         p: Origin of the ray.
         n: Normal there.
+        sheet: 1 if it is lit from both sides.
         density: Density of the direction; negative if no source was sampled there.
         total: Sum of all source weights there [lx].
         way_m: Distance from there to the path's current segment.
@@ -179,6 +180,7 @@ class Anchor:
 
     p: wp.vec3
     n: wp.vec3
+    sheet: int
     density: float
     total: float
     way_m: float
@@ -340,7 +342,8 @@ def hit_lamp_light(world: World, budget: Budget, a: Anchor, d: wp.vec3, end_m: f
             if a.density >= 0.0 and budget.lights != 2:
                 # Density of the other technique: the source's share of all weights, times its
                 # density.
-                asked = g.density * lamp_weight(world.lamps[j], a.p, a.n) / wp.max(a.total, 1.0e-20)
+                weight = lamp_weight_at(world.lamps[j], a.p, a.n, a.sheet)
+                asked = g.density * weight / wp.max(a.total, 1.0e-20)
                 # If only source sampling is under test (1), hits count for nothing.
                 part = power_heuristic(a.density, asked) * float(budget.lights >> 1)
             light += g.radiance * part
@@ -356,7 +359,7 @@ def hit_sky_light(world: World, table: SkyTable, budget: Budget, a: Anchor, d: w
         place = sky_place(world.sky, d)
         part = float(1.0)
         if a.density >= 0.0 and budget.lights != 2 and table.part > 0.0:
-            asked = sky_density(table, place) * sky_weight(world.sky, table, a.n)
+            asked = sky_density(table, place) * sky_weight_at(world.sky, table, a.n, a.sheet)
             asked = asked / wp.max(a.total, 1.0e-20)
             part = power_heuristic(a.density, asked) * float(budget.lights >> 1)
         light = sky_light(world.sky, place) * part
@@ -392,8 +395,10 @@ def sample_source(
     else:
         g = draw_ball(world.lamps[choice.source], o, u)
     l = to_shading_frame(g.direction, x, y, v.material.normal)  # noqa: E741
-    # Above both horizons: light must not leak through a face because of its shading normal.
-    if g.distance_m > 0.0 and l[2] > 0.0 and wp.dot(g.direction, v.flat) > 0.0:
+    # Above both horizons: light must not leak through a face because of its shading normal. Sheets
+    # are lit from either side.
+    before = wp.dot(g.direction, v.flat) > 0.0
+    if g.distance_m > 0.0 and ((l[2] > 0.0 and before) or s.p_passed > 0.0):
         f, density = evaluate(s, l)
         asked = g.density * choice.part
         f = wp.cw_mul(f, g.radiance)
@@ -403,7 +408,10 @@ def sample_source(
             if budget.lights == 3:
                 part = power_heuristic(asked, density)
             # The shadow ray comes last: it is the most expensive part.
-            through = transmittance(world, o, g.direction, g.distance_m, budget.clear)
+            start = o
+            if not before:
+                start = offset_origin(v.p, -v.flat)
+            through = transmittance(world, start, g.direction, g.distance_m, budget.clear)
             light = wp.cw_mul(f, through) * (part / asked)
     return light
 
@@ -479,10 +487,18 @@ def choose_glass_lobe(world: World, v: Vertex, w: wp.vec3, xi: float):
 
 
 @wp.func
-def choose_lobe(world: World, v: Vertex, w: wp.vec3, key: wp.uint32, pair: int, sample: wp.uint32):
+def choose_lobe(
+    world: World,
+    v: Vertex,
+    w: wp.vec3,
+    flat: wp.vec3,
+    key: wp.uint32,
+    pair: int,
+    sample: wp.uint32,
+):
     """Choose the lobe of a vertex at random.
 
-    ``w`` points to where the path comes from, in the shading frame.
+    ``w`` points to where the path comes from, ``flat`` is the face's normal, in the shading frame.
     """
     out = ChosenLobe()
     xi = float(0.0)
@@ -502,6 +518,8 @@ def choose_lobe(world: World, v: Vertex, w: wp.vec3, key: wp.uint32, pair: int, 
         world.lobes,
         w,
         v.material.albedo,
+        v.material.translucency,
+        flat,
         v.material.roughness,
         v.material.metallic,
         v.material.specular,
@@ -521,7 +539,7 @@ class Step:
         weight: Weight of the radiance from the new direction.
         straight: Whether the path passes without scattering.
         o, d: The next ray, if ``weight`` is not 0.
-        density, total: As for Anchor.
+        sheet, density, total: As for Anchor.
     """
 
     light: wp.vec3
@@ -529,6 +547,7 @@ class Step:
     straight: bool
     o: wp.vec3
     d: wp.vec3
+    sheet: int
     density: float
     total: float
 
@@ -555,7 +574,8 @@ def scatter_path(
     w = to_shading_frame(-d, x, y, n)
     # Bumps may turn the normal away from the path; the BSDF needs Z > 0.
     w = wp.vec3(w[0], w[1], wp.max(w[2], 1.0e-3))
-    dealt = choose_lobe(world, v, w, key, pair, sample)
+    dealt = choose_lobe(world, v, w, to_shading_frame(v.flat, x, y, n), key, pair, sample)
+    sheet = wp.where(dealt.bsdf.p_passed > 0.0, 1, 0)
     step = Step()
     step.density = -1.0
     step.straight = dealt.kind == STRAIGHT
@@ -577,14 +597,18 @@ def scatter_path(
         sent.density = -1.0
     step.weight = sent.weight
     side = v.flat
-    if sent.l[2] <= 0.0:
+    if sheet != 0:
+        if wp.dot(dealt.bsdf.flat, sent.l) < 0.0:
+            side = -v.flat
+    elif sent.l[2] <= 0.0:
         side = -v.flat
         step.weight = wp.cw_mul(sent.weight, dealt.weight)
     o = offset_origin(v.p, v.flat)
     # No source is sampled inside glass: refracted paths have to find the outside themselves.
     if dealt.kind == OPAQUE or (dealt.kind == SOLID and v.outside):
-        choice = choose_source(world, table, o, n, choices[1])
+        choice = choose_source(world, table, o, n, sheet, choices[1])
         step.density = sent.density
+        step.sheet = sheet
         step.total = choice.total
         if choice.part > 0.0 and budget.lights != 2:
             u = random_pair(key, pair + 3, sample)
@@ -603,6 +627,7 @@ def make_anchor(step: Step, n: wp.vec3):
     a = Anchor()
     a.p = step.o
     a.n = n
+    a.sheet = step.sheet
     a.density = step.density
     a.total = step.total
     return a

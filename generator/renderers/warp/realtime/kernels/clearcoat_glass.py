@@ -53,6 +53,7 @@ from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import
 from gen_data.generator.renderers.warp.scene.kernels.material_eval import (
     SurfaceMaterial,
     evaluate_material,
+    sheet_normal,
 )
 from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
     FARTHEST,
@@ -280,16 +281,21 @@ def light_at_hit(
     if share < SAMPLED_SHARE:
         parts = probe.centre
         disc = probe.pair
+    surface = surface_index(world, m.hit)
+    side = sheet_normal(world, surface, m.hit, m.weight)
     for j in range(world.lamps.shape[0]):
         # Scratch memory holds values of earlier rays: set every lamp.
         probe.lit[j, k] = 1.0
         if clear < MOSTLY_CLEAR:
-            probe.lit[j, k] = visible_lamp_fraction(world, world.lamps[j], origin, m.normal, parts)
+            probe.lit[j, k] = visible_lamp_fraction(
+                world, world.lamps[j], p, origin, m.normal, side, parts
+            )
     open_sky = occlusion
     if share > AMBIENT_SHARE and clear < MOSTLY_CLEAR:
-        open_sky *= visible_sky_fraction(world, origin, m.normal, disc, probe.radius_m)
-    surface = surface_index(world, m.hit)
-    return light_at(world, surface, material, p, -d, probe.lit, open_sky, k)
+        open_sky *= visible_sky_fraction(
+            world, m.hit[0], p, origin, m.normal, side, disc, probe.radius_m
+        )
+    return light_at(world, surface, material, side, p, -d, probe.lit, open_sky, k)
 
 
 @wp.struct
@@ -469,7 +475,7 @@ def add_clearcoat(
     rough = world.surfaces[surface].coat_roughness
     lacquer = make_brdf(world.lobes, wp.vec3(0.0), rough, 0.0, 0.5, c)
     share = coat * lacquer.gloss[0]
-    lamps = sum_lamp_light(world, lacquer, n, p, v, lit, k)
+    lamps = sum_lamp_light(world, lacquer, n, wp.vec3(0.0), p, v, lit, k)
     layers.own = layers.own * (1.0 - share) + lamps.shine * coat
     layers.mirror = layers.mirror * (1.0 - share)
     layers.behind = layers.behind * (1.0 - share)
@@ -491,6 +497,7 @@ def layers_at(
     maps: Maps,
     bare: float,
     n: wp.vec3,
+    side: wp.vec3,
     p: wp.vec3,
     v: wp.vec3,
     lit: wp.array2d[float],
@@ -502,6 +509,7 @@ def layers_at(
     Args:
         bare: Share that no snow covers.
         n: Normal without bumps.
+        side: As for light_at.
     """
     layers = Layers()
     layers.n = material.normal
@@ -522,10 +530,15 @@ def layers_at(
         mirrored, passed = glass_shares(world, surface, material.albedo, c)
         gloss = gloss * (1.0 - clear) + mirrored * clear
         layers.behind = passed * clear
-    lamps = sum_lamp_light(world, brdf, material.normal, p, v, lit, k)
+    lamps = sum_lamp_light(world, brdf, material.normal, side, p, v, lit, k)
     ambient = sky_irradiance(world.sky, material.normal) * open_sky
     diffuse = wp.cw_mul(brdf.matte, material.albedo) * (1.0 - clear)
-    layers.own = wp.cw_mul(diffuse, lamps.lux * (1.0 / wp.pi) + ambient) + lamps.shine
+    received = lamps.lux * (1.0 / wp.pi) + ambient
+    if wp.dot(side, side) > 0.0:
+        behind = sky_irradiance(world.sky, -material.normal) * open_sky
+        behind += lamps.behind * (1.0 / wp.pi)
+        received += wp.cw_mul(material.translucency, behind)
+    layers.own = wp.cw_mul(diffuse, received) + lamps.shine
     layers.own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow)
     if brdf.roughness < MIRROR_ROUGHNESS and (material.metallic >= 0.5 or clear > 0.0):
         layers.mirror = gloss
@@ -662,7 +675,8 @@ def layered_radiance(
         material = apply_coat(world, surface, material, coat, n)
         bare = 1.0 - wp.min(coat.snow, 1.0)
     sky = listed.open_sky[0, k] * maps.occlusion
-    layers = layers_at(world, surface, material, maps, bare, n, p, v, listed.lit, sky, k)
+    side = sheet_normal(world, surface, hit, point.weight)
+    layers = layers_at(world, surface, material, maps, bare, n, side, p, v, listed.lit, sky, k)
     c = layers.own
     for part in range(4):
         ray = make_layer_ray(view, world, layers, part, hit, point.weight, n, p, point.way, width_m)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from gen_data.generator.renderers.warp.scene.kernels.material_eval import is_translucent
 from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
     OFFSET_M,
     OFFSET_PER_DISTANCE,
@@ -80,6 +81,9 @@ def ray_origin(world: World, hit: wp.vec2i, weight: wp.vec2, p_world: wp.vec3, d
     shift = n0 * (w * wp.min(0.0, wp.dot(p - p0, n0)))
     shift += n1 * (u * wp.min(0.0, wp.dot(p - p1, n1)))
     shift += n2 * (v * wp.min(0.0, wp.dot(p - p2, n2)))
+    if is_translucent(world, surface_index(world, hit)):
+        # Light of either side counts: the point must lie on the side of the sheet that it is for.
+        shift = wp.vec3(0.0)
     flat = fast_normalize(wp.cross(p1 - p0, p2 - p0)) * side
     lift_m = OFFSET_M + OFFSET_PER_DISTANCE * wp.length(d_world)
     return p_world + world.bodies[b].R_world_mesh @ (flat * lift_m - shift * world.bodies[b].scale)
@@ -113,6 +117,47 @@ def sample_lattice(
     # Only its own back could occlude a point on the front of a convex solid, and that is behind the
     # horizon.
     lattice.skip[i] = wp.where(convex != 0 and images.weights[pixel][0] < 1.5, hit[0], -1)
+
+
+@wp.func
+def sheet_side(world: World, lattice: Lattice, i: int):
+    """Direction away from a translucent surface on its visible side, any length; 0 for others."""
+    side = wp.vec3(0.0)
+    if is_translucent(world, lattice.surface[i]):
+        side = lattice.origin_m[i] - lattice.p_m[i]
+    return side
+
+
+@wp.struct
+class Departure:
+    """Where rays from a point towards a lamp begin.
+
+    Attributes:
+        origin_m: Just off the surface, on the lamp's side of a translucent one.
+        normal: Normal of the horizon above which the lamp lights the point.
+        skip: As for Lattice.
+    """
+
+    origin_m: wp.vec3
+    normal: wp.vec3
+    skip: int
+
+
+@wp.func
+def departure_to(world: World, lattice: Lattice, i: int, to_lamp: wp.vec3):
+    """Start of the rays from lattice point i towards a lamp in the given direction."""
+    start = Departure()
+    start.origin_m = lattice.origin_m[i]
+    start.normal = lattice.normal[i]
+    start.skip = lattice.skip[i]
+    side = sheet_side(world, lattice, i)
+    if wp.dot(side, side) > 0.0:
+        start.normal = side
+        if wp.dot(side, to_lamp) < 0.0:
+            start.origin_m = lattice.p_m[i] - side
+            start.normal = -side
+            start.skip = -1
+    return start
 
 
 @wp.func

@@ -9,8 +9,14 @@ from gen_data.generator.renderers.warp.atmosphere.kernels.ground_weathering impo
     coat_at,
     footprint,
 )
-from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice, cell_at, ray_origin
+from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
+    Lattice,
+    cell_at,
+    ray_origin,
+    sheet_side,
+)
 from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import (
+    CROWN_M,
     make_frame,
     path_to_lamp,
     surface_tolerance,
@@ -31,9 +37,11 @@ from gen_data.generator.renderers.warp.scene.kernels.material_eval import (
     SurfaceMaterial,
     evaluate_material,
     plain_material,
+    sheet_normal,
 )
 from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
     free_path,
+    free_path_before,
     is_occluded,
     path_along,
     precipitation_exposure,
@@ -128,11 +136,13 @@ class LampLight:
     Attributes:
         lux: Illuminance of the surface [lx].
         shine: Specular reflection towards the viewer [cd/m^2].
+        behind: Illuminance of the other side of a translucent surface [lx].
         shown: Share of ``shine`` of lamps that reflected rays hit themselves.
         towards: Mean direction towards the lamps; any length.
     """
 
     lux: wp.vec3
+    behind: wp.vec3
     shine: wp.vec3
     shown: wp.vec3
     towards: wp.vec3
@@ -143,6 +153,7 @@ def sum_lamp_light(
     world: World,
     brdf: Brdf,
     n: wp.vec3,
+    side: wp.vec3,
     p_world: wp.vec3,
     v: wp.vec3,
     lit: wp.array2d[float],
@@ -156,15 +167,18 @@ def sum_lamp_light(
         visible = lit[j, k]
         if visible > 0.0:
             beam = beam_from(world.lamps[j], p_world)
-            n_l = relative_illuminance(world.lamps[j], beam, p_world, n)
-            if n_l > 0.0:
+            facing = lit_normal(n, side, beam.direction)
+            n_l = relative_illuminance(world.lamps[j], beam, p_world, facing)
+            arriving = beam.normal_lux * (n_l * visible)
+            if wp.dot(side, beam.direction) < 0.0:
+                light.behind += arriving
+            elif n_l > 0.0:
                 l = representative_direction(world.lamps[j], beam, p_world, mirrored, alpha)  # noqa: E741
                 # The representative point of a wide lamp may be below the horizon while the lamp
                 # still contributes: see ``above_horizon_fraction``.
                 n_s = wp.max(wp.dot(n, l), 1.0e-3)
                 wider = lobe_widening(world.lamps[j], beam, alpha)
                 lobe = specular_lobe(brdf, n, v, l, n_s, wider)
-                arriving = beam.normal_lux * (n_l * visible)
                 light.lux += arriving
                 shine = wp.cw_mul(lobe, beam.normal_lux) * (n_s * visible)
                 shine *= above_horizon_fraction(world.lamps[j], beam, n)
@@ -173,6 +187,20 @@ def sum_lamp_light(
                     light.shown += shine
                 light.towards += beam.direction * (arriving[0] + arriving[1] + arriving[2])
     return light
+
+
+@wp.func
+def lit_normal(n: wp.vec3, side: wp.vec3, to_lamp: wp.vec3):
+    """The normal whose cosine counts for a lamp; arguments as for light_at.
+
+    Of a translucent surface ``side`` tells reflection from transmission, and either counts by the
+    absolute cosine of the smooth normal. Its mean over the directions of one side is the same for
+    every smooth normal: no energy is gained or lost.
+    """
+    facing = n
+    if wp.dot(side, side) > 0.0 and wp.dot(n, to_lamp) < 0.0:
+        facing = -n
+    return facing
 
 
 @wp.func
@@ -190,6 +218,7 @@ def light_at(
     world: World,
     surface: int,
     material: SurfaceMaterial,
+    side: wp.vec3,
     p_world: wp.vec3,
     v: wp.vec3,
     lit: wp.array2d[float],
@@ -199,6 +228,8 @@ def light_at(
     """Light of all lamps and of the environment at a point.
 
     Args:
+        side: Direction away from a translucent surface on its visible side, any length; 0 for
+            opaque surfaces.
         v: Unit direction to the viewer.
         lit: Visible fraction of each lamp at points [lamp, k]; UNSEEN counts as none.
         open_sky: Visible fraction of the hemisphere.
@@ -208,17 +239,24 @@ def light_at(
     brdf = make_brdf(
         world.lobes, material.albedo, material.roughness, material.metallic, material.specular, n_v
     )
-    lamps = sum_lamp_light(world, brdf, n, p_world, v, lit, k)
+    lamps = sum_lamp_light(world, brdf, n, side, p_world, v, lit, k)
     light = LatticeLight()
     light.towards = lamps.towards
     ambient = sky_irradiance(world.sky, n) * open_sky
     mirror = sky_reflection(world.sky, n * (2.0 * n_v) - v, brdf.roughness)
     # Lambert: illuminance over pi is luminance per albedo.
     lux = lamps.lux * (1.0 / wp.pi)
-    light.diffuse = wp.cw_mul(brdf.matte, lux + ambient)
-    light.rest = wp.cw_mul(brdf.gloss, mirror) * specular_occlusion(brdf, open_sky) + lamps.shine
+    received = lux + ambient
+    mirrored = specular_occlusion(brdf, open_sky)
+    if wp.dot(side, side) > 0.0:
+        # What hides the sky from a leaf hides it from its reflections, at any angle.
+        mirrored = wp.min(mirrored, open_sky)
+        behind = lamps.behind * (1.0 / wp.pi) + sky_irradiance(world.sky, -n) * open_sky
+        received += wp.cw_mul(material.translucency, behind)
+    light.diffuse = wp.cw_mul(brdf.matte, received)
+    light.rest = wp.cw_mul(brdf.gloss, mirror) * mirrored + lamps.shine
     light.rest += world.surfaces[surface].emission_cd_m2
-    light.lamps = share_of(lux, lux + ambient)
+    light.lamps = share_of(lux, received)
     light.shine = share_of(lamps.shine, light.rest)
     return light
 
@@ -265,7 +303,8 @@ def light_lattice(
         coats[k] = coat.mixable
     # The pixels apply bumps themselves: see lattice_interpolation.bump_factors.
     material.normal = lattice.normal[k]
-    lights[k] = light_at(world, surface, material, p, v, lit, open_sky[0, k], k)
+    side = sheet_side(world, lattice, k)
+    lights[k] = light_at(world, surface, material, side, p, v, lit, open_sky[0, k], k)
 
 
 @wp.kernel
@@ -295,7 +334,8 @@ def shade_points(
         n = images.normals[i]
         coat = coat_at(world, surface, p, n, listed.exposed[k], footprint(view, p, n, 1.0))
         material = apply_coat(world, surface, material, coat, n)
-    light = light_at(world, surface, material, p, v, listed.lit, listed.open_sky[0, k], k)
+    side = sheet_normal(world, surface, hit, images.weights[i])
+    light = light_at(world, surface, material, side, p, v, listed.lit, listed.open_sky[0, k], k)
     radiance[i] = wp.cw_mul(light.diffuse, material.albedo) + light.rest
 
 
@@ -364,11 +404,18 @@ def find_pixel_visibility(
     else:
         n = images.normals[i]
         origin = ray_origin(world, images.hits[i], images.weights[i], p, d * images.z_m[i])
+        side = sheet_normal(
+            world, surface_index(world, images.hits[i]), images.hits[i], images.weights[i]
+        )
         for j in range(world.lamps.shape[0]):
-            listed.lit[j, k] = visible_lamp_fraction(world, world.lamps[j], origin, n, probe.parts)
+            listed.lit[j, k] = visible_lamp_fraction(
+                world, world.lamps[j], p, origin, n, side, probe.parts
+            )
         sky, found = body_sky_visibility(lattice, lattice_sky, cell.first, images.hits[i][0])
         if found == 0.0:
-            sky = visible_sky_fraction(world, origin, n, probe.disc, probe.radius_m)
+            sky = visible_sky_fraction(
+                world, images.hits[i][0], p, origin, n, side, probe.disc, probe.radius_m
+            )
             found = 1.0
         listed.open_sky[0, k] = sky / found
         listed.exposed[k] = sky_exposure_at(world, origin, n)
@@ -435,19 +482,40 @@ def is_usable_point(
 
 @wp.func
 def visible_lamp_fraction(
-    world: World, lamp: LightRecord, origin: wp.vec3, n: wp.vec3, parts: wp.array[wp.vec2]
+    world: World,
+    lamp: LightRecord,
+    p: wp.vec3,
+    origin: wp.vec3,
+    n: wp.vec3,
+    side: wp.vec3,
+    parts: wp.array[wp.vec2],
 ):
-    """Visible fraction of a lamp from a point, by up to all ``parts``; one ray for small lamps."""
+    """Visible fraction of a lamp from a point, by up to all ``parts``; one ray for small lamps.
+
+    Args:
+        p: The point on its surface.
+        origin: Origin of rays on its visible side; those to a lamp behind a translucent surface
+            begin on the other side.
+        n: Normal of the horizon of opaque surfaces.
+        side: As for light_at.
+    """
     beam = beam_from(lamp, origin)
     seen = float(0.0)
     cast = int(0)
-    if wp.dot(beam.direction, n) > -beam.spread and wp.max(beam.normal_lux) > 0.0:
+    start = origin
+    horizon = n
+    if wp.dot(side, side) > 0.0:
+        horizon = side
+        if wp.dot(side, beam.direction) < 0.0:
+            start = p * 2.0 - origin
+            horizon = -side
+    if wp.dot(beam.direction, horizon) > -beam.spread and wp.max(beam.normal_lux) > 0.0:
         for k in range(wp.where(beam.spread < SMALL_SPREAD, 1, parts.shape[0])):
             # Penumbrae are rare: where the first two rays agree, the rest is taken to agree.
             if k < 2 or (seen > 0.0 and seen < float(cast)):
                 cast += 1
                 if not is_occluded(
-                    world, path_along(origin, path_to_lamp(lamp, origin, n, parts[k]))
+                    world, path_along(start, path_to_lamp(lamp, start, horizon, parts[k]))
                 ):
                     seen += 1.0
     return seen / wp.max(float(cast), 1.0)
@@ -455,9 +523,21 @@ def visible_lamp_fraction(
 
 @wp.func
 def visible_sky_fraction(
-    world: World, origin: wp.vec3, n: wp.vec3, disc: wp.array[wp.vec2], radius_m: float
+    world: World,
+    body: int,
+    p: wp.vec3,
+    origin: wp.vec3,
+    n: wp.vec3,
+    side: wp.vec3,
+    disc: wp.array[wp.vec2],
+    radius_m: float,
 ):
-    """Visible fraction of the hemisphere within a radius, weighted by the cosine."""
+    """Visible fraction of the hemisphere within a radius, weighted by the cosine.
+
+    Of a translucent surface of ``body`` it is the mean of both sides, and the body itself hides the
+    sky up to CROWN_M, as in soft_shadows.probe_ambient. Other arguments as for
+    visible_lamp_fraction.
+    """
     if radius_m == 0.0:
         return 1.0
     x, y = make_frame(n)
@@ -466,7 +546,15 @@ def visible_sky_fraction(
         c = disc[k]
         # Malley's method: disk points lifted to the hemisphere are distributed by the cosine.
         up = wp.sqrt(1.0 - wp.dot(c, c))
-        t = free_path(world, path_along(origin, (x * c[0] + y * c[1] + n * up) * radius_m))
+        way = x * c[0] + y * c[1] + n * up
+        start = origin
+        within = float(1.0)
+        if wp.dot(side, side) > 0.0:
+            way = way * wp.where((k & 1) == 0, 1.0, -1.0)
+            if wp.dot(side, way) < 0.0:
+                start = p * 2.0 - origin
+            within = free_path_before(world, body, path_along(start, way * CROWN_M), 1.0)
+        t = free_path(world, path_along(start, way * radius_m))
         # Full occlusion on contact, fading with zero slope at the radius.
-        total += t * (2.0 - t)
+        total += wp.min(t * (2.0 - t), within)
     return total / float(disc.shape[0])

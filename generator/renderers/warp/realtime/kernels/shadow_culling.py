@@ -9,6 +9,7 @@ import warp as wp
 
 from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, SUN_DISTANCE_M
+from gen_data.generator.renderers.warp.scene.kernels.material_eval import is_translucent
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     LightRecord,
     World,
@@ -43,7 +44,7 @@ class Tile:
 
 
 @wp.func
-def tile_bounds(lattice: Lattice, column: int, row: int):
+def tile_bounds(world: World, lattice: Lattice, column: int, row: int):
     """Bounds of one tile."""
     low = wp.vec3(1.0e9)
     high = wp.vec3(-1.0e9)
@@ -61,6 +62,9 @@ def tile_bounds(lattice: Lattice, column: int, row: int):
                 if tile.count == 0:
                     tile.normal = lattice.normal[i]
                 if wp.dot(lattice.normal[i], tile.normal) < 0.99999:
+                    tile.flat = 0
+                if is_translucent(world, lattice.surface[i]):
+                    # Lamps behind it light it as well: both sides may lie in shadow.
                     tile.flat = 0
                 # Height along the first point's normal; nothing below it can shade a flat tile.
                 tile.height_m = wp.max(tile.height_m, wp.dot(p, tile.normal))
@@ -232,7 +236,7 @@ def list_occluders(
     i = wp.tid()
     column = i % tile_columns
     row = i / tile_columns
-    tile = tile_bounds(lattice, column, row)
+    tile = tile_bounds(world, lattice, column, row)
     lamps = world.lamps.shape[0]
     for j in range(lamps + 1):
         lists[i, j, 0] = 0

@@ -15,7 +15,12 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice, points_agree
+from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
+    Departure,
+    Lattice,
+    departure_to,
+    points_agree,
+)
 from gen_data.generator.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE, TILE
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     DISK,
@@ -25,7 +30,9 @@ from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     beam_from,
 )
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_irradiance
+from gen_data.generator.renderers.warp.scene.kernels.material_eval import is_translucent
 from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
+    free_path_before,
     free_path_of_listed,
     is_occluded,
     is_occluded_by_listed,
@@ -44,6 +51,9 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 UNSEEN = wp.constant(-1.0)
 # Shadows of lamps with a smaller share of a point's light are too faint for further rays.
 SMOOTHED_SHARE = wp.constant(0.08)
+# Leaves of one body hide the sky from one another up to this distance, the less the farther they
+# are, since they scatter light themselves [m]. With it, crowns are as bright as path-traced ones.
+CROWN_M = wp.constant(18.0)
 
 
 @wp.func
@@ -69,6 +79,15 @@ def make_frame(z: wp.vec3):
 
 
 @wp.func
+def lamp_vector(lamp: LightRecord, p_world: wp.vec3):
+    """Displacement from a point to the centre of a lamp."""
+    way = lamp.position_m - p_world
+    if lamp.kind == SUN:
+        way = lamp.direction * -SUN_DISTANCE_M
+    return way
+
+
+@wp.func
 def path_to_lamp(lamp: LightRecord, origin: wp.vec3, n: wp.vec3, part: wp.vec2):
     """Displacement from a point to a part of a lamp; mirrored if below the horizon.
 
@@ -76,7 +95,7 @@ def path_to_lamp(lamp: LightRecord, origin: wp.vec3, n: wp.vec3, part: wp.vec2):
         n: Normal of the horizon.
         part: Point of the unit disk, which parametrises the lamp's outline.
     """
-    to_lamp = lamp.position_m - origin
+    to_lamp = lamp_vector(lamp, origin)
     off = wp.vec3(0.0)
     if lamp.kind == RECTANGLE:
         q = square_of_disc(part)
@@ -86,7 +105,6 @@ def path_to_lamp(lamp: LightRecord, origin: wp.vec3, n: wp.vec3, part: wp.vec2):
     else:
         radius = lamp.radius
         if lamp.kind == SUN:
-            to_lamp = lamp.direction * -SUN_DISTANCE_M
             radius = lamp.radius * SUN_DISTANCE_M
         x, y = make_frame(fast_normalize(to_lamp))
         off = (x * part[0] + y * part[1]) * radius
@@ -138,15 +156,21 @@ def agreed_value(lattice: Lattice, values: wp.array2d[float], j: int, x: int, y:
 
 @wp.kernel
 def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float]):
-    """Share of each lamp in each point's unshadowed light [lamp, point]; UNSEEN behind surfaces."""
+    """Share of each lamp in each point's unshadowed light [lamp, point]; UNSEEN behind surfaces.
+
+    Lamps behind a translucent surface count like those before it.
+    """
     i = wp.tid()
     if lattice.body[i] < 0:
         return
     n = lattice.normal[i]
+    translucent = is_translucent(world, lattice.surface[i])
     total = wp.max(wp.max(sky_irradiance(world.sky, n)) * wp.pi, 1.0e-9)
     for j in range(world.lamps.shape[0]):
         beam = beam_from(world.lamps[j], lattice.origin_m[i])
         cosine = wp.dot(beam.direction, n)
+        if translucent:
+            cosine = wp.abs(cosine)
         brightest = wp.max(beam.normal_lux)
         lux = float(UNSEEN)
         if cosine > -beam.spread and brightest > 0.0:
@@ -219,9 +243,10 @@ def probe_lamp(
     """Visibility of a part of lamp j from point i, 1 or 0, by one ray."""
     value = float(1.0)
     if lists[tile, j, 0] != 0:
-        origin = lattice.origin_m[i]
-        path = path_along(origin, path_to_lamp(world.lamps[j], origin, lattice.normal[i], part))
-        if is_occluded_by_listed(world, lists, tile, j, lattice.skip[i], path):
+        start = departure_to(world, lattice, i, lamp_vector(world.lamps[j], lattice.p_m[i]))
+        way = path_to_lamp(world.lamps[j], start.origin_m, start.normal, part)
+        path = path_along(start.origin_m, way)
+        if is_occluded_by_listed(world, lists, tile, j, start.skip, path):
             value = 0.0
     return value
 
@@ -304,13 +329,13 @@ def refine_lamps(
         if mixed and shares[j, i] > SMOOTHED_SHARE:
             if window_bits(lattice, probed, j, i) == 3:
                 seen = value
-                origin = lattice.origin_m[i]
+                start = departure_to(world, lattice, i, lamp_vector(world.lamps[j], lattice.p_m[i]))
                 for k in range(2):
                     # The two points of the triple that probe_lamps has left out.
                     part = disc[3 * bayer(x, y) + 2 * k]
-                    way = path_to_lamp(world.lamps[j], origin, lattice.normal[i], part)
-                    path = path_along(origin, way)
-                    if not is_occluded_by_listed(world, lists, tile, j, lattice.skip[i], path):
+                    way = path_to_lamp(world.lamps[j], start.origin_m, start.normal, part)
+                    path = path_along(start.origin_m, way)
+                    if not is_occluded_by_listed(world, lists, tile, j, start.skip, path):
                         seen += 1.0
                 value = seen / 3.0
         lit[j, i] = value
@@ -434,6 +459,9 @@ def probe_ambient(
 ):
     """Ambient occlusion by one short ray per point: 1 if free, less the nearer the obstacle.
 
+    On a translucent surface, half of the points look to the other side, and the body itself hides
+    the sky up to CROWN_M: leaves see little of it from inside of a crown.
+
     Args:
         hemisphere: Sixteen directions about +Z, distributed by the cosine.
     """
@@ -446,12 +474,24 @@ def probe_ambient(
         if lists[tile, lamps, 0] != 0:
             n = lattice.normal[i]
             x, y = make_frame(n)
-            h = hemisphere[bayer(i % lattice.width, i / lattice.width)]
-            way = (x * h[0] + y * h[1] + n * h[2]) * radius_m
-            path = path_along(lattice.origin_m[i], way)
-            t = free_path_of_listed(world, lists, tile, lattice.skip[i], path)
+            rank = bayer(i % lattice.width, i / lattice.width)
+            h = hemisphere[rank]
+            way = x * h[0] + y * h[1] + n * h[2]
+            start = Departure()
+            start.origin_m = lattice.origin_m[i]
+            start.skip = lattice.skip[i]
+            within = float(1.0)
+            if is_translucent(world, lattice.surface[i]):
+                way = way * wp.where((rank & 2) != 0, 1.0, -1.0)
+                start = departure_to(world, lattice, i, way)
+                start.skip = lattice.body[i]
+                within = free_path_before(
+                    world, lattice.body[i], path_along(start.origin_m, way * CROWN_M), 1.0
+                )
+            path = path_along(start.origin_m, way * radius_m)
+            t = free_path_of_listed(world, lists, tile, start.skip, path)
             # Full occlusion on contact, fading with zero slope at the radius: no visible boundary.
-            value = t * (2.0 - t)
+            value = wp.min(t * (2.0 - t), within)
     open_sky[0, i] = value
 
 

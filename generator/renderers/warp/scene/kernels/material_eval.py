@@ -10,6 +10,8 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     face_vertices,
     fast_normalize,
     first_weight,
+    flat_normal,
+    is_back_face,
     vertex_at,
 )
 from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import make_sampler, texel_at
@@ -20,13 +22,38 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 @wp.struct
 class SurfaceMaterial:
-    """Material parameters at a point, textures included; ``normal`` in the world frame."""
+    """Material parameters at a point, textures included; ``normal`` in the world frame.
+
+    ``translucency`` is the ratio of diffuse transmittance to ``albedo``.
+    """
 
     albedo: wp.vec3
     roughness: float
     metallic: float
     specular: float
     normal: wp.vec3
+    translucency: wp.vec3
+
+
+@wp.func
+def is_translucent(world: World, surface: int):
+    """Whether a surface scatters light to its other side."""
+    return wp.max(world.surfaces[surface].translucency) > 0.0
+
+
+@wp.func
+def sheet_normal(world: World, surface: int, hit: wp.vec2i, weight: wp.vec2):
+    """Geometric normal of a translucent surface on its visible side; 0 for opaque surfaces.
+
+    Smooth normals of foliage lean out of the crown, so that they do not tell the sides of a leaf
+    apart.
+    """
+    n = wp.vec3(0.0)
+    if is_translucent(world, surface):
+        n = flat_normal(world, hit)
+        if is_back_face(weight):
+            n = -n
+    return n
 
 
 @wp.func
@@ -137,6 +164,7 @@ def plain_material(world: World, surface: int, normal: wp.vec3):
     material.metallic = world.surfaces[surface].metallic
     material.specular = world.surfaces[surface].specular
     material.normal = normal
+    material.translucency = world.surfaces[surface].translucency
     return material
 
 

@@ -115,6 +115,8 @@ class MaterialRecord:
 
     Attributes:
         texture: Index into the textures; -1 where there is none.
+        translucency: Diffuse transmittance over diffuse reflectance, ``base_color``; 0 for opaque
+            surfaces.
         layered: 1 for a coat, transmission, maps of emission, metal or occlusion, or a mirror; for
             0 the fields below are unused.
         coat, coat_roughness: Weight and perceptual roughness of the clear coat.
@@ -131,6 +133,7 @@ class MaterialRecord:
     texture: int
     texture_scale_m: float
     emission_cd_m2: wp.vec3
+    translucency: wp.vec3
     layered: int
     coat: float
     coat_roughness: float
