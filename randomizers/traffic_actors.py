@@ -48,6 +48,7 @@ DRIVERS: Mapping[str, Driver] = {
     "bus": Driver(22.0, 1.0),
     "cyclist": Driver(5.5, 0.8, keeps_side=True),
     "motorcycle": Driver(60.0, 2.2),
+    "tram": Driver(14.0, 1.0),
     "truck": Driver(22.0, 0.9),
 }
 

@@ -25,7 +25,7 @@ from gen_data.generator.roads.reference_line import Array, ReferenceLine
 FURNITURE_M = 0.5
 """Distance of poles and bins from the kerb."""
 OVERHANG_M = 0.6
-"""Length by which cars in angled bays stand over the kerb (EAR 05: 0.70 m)."""
+"""Length by which cars in angled bays stand over the kerb (RAR, by sicherestrassen.de: 0.70 m)."""
 PLANTED_MEDIAN_M = 1.2
 """Kerbed medians from this width on are a lane for plants."""
 MEETING_M = 0.05
