@@ -45,7 +45,7 @@ def tram(seed: int) -> Solid:
     rng = variant_rng("tram", seed)
     half, x = 0.5 * _WIDTHS_M[seed % len(_WIDTHS_M)], 0.5 * rng.between(27.0, 35.0)
     joints = np.linspace(-x, x, (3 if seed % 2 else 5) + 1)[1:-1].tolist()
-    livery = [hex_to_linear(code) for code in rng.choose(COLORS["liveries"]).split()]
+    main, second = (hex_to_linear(code) for code in rng.choose(COLORS["liveries"]).split())
     shell = [_body(half, x, joints, rng), *_running_gear(x)]
     shell += [*_roof(half, x, joints, rng), *_ends(x)]
     parts = [drop_uvs(part) for part in shell]
@@ -54,7 +54,7 @@ def tram(seed: int) -> Solid:
         hulls.box((-x + 2.0, -0.8, 0.0), (x - 2.0, 0.8, _FLOOR_M)),
     ]
     whole = [*parts, *(drop_uvs(part) for part in _pantograph())]
-    return make_solid(whole, materials(rng, *livery), hull, _keypoints(half, x), parts)
+    return make_solid(whole, materials(rng, main, second), hull, _keypoints(half, x), parts)
 
 
 def tram_facts(seed: int) -> Facts:
