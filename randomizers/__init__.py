@@ -33,6 +33,7 @@ TABLE = PluginTable[Randomizer](
         "textures": "gen_data.randomizers.textures:Textures",
         "time_of_day": "gen_data.randomizers.time_of_day:TimeOfDay",
         "traffic_flow": "gen_data.randomizers.traffic_flow:TrafficFlow",
+        "umbrellas": "gen_data.randomizers.umbrellas:Umbrellas",
         "vehicle_lights": "gen_data.randomizers.vehicle_lights:VehicleLights",
         "vehicle_paint": "gen_data.randomizers.vehicle_paint:VehiclePaint",
         "weather": "gen_data.randomizers.weather:Weather",

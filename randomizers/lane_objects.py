@@ -82,6 +82,7 @@ class LaneObjects(GroupRandomizer):
         scale: Factor on an object's size.
         min_clearance_m: Smallest distance to any other object.
         junctions: Whether to use lanes across junctions, too.
+        among: Lanes to use of several that have the same direction.
         uniform_area: Whether to scatter objects over the bounding rectangle of the lanes at any
             yaw, as in unstructured domain randomisation (Tremblay et al. 2018); ``count`` sets
             their number.
@@ -104,6 +105,7 @@ class LaneObjects(GroupRandomizer):
     scale: Annotated[dist.Scalar, SCALE] = dist.Constant(1.0)
     min_clearance_m: float = Field(0.15, ge=0)
     junctions: bool = False
+    among: Literal["all", "leftmost", "rightmost"] = "all"
     uniform_area: bool = False
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
@@ -132,6 +134,8 @@ class LaneObjects(GroupRandomizer):
             for lane in scene.lanes
             if lane.kind in kinds
             and (self.junctions or not lane.junction)
+            and not (self.among == "rightmost" and lane.right)
+            and not (self.among == "leftmost" and lane.left)
             and (not self.roads or lane.road in self.roads)
         ]
 

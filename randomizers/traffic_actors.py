@@ -36,16 +36,19 @@ class Driver:
     Attributes:
         speed_m_s: Largest speed.
         acceleration_m_s2: Largest acceleration.
+        keeps_side: Whether it stays where it is across its lane, instead of in the middle.
     """
 
     speed_m_s: float = 60.0
     acceleration_m_s2: float = 1.5
+    keeps_side: bool = False
 
 
 DRIVERS: Mapping[str, Driver] = {
     "bus": Driver(22.0, 1.0),
-    "cyclist": Driver(5.5, 0.8),
+    "cyclist": Driver(5.5, 0.8, keeps_side=True),
     "motorcycle": Driver(60.0, 2.2),
+    "tram": Driver(14.0, 1.0),
     "truck": Driver(22.0, 0.9),
 }
 
@@ -76,7 +79,7 @@ class OnFoot:
 
 
 def find_drivers(scene: Scene, graph: LaneGraph, assets: AssetIndex) -> list[OnRoad]:
-    """Find the vehicles on driving lanes, in order: members of groups and carriers of rigs.
+    """Find the vehicles on the graph's lanes, in order: members of groups and carriers of rigs.
 
     Vehicles across a lane or against its direction are left out.
     """

@@ -66,7 +66,7 @@ BODY_M = (0.2, 0.22)
 
 @dataclass(frozen=True, slots=True)
 class Streets:
-    """Lane graphs by kind of traffic."""
+    """Lane graphs by kind of traffic; ``driving`` includes bicycle lanes."""
 
     driving: LaneGraph
     sidewalks: LaneGraph
@@ -75,18 +75,19 @@ class Streets:
     @classmethod
     def of(cls, scene: Scene) -> Streets:
         """Build the lane graphs of a scene."""
-        kinds = ("driving", "sidewalk", "crosswalk")
-        return cls(*(LaneGraph.of(scene.lanes, kind) for kind in kinds))
+        kinds = (("driving", "bicycle"), ("sidewalk",), ("crosswalk",))
+        return cls(*(LaneGraph.of(scene.lanes, *of) for of in kinds))
 
 
 class TrafficFlow(RandomizerBase):
     """Simulates traffic; list it after all groups, paints and lights of a street.
 
-    Vehicles on driving lanes, including the ego vehicle, follow routes over the lanes with pure
-    pursuit (Coulter 1992) and keep their distance with the Intelligent Driver Model (Treiber,
-    Hennecke, Helbing 2000). They obey signals, give way at junctions without signals, and stop for
-    pedestrians on crosswalks. People in a walking pose follow sidewalks and use crosswalks.
-    Everything else stands still. Vehicles and pedestrians stop at the end of the road network.
+    Vehicles on driving and bicycle lanes, including the ego vehicle, follow routes over the lanes
+    with pure pursuit (Coulter 1992) and keep their distance with the Intelligent Driver Model
+    (Treiber, Hennecke, Helbing 2000). Cyclists keep to the side of their lane. Vehicles obey
+    signals, give way at junctions without signals, and stop for pedestrians on crosswalks. People
+    in a walking pose follow sidewalks and use crosswalks. Everything else stands still. Vehicles
+    and pedestrians stop at the end of the road network.
 
     Attributes:
         duration_s: Simulated time from time 0; limits the length of the data set's sequences.
@@ -219,6 +220,7 @@ class TrafficFlow(RandomizerBase):
                     speed_max_m_s=kind.speed_m_s,
                     headway_s=headway_s,
                     acceleration_m_s2=kind.acceleration_m_s2,
+                    left_m=member.place.left_m if kind.keeps_side else 0.0,
                 )
             )
         if not vehicles:

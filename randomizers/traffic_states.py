@@ -135,7 +135,8 @@ def gait_changes(
         still = pace < (WALKS_M_S if still else STANDS_M_S)
         standing[k] = still
     states = np.where(standing, -1, phases).tolist()
-    at_rest = str(AssetId(asset.name, {**asset.parameters, "pose": "stand"}))
+    rest = "stand_umbrella" if known["pose"] == "walk_umbrella" else "stand"
+    at_rest = str(AssetId(asset.name, {**asset.parameters, "pose": rest}))
     walking = [
         str(AssetId(asset.name, {**asset.parameters, "phase": k / PHASES})) for k in range(PHASES)
     ]

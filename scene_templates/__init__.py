@@ -36,6 +36,7 @@ TABLE = PluginTable[Element](
         "signals": "gen_data.scene_templates.signals:Signals",
         "square": "gen_data.scene_templates.square:Square",
         "surface": "gen_data.scene_templates.surface:SurfaceElement",
+        "tram_line": "gen_data.scene_templates.tram_line:TramLine",
         "usd_stage": "gen_data.scene_templates.usd_stage:UsdStage",
     },
     (Element,),

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Literal
 
 from pydantic import Field
 
+from gen_data.generator.assets.procedural.variant_rng import variant_rng
+from gen_data.generator.assets.scenery.shelters import pump_islands_m
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import LaneKind, Scene
 from gen_data.generator.core.se3 import SE3
+from gen_data.generator.roads.cross_section import strips
 from gen_data.scene_templates.element import (
     Element,
     add_background,
@@ -19,30 +23,37 @@ from gen_data.scene_templates.element import (
     parametric_id,
     stand_upright,
 )
-from gen_data.scene_templates.road_places import cut_lanes, find_place
+from gen_data.scene_templates.road_places import RoadPlace, cut_lanes, find_place
 
 LENGTH_M, DEPTH_M = 38.0, 30.0
 """Extent of the forecourt along the road and away from it (assumed, 20 %)."""
 _CANOPY_M, _SHOP_M = 10.5, 24.0
 """Distances of the middles of canopy and shop from the road's edge."""
+_DRIVEWAYS_M, _DRIVEWAY_M = (-12.5, 12.5), 6.5
+"""Places of the driveways along the road, and their width (assumed, 20 %)."""
+_BESIDE_M, _CARS = 1.75, 124
+"""Distance of a car that is filled up from the middle of its island; variants of cars."""
 
 
 class PetrolStation(Element):
-    """A forecourt beside a road with a canopy over pumps, a shop and a price sign; unlabelled.
+    """A forecourt beside a road with a canopy over pumps, a shop and a price sign.
 
-    It takes the place of houses, gardens and trees there; the road stays as it is.
+    It takes the place of houses, gardens and trees there; the road stays as it is. Two driveways
+    cross the kerb and the sidewalk. Only cars at the pumps have labels.
 
     Attributes:
         road: Name of the road.
         station_m: Position of its middle along the road.
         side: Side of the road, as seen along it.
-        seed: Seed of the brand and of all parts.
+        cars: Probability that a car stands at an island of pumps.
+        seed: Seed of the brand, of all parts and of the cars.
     """
 
     type: Literal["petrol_station"] = "petrol_station"
     road: str = Field(examples=["main"])
     station_m: float = Field(60.0, ge=0)
     side: Literal["left", "right"] = "right"
+    cars: float = Field(0.5, ge=0, le=1)
     seed: int = Field(0, ge=0, le=1_000_000)
 
     @property
@@ -75,4 +86,40 @@ class PetrolStation(Element):
             asset = parametric_id(family, seed=brand)
             pose = stand_upright(assets, asset, frame @ stand)
             scene = add_static(scene, assets, f"{self.name}/{word}", asset, pose)
+        scene = self._add_driveways(scene, assets, place, side, max(z_m, -0.02) + 0.02)
+        return self._add_cars(scene, assets, frame @ SE3((_CANOPY_M, 0.0, 0.0)), brand)
+
+    def _add_driveways(
+        self, scene: Scene, assets: AssetIndex, place: RoadPlace, side: int, rise_m: float
+    ) -> Scene:
+        """Add asphalt from the gutter to the forecourt, ``rise_m`` above the gutter."""
+        foot_m = place.shape.carriageway_m(side)
+        row = [s for s in strips(place.shape, side) if s.kind == "kerb"]
+        kerb_m = row[-1].outer_z_m - row[-1].inner_z_m if row else 0.0
+        for number, along in enumerate(_DRIVEWAYS_M):
+            here = replace(place, station_m=place.station_m + along)
+            edge_m = place.edge_m(side, land=False)[0] + place.sagitta_m(side, 0.5 * LENGTH_M)
+            # On the inside of bends the road comes nearer to the forecourt's edge.
+            bent_m = 0.5 * side * place.shape.curvature_per_m * along * along
+            asset = parametric_id(
+                "driveway", seed=self.seed % 4, width_m=_DRIVEWAY_M,
+                depth_m=round(edge_m - foot_m - min(bent_m, edge_m - foot_m - 0.5) + 0.3, 3),
+                kerb_m=round(kerb_m, 4), rise_m=round(rise_m, 4),
+            )  # fmt: skip
+            pose = here.pose(side * foot_m, 0.0, side * 0.5 * math.pi)
+            scene = add_background(scene, assets, f"{self.name}/driveway{number}", asset, pose)
+        return scene
+
+    def _add_cars(self, scene: Scene, assets: AssetIndex, T_world_canopy: SE3, brand: int) -> Scene:
+        """Add cars beside the islands, their fronts to or from the shop."""
+        rng = variant_rng("petrol_station/cars", self.seed)
+        for number, y in enumerate(pump_islands_m(brand)):
+            here = rng.chance(self.cars)
+            at = SE3.about_z(math.pi * (rng.random() < 0.5), (rng.between(-1.4, 1.4), y + _BESIDE_M,
+                             0.0))  # fmt: skip
+            asset = parametric_id("car", seed=int(rng.between(0, _CARS)))
+            if here:
+                pose = stand_upright(assets, asset, T_world_canopy @ at)
+                name = f"{self.name}/car{number}"
+                scene = add_static(scene, assets, name, asset, pose, annotated=True)
         return scene

@@ -31,9 +31,10 @@ from gen_data.scene_templates.element import (
 T = TypeVar("T")
 Width = float
 PARKING_M = {"none": 0.0, "parallel": 2.2, "angled": 5.58, "perpendicular": 5.0}
-"""Width of a parking strip: 2.00 to 2.30 m along the kerb, bays of 2.50 x 5.00 m (EAR 05)."""
+"""Width of a parking strip: at least 2.00 m along the kerb (RASt 06, by stvo2go.de); bays of 2.50 m
+x 5.00 m, 0.70 m of it over the kerb (RAR, by sicherestrassen.de)."""
 TURN_LANE_M = 2.5
-"""Smallest width of a lane for turning vehicles (assumed; RASt 06 plans 2.75 to 3.25 m)."""
+"""Smallest width of a lane for turning vehicles (assumed, 10 %)."""
 BAY_ANGLE_DEG = {"none": 0.0, "parallel": 0.0, "angled": 60.0, "perpendicular": 90.0}
 
 Ground = Literal["grass", "paving", "cobbles", "gravel", "earth", "asphalt"]

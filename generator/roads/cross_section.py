@@ -25,9 +25,9 @@ APRON_M, APRON_FALL_M = 6.0, 0.1
 APRON_STEPS, APRON_DROPS = (0.0, 0.25, 1.0), (0.0, 0.25, 1.0)
 """Profile of the apron as fractions of both."""
 BAY_WIDTH_M = 2.5
-"""Width of bays at an angle to the road (EAR 05: 2.50 m)."""
+"""Width of bays at an angle to the road (RAR, by sicherestrassen.de: 2.50 m)."""
 FALL = 0.025
-"""Slope of sidewalks and verges: 2 to 2.5 % for drainage (EAE/RASt 06, 6.1.1.2)."""
+"""Slope of sidewalks and verges, for drainage (assumed, 2 to 3 %)."""
 
 
 @dataclass(frozen=True, slots=True)

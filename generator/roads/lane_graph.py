@@ -25,12 +25,14 @@ from gen_data.generator.roads.reference_line import Array, ReferenceLine
 FURNITURE_M = 0.5
 """Distance of poles and bins from the kerb."""
 OVERHANG_M = 0.6
-"""Length by which cars in angled bays stand over the kerb (EAR 05: 0.70 m)."""
+"""Length by which cars in angled bays stand over the kerb (RAR, by sicherestrassen.de: 0.70 m)."""
 PLANTED_MEDIAN_M = 1.2
 """Kerbed medians from this width on are a lane for plants."""
 MEETING_M = 0.05
 MEETING_RAD = math.radians(8.0)
 """Largest distance and angle between the end of a lane and the start of its successor."""
+BICYCLE_M_S = 5.0
+"""Usual speed on bicycle lanes: 18 km/h (assumed, 20 %)."""
 _STEP_M = 2.0
 
 
@@ -58,7 +60,9 @@ def road_lanes(
             if kind == "parking" and angled:
                 continue
             center = path(line, t_m, z_m, side < 0, T_world_road)
-            lanes.append(Lane(f"{name}/{kind}_{word}", kind, center, width_m, road=name))
+            speed = BICYCLE_M_S if kind == "bicycle" else 0.0
+            own = f"{name}/{kind}_{word}"
+            lanes.append(Lane(own, kind, center, width_m, road=name, speed_m_s=speed))
         if angled:
             lanes += _bays(shape, row, f"{name}/parking_{word}", name, T_world_road)
     lanes += _turn_lanes(shape, name, T_world_road, speed_m_s)

@@ -22,8 +22,8 @@ class ParkingShape:
     Attributes:
         bays: Number of bays per row.
         aisles: Number of aisles, each with a row of bays on both sides.
-        bay_m: Width and length of a bay (EAR 05: 2.50 m x 5.00 m).
-        aisle_m: Width of an aisle (EAR 05: 6.00 m for bays at right angles).
+        bay_m: Width and length of a bay (RAR, by sicherestrassen.de: 2.50 m x 5.00 m).
+        aisle_m: Width of an aisle (likewise: 6.00 m for bays at right angles).
     """
 
     bays: int = 10

@@ -21,7 +21,7 @@ STATION_M = 0.5
 
 @dataclass(frozen=True, eq=False)
 class LaneGraph:
-    """Graph of the lanes of one kind.
+    """Graph of the lanes of one kind, or of several.
 
     Attributes:
         names: Names of the lanes, sorted, lanes across junctions last.
@@ -34,9 +34,9 @@ class LaneGraph:
     segments: Array
 
     @classmethod
-    def of(cls, lanes: Iterable[Lane], kind: str) -> LaneGraph:
-        """Build the graph of all lanes of a kind."""
-        lines = {lane.name: LaneLine(lane) for lane in lanes if lane.kind == kind}
+    def of(cls, lanes: Iterable[Lane], *kinds: str) -> LaneGraph:
+        """Build the graph of all lanes of some kinds."""
+        lines = {lane.name: LaneLine(lane) for lane in lanes if lane.kind in kinds}
         before: dict[str, list[str]] = {}
         for name, line in lines.items():
             for after in line.lane.successors:

@@ -19,7 +19,7 @@ from gen_data.generator.traffic.conflict_zones import (
 )
 from gen_data.generator.traffic.idm import Drivers
 from gen_data.generator.traffic.lane_routes import STATION_M, LaneGraph, Route, points_at
-from gen_data.generator.traffic.steering import Courses, follow_lines
+from gen_data.generator.traffic.steering import Courses, follow_lines, normalize
 
 LOOKAHEAD_S, LOOKAHEAD_M = 0.6, (3.0, 10.0)
 """Lookahead of the steering: a time at the vehicle's speed, within bounds."""
@@ -46,6 +46,7 @@ class Vehicle:
         station_m: Station of the rear axle on the route.
         speed_factor: Factor on the lanes' usual speed.
         speed_max_m_s: Largest speed.
+        left_m: Distance to the left of the lanes' middle that it keeps.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Vehicle:
     speed_max_m_s: float = 60.0
     headway_s: float = 1.2
     acceleration_m_s2: float = 1.5
+    left_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +142,7 @@ def make_vehicles(
     first = np.array([v.station_m for v in vehicles])
     beyond = math.ceil(max([LOOKAHEAD_M[1], *(v.wheelbase_m for v in vehicles)]) / STATION_M) + 2
     grid: Array = STATION_M * np.arange(m + beyond, dtype=np.float64)
-    lines = np.stack([points_at(graph, v.route, v.station_m + grid) for v in vehicles])
+    lines = np.stack([_followed_line(graph, v, grid) for v in vehicles])
     limits = np.stack([_speed_limits(graph, v, grid[:m]) for v in vehicles])
     limit_braking(limits)
     lookahead = np.clip(LOOKAHEAD_S * limits, *LOOKAHEAD_M) / STATION_M
@@ -182,6 +184,15 @@ def make_vehicles(
         overlaps=crossed,
         headings={name: heading(graph.lines[name].lane.center_m, -1) for name in widths},
     )
+
+
+def _followed_line(graph: LaneGraph, vehicle: Vehicle, grid: Array) -> Array:
+    """Points [m, 3] that a vehicle follows: beside the middle of its lanes by ``left_m``."""
+    points = points_at(graph, vehicle.route, vehicle.station_m + grid)
+    if vehicle.left_m:
+        way = normalize(np.gradient(points[:, :2], axis=0))
+        points[:, :2] += vehicle.left_m * np.column_stack([-way[:, 1], way[:, 0]])
+    return points
 
 
 def limit_braking(limits: Array) -> None:

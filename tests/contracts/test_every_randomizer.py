@@ -25,6 +25,7 @@ from gen_data.generator.core.scene import (
     ObjectGroup,
     Rig,
     Scene,
+    Weather,
 )
 from gen_data.generator.core.se3 import SE3, look_at
 from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
@@ -56,7 +57,10 @@ PHYSICS_BOUND = (
 
 
 def nominal_scene() -> Scene:
-    """A room with a table, an arm, objects, lamps, cars, one of them the ego, and two cameras."""
+    """A room with a table, an arm, objects, lamps, cars, one of them the ego, and two cameras.
+
+    Outside, people walk in rain.
+    """
     household, shapes = AssetChoice(tags=("household",)), AssetChoice(tags=("random_shape",))
     elements = (
         Room(name="room"),
@@ -81,16 +85,25 @@ def nominal_scene() -> Scene:
     lamp = Body("street_lamp", "street_lamp", SE3((1.0, 1.0, 0.0)))
     signal = Body("signal", "signal", SE3((3.0, 3.0, 0.0)))
     plate = Body("plate", "plane", materials=(Material(role=CATCHER),))
+    walkers = [_walker(k) for k in range(12)]
+    persons = [Instance(w.instance_id, w.name, "person", 0, w.asset) for w in walkers]
+    crowd = ObjectGroup("people", (), ("walker?seed=0",), 12, "along", lanes=("sidewalk",))
     return replace(
         scene,
-        bodies=(*scene.bodies, lamp, signal, plate, wagon, ego),
-        instances=(*scene.instances, labelled, carrier),
+        bodies=(*scene.bodies, lamp, signal, plate, wagon, ego, *walkers),
+        instances=(*scene.instances, labelled, carrier, *persons),
         rigs=(*scene.rigs, Rig("ego", "ego"), Rig("car", "lane_objects/0")),
         cameras=cameras,
         lidars=(Lidar("roof", "", SE3((0.0, 0.0, 1.9)), rig="car"),),
         lanes=lanes,
-        groups=(*scene.groups, group),
+        groups=(*scene.groups, group, crowd),
+        weather=Weather(rain_mm_h=5.0),
     )
+
+
+def _walker(k: int) -> Body:
+    at = SE3((float(k), -20.0, 0.0))
+    return Body(f"people/{k}", f"walker?seed={k}", at, instance_id=100 + k, group="people")
 
 
 def made(kind: str) -> Any:

@@ -35,6 +35,7 @@ FURNITURE_M: dict[str, tuple[float, ...]] = {
     "light_panel": (0.6, 0.6),
     "backdrop": (3.0, 3.0, 2.2),
     "street_lamp": (0.4, 0.4, 6.0),
+    "walker": (0.5, 0.5, 1.7),
 }
 SLOTS = {"room": 7, "table": 2, "shelf": 2}
 
@@ -120,6 +121,8 @@ class FakeAssets:
         if asset_id in PLATES:
             return _asset(asset_id, "plate", "", ("rendered",))
         family = parse_asset_id(asset_id).name
+        if family == "walker":
+            return replace(_asset(asset_id, "object", "person", ()), attributes=(("pose", "walk"),))
         if family in FURNITURE_M:
             return _asset(asset_id, "object", family, ("furniture",))
         if family == "two_link":

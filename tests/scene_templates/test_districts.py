@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from functools import cache
 
+import numpy as np
 import pytest
 
 from gen_data.generator.assemble.config import Config, load_config
 from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.config.distributions import Constant
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.scene import Scene, SharedValue
 from gen_data.generator.core.streams import Streams
@@ -146,6 +148,41 @@ def test_traffic_can_go_on_where_roads_meet() -> None:
         crossing = [lane for lane in driving.values() if lane.junction]
         assert bool(crossing) == (key[1] != "none"), key
         assert all(lane.successors for lane in crossing), key
+
+
+def test_cyclists_ride_along_across_and_towards() -> None:
+    """On the right of their lanes: directions of all quarters, in streets of all districts."""
+    config, ways = street(), []
+    parts = config.scene_config(config.shared(Streams(3, 0, index=0)))
+    group = next(e for e in parts.elements if e.name == "cyclists")
+    draw = next(r for r in parts.randomizers if r.name == "cyclists")
+    for number, scene in enumerate(districts().values()):
+        streams = Streams(2, number)
+        drawn = draw(group.add(scene, library()), library(), streams.rng("cyclists"))
+        bodies = [body for body in drawn.bodies if body.group == "cyclists"]
+        ways += [np.arctan2(*body.T_world_body.rotation()[[1, 0], 0]) for body in bodies]
+    quarters = np.bincount(np.round(np.array(ways) / (0.5 * np.pi)).astype(int) % 4, minlength=4)
+
+    assert quarters.sum() > 20
+    assert (quarters >= 0.1 * quarters.sum()).all(), quarters
+
+
+def test_groups_may_use_only_the_outer_or_the_inner_lanes() -> None:
+    """Of two lanes of 3.5 m each way: all, those at the kerb, those next to the middle."""
+    group = LaneObjects(name="bins", lanes=("driving",), assets=AssetChoice(ids=("bench",)))
+    scene = built(Road(name="main", lanes=(2, 2)), group)
+    away_m = {}
+    for among in ("all", "rightmost", "leftmost"):
+        draw = DrawLaneObjects(name="bins", among=among, gap_m=Constant(5.0))
+        drawn = draw(scene, library(), rng_of("stream"))
+        places = [b.T_world_body.translation_m[1] for b in drawn.bodies if b.group == "bins"]
+        away_m[among] = {round(abs(y), 1) for y in places}
+
+    assert {among: sorted(found) for among, found in away_m.items()} == {
+        "all": [1.8, 5.2],
+        "rightmost": [5.2],
+        "leftmost": [1.8],
+    }
 
 
 def test_sections_differ_by_district() -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.assets.scenery.shelters import pump_islands_m
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.scene import Scene
 from gen_data.scene_templates.builder import build_scene
@@ -18,6 +19,7 @@ from gen_data.scene_templates.overpass import Overpass
 from gen_data.scene_templates.petrol_station import PetrolStation
 from gen_data.scene_templates.road import Road
 from gen_data.scene_templates.square import Square
+from gen_data.scene_templates.tram_line import TramLine
 from tests.scenery.rays import cast
 
 TOWN = Road(name="main", length_m=150.0, verge_m=(1.5, 1.5), setback_m=(5.0, 5.0), parking=True)
@@ -145,6 +147,75 @@ def test_a_square_has_people_and_houses_around_it() -> None:
         middle = house.T_world_body.apply(np.array([[x0, 0.5 * (y0 + y1), 0.0]]))
         x, y, _ = inverse.apply(middle)[0]
         assert x > 15.0 or abs(y) > 20.0
+
+
+@pytest.mark.parametrize("road", [TOWN, BENT], ids=["town", "bent"])
+def test_driveways_lead_from_the_gutter_to_the_forecourt(road: Road) -> None:
+    """They begin in the gutter, rise over the kerb, and end on the forecourt at its height."""
+    made = built(road, PLACES[3])
+    pad = next(b for b in made.bodies if b.name == "place/forecourt")
+    (x0, _, _), _ = library().bounds_m(pad.asset)
+    ways = [b for b in made.bodies if b.name.startswith("place/driveway")]
+
+    assert len(ways) == 2
+    for body in ways:
+        ends = [(x, 0.0, 0.0) for x in (-0.45, library().bounds_m(body.asset)[1][0])]
+        gutter, far = body.T_world_body.apply(np.array(ends))
+        assert gutter[2] == pytest.approx(0.0, abs=0.01)
+        inside = pad.T_world_body.inverse().apply(far[None])[0]
+        assert x0 - 0.05 < inside[0] < x0 + 1.0
+        top = library().bounds_m(body.asset)[1][2]
+        assert top == pytest.approx(pad.T_world_body.translation_m[2] + 0.012, abs=0.011)
+
+
+def test_cars_stand_beside_the_islands_under_the_canopy() -> None:
+    """With labels, clear of islands and of each other; none if nobody fills up."""
+    busy = PetrolStation(name="place", road="main", station_m=75.0, cars=1.0, seed=2)
+    made = built(TOWN, busy)
+    canopy = next(b for b in made.bodies if b.name == "place/canopy")
+    islands = pump_islands_m(2)
+    cars = [b for b in made.bodies if b.name.startswith("place/car")]
+    annotated = {i.name for i in made.instances if i.annotated}
+
+    assert len(cars) == len(islands)
+    assert {car.name for car in cars} <= annotated
+    inverse = canopy.T_world_body.inverse()
+    for car in cars:
+        (x0, y0, _), (x1, y1, _) = library().bounds_m(car.asset)
+        corners = car.T_world_body.apply(
+            np.array([(x, y, 0.0) for x in (x0, x1) for y in (y0, y1)])
+        )
+        y = inverse.apply(corners)[:, 1]
+        for island in islands:
+            assert (y > island + 0.55).all() or (y < island - 0.55).all()
+    quiet = built(TOWN, busy.model_copy(update={"cars": 0.0}))
+    assert not any(b.name.startswith("place/car") for b in quiet.bodies)
+
+
+RAILS = Road(name="main", length_m=120.0, tram=True, lanes=(2, 2), median_m=3.0)
+
+
+def test_contact_wires_hang_over_the_tracks_between_poles() -> None:
+    """5.5 m over the middles of the inner lanes, without gaps; poles stand beside the lanes."""
+    made = built(RAILS, TramLine(name="wires", road="main"))
+    lanes = {lane.name: np.array(lane.center_m) for lane in made.lanes}
+    wires = [b for b in made.bodies if b.name.endswith("/wires")]
+    poles = [b for b in made.bodies if "/pole_" in b.name]
+    points = np.concatenate(
+        [b.T_world_body.apply(library().mesh(b.asset).vertices_m.astype(float)) for b in wires]
+    )
+    thin = points[np.abs(points[:, 2] - 5.5) < 0.02]
+
+    assert len(wires) == 4 and len(poles) == 8
+    for name in ("main/forward0", "main/backward0"):
+        mine = thin[np.abs(thin[:, 1] - lanes[name][0, 1]) < 0.02]
+        assert np.unique(np.round(mine[:, 0], 3))[[0, -1]] == pytest.approx([0.0, 120.0], abs=0.01)
+    assert min(abs(b.T_world_body.translation_m[1]) for b in poles) > 8.6
+    assert all(b.instance_id for b in poles) and not any(b.instance_id for b in wires)
+    with pytest.raises(ConfigError, match="'main' bends; expected a straight road"):
+        built(RAILS.model_copy(update={"curvature_per_m": 0.004}), TramLine(name="w", road="main"))
+    with pytest.raises(ConfigError, match="'main' has no track"):
+        built(TOWN, TramLine(name="w", road="main"))
 
 
 @pytest.mark.parametrize("place", PLACES, ids=lambda p: p.type)

@@ -56,7 +56,7 @@ LIMITS = {
     "horizon/hills": (12.0, 100.0, 6000), "horizon/skyline": (12.0, 90.0, 1500),
     "horizon/town": (7.0, 50.0, 1500),
     "overpass": (6.5, 7.6, 1500), "embankment": (6.0, 7.0, 400),
-    "railway_track": (0.5, 0.6, 1500),
+    "railway_track": (0.5, 0.6, 1500), "tram_pole": (7.0, 7.4, 200),
     "petrol_shop": (3.5, 4.3, 600), "price_sign": (4.9, 7.6, 600), "fountain": (0.9, 3.7, 1500),
     "straw_bale": (0.85, 2.0, 900), "power_pylon": (26.0, 36.0, 2000),
     "street_light": (6.0, 9.0, 1500), "litter_bin": (0.8, 1.4, 1500), "bench": (0.4, 1.0, 1500),

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from gen_data.generator.traffic.lane_routes import LaneGraph
+from gen_data.generator.traffic.lane_routes import LaneGraph, project_on_lane
 from gen_data.generator.traffic.pedestrian_paths import draw_path, make_walk_network
 from gen_data.generator.traffic.pedestrians import Pedestrian
 from gen_data.generator.traffic.signal_cycles import AMBER_S, Approach, Cycle
 from gen_data.generator.traffic.simulation import SimulatedMotion, first_overlap, simulate
-from gen_data.generator.traffic.vehicles import Vehicles
-from tests.traffic.roads import NO_BOXES, crossing, driven, fronts_m, lane, rng_of
+from gen_data.generator.traffic.vehicles import Vehicles, make_vehicles
+from tests.traffic.roads import NO_BOXES, car, crossing, driven, fronts_m, lane, rng_of
 
 LINE_M = 140.0
 """Station at which the lanes into the crossing end."""
@@ -202,6 +204,22 @@ def test_a_car_stops_before_what_stands_on_its_lane() -> None:
 
     assert 95.0 < front[-1] < 99.0
     assert motion.speed_m_s[-1, 0] == 0.0
+
+
+def test_cyclists_keep_to_the_side_of_their_lane() -> None:
+    """At the same distance from the middle after 40 m and around a bend; cars go to the middle."""
+    turns = np.linspace(0.0, 0.5 * np.pi, 15)[1:]
+    bend = [(40.0 + 30.0 * np.sin(t), 30.0 - 30.0 * np.cos(t)) for t in turns]
+    lanes = [lane("way", (0.0, 0.0), (40.0, 0.0), *bend, (70.0, 150.0))]
+    graph = LaneGraph.of(lanes, "driving", "bicycle")
+    beside = replace(car(graph, "cyclist", "way", 5.0), xy_m=(5.0, -1.2))
+    keeps, drifts = replace(beside, left_m=-1.2), beside
+    made = make_vehicles([keeps, drifts], graph, LaneGraph.of([], "crosswalk"), NO_BOXES, 90.0)
+
+    for k, expected in ((0, -1.2), (1, 0.0)):
+        ends = made.courses.xy_m[k, [60, 160]]
+        lefts = [project_on_lane(graph.lines["way"], *end).left_m for end in ends.tolist()]
+        assert lefts == pytest.approx([expected] * 2, abs=0.12)
 
 
 def test_nothing_teleports() -> None:

@@ -8,6 +8,7 @@ import pytest
 from gen_data.generator.assets.vehicles import FAMILIES
 from gen_data.generator.assets.vehicles.bicycle import cyclist, cyclist_facts
 from gen_data.generator.core.asset_types import MeshData
+from gen_data.generator.core.errors import AssetError
 
 VARIANTS = [cyclist(seed).mesh for seed in range(FAMILIES["cyclist"].variants)]
 
@@ -44,6 +45,23 @@ def test_racing_bicycles_have_no_panniers() -> None:
         bag = with_role(mesh, "canvas")
         if "road" in str(cyclist_facts(seed)) and len(bag):
             assert bag[:, 2].min() - mesh.bounds_m()[0][2] > 0.9
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_who_waits_has_one_foot_on_the_ground(seed: int) -> None:
+    """The left one, beside the bicycle; the other one is on a pedal; heads are below a rider's."""
+    mesh = cyclist(seed, "wait").mesh
+    shoes = with_role(mesh, "shoes")
+    left, right = shoes[shoes[:, 1] > 0.0], shoes[shoes[:, 1] < 0.0]
+
+    assert left[:, 2].min() == pytest.approx(0.0, abs=0.02)
+    assert left[:, 1].min() > 0.15
+    assert right[:, 2].min() > 0.2
+    assert VARIANTS[seed].bounds_m()[1][2] - 0.25 < mesh.bounds_m()[1][2]
+    assert mesh.bounds_m()[1][2] < VARIANTS[seed].bounds_m()[1][2]
+    assert dict(cyclist_facts(seed, "wait").attributes)["pose"] == "wait"
+    with pytest.raises(AssetError, match="pose=fly is unknown"):
+        cyclist(seed, "fly")
 
 
 def test_girth_varies() -> None:

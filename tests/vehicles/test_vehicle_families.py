@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
-from gen_data.generator.assets.vehicles import FAMILIES
+from gen_data.generator.assets.vehicles import FAMILIES as VEHICLES
 from gen_data.generator.assets.vehicles.car_design import MODELS
 from gen_data.generator.assets.vehicles.cars import draw_car
 from gen_data.generator.assets.vehicles.vehicle_materials import draw_paint
@@ -20,6 +20,8 @@ from gen_data.generator.core.asset_types import MeshData
 from tests.scenery.rays import cast
 
 Array = NDArray[np.float64]
+FAMILIES = {name: family for name, family in VEHICLES.items() if name != "tram"}
+"""Vehicles with tyres; test_trams.py is about the others."""
 
 # Length, width without mirrors (from paint and glass), height [m], and triangles.
 LIMITS = {

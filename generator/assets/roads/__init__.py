@@ -66,6 +66,8 @@ FAMILIES: Mapping[str, Family] = {
         _surface("parking_area:parking_area", **_PARKING, **_LOOKS),
         _surface("fields:fields", **_FIELDS),
         _surface("paved_area:paved_area", size_m=(30.0, 20.0), cover="paving", seed=0),
+        _surface("driveway:driveway", seed=0, width_m=6.0, depth_m=2.5, kerb_m=0.12, rise_m=0.18),
+        _surface("tram_wires:contact_wires", span_m=30.0, left_m=6.5, right_m=6.5, tracks_m=1.7),
         _surface("level_crossing:level_crossing", **_SHAPE, **_LOOKS, station_m=60.0),
         _surface("ground:ground", seed=0, size_m=(800.0, 800.0), cover="grass", relief_m=0.04),
     )

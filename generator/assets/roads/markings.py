@@ -26,7 +26,7 @@ from gen_data.generator.roads.cross_section import (
 NARROW_M, BROAD_M = 0.12, 0.25
 STOP_LINE_M, ZEBRA_BAR_M = 0.5, 0.5
 BAY_M = 5.7
-"""Length of a bay for parking along the kerb (EAR 05: 5.20 to 5.75 m)."""
+"""Length of a bay for parking along the kerb (assumed, 5.2 to 5.8 m)."""
 
 
 @dataclass(frozen=True, slots=True)

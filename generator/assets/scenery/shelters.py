@@ -256,15 +256,13 @@ def petrol_canopy(seed: int) -> Solid:
     Slots: fascia, ceiling, steel, pump body, pump front, hoses, kerb, lights, trim.
     """
     rng = variant_rng("petrol_canopy", seed)
-    x, half, low = rng.between(3.5, 4.5), rng.between(5.5, 8.0), rng.between(4.5, 5.2)
+    x, half, low = _canopy_m(rng)
     parts = [
         block((-x, -half, low), (x, half, low + 0.9), 0.03),
         block((-x + 0.05, -half + 0.05, low - 0.02), (x - 0.05, half - 0.05, low + 0.01), 0.0, 1),
         block((-x - 0.01, -half - 0.01, low + 0.12), (x + 0.01, half + 0.01, low + 0.3), 0.0, 8),
     ]
-    count = 2 if half < 6.8 else 3
-    for k in range(count):
-        y = 2.0 * half * ((k + 0.5) / count - 0.5)
+    for y in _islands_m(half):
         parts.append(block((-0.2, y - 0.2, 0.0), (0.2, y + 0.2, low), 0.0, 2))
         for side in (-1.6, 1.6):
             lamp = block((side - 0.3, y - 0.3, low - 0.05), (side + 0.3, y + 0.3, low - 0.02), 0, 7)
@@ -289,6 +287,21 @@ def petrol_canopy(seed: int) -> Solid:
     )
     shells = [hulls.box((-x, -half, low), (x, half, low + 0.9))]
     return make_solid(parts, materials, shells)
+
+
+def pump_islands_m(seed: int) -> tuple[float, ...]:
+    """Places of the islands of pumps along Y, in the canopy's frame."""
+    return _islands_m(_canopy_m(variant_rng("petrol_canopy", seed))[1])
+
+
+def _canopy_m(rng: VariantRng) -> tuple[float, float, float]:
+    """Half extents along X and Y, and the height below it."""
+    return rng.between(3.5, 4.5), rng.between(5.5, 8.0), rng.between(4.5, 5.2)
+
+
+def _islands_m(half: float) -> tuple[float, ...]:
+    count = 2 if half < 6.8 else 3
+    return tuple(2.0 * half * ((k + 0.5) / count - 0.5) for k in range(count))
 
 
 def _pump() -> list[Patch]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from gen_data.generator.assets.procedural import collision_hulls as hulls
 from gen_data.generator.assets.procedural.data_tables import load_table
-from gen_data.generator.assets.procedural.family import Facts, Solid
+from gen_data.generator.assets.procedural.family import Facts, Solid, check_option
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block, circle, cone, lathe, sweep
@@ -26,10 +26,13 @@ from gen_data.generator.core.asset_types import Keypoint, Material
 from gen_data.generator.core.se3 import Vec3
 
 STYLES = ("city", "mountain", "road")
+POSES = ("ride", "wait")
 
 _CRANK_M = 0.17
 _BULK = (1.0, 1.22)
 """Girth of a clothed cyclist, from tight to loose or padded, relative to a lean one's; assumed."""
+_WAITS_AHEAD_M, _WAITS_HIPS_M, _WAITS_CRANK_RAD = 0.22, 0.89, math.radians(210.0)
+"""Who waits stands before the saddle, astride the bicycle, a foot on a raised pedal (assumed)."""
 
 
 @dataclass(frozen=True)
@@ -79,12 +82,15 @@ def bicycle_facts(seed: int) -> Facts:
     return Facts(in_turn(STYLES, seed), {"rider": "no"})
 
 
-def cyclist(seed: int) -> Solid:
-    """A bicycle with its rider."""
+def cyclist(seed: int, pose: str = "ride") -> Solid:
+    """A bicycle with its rider, who rides (``ride``) or stands with a foot down (``wait``)."""
+    check_option("cyclist", "pose", pose, POSES)
     rng = variant_rng("cyclist", seed)
     style = in_turn(STYLES, seed)
     frame, turn = _FRAMES[style], rng.between(0.0, 2.0 * math.pi)
-    parts, seat = _machine(style, frame, turn, rng), _seat(frame, turn)
+    turn = turn if pose == "ride" else _WAITS_CRANK_RAD
+    seat = _seat(frame, turn) if pose == "ride" else _stance(frame, turn)
+    parts = _machine(style, frame, turn, rng)
     nod_rad = people.draw_nod(rng)
     paint = hex_to_linear(rng.choose(COLORS["bicycles"]))
     finish = list(materials(rng, paint, clothes=people.draw_clothes(rng)))
@@ -95,9 +101,9 @@ def cyclist(seed: int) -> Solid:
     return _solid(parts, frame, tuple(finish), 1.7)
 
 
-def cyclist_facts(seed: int) -> Facts:
-    """The kind of bicycle."""
-    return Facts(in_turn(STYLES, seed), {"rider": "yes"})
+def cyclist_facts(seed: int, pose: str = "ride") -> Facts:
+    """The kind of bicycle, and what its rider does."""
+    return Facts(in_turn(STYLES, seed), {"rider": "yes", "pose": pose})
 
 
 def spoked_wheel(radius_m: float, tyre_m: float, spokes: int) -> Patch:
@@ -251,6 +257,15 @@ def _seat(frame: _Frame, turn_rad: float) -> Seat:
     left, right = ((px, py, pz + 0.03) for px, py, pz in _pedals(frame, turn_rad))
     hips = (frame.saddle[0], 0.0, frame.saddle[1] + 0.1)
     return Seat(hips, ((x, y, z), (x, -y, z)), (left, right), frame.lean_rad, full_face=False)
+
+
+def _stance(frame: _Frame, turn_rad: float) -> Seat:
+    """Of a rider who stands astride, the left foot on the ground beside the left pedal."""
+    x, y, z = frame.grip
+    hips = (frame.saddle[0] + _WAITS_AHEAD_M, 0.04, _WAITS_HIPS_M)
+    px, py, pz = _pedals(frame, turn_rad)[1]
+    soles = ((hips[0] + 0.06, 0.25, 0.01), (px, py, pz + 0.03))
+    return Seat(hips, ((x, y, z), (x, -y, z)), soles, 0.4 * frame.lean_rad, full_face=False)
 
 
 def _in_plane(point: tuple[float, float]) -> Array:

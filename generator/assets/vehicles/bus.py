@@ -1,4 +1,8 @@
-"""City buses of 12 m; dimensions after Directive 96/53/EC and common low-floor models."""
+"""City buses of 12 m.
+
+At most 2.55 m wide (Directive 96/53/EC as amended by 2002/7/EC, by Parliament's summary); floors
+and doors of common low-floor models, assumed, 10 %.
+"""
 
 from __future__ import annotations
 

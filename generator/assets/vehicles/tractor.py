@@ -1,7 +1,8 @@
 """Farm tractors with a cab, a bonnet and large rear wheels.
 
 Sizes of tractors of 70 to 150 kW: 4 to 5 m long, 2.3 to 2.55 m wide, 2.7 to 3.1 m high, rear tyres
-of 1.65 to 1.9 m; assumed, 10 %. At most 2.55 m wide (Directive 96/53/EC).
+of 1.65 to 1.9 m; assumed, 10 %. At most 2.55 m wide (Directive 96/53/EC for trucks; assumed for
+tractors).
 """
 
 from __future__ import annotations

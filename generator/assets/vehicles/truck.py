@@ -1,4 +1,8 @@
-"""Trucks with a cab over the front axle; dimensions after Directive 96/53/EC."""
+"""Trucks with a cab over the front axle.
+
+At most 2.55 m wide, 2.60 m with insulated walls, 4.00 m high and 12.00 m long (Directive 96/53/EC,
+by transportxxl.eu); other measures assumed, 10 %.
+"""
 
 from __future__ import annotations
 

@@ -42,6 +42,10 @@ PI = wp.constant(3.14159265)
 # Reflectance of fresh and settled snow near 905 nm (Wiscombe and Warren, "A model for the spectral
 # albedo of snow", 1980: 0.9 to 0.75 for grains of 0.1 to 1 mm).
 SNOW = wp.constant(0.85)
+# Share of its reflectance that porous ground loses under water: total reflection in the water
+# returns light to the ground, and stones reflect less at once (Lekner and Dorf 1988, for
+# reflectances of 0.2 and an index of 1.5). Cameras use Lagarde's value, which is for darker ground.
+DARKENED = wp.constant(0.6)
 # Share of a marking's retro-reflection that water suppresses: a quarter remains (EN 1436, classes R
 # and RW).
 DROWNED = wp.constant(0.75)
@@ -356,7 +360,7 @@ def apply_weather(world: World, light: Infrared, coat: Coat, surface: int, cosin
     film = wp.max(coat.puddle, 0.5 * porous * coat.wet)
     # Two passages of the water's surface here, two more in ``kept``: down and up.
     passes = 1.0 - film * fresnel_schlick(WATER_F0, cosine)
-    kept = coat.mixable[0] * passes * passes
+    kept = (1.0 - DARKENED * porous * coat.wet) * passes * passes
     bare = 1.0 - wp.min(coat.snow, 1.0)
     below = Infrared()
     below.even = light.even * kept * bare + SNOW * (1.0 - bare)
