@@ -11,7 +11,7 @@ import pytest
 
 from gen_data.generator.assets.people.analytic_body import simple_body
 from gen_data.generator.assets.people.body import DELTA_M, FILE, load
-from gen_data.generator.assets.people.convert import convert
+from gen_data.generator.assets.people.convert import FACES, convert
 from gen_data.generator.assets.people.person import draw_person
 from gen_data.generator.assets.people.person_mesh import build_person, dress_person
 
@@ -58,6 +58,10 @@ def write_source(folder: Path) -> None:
     (data / "rigs/standard/weights.game_engine.json").write_text(table, "utf-8")
     (data / "mesh_metadata/basemesh_vertex_groups.json").write_text("{}", "utf-8")
     write_targets(data / "targets" / "macrodetails", len(body.points_m))
+    for path in {path for files in FACES.values() for path in files}:
+        (data / "targets" / path).parent.mkdir(parents=True, exist_ok=True)
+        with gzip.open(data / "targets" / path, "wt") as file:
+            file.write("0 0 0.1 0\n")
 
 
 def write_targets(folder: Path, count: int) -> None:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_data.generator.assets.people.body import Array, Indices
 from gen_data.generator.assets.procedural.data_tables import load_table
@@ -218,16 +219,48 @@ def _shoulders(p: Array) -> Array:
     return np.minimum(np.hypot(p[:, 0] - 0.012, p[:, 1]) - 0.098, 0.6 - p[:, 2])
 
 
-def _ellipse(y_m: float, z_m: float, half_y_m: float, half_z_m: float, bend: float = 0.0) -> Level:
-    """Positive within an upright ellipse on the front of the head, one on either side."""
+@dataclass(frozen=True, slots=True)
+class _Feature:
+    """An ellipsoid on either side of the head that gets its own number of triangles."""
 
-    def level(p: Array) -> Array:
-        p = _one_side(p)
-        y = (p[:, 1] - y_m) / half_y_m
-        z = (p[:, 2] - z_m + bend * (p[:, 1] - y_m) ** 2) / half_z_m
-        return np.minimum((1.0 - np.hypot(y, z)) * half_z_m, p[:, 0] - 0.1)
+    middle_m: tuple[float, float, float]
+    radii_m: tuple[float, float, float]
 
-    return level
+    def holds(self, p: Array) -> NDArray[np.bool_]:
+        """Whether positions [n, 3] lie inside."""
+        away = (_one_side(p) - self.middle_m) / self.radii_m
+        return np.asarray((away * away).sum(axis=1) < 1.0)
+
+
+_EYEBALL = _Feature((0.1245, 0.0308, 0.7284), (0.0132, 0.0132, 0.0132))
+# The first that holds a triangle gets it. Numbers of triangles are in ``zone_triangles.yaml``.
+_FEATURES = {
+    "lids": _Feature((0.125, 0.0315, 0.7285), (0.04, 0.027, 0.0185)),
+    "mouth": _Feature((0.15, 0.0, 0.661), (0.035, 0.034, 0.018)),
+    "nose": _Feature((0.155, 0.0, 0.7), (0.03, 0.026, 0.026)),
+    "ears": _Feature((0.04, 0.088, 0.718), (0.045, 0.022, 0.05)),
+    "mask": _Feature((0.12, 0.0, 0.71), (0.085, 0.09, 0.1)),
+}
+
+
+def mark_features(rows: MeshRows) -> MeshRows:
+    """The mesh with the features of its face as zones of their own, for ``simplify_region``.
+
+    Its edges are not cut: zones of features are merged again. What an eyeball hides is dropped.
+    """
+    zones = rows.zones.copy()
+    face = np.flatnonzero(zones == "face")
+    middles = rows.values[rows.faces[face], :3].mean(axis=1)
+    for name, feature in reversed(_FEATURES.items()):
+        zones[face[feature.holds(middles)]] = name
+    zones[face[_EYEBALL.holds(middles)]] = ""
+    return MeshRows(rows.values, rows.faces, zones)
+
+
+def merge_features(rows: MeshRows) -> MeshRows:
+    """The mesh with its features in the zone ``face`` again."""
+    zones = np.where(np.isin(rows.zones, list(_FEATURES)), "face", rows.zones)
+    return MeshRows(rows.values, rows.faces, zones)
 
 
 def _one_side(p: Array) -> Array:
@@ -257,7 +290,7 @@ FRONT = (
 THIGH = Cut("legs", "upper_legs", _above(-0.385))
 KNEE = Cut("thighs", "shins", _below(-0.31))
 CUFF = Cut("shins", "ankles", _below(-0.7))
-SOLE = Cut("shoes", "soles", _below(-0.803))
+SOLE = Cut("shoes", "soles", _below(-0.794))
 
 BODY: Sequence[Cut] = (
     Cut("face", "hands", _beyond_wrist(-0.02)),
@@ -269,9 +302,8 @@ BODY: Sequence[Cut] = (
     SHOULDERS,
     Cut("face", "", _mouth_inside),
     HAIRLINE,
-    Cut("face", "brows", _ellipse(0.033, 0.752, 0.022, 0.0042, 4.0)),
-    Cut("face", "lips", _ellipse(0.0, 0.6615, 0.025, 0.0105)),
 )
+"""Brows and lips are painted on the face (``face_textures``)."""
 EYES: Sequence[Cut] = (Cut("eyes", "irises", lambda p: np.asarray(p[:, 0] - 0.1375)),)
 TIGHTS: Sequence[Cut] = (
     Cut("hips", "sleeves", _arm_beyond(_SHORT_SLEEVE_M)),

@@ -14,6 +14,7 @@ import numpy as np
 
 from gen_data.generator.assets.people.body import Array, BodyTemplate, Indices
 from gen_data.generator.assets.people.body_regions import grid_faces
+from gen_data.generator.assets.people.hair import hair_material
 from gen_data.generator.assets.people.person import Person
 from gen_data.generator.assets.people.posing import HELD, vertex_normals
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
@@ -82,7 +83,7 @@ class Carrier:
 def make_things(carrier: Carrier) -> list[Sheet]:
     """All that a person wears on the back, holds, pushes or pulls."""
     outfit, held = carrier.person.outfit, HELD[carrier.person.pose]
-    made = _visor(carrier) if outfit.headwear == "cap" else []
+    made = _visor(carrier) if outfit.headwear == "cap" else _tied_hair(carrier)
     if outfit.bag == "backpack":
         made += _backpack(carrier)
     elif outfit.bag == "shoulder_bag":
@@ -123,7 +124,7 @@ def _hanging_bag(carrier: Carrier, side: str, material: Material) -> list[Sheet]
     drop = 0.1 * scale + 0.5 * float(size[2])
     bag = pillow(grip - (0.0, 0.0, drop), size, np.eye(3), material)
     handle_m = np.array([0.1, 0.02, 0.16]) * scale
-    handle = pillow(grip - (0.0, 0.0, 0.06 * scale), handle_m, np.eye(3), material)
+    handle = pillow(grip - (0.0, 0.0, 0.06 * scale), handle_m, np.eye(3), material, steps=2)
     return [bag, handle]
 
 
@@ -171,30 +172,88 @@ def _pram(carrier: Carrier) -> list[Sheet]:
     return [basket, hood, bar, *frame]
 
 
+_RIBS = 8
+_OPEN_M, _RISE_M, _DROP_M = 0.5, 0.84, 0.2
+"""Radius of a canopy, height of its top above the hand, and of its top above its edge."""
+
+
 def _umbrella(carrier: Carrier) -> list[Sheet]:
-    """Eight panels that sag between their ribs, on a shaft that leans back over the shoulder."""
-    grip = carrier.grip("r")
+    """Eight panels that hang between their ribs, on a shaft that leans back over the shoulder."""
+    grip, rise = carrier.grip("r"), _RISE_M * carrier.scale
     axes = _axes_along(np.array([-0.12, 0.1, 1.0]))
-    rings, columns = 5, 25
-    reach = np.linspace(0.02, 1.0, rings)[:, None]
-    turn = 2.0 * math.pi * np.arange(columns)[None] / (columns - 1)
-    sag = 0.05 * np.sin(4.0 * turn) ** 2 * reach**2
-    radius = (0.5 - sag) * reach
-    dome = np.stack([radius * np.cos(turn), radius * np.sin(turn),
-                     0.72 * carrier.scale + 0.0 * turn - 0.22 * reach**2], axis=2)  # fmt: skip
+    # Rings of ribs and middles of panels by turns; cloth curves in between ribs.
+    reach = np.array([0.02, 0.25, 0.5, 0.75, 1.0])[:, None]
+    steps = 4 * _RIBS
+    turn = 2.0 * math.pi * np.arange(steps + 1)[None] / steps
+    slack = np.sin(0.5 * _RIBS * turn) ** 2 * reach**2
+    radius = _OPEN_M * (1.0 - 0.11 * slack) * reach
+    height = rise - _DROP_M * reach**1.8 - 0.012 * slack
+    dome = np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=2)
     places = dome.reshape(-1, 3) @ axes.T + grip
-    faces = grid_faces(rings, columns)
+    faces = grid_faces(len(reach), steps + 1)
     both = np.concatenate([faces, faces[:, ::-1] + len(places)])
     normals = vertex_normals(places, faces)
     # Rings run outward: the upper side is the one whose normals rise.
     normals = normals * np.sign(normals[:, 2].mean() + 1e-9)
-    cloth = replace(carrier.person.outfit.hat_material, roughness=0.6, role="bag")
     canopy = Sheet(np.concatenate([places, places - 0.003 * normals]),
                    np.concatenate([normals, -normals]), both, np.zeros(len(both), np.int64),
-                   (cloth,))  # fmt: skip
-    shaft = _bar(grip - axes @ (0.0, 0.0, 0.12), grip + axes @ (0.0, 0.0, 0.7 * carrier.scale),
-                 0.014, _BAR)  # fmt: skip
-    return [canopy, shaft]
+                   (_umbrella_cloth(carrier),))  # fmt: skip
+    top = grip + axes @ (0.0, 0.0, rise)
+    ribs = []
+    for k in range(_RIBS):
+        angle = 2.0 * math.pi * k / _RIBS
+        out = np.array([math.cos(angle), math.sin(angle), 0.0])
+        end = grip + axes @ (0.98 * _OPEN_M * out + (0.0, 0.0, rise - _DROP_M - 0.006))
+        middle = grip + axes @ (0.5 * _OPEN_M * out + (0.0, 0.0, rise - 0.29 * _DROP_M - 0.008))
+        ribs += [_rod(top - axes @ (0.0, 0.0, 0.01), middle), _rod(middle, end),
+                 _rod(grip + axes @ (0.0, 0.0, rise - 0.26), middle)]  # fmt: skip
+    shaft = _bar(grip - axes @ (0.0, 0.0, 0.06), top + axes @ (0.0, 0.0, 0.05), 0.012, _BAR)
+    handle = _bar(grip - axes @ (0.0, 0.0, 0.12), grip + axes @ (0.0, 0.0, 0.05), 0.026, _RUBBER)
+    return [canopy, *ribs, shaft, handle]
+
+
+def _closed_umbrella(carrier: Carrier) -> list[Sheet]:
+    """A furled umbrella that hangs from the hand, its tip above the ground."""
+    grip = carrier.grip("r")
+    length = min(0.78, float(grip[2]) - carrier.ground_m - 0.06)
+    axes = _axes_along(np.array([0.1, 0.02, -1.0]))
+    along = np.array([0.1, 0.13, 0.3, 0.6, 0.86, 0.9])[:, None] * length
+    widths = np.array([0.004, 0.017, 0.026, 0.034, 0.03, 0.007])[:, None]
+    turn = 2.0 * math.pi * np.arange(2 * _RIBS + 1)[None] / (2 * _RIBS)
+    # Folds of the cloth lie around the shaft in a spiral.
+    radius = widths * (1.0 + 0.16 * np.cos(_RIBS * turn + 3.0 * along))
+    rows = np.stack([radius * np.cos(turn), radius * np.sin(turn), along + 0.0 * turn], axis=2)
+    places = rows.reshape(-1, 3) @ axes.T + grip
+    faces = grid_faces(len(along), 2 * _RIBS + 1)[:, ::-1]
+    cloth = Sheet(places, vertex_normals(places, faces), faces, np.zeros(len(faces), np.int64),
+                  (_umbrella_cloth(carrier),))  # fmt: skip
+    tip = _bar(
+        grip + axes @ (0.0, 0.0, 0.85 * length), grip + axes @ (0.0, 0.0, length), 0.01, _BAR
+    )
+    handle = _bar(grip - axes @ (0.0, 0.0, 0.05), grip + axes @ (0.0, 0.0, 0.11), 0.026, _RUBBER)
+    return [cloth, tip, handle]
+
+
+def _umbrella_cloth(carrier: Carrier) -> Material:
+    """Two of three umbrellas are black or navy (assumed); the others have a strong colour."""
+    code = _UMBRELLAS[7 * carrier.person.seed % len(_UMBRELLAS)]
+    return Material(hex_to_linear(code), 0.6, specular=0.4, role="bag")
+
+
+_UMBRELLAS = ("#15161a", "#1c2438", "#15161a", "#7d1f26", "#20242a", "#2d5a4a", "#15161a",
+              "#c9a42c", "#1c2438", "#15161a", "#3a6ea5", "#20242a")  # fmt: skip
+
+
+def _rod(start: Array, end: Array) -> Sheet:
+    """A thin rod of three sides."""
+    axes = _axes_along(end - start)
+    turn = 2.0 * math.pi * np.arange(3) / 3.0
+    ring = np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1) @ axes.T
+    places = np.concatenate([start + 0.0025 * ring, end + 0.0025 * ring])
+    faces = np.array([(i, (i + 1) % 3, 3 + (i + 1) % 3) for i in range(3)]
+                     + [(i, 3 + (i + 1) % 3, 3 + i) for i in range(3)])  # fmt: skip
+    normals = np.concatenate([ring, ring])
+    return Sheet(places, normals, faces, np.zeros(len(faces), np.int64), (_BAR,))
 
 
 def _backpack(carrier: Carrier) -> list[Sheet]:
@@ -203,7 +262,7 @@ def _backpack(carrier: Carrier) -> list[Sheet]:
     material = carrier.person.outfit.bag_material
     pack = pillow(middle, np.array([0.17, 0.3, 0.42]) * scale, trunk, material)
     pocket = pillow(middle + trunk @ (np.array([-0.08, 0.0, -0.07]) * scale),
-                    np.array([0.07, 0.22, 0.2]) * scale, trunk, material)  # fmt: skip
+                    np.array([0.07, 0.22, 0.2]) * scale, trunk, material, steps=3)  # fmt: skip
     straps = [
         _strap(carrier, [(x, sign * y, z) for x, y, z in _BACKPACK_STRAP], 0.055)
         for sign in (-1.0, 1.0)
@@ -254,7 +313,48 @@ def _visor(carrier: Carrier) -> list[Sheet]:
     eyes = [carrier.posed_m[body.landmark(f"{side}_eye")] for side in ("left", "right")]
     middle = 0.5 * (eyes[0] + eyes[1]) + head @ (np.array([0.035, 0.0, 0.058]) * carrier.scale)
     size = np.array([0.13, 0.15, 0.014]) * carrier.scale
-    return [pillow(middle, size, head, carrier.person.outfit.hat_material)]
+    return [pillow(middle, size, head, carrier.person.outfit.hat_material, steps=3)]
+
+
+def _tied_hair(carrier: Carrier) -> list[Sheet]:
+    """A bun, or a ponytail that hangs from the back of the head."""
+    haircut, headwear = carrier.person.haircut, carrier.person.outfit.headwear
+    if haircut not in ("bun", "ponytail") or headwear:
+        return []
+    head, scale = carrier.axes("head"), carrier.scale
+    crown = carrier.posed_m[carrier.body.landmark("crown")]
+    knot = crown + head @ (np.array([-0.118, 0.0, -0.075]) * scale)
+    hair = replace(hair_material(carrier.person), texture_scale_m=0.2)
+    if haircut == "bun":
+        return [_lock(knot, head @ np.array([-1.0, 0.0, 0.0]), _BUN, scale, hair)]
+    # It falls freely: only its root turns with the head.
+    back = head @ np.array([-1.0, 0.0, 0.0]) * (1.0, 1.0, 0.0)
+    return [_lock(knot, back, _PONYTAIL, scale, hair)]
+
+
+_BUN = ((0.0, -0.038, 0.006), (0.0, -0.03, 0.026), (0.0, -0.012, 0.038), (0.0, 0.012, 0.038),
+        (0.0, 0.03, 0.026), (0.0, 0.038, 0.006))  # fmt: skip
+_PONYTAIL = ((-0.03, 0.0, 0.012), (0.015, 0.0, 0.018), (0.035, 0.03, 0.028), (0.035, 0.1, 0.032),
+             (0.028, 0.18, 0.026), (0.022, 0.24, 0.012), (0.02, 0.26, 0.002))  # fmt: skip
+"""Rings of tied hair [m]: behind the knot, below it, half their width."""
+
+
+def _lock(
+    knot: Array, back: Array, rings: Sequence[tuple[float, float, float]], scale: float,
+    hair: Material,
+) -> Sheet:  # fmt: skip
+    """Hair in rings around a course that begins at a knot."""
+    drop = np.array([0.0, 0.0, -1.0])
+    side = np.cross(back, drop)
+    turn = 2.0 * math.pi * np.arange(9)[:, None] / 8.0
+    around = np.cos(turn) * back + 1.2 * np.sin(turn) * side
+    rows = [
+        knot + scale * (behind * back + below * drop + half * around)
+        for behind, below, half in rings
+    ]
+    places, faces = np.concatenate(rows), grid_faces(len(rows), 9)
+    normals = vertex_normals(places, faces)
+    return Sheet(places, normals, faces, np.zeros(len(faces), np.int64), (hair,))
 
 
 def _moved(place: Array, *, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Array:
@@ -341,4 +441,5 @@ _HELD: Mapping[str, Callable[[Carrier], list[Sheet]]] = {
     "suitcase": _suitcase,
     "pram": _pram,
     "umbrella": _umbrella,
+    "closed_umbrella": _closed_umbrella,
 }

@@ -23,8 +23,11 @@ from gen_data.generator.assets.people.body_regions import (
     MeshRows,
     grid_faces,
     make_rows,
+    mark_features,
+    merge_features,
     simplify_region,
 )
+from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.core.errors import AssetError
 
 _RIG = "game_engine"
@@ -33,6 +36,8 @@ _AGES = ("child", "young", "old")
 _ORIGINS = ("african", "asian", "caucasian")
 _METRES_PER_UNIT = 0.1
 _STRANDS = 6
+FACES = load_table(__package__, "face_shapes", dict[str, float])
+"""Shapes of faces and expressions: the files that each adds up, and their shares."""
 _SKIRT_SPAN_M = 0.13
 """Half the width over which a skirt goes from one leg to the other."""
 
@@ -103,7 +108,7 @@ def _body(base: _Base) -> BodyTemplate:
 
 def _parts(base: _Base) -> Iterator[MeshRows]:
     """The pieces of the template, cut into zones; "" is dropped."""
-    yield _cut(base, ("body",), "face", body_regions.BODY)
+    yield mark_features(_cut(base, ("body",), "face", body_regions.BODY))
     yield _cut(base, ("helper-l-eye", "helper-r-eye"), "eyes", body_regions.EYES)
     yield _cut(base, ("helper-tights",), "hips", body_regions.TIGHTS)
     yield _span_legs(base, _cut(base, ("helper-skirt",), "skirt_top", body_regions.SKIRT))
@@ -150,6 +155,7 @@ def _simplify(rows: MeshRows) -> MeshRows:
     for zone, faces in body_regions.ZONE_TRIANGLES.items():
         if (rows.zones == zone).sum() > faces:
             rows = simplify_region(rows, zone, faces)
+    rows = merge_features(rows)
     keep = np.isin(rows.zones, ZONES)
     used, local = np.unique(rows.faces[keep], return_inverse=True)
     return MeshRows(rows.values[used], local.reshape(-1, 3), rows.zones[keep])
@@ -178,8 +184,8 @@ def _landmarks(base: _Base) -> Array:
 def _read(folder: Path) -> _Base:
     positions, groups = _read_obj(folder / "3dobjs" / "base.obj")
     bones = _read_bones(folder)
-    names = tuple(_targets())
-    shapes = [_read_target(folder / "targets" / _file(name), len(positions)) for name in names]
+    names = (*_targets(), *FACES)
+    shapes = [_read_shape(folder / "targets", name, len(positions)) for name in names]
     table = json.loads((folder / f"rigs/standard/weights.{_RIG}.json").read_text("utf-8"))
     weights = np.zeros((len(positions), len(bones)))
     for k, bone in enumerate(bones):
@@ -207,6 +213,15 @@ def _file(name: str) -> str:
     return f"macrodetails/{name}.target.gz"
 
 
+def _read_shape(folder: Path, name: str, count: int) -> Array:
+    """What a shape adds to the positions [m], float64 [n, 3]."""
+    files = FACES.get(name, {_file(name): 1.0})
+    return sum(
+        (share * _read_target(folder / file, count) for file, share in files.items()),
+        np.zeros((count, 3)),
+    )
+
+
 def _read_obj(path: Path) -> tuple[Array, dict[str, Indices]]:
     """Positions in the template frame [n, 3], and triangles of each group [m, 3]."""
     vertices: list[list[float]] = []
@@ -227,7 +242,8 @@ def _read_obj(path: Path) -> tuple[Array, dict[str, Indices]]:
 
 def _read_target(path: Path, count: int) -> Array:
     deltas = np.zeros((count, 3))
-    with gzip.open(path, "rt", encoding="utf-8") as file:
+    opened = gzip.open if path.suffix == ".gz" else open
+    with opened(path, "rt", encoding="utf-8") as file:
         for line in file:
             words = line.split()
             if len(words) == 4 and words[0].isdigit():

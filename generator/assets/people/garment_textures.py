@@ -201,13 +201,18 @@ def hi_vis(seed: int) -> TextureData:
 
 
 def hair_strands(seed: int) -> TextureData:
-    """Strands from above to below, in locks; a light grey to be tinted. 0.25 m per repeat."""
+    """Strands from above to below, in locks, or curls; a light grey. 0.25 m per repeat."""
     rng = variant_rng("hair_strands", seed)
-    bend = 5.0 * perlin((4, 4), rng)
+    if seed % 2:
+        bend, sway = 9.0 * perlin((9, 9), rng), 9.0 * perlin((9, 9), rng)
+        curls = np.abs(warp_image(perlin((26, 26), rng), bend, sway))
+        height = (2.6 * curls - 0.6 + 0.5 * perlin((60, 60), rng)).astype(np.float32)
+        return texture(_rgb(0.76 + 0.24 * height), None, 2.2 * height)
+    bend = 7.0 * perlin((4, 6), rng)
     strands = 0.6 * perlin((4, 128), rng) + 0.4 * perlin((6, 220), rng)
-    locks = perlin((3, 26), rng)
+    locks = perlin((3, 26), rng) + 0.6 * perlin((3, 11), rng)
     height = warp_image(strands + 1.2 * locks, 0.0 * bend, bend)
-    return texture(_rgb(0.78 + 0.2 * height), None, 1.2 * height)
+    return texture(_rgb(0.78 + 0.26 * height), None, 1.5 * height)
 
 
 def skin_relief(seed: int) -> TextureData:

@@ -25,6 +25,36 @@ _COLORS = load_table(__package__, "wardrobe", tuple[str, ...])
 
 
 @dataclass(frozen=True, slots=True)
+class FaceKind:
+    """A row of ``faces.yaml``. All but the shares are strengths.
+
+    Attributes:
+        brows: How much darker brows are than skin.
+        lips: How much darker lips are than skin.
+        lashes: Darkness of the line of lashes.
+        beard: Stubble up to about 0.4, above that a full beard.
+        age: Folds and lines.
+        freckles: Freckles across cheeks and nose.
+        sexes: ``female``, ``male`` or both.
+        ages: Age groups that have such faces.
+        share: How often it is drawn.
+    """
+
+    brows: float
+    lips: float
+    lashes: float
+    beard: float
+    age: float
+    freckles: float
+    sexes: tuple[str, ...]
+    ages: tuple[str, ...]
+    share: float
+
+
+_FACES = load_table(__package__, "faces", FaceKind)
+
+
+@dataclass(frozen=True, slots=True)
 class Outfit:
     """Outfit of one person.
 
@@ -179,10 +209,15 @@ _ADULT_M = (1.45, 2.0)
 # children and adolescents", Bulletin of the WHO 85(9), 2007.
 _CHILD_M = (1.1, 1.5)
 
+# Assumed, +/- half of each. Children have the first three.
 _HAIRCUTS = {
-    "female": ("long", "long", "bob", "bob", "short", "long"),
-    "male": ("short", "short", "short", "cropped", "cropped", "bald"),
-}
+    "female": ("long", "ponytail", "bob", "long", "bob", "bun", "ponytail", "short", "fringe",
+               "long", "curly"),
+    "male": ("short", "fringe", "short", "side_part", "cropped", "cropped", "short", "side_part",
+             "curly", "bald"),
+}  # fmt: skip
+_HORSESHOE_SHARE, _AFRO_SHARE = 0.4, 0.3
+"""Of men over 65 whose crown is bald; of short or cropped hair on the two darkest skins."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,7 +226,10 @@ class Person:
 
     Attributes:
         figure: Strength of each word of the body's shapes.
-        haircut: ``bald``, ``cropped``, ``short``, ``bob`` or ``long``.
+        face: Row of ``faces.yaml``.
+        eyes: Row of ``eye_colors.yaml``.
+        haircut: ``bald``, ``cropped``, ``short``, ``side_part``, ``fringe``, ``curly``, ``afro``,
+            ``horseshoe`` (a bald crown), ``bob``, ``long``, ``ponytail`` or ``bun``.
         step: Sixteenth of the stride of the left leg.
     """
 
@@ -203,6 +241,8 @@ class Person:
     skin: Vec3
     hair: Vec3
     haircut: str
+    face: int
+    eyes: int
     outfit: Outfit
     pose: str
     step: int
@@ -227,6 +267,8 @@ def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
     height_m = _drawn_height_m(sex, age_group, rng)
     tone = rng.choose(range(len(_COLORS["skin"])))
     figure = _drawn_figure(sex, age_group, height_m, tone, rng)
+    face_rng = variant_rng("person/face", seed)
+    figure |= _drawn_features(age_group, face_rng)
     action, step = _drawn_action(seed, age_group, pose, phase)
     return Person(
         seed,
@@ -236,7 +278,9 @@ def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
         figure,
         skin=jitter_color(hex_to_linear(_COLORS["skin"][tone]), 0.07, rng),
         hair=_drawn_hair(age_group, tone, rng),
-        haircut=rng.choose(_HAIRCUTS[sex][: 3 if age_group == "child" else None]),
+        haircut=_drawn_haircut(sex, age_group, tone, rng, face_rng),
+        face=_drawn_face(sex, age_group, face_rng),
+        eyes=_drawn_eyes(tone, face_rng),
         outfit=draw_outfit(sex, age_group == "child", rng),
         pose=action,
         step=step,
@@ -317,6 +361,58 @@ def _drawn_hair(age_group: AgeGroup, tone: int, rng: VariantRng) -> Vec3:
         return draw_linear(_COLORS["grey_hair"], 0.1, rng)
     # Fair hair belongs to fair skin.
     return draw_linear(_COLORS["hair"][: 8 if tone < 2 else 4 if tone < 4 else 2], 0.12, rng)
+
+
+def _drawn_haircut(
+    sex: Sex, age_group: AgeGroup, tone: int, rng: VariantRng, face_rng: VariantRng
+) -> str:
+    haircut = rng.choose(_HAIRCUTS[sex][: 3 if age_group == "child" else None])
+    draw = float(face_rng.random())
+    if sex == "male" and age_group == "senior" and draw < _HORSESHOE_SHARE:
+        return "horseshoe"
+    short = haircut in ("short", "cropped", "curly", "fringe", "side_part")
+    if short and tone >= len(_COLORS["skin"]) - 2:
+        return "afro" if draw < _AFRO_SHARE else "cropped"
+    return haircut
+
+
+def _drawn_face(sex: Sex, age_group: AgeGroup, rng: VariantRng) -> int:
+    """A row of ``faces.yaml`` that fits sex and age."""
+    lots = [
+        k
+        for k, kind in enumerate(_FACES.values())
+        if sex in kind.sexes and age_group in kind.ages
+        for _ in range(round(kind.share))
+    ]
+    return rng.choose(lots)
+
+
+def _drawn_eyes(tone: int, rng: VariantRng) -> int:
+    """A row of ``eye_colors.yaml``: light eyes belong to light skin."""
+    return rng.choose((0, 1, 1, 2, 3, 4, 5, 6, 6, 7) if tone < 2 else (0, 0, 1, 1, 2))
+
+
+def _drawn_features(age_group: AgeGroup, rng: VariantRng) -> dict[str, float]:
+    """Strengths of shapes of the face and its expression; bodies without them ignore these."""
+    head = rng.choose(("round_head", "oval_head", "square_head", "triangular_head"))
+    nose = rng.choose(("wide_nose", "narrow_nose", "hooked_nose"))
+    chin = rng.choose(("strong_chin", "weak_chin"))
+    features = {
+        head: rng.between(0.0, 0.7),
+        nose: rng.between(0.0, 0.7),
+        chin: rng.between(0.0, 0.6),
+        "full_face": rng.between(0.0, 0.5),
+        "squint": rng.between(0.0, 0.2),
+        # The template's mouth looks sullen.
+        "smile": rng.between(0.1, 0.25),
+    }
+    if age_group == "senior":
+        features["aged_head"] = rng.between(0.4, 0.9)
+    # People in streets mostly look straight ahead; expressions are assumed.
+    mood = rng.choose(("smile", "smile", "frown", "raised_brows", ""))
+    if mood:
+        features[mood] = rng.between(0.1, 0.3 if mood == "frown" else 0.55)
+    return features
 
 
 _NOT_OF_AGE: Mapping[AgeGroup, tuple[str, ...]] = {

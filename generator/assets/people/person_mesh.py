@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -20,8 +19,9 @@ from gen_data.generator.assets.people.body import (
     load,
 )
 from gen_data.generator.assets.people.carried_things import STRAPPED, Carrier, Sheet, make_things
-from gen_data.generator.assets.people.clothes import Layer, displace_layer, find_region, layers
+from gen_data.generator.assets.people.clothes import displace_layer, layers
 from gen_data.generator.assets.people.garment_layout import lay_out
+from gen_data.generator.assets.people.layer import Layer
 from gen_data.generator.assets.people.person import Person, draw_person
 from gen_data.generator.assets.people.posing import (
     BEHAVIOURS,
@@ -36,12 +36,11 @@ from gen_data.generator.assets.people.posing import (
 from gen_data.generator.assets.procedural.collision_hulls import extreme
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Solid
-from gen_data.generator.assets.procedural.variant_rng import variant_rng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import ConvexParts, Float32, Keypoint, Material, MeshData
 
 _GRID_M = 1e-5
 """Vertices lie on this grid, so that the last bits of sines do not reach the mesh."""
-_PHASES = 7
 _NARROW_STRIDE = 0.7
 """What a long skirt leaves of a stride."""
 _HULL_POINTS = 40
@@ -98,28 +97,24 @@ def dress_person(person: Person, body: BodyTemplate) -> Figure:
     rng = variant_rng("person/folds", person.seed)
     made = []
     for layer in layers(person):
-        phases = 2.0 * math.pi * np.array([rng.random() for _ in range(_PHASES)])
-        made.append(_make_piece(body, layer, points, phases))
+        made.append(_make_piece(body, layer, points, rng))
     return Figure(body, points, scale, tuple(made))
 
 
-def _make_piece(body: BodyTemplate, layer: Layer, points: Array, phases: Array) -> _Piece:
-    region, places = displace_layer(body, layer, points, phases)
+def _make_piece(body: BodyTemplate, layer: Layer, points: Array, rng: VariantRng) -> _Piece:
+    sheet = displace_layer(body, layer, points, rng)
     zones, materials = zip(*layer.zones, strict=True)
-    used, faces, slots = region.used, region.faces, region.slots
-    corners, corner_faces = np.arange(len(used)), faces
-    uvs = np.zeros((len(used), 2), np.float32)
-    if layer.mapped:
-        corners, corner_faces, uvs = _lay_out(body, zones)
-    return _Piece(used, places, faces, slots, materials, corners, corner_faces, uvs)
-
-
-@lru_cache(maxsize=64)
-def _lay_out(body: BodyTemplate, zones: tuple[str, ...]) -> tuple[Indices, Indices, Float32]:
-    """As ``lay_out`` of a garment in some zones of a template; the same for everyone."""
-    region = find_region(body, zones)
-    corners, faces, uvs = lay_out(body.points_m[region.used], region.faces, zones, region.slots)
-    return corners, faces, np.round(uvs, 5).astype(np.float32)
+    corners, corner_faces = np.arange(len(sheet.used)), sheet.faces
+    uvs = np.zeros((len(sheet.used), 2))
+    if layer.layout:
+        uvs = layer.layout(sheet.template_m)
+    elif layer.mapped:
+        corners, corner_faces, uvs = lay_out(sheet.template_m, sheet.faces, zones, sheet.slots)
+    rounded = np.round(uvs, 5).astype(np.float32)
+    return _Piece(
+        sheet.used, sheet.places_m, sheet.faces, sheet.slots, materials, corners, corner_faces,
+        rounded,
+    )  # fmt: skip
 
 
 def build_person(person: Person, figure: Figure) -> Solid:
