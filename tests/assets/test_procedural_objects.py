@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from functools import cache
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.vessel_contents import CONTENTS, FOODS
 from gen_data.generator.assets.procedural.vessels import choose
 from gen_data.generator.core.asset_types import MeshData
+from tests.every_value import for_every
 
 SEEDS = (0, 1, 7, 11)
 OBJECTS = sorted(name for name, family in FAMILIES.items() if family.variants)
@@ -39,13 +41,15 @@ LONGEST_SIDE_M = {
 OPEN_EDGES = {"milk_carton": 0.02, "pipe_elbow": 0.02, "flange": 0.005}
 
 
-Built = dict[tuple[str, int], Solid]
+@cache
+def variant(name: str, seed: int) -> Solid:
+    """A variant of a family, built once for all tests."""
+    return FAMILIES[name].build(seed=seed)
 
 
-@pytest.fixture(scope="module")
-def built() -> Built:
-    """Variants of all families by family and seed; tests list those that fail."""
-    return {(name, seed): FAMILIES[name].build(seed=seed) for name in OBJECTS for seed in SEEDS}
+for_every_variant = for_every(
+    [(name, seed) for name in OBJECTS for seed in SEEDS], lambda key: (key[0], variant(*key))
+)
 
 
 def test_every_object_family_has_a_stated_real_size() -> None:
@@ -53,136 +57,132 @@ def test_every_object_family_has_a_stated_real_size() -> None:
     assert set(LONGEST_SIDE_M) == set(OBJECTS)
 
 
-def test_objects_have_the_size_of_real_ones(built: Built) -> None:
+@for_every_variant
+def test_objects_have_the_size_of_real_ones(built: tuple[str, Solid]) -> None:
     """The longest side lies in the range that is measured on real things."""
-    wrong = {}
-    for (name, seed), solid in built.items():
-        longest_m = float(np.ptp(solid.mesh.bounds_m(), axis=0).max())
-        low_m, high_m = LONGEST_SIDE_M[name]
-        if not low_m <= longest_m <= high_m:
-            wrong[name, seed] = longest_m
+    name, solid = built
+    low, high = solid.mesh.bounds_m()
+    longest = max(b - a for a, b in zip(low, high, strict=True))
 
-    assert not wrong
+    assert LONGEST_SIDE_M[name][0] <= longest <= LONGEST_SIDE_M[name][1]
 
 
-def test_the_origin_is_the_centre_of_the_bounding_box(built: Built) -> None:
+@for_every_variant
+def test_the_origin_is_the_centre_of_the_bounding_box(built: tuple[str, Solid]) -> None:
     """Objects are placed by the centre of their box."""
-    sums_m = {key: np.sum(solid.mesh.bounds_m(), axis=0) for key, solid in built.items()}
+    low, high = built[1].mesh.bounds_m()
 
-    assert not [key for key, sum_m in sums_m.items() if not np.allclose(sum_m, 0.0, atol=3e-6)]
+    assert np.allclose(np.add(low, high), 0.0, atol=3e-6)
 
 
-def test_arrays_are_finite_typed_and_within_the_budget(built: Built) -> None:
+@for_every_variant
+def test_arrays_are_finite_typed_and_within_the_budget(built: tuple[str, Solid]) -> None:
     """Shapes and types are the contract's; a mesh has at most 12 000 triangles."""
-    for key, solid in built.items():
-        mesh = solid.mesh
-        n, m = len(mesh.vertices_m), len(mesh.faces)
+    mesh = built[1].mesh
+    n, m = len(mesh.vertices_m), len(mesh.faces)
 
-        for array, shape, dtype in (
-            (mesh.vertices_m, (n, 3), np.float32),
-            (mesh.normals, (n, 3), np.float32),
-            (mesh.uvs, (n, 2), np.float32),
-            (mesh.faces, (m, 3), np.int32),
-            (mesh.face_slots, (m,), np.int32),
-        ):
-            assert array.shape == shape, key
-            assert array.dtype == dtype, key
-            assert np.isfinite(array).all(), key
-        assert 60 <= m <= 12_000, key
-        assert set(np.unique(mesh.face_slots)) <= set(range(len(mesh.materials))), key
-        assert mesh.faces.min() == 0, key
-        assert mesh.faces.max() == n - 1, key
+    for array, shape, dtype in (
+        (mesh.vertices_m, (n, 3), np.float32),
+        (mesh.normals, (n, 3), np.float32),
+        (mesh.uvs, (n, 2), np.float32),
+        (mesh.faces, (m, 3), np.int32),
+        (mesh.face_slots, (m,), np.int32),
+    ):
+        assert array.shape == shape
+        assert array.dtype == dtype
+        assert np.isfinite(array).all()
+    assert 60 <= m <= 12_000
+    assert set(np.unique(mesh.face_slots)) <= set(range(len(mesh.materials)))
+    assert mesh.faces.min() == 0
+    assert mesh.faces.max() == n - 1
 
 
-def test_texture_coordinates_stay_in_the_image(built: Built) -> None:
+@for_every_variant
+def test_texture_coordinates_stay_in_the_image(built: tuple[str, Solid]) -> None:
     """Labels are never cut off by wrapping around."""
-    ranges = {key: (s.mesh.uvs.min(), s.mesh.uvs.max()) for key, s in built.items()}
+    uvs = built[1].mesh.uvs
 
-    assert not {key: found for key, found in ranges.items() if found[0] < 0.0 or found[1] > 1.0}
+    assert uvs.min() >= 0.0
+    assert uvs.max() <= 1.0
 
 
-def test_surfaces_are_closed(built: Built) -> None:
+@for_every_variant
+def test_surfaces_are_closed(built: tuple[str, Solid]) -> None:
     """Every edge is walked as often in one direction as in the other."""
-    shares = {key: _unmatched_edges(solid.mesh) for key, solid in built.items()}
+    name, solid = built
 
-    assert not {key: x for key, x in shares.items() if x > OPEN_EDGES.get(key[0], 0.0)}
+    assert _unmatched_edges(solid.mesh) <= OPEN_EDGES.get(name, 0.0)
 
 
-def test_faces_are_wound_outward(built: Built) -> None:
+@for_every_variant
+def test_faces_are_wound_outward(built: tuple[str, Solid]) -> None:
     """The divergence theorem gives a positive volume, smaller than the box; so for contents."""
-    wrong = {}
-    for key, solid in built.items():
-        mesh = solid.mesh
-        box_m3 = np.ptp(mesh.bounds_m(), axis=0).prod()
-        is_content = np.array([material.role == CONTENTS for material in mesh.materials])
-        inside = is_content[mesh.face_slots]
-        for faces in (mesh.faces[~inside], mesh.faces[inside]):
-            volume_m3 = _volume_m3(mesh.vertices_m[faces].astype(np.float64))
-            if (volume_m3 <= 0.0 and len(faces)) or volume_m3 >= box_m3:
-                wrong[key] = volume_m3
+    mesh = built[1].mesh
+    low, high = mesh.bounds_m()
+    inside = np.array([material.role == CONTENTS for material in mesh.materials])[mesh.face_slots]
 
-    assert not wrong
+    for faces in (mesh.faces[~inside], mesh.faces[inside]):
+        volume_m3 = _volume_m3(mesh.vertices_m[faces].astype(np.float64))
+        assert (volume_m3 > 0.0 or not len(faces)) and volume_m3 < np.prod(np.subtract(high, low))
 
 
-def test_no_triangle_is_degenerate(built: Built) -> None:
+@for_every_variant
+def test_no_triangle_is_degenerate(built: tuple[str, Solid]) -> None:
     """Every face has an area, so that it has a normal."""
-    cross = {key: _face_normals(solid.mesh) for key, solid in built.items()}
+    corners = built[1].mesh.vertices_m[built[1].mesh.faces].astype(np.float64)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
-    assert not [k for k, c in cross.items() if np.sqrt((c**2).sum(axis=1)).min() <= 1e-13]
+    assert np.sqrt((cross**2).sum(axis=1)).min() > 1e-13
 
 
-def test_normals_are_unit_and_on_the_side_of_their_faces(built: Built) -> None:
+@for_every_variant
+def test_normals_are_unit_and_on_the_side_of_their_faces(built: tuple[str, Solid]) -> None:
     """Smoothing never turns a normal away from a face it belongs to."""
-    wrong = []
-    for key, solid in built.items():
-        mesh = solid.mesh
-        cross = _face_normals(mesh)
-        face = cross / np.sqrt((cross**2).sum(axis=1, keepdims=True))
-        squares = (mesh.normals.astype(np.float64) ** 2).sum(axis=1)
-        cosines = (face[:, None, :] * mesh.normals[mesh.faces]).sum(axis=2)
-        if not np.allclose(squares, 1.0, atol=1e-4) or cosines.min() <= 0.5:
-            wrong.append(key)
+    mesh = built[1].mesh
+    corners = mesh.vertices_m[mesh.faces].astype(np.float64)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    face = cross / np.sqrt((cross**2).sum(axis=1, keepdims=True))
 
-    assert not wrong
+    assert np.allclose((mesh.normals.astype(np.float64) ** 2).sum(axis=1), 1.0, atol=1e-4)
+    assert (face[:, None, :] * mesh.normals[mesh.faces]).sum(axis=2).min() > 0.5
 
 
-def test_collision_is_few_small_convex_parts(built: Built) -> None:
+@for_every_variant
+def test_collision_is_few_small_convex_parts(built: tuple[str, Solid]) -> None:
     """At most 24 parts of at most 48 vertices; all of them are vertices of their hull."""
-    for key, solid in built.items():
-        parts = solid.collision.parts_m
+    parts = built[1].collision.parts_m
 
-        assert 1 <= len(parts) <= 24, key
-        for part in parts:
-            assert part.dtype == np.float64, key
-            assert 4 <= len(part) <= 48, key
-            assert _outside_m(part, part).min() > -2e-4, key
+    assert 1 <= len(parts) <= 24
+    for part in parts:
+        assert part.dtype == np.float64
+        assert 4 <= len(part) <= 48
+        hull = ConvexHull(part)
+        depth = (part @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
+        assert depth.min() > -2e-4
 
 
-def test_collision_has_the_bounds_of_what_is_seen(built: Built) -> None:
+@for_every_variant
+def test_collision_has_the_bounds_of_what_is_seen(built: tuple[str, Solid]) -> None:
     """Things rest where they seem to rest."""
-    gaps_m = {}
-    for key, solid in built.items():
-        points = np.concatenate(solid.collision.parts_m)
-        bounds_m = np.stack([points.min(axis=0), points.max(axis=0)])
-        gaps_m[key] = float(np.abs(bounds_m - solid.mesh.bounds_m()).max())
+    mesh = built[1].mesh
+    points = np.concatenate(built[1].collision.parts_m)
+    low, high = mesh.bounds_m()
 
-    assert not {key: gap_m for key, gap_m in gaps_m.items() if gap_m >= 0.003}
+    assert np.abs(points.min(axis=0) - low).max() < 0.003
+    assert np.abs(points.max(axis=0) - high).max() < 0.003
 
 
-def test_most_of_what_is_seen_lies_near_the_collision(built: Built) -> None:
+@for_every_variant
+def test_most_of_what_is_seen_lies_near_the_collision(built: tuple[str, Solid]) -> None:
     """Half of the vertices within 2.5 mm of a part, nine in ten within 3.5 mm."""
-    wrong = {}
-    for key, solid in built.items():
-        mesh = solid.mesh
-        slots = [slot for slot, material in enumerate(mesh.materials) if material.role != CONTENTS]
-        seen = np.unique(mesh.faces[np.isin(mesh.face_slots, slots)])
-        vertices = mesh.vertices_m[seen].astype(np.float64)
-        outside_m = np.min([_outside_m(part, vertices) for part in solid.collision.parts_m], axis=0)
-        half_m, most_m = np.quantile(outside_m, (0.5, 0.9))
-        if half_m >= 0.0025 or most_m >= 0.0035:
-            wrong[key] = (float(half_m), float(most_m))
+    mesh = built[1].mesh
+    solid = [slot for slot, material in enumerate(mesh.materials) if material.role != CONTENTS]
+    seen = np.unique(mesh.faces[np.isin(mesh.face_slots, solid)])
+    vertices = mesh.vertices_m[seen].astype(np.float64)
+    outside = np.min([_outside_m(part, vertices) for part in built[1].collision.parts_m], axis=0)
 
-    assert not wrong
+    assert np.quantile(outside, 0.5) < 0.0025
+    assert np.quantile(outside, 0.9) < 0.0035
 
 
 def open_variants(name: str) -> list[int]:
@@ -209,27 +209,28 @@ def test_vessels_are_hollow_in_physics(name: str, seed: int) -> None:
         assert (_outside_m(part, marble) > 0.001).all()
 
 
-def test_equal_seeds_make_equal_bytes_and_others_differ(built: Built) -> None:
+@for_every(OBJECTS)
+def test_equal_seeds_make_equal_bytes_and_others_differ(name: str) -> None:
     """A variant is a pure function of its seed."""
-    for name in OBJECTS:
-        again = [_digest(FAMILIES[name].build(seed=seed)) for seed in range(4)]
+    digests = [_digest(FAMILIES[name].build(seed=seed)) for seed in range(4)]
 
-        assert again[:2] == [_digest(built[name, seed]) for seed in (0, 1)], name
-        assert len(set(again)) == 4, name
+    assert digests[:2] == [_digest(variant(name, seed)) for seed in (0, 1)]
+    assert len(set(digests)) == 4
 
 
-def test_materials_are_physical_and_their_textures_exist(built: Built) -> None:
+@for_every(OBJECTS)
+def test_materials_are_physical_and_their_textures_exist(name: str) -> None:
     """Values are in range; a texture id names a family of the table; labels are printed."""
-    for key, solid in built.items():
-        for material in solid.mesh.materials:
-            assert all(0.0 <= channel <= 1.0 for channel in material.base_color), key
-            assert 0.04 <= material.roughness <= 1.0, key
-            assert material.metallic in (0.0, 0.35, 1.0), key
+    for seed in SEEDS:
+        for material in variant(name, seed).mesh.materials:
+            assert all(0.0 <= channel <= 1.0 for channel in material.base_color)
+            assert 0.04 <= material.roughness <= 1.0
+            assert material.metallic in (0.0, 0.35, 1.0)
             if material.texture:
                 prefix, _, rest = material.texture.partition("/")
-                assert prefix == "texture", key
-                assert rest.partition("?")[0] in TEXTURES, key
-                assert material.printed, key
+                assert prefix == "texture"
+                assert rest.partition("?")[0] in TEXTURES
+                assert material.printed
 
 
 @pytest.mark.parametrize("name", ["bottle", "can", "carton", "milk_carton", "jar", "book"])
@@ -278,12 +279,6 @@ def _unmatched_edges(mesh: MeshData) -> float:
     keys = np.unique(np.concatenate([there, back]))
     counts = [np.bincount(np.searchsorted(keys, e), minlength=len(keys)) for e in (there, back)]
     return float(np.maximum(counts[0] - counts[1], 0).sum() / len(edges))
-
-
-def _face_normals(mesh: MeshData) -> np.ndarray:
-    """Twice the area of every face [m^2], along its normal."""
-    corners = mesh.vertices_m[mesh.faces].astype(np.float64)
-    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
 
 
 def _volume_m3(corners: np.ndarray) -> float:
