@@ -41,6 +41,7 @@ from gen_data.generator.config.shared_values import (
 )
 from gen_data.generator.config.validation import validate
 from gen_data.generator.config.yaml_tree import Node
+from gen_data.generator.core.bounded_cache import ObjectCache
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import (
     AnyAnnotator,
@@ -241,9 +242,16 @@ class Config:
         if not shared:
             return self.probes[0]
         problems = Problems()
-        config = _scene_config(self.document, dict(shared), problems, _Known())
+        known = _CONSTANT_PARTS.get(self.document, self._constant_parts).copy()
+        config = _scene_config(self.document, dict(shared), problems, known)
         problems.raise_if_any()
         return config
+
+    def _constant_parts(self) -> _Known:
+        """Parts of scenes that do not depend on shared values."""
+        known = _Known()
+        _scene_config(self.document, dict(self.probes[0].shared), Problems(), known)
+        return known.constant()
 
     @property
     def asset_folders(self) -> tuple[Path, ...]:
@@ -405,6 +413,17 @@ class _Known:
     items: dict[tuple[int, str], Node] = field(default_factory=dict)
     plugins: dict[tuple[str, int], tuple[Node, Any]] = field(default_factory=dict)
 
+    def constant(self) -> _Known:
+        """Names of all items, and those parts that are the same in all scenes."""
+        items = {place: node for place, node in self.items.items() if not self.names[place[0]]}
+        kept = {id(node) for node in items.values()}
+        plugins = {place: known for place, known in self.plugins.items() if place[1] in kept}
+        return _Known(self.names, items, plugins)
+
+    def copy(self) -> _Known:
+        """A copy that may grow by the parts of one scene."""
+        return _Known(dict(self.names), dict(self.items), dict(self.plugins))
+
     def resolve(self, listed: Node, shared: Mapping[str, SharedValue], key: str) -> Node:
         """Replace the shared values in a list of the document.
 
@@ -433,6 +452,10 @@ class _Known:
             if plugin is not None:
                 self.plugins[key, id(node)] = node, plugin
         return plugin
+
+
+_CONSTANT_PARTS: ObjectCache[_Known] = ObjectCache(4)
+"""Parts of the latest documents that do not depend on shared values."""
 
 
 def _scene_config(

@@ -63,8 +63,7 @@ class PipelineFactory:
         """Make a pipeline, which is used as a context manager."""
         # One core per process: workers use the others.
         cv2.setNumThreads(1)
-        config = self.config
-        library = open_library(config.asset_folders)
+        config, library = self.config, self.library
         resolved = pipeline_config(config, library, self.n, self.categories, self.extra_channels)
         return Pipeline(
             resolved,
@@ -74,15 +73,20 @@ class PipelineFactory:
         )
 
     @cached_property
+    def library(self) -> Library:
+        """Assets, of this process: opening them takes as long as building a simple scene."""
+        return open_library(self.config.asset_folders)
+
+    @cached_property
     def nominal(self) -> tuple[Scene, ...]:
         """Nominal scenes, one per probe, that cover what a scene can contain.
 
         Raises:
             ConfigError: a randomizer refers to something that neither they nor the assets have.
         """
-        library = open_library(self.config.asset_folders)
-        scenes = tuple(nominal_scene(self.config, scene, library) for scene in self.config.probes)
-        _check_references(self.config, scenes, library)
+        config, library = self.config, self.library
+        scenes = tuple(nominal_scene(config, scene, library) for scene in config.probes)
+        _check_references(config, scenes, library)
         return scenes
 
     def check(self) -> None:
@@ -92,7 +96,7 @@ class PipelineFactory:
             ConfigError: a sequence is too long, or a format cannot hold the data set.
         """
         _check_durations(self.config)
-        ready_exporters(self.config, self.info, open_library(self.config.asset_folders))
+        ready_exporters(self.config, self.info, self.library)
         for scene in self.nominal:
             check_scene(self.config, scene)
 
@@ -106,12 +110,12 @@ class PipelineFactory:
         """Sorted names of all categories that a sample may contain."""
         if self.known_categories is not None:
             return self.known_categories
-        return collect_categories(self.nominal, open_library(self.config.asset_folders))
+        return collect_categories(self.nominal, self.library)
 
     def __getstate__(self) -> dict[str, object]:
         """Pickle the categories, because finding them takes a second."""
         categories = self.categories
-        state = {name: value for name, value in self.__dict__.items() if name != "nominal"}
+        state = {k: v for k, v in self.__dict__.items() if k not in ("library", "nominal")}
         return {**state, "categories": categories}
 
 

@@ -12,7 +12,7 @@ import time
 from collections.abc import Iterator
 from hashlib import sha256
 from os import stat_result
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import Any
 from urllib.parse import unquote
 
@@ -32,6 +32,11 @@ _TICK_NS = 2_000_000_000
 _MTLLIB = re.compile(rb"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
 _MAP = re.compile(rb"^[ \t]*(?:map_\w+|norm|bump)[ \t]([^\n]*)", re.MULTILINE)
 _MAX_FILES = 2000
+_ASSETS_KEPT = 4000
+"""Above this number of recorded assets, those whose files are gone are dropped.
+
+Every process reads all records, and folders of users come and go.
+"""
 
 
 class ContentHashes:
@@ -71,8 +76,19 @@ class ContentHashes:
         """Store new digests on disk, if there are any."""
         if self._changed and self._known is not None:
             # Merge: other processes may have stored digests meanwhile.
-            self._cache.store_json(_NAME, {**self._cache.load_json(_NAME), **self._known})
+            rows = {**self._cache.load_json(_NAME), **self._known}
+            if len(rows) > _ASSETS_KEPT:
+                rows = {name: row for name, row in rows.items() if _exists(name)}
+            self._cache.store_json(_NAME, rows)
             self._changed = False
+
+
+def _exists(name: str) -> bool:
+    """Whether a file exists, as far as this process may know."""
+    try:
+        return Path(name).exists()
+    except (OSError, ValueError):
+        return False
 
 
 def _hash(folder: Folder, file: str) -> list[Any]:

@@ -7,6 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -342,11 +343,18 @@ def _is_road_network(entry: Entry) -> bool:
 
 
 def _list_everything(packs: Path, user_roots: Sequence[Path]) -> Iterator[IndexedAsset]:
-    yield from list_assets(read_index(_BUILT_IN), _pybullet_data())
-    yield from list_assets(read_index(_RENDERED / INDEX_NAME), _RENDERED, "plate/")
+    yield from _list_built_in()
     yield from pack_assets(packs)
     for root in user_roots:
         yield from user_folder(root)
+
+
+@lru_cache(maxsize=1)
+def _list_built_in() -> tuple[IndexedAsset, ...]:
+    """Assets that are installed with this package, the same as long as a process runs."""
+    pybullet = list_assets(read_index(_BUILT_IN), _pybullet_data())
+    rendered = list_assets(read_index(_RENDERED / INDEX_NAME), _RENDERED, "plate/")
+    return (*pybullet, *rendered)
 
 
 def _pybullet_data() -> Path:

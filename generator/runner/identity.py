@@ -9,7 +9,6 @@ from gen_data.generator import __version__
 from gen_data.generator.assemble.pipeline_factory import PipelineFactory, annotators_of
 from gen_data.generator.assemble.plugin_tables import third_party_packages
 from gen_data.generator.assets.installed_packs import TAG, installed_packs
-from gen_data.generator.assets.library import open_library
 from gen_data.generator.assets.paths import packs_dir
 from gen_data.generator.core.asset_types import Asset
 from gen_data.generator.core.scene import Scene
@@ -79,13 +78,13 @@ def installation_differences(plan: Plan) -> list[str]:
 
 def format_licences(factory: PipelineFactory, used: Sequence[str]) -> str:
     """Markdown table of the assets with these ids, grouped by source."""
-    library = open_library(factory.config.asset_folders)
+    library = factory.library
     return licence_table(library.get(asset_id) for asset_id in used)
 
 
 def possible_assets(factory: PipelineFactory) -> tuple[Asset, ...]:
     """Every object, robot and panorama that a sample may contain, sorted by id."""
-    library = open_library(factory.config.asset_folders)
+    library = factory.library
     ids = {asset_id for scene in factory.nominal for asset_id in _asset_ids(scene)}
     drawn = {
         asset_id

@@ -220,22 +220,16 @@ def test_workers_have_one_thread_whatever_the_host_programs_environment(tmp_path
     assert done.stdout.strip() == "1"
 
 
-def test_progress_is_reported(tmp_path: Path) -> None:
-    """The callback sees every sample of the data set."""
+def test_progress_is_reported_and_empty_splits_are_warned_of(tmp_path: Path) -> None:
+    """The callback sees every sample of the data set; the summary names the folder."""
     seen: list[int] = []
-    gen_data.generate(
-        MINIMAL, 2, out=tmp_path / "out", workers=0, on_progress=lambda p: seen.append(p.done)
-    )
+    one_scene = {**MINIMAL, "views_per_scene": 2, "splits": {"train": 0.5, "val": 0.5, "test": 0}}
+    with pytest.warns(gen_data.ConfigWarning, match="splits: 1 scene leaves"):
+        summary = gen_data.generate(
+            one_scene, 2, out=tmp_path / "out", workers=0, on_progress=lambda p: seen.append(p.done)
+        )
 
     assert max(seen) == 2
-
-
-def test_the_summary_names_the_folder_and_empty_splits_are_warned_of(tmp_path: Path) -> None:
-    """As the command line does."""
-    two_splits = {**MINIMAL, "splits": {"train": 0.5, "val": 0.5, "test": 0}}
-    with pytest.warns(gen_data.ConfigWarning, match="splits: 1 scene leaves"):
-        summary = gen_data.generate(two_splits, 1, out=tmp_path / "out", workers=0)
-
     assert summary.folder == str(tmp_path / "out")
 
 
@@ -291,7 +285,10 @@ def test_importing_loads_no_engine() -> None:
 
 
 def test_packages_of_the_same_names_do_no_harm(tmp_path: Path) -> None:
-    """A user's own ``configs``, ``exporters`` and ``tests`` lie beside the script, and it works."""
+    """A user's own ``configs``, ``exporters`` and ``tests`` lie beside the script, and it works.
+
+    The worker, which makes the sample, has the same search path.
+    """
     for name in ("configs", "exporters", "tests", "generator", "randomizers"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "__init__.py").write_text("raise ImportError('not this one')\n")
@@ -299,7 +296,7 @@ def test_packages_of_the_same_names_do_no_harm(tmp_path: Path) -> None:
     script.write_text(
         "import gen_data\n"
         f"data = gen_data.Dataset('tabletop.yaml', overrides={SMALL!r})\n"
-        "print(len(data[3].boxes2d['color']))\n"
+        "print(len(data.categories))\n"
         f"gen_data.generate('tabletop.yaml', 1, out='out', workers=1, overrides={SMALL!r})\n"
     )
 

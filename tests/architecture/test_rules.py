@@ -6,6 +6,7 @@ import ast
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -23,11 +24,22 @@ def test_functions_stay_short() -> None:
     too_long = [
         f"{path.relative_to(ROOT)}: {node.name}: {length} lines"
         for path in python_files(*OURS)
-        for node in ast.walk(ast.parse(path.read_text()))
-        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
+        for node in functions_in(ast.parse(path.read_text()))
+        # Most are short, comments included.
+        if (node.end_lineno or 0) - node.lineno >= LINES_PER_FUNCTION_MAX
         and (length := lines_of_code(path, node)) > LINES_PER_FUNCTION_MAX
     ]
     assert not too_long
+
+
+def functions_in(node: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
+    """Functions among the statements of a module, nested ones included."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            yield child
+        # Expressions, the most numerous nodes, hold no statements.
+        if not isinstance(child, ast.expr):
+            yield from functions_in(child)
 
 
 def lines_of_code(path: Path, function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:

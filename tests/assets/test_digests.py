@@ -108,6 +108,26 @@ def test_a_file_that_was_missing_and_came_changes_the_asset(folder: Folder, tmp_
     assert set(again.of(folder, "a.obj")) == {"a.mtl", "a.obj"}
 
 
+@pytest.mark.usefixtures("settled")
+def test_records_of_files_that_are_gone_are_dropped_when_there_are_many(
+    folder: Folder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Others stay, and so do all of them below the limit."""
+    shutil.copytree(folder.root, tmp_path / "gone")
+    digest_of(Folder(tmp_path / "gone"), tmp_path / "cache")
+    shutil.rmtree(tmp_path / "gone")
+    cache = DiskCache(tmp_path / "cache")
+    gone, kept = (str(tmp_path / name / "a.obj") for name in ("gone", "props"))
+
+    digest_of(folder, tmp_path / "cache")
+    assert set(cache.load_json("digests.json")) == {gone, kept}
+
+    monkeypatch.setattr(content_hashes, "_ASSETS_KEPT", 1)
+    rewrite(folder.root / "a.obj", NEW)
+    assert digest_of(folder, tmp_path / "cache") == sha256(NEW).hexdigest()
+    assert set(cache.load_json("digests.json")) == {kept}
+
+
 @pytest.mark.parametrize("blank", ["mtllib a{}b\n", "mtllib{}\n", "{}mtllib a\n", "mtllib a{}\n"])
 def test_lines_full_of_blanks_are_read_in_linear_time(folder: Folder, blank: str) -> None:
     """Two million blanks; a pattern that tries every split of them would not end."""

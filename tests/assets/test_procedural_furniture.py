@@ -208,18 +208,22 @@ def test_wood_grain_runs_along_every_leg() -> None:
     assert (np.ptp(uv[:, :, 0], axis=1) > np.ptp(uv[:, :, 1], axis=1)).all()
 
 
+def _are_inside(solid: Solid, points: np.ndarray) -> np.ndarray:
+    """For each of [n, 3] points, is it in a part of the collision?"""
+    hulls = [ConvexHull(part).equations for part in solid.collision.parts_m]
+    inside = [(points @ planes[:, :3].T + planes[:, 3] <= 1e-9).all(axis=1) for planes in hulls]
+    return np.asarray(np.any(inside, axis=0))
+
+
 def _inside_any(solid: Solid, point: tuple[float, float, float]) -> bool:
-    for part in solid.collision.parts_m:
-        planes = ConvexHull(part).equations
-        if (planes[:, :3] @ np.array(point) + planes[:, 3] <= 1e-9).all():
-            return True
-    return False
+    return bool(_are_inside(solid, np.array([point]))[0])
 
 
 def _highest_at(solid: Solid, x: float, y: float) -> float:
     """Top of the collision above a place, on a grid of 1 mm."""
     heights = np.arange(2.0, -0.001, -0.001)
-    return next(float(z) for z in heights if _inside_any(solid, (x, y, float(z) - 5e-4)))
+    points = np.stack([np.full_like(heights, x), np.full_like(heights, y), heights - 5e-4], axis=1)
+    return float(heights[_are_inside(solid, points).argmax()])
 
 
 def test_a_sphere_is_as_wide_as_asked_and_stands_on_the_floor() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from functools import cache
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.vessel_contents import CONTENTS, FOODS
 from gen_data.generator.assets.procedural.vessels import choose
 from gen_data.generator.core.asset_types import MeshData
+from tests.every_value import for_every
 
 SEEDS = (0, 1, 7, 11)
 OBJECTS = sorted(name for name, family in FAMILIES.items() if family.variants)
@@ -43,13 +45,15 @@ LONGEST_SIDE_M = {
 OPEN_EDGES = {"milk_carton": 0.02, "pipe_elbow": 0.02, "flange": 0.005}
 
 
-@pytest.fixture(
-    params=[(name, seed) for name in OBJECTS for seed in SEEDS], ids=str, scope="module"
+@cache
+def variant(name: str, seed: int) -> Solid:
+    """A variant of a family, built once for all tests."""
+    return FAMILIES[name].build(seed=seed)
+
+
+for_every_variant = for_every(
+    [(name, seed) for name in OBJECTS for seed in SEEDS], lambda key: (key[0], variant(*key))
 )
-def built(request: pytest.FixtureRequest) -> tuple[str, Solid]:
-    """One variant of one family."""
-    name, seed = request.param
-    return name, FAMILIES[name].build(seed=seed)
 
 
 def test_every_object_family_has_a_stated_real_size() -> None:
@@ -57,6 +61,7 @@ def test_every_object_family_has_a_stated_real_size() -> None:
     assert set(LONGEST_SIDE_M) == set(OBJECTS)
 
 
+@for_every_variant
 def test_objects_have_the_size_of_real_ones(built: tuple[str, Solid]) -> None:
     """The longest side lies in the range that is measured on real things."""
     name, solid = built
@@ -66,6 +71,7 @@ def test_objects_have_the_size_of_real_ones(built: tuple[str, Solid]) -> None:
     assert LONGEST_SIDE_M[name][0] <= longest <= LONGEST_SIDE_M[name][1]
 
 
+@for_every_variant
 def test_the_origin_is_the_centre_of_the_bounding_box(built: tuple[str, Solid]) -> None:
     """Objects are placed by the centre of their box."""
     low, high = built[1].mesh.bounds_m()
@@ -73,6 +79,7 @@ def test_the_origin_is_the_centre_of_the_bounding_box(built: tuple[str, Solid]) 
     assert np.allclose(np.add(low, high), 0.0, atol=3e-6)
 
 
+@for_every_variant
 def test_arrays_are_finite_typed_and_within_the_budget(built: tuple[str, Solid]) -> None:
     """Shapes and types are the contract's; a mesh has at most 12 000 triangles."""
     mesh = built[1].mesh
@@ -94,6 +101,7 @@ def test_arrays_are_finite_typed_and_within_the_budget(built: tuple[str, Solid])
     assert mesh.faces.max() == n - 1
 
 
+@for_every_variant
 def test_texture_coordinates_stay_in_the_image(built: tuple[str, Solid]) -> None:
     """Labels are never cut off by wrapping around."""
     uvs = built[1].mesh.uvs
@@ -102,6 +110,7 @@ def test_texture_coordinates_stay_in_the_image(built: tuple[str, Solid]) -> None
     assert uvs.max() <= 1.0
 
 
+@for_every_variant
 def test_surfaces_are_closed(built: tuple[str, Solid]) -> None:
     """Every edge is walked as often in one direction as in the other."""
     name, solid = built
@@ -109,6 +118,7 @@ def test_surfaces_are_closed(built: tuple[str, Solid]) -> None:
     assert _unmatched_edges(solid.mesh) <= OPEN_EDGES.get(name, 0.0)
 
 
+@for_every_variant
 def test_faces_are_wound_outward(built: tuple[str, Solid]) -> None:
     """The divergence theorem gives a positive volume, smaller than the box; so for contents."""
     mesh = built[1].mesh
@@ -120,6 +130,7 @@ def test_faces_are_wound_outward(built: tuple[str, Solid]) -> None:
         assert (volume_m3 > 0.0 or not len(faces)) and volume_m3 < np.prod(np.subtract(high, low))
 
 
+@for_every_variant
 def test_no_triangle_is_degenerate(built: tuple[str, Solid]) -> None:
     """Every face has an area, so that it has a normal."""
     corners = built[1].mesh.vertices_m[built[1].mesh.faces].astype(np.float64)
@@ -128,6 +139,7 @@ def test_no_triangle_is_degenerate(built: tuple[str, Solid]) -> None:
     assert np.sqrt((cross**2).sum(axis=1)).min() > 1e-13
 
 
+@for_every_variant
 def test_normals_are_unit_and_on_the_side_of_their_faces(built: tuple[str, Solid]) -> None:
     """Smoothing never turns a normal away from a face it belongs to."""
     mesh = built[1].mesh
@@ -139,6 +151,7 @@ def test_normals_are_unit_and_on_the_side_of_their_faces(built: tuple[str, Solid
     assert (face[:, None, :] * mesh.normals[mesh.faces]).sum(axis=2).min() > 0.5
 
 
+@for_every_variant
 def test_collision_is_few_small_convex_parts(built: tuple[str, Solid]) -> None:
     """At most 24 parts of at most 48 vertices; all of them are vertices of their hull."""
     parts = built[1].collision.parts_m
@@ -152,6 +165,7 @@ def test_collision_is_few_small_convex_parts(built: tuple[str, Solid]) -> None:
         assert depth.min() > -2e-4
 
 
+@for_every_variant
 def test_collision_has_the_bounds_of_what_is_seen(built: tuple[str, Solid]) -> None:
     """Things rest where they seem to rest."""
     mesh = built[1].mesh
@@ -162,6 +176,7 @@ def test_collision_has_the_bounds_of_what_is_seen(built: tuple[str, Solid]) -> N
     assert np.abs(points.max(axis=0) - high).max() < 0.003
 
 
+@for_every_variant
 def test_most_of_what_is_seen_lies_near_the_collision(built: tuple[str, Solid]) -> None:
     """Half of the vertices within 2.5 mm of a part, nine in ten within 3.5 mm."""
     mesh = built[1].mesh
@@ -198,20 +213,20 @@ def test_vessels_are_hollow_in_physics(name: str, seed: int) -> None:
         assert (_outside_m(part, marble) > 0.001).all()
 
 
-@pytest.mark.parametrize("name", OBJECTS)
+@for_every(OBJECTS)
 def test_equal_seeds_make_equal_bytes_and_others_differ(name: str) -> None:
     """A variant is a pure function of its seed."""
-    family = FAMILIES[name]
+    digests = [_digest(FAMILIES[name].build(seed=seed)) for seed in range(4)]
 
-    assert _digest(family.build(seed=3)) == _digest(family.build(seed=3))
-    assert len({_digest(family.build(seed=k)) for k in range(4)}) == 4
+    assert digests[:2] == [_digest(variant(name, seed)) for seed in (0, 1)]
+    assert len(set(digests)) == 4
 
 
-@pytest.mark.parametrize("name", OBJECTS)
+@for_every(OBJECTS)
 def test_materials_are_physical_and_their_textures_exist(name: str) -> None:
     """Values are in range; a texture id names a family of the table; labels are printed."""
     for seed in SEEDS:
-        for material in FAMILIES[name].build(seed=seed).mesh.materials:
+        for material in variant(name, seed).mesh.materials:
             assert all(0.0 <= channel <= 1.0 for channel in material.base_color)
             assert 0.04 <= material.roughness <= 1.0
             assert material.metallic in (0.0, 0.35, 1.0)

@@ -145,8 +145,7 @@ def test_nominal_objects_stand_on_their_surfaces_inside_the_room(name: str) -> N
 @pytest.mark.parametrize("name", CONFIGS)
 def test_nominal_scene_is_the_same_every_time(name: str) -> None:
     """Built twice, from two libraries."""
-    spec_again = load_config(name)
-    again = nominal_scene(spec_again, spec_again.probes[0], open_library(()))
+    again = nominal_scene(spec(name), spec(name).probes[0], open_library(()))
 
     assert canonical_json(again) == canonical_json(scene_of(name))
 

@@ -2,7 +2,8 @@
 
 ``python -m tests.end_to_end.cli_server`` reads requests from its standard input, a line of JSON
 each, and answers each with the exit code. Each command has a process of its own, with its own
-folder, environment and streams; only the imports, seconds for each command, happen once.
+folder, environment and streams; only imports and reads of the package's own files, seconds for each
+command, happen once.
 """
 
 from __future__ import annotations
@@ -31,8 +32,13 @@ def serve() -> None:
     # As the command line does, before NumPy is imported.
     os.environ.update(dict.fromkeys(SINGLE_THREADED, "1"))
     _import_all()
+    from gen_data.generator.assemble.config import load_config
+    from gen_data.generator.assets.library import open_library
     from gen_data.generator.cli.main import main
 
+    # Models of plug-ins, and the list of built-in assets.
+    load_config("tabletop.yaml")
+    open_library().find({"mug"})
     if len(list(Path("/proc/self/task").iterdir())) > 1:
         raise RuntimeError("an import started a thread: forks of this process may hang")
     gc.freeze()  # a collection would copy the memory that forks share

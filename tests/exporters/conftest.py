@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -287,11 +288,17 @@ def driving_scene() -> Scene:
 
 def make_drive(strides: Mapping[str, int] | None = None) -> list[Sample]:
     """Two sequences of four steps, the first for training; sensors read at every stride-th step."""
+    return list(_drive(tuple(sorted((strides or {}).items()))))
+
+
+@cache
+def _drive(strides: tuple[tuple[str, int], ...]) -> tuple[Sample, ...]:
+    """A drive, cast and annotated once for all tests."""
     samples = []
     for index in range(8):
         sequence, step = divmod(index, 4)
         scene = scene_at(driving_scene(), STEP_S * step)
-        reads = [n for n in ("left", "right", "top") if step % (strides or {}).get(n, 1) == 0]
+        reads = [n for n in ("left", "right", "top") if step % dict(strides).get(n, 1) == 0]
         readings = {
             camera.name: replace(ray_cast(scene, camera), time_s=scene.time_s)
             for camera in scene.cameras
@@ -305,7 +312,7 @@ def make_drive(strides: Mapping[str, int] | None = None) -> list[Sample]:
         samples.append(
             Sample(index, sequence, 0, split, scene, capture, truth, step_index=step, cameras=names)
         )
-    return samples
+    return tuple(samples)
 
 
 def make_pairs() -> tuple[DatasetInfo, list[Sample]]:

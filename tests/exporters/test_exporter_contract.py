@@ -44,44 +44,52 @@ def test_its_type_is_its_name_in_the_table(exporter: Any) -> None:
     assert exporter.needs <= set(annotations.TABLE)
 
 
-def test_shards_can_be_written_in_any_order(exporter: Any, world: Any, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def written(exporter: Any, world: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three shards in order, and the data set that they are merged to."""
+    folder = tmp_path_factory.mktemp(exporter.type)
+    world.export(exporter, *given(exporter, world), folder)
+    return folder
+
+
+def test_shards_can_be_written_in_any_order(
+    exporter: Any, world: Any, written: Path, tmp_path: Path
+) -> None:
     """Ids are computed, not counted."""
     info, samples = given(exporter, world)
 
-    forwards = world.export(exporter, info, samples, tmp_path / "a")
-    backwards = world.export(exporter, info, samples, tmp_path / "b", backwards=True)
+    backwards = world.export(exporter, info, samples, tmp_path, backwards=True)
 
-    assert files(forwards) == files(backwards)
-    assert len(files(forwards)) >= (2 if exporter.type in PACKED else len(samples))
+    forwards = files(written / "dataset")
+    assert forwards == files(backwards)
+    assert len(forwards) >= (2 if exporter.type in PACKED else len(samples))
 
 
-def test_the_size_of_shards_leaves_no_trace(exporter: Any, world: Any, tmp_path: Path) -> None:
-    """One shard or seven: the merged data set has the same bytes."""
+@pytest.mark.parametrize("size", [1, 7])
+def test_the_size_of_shards_leaves_no_trace(
+    exporter: Any, world: Any, written: Path, tmp_path: Path, size: int
+) -> None:
+    """Shards of one, three or seven samples: the merged data set has the same bytes."""
     info, samples = given(exporter, world)
 
-    one = world.export(exporter, info, samples, tmp_path / "a", shard_size=7)
-    seven = world.export(exporter, info, samples, tmp_path / "b", shard_size=1)
+    other = world.export(exporter, info, samples, tmp_path, shard_size=size)
 
-    assert files(one) == files(seven)
+    assert files(other) == files(written / "dataset")
 
 
 def test_file_names_of_a_shard_depend_on_indices_only(
-    exporter: Any, world: Any, tmp_path: Path
+    exporter: Any, world: Any, written: Path, tmp_path: Path
 ) -> None:
     """A shard written alone equals the same shard of the whole data set."""
     info, samples = given(exporter, world)
-    world.export(exporter, info, samples, tmp_path / "all")
 
-    world.export(exporter, info, samples[3:6], tmp_path / "alone")
+    world.export(exporter, info, samples[3:6], tmp_path)
 
-    whole = files(tmp_path / "all/shards/000001")
-    assert whole == files(tmp_path / "alone/shards/000000")
+    assert files(written / "shards/000001") == files(tmp_path / "shards/000000")
 
 
-def test_text_files_are_utf8_with_unix_line_ends(exporter: Any, world: Any, tmp_path: Path) -> None:
+def test_text_files_are_utf8_with_unix_line_ends(written: Path) -> None:
     """On every system."""
-    folder = world.export(exporter, *given(exporter, world), tmp_path)
-
-    for name, data in files(folder).items():
+    for name, data in files(written / "dataset").items():
         if name.endswith((".json", ".txt")):
             assert b"\r" not in data.decode("utf-8").encode()

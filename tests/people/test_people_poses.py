@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 
 import numpy as np
@@ -33,14 +34,13 @@ def posed_heads(kind: str, pose: str, step: int) -> tuple[np.ndarray, np.ndarray
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("pose", POSES)
-def test_bones_keep_their_lengths_in_every_pose(kind: str, pose: str) -> None:
+def test_bones_keep_their_lengths_in_every_pose(kind: str) -> None:
     """Poses turn bones; they never stretch them."""
-    for step in range(0, PHASES, 3):
+    for pose, step in itertools.product(POSES, range(0, PHASES, 3)):
         before, after, parents = posed_heads(kind, pose, step)
         child = np.flatnonzero(parents >= 0)
         lengths = [np.linalg.norm(p[child] - p[parents[child]], axis=1) for p in (before, after)]
-        np.testing.assert_allclose(lengths[0], lengths[1], atol=1e-9)
+        np.testing.assert_allclose(lengths[0], lengths[1], atol=1e-9, err_msg=f"{pose} {step}")
 
 
 @pytest.mark.parametrize("kind", KINDS)

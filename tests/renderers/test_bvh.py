@@ -89,7 +89,9 @@ def by_every_face(
     It is not where the ray passes the edge of a face so closely that 32 bits cannot tell, or lies
     in a face's plane.
     """
-    a, b, c = (corners[None, :, k].astype(np.float64) for k in range(3))
+    # Faces on top of each other are met where one of them is.
+    different = np.unique(corners, axis=0)
+    a, b, c = (different[None, :, k].astype(np.float64) for k in range(3))
     o, d = (v.astype(np.float32).astype(np.float64)[:, None] for v in (origins, ways))
     e1, e2, s = b - a, c - a, o - a
     p, q = np.cross(d, e2), np.cross(s, e1)

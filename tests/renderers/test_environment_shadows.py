@@ -64,8 +64,8 @@ def panorama(*lights: tuple[Vec3, float, float], height: int = 256) -> Float32:
 def irradiance(image: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Of surfaces with normals [n, 3] under a panorama, linear RGB [n, 3], by summing texels."""
     d, solid = directions(image.shape[0])
-    cosine = np.maximum(np.einsum("hwc,nc->nhw", d, normals), 0.0)
-    return np.einsum("nhw,hw,hwc->nc", cosine, solid, image)
+    cosine = np.maximum(normals @ d.reshape(-1, 3).T, 0.0)
+    return np.asarray(cosine @ (solid[..., None] * image).reshape(-1, 3))
 
 
 def disc_irradiance(lamp: SkyLamp, normals: np.ndarray) -> np.ndarray:

@@ -43,12 +43,14 @@ class FragileDisk:
     Attributes:
         fail_at: Number of the operation that fails, from 1; 0 = none.
         errno: The error that it and all later ones give; 0 = the process is killed there.
+        before: Called with the number of each operation, before it.
     """
 
     root: Path
     attic: Path
     fail_at: int = 0
     errno: int = 0
+    before: Callable[[int], object] = lambda number: None
     count: int = 0
     healed: bool = False
     pending: list[Pending] = field(default_factory=list)
@@ -86,6 +88,7 @@ class FragileDisk:
         if self.healed:
             return
         self.count += 1
+        self.before(self.count)
         if self.fail_at and self.count >= self.fail_at:
             if self.errno:
                 raise OSError(self.errno, os.strerror(self.errno), path)

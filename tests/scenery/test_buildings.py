@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,16 +16,20 @@ from gen_data.generator.assets.scenery.building_designs import (
     draw_design,
 )
 from gen_data.generator.assets.scenery.buildings import building, building_facts
+from tests.every_value import for_every
 from tests.scenery.rays import cast
 
 SEEDS = (0, 1, 5)
 
 
-@pytest.fixture(params=[(s, k) for s in STYLES for k in SEEDS], ids=str, scope="module")
-def built(request: pytest.FixtureRequest) -> tuple[str, int, Solid]:
-    """Some buildings of every style."""
-    style, seed = request.param
+@cache
+def built_of(key: tuple[str, int]) -> tuple[str, int, Solid]:
+    """A building of a style and a seed, made once for all tests."""
+    style, seed = key
     return style, seed, building(seed, style)
+
+
+for_some_of_every_style = for_every([(s, k) for s in STYLES for k in SEEDS], built_of)
 
 
 def window_faces(solid: Solid) -> np.ndarray:
@@ -33,6 +38,7 @@ def window_faces(solid: Solid) -> np.ndarray:
     return np.isin(solid.mesh.face_slots, slots)
 
 
+@for_some_of_every_style
 def test_panes_lie_behind_the_front_wall_by_a_real_recess(built: tuple[str, int, Solid]) -> None:
     """Rays along -X through the front panes meet glass 0.1-0.35 m behind the wall's plane."""
     style, seed, solid = built
@@ -56,6 +62,7 @@ def test_panes_lie_behind_the_front_wall_by_a_real_recess(built: tuple[str, int,
     assert depth.max() < 0.36
 
 
+@for_some_of_every_style
 def test_windows_have_the_size_and_sills_of_real_ones(built: tuple[str, int, Solid]) -> None:
     """Building practice: 1.0-2.9 m wide, 1.2-2.6 m high, storeys of 2.7-4.7 m; halls to 6.5 m."""
     style, seed, _ = built
@@ -70,6 +77,7 @@ def test_windows_have_the_size_and_sills_of_real_ones(built: tuple[str, int, Sol
     assert 1 <= plan.floors <= 13
 
 
+@for_some_of_every_style
 def test_who_looks_at_it_from_outside_never_sees_an_inside(built: tuple[str, int, Solid]) -> None:
     """Rays from all around meet the front of a face first; thin railings excepted."""
     style, seed, solid = built
@@ -88,6 +96,7 @@ def test_who_looks_at_it_from_outside_never_sees_an_inside(built: tuple[str, int
     assert facing[face >= 0].mean() > 0.985
 
 
+@for_some_of_every_style
 def test_walls_are_closed_below_and_roofs_above(built: tuple[str, int, Solid]) -> None:
     """A ray up from below the ground meets the floor, a ray down from the sky the roof."""
     style, seed, solid = built
@@ -107,6 +116,7 @@ def test_walls_are_closed_below_and_roofs_above(built: tuple[str, int, Solid]) -
     assert (roof[:, 2] > 0.0).all()
 
 
+@for_some_of_every_style
 def test_the_front_faces_plus_x(built: tuple[str, int, Solid]) -> None:
     """There is more glass towards +X than towards any other side."""
     solid = built[2]
@@ -129,6 +139,7 @@ def test_a_style_has_varied_buildings(style: str) -> None:
     assert len(colors) >= 5
 
 
+@for_some_of_every_style
 def test_walls_have_the_first_material_of_their_design(built: tuple[str, int, Solid]) -> None:
     """What the variety of designs is counted by is what is built."""
     style, seed, solid = built
@@ -166,6 +177,7 @@ def test_no_two_of_200_buildings_have_the_same_mesh() -> None:
     assert len(digests) == len(STYLES) * (200 // len(STYLES) + 1)
 
 
+@for_some_of_every_style
 def test_front_stays_on_its_plot(built: tuple[str, int, Solid]) -> None:
     """Fences reach at most 3 m beyond the side walls, wings and porches 5 m before the front."""
     style, seed, solid = built

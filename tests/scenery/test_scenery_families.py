@@ -12,6 +12,7 @@ from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural_library import TABLES, _import_tables
 from gen_data.generator.assets.scenery import FAMILIES, TEXTURES
 from gen_data.generator.core.errors import AssetError
+from tests.every_value import for_every
 from tests.scenery.clutter_limits import CLUTTER
 
 # Height range [m] of real ones, and the largest number of triangles that a street affords.
@@ -84,13 +85,10 @@ variant = cache(build)
 """The same, built once for all tests."""
 
 
-@pytest.fixture(
-    params=[(name, seed) for name in FAMILIES for seed in (0, 1)], ids=str, scope="module"
+for_every_variant = for_every(
+    [(name, seed) for name in FAMILIES for seed in (0, 1)], lambda key: (key[0], variant(*key))
 )
-def built(request: pytest.FixtureRequest) -> tuple[str, Solid]:
-    """The first variants of every family."""
-    name, seed = request.param
-    return name, variant(name, seed)
+"""The first variants of every family."""
 
 
 def test_every_family_has_a_stated_height_and_budget() -> None:
@@ -108,6 +106,7 @@ def test_every_variant_is_as_high_as_real_ones_and_within_its_budget(name: str) 
         assert 30 <= len(mesh.faces) <= triangles, seed
 
 
+@for_every_variant
 def test_it_stands_on_the_ground_around_its_origin(built: tuple[str, Solid]) -> None:
     """Nothing reaches below z = 0, something touches it, and the origin is under the thing."""
     name, solid = built
@@ -121,6 +120,7 @@ def test_it_stands_on_the_ground_around_its_origin(built: tuple[str, Solid]) -> 
     assert low[1] < 0.0 < high[1]
 
 
+@for_every_variant
 def test_arrays_are_finite_typed_and_normals_unit(built: tuple[str, Solid]) -> None:
     """Shapes and types are the contract's."""
     mesh = built[1].mesh
@@ -135,6 +135,7 @@ def test_arrays_are_finite_typed_and_normals_unit(built: tuple[str, Solid]) -> N
     assert set(np.unique(mesh.face_slots)) == set(range(len(mesh.materials)))
 
 
+@for_every_variant
 def test_no_triangle_is_degenerate(built: tuple[str, Solid]) -> None:
     """Every face has an area."""
     corners = built[1].mesh.vertices_m[built[1].mesh.faces].astype(np.float64)
@@ -143,6 +144,7 @@ def test_no_triangle_is_degenerate(built: tuple[str, Solid]) -> None:
     assert np.sqrt((cross**2).sum(axis=1)).min() > 1e-10
 
 
+@for_every_variant
 def test_materials_have_known_roles_and_textures_that_exist(built: tuple[str, Solid]) -> None:
     """Randomizers look for roles; a texture's family must be in one of the tables."""
     textures = {name for table in _import_tables() for name in table}
@@ -156,6 +158,7 @@ def test_materials_have_known_roles_and_textures_that_exist(built: tuple[str, So
             assert material.texture.removeprefix("texture/").partition("?")[0] in textures
 
 
+@for_every_variant
 def test_collision_lies_within_the_mesh_bounds(built: tuple[str, Solid]) -> None:
     """Nothing collides that is not there."""
     name, solid = built
@@ -166,14 +169,14 @@ def test_collision_lies_within_the_mesh_bounds(built: tuple[str, Solid]) -> None
     assert (points <= np.array(high) + 0.1).all(), name
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@for_every(FAMILIES)
 def test_a_variant_has_the_same_bytes_every_time_and_others_than_its_neighbour(name: str) -> None:
     """A pure function of family and seed."""
     assert digest(variant(name, 1)) == digest(build(name, 1))
     assert digest(variant(name, 1)) != digest(variant(name, 2))
 
 
-@pytest.mark.parametrize("name", FAMILIES)
+@for_every(FAMILIES)
 def test_facts_are_known_without_building(name: str) -> None:
     """Every variant says what it is."""
     family = FAMILIES[name]

@@ -17,6 +17,7 @@ from gen_data.generator.assets.vehicles.car_design import MODELS
 from gen_data.generator.assets.vehicles.cars import draw_car
 from gen_data.generator.assets.vehicles.vehicle_materials import draw_paint
 from gen_data.generator.core.asset_types import MeshData
+from tests.every_value import for_every
 from tests.scenery.rays import cast
 
 Array = NDArray[np.float64]
@@ -70,15 +71,11 @@ def _few(name: str) -> int:
     return 5 if name in ("car", "truck") else 2 if name in FROM_CARS[2:] else 3
 
 
-@pytest.fixture(
-    params=[(name, seed) for name in FAMILIES for seed in range(_few(name))],
-    ids=str,
-    scope="module",
+for_every_variant = for_every(
+    [(name, seed) for name in FAMILIES for seed in range(_few(name))],
+    lambda key: (key[0], variant(*key)),
 )
-def built(request: pytest.FixtureRequest) -> tuple[str, Solid]:
-    """The first variants of every family."""
-    name, seed = request.param
-    return name, variant(name, seed)
+"""The first variants of every family."""
 
 
 @pytest.mark.parametrize("name", FAMILIES)
@@ -102,6 +99,7 @@ def test_every_variant_is_as_big_as_real_ones_and_within_its_budget(name: str) -
         assert 1000 <= len(mesh.faces) <= triangles, seed
 
 
+@for_every_variant
 def test_tyres_touch_the_ground_and_nothing_reaches_below(built: tuple[str, Solid]) -> None:
     """The ground is z = 0."""
     mesh = built[1].mesh
@@ -112,6 +110,7 @@ def test_tyres_touch_the_ground_and_nothing_reaches_below(built: tuple[str, Soli
     assert with_role(mesh, *others)[..., 2].min() > 0.015
 
 
+@for_every_variant
 def test_the_origin_is_the_middle_of_the_footprint(built: tuple[str, Solid]) -> None:
     """Mirrors and baskets aside."""
     low, high = built[1].mesh.bounds_m()
@@ -121,6 +120,7 @@ def test_the_origin_is_the_middle_of_the_footprint(built: tuple[str, Solid]) -> 
         assert abs(low[1] + high[1]) < 0.15
 
 
+@for_every_variant
 def test_wheel_keypoints_are_the_middles_of_the_tyres(built: tuple[str, Solid]) -> None:
     """Found again from the tyres' own triangles."""
     name, solid = built
@@ -137,6 +137,7 @@ def test_wheel_keypoints_are_the_middles_of_the_tyres(built: tuple[str, Solid]) 
         assert mine[:, 1].min() - 1e-3 <= at[1] <= mine[:, 1].max() + 1e-3
 
 
+@for_every_variant
 def test_keypoints_are_named_in_the_vocabulary(built: tuple[str, Solid]) -> None:
     """Front is +X and left is +Y."""
     name, solid = built
@@ -154,6 +155,7 @@ def test_keypoints_are_named_in_the_vocabulary(built: tuple[str, Solid]) -> None
         assert points["wheel_front"][0] > 0.0 > points["wheel_rear"][0]
 
 
+@for_every_variant
 def test_lamp_keypoints_lie_at_the_lamps(built: tuple[str, Solid]) -> None:
     """Within a hand's breadth of triangles of the lamp."""
     _, solid = built
@@ -165,6 +167,7 @@ def test_lamp_keypoints_lie_at_the_lamps(built: tuple[str, Solid]) -> None:
             assert away.min() < point.radius_m, point.name
 
 
+@for_every_variant
 def test_slots_have_the_roles_that_randomizers_look_for(built: tuple[str, Solid]) -> None:
     """Cars, vans, trucks, buses and motorcycles have all lamps; bicycles have two."""
     name, solid = built
@@ -189,6 +192,7 @@ def _seed_of(built: tuple[str, Solid]) -> int:
     raise AssertionError("no seed makes this mesh")
 
 
+@for_every_variant
 def test_indicators_are_on_their_own_sides(built: tuple[str, Solid]) -> None:
     """The left one has y > 0, in front and behind."""
     name, solid = built
@@ -256,6 +260,7 @@ def test_nothing_inside_sticks_out(name: str, seed: int) -> None:
     assert "interior" not in met
 
 
+@for_every_variant
 def test_arrays_are_finite_typed_and_normals_unit(built: tuple[str, Solid]) -> None:
     """Shapes and types are the contract's."""
     mesh = built[1].mesh
@@ -266,6 +271,7 @@ def test_arrays_are_finite_typed_and_normals_unit(built: tuple[str, Solid]) -> N
     assert mesh.face_slots.max() < len(mesh.materials)
 
 
+@for_every_variant
 def test_collision_is_a_few_boxes_around_the_body(built: tuple[str, Solid]) -> None:
     """At most three parts that cover the mesh but for mirrors and handlebars."""
     solid = built[1]
@@ -298,6 +304,7 @@ def test_steering_turns_the_front_wheels_alone(name: str) -> None:
     assert straight.keypoints == turned.keypoints
 
 
+@for_every_variant
 def test_same_seed_makes_the_same_bytes_and_others_do_not(built: tuple[str, Solid]) -> None:
     """Pure functions of the seed."""
     name, solid = built
