@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gen_data.generator.assemble.config import load_config
-from gen_data.generator.assemble.pipeline_factory import open_pipeline
+from gen_data.generator.assemble.pipeline_factory import PipelineFactory
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import from_plain, to_plain
@@ -26,10 +26,10 @@ SMALL = (
 @pytest.fixture(scope="module")
 def samples() -> Iterator[list[Sample]]:
     """Two instants of a street, and the first made again in another pipeline."""
-    spec = load_config("kitti_rig.yaml", overrides=SMALL)
-    with open_pipeline(spec) as pipeline:
+    factory = PipelineFactory(load_config("kitti_rig.yaml", overrides=SMALL), n=1)
+    with factory() as pipeline:
         made = [pipeline.sample(0), pipeline.sample(1)]
-    with open_pipeline(spec) as pipeline:
+    with factory() as pipeline:
         yield [*made, pipeline.sample(0)]
 
 
