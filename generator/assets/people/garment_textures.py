@@ -211,7 +211,7 @@ def hair_strands(seed: int) -> TextureData:
     bend = 7.0 * perlin((4, 6), rng)
     strands = 0.6 * perlin((4, 128), rng) + 0.4 * perlin((6, 220), rng)
     locks = perlin((3, 26), rng) + 0.6 * perlin((3, 11), rng)
-    height = warp_image(strands + 1.2 * locks, 0.0 * bend, bend)
+    height = warp_image((strands + 1.2 * locks).astype(np.float32), 0.0 * bend, bend)
     return texture(_rgb(0.78 + 0.26 * height), None, 1.5 * height)
 
 
