@@ -15,14 +15,14 @@ LONG = "a" * 65
     ("override", "message"),
     [
         (f"sensors.color.name={LONG}", "--set:1:20: sensors[0].name: 'aaa"),
-        (f"randomizers.clutter.name={LONG}", "--set:1:26: randomizers[1].name: 'aaa"),
-        ("randomizers.distractors.name=a b", "--set:1:30: randomizers[2].name: 'a b' does not"),
+        (f"randomizers.clutter.name={LONG}", "--set:1:26: randomizers[0].name: 'aaa"),
+        ("randomizers.distractors.name=a b", "--set:1:30: randomizers[1].name: 'a b' does not"),
         (f"elements.clutter.name={LONG}", "--set:1:23: elements[3].name: 'aaa"),
         (
             "exporters=[{type: coco}, {type: coco}]",
             "--set:1:33: exporters[1].type: the exporter 'coco' is listed twice; expected it once",
         ),
-        ("randomizers.clutter.count=1000000000", "--set:1:27: randomizers[1].count: 1000000000"),
+        ("randomizers.clutter.count=1000000000", "--set:1:27: randomizers[0].count: 1000000000"),
     ],
 )
 def test_names_counts_and_repetitions_are_refused_when_read(override: str, message: str) -> None:
