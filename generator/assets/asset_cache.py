@@ -37,7 +37,7 @@ S = TypeVar("S", bound=Sized)
 T = TypeVar("T")
 Arrays = dict[str, NDArray[Any]]
 
-FORMAT = 2
+FORMAT = 3
 """Increased whenever the same sources are stored as different arrays."""
 # Small, since renderers and physics engines keep their own copies.
 _MEMORY_BYTES = 24 * 1024 * 1024
@@ -71,7 +71,8 @@ class DiskCache:
 
     def arrays(self, key: str, compute: Callable[[], Arrays]) -> Arrays:
         """Load the arrays of a content key, read-only; compute and store them if missing."""
-        path = self.folder / key[:2] / f"{key}.arrays"
+        # Versions of this program that store other arrays may share the folder.
+        path = self.folder / f"format-{FORMAT}" / key[:2] / f"{key}.arrays"
         stored = _load(path, key, self._intact)
         if stored is not None:
             return stored
