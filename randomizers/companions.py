@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Annotated, Literal
 
 from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
 from gen_data.generator.assets.people.posing import BEHAVIOURS, MOVING_POSES, PHASES
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.members import Member, add_members
+from gen_data.generator.core.members import Member, add_members, change_assets
 from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.streams import Rng
@@ -61,7 +60,7 @@ class Companions(GroupRandomizer):
         leaders = [body for body in scene.bodies if body.group == group.name]
         ground = make_ground(standing_bodies(scene), assets)
         added: list[Member] = []
-        changed: list[Body] = []
+        changed: dict[str, str] = {}
         for leader in leaders:
             others = self.size.draw(rng) - 1
             pose = dict(assets.get(leader.asset).attributes).get("pose", "")
@@ -70,9 +69,9 @@ class Companions(GroupRandomizer):
             if not pose or pose in MOVING_POSES:
                 added += self._walk_beside(leader, others, weights, ground, assets, rng)
             else:
-                changed.append(replace(leader, asset=_posed(leader.asset, _STANDS, assets, rng)))
+                changed[leader.name] = _posed(leader.asset, _STANDS, assets, rng)
                 added += self._stand_around(leader, others, weights, ground, assets, rng)
-        scene = _replaced(scene, changed)
+        scene = change_assets(scene, changed)
         return add_members(scene, group, added, assets, first=_free_number(leaders))
 
     def _walk_beside(
@@ -135,16 +134,6 @@ def _posed(asset: str, poses: tuple[str, ...], assets: AssetIndex, rng: Rng) -> 
     if pose in MOVING_POSES:
         parameters["phase"] = phase
     return str(AssetId(parsed.name, parameters))
-
-
-def _replaced(scene: Scene, changed: Sequence[Body]) -> Scene:
-    """The scene with other assets on some bodies and their instances."""
-    assets = {body.instance_id: body.asset for body in changed}
-    instances = tuple(
-        replace(i, asset=assets[i.instance_id]) if i.instance_id in assets else i
-        for i in scene.instances
-    )
-    return replace(scene.with_bodies(*changed), instances=instances)
 
 
 def _free_number(members: Sequence[Body]) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Literal
 
 from pydantic import Field
@@ -11,6 +10,7 @@ from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
 from gen_data.generator.assets.people.posing import BEHAVIOURS, HELD, MOVING_POSES
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.members import change_assets
 from gen_data.generator.core.scene import ObjectGroup, Scene
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase, check_known
@@ -60,12 +60,7 @@ class Umbrellas(RandomizerBase):
             pose = dict(assets.get(body.asset).attributes).get("pose", "")
             if wanted and pose in _FREE:
                 opened[body.name] = _under_umbrella(body.asset, pose)
-        bodies = tuple(replace(b, asset=opened.get(b.name, b.asset)) for b in scene.bodies)
-        by_id = {b.instance_id: opened[b.name] for b in scene.bodies if b.name in opened}
-        instances = tuple(
-            replace(i, asset=by_id.get(i.instance_id, i.asset)) for i in scene.instances
-        )
-        return replace(scene, bodies=bodies, instances=instances)
+        return change_assets(scene, opened)
 
 
 def _under_umbrella(asset: str, pose: str) -> str:

@@ -62,11 +62,15 @@ def _is_mapped(array: Any) -> bool:
 
 def release_mapped_pages() -> None:
     """Drop the pages of all maps from this process; they come back when they are read."""
+    for address, length in list(_mapped.items()):
+        drop_pages(address, length)
+
+
+def drop_pages(address: int, length: int) -> None:
+    """Drop the pages of a map of an unmodified file; locked ones simply stay."""
     libc = _libc()
     if libc is not None:
-        for address, length in list(_mapped.items()):
-            # It fails for locked memory, which then simply stays.
-            libc.madvise(address, length, _MADV_DONTNEED)
+        libc.madvise(address, length, _MADV_DONTNEED)
 
 
 def limit_mapped_pages(kept_bytes: int) -> None:

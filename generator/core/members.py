@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from gen_data.generator.core.interfaces import AssetIndex
@@ -53,6 +53,17 @@ def add_members(
             Instance(instance_id, body.name, category, 0, member.asset, annotated=group.annotated)
         )
     return replace(scene, bodies=(*scene.bodies, *bodies), instances=(*scene.instances, *instances))
+
+
+def change_assets(scene: Scene, assets: Mapping[str, str]) -> Scene:
+    """The scene with other assets on members, by name, and on their instances."""
+    changed = [replace(b, asset=assets[b.name]) for b in scene.bodies if b.name in assets]
+    by_id = {body.instance_id: body.asset for body in changed}
+    instances = tuple(
+        replace(i, asset=by_id[i.instance_id]) if i.instance_id in by_id else i
+        for i in scene.instances
+    )
+    return replace(scene.with_bodies(*changed), instances=instances)
 
 
 def remove_members(scene: Scene, group: str) -> Scene:

@@ -12,9 +12,8 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from gen_data.generator.core.mapped_files import limit_mapped_pages, read_statm
+from gen_data.generator.core.mapped_files import drop_pages, limit_mapped_pages, read_statm
 
-MADV_DONTNEED = 4  # <asm-generic/mman-common.h>
 FILE_BYTES_KEPT = 96 * 1024 * 1024
 """Pages of files that stay mapped between shards; releasing them takes some milliseconds."""
 
@@ -37,8 +36,7 @@ def release_memory(file_bytes_kept: int = FILE_BYTES_KEPT) -> None:
     still needed come back from the page cache of the system without reading the disk.
     """
     gc.collect()
-    libc = ctypes.CDLL(None)
-    trim = getattr(libc, "malloc_trim", None)
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
     limit_mapped_pages(file_bytes_kept)
@@ -47,8 +45,7 @@ def release_memory(file_bytes_kept: int = FILE_BYTES_KEPT) -> None:
         return
     with suppress(OSError):
         for start, end in list(_unmodified_files(Path("/proc/self/smaps").read_text())):
-            # It fails for locked memory, which then simply stays.
-            libc.madvise(ctypes.c_void_p(start), ctypes.c_size_t(end - start), MADV_DONTNEED)
+            drop_pages(start, end - start)
 
 
 def _unmodified_files(smaps: str) -> Iterator[tuple[int, int]]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gen_data.generator.assets.people.body import Array, Indices
+from gen_data.generator.assets.procedural.patches import unit
 from gen_data.generator.assets.procedural.variant_rng import VariantRng
 
 _CALM_PASSES, _NECKLINE_PASSES = 6, 10
@@ -99,9 +100,9 @@ def add_tufts(sheet: Surface, tufts: Tufts, edges: Indices, rng: VariantRng) -> 
     noise = np.array([rng.random() for _ in range(2 * len(a))]).reshape(-1, 2)
     length = length * (0.45 + 0.95 * noise[:, 0])
     along = p[b] - p[a]
-    up = _unit(sheet.normals[a] + sheet.normals[b])
-    away = _unit(np.cross(along, up)) * (1.0 - tufts.down) - (0.0, 0.0, tufts.down)
-    away = _unit(away + tufts.spread * (2.0 * noise[:, 1:] - 1.0) * _unit(along))
+    up = unit(sheet.normals[a] + sheet.normals[b])
+    away = unit(np.cross(along, up)) * (1.0 - tufts.down) - (0.0, 0.0, tufts.down)
+    away = unit(away + tufts.spread * (2.0 * noise[:, 1:] - 1.0) * unit(along))
     # The head is round: a straight lock would dip into it.
     lift = tufts.lift_m + length**2 / (2.0 * _HEAD_RADIUS_M)
     step = length[:, None] * away + lift[:, None] * up
@@ -141,8 +142,3 @@ def add_collar(sheet: Surface, collar: Collar, edges: Indices, neck_z_m: float) 
         np.concatenate([sheet.faces, made]),
         np.concatenate([sheet.slots, np.zeros(len(made), dtype=np.int64)]),
     )
-
-
-def _unit(vectors: Array) -> Array:
-    lengths = np.sqrt((vectors**2).sum(axis=1, keepdims=True))
-    return np.asarray(vectors / np.maximum(lengths, 1e-12))
