@@ -40,6 +40,8 @@ REFERENCE = "$shared."
 SWITCH = "switch"
 DEFAULT = "default"
 _PROBED_SCENES = 8
+_SEARCHED_SCENES = 400
+"""Scenes drawn for an outcome of a choice within selections."""
 
 Shared = Mapping[str, SharedValue]
 
@@ -107,14 +109,56 @@ def read_shared(section: Node, shared: Shared) -> dict[str, Distribution[Any]]:
 def probe_values(section: Node, seed: int) -> Iterator[dict[str, SharedValue]]:
     """Values that cover a configuration, for checks before a run.
 
-    Yields the values of the first scenes, then each outcome of each choice by itself.
+    Yields the values of the first scenes, then each outcome of each choice by itself, then scenes
+    with those outcomes of choices within selections that none had: a forced one might contradict
+    the values that it depends on. Outcomes that one scene in some hundreds has may be missing.
     """
+    seen: set[tuple[str, str]] = set()
+
+    def record(shared: dict[str, SharedValue]) -> dict[str, SharedValue]:
+        seen.update((name, repr(value)) for name, value in shared.items())
+        return shared
+
     for scene in range(_PROBED_SCENES):
-        yield _evaluate(section, Streams(seed, scene, index=scene), {})
+        yield record(_evaluate(section, Streams(seed, scene, index=scene), {}))
     first = Streams(seed, 0)
     for name, node in section.entries.items():
         for outcome in _outcomes(node):
-            yield _evaluate(section, first, {name: outcome})
+            yield record(_evaluate(section, first, {name: outcome}))
+    for name, node in section.entries.items():
+        for outcome, selected in _selected_outcomes(node, {}):
+            if (name, repr(outcome)) in seen:
+                continue
+            # Values that depend on no others can be given without a contradiction.
+            own = {n: v for n, v in selected.items() if not names_in(section.entries[n])}
+            if any(v not in _possible(section.entries[n]) for n, v in own.items()):
+                continue
+            for scene in range(_SEARCHED_SCENES):
+                shared = _evaluate(section, Streams(seed, scene, index=scene), own)
+                if shared[name] == outcome:
+                    yield record(shared)
+                    break
+
+
+def _possible(node: Node) -> tuple[SharedValue, ...]:
+    """All values of a choice, sequence or constant."""
+    constant = (node.content,) if isinstance(node.content, (str, int, float)) else ()
+    return _outcomes(node) or constant
+
+
+def _selected_outcomes(
+    node: Node, selected: Shared
+) -> Iterator[tuple[SharedValue, dict[str, SharedValue]]]:
+    """Outcomes of the choices within selections, and the values that select each."""
+    if SWITCH not in node.entries:
+        if selected:
+            yield from ((outcome, dict(selected)) for outcome in _outcomes(node))
+        return
+    name = str(node.entries[SWITCH].content)
+    for key, item in node.entries.items():
+        if key != SWITCH:
+            value = {} if key == DEFAULT else {name: _scalar(key)}
+            yield from _selected_outcomes(item, {**selected, **value})
 
 
 def _evaluate(section: Node, streams: Streams, fixed: Shared) -> dict[str, SharedValue]:

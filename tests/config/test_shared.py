@@ -6,6 +6,7 @@ from collections import Counter
 
 import pytest
 
+from gen_data.generator.assemble.config import load_config
 from gen_data.generator.config.shared_values import (
     draw_shared,
     probe_values,
@@ -95,6 +96,32 @@ def test_probes_show_every_outcome_of_every_choice() -> None:
     """What is rare must be checked, too."""
     section = parse_yaml("road: {choice: {street: 1, alley: 0.000001}}", "test")
     assert {p["road"] for p in probe_values(section, 0)} == {"street", "alley"}
+
+
+def test_probes_show_every_outcome_of_choices_within_selections_that_can_occur() -> None:
+    """Two roads in a thousand have a track; parks have none, and there is no motorway."""
+    section = parse_yaml(
+        """
+        road: {choice: {street: 500, avenue: 1, park: 1}}
+        rails: {switch: bend, 0: {switch: road, avenue: {choice: {none: 1, track: 1}},
+                motorway: {choice: {maglev: 1}}, default: none}, default: none}
+        bend: {switch: road, street: {choice: [0, 1]}, park: 1, default: {choice: [0, 1]}}
+        """,
+        "test",
+    )
+    probes = list(probe_values(section, 0))
+    assert {p["rails"] for p in probes} == {"none", "track"}
+    assert all(p["road"] == "avenue" and p["bend"] == 0 for p in probes if p["rails"] == "track")
+
+
+def test_probes_of_the_street_show_every_outcome_of_a_thousand_scenes() -> None:
+    """A category that few scenes have is one of the data set; only seeds have over 20 values."""
+    section = load_config("street.yaml").document.entries["shared"]
+    probes = list(probe_values(section, 0))
+    drawn = [draw_shared(section, Streams(3, scene)) for scene in range(1000)]
+    for name in section.entries:
+        values = {repr(scene[name]) for scene in drawn}
+        assert len(values) > 20 or values <= {repr(probe[name]) for probe in probes}, name
 
 
 @pytest.mark.parametrize(
