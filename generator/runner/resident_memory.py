@@ -10,10 +10,13 @@ import ctypes
 import gc
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from gen_data.generator.core.mapped_files import drop_pages, limit_mapped_pages, read_statm
 
+HEAP_GROWTH_BYTES = 48 * 1024 * 1024
+"""Private memory that may be freed but not returned; trimming takes some milliseconds."""
 FILE_BYTES_KEPT = 96 * 1024 * 1024
 """Pages of files that stay mapped between shards; releasing them takes some milliseconds."""
 
@@ -28,6 +31,34 @@ def resident_file_bytes() -> int:
     return read_statm(2)
 
 
+def private_bytes() -> int:
+    """Resident memory of this process without pages of files; 0 without procfs."""
+    return resident_bytes() - resident_file_bytes()
+
+
+@dataclass
+class HeapTrimmer:
+    """Returns freed memory to the system whenever private memory has grown.
+
+    glibc keeps the gaps between arrays in use, which hold large temporary arrays of past samples.
+    """
+
+    _kept_bytes: int = field(default_factory=private_bytes)
+
+    def trim_if_grown(self) -> None:
+        """Trim the heap if private memory has grown by ``HEAP_GROWTH_BYTES`` since last time."""
+        if private_bytes() > self._kept_bytes + HEAP_GROWTH_BYTES:
+            _trim_heap()
+            self._kept_bytes = private_bytes()
+
+
+def _trim_heap() -> None:
+    """Return the free pages of the heap to the system, where the C library can."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
+
+
 def release_memory(file_bytes_kept: int = FILE_BYTES_KEPT) -> None:
     """Return freed memory, and unmodified pages of files, to the system.
 
@@ -36,9 +67,7 @@ def release_memory(file_bytes_kept: int = FILE_BYTES_KEPT) -> None:
     still needed come back from the page cache of the system without reading the disk.
     """
     gc.collect()
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if trim is not None:
-        trim(0)
+    _trim_heap()
     limit_mapped_pages(file_bytes_kept)
     # Listing all maps takes tens of milliseconds, and most pages of libraries are gone after once.
     if resident_file_bytes() <= file_bytes_kept:

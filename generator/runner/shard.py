@@ -19,6 +19,7 @@ from gen_data.generator.runner.error_context import explain_errors
 from gen_data.generator.runner.labels import LABELS_NAME, labels_line
 from gen_data.generator.runner.plan import Plan
 from gen_data.generator.runner.provenance import SCENES_NAME, scene_line
+from gen_data.generator.runner.resident_memory import HeapTrimmer
 from gen_data.generator.runner.shard_record import ShardRecord, describe_shard
 from gen_data.generator.runner.store import LocalStore
 
@@ -152,8 +153,10 @@ def make_shard(
         folder = job.store.scratch_dir()
     try:
         samples: list[Sample] = []
+        heap = HeapTrimmer()
         for index in indices:
             samples.append(_make_sample(job, pipeline, index, folder, samples, on_sample))
+            heap.trim_if_grown()
         started_s = time.process_time()
         for name in sorted(pipeline.exporters):
             with explain_errors(f"shard {shard}, exporter {name}"), job.store.errors():

@@ -8,7 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from gen_data.generator.runner.resident_memory import release_memory, resident_file_bytes
+from gen_data.generator.runner.resident_memory import (
+    HEAP_GROWTH_BYTES,
+    HeapTrimmer,
+    private_bytes,
+    release_memory,
+    resident_file_bytes,
+)
 
 SIZE = 8 << 20
 
@@ -64,3 +70,30 @@ def test_modified_pages_that_became_read_only_are_kept(tmp_path: Path) -> None:
     release_memory(file_bytes_kept=0)
 
     np.testing.assert_array_equal(values, pattern())
+
+
+def test_the_heap_is_trimmed_once_it_has_grown_by_the_threshold() -> None:
+    """Blocks below one still in use stay in the heap when they are freed, until it is trimmed."""
+    libc = ctypes.CDLL(None)
+    libc.malloc.restype = ctypes.c_void_p
+    heap = HeapTrimmer()
+    before = private_bytes()
+
+    def fill_and_free(size: int) -> ctypes.c_void_p:
+        """Freed blocks of 64 kB below one that is in use."""
+        blocks = [ctypes.c_void_p(libc.malloc(1 << 16)) for _ in range(size >> 16)]
+        for block in blocks:
+            ctypes.memset(block, 1, 1 << 16)
+        last = ctypes.c_void_p(libc.malloc(1 << 16))
+        for block in blocks:
+            libc.free(block)
+        return last
+
+    used = [fill_and_free(HEAP_GROWTH_BYTES // 2)]
+    heap.trim_if_grown()
+    assert private_bytes() > before + HEAP_GROWTH_BYTES // 4
+    used.append(fill_and_free(2 * HEAP_GROWTH_BYTES))
+    heap.trim_if_grown()
+    assert private_bytes() < before + HEAP_GROWTH_BYTES // 4
+    for block in used:
+        libc.free(block)

@@ -111,8 +111,8 @@ class _PackedScene:
     layered: bool
 
 
-_FILE_BYTES = 192 << 20
-"""Pages of files that stay in memory from frame to frame; a frame reads about as many."""
+_FILE_BYTES = 128 << 20
+"""Pages of files that stay in memory from frame to frame; large frames read somewhat more."""
 
 
 def pack_world(scene: Scene, camera: Camera, cache: DeviceCache) -> PackedWorld:
