@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Annotated, Literal
 
 from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
-from gen_data.generator.assets.people.posing import BEHAVIOURS, MOVING_POSES, PHASES
+from gen_data.generator.assets.people.posing import BEHAVIOURS, MOVING_POSES
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.members import Member, add_members, change_assets
@@ -15,14 +15,13 @@ from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.asset_groups import CategoryWeights, GroupRandomizer, draw_asset
-from gen_data.randomizers.base import choose
 from gen_data.randomizers.free_space import Footprint, Ground, make_ground, standing_bodies
 
 SIZE_MAX = 12
 """Largest size of a company."""
 _TALKING = tuple(pose for pose, behaviour in BEHAVIOURS.items() if behaviour == "talking")
 _STANDS = tuple(pose for pose in _TALKING if pose not in MOVING_POSES)
-_WALKS = ("walk", "walk", "walk_slow", "walk_pockets", "walk_talk", "walk_talk_right")
+_WALKS = tuple(pose for pose in MOVING_POSES if BEHAVIOURS[pose] != "running")
 _SWAY_M = 0.2
 """Standard deviation of how far a companion walks ahead or behind."""
 
@@ -32,7 +31,8 @@ class Companions(GroupRandomizer):
 
     List it after the randomizer that draws the group. Companions of somebody who walks walk beside
     them in the same direction; companions of somebody who stands form a circle with them and talk.
-    Those who would overlap something else are left out.
+    Those who would overlap something else are left out. Everybody has one way to walk in company
+    and one way to talk, so that meshes are used again.
 
     Attributes:
         size: Number of people in a company, including the one who has a place already. By default a
@@ -69,7 +69,7 @@ class Companions(GroupRandomizer):
             if not pose or pose in MOVING_POSES:
                 added += self._walk_beside(leader, others, weights, ground, assets, rng)
             else:
-                changed[leader.name] = _posed(leader.asset, _STANDS, assets, rng)
+                changed[leader.name] = _talking(leader.asset, assets)
                 added += self._stand_around(leader, others, weights, ground, assets, rng)
         scene = change_assets(scene, changed)
         return add_members(scene, group, added, assets, first=_free_number(leaders))
@@ -88,7 +88,7 @@ class Companions(GroupRandomizer):
         side = 1.0 if rng.uniform() < 0.5 else -1.0
         gap_m = self.gap_m.draw(rng)
         for k in range(others):
-            asset = _posed(draw_asset(weights, rng), _WALKS, assets, rng)
+            asset = _walking(draw_asset(weights, rng), assets)
             aside_m = side * gap_m * (k // 2 + 1) * (-1.0 if k % 2 else 1.0)
             ahead_m = _SWAY_M * float(rng.normal())
             place = leader.T_world_body @ SE3((ahead_m, aside_m, 0.0))
@@ -109,7 +109,7 @@ class Companions(GroupRandomizer):
         middle = leader.T_world_body @ SE3((radius_m, 0.0, 0.0))
         made = []
         for k in range(others):
-            asset = _posed(draw_asset(weights, rng), _STANDS, assets, rng)
+            asset = _talking(draw_asset(weights, rng), assets)
             turn = 2.0 * math.pi * (k + 1) / (others + 1) + 0.15 * float(rng.normal())
             place = middle @ SE3.about_z(turn) @ SE3((-radius_m, 0.0, 0.0))
             made += self._place(asset, place, ground, assets)
@@ -124,16 +124,25 @@ class Companions(GroupRandomizer):
         return [Member(asset, pose.rounded(), collides=False)]
 
 
-def _posed(asset: str, poses: tuple[str, ...], assets: AssetIndex, rng: Rng) -> str:
-    """The asset in one of several poses, at any phase; assets without poses stay as they are."""
-    pose, phase = choose(poses, rng), float(rng.integers(PHASES)) / PHASES
-    if "pose" not in dict(assets.get(asset).attributes):
+def _walking(asset: str, assets: AssetIndex) -> str:
+    """The asset as it walks: in its own pose if that is a walk, at its own phase."""
+    return _posed(asset, _WALKS, "walk", assets)
+
+
+def _talking(asset: str, assets: AssetIndex) -> str:
+    """The asset as it stands and talks: each seed in one of the poses."""
+    seed = parse_asset_id(asset).parameters.get("seed", 0)
+    pose = _STANDS[seed % len(_STANDS)] if isinstance(seed, int) else _STANDS[0]
+    return _posed(asset, _STANDS, pose, assets)
+
+
+def _posed(asset: str, fitting: Collection[str], pose: str, assets: AssetIndex) -> str:
+    """The asset, in another pose unless its own fits; assets without poses stay as they are."""
+    own = dict(assets.get(asset).attributes).get("pose")
+    if own is None or own in fitting:
         return asset
     parsed = parse_asset_id(asset)
-    parameters = {**parsed.parameters, "pose": pose}
-    if pose in MOVING_POSES:
-        parameters["phase"] = phase
-    return str(AssetId(parsed.name, parameters))
+    return str(AssetId(parsed.name, {**parsed.parameters, "pose": pose}))
 
 
 def _free_number(members: Sequence[Body]) -> int:

@@ -19,7 +19,6 @@ import math
 import os
 import struct
 import tempfile
-import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
@@ -27,6 +26,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
+from deflate import crc32
 from numpy.typing import NDArray
 
 from gen_data.generator.core.bounded_cache import ByteCache, CountCache, Sized
@@ -158,7 +158,7 @@ def encode_arrays(key: str, arrays: Arrays) -> bytes:
     body = bytearray(struct.pack("<I", len(head)) + head)
     for array in arrays.values():
         body += array.tobytes() + bytes(_padding(array.nbytes))
-    return struct.pack("<I", zlib.crc32(body)) + body
+    return struct.pack("<I", crc32(body)) + body
 
 
 def decode_arrays(data: bytes, key: str) -> Arrays | None:
@@ -172,7 +172,7 @@ def decode_arrays(data: bytes, key: str) -> Arrays | None:
 
 
 def _matches_checksum(body: memoryview, checksum: bytes) -> bool:
-    return zlib.crc32(body) == int.from_bytes(checksum, "little")
+    return crc32(body) == int.from_bytes(checksum, "little")
 
 
 def _decode_checked(data: bytes | memoryview, key: str) -> Arrays | None:
@@ -221,7 +221,7 @@ def _is_intact(file: BinaryIO) -> bool:
     expected = int.from_bytes(file.read(4), "little")
     actual, buffer = 0, bytearray(_CHUNK_BYTES)
     while size := file.readinto(buffer):  # type: ignore[attr-defined]
-        actual = zlib.crc32(memoryview(buffer)[:size], actual)
+        actual = crc32(memoryview(buffer)[:size], actual)
     return actual == expected
 
 

@@ -142,8 +142,8 @@ class ProceduralLibrary:
     def is_stored(self, asset_id: AssetId) -> bool:
         """Whether the asset is kept on disk: others are too many, or quick to compute."""
         family = self._families[asset_id.name]
-        is_offered = family.variants > 0 and set(asset_id.parameters) <= {"seed"}
-        return is_offered or family.stored
+        is_kept = set(asset_id.parameters) <= {"seed", *family.stored_parameters}
+        return family.stored or (family.variants > 0 and is_kept)
 
     def _find(self, asset_id: AssetId, kind: type[F], expected: str) -> F:
         """The id's family. Raises AssetError if it is of another kind."""

@@ -20,6 +20,9 @@ HEAP_GROWTH_BYTES = 48 * 1024 * 1024
 FILE_BYTES_KEPT = 96 * 1024 * 1024
 """Pages of files that stay mapped between shards; releasing them takes some milliseconds."""
 
+_COLLECTIONS_OF_NEW = 16
+"""Collections among new objects until the next one among all."""
+
 
 def resident_bytes() -> int:
     """Resident memory of this process; 0 without procfs."""
@@ -66,7 +69,7 @@ def release_memory(file_bytes_kept: int = FILE_BYTES_KEPT) -> None:
     when they are loaded, and assets that were seen long ago are not read either; pages that are
     still needed come back from the page cache of the system without reading the disk.
     """
-    gc.collect()
+    _collect_garbage()
     _trim_heap()
     limit_mapped_pages(file_bytes_kept)
     # Listing all maps takes tens of milliseconds, and most pages of libraries are gone after once.
@@ -75,6 +78,15 @@ def release_memory(file_bytes_kept: int = FILE_BYTES_KEPT) -> None:
     with suppress(OSError):
         for start, end in list(_unmodified_files(Path("/proc/self/smaps").read_text())):
             drop_pages(start, end - start)
+
+
+def _collect_garbage() -> None:
+    """Collect what has become unreachable: mostly among new objects only.
+
+    Looking at all objects takes tens of milliseconds, and hardly any old one is part of a cycle.
+    """
+    _, _, collections_of_new = gc.get_count()
+    gc.collect(2 if collections_of_new >= _COLLECTIONS_OF_NEW else 1)
 
 
 def _unmodified_files(smaps: str) -> Iterator[tuple[int, int]]:

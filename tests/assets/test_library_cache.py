@@ -115,6 +115,15 @@ def test_derived_arrays_are_stored_by_asset_and_name(tmp_path: Path) -> None:
     assert derive("mug?seed=1", "tree 1") == [0, 1, 2]
 
 
+def test_people_in_a_given_pose_are_stored_but_not_every_step_of_a_stride(tmp_path: Path) -> None:
+    """Poses are few; a walk through a sequence takes hundreds of steps."""
+    library = open_library(cache_dir=tmp_path)
+    library.mesh("simple_person?pose=walk&phase=0.25&seed=3")
+    assert not entries(tmp_path)
+    library.mesh("simple_person?pose=talk&seed=3")
+    assert len(entries(tmp_path)) == 1
+
+
 def test_a_cache_that_cannot_be_written_only_costs_time(tmp_path: Path) -> None:
     """A file stands where the cache folder should be."""
     blocked = tmp_path / "cache"

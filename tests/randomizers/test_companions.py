@@ -107,3 +107,16 @@ def test_nobody_stands_in_a_wall_or_has_a_name_twice(library: AssetLibrary) -> N
     assert len(set(names)) == len(names)
     assert len({i.instance_id for i in scene.instances}) == len(names)
     assert len(names) < 30
+
+
+def test_everybody_has_one_way_to_walk_in_company_and_one_to_talk(library: AssetLibrary) -> None:
+    """However often four people are drawn, at most eight meshes are needed."""
+    draw = Companions(name="company", group="people", size=Constant(3))
+    found: set[str] = set()
+    for pose in ("walk", "stand"):
+        start = people(library, pose, 30)
+        given = {body.asset for body in start.bodies}
+        scene = draw(start, library, rng_of(pose))
+        found |= {body.asset for body in scene.bodies} - given
+    assert 4 < len(found) <= 2 * len(ASSETS)
+    assert not any("phase" in asset for asset in found)

@@ -40,8 +40,9 @@ def _people(name: str, version: int, *tags: str) -> Family:
         parameters={"pose": "", "phase": -1.0},
         build=Lazy(f"{_PACKAGE}.person_mesh:{name}"),
         facts=Lazy(f"{_PACKAGE}.person:facts"),
-        # There are too many poses to keep them all on disk.
+        # There are too many steps of strides to keep them all on disk.
         stored=False,
+        stored_parameters=("pose",),
         origin=_PACK if "pack" in tags else OURS,
     )
 

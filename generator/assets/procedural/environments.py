@@ -147,13 +147,16 @@ def night_city(seed: int) -> Float32:
     return normalize_luminance(image)
 
 
-def pixel_directions(height_px: int) -> Array:
-    """Unit vector of each pixel's centre, shape [height, 2 * height, 3]."""
-    polar = math.pi * (np.arange(height_px) + 0.5) / height_px
+def pixel_directions(height_px: int, rows: int | None = None) -> Array:
+    """Unit vector of each pixel's centre, shape [height, 2 * height, 3], or of the first rows."""
+    polar = (math.pi * (np.arange(height_px) + 0.5) / height_px)[:rows]
     turn = 2.0 * math.pi * (0.5 - (np.arange(2 * height_px) + 0.5) / (2 * height_px))
     flat = np.sin(polar)[:, None]
-    x, y, z = np.broadcast_arrays(flat * np.cos(turn), flat * np.sin(turn), np.cos(polar)[:, None])
-    return np.stack([x, y, z], axis=2)
+    directions = np.zeros((len(polar), 2 * height_px, 3))
+    np.multiply(flat, np.cos(turn), out=directions[..., 0])
+    np.multiply(flat, np.sin(turn), out=directions[..., 1])
+    directions[..., 2] = np.cos(polar)[:, None]
+    return directions
 
 
 def normalize_luminance(image: Array | Float32) -> Float32:
@@ -163,7 +166,8 @@ def normalize_luminance(image: Array | Float32) -> Float32:
     edges = np.cos(math.pi * np.arange(rows + 1) / rows)
     weight = (edges[:-1] - edges[1:]) / 2.0
     per_row = luminance(image).mean(axis=1, dtype=np.float64)
-    scaled: Float32 = (image / float((per_row * weight).sum())).astype(np.float32)
+    image /= float((per_row * weight).sum())
+    scaled: Float32 = image.astype(np.float32, copy=False)
     return scaled
 
 

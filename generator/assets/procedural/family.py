@@ -81,6 +81,7 @@ class Family:
         symmetries: Likewise: turns that leave the object as it looks; None = there are none.
         stored: Whether the disk cache also keeps results that are not offered for selection;
             false where hardly any is used twice.
+        stored_parameters: Parameters that stored results may have beside a seed, even so.
         origin: Source and licence, if not all is ours.
     """
 
@@ -95,6 +96,7 @@ class Family:
     build: Callable[..., Solid]
     facts: Callable[..., Facts] | None = None
     stored: bool = True
+    stored_parameters: tuple[str, ...] = ()
     origin: Provenance = OURS
     symmetries: Callable[..., tuple[Symmetry, ...]] | None = None
 
@@ -107,6 +109,7 @@ class ImageFamily:
         variants: Seeds ``range(variants)`` are offered for selection; any other seed works too.
         stored: Whether the disk cache also keeps images that are not offered for selection;
             false where hardly any is used twice.
+        stored_parameters: As of objects.
         origin: Source and licence, if it is not ours.
     """
 
@@ -117,6 +120,7 @@ class ImageFamily:
     build: Callable[..., Any]
     parameters: Mapping[str, object] = field(default_factory=dict)
     stored: bool = True
+    stored_parameters: tuple[str, ...] = ()
     origin: Provenance = OURS
 
 

@@ -17,6 +17,7 @@ from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.streams import Rng
 
 SIZE_PX = 512
+_STRIP_PX = 64
 
 Cells = tuple[int, int]
 _Reals = TypeVar("_Reals", Float32, NDArray[np.float64])
@@ -58,25 +59,29 @@ def perlin(cells: Cells, rng: Rng, size_px: int = SIZE_PX) -> Float32:
     iy, fy = _lattice(down, size_px)
     ix, fx = _lattice(across, size_px)
     sy, sx = _fade(fy)[:, None], _fade(fx)[None, :]
+    # Columns of the lattice first: whole rows are gathered ten times as fast.
+    sides = [
+        (gy.take(column, axis=1), gx.take(column, axis=1) * away_x)
+        for column, away_x in ((ix, fx), ((ix + 1) % across, fx - np.float32(1.0)))
+    ]
+    noise = np.zeros((size_px, size_px), np.float32)
+    # In strips, whose intermediate arrays stay in the processor's caches.
+    for strip in (slice(k, k + _STRIP_PX) for k in range(0, size_px, _STRIP_PX)):
 
-    def edge(dy: int) -> Float32:
-        row, away_y = (iy + dy) % down, (fy - dy)[:, None]
-        left, right = (
-            # Columns of the lattice first: whole rows are gathered ten times as fast.
-            _ramp_along(gy.take(column, axis=1), gx.take(column, axis=1) * away_x, row, away_y)
-            for column, away_x in ((ix, fx), ((ix + 1) % across, fx - np.float32(1.0)))
-        )
-        return _mix(left, right, sx)
+        def edge(dy: int, strip: slice = strip) -> Float32:
+            row, away_y = (iy[strip] + dy) % down, (fy[strip] - dy)[:, None]
+            left, right = (_ramp_along(*side, row, away_y) for side in sides)
+            return _mix(left, right, sx)
 
-    noise = _mix(edge(0), edge(1), sy)
+        noise[strip] = _mix(edge(0), edge(1), sy[strip])
     noise *= np.float32(1.6)
     return noise
 
 
 def _ramp_along(gy: Float32, ramp_x: Float32, row: NDArray[np.int64], away_y: Float32) -> Float32:
-    ramp: Float32 = gy[row]
+    ramp: Float32 = gy.take(row, axis=0)
     ramp *= away_y
-    ramp += ramp_x[row]
+    ramp += ramp_x.take(row, axis=0)
     return ramp
 
 

@@ -28,6 +28,7 @@ _HAZE_M = 28_000.0
 _HEAPING = 0.14
 """Clouds are as high as they are wide: low in the sky they look less flat than a layer would."""
 _OCTAVES = 7
+_STRIP_ROWS = 8
 
 
 def cloud_layer(
@@ -52,8 +53,10 @@ def cloud_layer(
     level_of_row = _mip_levels(up, len(levels), 2 * d.shape[0])
     for k, level in enumerate(levels):
         near = np.clip(1.0 - np.abs(level_of_row - k), 0.0, 1.0)
-        rows = np.flatnonzero((near > 0.0) & (up > 0.0))
-        if rows.size:
+        shown = np.flatnonzero((near > 0.0) & (up > 0.0))
+        # Strip by strip, so that intermediate arrays stay in the processor's caches.
+        for first in range(0, len(shown), _STRIP_ROWS):
+            rows = shown[first : first + _STRIP_ROWS]
             flat_m = _HEIGHT_M / (up[rows, None, None] + _HEAPING)
             place = d[rows, :, :2] * (flat_m / _TILE_M)
             sample = _sample(level, place)

@@ -10,6 +10,7 @@ Sources: Preetham, Shirley and Smits, "A practical analytic model for daylight",
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -31,6 +32,7 @@ MODELS = ("measured", "preetham")
 """Where a sky's luminances come from."""
 _ROWS = 512
 _MEAN_ROWS = 64
+_STRIP_ROWS = 16
 # Less light than this share of the rest is not computed.
 _NEGLIGIBLE = 1e-3
 _TABLES = load_table(__package__, "preetham", tuple[tuple[float, ...], ...])
@@ -110,21 +112,19 @@ def luminance_cd_m2(model: SkyModel, rows: int) -> Float32:
         ValueError: a parameter is outside its range.
     """
     _check(model)
-    d = pixel_directions(rows)
-    above, below = d[: rows // 2], d[rows // 2 :]
+    above = pixel_directions(rows, rows // 2)
     if model.model == "preetham":
         zenith = daylight.preetham_zenith_cd_m2(model.sun_altitude_rad, model.turbidity)
         half = clear_sky(above[:, :rows], model.sun_altitude_rad, model.turbidity, pale=0.0)
-        image = _mirror(zenith * half)
-        return np.concatenate([image, _land(image, below, model)])
+        return _with_land(_mirror(zenith * half), model)
     night_lux = daylight.night_illuminance_lux(model.cloudiness)
     day_lux = daylight.sky_illuminance_lux(model.sun_altitude_rad, model.cloudiness) - night_lux
-    image = np.zeros(above.shape, np.float32)
+    parts = []
     if day_lux > _NEGLIGIBLE * night_lux:
-        image += _scale_to_lux(_daylight(above, model), day_lux)
+        parts.append(_scale_to_lux(_daylight(above, model), day_lux))
     if night_lux > _NEGLIGIBLE * day_lux:
-        image += _scale_to_lux(_night(above, model), night_lux)
-    return np.concatenate([image, _land(image, below, model)])
+        parts.append(_scale_to_lux(_night(above, model), night_lux))
+    return _with_land(sum(parts[1:], start=parts[0]), model)
 
 
 def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float, pale: float = 1.0) -> Array:
@@ -178,16 +178,25 @@ def _perez(up: Array, angle: Array, cosine_squared: Array, c: list[float]) -> Ar
     return luminance
 
 
+def _in_strips(compute: Callable[[Array], Array], d: Array) -> Array:
+    """What a function computes row by row; in strips, whose intermediate arrays stay in caches."""
+    return np.concatenate([compute(d[k : k + _STRIP_ROWS]) for k in range(0, len(d), _STRIP_ROWS)])
+
+
 def _mirror(half: Array) -> Float32:
     """Both sides of the plane through the sun and the zenith, which differ in clouds only."""
-    return np.concatenate([half, half[:, ::-1]], axis=1).astype(np.float32)
+    columns = half.shape[1]
+    both = np.zeros((len(half), 2 * columns, *half.shape[2:]), np.float32)
+    both[:, :columns], both[:, columns:] = half, half[:, ::-1]
+    return both
 
 
 def _daylight(d: Array, model: SkyModel) -> Float32:
     """Sky lit by the sun, any unit: clear air, clouds in it, a closed deck."""
     altitude = model.sun_altitude_rad
     half = d[:, : d.shape[1] // 2]
-    by_day = clear_sky(half, max(altitude, math.radians(1.5)), model.turbidity)
+    lit_from_rad = max(altitude, math.radians(1.5))
+    by_day = _in_strips(lambda strip: clear_sky(strip, lit_from_rad, model.turbidity), half)
     dusk = 1.0 - _ramp(-1.0, 6.0, model.sun_altitude_deg)
     by_day = _scale_to_lux(by_day, 1.0)
     if dusk > 0.0:
@@ -250,23 +259,28 @@ def _night(d: Array, model: SkyModel) -> Float32:
     return image
 
 
-def _land(image: Float32, d: Array, model: SkyModel) -> Float32:
-    """Land below the horizon, lit by sun and sky, hazy in the distance."""
+def _with_land(image: Float32, model: SkyModel) -> Float32:
+    """The sky above land that sun and sky light, hazy in the distance."""
+    rows = len(image)
     altitude = model.sun_altitude_rad
     sun = sun_lux(model) * max(math.sin(altitude), 0.0) * np.array(daylight.sun_color(altitude))
     light = _level_light(image) + sun
     soil = _SOIL if model.ground_albedo < 0.5 else np.ones(3)
     land = model.ground_albedo / math.pi * light * soil
     land = land + _STREETS_CD_M2 * _ramp(-1.0, -8.0, model.sun_altitude_deg) * _CITY
-    far = np.exp(d[:, :1, 2:] / 0.02)
-    mixed: Float32 = (land + (image[-1:] - land) * far).astype(np.float32)
-    return mixed
+    haze = image[-1] - land
+    whole = np.zeros((2 * rows, *image.shape[1:]), np.float32)
+    whole[:rows] = image
+    heights = np.cos(math.pi * (np.arange(2 * rows) + 0.5) / (2 * rows))
+    for row, far in enumerate(np.exp(heights[rows:] / 0.02), rows):
+        whole[row] = land + haze * far
+    return whole
 
 
 def _scale_to_lux(image: Image, lux: float) -> Image:
-    """A sky, or its half, that gives that illuminance on level ground."""
-    scaled: Image = image * image.dtype.type(lux / float(luminance(_level_light(image))))
-    return scaled
+    """Scale a sky, or its half, in place to that illuminance of level ground."""
+    image *= image.dtype.type(lux / float(luminance(_level_light(image))))
+    return image
 
 
 def _level_light(image: Array | Float32) -> Array:
