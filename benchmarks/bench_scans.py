@@ -386,7 +386,8 @@ def main() -> None:
     print(f"{'':32} {'real':>9} {'here':>9} {'':7} {'error':>6} {'own':>9}")
     for name, real in REAL.items():
         value, error, own = figures[name]
-        more = "" if math.isnan(error) else f" {error:6.0%} {own:9.4g}"
+        more = "" if math.isnan(error) else f" {error:6.0%}"
+        more += "" if math.isnan(own) else f" {own:9.4g}"
         print(f"{name:32} {real:9.4g} {value:9.4g} {value / real - 1.0:+7.0%}{more}")
 
 
