@@ -286,6 +286,34 @@ def test_the_detector_notices_by_light() -> None:
         assert is_detected(pulses, rng()).mean() == pytest.approx(expected, abs=4 * spread)
 
 
+def test_a_soiled_window_takes_light_both_ways() -> None:
+    """A wall that a clean scanner sees half of the time answers 0.8^2 of that light through 0.8."""
+    wall = Wall(MODEL.seen.range_m, MODEL.seen.reflectance)
+    clean = scan(LidarSensor(model="VLP-16"), wall)
+    soiled = scan(LidarSensor(model="VLP-16", window=0.8), wall)
+
+    pulses, light = 1808 * 16, 0.64
+    for points, expected in ((clean, 0.5), (soiled, light**6 / (1.0 + light**6))):
+        spread = math.sqrt(expected * (1.0 - expected) / pulses)
+        assert len(points) / pulses == pytest.approx(expected, abs=4.0 * spread)
+    assert soiled["intensity"].mean() == pytest.approx(0.64 * clean["intensity"].mean(), rel=1e-4)
+
+
+def test_an_ideal_scanner_has_a_clean_window() -> None:
+    """Every hit, with the intensity of its reflectance."""
+    ideal = LidarSensor(model="VLP-16", ideal=True)
+    soiled = ideal.model_copy(update={"window": 0.2})
+
+    np.testing.assert_array_equal(scan(soiled, Wall(90.0)), scan(ideal, Wall(90.0)))
+
+
+def test_a_window_passes_some_light_and_at_most_all() -> None:
+    """Outside of (0, 1] it is refused."""
+    for share in (0.0, 1.1, -0.5):
+        with pytest.raises(ValueError, match="window"):
+            LidarSensor(window=share)
+
+
 def test_retro_reflectors_are_told_from_white() -> None:
     """White matte is 100 of 255 on a Velodyne, the brightest sign 255."""
     told = report_intensity(np.float32([0.0, 0.5, 1.0, 800.0, 1e5]), MODEL)

@@ -102,7 +102,7 @@ def optical_depth(
     return np.asarray(range_m * (uniform + here * mean), np.float32)
 
 
-def attenuate(pulses: Pulses, depth: Float32) -> Pulses:
+def attenuate(pulses: Pulses, depth: Float32 | np.float32) -> Pulses:
     """Attenuate pulses by a one-way optical depth, both ways."""
     factor = np.exp(np.float32(-2.0) * depth)
     return replace(pulses, light=pulses.light * factor, reflectance=pulses.reflectance * factor)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, Literal
 
@@ -90,7 +91,10 @@ class LidarSensor(Mounted):
             centre, along its axis.
         returns: Return of a pulse to report; ``dual`` reports two.
         divergence: Whether beams diverge; costs seven rays instead of one.
-        ideal: No noise, no missed return, no weather, no mirror images: every hit within range.
+        window: Transmittance of the scanner's window, one way, relative to a clean one; dust and
+            grime lower it. Light passes it twice.
+        ideal: No noise, no missed return, no weather, no mirror images, a clean window: every hit
+            within range.
         motion_distortion: Effect of the scanner's motion during a sweep. ``raw``: points are in
             the lidar frame of each pulse's own instant. ``deskewed``: in that of the sweep's
             middle, as in KITTI's files; moving objects are where each pulse hit them. ``none``:
@@ -105,6 +109,7 @@ class LidarSensor(Mounted):
     camera: str = "color"
     returns: Kept = "strongest"
     divergence: bool = False
+    window: float = Field(1.0, gt=0, le=1)
     ideal: bool = False
     motion_distortion: Literal["raw", "deskewed", "none"] = "deskewed"
 
@@ -168,6 +173,8 @@ class LidarSensor(Mounted):
         weather = CLEAR if self.ideal else scene.weather
         if weather != CLEAR:
             pulses = _apply_weather(pulses, weather, model, lidar, shots, rng)
+        if self.window < 1.0 and not self.ideal:
+            pulses = attenuate(pulses, np.float32(-math.log(self.window)))
         pulses = clip_range(pulses, model)
         detected = pulses.light > 0.0 if self.ideal else is_detected(pulses, rng)
         returns = Returns.select(pulses, *select_returns(pulses, detected, self.returns))
