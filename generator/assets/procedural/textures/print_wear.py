@@ -1,0 +1,195 @@
+"""Wear of printed matter: rubbed edges, creases, scuffs, dust, stains, torn labels.
+
+A print is an atlas of faces. The borders of a face are the convex edges of its box or book, where
+ink is rubbed off first and the board shows. Lengths are in metres on the object; measures and
+shares are assumed, within a half.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from gen_data.generator.assets.procedural import wear as traces
+from gen_data.generator.assets.procedural.surface_shapes import UvRect
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
+from gen_data.generator.assets.procedural.wear import COARSE, FINE, MEDIUM, Film, Size
+from gen_data.generator.core.asset_types import Float32, TextureData, UInt8
+from gen_data.generator.core.se3 import Vec3
+
+BOARD: Vec3 = (0.83, 0.79, 0.71)
+PAPER: Vec3 = (0.92, 0.9, 0.85)
+METAL: Vec3 = (0.78, 0.785, 0.79)
+_GRIME: Vec3 = (0.33, 0.29, 0.24)
+_DUST: Vec3 = (0.67, 0.64, 0.59)
+_COFFEE: Vec3 = (0.42, 0.29, 0.17)
+# How far from an edge ink is rubbed off, well used; how near a corner it is rubbed most; the width
+# of the grime along edges.
+_REACH_M, _CORNER_M, _GRIME_M = 0.0022, 0.009, 0.009
+# Radius of the foot of a mug.
+_RING_M = (0.03, 0.042)
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What a print is on.
+
+    Attributes:
+        places: Where each face is in the image.
+        size_m: Width and height of each face.
+        core: Colour under the ink, sRGB in [0, 1].
+        exposed: How much its borders are rubbed: 1 = edges of a box, less where it lies flat.
+        level: The face that lies upward, where dust settles and mugs stand; empty = none.
+        tears: Whether it is a label, of which pieces come off.
+    """
+
+    places: Mapping[str, UvRect]
+    size_m: Mapping[str, tuple[float, float]]
+    core: Vec3 = BOARD
+    exposed: float = 1.0
+    level: str = ""
+    tears: bool = False
+
+
+def label_sheet(width_m: float, height_m: float, core: Vec3) -> Sheet:
+    """A sheet of one face that lies flat on a bottle or can."""
+    whole = {"front": (0.0, 0.0, 1.0, 1.0)}
+    return Sheet(whole, {"front": (width_m, height_m)}, core, exposed=0.3, tears=core == PAPER)
+
+
+def wear_print(clean: TextureData, sheet: Sheet, name: str, seed: int) -> TextureData:
+    """A print with the wear of its family's variant; the roughness map has its dull places."""
+    wear, rng = traces.draw_wear(name, seed), variant_rng(f"{name}/wear/places", seed)
+    size_px = (clean.albedo.shape[0], clean.albedo.shape[1])
+    rubbed, soiled = _rub_edges(sheet, wear, size_px, rng)
+    count = int(3 + 45 * wear**1.5)
+    scuffed = traces.scratches(count, 60.0 + 110.0 * wear, size_px, rng, 0.35)
+    broken = np.maximum(traces.ramp_bytes(scuffed, 0.0, 1.0, 0.1 + 0.4 * wear),
+                        _creases(sheet, wear, size_px, rng))  # fmt: skip
+    films = [Film(soiled, _GRIME), Film(np.maximum(rubbed, broken), sheet.core)]
+    smudged = traces.noise_bytes(COARSE, size_px, rng)
+    dull = np.maximum(rubbed, traces.ramp_bytes(smudged, 0.7 - 0.35 * wear, 0.8 - 0.2 * wear))
+    if sheet.level:
+        films += _on_level_face(sheet, wear, size_px, rng)
+        dull = np.maximum(dull, films[-1].share)
+    if sheet.tears and rng.chance(0.5 * wear):
+        films += _tear(size_px, rng)
+        dull = np.maximum(dull, films[-1].share)
+    worn = traces.lay_films(clean.albedo, films)
+    return TextureData(worn, traces.roughness_factor(dull, wear))
+
+
+def _window(place: UvRect, size_px: Size) -> tuple[slice, slice]:
+    """Rows and columns of a face."""
+    (u0, v0, u1, v1), (height, width) = place, size_px
+    return (
+        slice(round((1 - v1) * height), round((1 - v0) * height)),
+        slice(round(u0 * width), round(u1 * width)),
+    )
+
+
+def _edge_distances(count: int, length_m: float) -> Float32:
+    """Distance of pixel centres from the nearer end [m], shape [count]."""
+    along = (np.arange(count, dtype=np.float32) + 0.5) * np.float32(length_m / count)
+    return np.minimum(along, np.float32(length_m) - along)
+
+
+def _strips(rows: int, columns: int, deep: int, wide: int) -> Iterator[tuple[slice, slice]]:
+    """The four borders of a face, so many pixels deep and wide."""
+    whole = slice(None)
+    for k, n, is_row in ((deep, rows, True), (wide, columns, False)):
+        for part in (slice(0, min(k, n)), slice(max(n - k, 0), n)):
+            yield (part, whole) if is_row else (whole, part)
+
+
+def _rub_edges(sheet: Sheet, wear: float, size_px: Size, rng: VariantRng) -> tuple[UInt8, UInt8]:
+    """Shares of bare board along edges, most at corners, and of grime beside it."""
+    soil = traces.noise_bytes(COARSE, size_px, rng)
+    rubbed, soiled = np.zeros(size_px, np.uint8), traces.ramp_bytes(soil, 0.4, 0.9, 0.05 * wear)
+    stretches = traces.noise_bytes(MEDIUM, size_px, rng)
+    grain = traces.noise_bytes(FINE, size_px, rng)
+    for name, place in sheet.places.items():
+        window = _window(place, size_px)
+        (rows, columns), (width_m, height_m) = rubbed[window].shape, sheet.size_m[name]
+        across, down = _edge_distances(columns, width_m), _edge_distances(rows, height_m)
+        deep, wide = (math.ceil(_GRIME_M * n / length) for n, length in
+                      ((rows, height_m), (columns, width_m)))  # fmt: skip
+        for strip in _strips(rows, columns, deep, wide):
+            x, y = across[None, strip[1]], down[strip[0], None]
+            corner = np.maximum(1.0 - (x + y) / np.float32(_CORNER_M), np.float32(0.0))
+            # Edges are rubbed in stretches, the more the longer they have been in use.
+            touched = stretches[window][strip] * np.float32(1.0 / 255.0) + corner
+            reach = np.clip(4.0 * (touched - np.float32(0.95 - 0.55 * wear)), 0.0, 2.5)
+            reach *= 0.4 + grain[window][strip] * np.float32(1.2 / 255.0)
+            reach *= np.float32(sheet.exposed * wear * _REACH_M)
+            near = np.minimum(x, y)
+            rubbed[window][strip] = traces.to_bytes((reach - near) * np.float32(2000.0) + 0.5)
+            dark = np.maximum(1.0 - near / np.float32(_GRIME_M), 0.0) * np.float32(0.22 * wear)
+            soiled[window][strip] = np.maximum(soiled[window][strip], traces.to_bytes(dark * touched))
+    return rubbed, soiled
+
+
+def _creases(sheet: Sheet, wear: float, size_px: Size, rng: VariantRng) -> UInt8:
+    """Lines where board was folded and its ink has broken: across corners, and along spines."""
+    from PIL.Image import new
+    from PIL.ImageDraw import Draw
+
+    image = new("L", (size_px[1], size_px[0]))
+    pen = Draw(image)
+    for _ in range(int(wear * 4.5 * rng.between(0.0, 1.0))):
+        rows, columns = _window(rng.choose(tuple(sheet.places.values())), size_px)
+        w, h = columns.stop - columns.start, rows.stop - rows.start
+        reach, bend = rng.between(0.1, 0.3) * min(w, h), rng.between(-0.3, 0.3)
+        is_right, is_low = rng.chance(0.5), rng.chance(0.5)
+        line = []
+        for t in (0.0, 0.3, 0.7, 1.0):
+            x, y = reach * (t + bend * t * (1 - t)), 1.3 * reach * (1 - t - bend * t * (1 - t))
+            line.append((round(columns.stop - 1 - x if is_right else columns.start + x),
+                         round(rows.stop - 1 - y if is_low else rows.start + y)))  # fmt: skip
+        pen.line(line, fill=int(rng.between(70, 150)), width=rng.choose((1, 1, 2)))
+    if "spine" in sheet.places:
+        rows, columns = _window(sheet.places["spine"], size_px)
+        for _ in range(int(wear * 5.0 * rng.between(0.0, 1.0))):
+            x = round(rng.between(columns.start, columns.stop))
+            pen.line([x, rows.start, x, rows.stop], fill=int(rng.between(50, 130)))
+    return np.asarray(image, dtype=np.uint8)
+
+
+def _on_level_face(sheet: Sheet, wear: float, size_px: Size, rng: VariantRng) -> list[Film]:
+    """Rings of mugs and dust on the face that lies upward; dust comes last."""
+    window = _window(sheet.places[sheet.level], size_px)
+    width_m, height_m = sheet.size_m[sheet.level]
+    films, dusty = [], np.zeros(size_px, np.uint8)
+    rows, columns = dusty[window].shape
+    noise = traces.noise_bytes(COARSE, (rows, columns), rng)
+    if rng.chance(0.45 * wear):
+        x = (np.arange(columns) + 0.5) * (width_m / columns) - rng.between(0.2, 0.8) * width_m
+        y = (np.arange(rows) + 0.5) * (height_m / rows) - rng.between(0.2, 0.8) * height_m
+        away = np.sqrt(x[None, :] ** 2 + y[:, None] ** 2) - rng.between(*_RING_M)
+        share = 0.45 * np.clip(2.0 - np.abs(away) / 0.0011, 0.0, 1.0) * (noise / 255.0)
+        ring = np.zeros(size_px, np.uint8)
+        ring[window] = traces.to_bytes(share.astype(np.float32))
+        films.append(Film(ring, _COFFEE))
+    # Dust comes with standing about, not with use: it is wiped off things that are handled.
+    amount = 0.4 * rng.between(0.0, 1.0) ** 3
+    level = float(traces.dust_share(np.ones(1, np.float32), amount)[0])
+    dusty[window] = traces.ramp_bytes(noise, 0.15, 0.6, level)
+    return [*films, Film(dusty, _DUST)]
+
+
+def _tear(size_px: Size, rng: VariantRng) -> list[Film]:
+    """A piece torn off a label's border: its shadow, then the fibres that stayed."""
+    height, width = size_px
+    x0, is_above = rng.choose((0.0, 0.3, 0.7, 1.0)) * width, rng.chance(0.5)
+    wide, deep = rng.between(0.05, 0.14) * width, rng.between(0.1, 0.28) * height
+    x = np.abs(np.arange(width, dtype=np.float32) - np.float32(x0)) / np.float32(wide)
+    y = np.arange(height, dtype=np.float32)[:: 1 if is_above else -1] / np.float32(deep)
+    ragged = traces.noise_bytes(MEDIUM, size_px, rng) * np.float32(1.6 / 255.0) - np.float32(0.8)
+    away = x[None, :] + y[:, None] + ragged
+    fibres = traces.ramp_bytes(traces.noise_bytes(FINE, size_px, rng), -1.5, 0.6) / np.float32(255.0)
+    left = traces.to_bytes((1.0 - away) * 12.0 * fibres)
+    shadow = traces.to_bytes(np.minimum((1.16 - away) * 3.0, 0.3))
+    return [Film(shadow, _GRIME), Film(np.minimum(left, (235.0 * fibres).astype(np.uint8)), PAPER)]
