@@ -24,7 +24,7 @@ from gen_data.generator.core.se3 import Vec3
 _SKEW = 1.8
 # Roughness of a worn-out surface over that of a new one, minus 1 (assumed, within a half).
 _DULLING = 0.8
-COARSE, MEDIUM, FINE = 6, 24, 96
+COARSE, MEDIUM, FINE = 6, 24, 64
 """Cells of noise per image."""
 Size = tuple[int, int]
 
@@ -38,7 +38,12 @@ class Film(NamedTuple):
 
 def draw_wear(name: str, seed: int) -> float:
     """Wear of a variant, from 0 (new) to 1 (well used); a stream of its own for each name."""
-    return float(variant_rng(f"{name}/wear", seed).random() ** _SKEW)
+    return skewed(float(variant_rng(f"{name}/wear", seed).random()))
+
+
+def skewed(quantile: float) -> float:
+    """Wear of the thing below which a share ``quantile`` of all things are."""
+    return float(quantile**_SKEW)
 
 
 def dulled(roughness: float, wear: float) -> float:
@@ -124,7 +129,9 @@ def dust_share(upward: Float32, amount: float) -> Float32:
 
 def to_bytes(share: Float32) -> UInt8:
     """Shares in [0, 1] as bytes."""
-    scaled: UInt8 = np.clip(share * np.float32(255.0) + np.float32(0.5), 0.0, 255.0).astype(np.uint8)
+    scaled: UInt8 = np.clip(share * np.float32(255.0) + np.float32(0.5), 0.0, 255.0).astype(
+        np.uint8
+    )
     return scaled
 
 

@@ -128,7 +128,9 @@ def _rub_edges(sheet: Sheet, wear: float, size_px: Size, rng: VariantRng) -> tup
             near = np.minimum(x, y)
             rubbed[window][strip] = traces.to_bytes((reach - near) * np.float32(2000.0) + 0.5)
             dark = np.maximum(1.0 - near / np.float32(_GRIME_M), 0.0) * np.float32(0.22 * wear)
-            soiled[window][strip] = np.maximum(soiled[window][strip], traces.to_bytes(dark * touched))
+            soiled[window][strip] = np.maximum(
+                soiled[window][strip], traces.to_bytes(dark * touched)
+            )
     return rubbed, soiled
 
 
@@ -189,7 +191,9 @@ def _tear(size_px: Size, rng: VariantRng) -> list[Film]:
     y = np.arange(height, dtype=np.float32)[:: 1 if is_above else -1] / np.float32(deep)
     ragged = traces.noise_bytes(MEDIUM, size_px, rng) * np.float32(1.6 / 255.0) - np.float32(0.8)
     away = x[None, :] + y[:, None] + ragged
-    fibres = traces.ramp_bytes(traces.noise_bytes(FINE, size_px, rng), -1.5, 0.6) / np.float32(255.0)
+    fibres = traces.ramp_bytes(traces.noise_bytes(FINE, size_px, rng), -1.5, 0.6) / np.float32(
+        255.0
+    )
     left = traces.to_bytes((1.0 - away) * 12.0 * fibres)
     shadow = traces.to_bytes(np.minimum((1.16 - away) * 3.0, 0.3))
     return [Film(shadow, _GRIME), Film(np.minimum(left, (235.0 * fibres).astype(np.uint8)), PAPER)]
