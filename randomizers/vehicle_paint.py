@@ -62,8 +62,8 @@ class VehiclePaint(SurfaceRandomizer):
         probability: Probability that a vehicle is repainted; others keep their model's paint.
         roughness: Roughness of the finish: 0.1 waxed, 0.3 weathered.
         metallic: Whether the paint contains metal flakes; white never does.
-        dirt: Fraction of dust on the vehicle's surfaces; more gathers along sills, around and behind
-            wheels and on the rear.
+        dirt: Fraction of dust on the vehicle's surfaces; more gathers along sills, around and
+            behind wheels and on the rear.
         weathered: Probability that the clear coat of a vehicle has gone, so that its paint is matt
             and paler, without flakes.
         plates: Whether every vehicle gets its own licence plate instead of its model's.

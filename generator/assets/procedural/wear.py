@@ -55,24 +55,22 @@ def roughness_factor(dull: UInt8, wear: float) -> UInt8:
     """The roughness map of a texture: 1 where all is dull, as new where nothing is."""
     clean = 1.0 / (1.0 + _DULLING * wear)
     steps = 255.0 * (clean + (1.0 - clean) * np.arange(256) / 255.0)
-    return np.take(np.round(steps).astype(np.uint8), dull, mode="clip")
+    return look_up(dull, np.round(steps).astype(np.uint8))
 
 
 def noise_bytes(cells: int, size_px: Size, rng: VariantRng) -> UInt8:
     """Smooth noise, most of it within 50 to 205 about a mean of 128, that repeats.
 
-    Every image is the same page, shifted and mirrored at random.
+    Every image is a part of the same page, shifted at random.
     """
     height, width = size_px
-    down, across, mirror = rng.random(3).tolist()
-    page = _noise_page(cells)[:, :: 1 if mirror < 0.5 else -1]
-    rolled = np.roll(page, (int(down * SIZE_PX), int(across * SIZE_PX)), axis=(0, 1))
-    return rolled[:height, :width]
+    down, across = (int(share * SIZE_PX) for share in rng.random(2).tolist())
+    return _noise_page(cells)[down : down + height, across : across + width]
 
 
 @lru_cache(maxsize=8)
 def _noise_page(cells: int) -> UInt8:
-    """Two octaves of random bytes, resized; the lattice continues across the border."""
+    """Two octaves of random bytes, resized; two repeats down and two across."""
     from PIL.Image import Resampling, blend, fromarray
 
     rng, octaves = variant_rng("wear/noise", cells), []
@@ -80,14 +78,14 @@ def _noise_page(cells: int) -> UInt8:
         lattice = np.pad((rng.random((count, count)) * 256.0).astype(np.uint8), 2, mode="wrap")
         box = (2.0, 2.0, 2.0 + count, 2.0 + count)
         octaves.append(fromarray(lattice).resize((SIZE_PX, SIZE_PX), Resampling.BICUBIC, box))
-    page = np.array(blend(octaves[0], octaves[1], 0.35), dtype=np.uint8)
+    page = np.tile(np.array(blend(octaves[0], octaves[1], 0.35), dtype=np.uint8), (2, 2))
     page.flags.writeable = False
     return page
 
 
 def ramp_bytes(noise: UInt8, low: float, high: float, most: float = 1.0) -> UInt8:
     """Bytes below ``low`` as 0, above ``high`` as ``most`` of 255, both in [0, 1] of 255."""
-    return np.take(_levels(low, high, most), noise, mode="clip")
+    return look_up(noise, _levels(low, high, most))
 
 
 def scratches(count: int, length_px: float, size_px: Size, rng: VariantRng, lean: float) -> UInt8:
@@ -143,10 +141,18 @@ def lay_films(albedo: UInt8, films: Sequence[Film]) -> UInt8:
     for share, color in films:
         if not share.any():
             continue
-        added = [cv2.LUT(share, _levels(0.0, 1.0, part)) for part in color]
-        kept = cv2.multiply(image, cv2.merge([255 - share] * 3), scale=1.0 / 255.0)
-        image = cv2.add(kept, cv2.merge(added))
+        shares = cv2.merge([share] * 3)
+        levels = np.stack([_levels(0.0, 1.0, part) for part in color], axis=1)
+        kept = cv2.multiply(image, cv2.bitwise_not(shares), scale=1.0 / 255.0)
+        image = cv2.add(kept, look_up(shares, levels[None]))
     return np.asarray(image, dtype=np.uint8)
+
+
+def look_up(image: UInt8, levels: UInt8) -> UInt8:
+    """Each byte's entry of a table of 256, or of one table per channel, shape [1, 256, 3]."""
+    import cv2
+
+    return np.asarray(cv2.LUT(image, levels), dtype=np.uint8)
 
 
 def _levels(low: float, high: float, most: float) -> UInt8:

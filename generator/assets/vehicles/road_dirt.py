@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,10 +33,25 @@ SEEDS = 4
 AXLES = (0.62, -0.6)
 """Where the axles are along the image's side: 1 = front end, -1 = rear end of the vehicle."""
 _SIZE_PX = (64, 256)
+# Border of the image, so that coarse mip levels do not mix its opposite sides.
+_MARGIN = 0.07
 # Roughness of what is clean over that of dirt, at most.
 _CLEAN = 0.5
 _BRAKE_DUST: Vec3 = (0.035, 0.026, 0.02)
 _WHITE: Vec3 = (1.0, 1.0, 1.0)
+
+
+class Frame(NamedTuple):
+    """What the coordinates of dirt refer to [m].
+
+    Attributes:
+        bounds_m: Of the body, without mirrors: smallest and largest coordinates.
+        front_m, rear_m: Places of the axles along X.
+    """
+
+    bounds_m: tuple[Vec3, Vec3]
+    front_m: float
+    rear_m: float
 
 
 def soil(solid: Solid, name: str, seed: int) -> Solid:
@@ -44,7 +60,8 @@ def soil(solid: Solid, name: str, seed: int) -> Solid:
     materials = tuple(_soil_slot(m, amount, seed) for m in solid.mesh.materials)
     dirty = [k for k, m in enumerate(materials) if is_soiled(m)]
     mesh = replace(solid.mesh, materials=materials)
-    return replace(solid, mesh=map_dirt(mesh, dirty, axles_m(solid)))
+    frame = Frame(solid.body_bounds_m or mesh.bounds_m(), *axles_m(solid))
+    return replace(solid, mesh=map_dirt(mesh, dirty, frame))
 
 
 def _soil_slot(material: Material, amount: float, seed: int) -> Material:
@@ -87,7 +104,7 @@ def axles_m(solid: Solid) -> tuple[float, float]:
     return places.get("wheel_front_left", high - fifth), places.get("wheel_rear_left", low + fifth)
 
 
-def map_dirt(mesh: MeshData, slots: list[int], axles: tuple[float, float]) -> MeshData:
+def map_dirt(mesh: MeshData, slots: list[int], frame: Frame) -> MeshData:
     """The mesh with the texture coordinates of dirt on some slots."""
     chosen = np.isin(mesh.face_slots, slots)
     if not chosen.any():
@@ -99,7 +116,7 @@ def map_dirt(mesh: MeshData, slots: list[int], axles: tuple[float, float]) -> Me
     target[shared] = len(target) + np.arange(len(shared), dtype=np.int32)
     vertices = np.concatenate([mesh.vertices_m, mesh.vertices_m[shared]])
     uvs = np.concatenate([mesh.uvs, mesh.uvs[shared]])
-    uvs[target[dirty]] = dirt_coordinates(vertices[target[dirty]], mesh, axles)
+    uvs[target[dirty]] = dirt_coordinates(vertices[target[dirty]], frame)
     return replace(
         mesh,
         vertices_m=vertices,
@@ -109,15 +126,16 @@ def map_dirt(mesh: MeshData, slots: list[int], axles: tuple[float, float]) -> Me
     )
 
 
-def dirt_coordinates(points_m: Float32, mesh: MeshData, axles: tuple[float, float]) -> Float32:
+def dirt_coordinates(points_m: Float32, frame: Frame) -> Float32:
     """Texture coordinates of points [n, 3] of a vehicle, shape [n, 2]; linear between the axles."""
-    (x0, y0, _), (x1, y1, z1) = mesh.bounds_m()
+    (x0, y0, _), (x1, y1, z1) = frame.bounds_m
     x, y, z = points_m.astype(np.float64).T
-    front, rear = axles
-    along = np.interp(x, [x0, rear, front, x1], [-1.0, AXLES[1], AXLES[0], 1.0])
+    along = np.interp(x, [x0, frame.rear_m, frame.front_m, x1], [-1.0, AXLES[1], AXLES[0], 1.0])
     inward = 1.0 - np.minimum(np.abs(y) / max(-y0, y1), 1.0)
     u = 0.5 - 0.25 * along * (1.0 + inward)
-    return np.round(np.stack([u, z / z1], axis=1), 6).astype(np.float32)
+    v = np.clip(z / z1, 0.0, 1.0)
+    inside = _MARGIN + (1.0 - 2.0 * _MARGIN) * np.stack([u, v], axis=1)
+    return np.round(inside, 6).astype(np.float32)
 
 
 def road_dirt(seed: int, amount: float, paint: str) -> TextureData:
@@ -142,8 +160,11 @@ def dirt_share(seed: int) -> Float32:
     """Share of the surface that dirt covers on a vehicle that was not washed, [64, 256]."""
     rng = variant_rng("road_dirt", seed)
     rows, columns = _SIZE_PX
-    u = ((np.arange(columns) + 0.5) / columns)[None, :]
-    v = 1.0 - ((np.arange(rows) + 0.5) / rows)[:, None]
+    u, below = (
+        np.clip(((np.arange(n) + 0.5) / n - _MARGIN) / (1.0 - 2.0 * _MARGIN), 0.0, 1.0)
+        for n in (columns, rows)
+    )
+    u, v = u[None, :], 1.0 - below[:, None]
     along = np.clip((0.5 - u) * 4.0, -1.0, 1.0)
     side = _ramp(u, 0.19, 0.26) * _ramp(u, 0.81, 0.74)
     sill = 0.75 * np.exp(-np.maximum(v - 0.14, 0.0) / 0.11)

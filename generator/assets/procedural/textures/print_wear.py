@@ -8,7 +8,7 @@ shares are assumed, within a half.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,9 +28,13 @@ _DUST: Vec3 = (0.67, 0.64, 0.59)
 _COFFEE: Vec3 = (0.42, 0.29, 0.17)
 # How far from an edge ink is rubbed off, well used; how near a corner it is rubbed most; the width
 # of the grime along edges.
-_REACH_M, _CORNER_M, _GRIME_M = 0.0022, 0.009, 0.009
+_REACH_M, _CORNER_M, _GRIME_M = 0.0022, 0.009, 0.007
+# Wear below which edges are as new.
+_UNTOUCHED = 0.05
 # Radius of the foot of a mug.
 _RING_M = (0.03, 0.042)
+
+Window = tuple[slice, slice]
 
 
 @dataclass(frozen=True)
@@ -72,17 +76,23 @@ def wear_print(clean: TextureData, sheet: Sheet, name: str, seed: int) -> Textur
     films = [Film(soiled, _GRIME), Film(np.maximum(rubbed, broken), sheet.core)]
     smudged = traces.noise_bytes(COARSE, size_px, rng)
     dull = np.maximum(rubbed, traces.ramp_bytes(smudged, 0.7 - 0.35 * wear, 0.8 - 0.2 * wear))
-    if sheet.level:
-        films += _on_level_face(sheet, wear, size_px, rng)
-        dull = np.maximum(dull, films[-1].share)
-    if sheet.tears and rng.chance(0.5 * wear):
-        films += _tear(size_px, rng)
-        dull = np.maximum(dull, films[-1].share)
     worn = traces.lay_films(clean.albedo, films)
+    if sheet.level:
+        window = _window(sheet.places[sheet.level], size_px)
+        _lay_in(worn, dull, window, _settle(sheet, wear, dull[window].shape, rng))
+    if sheet.tears and rng.chance(0.6 * wear):
+        window = _torn_window(size_px, rng)
+        _lay_in(worn, dull, window, _tear(dull[window].shape, window[0].start > 0, rng))
     return TextureData(worn, traces.roughness_factor(dull, wear))
 
 
-def _window(place: UvRect, size_px: Size) -> tuple[slice, slice]:
+def _lay_in(image: UInt8, dull: UInt8, window: Window, films: Sequence[Film]) -> None:
+    """Lay films over a part of an image, in place; the last one dulls it."""
+    image[window] = traces.lay_films(np.ascontiguousarray(image[window]), films)
+    dull[window] = np.maximum(dull[window], films[-1].share)
+
+
+def _window(place: UvRect, size_px: Size) -> Window:
     """Rows and columns of a face."""
     (u0, v0, u1, v1), (height, width) = place, size_px
     return (
@@ -94,43 +104,45 @@ def _window(place: UvRect, size_px: Size) -> tuple[slice, slice]:
 def _edge_distances(count: int, length_m: float) -> Float32:
     """Distance of pixel centres from the nearer end [m], shape [count]."""
     along = (np.arange(count, dtype=np.float32) + 0.5) * np.float32(length_m / count)
-    return np.minimum(along, np.float32(length_m) - along)
+    near: Float32 = np.minimum(along, np.float32(length_m) - along)
+    return near
 
 
-def _strips(rows: int, columns: int, deep: int, wide: int) -> Iterator[tuple[slice, slice]]:
-    """The four borders of a face, so many pixels deep and wide."""
-    whole = slice(None)
-    for k, n, is_row in ((deep, rows, True), (wide, columns, False)):
-        for part in (slice(0, min(k, n)), slice(max(n - k, 0), n)):
-            yield (part, whole) if is_row else (whole, part)
+def _borders(rows: int, columns: int, deep: int, wide: int) -> Iterator[Window]:
+    """Rows and columns of the four borders of a face, so many pixels deep and wide."""
+    yield slice(0, deep), slice(0, columns)
+    yield slice(max(rows - deep, 0), rows), slice(0, columns)
+    yield slice(0, rows), slice(0, wide)
+    yield slice(0, rows), slice(max(columns - wide, 0), columns)
 
 
 def _rub_edges(sheet: Sheet, wear: float, size_px: Size, rng: VariantRng) -> tuple[UInt8, UInt8]:
     """Shares of bare board along edges, most at corners, and of grime beside it."""
     soil = traces.noise_bytes(COARSE, size_px, rng)
     rubbed, soiled = np.zeros(size_px, np.uint8), traces.ramp_bytes(soil, 0.4, 0.9, 0.05 * wear)
+    if wear < _UNTOUCHED:
+        return rubbed, soiled
     stretches = traces.noise_bytes(MEDIUM, size_px, rng)
     grain = traces.noise_bytes(FINE, size_px, rng)
     for name, place in sheet.places.items():
         window = _window(place, size_px)
         (rows, columns), (width_m, height_m) = rubbed[window].shape, sheet.size_m[name]
         across, down = _edge_distances(columns, width_m), _edge_distances(rows, height_m)
-        deep, wide = (math.ceil(_GRIME_M * n / length) for n, length in
+        border_m = _GRIME_M * sheet.exposed
+        deep, wide = (math.ceil(border_m * n / length) for n, length in
                       ((rows, height_m), (columns, width_m)))  # fmt: skip
-        for strip in _strips(rows, columns, deep, wide):
-            x, y = across[None, strip[1]], down[strip[0], None]
+        for at in _borders(rows, columns, deep, wide):
+            x, y = across[None, at[1]], down[at[0], None]
             corner = np.maximum(1.0 - (x + y) / np.float32(_CORNER_M), np.float32(0.0))
             # Edges are rubbed in stretches, the more the longer they have been in use.
-            touched = stretches[window][strip] * np.float32(1.0 / 255.0) + corner
-            reach = np.clip(4.0 * (touched - np.float32(0.95 - 0.55 * wear)), 0.0, 2.5)
-            reach *= 0.4 + grain[window][strip] * np.float32(1.2 / 255.0)
+            touched = stretches[window][at] * np.float32(1.0 / 255.0) + corner
+            reach = np.clip(4.0 * (touched - np.float32(0.95 - 0.55 * wear)), 0.0, 1.9)
+            reach *= 0.4 + grain[window][at] * np.float32(1.2 / 255.0)
             reach *= np.float32(sheet.exposed * wear * _REACH_M)
             near = np.minimum(x, y)
-            rubbed[window][strip] = traces.to_bytes((reach - near) * np.float32(2000.0) + 0.5)
-            dark = np.maximum(1.0 - near / np.float32(_GRIME_M), 0.0) * np.float32(0.22 * wear)
-            soiled[window][strip] = np.maximum(
-                soiled[window][strip], traces.to_bytes(dark * touched)
-            )
+            rubbed[window][at] = traces.to_bytes((reach - near) * np.float32(2000.0) + 0.5)
+            dark = np.maximum(1.0 - near / np.float32(border_m), 0.0) * np.float32(0.22 * wear)
+            soiled[window][at] = np.maximum(soiled[window][at], traces.to_bytes(dark * touched))
     return rubbed, soiled
 
 
@@ -160,40 +172,42 @@ def _creases(sheet: Sheet, wear: float, size_px: Size, rng: VariantRng) -> UInt8
     return np.asarray(image, dtype=np.uint8)
 
 
-def _on_level_face(sheet: Sheet, wear: float, size_px: Size, rng: VariantRng) -> list[Film]:
-    """Rings of mugs and dust on the face that lies upward; dust comes last."""
-    window = _window(sheet.places[sheet.level], size_px)
+def _settle(sheet: Sheet, wear: float, size_px: Size, rng: VariantRng) -> list[Film]:
+    """Rings of mugs and dust on the face that lies upward, of that size; dust comes last."""
     width_m, height_m = sheet.size_m[sheet.level]
-    films, dusty = [], np.zeros(size_px, np.uint8)
-    rows, columns = dusty[window].shape
-    noise = traces.noise_bytes(COARSE, (rows, columns), rng)
+    films: list[Film] = []
+    rows, columns = size_px
+    noise = traces.noise_bytes(COARSE, size_px, rng)
     if rng.chance(0.45 * wear):
         x = (np.arange(columns) + 0.5) * (width_m / columns) - rng.between(0.2, 0.8) * width_m
         y = (np.arange(rows) + 0.5) * (height_m / rows) - rng.between(0.2, 0.8) * height_m
         away = np.sqrt(x[None, :] ** 2 + y[:, None] ** 2) - rng.between(*_RING_M)
         share = 0.45 * np.clip(2.0 - np.abs(away) / 0.0011, 0.0, 1.0) * (noise / 255.0)
-        ring = np.zeros(size_px, np.uint8)
-        ring[window] = traces.to_bytes(share.astype(np.float32))
-        films.append(Film(ring, _COFFEE))
+        films.append(Film(traces.to_bytes(share.astype(np.float32)), _COFFEE))
     # Dust comes with standing about, not with use: it is wiped off things that are handled.
     amount = 0.4 * rng.between(0.0, 1.0) ** 3
     level = float(traces.dust_share(np.ones(1, np.float32), amount)[0])
-    dusty[window] = traces.ramp_bytes(noise, 0.15, 0.6, level)
-    return [*films, Film(dusty, _DUST)]
+    return [*films, Film(traces.ramp_bytes(noise, 0.15, 0.6, level), _DUST)]
 
 
-def _tear(size_px: Size, rng: VariantRng) -> list[Film]:
-    """A piece torn off a label's border: its shadow, then the fibres that stayed."""
+def _torn_window(size_px: Size, rng: VariantRng) -> Window:
+    """Where a piece is torn off a label: rows from its upper or lower border, some columns."""
     height, width = size_px
-    x0, is_above = rng.choose((0.0, 0.3, 0.7, 1.0)) * width, rng.chance(0.5)
-    wide, deep = rng.between(0.05, 0.14) * width, rng.between(0.1, 0.28) * height
-    x = np.abs(np.arange(width, dtype=np.float32) - np.float32(x0)) / np.float32(wide)
-    y = np.arange(height, dtype=np.float32)[:: 1 if is_above else -1] / np.float32(deep)
-    ragged = traces.noise_bytes(MEDIUM, size_px, rng) * np.float32(1.6 / 255.0) - np.float32(0.8)
+    wide, deep = (round(rng.between(*share) * n) for share, n in
+                  (((0.16, 0.36), width), ((0.16, 0.4), height)))  # fmt: skip
+    left = round(rng.choose((0.0, 0.2, 0.6, 1.0)) * (width - wide))
+    top = 0 if rng.chance(0.5) else height - deep
+    return slice(top, top + deep), slice(left, left + wide)
+
+
+def _tear(size_px: Size, is_low: bool, rng: VariantRng) -> list[Film]:
+    """A piece torn off the upper or lower border: its shadow, then the fibres that stayed."""
+    height, width = size_px
+    x = np.abs(np.linspace(-1.6, 1.6, width, dtype=np.float32))
+    y = np.linspace(0.0, 1.6, height, dtype=np.float32)[:: -1 if is_low else 1]
+    ragged = traces.noise_bytes(MEDIUM, size_px, rng) * np.float32(1.2 / 255.0) - np.float32(0.6)
     away = x[None, :] + y[:, None] + ragged
-    fibres = traces.ramp_bytes(traces.noise_bytes(FINE, size_px, rng), -1.5, 0.6) / np.float32(
-        255.0
-    )
-    left = traces.to_bytes((1.0 - away) * 12.0 * fibres)
+    fibres = traces.ramp_bytes(traces.noise_bytes(FINE, size_px, rng), -1.5, 0.6)
+    left = np.minimum(traces.to_bytes((1.0 - away) * 12.0), fibres)
     shadow = traces.to_bytes(np.minimum((1.16 - away) * 3.0, 0.3))
-    return [Film(shadow, _GRIME), Film(np.minimum(left, (235.0 * fibres).astype(np.uint8)), PAPER)]
+    return [Film(shadow, _GRIME), Film(left, PAPER)]
