@@ -46,6 +46,7 @@ class Sheet:
         size_m: Width and height of each face.
         core: Colour under the ink, sRGB in [0, 1].
         exposed: How much its borders are rubbed: 1 = edges of a box, less where it lies flat.
+        scratched: Share of the core that shows in the deepest scratches.
         level: The face that lies upward, where dust settles and mugs stand; empty = none.
         tears: Whether it is a label, of which pieces come off.
     """
@@ -54,6 +55,7 @@ class Sheet:
     size_m: Mapping[str, tuple[float, float]]
     core: Vec3 = BOARD
     exposed: float = 1.0
+    scratched: float = 0.5
     level: str = ""
     tears: bool = False
 
@@ -61,7 +63,9 @@ class Sheet:
 def label_sheet(width_m: float, height_m: float, core: Vec3) -> Sheet:
     """A sheet of one face that lies flat on a bottle or can."""
     whole = {"front": (0.0, 0.0, 1.0, 1.0)}
-    return Sheet(whole, {"front": (width_m, height_m)}, core, exposed=0.3, tears=core == PAPER)
+    # Lacquer over the print of drink cans is hard.
+    deep = 0.2 if core == METAL else 0.5
+    return Sheet(whole, {"front": (width_m, height_m)}, core, 0.3, deep, tears=core == PAPER)
 
 
 def wear_print(clean: TextureData, sheet: Sheet, name: str, seed: int) -> TextureData:
@@ -71,7 +75,7 @@ def wear_print(clean: TextureData, sheet: Sheet, name: str, seed: int) -> Textur
     rubbed, soiled = _rub_edges(sheet, wear, size_px, rng)
     count = int(3 + 45 * wear**1.5)
     scuffed = traces.scratches(count, 60.0 + 110.0 * wear, size_px, rng, 0.35)
-    broken = np.maximum(traces.ramp_bytes(scuffed, 0.0, 1.0, 0.1 + 0.4 * wear),
+    broken = np.maximum(traces.ramp_bytes(scuffed, 0.0, 1.0, sheet.scratched * (0.2 + 0.8 * wear)),
                         _creases(sheet, wear, size_px, rng))  # fmt: skip
     films = [Film(soiled, _GRIME), Film(np.maximum(rubbed, broken), sheet.core)]
     smudged = traces.noise_bytes(COARSE, size_px, rng)
