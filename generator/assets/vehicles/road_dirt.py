@@ -21,8 +21,9 @@ from gen_data.generator.assets.procedural import wear as traces
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import hex_to_linear
 from gen_data.generator.assets.procedural.patches import Array
+from gen_data.generator.assets.procedural.place_coordinates import map_by_place
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
-from gen_data.generator.core.asset_types import Float32, Material, MeshData, TextureData, UInt8
+from gen_data.generator.core.asset_types import Float32, Material, TextureData, UInt8
 from gen_data.generator.core.colorimetry import srgb_encode
 from gen_data.generator.core.se3 import Vec3
 
@@ -61,7 +62,9 @@ def soil(solid: Solid, name: str, seed: int) -> Solid:
     dirty = [k for k, m in enumerate(materials) if is_soiled(m)]
     mesh = replace(solid.mesh, materials=materials)
     frame = Frame(solid.body_bounds_m or mesh.bounds_m(), *axles_m(solid))
-    return replace(solid, mesh=map_dirt(mesh, dirty, frame))
+    return replace(
+        solid, mesh=map_by_place(mesh, dirty, lambda points_m: dirt_coordinates(points_m, frame))
+    )
 
 
 def _soil_slot(material: Material, amount: float, seed: int) -> Material:
@@ -104,28 +107,6 @@ def axles_m(solid: Solid) -> tuple[float, float]:
     return places.get("wheel_front_left", high - fifth), places.get("wheel_rear_left", low + fifth)
 
 
-def map_dirt(mesh: MeshData, slots: list[int], frame: Frame) -> MeshData:
-    """The mesh with the texture coordinates of dirt on some slots."""
-    chosen = np.isin(mesh.face_slots, slots)
-    if not chosen.any():
-        return mesh
-    dirty, others = np.unique(mesh.faces[chosen]), np.unique(mesh.faces[~chosen])
-    # Vertices that a print shares keep its coordinates; the dirt has copies.
-    shared = np.intersect1d(dirty, others)
-    target = np.arange(len(mesh.vertices_m), dtype=np.int32)
-    target[shared] = len(target) + np.arange(len(shared), dtype=np.int32)
-    vertices = np.concatenate([mesh.vertices_m, mesh.vertices_m[shared]])
-    uvs = np.concatenate([mesh.uvs, mesh.uvs[shared]])
-    uvs[target[dirty]] = dirt_coordinates(vertices[target[dirty]], frame)
-    return replace(
-        mesh,
-        vertices_m=vertices,
-        normals=np.concatenate([mesh.normals, mesh.normals[shared]]),
-        uvs=uvs,
-        faces=np.where(chosen[:, None], target[mesh.faces], mesh.faces),
-    )
-
-
 def dirt_coordinates(points_m: Float32, frame: Frame) -> Float32:
     """Texture coordinates of points [n, 3] of a vehicle, shape [n, 2]; linear between the axles."""
     (x0, y0, _), (x1, y1, z1) = frame.bounds_m
@@ -135,7 +116,7 @@ def dirt_coordinates(points_m: Float32, frame: Frame) -> Float32:
     u = 0.5 - 0.25 * along * (1.0 + inward)
     v = np.clip(z / z1, 0.0, 1.0)
     inside = _MARGIN + (1.0 - 2.0 * _MARGIN) * np.stack([u, v], axis=1)
-    return np.round(inside, 6).astype(np.float32)
+    return inside.astype(np.float32)
 
 
 def road_dirt(seed: int, amount: float, paint: str) -> TextureData:

@@ -22,7 +22,7 @@ from gen_data.generator.core.asset_types import Material, TextureData, UInt8
 
 STEPS = 12
 # Below this step things are as new.
-_FIRST = 2
+_FIRST = 4
 # Length of a repeat [m]; 0 = the mesh's own coordinates.
 _SCALES_M = {"vessel": 0.0, "dish": 0.27, "metal": 0.13, "plastic": 0.16}
 _TEA, _GREASE = (0.56, 0.38, 0.2), (0.45, 0.39, 0.31)
