@@ -112,7 +112,7 @@ def _dish(wear: float, size_px: Size, rng: VariantRng) -> Marks:
     fine = traces.scratches(int(10 + 170 * wear), 60.0, size_px, rng, 1.0)
     marks = traces.ramp_bytes(fine, 0.1, 1.2, 0.12 + 0.35 * wear)
     noise = traces.noise_bytes(COARSE, size_px, rng)
-    stain = traces.ramp_bytes(noise, 0.62, 0.95, 0.16 * wear)
+    stain = traces.ramp_bytes(noise, 0.62, 0.95, 0.08 * wear)
     dull = np.maximum(marks, traces.ramp_bytes(noise, 0.75 - 0.4 * wear, 1.0))
     return [Film(stain, _TEA), Film(marks, _PENCIL)], dull
 
@@ -123,7 +123,7 @@ def _metal(wear: float, size_px: Size, rng: VariantRng) -> Marks:
     drops = traces.noise_bytes(FINE, size_px, rng)
     spots = traces.ramp_bytes(drops, 0.68, 0.8, 0.5 * wear)
     prints = _fingerprints(int(1 + 7 * wear), _SCALES_M["metal"], size_px, rng)
-    soiled = traces.ramp_bytes(traces.noise_bytes(COARSE, size_px, rng), 0.5, 0.95, 0.3 * wear)
+    soiled = traces.ramp_bytes(traces.noise_bytes(COARSE, size_px, rng), 0.5, 0.95, 0.18 * wear)
     films = [Film(soiled, _GREASE), Film(traces.ramp_bytes(fine, 0.0, 1.0, 0.3 * wear), _GOUGE),
              Film(traces.ramp_bytes(prints, 0.0, 1.0, 0.12), _GREASE)]  # fmt: skip
     return films, np.maximum(np.maximum(fine, prints), np.maximum(spots, soiled))
@@ -132,7 +132,7 @@ def _metal(wear: float, size_px: Size, rng: VariantRng) -> Marks:
 def _plastic(wear: float, size_px: Size, rng: VariantRng) -> Marks:
     """Grease where hands hold it, scuffs and fingerprints."""
     held = traces.noise_bytes(COARSE, size_px, rng)
-    soiled = traces.ramp_bytes(held, 0.45, 1.0, 0.3 * wear)
+    soiled = traces.ramp_bytes(held, 0.5, 1.0, 0.18 * wear)
     specks = traces.ramp_bytes(traces.noise_bytes(FINE, size_px, rng), 0.68, 0.95, 0.25 * wear)
     fine = traces.scratches(int(6 + 90 * wear), 110.0, size_px, rng, 0.6)
     prints = _fingerprints(int(1 + 6 * wear), _SCALES_M["plastic"], size_px, rng)
