@@ -17,9 +17,13 @@ from gen_data.generator.assets.vehicles.road_dirt import (
     is_soiled,
     soiled,
 )
+from gen_data.generator.config.distributions import Constant
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.colorimetry import srgb_decode
+from gen_data.generator.core.scene import Body, ObjectGroup, Scene
+from gen_data.randomizers.vehicle_paint import VehiclePaint
 from tests.every_value import for_every
+from tests.randomizers.doubles import FakeAssets, rng_of
 
 SOILED = sorted(name for name, family in FAMILIES.items() if isinstance(family.build, Worn))
 
@@ -138,3 +142,31 @@ def test_washing_gives_the_plain_paint_back() -> None:
     assert plain.texture == "" and plain.role == "paint"
     assert plain.base_color == pytest.approx(paint.base_color, abs=0.003)
     assert plain.roughness == pytest.approx(0.22, abs=1e-4)
+
+
+@pytest.mark.parametrize("anew", [False, True])
+def test_the_randomizer_washes_paints_and_soils_again(anew: bool) -> None:
+    """No dirt gives plain paint, more dirt a larger amount; unsoiled vehicles get no texture."""
+    old = Material((0.3, 0.05, 0.02), roughness=0.22, specular=0.6, role="paint")
+    slots = (soiled(old, 0.9, 2), replace(old, role="trim"))
+    body = Body("traffic/0", "wagon", group="traffic", materials=slots)
+    group = ObjectGroup("traffic", (), ("wagon",), 1, "along", lanes=("driving",))
+    scene = Scene("t", bodies=(body,), groups=(group,))
+
+    def painted(dirt: float) -> tuple[Material, ...]:
+        painter = VehiclePaint(
+            name="paint", probability=Constant(anew), dirt=Constant(dirt), weathered=Constant(False)
+        )
+        return painter(scene, FakeAssets(), rng_of()).bodies[0].materials
+
+    plain, light, heavy = (painted(dirt) for dirt in (0.0, 0.1, 0.25))
+    amounts = [
+        float(m[0].texture.partition("amount=")[2].partition("&")[0]) for m in (light, heavy)
+    ]
+
+    assert plain[0].texture == ""
+    if not anew:
+        assert plain[0].base_color == pytest.approx(old.base_color, abs=0.003)
+    assert 0.0 < amounts[0] < amounts[1] <= 1.0
+    assert "seed=2" in heavy[0].texture
+    assert light[1].texture == "" and heavy[1].roughness > light[1].roughness
