@@ -38,7 +38,8 @@ def worn(name: str, seed: int) -> TextureData:
 
 def change(name: str, seed: int) -> np.ndarray:
     """Largest change of a channel per pixel, out of 255."""
-    return np.abs(worn(name, seed).albedo.astype(int) - clean(name, seed).albedo).max(axis=2)
+    moved = worn(name, seed).albedo.astype(int) - clean(name, seed).albedo
+    return np.asarray(np.abs(moved).max(axis=2))
 
 
 def convex_edges_m(mesh: MeshData) -> np.ndarray:

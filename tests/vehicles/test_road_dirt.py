@@ -30,7 +30,7 @@ SOILED = sorted(name for name, family in FAMILIES.items() if isinstance(family.b
 
 def build(name: str, seed: int) -> Solid:
     """A variant with straight wheels."""
-    return FAMILIES[name].build(seed=seed, **FAMILIES[name].parameters)  # type: ignore[no-any-return]
+    return FAMILIES[name].build(seed=seed, **FAMILIES[name].parameters)
 
 
 def shares(solid: Solid, seed: int) -> tuple[np.ndarray, np.ndarray]:
