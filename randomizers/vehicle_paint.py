@@ -10,17 +10,18 @@ from pydantic import Field
 
 from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.vehicles.plates import FORMATS, IN_EUROPE, SEEDS, reseed_plate
+from gen_data.generator.assets.vehicles.road_dirt import DUST, cleaned, is_soiled, soiled
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Scene
-from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import SurfaceRandomizer, body_materials
 from gen_data.randomizers.color_space import hsv_to_linear
 
 PAINT = "paint"
-_DUST: Vec3 = (0.17, 0.145, 0.115)
+_GATHERED = 3.2
+"""Dirt along sills and behind wheels over that on the paint; assumed, within a half."""
 _PIGMENT = 0.45
 """Roughness of the pigment below a clear coat."""
 _WORN = 0.4
@@ -61,7 +62,8 @@ class VehiclePaint(SurfaceRandomizer):
         probability: Probability that a vehicle is repainted; others keep their model's paint.
         roughness: Roughness of the finish: 0.1 waxed, 0.3 weathered.
         metallic: Whether the paint contains metal flakes; white never does.
-        dirt: Fraction of dust on the vehicle's surfaces.
+        dirt: Fraction of dust on the vehicle's surfaces; more gathers along sills, around and
+            behind wheels and on the rear.
         weathered: Probability that the clear coat of a vehicle has gone, so that its paint is matt
             and paler, without flakes.
         plates: Whether every vehicle gets its own licence plate instead of its model's.
@@ -147,9 +149,14 @@ def _finish(body: Body, assets: AssetIndex, paint: dict[str, Any] | None, dirt: 
     """Return the body with dust on it, and painted unless the paint is None."""
 
     def finish(material: Material) -> Material:
+        gathers, seed = is_soiled(material), 0
+        if gathers:
+            material, seed = cleaned(material)
         if paint is not None and material.role == PAINT and not material.printed:
             material = replace(material, **paint)
-        return _soil(material, dirt) if material.role in _SOILED else material
+        if material.role in _SOILED:
+            material = _soil(material, dirt)
+        return soiled(material, _GATHERED * dirt, seed) if gathers and dirt > 0.0 else material
 
     slots = body_materials(body, assets)
     return replace(body, materials=tuple(finish(material) for material in slots))
@@ -168,7 +175,7 @@ def _soil(material: Material, dirt: float) -> Material:
     share = min(_SOILED[material.role] * dirt, 1.0)
     red, green, blue = (
         round(clean * (1.0 - share) + dust * share, 6)
-        for clean, dust in zip(material.base_color, _DUST, strict=True)
+        for clean, dust in zip(material.base_color, DUST, strict=True)
     )
     rough = round(material.roughness + (0.8 - material.roughness) * share, 4)
     dusty = replace(material, base_color=(red, green, blue), roughness=rough)

@@ -224,7 +224,10 @@ def test_equal_seeds_make_equal_bytes_and_others_differ(name: str) -> None:
 
 @for_every(OBJECTS)
 def test_materials_are_physical_and_their_textures_exist(name: str) -> None:
-    """Values are in range; a texture id names a family of the table; labels are printed."""
+    """Values are in range; a texture id names a family of the table; labels are printed.
+
+    Marks of use lie on plain colours, which randomizers may change.
+    """
     for seed in SEEDS:
         for material in variant(name, seed).mesh.materials:
             assert all(0.0 <= channel <= 1.0 for channel in material.base_color)
@@ -233,8 +236,9 @@ def test_materials_are_physical_and_their_textures_exist(name: str) -> None:
             if material.texture:
                 prefix, _, rest = material.texture.partition("/")
                 assert prefix == "texture"
-                assert rest.partition("?")[0] in TEXTURES
-                assert material.printed
+                family = rest.partition("?")[0]
+                assert family in TEXTURES
+                assert material.printed == (family != "use_marks")
 
 
 @pytest.mark.parametrize("name", ["bottle", "can", "carton", "milk_carton", "jar", "book"])

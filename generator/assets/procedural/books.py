@@ -21,6 +21,7 @@ from gen_data.generator.assets.procedural.patches import (
 )
 from gen_data.generator.assets.procedural.surface_shapes import Point2, UvRect, grid, rounded_box
 from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
+from gen_data.generator.assets.procedural.wear import draw_wear, dulled
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
 
@@ -53,7 +54,8 @@ def book(seed: int) -> Solid:
     block = rounded_box((length - 2 * margin, width - inside, thickness - 2 * board), 0.0003, 1)
     pages = block.painted(1).moved(y=0.5 * (board + bow - margin))
     paper = Material(jitter_color(hex_to_linear("#e9e2cf"), 0.05, rng), 0.85)
-    print_ = printed_material(f"texture/book_cover?seed={seed}", rng.between(0.25, 0.6))
+    rough = dulled(rng.between(0.25, 0.6), draw_wear("book_cover", seed))
+    print_ = printed_material(f"texture/book_cover?seed={seed}", rough)
     half = (0.5 * length, 0.5 * width, 0.5 * thickness)
     low = (-half[0], -half[1], -half[2])
     return make_centred_solid([cover, pages], (print_, paper), [hulls.box(low, half)])

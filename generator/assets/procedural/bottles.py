@@ -41,6 +41,7 @@ from gen_data.generator.assets.procedural.surface_shapes import (
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.assets.procedural.vessel_contents import CONTENTS, DRINKS, liquid
 from gen_data.generator.assets.procedural.vessels import radius_at, subdivide
+from gen_data.generator.assets.procedural.wear import draw_wear, dulled
 from gen_data.generator.core.asset_types import Material
 
 # Width by height of the unrolled label; its texture is drawn at this aspect.
@@ -166,10 +167,9 @@ def _bottle_materials(
         body = Material(color, 0.04, transmission=1.0, ior=1.5)
     elif choice.kind == "flask" and min(color) > 0.4:
         body = metal_material(color, gloss)
-    texture = f"texture/label?seed={seed}"
-    if choice.label == "front":
-        texture = f"texture/front_label?seed={seed}"
-    label = printed_material(texture, rng.between(0.35, 0.6))
+    name = "front_label" if choice.label == "front" else "label"
+    rough = dulled(rng.between(0.35, 0.6), draw_wear(name, seed))
+    label = printed_material(f"texture/{name}?seed={seed}", rough)
     cap = plastic_material(rng, style.caps)
     if choice.closure == "crown":
         cap = metal_material(draw_linear(style.caps, 0.05, rng), 0.3)
@@ -193,7 +193,8 @@ def jar(seed: int) -> Solid:
     filling = draw_linear(PALETTES["fillings"], 0.15, rng)
     body = Material(filling, rng.between(0.06, 0.12))
     name = "front_label" if style == "front" else "label"
-    label = printed_material(f"texture/{name}?seed={seed + 1000}", rng.between(0.45, 0.65))
+    rough = dulled(rng.between(0.45, 0.65), draw_wear(name, seed + 1000))
+    label = printed_material(f"texture/{name}?seed={seed + 1000}", rough)
     metals = (metal_material(color, 0.3) for color in ((0.83, 0.69, 0.35), STEEL))
     lid = rng.choose((*metals, plastic_material(rng, CAPS)))
     materials = [body, label, lid]

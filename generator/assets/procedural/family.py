@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple
 
 from gen_data.generator.assets.procedural.variant_rng import in_turn
@@ -149,6 +150,28 @@ class Lazy:
 
 
 @dataclass(frozen=True)
+class Worn:
+    """A generator whose objects are worn, more or less by seed.
+
+    Attributes:
+        build: The generator of objects as new.
+        name: Name of the family.
+        wear: Function of the object, the name and the seed: the object in use.
+    """
+
+    build: Callable[..., Solid]
+    name: str
+    wear: Callable[[Solid, str, int], Solid]
+
+    def __call__(self, seed: int, **parameters: Any) -> Solid:
+        """The object in use."""
+        return self.wear(self.build(seed=seed, **parameters), self.name, seed)
+
+
+_USE = Lazy(f"{__package__}.textures.use_marks:use")
+
+
+@dataclass(frozen=True)
 class ConstantFacts:
     """Facts that are the same for every variant."""
 
@@ -229,7 +252,14 @@ def load_families(package: str) -> FamilyTables:
 
 
 def _object_family(
-    name: str, *, category: str = "", subcategory: str = "", facts: bool = False, **row: Any
+    name: str,
+    *,
+    category: str = "",
+    subcategory: str = "",
+    facts: bool = False,
+    marks: Mapping[int | str, str] | None = None,
+    wear: Callable[[Solid, str, int], Solid] | None = None,
+    **row: Any,
 ) -> Family:
     known: Callable[..., Facts] | None = None
     if facts:
@@ -237,6 +267,10 @@ def _object_family(
     elif subcategory:
         known = ConstantFacts(subcategory)
     row = {"mass_kg": 0.0, "stackable": False, **row}
+    if marks:
+        row["build"] = Worn(row["build"], name, partial(_USE, marks=marks))
+    elif wear:
+        row["build"] = Worn(row["build"], name, wear)
     return Family(name=name, category=category or name, facts=known, **row)
 
 
@@ -252,6 +286,7 @@ def _arguments(package: str, row: Mapping[str, Any]) -> dict[str, Any]:
         **row,
         "build": Lazy(f"{package}.{row['build']}"),
         "tags": tuple(sorted(row["tags"])),
+        **({"wear": Lazy(f"{package}.{row['wear']}")} if "wear" in row else {}),
         "parameters": parameters,
         **_symmetries(package, row.get("symmetries")),
     }

@@ -36,6 +36,7 @@ from gen_data.generator.assets.procedural.surface_shapes import (
 )
 from gen_data.generator.assets.procedural.variant_rng import in_turn, variant_rng
 from gen_data.generator.assets.procedural.vessels import subdivide
+from gen_data.generator.assets.procedural.wear import draw_wear, dulled
 from gen_data.generator.core.se3 import Vec3
 
 _SIZES = load_table(__package__, "package_sizes", tuple[tuple[float, ...], ...])
@@ -67,13 +68,13 @@ def can(seed: int) -> Solid:
     rng = variant_rng("can", seed)
     size = can_size(seed)
     r, h = size.radius_m, size.height_m
-    texture = f"texture/can_label?seed={seed}"
+    texture, wear = f"texture/can_label?seed={seed}", draw_wear("can_label", seed)
     if size.food:
-        print_ = printed_material(texture, rng.between(0.5, 0.7))
+        print_ = printed_material(texture, dulled(rng.between(0.5, 0.7), wear))
         patches, stages = _food_can(r, h)
         lid: list[Patch] = []
     else:
-        print_ = printed_material(texture, rng.between(0.25, 0.38), 0.35)
+        print_ = printed_material(texture, dulled(rng.between(0.25, 0.38), wear), 0.35)
         patches, stages = _drink_can(r, h)
         lid = [piece.moved(z=h - 0.0045) for piece in _tab(0.68 * r)]
     body = metal_material(STEEL if size.food else ALUMINIUM, rng.between(0.22, 0.35))
@@ -167,7 +168,8 @@ def carton(seed: int) -> Solid:
     size = carton_size_m(seed)
     body = rounded_box(size, 0.0012, 1, uv=CARTON_ATLAS)
     x, y, z = (0.5 * side for side in size)
-    print_ = printed_material(f"texture/carton?seed={seed}", rng.between(0.35, 0.65))
+    rough = dulled(rng.between(0.35, 0.65), draw_wear("carton", seed))
+    print_ = printed_material(f"texture/carton?seed={seed}", rough)
     return make_centred_solid([body], (print_,), [hulls.box((-x, -y, -z), (x, y, z))])
 
 
@@ -178,7 +180,8 @@ def milk_carton(seed: int) -> Solid:
     body = rounded_box((x, y, z), 0.0015, 1, uv=CARTON_ATLAS).moved(z=z / 2)
     rise, fin = 0.33 * x, 0.016
     roof = _gable(x, y, rise, fin).moved(z=z)
-    print_ = printed_material(f"texture/milk_label?seed={seed}", rng.between(0.35, 0.5))
+    rough = dulled(rng.between(0.35, 0.5), draw_wear("milk_label", seed))
+    print_ = printed_material(f"texture/milk_label?seed={seed}", rough)
     patches, parts = [body, roof], [hulls.box((-x / 2, -y / 2, 0.0), (x / 2, y / 2, z))]
     if rng.chance(0.7):
         tilt = math.atan2(rise, 0.5 * x)

@@ -165,11 +165,12 @@ def make_walls(walls: Walls, segments: int = SEGMENTS) -> list[Patch]:
     """Patches: underside and outer wall in slot 0, rim and inside in slot 1.
 
     Along the outer wall v runs over [0, 1] from foot to rim; the underside shows its lowest row.
+    Inside, it runs from the rim to the middle of the floor.
     """
     return [
         shapes.lathe(walls.base, segments, 0, v=(0.0, 0.001)),
         shapes.lathe(walls.outer, segments, 0, v=(0.001, 1.0)),
-        shapes.lathe(walls.inner, segments, 1),
+        shapes.lathe(walls.inner, segments, 1, v=(0.0, 1.0)),
     ]
 
 

@@ -158,7 +158,8 @@ def barcode(image: Image, box: Box, rng: VariantRng) -> None:
     foot = y1 - 0.18 * (y1 - y0)
     while x < end:
         bar, gap = unit * int(rng.between(1, 4)), unit * int(rng.between(1, 4))
-        draw.rectangle([x, y0 + 0.08 * (y1 - y0), x + bar - 1, foot], fill=(15, 15, 15))
+        # Of a bar one unit wide, rounding may leave less than nothing.
+        draw.rectangle([x, y0 + 0.08 * (y1 - y0), max(x, x + bar - 1), foot], fill=(15, 15, 15))
         x += bar + gap
     digits = "".join(str(int(rng.between(0, 10))) for _ in range(13))
     w, h = image.size

@@ -1,0 +1,65 @@
+"""Grime of street furniture: where it lies, by height above the ground."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gen_data.generator.assets.procedural.family import Worn
+from gen_data.generator.assets.scenery import FAMILIES, TEXTURES
+from tests.every_value import for_every
+
+GRIMY = sorted(name for name, family in FAMILIES.items() if isinstance(family.build, Worn))
+VARIANTS = [(name, seed) for name in GRIMY for seed in range(FAMILIES[name].variants)]
+
+
+def test_boxes_and_posts_of_streets_are_grimy() -> None:
+    """The families that stand low on pavements."""
+    assert {"bollard", "cabinet", "hydrant", "litter_bin", "post_box"} <= set(GRIMY)
+
+
+@for_every(VARIANTS)
+def test_grime_changes_neither_shape_nor_print(variant: tuple[str, int]) -> None:
+    """Corners stay; other slots keep materials and coordinates."""
+    name, seed = variant
+    worn = FAMILIES[name].build
+    assert isinstance(worn, Worn)
+    parameters = FAMILIES[name].parameters
+    new, used = (make(seed=seed, **parameters).mesh for make in (worn.build, worn))
+    kept = [k for k, m in enumerate(used.materials) if "street_grime" not in m.texture]
+    others = np.isin(used.face_slots, kept)
+
+    assert (new.vertices_m[new.faces] == used.vertices_m[used.faces]).all()
+    assert (new.uvs[new.faces[others]] == used.uvs[used.faces[others]]).all()
+    assert all(new.materials[k] == used.materials[k] for k in kept)
+    assert all(
+        a.base_color == b.base_color for a, b in zip(new.materials, used.materials, strict=True)
+    )
+
+
+@pytest.mark.parametrize("name", ["cabinet", "bollard", "post_box"])
+def test_the_foot_is_darkest_and_edges_above_streak(name: str) -> None:
+    """Mean brightness of the texture by height, looked up through the mesh."""
+    seed = next(
+        s
+        for s in range(FAMILIES[name].variants)
+        if any("street_grime" in m.texture for m in FAMILIES[name].build(seed=s).mesh.materials)
+    )
+    mesh = FAMILIES[name].build(seed=seed).mesh
+    slot = next(k for k, m in enumerate(mesh.materials) if "street_grime" in m.texture)
+    used = np.unique(mesh.faces[mesh.face_slots == slot])
+    image = TEXTURES["street_grime"].build(TEXTURES["street_grime"].variants - 1).albedo
+    rows = np.clip(((1.0 - mesh.uvs[used, 1]) * len(image)).astype(int), 0, len(image) - 1)
+    heights = mesh.vertices_m[used, 2]
+    tone = image.astype(np.float64).mean(axis=2)
+
+    assert (np.diff(rows[np.argsort(heights)]) <= 0).all()
+    assert tone[-14:].mean() < 0.9 * tone[50:90].mean()
+    assert tone[10:30].std(axis=1).mean() > 1.5 * tone[60:90].std(axis=1).mean()
+
+
+def test_grime_grows_with_age() -> None:
+    """Each step is darker than the one two before."""
+    means = [TEXTURES["street_grime"].build(step).albedo.mean() for step in range(8)]
+
+    assert all(later < earlier for earlier, later in zip(means, means[2:], strict=False))
