@@ -29,6 +29,8 @@ from gen_data.generator.core.plugins import loaded, package_of, third_party
 
 VERSION = 2
 """Increased whenever code shared by all families generates different geometry."""
+_KEYS = 8192
+"""Content keys kept in memory, some hundred bytes each."""
 _MAX_SEED = 2**31 - 1
 _PREFIXES = {"object": "", "texture": "texture/", "environment": "environment/"}
 
@@ -62,6 +64,7 @@ class ProceduralLibrary:
             for name, family in table.items()
         }
         self._packages: dict[str, str] = {}
+        self._keys: CountCache[str] = CountCache(_KEYS)
         for name, family, package in _load_third_party():
             full_name = _PREFIXES[_kind(family)] + name
             if full_name not in self._families:
@@ -169,6 +172,9 @@ class ProceduralLibrary:
             raise AssetError(f"asset '{asset_id}': {error}") from error
 
     def _key(self, asset_id: AssetId, family: AnyFamily) -> str:
+        return self._keys.get(str(asset_id), lambda: self._content_key(asset_id, family))
+
+    def _content_key(self, asset_id: AssetId, family: AnyFamily) -> str:
         arguments = _merge_arguments(asset_id, family)
         parameters = {name: format_parameter(value) for name, value in arguments.items()}
         version = [VERSION, family.version]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -42,15 +42,18 @@ _ENVIRONMENT_BYTES = 32 << 20
 _OPTICS_BYTES = 192 << 20
 _LENSES = 64
 """Capacity of the cache of lenses: a randomized one is new in every scene."""
-_SCRATCH_BYTES = 64 << 20
+_SCRATCH_RESERVE = 8
+"""Scratch memory grows by one part in this number more than it must."""
 _BODIES = 2048
 """Capacity of the caches of material records."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Scratch:
-    array: wp.array
-    nbytes: int
+    """Memory of one name, and the part of it that was last requested."""
+
+    whole: wp.array
+    part: wp.array
 
 
 class DeviceCache:
@@ -74,7 +77,7 @@ class DeviceCache:
         self._textures: ByteCache[DeviceTexture] = ByteCache(texture_bytes, _TEXTURES)
         self._environments: ByteCache[DeviceEnvironment] = ByteCache(_ENVIRONMENT_BYTES)
         self._optics: ByteCache[DeviceOptics] = ByteCache(_OPTICS_BYTES, _LENSES)
-        self._scratch: ByteCache[_Scratch] = ByteCache(_SCRATCH_BYTES)
+        self._scratch: dict[str, _Scratch] = {}
         self._constants: dict[tuple[object, ...], wp.array] = {}
 
     def mesh(self, asset_id: str) -> DeviceMesh:
@@ -146,11 +149,17 @@ class DeviceCache:
     def scratch(self, name: str, shape: int | tuple[int, ...], dtype: Any) -> wp.array:
         """Uninitialised memory; reused, because touching fresh pages costs as much as filling them.
 
-        One name and shape stand for one array, valid until it is requested again.
+        It is valid until the same name is requested again. There is as much of each name as the
+        largest frame took: sizes change with every scene.
         """
-
-        def make() -> _Scratch:
-            array = wp.zeros(shape, dtype=dtype, device=self.device)
-            return _Scratch(array, int(np.prod(shape)) * wp.types.type_size_in_bytes(dtype))
-
-        return self._scratch.get(f"{name} {shape}", make).array
+        sizes = shape if isinstance(shape, tuple) else (shape,)
+        count = int(np.prod(sizes))
+        held = self._scratch.get(name)
+        if held is None or held.whole.size < count:
+            reserved = count + count // _SCRATCH_RESERVE
+            whole = wp.zeros(reserved, dtype=dtype, device=self.device)
+            held = _Scratch(whole, whole[:count].reshape(sizes))
+        elif held.part.shape != sizes:
+            held = replace(held, part=held.whole[:count].reshape(sizes))
+        self._scratch[name] = held
+        return held.part
