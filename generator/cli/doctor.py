@@ -17,6 +17,7 @@ import tempfile
 import time
 import zlib
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
 from importlib.metadata import version
 from multiprocessing.connection import Connection
@@ -147,16 +148,22 @@ def _try_renderer() -> str:
 
 
 def _try_physics() -> str:
-    import pybullet
+    import numpy as np
 
-    client = pybullet.connect(pybullet.DIRECT)
-    pybullet.setGravity(0.0, 0.0, -9.81, physicsClientId=client)
-    shape = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, 0.1, physicsClientId=client)
-    ball = pybullet.createMultiBody(1.0, shape, -1, [0.0, 0.0, 1.0], physicsClientId=client)
-    pybullet.stepSimulation(physicsClientId=client)
-    (_, _, height_m), _ = pybullet.getBasePositionAndOrientation(ball, physicsClientId=client)
-    _expect(height_m < 1.0, "a ball does not fall")
-    return f"PyBullet {version('pybullet')}"
+    from gen_data.generator.core.asset_types import ConvexParts
+    from gen_data.generator.core.se3 import SE3
+    from gen_data.generator.physics import PhysicsConfig
+    from gen_data.generator.physics.collision_shapes import collision_shape
+    from gen_data.generator.physics.world import open_world
+
+    config = PhysicsConfig()
+    corners = np.array([(x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)])
+    with closing(open_world(config)) as world:
+        world.reset()
+        world.add("cube", collision_shape(ConvexParts((corners,))), SE3(), mass_kg=1.0)
+        world.step(10)
+        _expect(world.pose("cube").translation_m[2] < 0.0, "a cube does not fall")
+    return f"{config.engine} {version(config.engine)}"
 
 
 def _try_meshes() -> str:
@@ -274,7 +281,7 @@ CHECKS = (
     Check("cache", _try_cache, "make the folder writable, or point XDG_CACHE_HOME elsewhere"),
     Check("limits", _try_limits, "raise them with ulimit -n, -v and -f"),
     Check("renderer", _try_renderer, REINSTALL.format("warp-lang")),
-    Check("physics", _try_physics, REINSTALL.format("pybullet")),
+    Check("physics", _try_physics, "pip install --force-reinstall mujoco"),
     Check("meshes", _try_meshes, REINSTALL.format("scipy trimesh fast-simplification")),
     Check("images", _try_images, REINSTALL.format("opencv-python-headless deflate pillow")),
     Check("openexr", _try_openexr, REINSTALL.format("OpenEXR")),
