@@ -32,6 +32,7 @@ from gen_data.generator.core.temporary_folders import temporary_folder
 
 FILES_MIN = 64
 MEMORY_MIN_BYTES = 2_000_000_000
+EXTRA = "pip install 'gen-data[{}]'"
 REINSTALL = "reinstall it: pip install --force-reinstall --no-deps {}"
 
 
@@ -284,11 +285,11 @@ CHECKS = (
     Check("physics", _try_physics, "pip install --force-reinstall mujoco"),
     Check("meshes", _try_meshes, REINSTALL.format("scipy trimesh fast-simplification")),
     Check("images", _try_images, REINSTALL.format("opencv-python-headless deflate pillow")),
-    Check("openexr", _try_openexr, REINSTALL.format("OpenEXR")),
+    Check("openexr", _try_openexr, EXTRA.format("exr"), required=False),
     Check("coco", _try_coco, REINSTALL.format("pycocotools")),
-    Check("usd", _try_usd, REINSTALL.format("usd-core")),
-    Check("preview", _try_preview, REINSTALL.format("rerun-sdk")),
+    Check("usd", _try_usd, EXTRA.format("usd"), required=False),
+    Check("preview", _try_preview, EXTRA.format("preview"), required=False),
     Check("sample", _try_sample, "if the checks above pass, delete ~/.cache/warp and try again"),
-    Check("denoiser", _try_denoiser, "pip install 'gen-data[denoise]'", required=False),
+    Check("denoiser", _try_denoiser, EXTRA.format("denoise"), required=False),
     Check("packs", _try_packs, "gen-data assets list shows the available packs", required=False),
 )

@@ -103,7 +103,7 @@ def _command(pack: Pack) -> list[str]:
     names = {"package": pack.package, "version": pack.version}
     # Messages are matched, so they must be in English.
     arguments = [argument.format(**names) for argument in client.arguments]
-    return ["/usr/bin/env", "LC_ALL=C", *start, *arguments]
+    return ["/usr/bin/env", "LC_ALL=C", *start, *arguments, *pack.options]
 
 
 def _client_error(pack: Pack, command: list[str], what: str) -> AssetError:
