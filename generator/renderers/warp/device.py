@@ -60,6 +60,12 @@ def _start() -> None:
         wp.init()
 
 
+def kernel_folder() -> Path:
+    """Folder of compiled kernels of this version of Warp."""
+    _start()
+    return Path(wp.config.kernel_cache_dir)
+
+
 EVERY_FRAME = (
     "realtime.kernels.lattice_lighting",
     "realtime.kernels.soft_shadows",
