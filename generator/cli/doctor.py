@@ -10,7 +10,6 @@ import hashlib
 import multiprocessing
 import os
 import platform
-import resource
 import shutil
 import subprocess
 import tempfile
@@ -19,15 +18,18 @@ import zlib
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
+from importlib import import_module
 from importlib.metadata import version
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 import click
 
 from gen_data.generator import __version__
 from gen_data.generator.core.errors import GenDataError, SampleError
 from gen_data.generator.core.processes import silence_stdio
+from gen_data.generator.core.system_calls import usable_cores
 from gen_data.generator.core.temporary_folders import temporary_folder
 
 FILES_MIN = 64
@@ -126,15 +128,22 @@ def _try_cache() -> str:
 
 
 def _try_limits() -> str:
-    """Limits of this user on files, memory and file sizes."""
+    """Limits of this user on files, memory and file sizes; Windows has none."""
+    try:
+        resource: Any = import_module("resource")
+    except ImportError:
+        return f"none, {usable_cores()} cores"
     files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     _expect(files == resource.RLIM_INFINITY or files >= FILES_MIN, f"only {files} open files")
     for name, kind in (("memory", resource.RLIMIT_AS), ("file size", resource.RLIMIT_FSIZE)):
         limit, _ = resource.getrlimit(kind)
         few = limit != resource.RLIM_INFINITY and limit < MEMORY_MIN_BYTES
         _expect(not few, f"{name} is limited to {limit / 1e6:.0f} MB")
+    cores = f"{usable_cores()} cores"
+    if "SC_AVPHYS_PAGES" not in os.sysconf_names:  # macOS
+        return f"{files} open files, {cores}"
     free = os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    return f"{files} open files, {free / 1e9:.1f} GB of memory free, {os.cpu_count()} cores"
+    return f"{files} open files, {free / 1e9:.1f} GB of memory free, {cores}"
 
 
 def _try_renderer() -> str:

@@ -55,7 +55,7 @@ class Pack:
 
 
 PACKS = tuple(
-    Pack(**{k: tuple(v) if isinstance(v, list) else v for k, v in entry.items()})
+    Pack(**{**entry, "wanted": tuple(entry["wanted"]), "options": tuple(entry.get("options", ()))})
     for entry in load_data(__package__, "packs")
 )
 

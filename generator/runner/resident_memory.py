@@ -36,9 +36,9 @@ def release_memory(file_bytes_kept: int = FILE_BYTES_KEPT) -> None:
     still needed come back from the page cache of the system without reading the disk.
     """
     gc.collect()
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if trim is not None:
-        trim(0)
+    # Of the GNU C library; Windows has no library of all symbols.
+    with suppress(AttributeError, OSError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)
     limit_mapped_pages(file_bytes_kept)
     # Listing all maps takes tens of milliseconds, and most pages of libraries are gone after once.
     if resident_file_bytes() <= file_bytes_kept:

@@ -41,7 +41,6 @@ class StoredObjects(StoredSamples):
     """
 
     def __init__(self, url: str) -> None:
-
         self.url = url.rstrip("/")
         self._objects = ObjectFolder(self.url)
         documents = self._objects.read([PLAN_NAME, MANIFEST_NAME])
