@@ -12,6 +12,7 @@ EXTRAS = {
     "mcap": ("mcap", "formats"),
     "mcap_protobuf": ("mcap-protobuf-support", "formats"),
     "pxr": ("usd-core", "usd"),
+    "pyarrow": ("pyarrow", "formats"),
     "rerun": ("rerun-sdk", "preview"),
 }
 """Package and extra by the module that the package installs."""
