@@ -28,6 +28,7 @@ import click
 
 from gen_data.generator import __version__
 from gen_data.generator.core.errors import GenDataError, SampleError
+from gen_data.generator.core.optional_packages import missing_packages
 from gen_data.generator.core.processes import silence_stdio
 from gen_data.generator.core.system_calls import usable_cores
 from gen_data.generator.core.temporary_folders import temporary_folder
@@ -286,6 +287,11 @@ def _try_packs() -> str:
     return ", ".join(f"{record.name} {record.version}" for record in records)
 
 
+def _is_installed(module: str) -> bool:
+    """Whether an optional package must work because it is there."""
+    return not missing_packages(module)
+
+
 CHECKS = (
     Check("python", _try_python, REINSTALL.format("gen-data numpy")),
     Check("cache", _try_cache, "make the folder writable, or point XDG_CACHE_HOME elsewhere"),
@@ -294,10 +300,10 @@ CHECKS = (
     Check("physics", _try_physics, "pip install --force-reinstall mujoco"),
     Check("meshes", _try_meshes, REINSTALL.format("scipy trimesh fast-simplification")),
     Check("images", _try_images, REINSTALL.format("opencv-python-headless deflate pillow")),
-    Check("openexr", _try_openexr, EXTRA.format("exr"), required=False),
+    Check("openexr", _try_openexr, EXTRA.format("exr"), _is_installed("OpenEXR")),
     Check("coco", _try_coco, REINSTALL.format("pycocotools")),
-    Check("usd", _try_usd, EXTRA.format("usd"), required=False),
-    Check("preview", _try_preview, EXTRA.format("preview"), required=False),
+    Check("usd", _try_usd, EXTRA.format("usd"), _is_installed("pxr")),
+    Check("preview", _try_preview, EXTRA.format("preview"), _is_installed("rerun")),
     Check("sample", _try_sample, "if the checks above pass, delete ~/.cache/warp and try again"),
     Check("denoiser", _try_denoiser, EXTRA.format("denoise"), required=False),
     Check("packs", _try_packs, "gen-data assets list shows the available packs", required=False),
