@@ -4,7 +4,7 @@ COPY . /src
 RUN pip wheel --no-cache-dir --no-deps --wheel-dir /wheels /src
 
 FROM python:3.11-slim-bookworm
-ARG EXTRAS=formats,cloud,ray
+ARG EXTRAS=all
 COPY --from=build /wheels /wheels
 RUN pip install --no-cache-dir "$(ls /wheels/*.whl)[$EXTRAS]" \
     && useradd --create-home --uid 1000 gen-data \

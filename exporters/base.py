@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from typing import ClassVar, TypeVar, get_args
 
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.capture import Channel, ImageFormat
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, Exporter
+from gen_data.generator.core.optional_packages import missing_packages
 from gen_data.generator.core.scene import Scene
 
 PNG_ONLY = frozenset({"png"})
@@ -73,20 +73,16 @@ def check_image_formats(exporter: Exporter, info: DatasetInfo) -> None:
             )
 
 
-def check_installed(exporter: str, **packages: str) -> None:
+def check_installed(exporter: str, *modules: str) -> None:
     """Reject a format whose writing library is absent.
 
     Args:
         exporter: Type of the exporter.
-        packages: Names of packages by the modules that they install.
+        modules: Names of the modules that it imports.
 
     Raises:
         ConfigError: a module is missing; the text names the remedy.
     """
-    absent = sorted({name for module, name in packages.items() if find_spec(module) is None})
-    if absent:
-        noun = "package" if len(absent) == 1 else "packages"
-        raise ConfigError(
-            f"exporter '{exporter}' needs the {noun} {', '.join(absent)}: "
-            "pip install 'gen-data[formats]'"
-        )
+    missing = missing_packages(*modules)
+    if missing:
+        raise ConfigError(f"exporter '{exporter}' {missing}")

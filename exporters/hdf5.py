@@ -38,7 +38,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -54,6 +53,7 @@ from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.optional_packages import missing_packages
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.serialization import canonical_json
@@ -105,11 +105,9 @@ class Hdf5(ExporterBase):
             raise ConfigError(
                 f"exporter '{self.type}': no camera writes a channel; add an rgb_camera"
             )
-        if self.container == "hdf5" and find_spec("h5py") is None:
-            raise ConfigError(
-                "exporter 'hdf5' needs the package h5py: pip install 'gen-data[formats]', "
-                "or set container: npz"
-            )
+        missing = missing_packages("h5py")
+        if self.container == "hdf5" and missing:
+            raise ConfigError(f"exporter 'hdf5' {missing}, or set container: npz")
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write one container per image.

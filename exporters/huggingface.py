@@ -38,7 +38,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import yaml
 from pydantic import Field
 
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
 from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
 from gen_data.exporters.parquet_tables import (
     GROUP_ROWS,
@@ -98,8 +98,9 @@ class HuggingFace(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: no sensor writes the rgb channel.
+            ConfigError: no sensor writes the rgb channel, or a library is missing.
         """
+        check_installed(self.type, "pyarrow")
         rgb_camera(info, "", self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:

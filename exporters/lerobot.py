@@ -36,7 +36,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import PrivateAttr
 
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
 from gen_data.exporters.fragments import fragment_rows
 from gen_data.exporters.image_files import read_pixels
 from gen_data.exporters.parquet_tables import (
@@ -97,8 +97,10 @@ class LeRobot(ExporterBase):
         """Reject a data set that this format cannot represent.
 
         Raises:
-            ConfigError: there are no sequences, or a camera is missing or skips steps.
+            ConfigError: there are no sequences, a camera is missing or skips steps, or a library
+                is missing.
         """
+        check_installed(self.type, "pyarrow")
         if info.steps_per_scene < 2:
             raise ConfigError(
                 f"exporter '{self.type}': episodes are sequences, but steps_per_scene is 1; "

@@ -101,12 +101,7 @@ class Mcap(ExporterBase):
         Raises:
             ConfigError: there is neither camera nor laser scanner, or a library is missing.
         """
-        check_installed(
-            self.type,
-            mcap="mcap",
-            mcap_protobuf="mcap-protobuf-support",
-            foxglove_schemas_protobuf="foxglove-schemas-protobuf",
-        )
+        check_installed(self.type, "mcap", "mcap_protobuf", "foxglove_schemas_protobuf")
         if not info.cameras and not info.lidars:
             raise ConfigError(
                 f"exporter '{self.type}': there is neither camera nor lidar; add such a sensor"

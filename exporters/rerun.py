@@ -35,7 +35,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase
+from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase, check_installed
 from gen_data.exporters.fragments import fragment_rows, write_fragment
 from gen_data.exporters.image_files import read_pixels
 from gen_data.exporters.label_colors import voc_palette
@@ -68,6 +68,15 @@ class Rerun(ExporterBase):
     def needs(self) -> frozenset[str]:
         """Names of the annotators that it reads."""
         return frozenset({"boxes2d", "boxes3d"})
+
+    def check(self, info: DatasetInfo) -> None:
+        """Refuse a machine without the format's library.
+
+        Raises:
+            ConfigError: it is not installed.
+        """
+        del info
+        check_installed(self.type, "rerun")
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write a JSON line per sample; images and points are read when files are merged."""

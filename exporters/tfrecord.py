@@ -102,7 +102,7 @@ class TfRecord(ExporterBase):
         Raises:
             ConfigError: no sensor writes the rgb channel, or the CRC library is missing.
         """
-        check_installed(self.type, google_crc32c="google-crc32c")
+        check_installed(self.type, "google_crc32c")
         rgb_camera(info, "", self.type)
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:

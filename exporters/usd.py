@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PrivateAttr
 
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sequences import write_bytes, write_text
@@ -65,6 +65,15 @@ class Usd(ExporterBase):
         bound = self.model_copy()
         bound._assets = assets
         return bound
+
+    def check(self, info: DatasetInfo) -> None:
+        """Refuse a machine without the format's library.
+
+        Raises:
+            ConfigError: it is not installed.
+        """
+        del info
+        check_installed(self.type, "pxr")
 
     def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
         """Write a stage for every sequence that starts in the shard, and its shared files."""

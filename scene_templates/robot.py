@@ -70,10 +70,10 @@ class Robot(PlacedElement):
         )
 
     def _find_installed(self, assets: AssetIndex) -> str:
-        """Find its first installed asset; the first one, for the error text, if there is none."""
+        """Find its first installed asset; the last one, for the error text, if there is none."""
         wanted = (self.asset,) if isinstance(self.asset, str) else self.asset
         known = {asset.asset_id for asset in assets.find((), kind="robot")}
-        return next((name for name in wanted if name in known), wanted[0])
+        return next((name for name in wanted if name in known), wanted[-1])
 
     def _workspace_m(self, scene: Scene, T_world_base: SE3) -> tuple[Vec3, Vec3]:
         """Space for the hand's goals: above the supporting surface, within reach."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any
 
 from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.system_calls import CAN_PASS_FILES, usable_cores
 
 if TYPE_CHECKING:
     from gen_data.generator.assemble.config import Config
@@ -37,13 +37,18 @@ def load_config(
 
 
 def count_workers(workers: int | None) -> int:
-    """Number of worker processes; None = one per core.
+    """Number of worker processes; None = one per core, or 0 where the system has none (Windows).
 
     Raises:
-        ConfigError: it is negative.
+        ConfigError: it is negative, or the system has no workers.
     """
     if workers is None:
-        return len(os.sched_getaffinity(0))
+        return usable_cores() if CAN_PASS_FILES else 0
+    if workers > 0 and not CAN_PASS_FILES:
+        raise ConfigError(
+            f"workers: {workers}; expected 0, this process: on this system, processes cannot be "
+            "given open files"
+        )
     if workers < 0:
         raise ConfigError(
             f"workers: {workers}; expected at least 1, or 0 to generate in this process"

@@ -145,7 +145,7 @@ class GeneralSettings(Strict):
         0.0001, gt=0, le=1, description="Metres per unit of 16-bit depth images."
     )
     template: str = Field("", description="Name of a scene template.")
-    physics: PhysicsConfig = PhysicsConfig()
+    physics: PhysicsConfig = Field(default_factory=PhysicsConfig)
     labels: LabelSettings = LabelSettings()
     splits: Splits = Splits()
     assets: AssetFolders = AssetFolders()

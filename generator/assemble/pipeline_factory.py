@@ -15,7 +15,7 @@ from gen_data.generator.assemble.config import Config, SceneConfig
 from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, default_plugin
 from gen_data.generator.assets.library import Library, open_library
 from gen_data.generator.config.error_positions import located_errors
-from gen_data.generator.config.problems import Problems
+from gen_data.generator.config.problems import Problems, refuse
 from gen_data.generator.config.yaml_tree import find_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError, UnknownAsset
@@ -32,7 +32,7 @@ from gen_data.generator.core.interfaces import (
 )
 from gen_data.generator.core.plates import has_plate
 from gen_data.generator.core.scene import LABEL_IDS_MAX, Scene, SharedValue
-from gen_data.generator.physics import open_engine
+from gen_data.generator.physics import missing_engine, open_engine
 from gen_data.generator.pipeline import Pipeline
 from gen_data.generator.pipeline.pipeline import PipelineConfig, SceneSource
 from gen_data.generator.sensors.camera.plate_camera import PlateCamera
@@ -93,9 +93,11 @@ class PipelineFactory:
         """Refuse what no sample could be generated or exported with, before any engine starts.
 
         Raises:
-            ConfigError: a sequence is too long, or a format cannot hold the data set.
+            ConfigError: a sequence is too long, the physics engine is not installed, or a format
+                cannot hold the data set.
         """
         _check_durations(self.config)
+        _check_engine(self.config)
         ready_exporters(self.config, self.info, self.library)
         for scene in self.nominal:
             check_scene(self.config, scene)
@@ -212,6 +214,15 @@ def _check_durations(config: Config) -> None:
                         f"than the sequences, {steps} steps of {step_s:g} s; "
                         f"expected at least {lasts_s:g}"
                     )
+
+
+def _check_engine(config: Config) -> None:
+    """Raise ConfigError if the physics engine is not installed."""
+    missing = missing_engine(config.general.physics.engine)
+    if missing:
+        # The default has no position of its own.
+        node = config.document.get("physics", "engine") or config.document
+        refuse(node.position, "physics.engine", missing)
 
 
 def _strides(info: DatasetInfo) -> dict[str, int]:

@@ -16,6 +16,7 @@ from hashlib import sha256
 from pathlib import Path, PurePosixPath
 
 from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.system_calls import READ_FLAGS
 
 MAX_FILE_BYTES = 512 * 1024 * 1024
 _MAX_REFERENCE = 1024
@@ -43,7 +44,7 @@ class Folder:
         path = self.path(relative)
         try:
             # Non-blocking, because opening a FIFO for reading otherwise waits for a writer.
-            descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+            descriptor = os.open(path, READ_FLAGS)
             with os.fdopen(descriptor, "rb") as file:
                 status = os.fstat(file.fileno())
                 if not stat.S_ISREG(status.st_mode):

@@ -35,7 +35,7 @@ from gen_data.generator.assets.importer import (
     VERSION,
     ImportedMesh,
 )
-from gen_data.generator.assets.installed_packs import pack_assets
+from gen_data.generator.assets.installed_packs import RECORD_NAME, pack_assets
 from gen_data.generator.assets.parsing import (
     parse_image,
     parse_lanes,
@@ -64,7 +64,9 @@ from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.plates import Plate
 from gen_data.generator.core.scene import Lane, StageModel
 
-_BUILT_IN = Path(__file__).with_name("pybullet.yaml")
+PYBULLET = "pybullet"
+"""Name of the pack with those files of pybullet that its index describes."""
+_PYBULLET = Path(__file__).with_name("pybullet.yaml")
 _RENDERED = Path(__file__).parent / "plates" / "rendered"
 PLATES_VERSION = 1
 """Changes with what is measured in photographs."""
@@ -97,6 +99,14 @@ class FileLibrary:
     def user_counts(self) -> Counter[str]:
         """Number of assets in the user's folders, by kind."""
         return Counter(one.kind for one in self._entries().values() if one.root in self._user_roots)
+
+    def is_missing(self, asset_id: str) -> bool:
+        """Whether the files of a known asset are neither installed with pybullet nor as a pack."""
+        name = asset_id.partition("#")[0]
+        return _pybullet_data(self._packs) is None and any(
+            name == one.asset_id or name.startswith(f"{one.asset_id}/")
+            for one in _list_pybullet(Path())
+        )
 
     def __contains__(self, asset_id: str) -> bool:
         """Whether the id names an asset, a robot's link or a stage's piece."""
@@ -343,23 +353,31 @@ def _is_road_network(entry: Entry) -> bool:
 
 
 def _list_everything(packs: Path, user_roots: Sequence[Path]) -> Iterator[IndexedAsset]:
-    yield from _list_built_in()
+    data = _pybullet_data(packs)
+    if data is not None:
+        yield from _list_pybullet(data)
+    yield from _list_rendered()
     yield from pack_assets(packs)
     for root in user_roots:
         yield from user_folder(root)
 
 
 @lru_cache(maxsize=1)
-def _list_built_in() -> tuple[IndexedAsset, ...]:
-    """Assets that are installed with this package, the same as long as a process runs."""
-    pybullet = list_assets(read_index(_BUILT_IN), _pybullet_data())
-    rendered = list_assets(read_index(_RENDERED / INDEX_NAME), _RENDERED, "plate/")
-    return (*pybullet, *rendered)
+def _list_rendered() -> tuple[IndexedAsset, ...]:
+    """Photographs that are installed with this package."""
+    return tuple(list_assets(read_index(_RENDERED / INDEX_NAME), _RENDERED, "plate/"))
 
 
-def _pybullet_data() -> Path:
-    """Folder of pybullet's data, found without importing it."""
+@lru_cache(maxsize=2)
+def _list_pybullet(data: Path) -> tuple[IndexedAsset, ...]:
+    """Assets whose files pybullet installs, or its pack."""
+    return tuple(list_assets(read_index(_PYBULLET), data))
+
+
+def _pybullet_data(packs: Path) -> Path | None:
+    """Folder of pybullet's data: its pack, or the package, which is not imported; else None."""
+    pack = packs / PYBULLET
+    if (pack / RECORD_NAME).is_file():
+        return pack
     spec = importlib.util.find_spec("pybullet_data")
-    if spec is None or spec.origin is None:
-        raise AssetError("pybullet_data: not installed; pip install pybullet")
-    return Path(spec.origin).parent
+    return Path(spec.origin).parent if spec is not None and spec.origin is not None else None

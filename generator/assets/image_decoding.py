@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gen_data.generator.core.asset_types import Float32, UInt8
 from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.optional_packages import missing_packages
 
 MAX_SIDE_PX = 16_384
 MAX_PIXELS = 64_000_000
@@ -85,8 +86,11 @@ def read_exr(data: bytes, place: str) -> Float32:
     """Decode an OpenEXR image to RGB, float32 [height, width, 3].
 
     Raises:
-        AssetError: if it is unreadable, too large, or lacks a colour.
+        AssetError: if it is unreadable, too large, or lacks a colour, or the library is missing.
     """
+    missing = missing_packages("OpenEXR")
+    if missing:
+        raise AssetError(f"{place}: {missing}")
     import OpenEXR
 
     with tempfile.NamedTemporaryFile(suffix=".exr") as file:

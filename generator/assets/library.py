@@ -222,7 +222,9 @@ class Library:
         raise UnknownAsset(f"asset '{asset_id[:120]}': {self._nearest(asset_id[:120])}", asset_id)
 
     def _nearest(self, asset_id: str) -> str:
-        """Suggestions for an unknown id: similar ids, else the content of the user's folders."""
+        """Suggestions for an unknown id: its pack, similar ids, or what the user's folders hold."""
+        if self._files.is_missing(asset_id):
+            return "comes with pybullet, which is not here; run: gen-data assets install pybullet"
         known = [*self._generated.names(), *self._files.names()]
         ours = [name for name in known if name.startswith("user/")]
         near = did_you_mean(f"user/{asset_id.removeprefix('user/')}", ours) or did_you_mean(

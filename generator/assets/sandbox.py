@@ -11,14 +11,12 @@ import io
 import json
 import os
 import pickle
-import select
 import signal
 import struct
 import subprocess
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -27,6 +25,7 @@ from typing import Any
 from gen_data.generator.assets.asset_cache import Arrays, decode_arrays
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.processes import SINGLE_THREADED
+from gen_data.generator.core.system_calls import KILLED
 
 LENGTH = struct.Struct("<Q")
 """Length prefix of requests and replies on the pipes between both processes."""
@@ -43,6 +42,8 @@ _START = (
     "main(int(sys.argv[1]), sys.argv[2])"
 )
 """Modules are found as in this process, whatever the working directory holds."""
+TOO_LONG = -int(getattr(signal, "SIGXCPU", 24))
+"""Exit status of a process that has used up its processor time."""
 _WALL_PER_CPU = 12.0
 """Wall time in multiples of the limit of processor time: other processes may hold the cores."""
 
@@ -115,9 +116,15 @@ class Sandbox:
             child.stdin.flush()
         except BrokenPipeError:
             return None
-        deadline_s = time.monotonic() + timeout_s
-        head = _receive(child.stdout.fileno(), LENGTH.size, deadline_s)
-        return head and _receive(child.stdout.fileno(), LENGTH.unpack(head)[0], deadline_s)
+        # Whatever blocks below ends with the child. Windows has no wait for pipes with a timeout.
+        guard = threading.Timer(timeout_s, child.kill)
+        guard.daemon = True
+        guard.start()
+        try:
+            head = _receive(child.stdout.fileno(), LENGTH.size)
+            return head and _receive(child.stdout.fileno(), LENGTH.unpack(head)[0])
+        finally:
+            guard.cancel()
 
     def _running_child(self) -> subprocess.Popen[bytes]:
         if self._owner != os.getpid():
@@ -156,20 +163,17 @@ class Sandbox:
 
 def _describe_end(status: int, cpu_s: float) -> str:
     """Reason and remedy for an exit status of the child (negative: number of a signal)."""
-    if status in (-signal.SIGXCPU, -signal.SIGKILL):
+    if status in (KILLED, TOO_LONG):
         return f"not read within {cpu_s:.0f} s of processor time; simplify or split it"
     name = signal.Signals(-status).name if status < 0 else f"exit status {status}"
     return f"its reader crashed ({name}); the file is damaged, export it again"
 
 
-def _receive(descriptor: int, size: int, deadline_s: float) -> bytes | None:
-    """Read ``size`` bytes; None at the end of the stream or after the deadline."""
+def _receive(descriptor: int, size: int) -> bytes | None:
+    """Read ``size`` bytes; None at the end of the stream."""
     parts = io.BytesIO()
-    readable = select.poll()
-    readable.register(descriptor, select.POLLIN)
     while parts.tell() < size:
-        ready = readable.poll(max(deadline_s - time.monotonic(), 0.0) * 1000)
-        part = os.read(descriptor, min(size - parts.tell(), 1 << 20)) if ready else b""
+        part = os.read(descriptor, min(size - parts.tell(), 1 << 20))
         if not part:
             return None
         parts.write(part)

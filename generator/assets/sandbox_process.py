@@ -6,21 +6,28 @@ import ctypes
 import json
 import os
 import pickle
-import resource
 import select
 import signal
 import sys
 import tempfile
 import traceback
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from gen_data.generator.assets.asset_cache import Arrays, encode_arrays
 from gen_data.generator.assets.sandbox import LENGTH
 from gen_data.generator.core.errors import AssetError
-from gen_data.generator.core.processes import end_with_parent
+from gen_data.generator.core.processes import end_with_parent, forbid_core_dumps
+from gen_data.generator.core.system_calls import read_binary
+
+try:
+    resource: Any = import_module("resource")
+except ImportError:
+    resource = None
 
 _IDLE_S = 5.0
 _FILES_MAX = 256
@@ -37,7 +44,8 @@ def main(parent_pid: int, temporary_folder: str) -> None:
     # Libraries print warnings, which must not mix with replies.
     os.dup2(2, 1)
     _give_up_rights()
-    while select.select([0], [], [], _IDLE_S)[0]:
+    read_binary(0, replies)
+    while _is_request_due():
         head = _read(LENGTH.size)
         if not head:
             break
@@ -45,9 +53,17 @@ def main(parent_pid: int, temporary_folder: str) -> None:
         _write(replies, LENGTH.pack(len(reply)) + reply)
 
 
+def _is_request_due() -> bool:
+    """Whether a request comes before this process has been idle for long enough."""
+    # Windows waits for sockets only: there, this process ends with its parent or its input.
+    return resource is None or bool(select.select([0], [], [], _IDLE_S)[0])
+
+
 def _give_up_rights() -> None:
-    """No core dumps, few open files and, where permitted, no network."""
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    """No core dumps, few open files and, where permitted, no network; Windows has no limits."""
+    forbid_core_dumps()
+    if resource is None:
+        return
     files = min(_FILES_MAX, resource.getrlimit(resource.RLIMIT_NOFILE)[1])
     resource.setrlimit(resource.RLIMIT_NOFILE, (files, files))
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
@@ -75,7 +91,12 @@ def _serve(request: bytes) -> bytes:
 
 
 def _limit(cpu_s: float, memory_bytes: int) -> None:
-    """Limit processor time, memory and file sizes from now on; the first kills the process."""
+    """Limit processor time, memory and file sizes from now on; the first kills the process.
+
+    On Windows, only the parent's limit on time holds.
+    """
+    if resource is None:
+        return
     usage = resource.getrusage(resource.RUSAGE_SELF)
     used_s = usage.ru_utime + usage.ru_stime
     hard = resource.getrlimit(resource.RLIMIT_CPU)[1]

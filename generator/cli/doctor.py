@@ -10,27 +10,32 @@ import hashlib
 import multiprocessing
 import os
 import platform
-import resource
 import shutil
 import subprocess
 import tempfile
 import time
 import zlib
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
+from importlib import import_module
 from importlib.metadata import version
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 import click
 
 from gen_data.generator import __version__
 from gen_data.generator.core.errors import GenDataError, SampleError
+from gen_data.generator.core.optional_packages import missing_packages
 from gen_data.generator.core.processes import silence_stdio
+from gen_data.generator.core.system_calls import usable_cores
 from gen_data.generator.core.temporary_folders import temporary_folder
 
 FILES_MIN = 64
 MEMORY_MIN_BYTES = 2_000_000_000
+EXTRA = "pip install 'gen-data[{}]'"
 REINSTALL = "reinstall it: pip install --force-reinstall --no-deps {}"
 
 
@@ -124,15 +129,22 @@ def _try_cache() -> str:
 
 
 def _try_limits() -> str:
-    """Limits of this user on files, memory and file sizes."""
+    """Limits of this user on files, memory and file sizes; Windows has none."""
+    try:
+        resource: Any = import_module("resource")
+    except ImportError:
+        return f"none, {usable_cores()} cores"
     files, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     _expect(files == resource.RLIM_INFINITY or files >= FILES_MIN, f"only {files} open files")
     for name, kind in (("memory", resource.RLIMIT_AS), ("file size", resource.RLIMIT_FSIZE)):
         limit, _ = resource.getrlimit(kind)
         few = limit != resource.RLIM_INFINITY and limit < MEMORY_MIN_BYTES
         _expect(not few, f"{name} is limited to {limit / 1e6:.0f} MB")
+    cores = f"{usable_cores()} cores"
+    if "SC_AVPHYS_PAGES" not in os.sysconf_names:  # macOS
+        return f"{files} open files, {cores}"
     free = os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    return f"{files} open files, {free / 1e9:.1f} GB of memory free, {os.cpu_count()} cores"
+    return f"{files} open files, {free / 1e9:.1f} GB of memory free, {cores}"
 
 
 def _try_renderer() -> str:
@@ -147,16 +159,22 @@ def _try_renderer() -> str:
 
 
 def _try_physics() -> str:
-    import pybullet
+    import numpy as np
 
-    client = pybullet.connect(pybullet.DIRECT)
-    pybullet.setGravity(0.0, 0.0, -9.81, physicsClientId=client)
-    shape = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, 0.1, physicsClientId=client)
-    ball = pybullet.createMultiBody(1.0, shape, -1, [0.0, 0.0, 1.0], physicsClientId=client)
-    pybullet.stepSimulation(physicsClientId=client)
-    (_, _, height_m), _ = pybullet.getBasePositionAndOrientation(ball, physicsClientId=client)
-    _expect(height_m < 1.0, "a ball does not fall")
-    return f"PyBullet {version('pybullet')}"
+    from gen_data.generator.core.asset_types import ConvexParts
+    from gen_data.generator.core.se3 import SE3
+    from gen_data.generator.physics import PhysicsConfig
+    from gen_data.generator.physics.collision_shapes import collision_shape
+    from gen_data.generator.physics.world import open_world
+
+    config = PhysicsConfig()
+    corners = np.array([(x, y, z) for x in (-0.1, 0.1) for y in (-0.1, 0.1) for z in (-0.1, 0.1)])
+    with closing(open_world(config)) as world:
+        world.reset()
+        world.add("cube", collision_shape(ConvexParts((corners,))), SE3(), mass_kg=1.0)
+        world.step(10)
+        _expect(world.pose("cube").translation_m[2] < 0.0, "a cube does not fall")
+    return f"{config.engine} {version(config.engine)}"
 
 
 def _try_meshes() -> str:
@@ -269,19 +287,24 @@ def _try_packs() -> str:
     return ", ".join(f"{record.name} {record.version}" for record in records)
 
 
+def _is_installed(module: str) -> bool:
+    """Whether an optional package must work because it is there."""
+    return not missing_packages(module)
+
+
 CHECKS = (
     Check("python", _try_python, REINSTALL.format("gen-data numpy")),
     Check("cache", _try_cache, "make the folder writable, or point XDG_CACHE_HOME elsewhere"),
     Check("limits", _try_limits, "raise them with ulimit -n, -v and -f"),
     Check("renderer", _try_renderer, REINSTALL.format("warp-lang")),
-    Check("physics", _try_physics, REINSTALL.format("pybullet")),
+    Check("physics", _try_physics, "pip install --force-reinstall mujoco"),
     Check("meshes", _try_meshes, REINSTALL.format("scipy trimesh fast-simplification")),
     Check("images", _try_images, REINSTALL.format("opencv-python-headless deflate pillow")),
-    Check("openexr", _try_openexr, REINSTALL.format("OpenEXR")),
+    Check("openexr", _try_openexr, EXTRA.format("exr"), _is_installed("OpenEXR")),
     Check("coco", _try_coco, REINSTALL.format("pycocotools")),
-    Check("usd", _try_usd, REINSTALL.format("usd-core")),
-    Check("preview", _try_preview, REINSTALL.format("rerun-sdk")),
+    Check("usd", _try_usd, EXTRA.format("usd"), _is_installed("pxr")),
+    Check("preview", _try_preview, EXTRA.format("preview"), _is_installed("rerun")),
     Check("sample", _try_sample, "if the checks above pass, delete ~/.cache/warp and try again"),
-    Check("denoiser", _try_denoiser, "pip install 'gen-data[denoise]'", required=False),
+    Check("denoiser", _try_denoiser, EXTRA.format("denoise"), required=False),
     Check("packs", _try_packs, "gen-data assets list shows the available packs", required=False),
 )

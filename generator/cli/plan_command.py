@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections import Counter
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ import click
 from gen_data.generator.cli.cost_estimate import Prices, Probe, estimate_rows
 from gen_data.generator.cli.options import ConfigurationOptions, configuration_options
 from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.system_calls import usable_cores
 
 if TYPE_CHECKING:
     from gen_data.generator.assemble.config import Config
@@ -58,7 +58,7 @@ def plan(
     for name, value in _rows(config, n):
         table.add_row(name, value)
     if probe is not None:
-        cores = len(os.sched_getaffinity(0))
+        cores = usable_cores()
         for name, value in estimate_rows(_measure(choice, probe), n, cores, prices):
             table.add_row(name, value)
     console = Console()

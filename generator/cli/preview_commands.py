@@ -12,6 +12,7 @@ import click
 from gen_data.generator.cli.options import ConfigurationOptions, configuration_options
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.optional_packages import missing_packages
 from gen_data.generator.core.sample import Sample
 
 if TYPE_CHECKING:
@@ -60,6 +61,10 @@ def preview(
     samples are generated again from its plan.
     """
     from gen_data.generator.assemble.pipeline_factory import open_pipeline
+
+    missing = missing_packages("rerun")
+    if missing:
+        raise ConfigError(f"gen-data preview {missing}; gen-data contact-sheet draws without it")
     from gen_data.generator.preview.rerun_recording import save_recording, send_samples
     from gen_data.generator.preview.viewer import open_window, serve_web
 

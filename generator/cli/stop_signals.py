@@ -11,11 +11,14 @@ from __future__ import annotations
 import os
 import select
 import signal
+import socket
 import threading
 import time
 from types import FrameType
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+from gen_data.generator.core.system_calls import stop_signals, wake_channel
+
+SIGNALS = stop_signals()
 PATIENCE_S = 8.0
 REPEATED_S = 0.1
 """Signals that follow within this time are the same request: ``timeout`` signals a process, and
@@ -25,6 +28,8 @@ INTERRUPTED = 130
 SHOW_CURSOR = "\x1b[?25h"
 
 _installed: list[signal.Signals] = []
+_kept: list[socket.socket] = []
+"""Sockets that live as long as the process."""
 _raised: list[int] = []
 """Number of the signal that has raised KeyboardInterrupt; one at most, so that cleaning up is not
 interrupted."""
@@ -37,12 +42,14 @@ def handle_stop_signals() -> None:
     """
     if _installed or threading.current_thread() is not threading.main_thread():
         return
-    reader, writer = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
-    signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    reader, writer = wake_channel()
+    _kept.append(writer)
+    signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
     # A forked process would report its signals as those of this one.
-    os.register_at_fork(after_in_child=_forget_wakeup)
+    if hasattr(os, "register_at_fork"):
+        os.register_at_fork(after_in_child=_forget_wakeup)
     for number in SIGNALS:
-        if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+        if number.name != "SIGHUP" or signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _interrupt)
             _installed.append(number)
     threading.Thread(target=_watch, args=(reader,), daemon=True).start()
@@ -73,7 +80,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
 
 
-def _watch(reader: int) -> None:
+def _watch(reader: socket.socket) -> None:
     """End the process at the second request, or if the first one has no effect."""
     first_s: float | None = None
     while True:
@@ -81,7 +88,7 @@ def _watch(reader: int) -> None:
         if left_s is not None and left_s <= 0.0:
             _end("gen-data: interrupted")
         ready, _, _ = select.select([reader], [], [], left_s)
-        if not ready or not any(number in SIGNALS for number in os.read(reader, 4096)):
+        if not ready or not any(number in SIGNALS for number in reader.recv(4096)):
             continue
         if first_s is None:
             first_s = time.monotonic()

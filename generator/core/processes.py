@@ -5,9 +5,12 @@ from __future__ import annotations
 import ctypes
 import os
 import signal
+import subprocess
 import sys
+import threading
+import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 SINGLE_THREADED = (
     "OMP_NUM_THREADS",
@@ -21,19 +24,30 @@ Sums in BLAS depend on the number of threads, and with them the last bits of a p
 """
 
 PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
+WATCH_S = 0.5
+"""How often a parent is looked for where the kernel tells nobody of its end."""
 
 
 def end_with_parent(parent_pid: int) -> None:
-    """Make the kernel kill this process when its parent ends, for whatever reason.
+    """End this process when its parent ends, for whatever reason. Call it first in a new process.
 
-    The setting survives ``exec``. Call it first in a new process; where the system is not Linux,
-    only a parent that has already ended is noticed.
+    On Linux the kernel kills it, also after ``exec``; elsewhere a thread watches the parent.
     """
-    if sys.platform == "linux":
+    if _has_death_signal():
         ctypes.CDLL(None, use_errno=True).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent_pid:
+    else:
+        threading.Thread(target=_watch_parent, args=(parent_pid,), daemon=True).start()
+    if not _is_parent(parent_pid):
         # The parent ended before the call above.
         os._exit(1)
+
+
+def forbid_core_dumps() -> None:
+    """Let a crash of this process write no core file, on systems that write any."""
+    with suppress(ImportError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
 def tie(command: Sequence[str]) -> list[str]:
@@ -41,12 +55,17 @@ def tie(command: Sequence[str]) -> list[str]:
 
     Start it with SIGINT blocked (``interrupts_blocked``): Ctrl-C may come before it is ignored.
     """
-    return [sys.executable, "-P", __file__, str(os.getpid()), *command]
+    # Python 3.10 does not know -P, which keeps the folder of this file from the module path.
+    options = ["-P"] if sys.version_info >= (3, 11) else []
+    return [sys.executable, *options, __file__, str(os.getpid()), *command]
 
 
 @contextmanager
 def interrupts_blocked() -> Iterator[None]:
     """Block SIGINT: a new process inherits the mask until it ignores SIGINT itself."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -57,7 +76,8 @@ def interrupts_blocked() -> Iterator[None]:
 def ignore_interrupts() -> None:
     """Ignore SIGINT, also in later programs of this process, and unblock it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 @contextmanager
@@ -82,7 +102,49 @@ def silence_stdio() -> Iterator[None]:
         os.close(nowhere)
 
 
-if __name__ == "__main__":
-    end_with_parent(int(sys.argv[1]))
+def _has_death_signal() -> bool:
+    return sys.platform == "linux"
+
+
+def _is_parent(pid: int) -> bool:
+    # Windows keeps the number of a parent that has ended; opening its handle tells.
+    return os.getppid() == pid and (not hasattr(os, "startfile") or _is_running(pid))
+
+
+def _is_running(pid: int) -> bool:
+    """Whether a process of Windows runs."""
+    kernel = ctypes.windll.kernel32  # type: ignore[attr-defined]
+    synchronize, timeout = 0x0010_0000, 0x102  # <winnt.h>, <winerror.h>
+    handle = kernel.OpenProcess(synchronize, False, pid)
+    runs = bool(handle) and kernel.WaitForSingleObject(handle, 0) == timeout
+    if handle:
+        kernel.CloseHandle(handle)
+    return runs
+
+
+def _watch_parent(pid: int) -> None:
+    while _is_parent(pid):
+        time.sleep(WATCH_S)
+    os._exit(1)
+
+
+def _run_tied(pid: int, command: Sequence[str]) -> int:
+    """Run a command where ``exec`` would end the thread that watches; its exit status."""
+    with subprocess.Popen(command) as child:
+        while _is_parent(pid):
+            with suppress(subprocess.TimeoutExpired):
+                return child.wait(WATCH_S)
+        child.kill()
+    return 1
+
+
+def _main(pid: int, command: list[str]) -> None:
     ignore_interrupts()
-    os.execvp(sys.argv[2], sys.argv[2:])
+    if not _has_death_signal():
+        sys.exit(_run_tied(pid, command))
+    end_with_parent(pid)
+    os.execvp(command[0], command)
+
+
+if __name__ == "__main__":
+    _main(int(sys.argv[1]), sys.argv[2:])

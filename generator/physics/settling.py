@@ -10,9 +10,9 @@ from gen_data.generator.core.asset_types import ConvexParts
 from gen_data.generator.core.errors import Rejection
 from gen_data.generator.core.scene import Body, Scene, SupportSurface
 from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.physics.bullet import World
 from gen_data.generator.physics.collision_shapes import CollisionShape, collision_shape
 from gen_data.generator.physics.physics_config import PhysicsConfig
+from gen_data.generator.physics.world import World
 
 _CHECK_EVERY_S = 0.05
 _LIFTS_MAX = 32

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import GenDataError
 from gen_data.generator.core.interfaces import media_path
+from gen_data.generator.core.system_calls import usable_cores
 from gen_data.generator.report.drawn_parameters import DrawnParameters, Parameter, draw_parameters
 from gen_data.generator.report.image_statistics import (
     DISTANCE_MAX,
@@ -247,7 +247,7 @@ def _measure(
                 files.append(
                     ImageFile(index, camera, index // per_scene, splits.get(index, ""), path)
                 )
-    workers = len(os.sched_getaffinity(0))
+    workers = usable_cores()
     return files, [look for _, look in measure_images(files, workers)]
 
 

@@ -11,13 +11,15 @@ import hashlib
 import os
 import shutil
 import stat
+import sys
 from collections.abc import Container, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from gen_data.generator.core.errors import StorageError
 
-FULL = frozenset({errno.ENOSPC, errno.EDQUOT})
+FULL = frozenset({errno.ENOSPC, getattr(errno, "EDQUOT", errno.ENOSPC)})
+IS_WINDOWS = sys.platform == "win32"
 CHUNK_BYTES = 1 << 20
 Inode = tuple[int, int]
 IRREGULAR = -1
@@ -34,8 +36,13 @@ def hash_file(path: Path) -> str:
 
 
 def sync_path(path: Path) -> None:
-    """Flush the bytes of a file, or the entries of a folder, to the disk."""
-    descriptor = os.open(path, os.O_RDONLY)
+    """Flush the bytes of a file, or the entries of a folder, to the disk.
+
+    Windows opens no folders, and flushes only files that are open for writing.
+    """
+    if IS_WINDOWS and path.is_dir():
+        return
+    descriptor = os.open(path, os.O_RDWR if IS_WINDOWS else os.O_RDONLY)
     try:
         os.fsync(descriptor)
     finally:

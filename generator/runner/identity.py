@@ -28,6 +28,7 @@ BYTES_DEPEND_ON = {
     "mapbox_earcut": "mapbox-earcut",
     "mcap": "mcap",
     "mcap_protobuf": "mcap-protobuf-support",
+    "mujoco": "mujoco",
     "numpy": "numpy",
     "pxr": "usd-core",
     "pyarrow": "pyarrow",
@@ -47,11 +48,16 @@ harmless.
 
 
 def make_plan(factory: PipelineFactory) -> Plan:
-    """Make the plan of a factory's data set."""
+    """Make the plan of a factory's data set.
+
+    It names the physics engine even if that is this machine's default: on others it may not be.
+    """
     config = factory.config
+    physics = config.resolved.get("physics") or {}
+    engine = {"engine": config.general.physics.engine}
     assets = possible_assets(factory)
     return Plan(
-        config=config.resolved,
+        config={**config.resolved, "physics": {**physics, **engine}},
         name=config.name,
         seed=config.general.seed,
         n=factory.n,

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import os
 import pickle
-import signal
 import subprocess
 import sys
 import time
@@ -21,10 +20,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
+from socket import socket
 from typing import Protocol
 
 from gen_data.generator.core.errors import GenDataError
 from gen_data.generator.core.processes import SINGLE_THREADED, interrupts_blocked
+from gen_data.generator.core.system_calls import KILLED, anonymous_file
 from gen_data.generator.runner.shard import Job
 from gen_data.generator.runner.supervisor import Supervisor
 from gen_data.generator.runner.termination_signals import Interruption
@@ -87,8 +88,8 @@ class Pool(Protocol):
         """Execute one action; actions on a worker that has ended do nothing."""
         ...
 
-    def events(self, wake_fd: int, timeout_s: float) -> Iterator[Event]:
-        """Wait for an event, ``wake_fd`` or the timeout; yield all events since the last call."""
+    def events(self, wake: socket, timeout_s: float) -> Iterator[Event]:
+        """Wait for an event, ``wake`` or the timeout; yield all events since the last call."""
         ...
 
 
@@ -101,7 +102,7 @@ class WorkerPool:
     """
 
     def __init__(self, job: Job, logs: Path) -> None:
-        self._job_fd = os.memfd_create("gen-data job")
+        self._job_fd = anonymous_file("gen-data job")
         with open(self._job_fd, "wb", closefd=False) as file:
             pickle.dump(job, file)
         self._logs = logs
@@ -140,11 +141,11 @@ class WorkerPool:
         elif isinstance(action, Kill) and action.worker in self._children:
             self._children[action.worker].process.kill()
 
-    def events(self, wake_fd: int, timeout_s: float) -> Iterator[Event]:
-        """Wait for an event, ``wake_fd`` or the timeout; yield all events since the last call."""
+    def events(self, wake: socket, timeout_s: float) -> Iterator[Event]:
+        """Wait for an event, ``wake`` or the timeout; yield all events since the last call."""
         connections = [c.connection for c in self._children.values() if c.connected]
         some_end = len(connections) < len(self._children)
-        wait([wake_fd, *connections], ENDING_TICK_S if some_end else timeout_s)
+        wait([wake, *connections], ENDING_TICK_S if some_end else timeout_s)
         for number, child in sorted(self._children.items()):
             # Poll first, so that messages before the end are not lost.
             exit_code = child.process.poll()
@@ -170,7 +171,7 @@ class WorkerPool:
     def _on_exit(self, number: int, exit_code: int) -> Exited:
         self._children.pop(number).connection.close()
         kills = _count_out_of_memory_kills()
-        out_of_memory = exit_code == -signal.SIGKILL and kills > self._out_of_memory_kills
+        out_of_memory = exit_code == KILLED and kills > self._out_of_memory_kills
         self._out_of_memory_kills = kills
         return Exited(number, exit_code, out_of_memory)
 
@@ -207,7 +208,7 @@ def run_supervisor(
     with open_pool(job) as pool:
         execute(supervisor.start(clock()))
         while not supervisor.finished and clock() < deadline_s:
-            for event in pool.events(interruption.wake_fd, TICK_S):
+            for event in pool.events(interruption.wake, TICK_S):
                 objection = observe(event)
                 execute(supervisor.handle(event, clock()))
                 if objection is not None:

@@ -8,13 +8,14 @@ the shard of a lost worker again, and a shard that was committed twice has the s
 from __future__ import annotations
 
 import pickle
-import signal
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
+from socket import socket
 from typing import TYPE_CHECKING, Any
 
 from gen_data.generator.core.processes import SINGLE_THREADED
+from gen_data.generator.core.system_calls import KILLED
 from gen_data.generator.runner.ray_worker import Placed, ShardWorker
 from gen_data.generator.runner.worker_events import (
     Action,
@@ -99,14 +100,14 @@ class RayPool:
             actor.is_leaving = True
             actor.stream = actor.handle.leave.remote()
         else:
-            self._end(Exited(action.worker, -signal.SIGKILL))
+            self._end(Exited(action.worker, KILLED))
 
-    def events(self, wake_fd: int, timeout_s: float) -> Iterator[Event]:
+    def events(self, wake: socket, timeout_s: float) -> Iterator[Event]:
         """Wait for an event or the timeout; yield all events since the last call.
 
-        Ray waits for no file descriptor: ``wake_fd`` is left to the caller, after a short wait.
+        Ray waits for no file descriptor: ``wake`` is left to the caller, after a short wait.
         """
-        del wake_fd
+        del wake
         streams = {a.stream: n for n, a in self._actors.items() if a.stream is not None}
         for stream in self._ready(list(streams), min(timeout_s, STEP_S)):
             yield from self._read(streams[stream], stream)
@@ -163,7 +164,7 @@ class RayPool:
     def _describe_end(self, number: int, actor: _Actor, error: Exception) -> Exited:
         exceptions = self._ray.exceptions
         if isinstance(error, exceptions.OutOfMemoryError):
-            return Exited(number, -signal.SIGKILL, out_of_memory=True)
+            return Exited(number, KILLED, out_of_memory=True)
         living = {node["NodeID"] for node in self._ray.nodes() if node["Alive"]}
         # A machine that lives reports the death of its worker. Ray notices the loss of a
         # machine after seconds only; until then, the worker is unavailable.

@@ -57,9 +57,9 @@ class HeapTrimmer:
 
 def _trim_heap() -> None:
     """Return the free pages of the heap to the system, where the C library can."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if trim is not None:
-        trim(0)
+    # Of the GNU C library; Windows has no library of all symbols.
+    with suppress(AttributeError, OSError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def release_memory(file_bytes_kept: int = FILE_BYTES_KEPT) -> None:

@@ -16,7 +16,6 @@ again.
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import shlex
@@ -30,6 +29,7 @@ from enum import Enum
 from pathlib import Path
 
 from gen_data.generator.core.errors import ConfigError, DeterminismError, StorageError
+from gen_data.generator.core.system_calls import try_lock
 from gen_data.generator.runner.durable_files import (
     Inode,
     free_bytes,
@@ -233,7 +233,7 @@ class LocalStore:
         """
         with self.errors():
             make_folder(self.run_dir)
-            descriptor = os.open(self._lock_path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            descriptor = os.open(self._lock_path, os.O_RDWR | os.O_CREAT, 0o644)
         try:
             with self.errors():
                 self._lock(descriptor)
@@ -248,7 +248,7 @@ class LocalStore:
             ConfigError: another process holds the lock; the message names host and pid.
         """
         try:
-            descriptor = os.open(self._lock_path, os.O_RDWR | os.O_CLOEXEC)
+            descriptor = os.open(self._lock_path, os.O_RDWR)
         except OSError:
             # Never written to, or not writable: found out later, with a message.
             return
@@ -464,13 +464,11 @@ class LocalStore:
         os.write(descriptor, f"{owner}\n".encode())
 
     def _acquire(self, descriptor: int) -> None:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+        if not try_lock(descriptor):
             raise ConfigError(
                 f"{self.root}: another run is writing here: {_describe_owner(descriptor)}. "
                 "Wait for it, stop it, or choose another folder with --out."
-            ) from None
+            )
 
 
 def _describe_owner(descriptor: int) -> str:

@@ -24,6 +24,13 @@ def open_stored(place: str | os.PathLike[str]) -> StoredSamples:
     return StoredObjects(os.fspath(place)) if is_url(place) else StoredSamples(place)
 
 
+def url_cache_dir() -> Path:
+    """Folder of the files of data sets that were opened at a URL."""
+    import platformdirs
+
+    return Path(platformdirs.user_cache_path("gen-data")) / "data-sets"
+
+
 class StoredObjects(StoredSamples):
     """Samples of a data set at a URL.
 
@@ -34,8 +41,6 @@ class StoredObjects(StoredSamples):
     """
 
     def __init__(self, url: str) -> None:
-        import platformdirs
-
         self.url = url.rstrip("/")
         self._objects = ObjectFolder(self.url)
         documents = self._objects.read([PLAN_NAME, MANIFEST_NAME])
@@ -46,7 +51,7 @@ class StoredObjects(StoredSamples):
                 "run the command that began it again"
             )
         self._record_digests: list[str] = manifest.get("shards", [])
-        cache = Path(platformdirs.user_cache_path("gen-data")) / "data-sets"
+        cache = url_cache_dir()
         folder = cache / str(manifest["dataset_id"])
         (folder / SHARDS_NAME).mkdir(parents=True, exist_ok=True)
         for name, data in documents.items():

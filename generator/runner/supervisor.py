@@ -19,6 +19,7 @@ from gen_data.generator.core.errors import (
     StorageError,
     WorkerLost,
 )
+from gen_data.generator.core.system_calls import KILLED
 from gen_data.generator.runner.worker_events import (
     Abort,
     Action,
@@ -334,4 +335,4 @@ def describe_exit(event: Exited) -> str:
     text = f"killed by signal {number} ({name})"
     if event.out_of_memory:
         return f"{text}; the kernel was out of memory"
-    return f"{text}; out of memory?" if number == signal.SIGKILL else text
+    return f"{text}; out of memory?" if number == -KILLED else text

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 
 from gen_data.generator.core.errors import Interrupted
+from gen_data.generator.core.system_calls import stop_signals, wake_channel
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+SIGNALS = stop_signals()
 
 
 class Interruption:
@@ -20,7 +20,7 @@ class Interruption:
     In other threads it does nothing, because signals belong to the host program there.
 
     Attributes:
-        wake_fd: Becomes readable at a request.
+        wake: Becomes readable at a request.
     """
 
     def __init__(self, message: str) -> None:
@@ -28,14 +28,14 @@ class Interruption:
         self._name = ""
         self._immediate = 0
         self._before: dict[signal.Signals, object] = {}
-        self.wake_fd, self._signal_fd = os.pipe2(os.O_CLOEXEC | os.O_NONBLOCK)
+        self.wake, self._writer = wake_channel()
 
     def __enter__(self) -> Interruption:
         """Install the signal handlers."""
         if threading.current_thread() is threading.main_thread():
             for number in SIGNALS:
                 # ``nohup`` makes its command ignore SIGHUP, which stays ignored.
-                if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:
+                if number.name != "SIGHUP" or signal.getsignal(number) is not signal.SIG_IGN:
                     self._before[number] = signal.signal(number, self._on_signal)
         return self
 
@@ -43,8 +43,8 @@ class Interruption:
         """Restore the previous handlers."""
         for number, handler in self._before.items():
             signal.signal(number, handler)  # type: ignore[arg-type]
-        os.close(self.wake_fd)
-        os.close(self._signal_fd)
+        self.wake.close()
+        self._writer.close()
 
     @property
     def pending(self) -> bool:
@@ -56,7 +56,7 @@ class Interruption:
         error = Interrupted(f"{self._name}: {self._message}")
         self._name = ""
         try:
-            os.read(self.wake_fd, 4096)
+            self.wake.recv(4096)
         except BlockingIOError:
             return error
         return error
@@ -77,4 +77,6 @@ class Interruption:
         self._name = "interrupted" if number == signal.SIGINT else signal.Signals(number).name
         if self._immediate:
             raise self.take()
-        os.write(self._signal_fd, b"!")
+        # A full channel has woken its reader already.
+        with suppress(BlockingIOError):
+            self._writer.send(b"!")

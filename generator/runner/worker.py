@@ -11,7 +11,6 @@ import faulthandler
 import gc
 import os
 import pickle
-import resource
 import sys
 import tempfile
 import traceback
@@ -24,7 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gen_data.generator.core.errors import CacheWarning, ConfigWarning, GenDataError
-from gen_data.generator.core.processes import end_with_parent, ignore_interrupts
+from gen_data.generator.core.processes import end_with_parent, forbid_core_dumps, ignore_interrupts
 from gen_data.generator.runner.error_context import unexpected_error
 from gen_data.generator.runner.resident_memory import release_memory, resident_bytes
 from gen_data.generator.runner.worker_events import Failed, Ready, SampleDone, ShardDone
@@ -45,7 +44,7 @@ def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
     """
     end_with_parent(parent_pid)
     ignore_interrupts()
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    forbid_core_dumps()
     faulthandler.enable()
     connection = Connection(connection_fd)
     try:
@@ -72,8 +71,12 @@ def _load_job(descriptor: int) -> Job:
 def _set_temporary_folder(folder: Path) -> None:
     """Make ``tempfile`` use a folder of the run, which is cleared even if workers are killed.
 
-    The alias is short ASCII whatever the name of the folder, because Bullet truncates long paths.
+    With procfs, the alias is short ASCII whatever the name of the folder, because Bullet truncates
+    long paths.
     """
+    if not Path("/proc/self/fd").is_dir():
+        tempfile.tempdir = str(folder)
+        return
     tempfile.tempdir = f"/proc/self/fd/{os.open(folder, os.O_RDONLY | os.O_DIRECTORY)}"
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.optional_packages import missing_packages
 from gen_data.generator.core.scene import Light
 from gen_data.generator.core.se3 import SE3, Array
 from gen_data.generator.usd.cameras import read_camera_pose
@@ -60,10 +61,11 @@ class OpenStage:
     """A stage that is open for reading.
 
     Raises:
-        AssetError: if the file is not a stage.
+        AssetError: if the file is not a stage, or OpenUSD is not installed.
     """
 
     def __init__(self, path: Path, place: str) -> None:
+        check_usd(place)
         from pxr import Tf, Usd, UsdGeom
 
         self.place = place
@@ -157,11 +159,22 @@ class OpenStage:
         return matrix
 
 
+def check_usd(place: str) -> None:
+    """Raise AssetError, which begins with ``place``, if OpenUSD is not installed."""
+    missing = missing_packages("pxr")
+    if missing:
+        raise AssetError(f"{place}: {missing}")
+
+
 def layer_references(path: Path) -> Sequence[str]:
     """References of one layer, verbatim: layers, and files named by attributes.
 
     Empty if the layer is unreadable, which its reader reports.
+
+    Raises:
+        AssetError: if OpenUSD is not installed.
     """
+    check_usd(str(path))
     from pxr import Tf, UsdUtils
 
     try:

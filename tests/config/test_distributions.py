@@ -380,7 +380,7 @@ def test_a_distribution_of_a_third_party_needs_fields_and_a_draw_only(
     from gen_data.generator.config.distributions import base
 
     @base.parameters
-    class Triangular(Numeric[float], name="triangular", kinds=("number",)):
+    class Triangular(Numeric[float], key="triangular", kinds=("number",)):
         """Rises to a peak and falls again."""
 
         peak: float

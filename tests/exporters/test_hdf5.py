@@ -206,7 +206,7 @@ def test_each_camera_has_a_container(world: Any, samples: Any, tmp_path: Path) -
 
 def test_a_missing_package_is_named(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Before anything is rendered; NumPy's archives need none."""
-    monkeypatch.setattr("gen_data.exporters.hdf5.find_spec", lambda name: None)
+    monkeypatch.setattr("gen_data.generator.core.optional_packages.find_spec", lambda name: None)
 
     with pytest.raises(ConfigError, match=r"pip install 'gen-data\[formats\]'"):
         Hdf5().check(world.info(1))

@@ -16,8 +16,8 @@ from mcap.reader import make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from PIL import Image
 
-from gen_data.exporters import base
 from gen_data.exporters.mcap import START_NS, Mcap, point_fields
+from gen_data.generator.core import optional_packages
 from gen_data.generator.core.capture import POINT
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.se3 import SE3
@@ -304,7 +304,9 @@ def test_wrong_values_are_found(
 
 def test_a_missing_package_is_named(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Before rendering."""
-    monkeypatch.setattr(base, "find_spec", lambda name: None if "fox" in name else name)
+    monkeypatch.setattr(
+        optional_packages, "find_spec", lambda name: None if "fox" in name else name
+    )
 
     with pytest.raises(ConfigError, match="needs the package foxglove-schemas-protobuf: pip"):
         Mcap().check(world.info(7))

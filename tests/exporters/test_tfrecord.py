@@ -16,8 +16,9 @@ import pytest
 from PIL import Image
 from tfrecord.reader import tfrecord_iterator
 
-from gen_data.exporters import base, tfrecord
+from gen_data.exporters import tfrecord
 from gen_data.exporters.tfrecord import TfRecord, encode_features, frame_record, label_map
+from gen_data.generator.core import optional_packages
 from gen_data.generator.core.capture import Channel, ImageEncoding
 from gen_data.generator.core.errors import ConfigError
 
@@ -185,7 +186,7 @@ def test_sums_of_the_specification() -> None:
 
 def test_a_missing_package_is_named(world: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     """Before rendering."""
-    monkeypatch.setattr(base, "find_spec", lambda name: None)
+    monkeypatch.setattr(optional_packages, "find_spec", lambda name: None)
 
     with pytest.raises(ConfigError, match=r"google-crc32c: pip install 'gen-data\[formats\]'"):
         TfRecord().check(world.info(7))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -13,20 +12,12 @@ import pytest
 from gen_data.generator.core.kinematics import link_poses
 from gen_data.generator.core.scene import ArmGoal, Articulation, Body, Instance, Scene
 from gen_data.generator.core.se3 import IDENTITY, SE3, multiply_quaternions
-from gen_data.generator.physics import PhysicsConfig
-from gen_data.generator.physics.engine import BulletEngine
-from tests.physics.doubles import TABLE_TOP_Z_M, Solids, table_scene, thing, world_vertices
+from gen_data.generator.physics.engine import Engine
+from tests.physics.doubles import TABLE_TOP_Z_M, table_scene, thing, world_vertices
 from tests.physics.panda import HOME, panda
 
 DOWN = (0.0, 1.0, 0.0, 0.0)
 ROBOT = panda()
-
-
-@pytest.fixture
-def engine() -> Iterator[BulletEngine]:
-    """An engine with default settings."""
-    with BulletEngine(Solids(), PhysicsConfig()) as bullet:
-        yield bullet
 
 
 def armed(scene: Scene, goal: ArmGoal | None, positions: tuple[float, ...] = HOME) -> Scene:
@@ -51,7 +42,7 @@ def hand_pose(scene: Scene) -> SE3:
     return poses[ROBOT.gripper.link] @ ROBOT.gripper.T_link_grasp
 
 
-def test_a_robot_without_a_goal_keeps_its_joints_and_gets_its_bodies(engine: BulletEngine) -> None:
+def test_a_robot_without_a_goal_keeps_its_joints_and_gets_its_bodies(engine: Engine) -> None:
     """One body per visible link, at the pose of forward kinematics, part ids from the instance."""
     settled = engine.settle(armed(table_scene(thing("cube", "box 0.05 0.05 0.05", x=0.2)), None))
 
@@ -65,7 +56,7 @@ def test_a_robot_without_a_goal_keeps_its_joints_and_gets_its_bodies(engine: Bul
         assert (body.part_id, body.instance_id, body.collides) == (k, 9, False)
 
 
-def test_link_bodies_of_the_template_are_moved_not_doubled(engine: BulletEngine) -> None:
+def test_link_bodies_of_the_template_are_moved_not_doubled(engine: Engine) -> None:
     """A finish that a randomizer gave to a link stays on it."""
     scene = armed(table_scene(), None)
     hand = Body("arm/panda_hand", "panda/panda_hand", instance_id=9, part_id=8, friction=0.123)
@@ -79,7 +70,7 @@ def test_link_bodies_of_the_template_are_moved_not_doubled(engine: BulletEngine)
     assert moved.T_world_body != hand.T_world_body
 
 
-def test_joints_goal_takes_the_first_candidate_that_works(engine: BulletEngine) -> None:
+def test_joints_goal_takes_the_first_candidate_that_works(engine: Engine) -> None:
     """Beyond a limit, then through the table, then good: the third is taken, rounded."""
     beyond = (0.0, -0.4, 0.0, 1.0, 0.0, 1.9, 0.0)
     into_table = (0.0, 1.6, 0.0, -0.6, 0.0, 1.9, 0.0)
@@ -93,7 +84,7 @@ def test_joints_goal_takes_the_first_candidate_that_works(engine: BulletEngine) 
     assert settled.scene.articulations[0].joint_positions == expected
 
 
-def test_an_arm_through_the_table_is_refused(engine: BulletEngine) -> None:
+def test_an_arm_through_the_table_is_refused(engine: Engine) -> None:
     """With and without a goal."""
     into_table = (0.0, 1.6, 0.0, -0.6, 0.0, 1.9, 0.0)
     goal = ArmGoal("joints", joint_candidates=(into_table,))
@@ -107,7 +98,7 @@ def test_an_arm_through_the_table_is_refused(engine: BulletEngine) -> None:
     assert given.rejection.reason == "arm collides"
 
 
-def test_an_arm_folded_into_itself_is_refused(engine: BulletEngine) -> None:
+def test_an_arm_folded_into_itself_is_refused(engine: Engine) -> None:
     """The hand inside the shoulder is within all limits, and impossible."""
     folded = (0.0, -1.7, 0.0, -3.05, 0.0, 0.3, 0.0)
     goal = ArmGoal("joints", joint_candidates=(folded,))
@@ -118,7 +109,7 @@ def test_an_arm_folded_into_itself_is_refused(engine: BulletEngine) -> None:
     assert settled.rejection.reason == "arm collides"
 
 
-def test_reach_puts_the_grasp_frame_where_it_was_asked(engine: BulletEngine) -> None:
+def test_reach_puts_the_grasp_frame_where_it_was_asked(engine: Engine) -> None:
     """Within 1 mm and half a degree, fingers as far open as asked."""
     target = above_table(0.1, 0.15, 0.3, yaw_rad=0.4)
     goal = ArmGoal("reach", pose_candidates=(target,), gripper_opening=0.5)
@@ -134,7 +125,7 @@ def test_reach_puts_the_grasp_frame_where_it_was_asked(engine: BulletEngine) -> 
 
 
 def test_reach_avoids_what_already_lies_there_and_ignores_what_has_yet_to_fall(
-    engine: BulletEngine,
+    engine: Engine,
 ) -> None:
     """The same box in the hand's way: scattered it forbids the pose, dropped it falls around."""
     box = thing("box", "box 0.2 0.2 0.3", x=0.1, above_m=0.151)
@@ -149,7 +140,7 @@ def test_reach_avoids_what_already_lies_there_and_ignores_what_has_yet_to_fall(
     assert dropped.rejection is None or dropped.rejection.reason != "arm collides"
 
 
-def test_what_is_out_of_reach_is_refused(engine: BulletEngine) -> None:
+def test_what_is_out_of_reach_is_refused(engine: Engine) -> None:
     """The remedy names the arm."""
     goal = ArmGoal("reach", pose_candidates=(above_table(3.0, 0.0, 0.3),))
 
@@ -175,7 +166,7 @@ def holding(asset: str, *candidates: SE3) -> Scene:
 
 
 @pytest.mark.parametrize("asset", HELD)
-def test_a_held_object_sits_between_closed_fingers(engine: BulletEngine, asset: str) -> None:
+def test_a_held_object_sits_between_closed_fingers(engine: Engine, asset: str) -> None:
     """Centred at the grasp frame, fingers apart by its width, pads within 1 mm of it."""
     settled = engine.settle(holding(asset, above_table(0.1, 0.0, 0.3, yaw_rad=0.2)))
 
@@ -209,7 +200,7 @@ def distance_m(one: Body, other: Body) -> float:
     return float(min(point[8] for point in found)) + 2 * shell_m
 
 
-def test_a_held_object_moves_with_the_grasp(engine: BulletEngine) -> None:
+def test_a_held_object_moves_with_the_grasp(engine: Engine) -> None:
     """Its pose in the grasp frame is the same wherever the hand is."""
     relative = []
     for target in (above_table(0.1, 0.0, 0.3), above_table(0.15, -0.2, 0.4, yaw_rad=1.0)):
@@ -220,7 +211,7 @@ def test_a_held_object_moves_with_the_grasp(engine: BulletEngine) -> None:
     np.testing.assert_allclose(relative[0].rotation(), relative[1].rotation(), atol=1e-5)
 
 
-def test_a_tall_object_is_held_near_its_end_clear_of_the_palm(engine: BulletEngine) -> None:
+def test_a_tall_object_is_held_near_its_end_clear_of_the_palm(engine: Engine) -> None:
     """A bottle of 24 cm hangs upright below the hand; nothing but fingers is near it."""
     settled = engine.settle(holding("cylinder 0.03 0.24", above_table(0.1, 0.0, 0.5)))
 
@@ -232,7 +223,7 @@ def test_a_tall_object_is_held_near_its_end_clear_of_the_palm(engine: BulletEngi
 
 
 def test_fingers_close_on_what_is_between_them_not_on_the_whole_object(
-    engine: BulletEngine,
+    engine: Engine,
 ) -> None:
     """A mast on one side of a wider foot, held by the mast: both pads touch it."""
     settled = engine.settle(holding("mast", above_table(0.1, 0.0, 0.5)))
@@ -242,7 +233,7 @@ def test_fingers_close_on_what_is_between_them_not_on_the_whole_object(
     assert sum(fingers) == pytest.approx(0.015, abs=0.002)
 
 
-def test_an_object_in_a_level_hand_stays_upright(engine: BulletEngine) -> None:
+def test_an_object_in_a_level_hand_stays_upright(engine: Engine) -> None:
     """Fingers forward and side by side: the object's Z is up."""
     forward = np.eye(4)
     forward[:3, :3] = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
@@ -254,7 +245,7 @@ def test_an_object_in_a_level_hand_stays_upright(engine: BulletEngine) -> None:
     assert settled.scene.body("it").T_world_body.rotation()[2, 2] > math.cos(math.radians(0.6))
 
 
-def test_an_object_wider_than_the_stroke_is_refused(engine: BulletEngine) -> None:
+def test_an_object_wider_than_the_stroke_is_refused(engine: Engine) -> None:
     """Eleven centimetres do not fit between fingers that open by eight."""
     settled = engine.settle(holding("box 0.11 0.11 0.05", above_table(0.1, 0.0, 0.4)))
 
@@ -262,7 +253,7 @@ def test_an_object_wider_than_the_stroke_is_refused(engine: BulletEngine) -> Non
     assert settled.rejection.reason == "object does not fit the gripper"
 
 
-def test_a_held_object_may_not_be_in_the_table(engine: BulletEngine) -> None:
+def test_a_held_object_may_not_be_in_the_table(engine: Engine) -> None:
     """The first candidate would push the bottle through the top; the second is taken."""
     low, high = above_table(0.1, 0.0, 0.12), above_table(0.1, 0.0, 0.5)
 
@@ -274,7 +265,7 @@ def test_a_held_object_may_not_be_in_the_table(engine: BulletEngine) -> None:
     )
 
 
-def test_things_fall_around_an_arm_and_come_to_rest(engine: BulletEngine) -> None:
+def test_things_fall_around_an_arm_and_come_to_rest(engine: Engine) -> None:
     """A box that is dropped onto the hand ends on the table or on the arm, not inside it."""
     goal = ArmGoal("reach", pose_candidates=(above_table(0.1, 0.0, 0.15),))
     box = thing("box", "box 0.06 0.06 0.06", x=0.12, above_m=0.2)
@@ -286,14 +277,14 @@ def test_things_fall_around_an_arm_and_come_to_rest(engine: BulletEngine) -> Non
         assert distance_m(settled.scene.body(f"arm/{link}"), settled.scene.body("box")) > -0.002
 
 
-def test_the_goal_stays_as_the_record_of_what_was_asked(engine: BulletEngine) -> None:
+def test_the_goal_stays_as_the_record_of_what_was_asked(engine: Engine) -> None:
     """Joint positions say what was done."""
     goal = ArmGoal("reach", pose_candidates=(above_table(0.1, 0.0, 0.3),))
 
     assert engine.settle(armed(table_scene(), goal)).scene.articulations[0].goal == goal
 
 
-def test_a_robot_without_a_gripper_follows_joint_candidates(engine: BulletEngine) -> None:
+def test_a_robot_without_a_gripper_follows_joint_candidates(engine: Engine) -> None:
     """Two hinges, two numbers; through a post in its way it may not go."""
     goal = ArmGoal("joints", joint_candidates=((0.0, 0.0), (1.5, 0.0)))
     arm = Articulation("arm", "gantry", 9, SE3((-0.4, -0.2, TABLE_TOP_Z_M)), (0.0, 0.5), goal)
@@ -307,7 +298,7 @@ def test_a_robot_without_a_gripper_follows_joint_candidates(engine: BulletEngine
 
 
 def test_a_candidate_of_the_wrong_length_is_a_mistake_not_a_rejection(
-    engine: BulletEngine,
+    engine: Engine,
 ) -> None:
     """Seven arm joints need seven numbers."""
     goal = ArmGoal("joints", joint_candidates=((0.0, 0.0),))
@@ -316,7 +307,7 @@ def test_a_candidate_of_the_wrong_length_is_a_mistake_not_a_rejection(
         engine.settle(armed(table_scene(), goal))
 
 
-def test_two_arms_avoid_each_other(engine: BulletEngine) -> None:
+def test_two_arms_avoid_each_other(engine: Engine) -> None:
     """The second arm may not take the place of the first."""
     target = above_table(0.0, 0.0, 0.3)
     goal = ArmGoal("reach", pose_candidates=(target,))

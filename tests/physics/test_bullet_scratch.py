@@ -12,17 +12,22 @@ import trimesh
 
 from gen_data.generator.core.asset_types import ConvexParts
 from gen_data.generator.core.se3 import SE3
-from gen_data.generator.physics.bullet import World
+from gen_data.generator.physics import PhysicsConfig, open_engine
 from gen_data.generator.physics.collision_shapes import collision_shape
 from gen_data.generator.runner.resident_memory import release_memory, resident_bytes
+from tests.physics.doubles import Solids, table_scene, thing
+
+pytest.importorskip("pybullet")
+
+from gen_data.generator.physics.bullet_world import BulletWorld
 
 
 def test_a_world_that_is_never_closed_leaves_no_folder(tmp_path: Path) -> None:
     """A program may end, or forget a data set, without closing it."""
     code = (
-        "from gen_data.generator.physics.bullet import World\n"
+        "from gen_data.generator.physics.bullet_world import BulletWorld\n"
         "import os\n"
-        "world = World(1 / 240, 50)\n"
+        "world = BulletWorld(1 / 240, 50)\n"
         "print(len(os.listdir(os.environ['TMPDIR'])))\n"
     )
     done = subprocess.run(
@@ -49,9 +54,9 @@ def test_shapes_at_new_scales_take_neither_memory_nor_disk() -> None:
         world.reset()
         return len(list(world._folder.iterdir()))
 
-    world = World(1 / 240, 10)
+    world = BulletWorld(1 / 240, 10)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("gen_data.generator.physics.bullet._HULL_FILES", 20)
+        patch.setattr("gen_data.generator.physics.bullet_world._HULL_FILES", 20)
         for step in range(-230, -200):
             files_after_a_fall(step)
         release_memory()
@@ -63,3 +68,16 @@ def test_shapes_at_new_scales_take_neither_memory_nor_disk() -> None:
 
     assert max(files) <= 20
     assert grown < 8e6
+
+
+def test_an_engine_gives_its_scratch_files_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is left in the temporary folder, and leaving twice does no harm."""
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with open_engine(Solids(), PhysicsConfig(engine="pybullet")) as engine:
+        engine.settle(table_scene(thing("cup", "mug 0.04 0.1", above_m=0.1)))
+        assert list(tmp_path.iterdir())
+    engine.__exit__(None, None, None)
+
+    assert not list(tmp_path.iterdir())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import multiprocessing
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,18 +14,12 @@ from gen_data.generator.core.scene import ArmGoal, Articulation, Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.physics import PhysicsConfig, open_engine
-from gen_data.generator.physics.bullet import World
 from gen_data.generator.physics.collision_shapes import collision_shape
-from gen_data.generator.physics.engine import BulletEngine
+from gen_data.generator.physics.engine import Engine
+from gen_data.generator.physics.physics_config import EngineName
+from gen_data.generator.physics.world import open_world
 from tests.physics.doubles import TABLE_TOP_Z_M, Solids, box, dropped_clutter, table_scene, thing
 from tests.physics.panda import HOME
-
-
-@pytest.fixture
-def engine() -> Iterator[BulletEngine]:
-    """An engine with default settings."""
-    with open_engine(Solids(), PhysicsConfig()) as bullet:
-        yield bullet
 
 
 def with_arm(scene: Scene) -> Scene:
@@ -37,18 +30,20 @@ def with_arm(scene: Scene) -> Scene:
     return replace(scene, articulations=(Articulation("arm", "panda", 99, base, HOME, goal),))
 
 
-def digest(engine: BulletEngine, scene: Scene) -> str:
+def digest(engine: Engine, scene: Scene) -> str:
     """Of every bit of the outcome."""
     return hashlib.sha256(canonical_json(engine.settle(scene)).encode()).hexdigest()
 
 
-def settle_alone(seed: int) -> str:
+def settle_alone(name: EngineName, seed: int) -> str:
     """What a process of its own makes of a scene."""
-    with open_engine(Solids(), PhysicsConfig()) as engine:
+    with open_engine(Solids(), PhysicsConfig(engine=name)) as engine:
         return digest(engine, with_arm(dropped_clutter(seed)))
 
 
-def test_a_scene_settles_the_same_whatever_was_settled_before(engine: BulletEngine) -> None:
+def test_a_scene_settles_the_same_whatever_was_settled_before(
+    engine: Engine, engine_name: EngineName
+) -> None:
     """A, B, A, refused, A and A in a new engine: the same bytes for every A."""
     a, b = with_arm(dropped_clutter(5)), dropped_clutter(6)
     refused = table_scene(thing("lost", "box 0.1 0.1 0.1", x=2.0))
@@ -58,30 +53,30 @@ def test_a_scene_settles_the_same_whatever_was_settled_before(engine: BulletEngi
     second = digest(engine, a)
     assert engine.settle(refused).rejection is not None
     third = digest(engine, a)
-    with open_engine(Solids(), PhysicsConfig()) as fresh:
+    with open_engine(Solids(), PhysicsConfig(engine=engine_name)) as fresh:
         fourth = digest(fresh, a)
 
     assert first == second == third == fourth
     assert first != other
 
 
-def test_a_scene_settles_the_same_in_another_process() -> None:
+def test_a_scene_settles_the_same_in_another_process(engine_name: EngineName) -> None:
     """Spawned, so that nothing is inherited; after other work in this one."""
-    with open_engine(Solids(), PhysicsConfig()) as engine:
+    with open_engine(Solids(), PhysicsConfig(engine=engine_name)) as engine:
         engine.settle(dropped_clutter(1))
         here = digest(engine, with_arm(dropped_clutter(5)))
     with multiprocessing.get_context("spawn").Pool(1) as pool:
-        there = pool.apply(settle_alone, (5,))
+        there = pool.apply(settle_alone, (engine_name, 5))
 
     assert here == there
 
 
-def test_bodies_that_once_ignored_each_other_meet_again() -> None:
+def test_bodies_that_once_ignored_each_other_meet_again(engine_name: EngineName) -> None:
     """Pairs that may pass through each other are forgotten with the world they were in."""
     floor, cube = (
         collision_shape(ConvexParts((box(*size),))) for size in ((1, 1, 0.1), (0.1, 0.1, 0.1))
     )
-    world = World(time_step_s=1 / 240, solver_iterations=50)
+    world = open_world(PhysicsConfig(engine=engine_name))
     heights = []
 
     for passes_through in (True, False):
@@ -98,7 +93,7 @@ def test_bodies_that_once_ignored_each_other_meet_again() -> None:
     assert heights[1] == pytest.approx(0.05, abs=0.0005)
 
 
-def test_memory_does_not_grow_with_the_number_of_scenes(engine: BulletEngine) -> None:
+def test_memory_does_not_grow_with_the_number_of_scenes(engine: Engine) -> None:
     """After a warm-up, sixty small scenes of ever new scale need less than 4 MB more."""
 
     def settle(count: int) -> None:
@@ -117,16 +112,3 @@ def resident_mb() -> float:
     """Memory of this process that is in RAM [MB]."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * 4096 / 1e6
-
-
-def test_an_engine_gives_its_scratch_files_back(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Nothing is left in the temporary folder, and leaving twice does no harm."""
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    with open_engine(Solids(), PhysicsConfig()) as engine:
-        engine.settle(table_scene(thing("cup", "mug 0.04 0.1", above_m=0.1)))
-        assert list(tmp_path.iterdir())
-    engine.__exit__(None, None, None)
-
-    assert not list(tmp_path.iterdir())

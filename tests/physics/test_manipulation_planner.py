@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
 
@@ -16,8 +15,9 @@ from gen_data.generator.core.scene import ArmGoal, Body, Scene
 from gen_data.generator.core.scene_time import scene_at
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.physics import PhysicsConfig
-from gen_data.generator.physics.engine import BulletEngine
+from gen_data.generator.physics.engine import Engine
 from gen_data.generator.physics.manipulation.joint_trajectories import smooth_step, speed_max
+from gen_data.generator.physics.physics_config import EngineName
 from tests.physics.doubles import TABLE_TOP_Z_M, Solids, table_scene, thing, world_vertices
 from tests.physics.panda import panda
 from tests.physics.test_arms import above_table, armed
@@ -26,13 +26,6 @@ ROBOT = panda()
 SPEED = 0.5
 START = ArmGoal("reach", pose_candidates=(above_table(0.05, 0.0, 0.4),))
 TARGET = (0.15, -0.2)
-
-
-@pytest.fixture
-def engine() -> Iterator[BulletEngine]:
-    """An engine with default settings."""
-    with BulletEngine(Solids(), PhysicsConfig()) as bullet:
-        yield bullet
 
 
 def going(scene: Scene, *way: ArmGoal, start: ArmGoal | None = START) -> Scene:
@@ -60,10 +53,10 @@ def pick_and_place(asset: str = "box 0.05 0.03 0.06") -> Scene:
 
 
 @cache
-def moved(asset: str = "box 0.05 0.03 0.06") -> Scene:
+def moved(engine_name: EngineName, asset: str = "box 0.05 0.03 0.06") -> Scene:
     """``pick_and_place`` after physics."""
-    with BulletEngine(Solids(), PhysicsConfig()) as bullet:
-        settled = bullet.settle(pick_and_place(asset))
+    with Engine(Solids(), PhysicsConfig(engine=engine_name)) as engine:
+        settled = engine.settle(pick_and_place(asset))
     assert settled.rejection is None
     return settled.scene
 
@@ -100,9 +93,11 @@ def overlap_m(bodies: list[Body], pairs: list[tuple[str, str]]) -> float:
     return deepest
 
 
-def test_joints_keep_to_their_limits_and_to_the_share_of_their_speed() -> None:
+def test_joints_keep_to_their_limits_and_to_the_share_of_their_speed(
+    engine_name: EngineName,
+) -> None:
     """Differences of knots over the step: never above the share of the URDF's velocity limit."""
-    track = moved().articulations[0].joint_track
+    track = moved(engine_name).articulations[0].joint_track
     assert track is not None
     knots = np.array(track.knots)
     speeds = np.abs(np.diff(knots, axis=0)) / track.step_s
@@ -115,9 +110,9 @@ def test_joints_keep_to_their_limits_and_to_the_share_of_their_speed() -> None:
     assert speeds.max() > 0.5 * SPEED * 2.175  # it does not creep either
 
 
-def test_joints_keep_to_the_share_of_their_acceleration() -> None:
+def test_joints_keep_to_the_share_of_their_acceleration(engine_name: EngineName) -> None:
     """Full speed within a quarter of a second is the limit: second differences of the knots."""
-    track = moved().articulations[0].joint_track
+    track = moved(engine_name).articulations[0].joint_track
     assert track is not None
     accelerations = np.abs(np.diff(track.knots, n=2, axis=0)) / track.step_s**2
 
@@ -133,9 +128,9 @@ def test_legs_start_and_end_at_rest() -> None:
     assert (smooth_step(0.5 + h) - smooth_step(0.5 - h)) / (2 * h) == pytest.approx(15 / 8)
 
 
-def test_links_are_where_the_joints_put_them_at_every_knot() -> None:
+def test_links_are_where_the_joints_put_them_at_every_knot(engine_name: EngineName) -> None:
     """Tracks of bodies and the joint track tell the same story."""
-    scene = moved()
+    scene = moved(engine_name)
     arm = scene.articulations[0]
     assert arm.joint_track is not None
     for k, positions in enumerate(arm.joint_track.knots):
@@ -149,9 +144,9 @@ def test_links_are_where_the_joints_put_them_at_every_knot() -> None:
 
 
 @pytest.mark.parametrize("asset", ["box 0.05 0.03 0.06", "cylinder 0.025 0.12", "ball 0.03"])
-def test_nothing_passes_through_anything(asset: str) -> None:
+def test_nothing_passes_through_anything(asset: str, engine_name: EngineName) -> None:
     """At every knot and half way between, nothing overlaps by more than a resting thing may."""
-    scene = moved(asset)
+    scene = moved(engine_name, asset)
     links = [f"arm/{link}" for link in ROBOT.visuals if link != "panda_link0"]
     pairs = [(one, other) for one in (*links, "it") for other in ("table", "can", "floor")]
     pairs += [(link, "it") for link in links]
@@ -160,9 +155,9 @@ def test_nothing_passes_through_anything(asset: str) -> None:
         assert overlap_m(list(scene_at(scene, time_s).bodies), pairs) < 0.001, time_s
 
 
-def test_what_is_held_is_rigid_in_the_hand() -> None:
+def test_what_is_held_is_rigid_in_the_hand(engine_name: EngineName) -> None:
     """From the table to where it stands, its pose in the hand is one and the same."""
-    scene = moved()
+    scene = moved(engine_name)
     track = scene.track("it")
     assert track is not None
     start = round(track.start_s / track.step_s)
@@ -178,9 +173,9 @@ def test_what_is_held_is_rigid_in_the_hand() -> None:
         np.testing.assert_allclose(pose.rotation(), relative[0].rotation(), atol=1e-5)
 
 
-def test_it_ends_where_it_was_to_be_put_and_stands_as_before() -> None:
+def test_it_ends_where_it_was_to_be_put_and_stands_as_before(engine_name: EngineName) -> None:
     """At the target, a quarter turn on, as high over the table as when it was found."""
-    scene = moved()
+    scene = moved(engine_name)
     track = scene.track("it")
     assert track is not None
     before, after = track.knots[0], track.knots[-1]
@@ -192,9 +187,11 @@ def test_it_ends_where_it_was_to_be_put_and_stands_as_before() -> None:
     np.testing.assert_allclose(after.rotation(), turned, atol=1e-4)
 
 
-def test_what_was_put_down_does_not_move_when_left_alone(engine: BulletEngine) -> None:
+def test_what_was_put_down_does_not_move_when_left_alone(
+    engine: Engine, engine_name: EngineName
+) -> None:
     """Settled again without the arm, it stays where it is to within a millimetre."""
-    last = scene_at(moved(), 1e3)
+    last = scene_at(moved(engine_name), 1e3)
     alone = replace(
         last,
         bodies=tuple(b for b in last.bodies if not b.name.startswith("arm/")),
@@ -208,14 +205,16 @@ def test_what_was_put_down_does_not_move_when_left_alone(engine: BulletEngine) -
     assert math.dist(resting, last.body("it").T_world_body.translation_m) < 1e-3
 
 
-def test_the_same_scene_moves_in_the_same_way_whatever_was_before(engine: BulletEngine) -> None:
+def test_the_same_scene_moves_in_the_same_way_whatever_was_before(
+    engine: Engine, engine_name: EngineName
+) -> None:
     """A second engine, with another scene in between."""
     engine.settle(going(table_scene(thing("x", "ball 0.03")), ArmGoal("grasp", objects=("x",))))
 
-    assert engine.settle(pick_and_place()).scene == moved()
+    assert engine.settle(pick_and_place()).scene == moved(engine_name)
 
 
-def test_a_way_through_the_table_names_it(engine: BulletEngine) -> None:
+def test_a_way_through_the_table_names_it(engine: Engine) -> None:
     """Joint positions with the hand below the top."""
     into_table = (0.0, 1.6, 0.0, -0.6, 0.0, 1.9, 0.0)
     fine = (0.3, -0.4, 0.0, -2.2, 0.0, 1.9, 0.785)
@@ -228,7 +227,7 @@ def test_a_way_through_the_table_names_it(engine: BulletEngine) -> None:
     assert settled.scene.tracks == ()
 
 
-def test_an_arm_goes_around_a_wall_between_two_free_poses(engine: BulletEngine) -> None:
+def test_an_arm_goes_around_a_wall_between_two_free_poses(engine: Engine) -> None:
     """Low on one side, low on the other: the hand is raised over a wall on its way."""
     wall = Body("wall", "box 0.5 0.02 0.2", SE3((0.15, 0.0, TABLE_TOP_Z_M + 0.1)))
     scene = table_scene()
@@ -250,7 +249,7 @@ def test_an_arm_goes_around_a_wall_between_two_free_poses(engine: BulletEngine) 
         assert overlap_m(bodies, [(link, "wall") for link in links]) == 0.0
 
 
-def test_what_leans_on_others_is_left_alone(engine: BulletEngine) -> None:
+def test_what_leans_on_others_is_left_alone(engine: Engine) -> None:
     """A block that carries another cannot be taken; the one on top does not stand on the table."""
     low = thing("low", "box 0.05 0.05 0.05", x=0.1, above_m=0.026)
     high = thing("high", "box 0.04 0.04 0.04", x=0.1, above_m=0.072)
@@ -262,7 +261,7 @@ def test_what_leans_on_others_is_left_alone(engine: BulletEngine) -> None:
     assert "no listed object lies free" in settled.rejection.reason
 
 
-def test_what_is_too_wide_is_passed_over_for_the_next(engine: BulletEngine) -> None:
+def test_what_is_too_wide_is_passed_over_for_the_next(engine: Engine) -> None:
     """Of a carton and a block, the block is lifted by a hand's breadth."""
     carton = thing("carton", "box 0.11 0.11 0.1", x=0.1, y=-0.2, above_m=0.051)
     block = thing("block", "box 0.04 0.04 0.06", x=0.1, y=0.15, above_m=0.031)
@@ -278,7 +277,7 @@ def test_what_is_too_wide_is_passed_over_for_the_next(engine: BulletEngine) -> N
     assert rise == pytest.approx(0.1, abs=1e-3)
 
 
-def test_a_place_without_room_is_passed_over_for_the_next(engine: BulletEngine) -> None:
+def test_a_place_without_room_is_passed_over_for_the_next(engine: Engine) -> None:
     """Over the edge and on top of the can are no places; the third is."""
     scene = pick_and_place()
     spots = (spot(0.1, 0.395), spot(0.12, -0.05), spot(0.0, -0.25))
@@ -293,7 +292,7 @@ def test_a_place_without_room_is_passed_over_for_the_next(engine: BulletEngine) 
     assert track.knots[-1].translation_m[:2] == pytest.approx((0.0, -0.25), abs=1e-4)
 
 
-def test_what_is_held_from_the_beginning_is_put_down_upright(engine: BulletEngine) -> None:
+def test_what_is_held_from_the_beginning_is_put_down_upright(engine: Engine) -> None:
     """A can in the hand at time 0 stands on the table at the end."""
     hold = ArmGoal("hold", pose_candidates=(above_table(0.1, 0.0, 0.35),), grasped_object="it")
     place = ArmGoal("place", pose_candidates=(spot(0.1, 0.15),))
@@ -310,7 +309,7 @@ def test_what_is_held_from_the_beginning_is_put_down_upright(engine: BulletEngin
     )
 
 
-def test_two_arms_move_in_turn(engine: BulletEngine) -> None:
+def test_two_arms_move_in_turn(engine: Engine) -> None:
     """The second starts when the first has come to rest."""
     way = ArmGoal("reach", pose_candidates=(above_table(-0.1, 0.15, 0.3),))
     scene = going(table_scene(), way)

@@ -129,11 +129,14 @@ class Distribution(ABC, Generic[T_co]):
     __pydantic_fields__: ClassVar[dict[str, FieldInfo]]
 
     def __init_subclass__(
-        cls, *, name: str = "", kinds: tuple[str, ...] = (), needs: str = "", bare: bool = False
+        cls, *, key: str = "", kinds: tuple[str, ...] = (), needs: str = "", bare: bool = False
     ) -> None:
-        """Attributes of the class are keywords of its definition; others are inherited."""
+        """Attributes of the class are keywords of its definition; others are inherited.
+
+        ``key`` is its name: Python 3.10 takes the keyword ``name`` for that of the class.
+        """
         super().__init_subclass__()
-        cls.name, cls.kinds = name or cls.name, kinds or cls.kinds
+        cls.name, cls.kinds = key or cls.name, kinds or cls.kinds
         cls.needs, cls.bare = needs or cls.needs, bare or cls.bare
 
     @abstractmethod

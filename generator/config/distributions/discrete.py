@@ -39,7 +39,7 @@ class Listed(Numeric[T_co], kinds=EVERY_KIND):
 
 
 @dataclass(frozen=True)
-class Constant(Listed[T_co], name="constant"):
+class Constant(Listed[T_co], key="constant"):
     """Always the same value. A plain value in YAML means this."""
 
     value: T_co
@@ -68,7 +68,7 @@ class Constant(Listed[T_co], name="constant"):
 
 
 @dataclass(frozen=True, init=False, repr=False)
-class Choice(Listed[T_co], name="choice"):
+class Choice(Listed[T_co], key="choice"):
     """One of the given values, equally likely or in proportion to weights.
 
     Attributes:
@@ -160,7 +160,7 @@ class Choice(Listed[T_co], name="choice"):
 
 
 @dataclass(frozen=True)
-class Sequence(Listed[T_co], name="sequence"):
+class Sequence(Listed[T_co], key="sequence"):
     """The given values in turn, by the number of the scene or sample; uses no random number."""
 
     values: tuple[T_co, ...]
@@ -195,7 +195,7 @@ class Sequence(Listed[T_co], name="sequence"):
 
 
 @parameters
-class Probability(Listed[bool], name="probability", kinds=("flag",)):
+class Probability(Listed[bool], key="probability", kinds=("flag",)):
     """True with the given probability, else false."""
 
     p: float = Field(json_schema_extra={"minimum": 0, "maximum": 1})

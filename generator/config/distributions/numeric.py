@@ -45,7 +45,7 @@ class Interval(Numeric[T_co], needs="two numbers [low, high]"):
 
 
 @parameters
-class Uniform(Interval[float], name="uniform", kinds=("number",)):
+class Uniform(Interval[float], key="uniform", kinds=("number",)):
     """Every number between low and high is equally likely."""
 
     low: float
@@ -65,7 +65,7 @@ class Uniform(Interval[float], name="uniform", kinds=("number",)):
 @parameters
 class LogUniform(
     Interval[float],
-    name="log_uniform",
+    key="log_uniform",
     kinds=("number",),
     needs="two numbers [low, high], both above 0",
 ):
@@ -94,7 +94,7 @@ class LogUniform(
 
 
 @parameters
-class Normal(Numeric[float], name="normal", kinds=("number",)):
+class Normal(Numeric[float], key="normal", kinds=("number",)):
     """Gaussian; with ``clip`` it is truncated: values outside are not drawn, none pile up.
 
     Drawn by inverting the cumulative distribution, so that each value costs exactly one random
@@ -167,7 +167,7 @@ class Normal(Numeric[float], name="normal", kinds=("number",)):
 @parameters
 class UniformInteger(
     Interval[int],
-    name="uniform_integer",
+    key="uniform_integer",
     kinds=("number", "whole number"),
     needs="two whole numbers [low, high]",
 ):

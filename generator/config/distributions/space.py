@@ -51,7 +51,7 @@ UnitVector = Annotated[
 
 
 @parameters
-class QuaternionWxyz(Distribution[Quaternion], name="quaternion_wxyz", kinds=("rotation",)):
+class QuaternionWxyz(Distribution[Quaternion], key="quaternion_wxyz", kinds=("rotation",)):
     """A fixed rotation as a quaternion, scalar first; it is normalised."""
 
     quaternion_wxyz: UnitQuaternion
@@ -66,7 +66,7 @@ class QuaternionWxyz(Distribution[Quaternion], name="quaternion_wxyz", kinds=("r
 
 
 @parameters
-class EulerDeg(Distribution[Quaternion], name="euler_deg", kinds=("rotation",)):
+class EulerDeg(Distribution[Quaternion], key="euler_deg", kinds=("rotation",)):
     """A fixed rotation: roll about X, then pitch about Y, then yaw about Z, all fixed axes [deg].
 
     The convention of URDF: R = Rz(yaw) Ry(pitch) Rx(roll).
@@ -87,7 +87,7 @@ class EulerDeg(Distribution[Quaternion], name="euler_deg", kinds=("rotation",)):
 
 
 @parameters
-class So3(Distribution[Quaternion], name="so3", kinds=("rotation",), bare=True):
+class So3(Distribution[Quaternion], key="so3", kinds=("rotation",), bare=True):
     """Every rotation is equally likely.
 
     Source: Shoemake, "Uniform random rotations", Graphics Gems III, 1992.
@@ -106,7 +106,7 @@ class So3(Distribution[Quaternion], name="so3", kinds=("rotation",), bare=True):
 
 
 @parameters
-class AboutZ(Distribution[Quaternion], name="about_z", kinds=("rotation",), bare=True):
+class AboutZ(Distribution[Quaternion], key="about_z", kinds=("rotation",), bare=True):
     """A turn about the vertical; every angle of the range is equally likely.
 
     Attributes:
@@ -129,7 +129,7 @@ class AboutZ(Distribution[Quaternion], name="about_z", kinds=("rotation",), bare
 
 
 @parameters
-class Sphere(Distribution[Vec3], name="sphere", kinds=("direction",), bare=True):
+class Sphere(Distribution[Vec3], key="sphere", kinds=("direction",), bare=True):
     """Every direction is equally likely.
 
     By Archimedes' hat-box theorem the height on the unit sphere is uniform.
@@ -141,7 +141,7 @@ class Sphere(Distribution[Vec3], name="sphere", kinds=("direction",), bare=True)
 
 
 @parameters
-class Cap(Distribution[Vec3], name="cap", kinds=("direction",)):
+class Cap(Distribution[Vec3], key="cap", kinds=("direction",)):
     """Directions within a cone about an axis, uniform by area on the unit sphere.
 
     Attributes:
@@ -167,7 +167,7 @@ class Cap(Distribution[Vec3], name="cap", kinds=("direction",)):
 
 
 @parameters
-class Box(Distribution[Vec3], name="box", kinds=("position",), needs="two corners [low, high]"):
+class Box(Distribution[Vec3], key="box", kinds=("position",), needs="two corners [low, high]"):
     """Positions in an axis-aligned box, uniform by volume.
 
     Attributes:
@@ -193,7 +193,7 @@ class Box(Distribution[Vec3], name="box", kinds=("position",), needs="two corner
 
 
 @parameters
-class Shell(Distribution[Vec3], name="shell", kinds=("position",)):
+class Shell(Distribution[Vec3], key="shell", kinds=("position",)):
     """Positions between two spheres, uniform by volume.
 
     The cube of the radius and the sine of the elevation are uniform.

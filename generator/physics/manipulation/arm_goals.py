@@ -21,10 +21,10 @@ from gen_data.generator.core.kinematics import (
 )
 from gen_data.generator.core.scene import ArmGoal, Articulation
 from gen_data.generator.core.se3 import SE3
-from gen_data.generator.physics.bullet import World
 from gen_data.generator.physics.collision_shapes import CollisionShape
 from gen_data.generator.physics.manipulation.grasping import Grasp, Hand
 from gen_data.generator.physics.manipulation.inverse_kinematics import make_chain, solve_all
+from gen_data.generator.physics.world import World
 
 
 class Failure(Enum):

@@ -10,7 +10,7 @@ import numpy as np
 from gen_data.generator.core.asset_types import Gripper, RobotModel
 from gen_data.generator.core.kinematics import all_positions, finger_links, link_poses, rigid_group
 from gen_data.generator.core.se3 import SE3, Array, Vec3
-from gen_data.generator.physics.bullet import World
+from gen_data.generator.physics.world import World
 
 _PALM_GAP_M = 0.002
 _PAD_GAP_M = 0.002

@@ -8,9 +8,7 @@ first use.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
-import os
 import subprocess
 import sys
 import warnings
@@ -23,6 +21,7 @@ import warp as wp
 
 from gen_data.generator.core.errors import CacheWarning, ConfigError
 from gen_data.generator.core.processes import interrupts_blocked, silence_stdio, tie
+from gen_data.generator.core.system_calls import usable_cores, wait_for_lock
 from gen_data.generator.renderers.warp.kernel_cache import remove_damaged_modules
 
 # Not -march=native: fused multiply-adds would change bytes between machines. The inlining threshold
@@ -60,6 +59,12 @@ def _start() -> None:
         wp.init()
 
 
+def kernel_folder() -> Path:
+    """Folder of compiled kernels of this version of Warp."""
+    _start()
+    return Path(wp.config.kernel_cache_dir)
+
+
 EVERY_FRAME = (
     "realtime.kernels.lattice_lighting",
     "realtime.kernels.soft_shadows",
@@ -86,11 +91,11 @@ def compile_kernels(device: str) -> None:
     Warns:
         CacheWarning: compiled kernels were damaged; they are compiled again.
     """
-    cores = len(os.sched_getaffinity(0))
+    cores = usable_cores()
     folder = Path(wp.config.kernel_cache_dir)
     stamp = folder / f"gen-data-{_digest()}-{device[:4]}"
     with (folder / "gen-data.lock").open("a") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+        wait_for_lock(lock.fileno())
         damaged = remove_damaged_modules(folder)
         if damaged:
             fact = f"{folder}: {len(damaged)} compiled kernel module(s) were damaged"

@@ -1,4 +1,4 @@
-"""A wrapper of pybullet: rigid bodies by name, with poses of their own frames.
+"""A world simulated by Bullet.
 
 The only module that imports pybullet. It hides pybullet's conventions: quaternions with the scalar
 last, body numbers, and poses of the centre of mass.
@@ -16,18 +16,17 @@ from gen_data.generator.core.processes import silence_stdio
 from gen_data.generator.core.se3 import SE3, Array, Vec3
 from gen_data.generator.core.temporary_folders import TemporaryFolder
 from gen_data.generator.physics.collision_shapes import CollisionShape, scale_step
+from gen_data.generator.physics.world import (
+    ANGULAR_DAMPING_PER_S,
+    GRAVITY_M_S2,
+    ROLLING_FRICTION_SHARE,
+)
 
 with silence_stdio():  # it prints its build time
     import pybullet
 
-GRAVITY_M_S2 = 9.81
-
 _HULL_FILES = 4096
 """Most files of shapes in the scratch folder, 10 kB each."""
-_ANGULAR_DAMPING = 0.5
-_ROLLING_FRICTION_SHARE = 0.1
-"""Rolling friction over an object's smallest half extent: balls and cans stop within a few turns,
-too little for anything to rest visibly out of balance."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -38,8 +37,8 @@ class _Solid:
     T_body_center: SE3
 
 
-class World:
-    """A simulated world, which owns a pybullet connection; ``reset`` must be called first.
+class BulletWorld:
+    """A simulated world as described at ``World``, which owns a pybullet connection.
 
     All bodies are single rigid bodies ("maximal coordinates"), whose contact solver separates
     overlapping bodies without giving them speed.
@@ -109,7 +108,7 @@ class World:
         )
         rolling = 0.0
         if mass_kg > 0.0:
-            rolling = _ROLLING_FRICTION_SHARE * float(shape.half_extents_m.min()) * scale
+            rolling = ROLLING_FRICTION_SHARE * float(shape.half_extents_m.min()) * scale
         pybullet.changeDynamics(
             number,
             -1,
@@ -117,7 +116,7 @@ class World:
             restitution=restitution,
             rollingFriction=rolling,
             spinningFriction=rolling,
-            angularDamping=_ANGULAR_DAMPING,
+            angularDamping=ANGULAR_DAMPING_PER_S,
             **self._here,
         )
         self._solids[name] = _Solid(number, shape, scale, T_body_center)

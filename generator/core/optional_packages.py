@@ -1,0 +1,29 @@
+"""Packages that only some features need: extras of the distribution."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+EXTRAS = {
+    "OpenEXR": ("OpenEXR", "exr"),
+    "foxglove_schemas_protobuf": ("foxglove-schemas-protobuf", "formats"),
+    "google_crc32c": ("google-crc32c", "formats"),
+    "h5py": ("h5py", "formats"),
+    "mcap": ("mcap", "formats"),
+    "mcap_protobuf": ("mcap-protobuf-support", "formats"),
+    "pxr": ("usd-core", "usd"),
+    "pyarrow": ("pyarrow", "formats"),
+    "rerun": ("rerun-sdk", "preview"),
+}
+"""Package and extra by the module that the package installs."""
+
+
+def missing_packages(*modules: str) -> str:
+    """Which packages of ``EXTRAS`` are not installed, and the remedy; empty if all are."""
+    absent = [EXTRAS[module] for module in modules if find_spec(module) is None]
+    if not absent:
+        return ""
+    noun = "package" if len(absent) == 1 else "packages"
+    names = ", ".join(sorted(package for package, _ in absent))
+    extras = ",".join(sorted({extra for _, extra in absent}))
+    return f"needs the {noun} {names}: pip install 'gen-data[{extras}]'"

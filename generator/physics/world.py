@@ -1,0 +1,106 @@
+"""The seam to rigid-body simulators: what settling and planning ask of a simulated world."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Protocol
+
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.se3 import SE3, Array
+from gen_data.generator.physics.collision_shapes import CollisionShape
+from gen_data.generator.physics.physics_config import PhysicsConfig, missing_engine
+
+GRAVITY_M_S2 = 9.81
+ANGULAR_DAMPING_PER_S = 0.5
+ROLLING_FRICTION_SHARE = 0.1
+"""Rolling friction over an object's smallest half extent: balls and cans stop within a few turns,
+too little for anything to rest visibly out of balance."""
+
+
+class World(Protocol):
+    """Rigid bodies by name, with poses of their own frames; ``reset`` must be called first.
+
+    What happens in it depends on the calls since the last ``reset`` only. Overlapping bodies are
+    separated without giving them speed.
+    """
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all bodies, in the order in which they were added."""
+        ...
+
+    def close(self) -> None:
+        """Release everything; may be called twice."""
+        ...
+
+    def reset(self) -> None:
+        """Remove all bodies and restore the parameters."""
+        ...
+
+    def add(
+        self,
+        name: str,
+        shape: CollisionShape,
+        T_world_body: SE3,
+        *,
+        scale: float = 1.0,
+        mass_kg: float = 0.0,
+        friction: float = 0.6,
+        restitution: float = 0.05,
+    ) -> None:
+        """Add a body at rest; a body with mass 0 is static."""
+        ...
+
+    def remove(self, name: str) -> None:
+        """Remove a body."""
+        ...
+
+    def ignore(self, name: str, others: Iterable[str]) -> None:
+        """Disable collisions of a body with others."""
+        ...
+
+    def place(self, name: str, T_world_body: SE3) -> None:
+        """Move a body to a pose, at rest."""
+        ...
+
+    def pose(self, name: str) -> SE3:
+        """``T_world_body``."""
+        ...
+
+    def bounds_m(self, name: str) -> tuple[Array, Array]:
+        """Low and high corner of a body in the world [m]."""
+        ...
+
+    def gap_m(self, one: str, other: str, limit_m: float) -> float:
+        """Distance between two bodies [m]: negative if they overlap, at most ``limit_m``."""
+        ...
+
+    def step(self, count: int) -> None:
+        """Simulate ``count`` steps."""
+        ...
+
+    def speed(self, name: str) -> tuple[float, float]:
+        """Linear [m/s] and angular speed [rad/s] of a body."""
+        ...
+
+    def contacts(self) -> list[tuple[str, str, float]]:
+        """All pairs of bodies in contact and their gap [m], negative if they overlap."""
+        ...
+
+
+def open_world(config: PhysicsConfig) -> World:
+    """Open an empty world of the configured simulator.
+
+    Raises:
+        ConfigError: it is not installed.
+    """
+    missing = missing_engine(config.engine)
+    if missing:
+        raise ConfigError(f"physics.engine: {missing}")
+    if config.engine == "mujoco":
+        from gen_data.generator.physics.mujoco_world import MujocoWorld
+
+        return MujocoWorld(config.time_step_s, config.solver_iterations)
+    from gen_data.generator.physics.bullet_world import BulletWorld
+
+    return BulletWorld(config.time_step_s, config.solver_iterations)

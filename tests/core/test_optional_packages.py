@@ -1,0 +1,78 @@
+"""Features without their package say which extra brings it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from gen_data.exporters.rerun import Rerun
+from gen_data.exporters.usd import Usd
+from gen_data.generator.assets.image_decoding import read_exr
+from gen_data.generator.cli.main import cli
+from gen_data.generator.core import optional_packages
+from gen_data.generator.core.errors import AssetError, ConfigError
+from gen_data.generator.core.optional_packages import EXTRAS, missing_packages
+from gen_data.generator.usd.stage_reader import OpenStage
+
+PROJECT = Path(__file__).parents[2] / "pyproject.toml"
+
+
+@pytest.fixture
+def bare(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine without any optional package."""
+    monkeypatch.setattr(optional_packages, "find_spec", lambda name: None)
+
+
+def extra_lists() -> dict[str, str]:
+    """Text of each list of optional dependencies; Python 3.10 has no reader of TOML."""
+    section = PROJECT.read_text().split("[project.optional-dependencies]")[1].split("\n[")[0]
+    return dict(re.findall(r"^([\w-]+) = \[(.*?)\]$", section, re.MULTILINE | re.DOTALL))
+
+
+def test_each_extra_brings_the_packages_that_messages_promise() -> None:
+    """As pyproject.toml lists them; the extra ``all`` names each of these extras."""
+    lists = extra_lists()
+
+    for package, extra in EXTRAS.values():
+        assert f'"{package}>=' in lists[extra]
+        assert re.search(rf"\W{extra}\W", lists["all"])
+
+
+def test_what_is_installed_is_not_missing() -> None:
+    """The tests' own environment has every extra."""
+    assert missing_packages(*EXTRAS) == ""
+
+
+def test_several_missing_packages_are_one_command(bare: None) -> None:
+    """Sorted, with each extra once."""
+    assert missing_packages("pxr", "h5py", "mcap") == (
+        "needs the packages h5py, mcap, usd-core: pip install 'gen-data[formats,usd]'"
+    )
+
+
+def test_exporters_are_refused_before_anything_is_rendered(bare: None) -> None:
+    """By ``check``, which a run calls first."""
+    with pytest.raises(ConfigError, match=r"exporter 'usd' needs .*'gen-data\[usd\]'"):
+        Usd().check(None)  # type: ignore[arg-type]
+    with pytest.raises(ConfigError, match=r"exporter 'rerun' needs .*'gen-data\[preview\]'"):
+        Rerun().check(None)  # type: ignore[arg-type]
+
+
+def test_files_that_cannot_be_read_name_themselves(bare: None, tmp_path: Path) -> None:
+    """A stage and a panorama of a user."""
+    with pytest.raises(AssetError, match=r"mine\.usda: needs .*'gen-data\[usd\]'"):
+        OpenStage(tmp_path / "mine.usda", "mine.usda")
+    with pytest.raises(AssetError, match=r"sky\.exr: needs .*'gen-data\[exr\]'"):
+        read_exr(b"", "sky.exr")
+
+
+def test_the_preview_names_its_extra_and_what_works_without(bare: None) -> None:
+    """No traceback of an import."""
+    done = CliRunner().invoke(cli, ["preview", "tabletop.yaml"])
+
+    assert isinstance(done.exception, ConfigError)
+    assert "gen-data[preview]" in str(done.exception)
+    assert "contact-sheet" in str(done.exception)

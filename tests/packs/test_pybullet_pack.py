@@ -1,0 +1,107 @@
+"""The files of pybullet, for systems for which it has no wheel."""
+
+from __future__ import annotations
+
+import importlib.util
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.core.errors import UnknownAsset
+from gen_data.generator.packs.install import install
+from gen_data.generator.packs.pack_table import find_pack
+
+pybullet_data = pytest.importorskip("pybullet_data")
+
+KINDS = ("colors16.png", "franka_panda", "lego", "soccerball", "teddy")
+
+
+def folder() -> Path:
+    """Where pybullet installs its files."""
+    return Path(pybullet_data.getDataPath())
+
+
+@pytest.fixture
+def installed(tmp_path: Path) -> Path:
+    """The pack, made of a wheel with a part of the files, and of some that nobody asked for."""
+    wheel = tmp_path / "pybullet.whl"
+    with zipfile.ZipFile(wheel, "w") as file:
+        for path in sorted(folder().rglob("*")):
+            name = path.relative_to(folder()).as_posix()
+            if path.is_file() and name.startswith(KINDS):
+                file.write(path, f"pybullet_data/{name}")
+        file.writestr("pybullet_data/policies/ppo.pb", b"never wanted")
+        file.writestr("pybullet.so", b"never wanted")
+    pack = replace(find_pack("pybullet"), sha256=sha256(wheel.read_bytes()).hexdigest())
+    install(pack, tmp_path / "packs", wheel)
+    return tmp_path / "packs"
+
+
+def without_pybullet(patch: pytest.MonkeyPatch) -> None:
+    """Hide pybullet, as on a system for which it has no wheel."""
+    find: Callable[[str], object] = importlib.util.find_spec
+    patch.setattr(
+        importlib.util, "find_spec", lambda name: None if "pybullet" in name else find(name)
+    )
+
+
+def library(packs: Path, cache: Path) -> Library:
+    """A library with a cache of its own."""
+    return open_library(cache_dir=cache, packs=packs)
+
+
+def test_the_pack_has_what_the_index_needs_and_nothing_else(installed: Path) -> None:
+    """Neither the simulator nor policies."""
+    names = {path.name for path in (installed / "pybullet").iterdir()}
+
+    assert {"franka_panda", "teddy_vhacd.urdf", "pack.json"} <= names
+    assert not names & {"policies", "pybullet.so", "pybullet_data"}
+
+
+def test_assets_are_the_same_as_those_of_pybullet(
+    installed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Description, digest of the files, and shape: a plan holds on both systems."""
+    ids = ("pybullet/teddy", "pybullet/lego", "pybullet/soccerball")
+    own = library(tmp_path / "none", tmp_path / "own cache")
+    there = [(own.get(name), own.bounds_m(name)) for name in ids]
+    robot = own.robot("franka_panda")
+    without_pybullet(monkeypatch)
+    packed = library(installed, tmp_path / "pack cache")
+
+    assert [(packed.get(name), packed.bounds_m(name)) for name in ids] == there
+    assert packed.robot("franka_panda") == robot
+
+
+def test_without_pybullet_and_its_pack_everything_else_is_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An asset of it names the command that installs the pack."""
+    without_pybullet(monkeypatch)
+    bare = library(tmp_path / "none", tmp_path / "cache")
+
+    assert bare.find(("household",))
+    assert bare.find(("pybullet",)) == ()
+    for missing in ("franka_panda", "pybullet/teddy", "franka_panda/panda_link0"):
+        with pytest.raises(UnknownAsset, match="run: gen-data assets install pybullet"):
+            bare.get(missing)
+    with pytest.raises(UnknownAsset, match=r"^asset 'pybullet/no': unknown"):
+        bare.get("pybullet/no")
+
+
+def test_the_tabletop_without_its_arm_names_the_pack(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before anything is generated, with the place of the name."""
+    without_pybullet(monkeypatch)
+    monkeypatch.setenv("GEN_DATA_ASSETS", str(tmp_path))
+
+    with pytest.raises(UnknownAsset, match=r"tabletop\.yaml:\d+:\d+.*assets install pybullet"):
+        PipelineFactory(load_config("tabletop.yaml"), n=1).check()

@@ -1,0 +1,27 @@
+"""Both engines, as far as they are installed: the same tests hold for each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import get_args
+
+import pytest
+
+from gen_data.generator.physics import PhysicsConfig
+from gen_data.generator.physics.engine import Engine
+from gen_data.generator.physics.physics_config import EngineName, is_installed
+from tests.physics.doubles import Solids
+
+
+@pytest.fixture(params=[name for name in get_args(EngineName) if is_installed(name)])
+def engine_name(request: pytest.FixtureRequest) -> EngineName:
+    """Name of an engine."""
+    name: EngineName = request.param
+    return name
+
+
+@pytest.fixture
+def engine(engine_name: EngineName) -> Iterator[Engine]:
+    """An engine with default settings."""
+    with Engine(Solids(), PhysicsConfig(engine=engine_name)) as opened:
+        yield opened
