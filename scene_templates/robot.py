@@ -70,10 +70,14 @@ class Robot(PlacedElement):
         )
 
     def _find_installed(self, assets: AssetIndex) -> str:
-        """Find its first installed asset; the last one, for the error text, if there is none."""
+        """Find its first installed asset; if there is none, the first that needs no pack.
+
+        The error text then is about that one; ids of packs have a slash.
+        """
         wanted = (self.asset,) if isinstance(self.asset, str) else self.asset
         known = {asset.asset_id for asset in assets.find((), kind="robot")}
-        return next((name for name in wanted if name in known), wanted[-1])
+        without_pack = [name for name in wanted if "/" not in name]
+        return next((name for name in wanted if name in known), [*without_pack, wanted[0]][0])
 
     def _workspace_m(self, scene: Scene, T_world_base: SE3) -> tuple[Vec3, Vec3]:
         """Space for the hand's goals: above the supporting surface, within reach."""

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 
 SINGLE_THREADED = (
@@ -50,14 +50,19 @@ def forbid_core_dumps() -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def tie(command: Sequence[str]) -> list[str]:
+def tie(command: Sequence[str], variables: Mapping[str, str] | None = None) -> list[str]:
     """Command that runs another one, which ends with this process and ignores Ctrl-C itself.
 
     Start it with SIGINT blocked (``interrupts_blocked``): Ctrl-C may come before it is ignored.
+
+    Args:
+        command: Program and arguments.
+        variables: Added to its environment.
     """
     # Python 3.10 does not know -P, which keeps the folder of this file from the module path.
     options = ["-P"] if sys.version_info >= (3, 11) else []
-    return [sys.executable, *options, __file__, str(os.getpid()), *command]
+    added = [f"{name}={value}" for name, value in (variables or {}).items()]
+    return [sys.executable, *options, __file__, str(os.getpid()), *added, "--", *command]
 
 
 @contextmanager
@@ -138,8 +143,13 @@ def _run_tied(pid: int, command: Sequence[str]) -> int:
     return 1
 
 
-def _main(pid: int, command: list[str]) -> None:
+def _main(pid: int, arguments: list[str]) -> None:
     ignore_interrupts()
+    end = arguments.index("--")
+    command = arguments[end + 1 :]
+    for variable in arguments[:end]:
+        # What runs next inherits the variables of the C library.
+        os.putenv(*variable.split("=", 1))
     if not _has_death_signal():
         sys.exit(_run_tied(pid, command))
     end_with_parent(pid)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import os
 import shutil
 import subprocess
 import sys
@@ -49,13 +48,13 @@ def fetch(pack: Pack, folder: Path) -> Path:
     temporary = folder / "tmp"
     temporary.mkdir()
     # A client that is killed leaves its temporary files, which go with the folder.
-    places = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(temporary))
+    variables = dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(temporary))
+    # Messages are matched, so they must be in English.
+    variables["LC_ALL"] = "C"
     try:
-        # Messages are matched, so they must be in English.
         done = subprocess.run(
-            tie(command), cwd=folder, env={**os.environ, **places, "LC_ALL": "C"},
-            capture_output=True, text=True, errors="replace", timeout=_TIMEOUT_S,
-            stdin=subprocess.DEVNULL, check=False,
+            tie(command, variables), cwd=folder, capture_output=True, text=True, errors="replace",
+            timeout=_TIMEOUT_S, stdin=subprocess.DEVNULL, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
         raise _client_error(pack, command, f"took longer than {_TIMEOUT_S} s") from None
