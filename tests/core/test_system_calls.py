@@ -149,7 +149,7 @@ def test_a_helper_ends_with_its_parent_where_no_kernel_ends_it(tmp_path: Path) -
     code = f"""
         import os, subprocess, sys
         child = subprocess.Popen(
-            [sys.executable, {str(helper)!r}, str(os.getpid()), "sleep", "617"]
+            [sys.executable, {str(helper)!r}, str(os.getpid()), "--", "sleep", "617"]
         )
         print(child.pid, flush=True)
         child.wait()
