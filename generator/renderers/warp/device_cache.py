@@ -34,7 +34,7 @@ from gen_data.generator.renderers.warp.visibility.distortion_lut import DeviceOp
 
 _MESH_BYTES, _TEXTURE_BYTES = 176 << 20, 384 << 20
 """Of a GPU."""
-_OWN_MESH_BYTES, _OWN_TEXTURE_BYTES = 72 << 20, 16 << 20
+_OWN_MESH_BYTES, _OWN_TEXTURE_BYTES = 48 << 20, 16 << 20
 """On the CPU, where most are views of files and take no memory that could not be dropped."""
 _MESHES, _TEXTURES = 4096, 2048
 """Some kilobytes each beside their arrays, and up to two maps of files."""
