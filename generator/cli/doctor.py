@@ -20,6 +20,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import version
+from importlib.util import find_spec
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -297,7 +298,9 @@ CHECKS = (
     Check("cache", _try_cache, "make the folder writable, or point XDG_CACHE_HOME elsewhere"),
     Check("limits", _try_limits, "raise them with ulimit -n, -v and -f"),
     Check("renderer", _try_renderer, REINSTALL.format("warp-lang")),
-    Check("physics", _try_physics, "pip install --force-reinstall mujoco"),
+    Check(
+        "physics", _try_physics, REINSTALL.format("pybullet" if find_spec("pybullet") else "mujoco")
+    ),
     Check("meshes", _try_meshes, REINSTALL.format("scipy trimesh fast-simplification")),
     Check("images", _try_images, REINSTALL.format("opencv-python-headless deflate pillow")),
     Check("openexr", _try_openexr, EXTRA.format("exr"), _is_installed("OpenEXR")),

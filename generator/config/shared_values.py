@@ -130,7 +130,9 @@ def probe_values(section: Node, seed: int) -> Iterator[dict[str, SharedValue]]:
             if (name, repr(outcome)) in seen:
                 continue
             # Values that depend on no others can be given without a contradiction.
-            own = {n: v for n, v in selected.items() if not names_in(section.entries[n])}
+            # Unknown names are refused where a scene evaluates them.
+            known = {n: v for n, v in selected.items() if n in section.entries}
+            own = {n: v for n, v in known.items() if not names_in(section.entries[n])}
             if any(v not in _possible(section.entries[n]) for n, v in own.items()):
                 continue
             for scene in range(_SEARCHED_SCENES):

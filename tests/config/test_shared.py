@@ -114,6 +114,17 @@ def test_probes_show_every_outcome_of_choices_within_selections_that_can_occur()
     assert all(p["road"] == "avenue" and p["bend"] == 0 for p in probes if p["rails"] == "track")
 
 
+def test_a_misspelt_name_in_a_rare_selection_is_one_clear_error() -> None:
+    """Not a traceback, though no scene but one that was searched for evaluates it."""
+    text = """
+        rails: {switch: width, broad: {switch: rod, a: {choice: [1, 2]}}, default: 0}
+        width: {switch: road, avenue: {choice: {narrow: 50, broad: 1}}, default: narrow}
+        road: {choice: {street: 500, avenue: 1}}
+        """
+    with pytest.raises(ConfigError, match="there is no shared value 'rod'; expected one of"):
+        list(probe_values(parse_yaml(text, "test"), 0))
+
+
 def test_probes_of_the_street_show_every_outcome_of_a_thousand_scenes() -> None:
     """A category that few scenes have is one of the data set; only seeds have over 20 values."""
     section = load_config("street.yaml").document.entries["shared"]

@@ -208,8 +208,8 @@ def _shade(frame: CameraView, lattice: Lattice) -> wp.array:
     outputs = [count, listed.pixels, radiance]
     frame.launch(lattice_interpolation.gather_light, shape, inputs, outputs)
     number = int(count.numpy()[0])
-    # Sizes are powers of two, so that few are kept, plus a little: rows of lamps a power of two
-    # apart would collide in the processor's cache.
+    # Powers of two, so that scratch memory seldom grows, plus a little: rows of lamps a power of
+    # two apart would collide in the processor's cache.
     room = (1 << number.bit_length()) + 48
     listed.lit = cache.scratch("listed lit", (around.lit.shape[0], room), float)
     listed.open_sky = cache.scratch("listed sky", (1, room), float)
