@@ -43,7 +43,6 @@ from gen_data.generator.renderers.warp.scene.light_selection import (
     extract_sky_lights,
     keep_main_lamps,
 )
-from gen_data.generator.renderers.warp.visibility.gbuffer import Projected
 from gen_data.generator.renderers.warp.visibility.kernels import (
     distortion,
     edge_antialiasing,
@@ -54,6 +53,7 @@ from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import 
     find_edges,
     write_mixed,
 )
+from gen_data.generator.renderers.warp.visibility.multisampling import draw_samples
 
 _PARTS = 2
 """Samples per pixel on edges in reflections or behind glass."""
@@ -132,7 +132,7 @@ def _average_samples(frame: CameraView, radiance: wp.array, samples: int) -> Non
     mixed = wp.zeros(max(len(edges), 1), dtype=wp.vec3, device=cache.device)
     inputs = [*frame.inputs, radiance, edges]
     if projected is not None:
-        inputs.append(_draw_samples(frame, projected, edges, samples))
+        inputs.append(draw_samples(frame, projected, edges, pixel_samples(samples)))
         frame.launch(mixing.mix_samples, len(edges), inputs, [mixed])
     else:
         inputs += [cache.constant(wp.vec2, pixel_samples, samples), rasterizer.Z_NEAR_M]
@@ -156,35 +156,6 @@ def darken_outside(view: records.View, radiance: wp.array) -> None:
     if view.lens != records.PINHOLE:
         n = view.width * view.height
         wp.launch(distortion.darken_outside, n, [view], [radiance], device=radiance.device)
-
-
-def _draw_samples(
-    frame: CameraView, projected: Projected, pixels: wp.array, samples: int
-) -> wp.array:
-    """Visible (body, face) at samples of listed pixels, [pixels, samples]; (-1, -1) for none."""
-    cache, view, world = frame.cache, frame.view, frame.world
-    numbers = cache.scratch("numbers", frame.pixels, wp.int32)
-    floors = cache.scratch("floors", frame.pixels, float)
-    floors.fill_(mixing.UNLISTED)
-    blocks = view.height * -(-view.width // mixing.BLOCK_PX)
-    block_floors = cache.scratch("block floors", blocks, float)
-    block_floors.fill_(mixing.UNLISTED)
-    inputs = [view, frame.gbuffer.record, pixels]
-    frame.launch(mixing.number_pixels, len(pixels), inputs, [numbers, floors, block_floors])
-    shape = (max(len(pixels), 1), samples)
-    nearness = wp.zeros(shape, dtype=float, device=cache.device)
-    hits = wp.full(shape, wp.vec2i(-1, -1), dtype=wp.vec2i, device=cache.device)
-    window = rasterizer.Window()
-    window.width, window.height = view.width, view.height
-    inputs = [view, window, world.record, projected.in_view, projected.p_camera, projected.xy]
-    inputs += [numbers, floors, block_floors, cache.constant(wp.vec2i, _offsets, samples)]
-    frame.launch(mixing.draw_samples, len(projected.in_view), inputs, [nearness, hits])
-    return hits
-
-
-def _offsets(samples: int) -> NDArray[np.int32]:
-    """Offsets of samples from a pixel's centre, in steps of 1/256 pixel, [samples, 2]."""
-    return (pixel_samples(samples) * 256.0 - 128.0).astype(np.int32)
 
 
 def _shade(frame: CameraView, lattice: Lattice) -> wp.array:

@@ -13,6 +13,7 @@ from gen_data.generator.core.boxes import BoxPx
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.scene.kernels import ray_queries, records
+from gen_data.generator.renderers.warp.scene.kernels.simd import LANES
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld
 from gen_data.generator.renderers.warp.visibility.kernels import label_resolve, rasterizer
 
@@ -144,7 +145,7 @@ def find_visible(
     drawn = drawn and view.lens == records.PINHOLE
     projected = project_vertices(world, view, cache) if drawn else None
     gbuffer = GBuffer(
-        cache.scratch("hits", n, wp.vec2i),
+        cache.scratch("hits", n + LANES, wp.vec2i)[:n],
         cache.scratch("z", n, float),
         cache.scratch("weights", n, wp.vec2),
         cache.scratch("normals", n, wp.vec3),
@@ -206,7 +207,7 @@ def bodies_within(
 def _rasterise(
     world: PackedWorld, view: records.View, cache: DeviceCache, projected: Projected, hits: wp.array
 ) -> None:
-    nearness = cache.scratch("nearness", view.width * view.height, float)
+    nearness = cache.scratch("nearness", view.width * view.height + LANES, float)
     nearness.zero_()
     hits.fill_(wp.vec2i(-1, -1))
     window = rasterizer.Window()

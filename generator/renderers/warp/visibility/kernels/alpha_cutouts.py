@@ -10,7 +10,6 @@ import warp as wp
 
 from gen_data.generator.renderers.warp.scene.kernels.alpha_test import (
     dominant_axis,
-    is_covered,
     project_uv,
 )
 from gen_data.generator.renderers.warp.scene.kernels.records import (
@@ -98,13 +97,42 @@ def make_cutout(view: View, world: World, b: int, face: int):
     return cutout
 
 
-@wp.func
-def is_solid_at(world: World, cutout: Cutout, x_px: float, y_px: float, nearness: float):
-    """Whether a triangle has no hole at a point of the image; nearness is 1/z [1/m]."""
-    solid = bool(True)
-    if cutout.texture >= 0:
-        z_m = 1.0 / nearness
-        u = cutout.u + (cutout.c_u + x_px * cutout.dx_u + y_px * cutout.dy_u) * z_m
-        v = cutout.v + (cutout.c_v + x_px * cutout.dx_v + y_px * cutout.dy_v) * z_m
-        solid = is_covered(world, cutout.texture, wp.vec2(u, v))
-    return solid
+# Of candidates, one bit each, the points of an image at which a triangle has no hole; ``nearness``
+# is 1/z [1/m]. Texels are read as by ``alpha_test.is_covered``. Needs ``world`` and ``cutout``, and
+# SIMD before it.
+SOLID = """
+    auto solid = [&](unsigned candidates, auto x_px, auto y_px, auto nearness) {
+        if (cutout.texture < 0)
+            return candidates;
+        typedef decltype(nearness) Points;
+        const auto& texture = world.textures.data[cutout.texture];
+        const int width = texture.width, height = texture.height;
+        const Points z_m = Points(1.0f) / nearness;
+        Points u = Points(cutout.u)
+            + (Points(cutout.c_u) + x_px * cutout.dx_u + y_px * cutout.dy_u) * z_m;
+        Points v = Points(cutout.v)
+            + (Points(cutout.c_v) + x_px * cutout.dx_v + y_px * cutout.dy_v) * z_m;
+        auto whole = [&](Points w) {
+            const auto i = ints(w);
+            return floats(i) > w ? i - 1 : i;
+        };
+        u = clamped(u, Points(-1.0e6f), Points(1.0e6f));
+        v = clamped(v, Points(-1.0e6f), Points(1.0e6f));
+        const Points x = (u - floats(whole(u))) * (float)width - 0.5f;
+        const Points y = (1.0f - (v - floats(whole(v)))) * (float)height - 0.5f;
+        const auto x0 = whole(x), y0 = whole(y);
+        const Points right = x - floats(x0), down = y - floats(y0);
+        unsigned kept = 0;
+        for (unsigned left = candidates; left; left &= left - 1) {
+            const int k = first_bit(left), column = get(x0, k), row = get(y0, k);
+            const float r = get(right, k), d = get(down, k);
+            const auto* top = texture.cover.data + (row < 0 ? height - 1 : row) * width;
+            const auto* below = texture.cover.data + (row + 1 >= height ? 0 : row + 1) * width;
+            const int a = column < 0 ? width - 1 : column, b = column + 1 >= width ? 0 : column + 1;
+            const float upper = (float)top[a] * (1.0f - r) + (float)top[b] * r;
+            const float lower = (float)below[a] * (1.0f - r) + (float)below[b] * r;
+            kept |= (unsigned)(upper * (1.0f - d) + lower * d >= 127.5f) << k;
+        }
+        return kept;
+    };
+"""

@@ -16,7 +16,9 @@ from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
     draw_coverage,
     fan_edges,
     is_beyond_guard,
+    is_empty,
     make_edges,
+    pixel_box,
 )
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -43,7 +45,10 @@ def draw_silhouettes(
         j = first + geometry.faces[3 * f + 1]
         k = first + geometry.faces[3 * f + 2]
         if xy[i][0] != UNSNAPPED and xy[j][0] != UNSNAPPED and xy[k][0] != UNSNAPPED:
-            e = make_edges(xy[i], xy[j], xy[k], outline.window)
+            box = pixel_box(xy[i], xy[j], xy[k], outline.window, 0)
+            if is_empty(box):
+                continue
+            e = make_edges(xy[i], xy[j], xy[k], outline.window, box, 0)
             if e.covers != 0:
                 cutout = make_cutout(view, world, outline.body, f)
                 plane = DepthPlane()
@@ -57,6 +62,6 @@ def draw_silhouettes(
             plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], outline.window)
             plane.high = 1.0 / Z_NEAR_M
             for t in range(1, corners - 1):
-                e = fan_edges(view, polygon, t, outline.window)
+                e = fan_edges(view, polygon, t, outline.window, 0)
                 if e.covers != 0:
                     draw_coverage(world, e, plane, cutout, outline, mask)

@@ -11,9 +11,10 @@ from __future__ import annotations
 import warp as wp
 
 from gen_data.generator.renderers.warp.scene.kernels.records import View, World
+from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 from gen_data.generator.renderers.warp.visibility.kernels.alpha_cutouts import (
+    SOLID,
     Cutout,
-    is_solid_at,
     make_cutout,
 )
 
@@ -67,6 +68,16 @@ class Outline:
 
 
 @wp.struct
+class Box:
+    """Pixels of a window, first and last of each axis."""
+
+    x_first: int
+    x_last: int
+    y_first: int
+    y_last: int
+
+
+@wp.struct
 class Edge:
     """Edge function: value at a first pixel, and steps per pixel; inside is >= 0."""
 
@@ -77,13 +88,10 @@ class Edge:
 
 @wp.struct
 class Edges:
-    """The edge functions of a triangle over its box of pixels, relative to the window."""
+    """The edge functions of a triangle over its box of pixels; ``covers`` is 0 if it has no area."""
 
     covers: int
-    x_first: int
-    x_last: int
-    y_first: int
-    y_last: int
+    box: Box
     a: Edge
     b: Edge
     c: Edge
@@ -152,25 +160,17 @@ def project_vertices(
 
 
 @wp.func
-def first_centre(fixed: int):
-    """First pixel whose centre is at or after a snapped coordinate."""
-    # A centre is at 256 i + 128; the shift rounds (fixed - 128) / 256 up.
-    return (fixed + 127) >> 8
+def edge_between(p: wp.vec2i, q: wp.vec2i, x: int, y: int, reach: int):
+    """Edge function from p to q at a snapped point; positive on its right (y is down).
 
-
-@wp.func
-def last_centre(fixed: int):
-    """Last pixel whose centre is at or before a snapped coordinate."""
-    return (fixed - 128) >> 8
-
-
-@wp.func
-def edge_between(p: wp.vec2i, q: wp.vec2i, x: int, y: int):
-    """Edge function from p to q at a snapped point; positive on its right (y is down)."""
+    Args:
+        reach: Distance along each axis by which the edge is moved outwards [1/256 px].
+    """
     dx = wp.int64(p[1] - q[1])
     dy = wp.int64(q[0] - p[0])
     edge = Edge()
     edge.value = wp.int64(x - p[0]) * dx + wp.int64(y - p[1]) * dy
+    edge.value += wp.int64(reach) * (wp.abs(dx) + wp.abs(dy))
     # Top-left rule: left and top edges own the centres on them.
     if not (dx > wp.int64(0) or (dx == wp.int64(0) and dy > wp.int64(0))):
         edge.value -= wp.int64(1)
@@ -180,68 +180,68 @@ def edge_between(p: wp.vec2i, q: wp.vec2i, x: int, y: int):
 
 
 @wp.func
-def make_edges(p: wp.vec2i, q: wp.vec2i, r: wp.vec2i, window: Window):
-    """Edge functions of a triangle of either orientation, and the box of pixels it may cover."""
-    edges = Edges()
+def pixel_box(p: wp.vec2i, q: wp.vec2i, r: wp.vec2i, window: Window, reach: int):
+    """The box of pixels of a window whose centres a triangle may cover; empty if last < first.
+
+    Args:
+        reach: Distance along each axis by which the triangle is enlarged [1/256 px].
+    """
     x_low, x_high = wp.min(p[0], wp.min(q[0], r[0])), wp.max(p[0], wp.max(q[0], r[0]))
     y_low, y_high = wp.min(p[1], wp.min(q[1], r[1])), wp.max(p[1], wp.max(q[1], r[1]))
-    edges.x_first = wp.max(first_centre(x_low) - window.x0, 0)
-    edges.x_last = wp.min(last_centre(x_high) - window.x0, window.width - 1)
-    edges.y_first = wp.max(first_centre(y_low) - window.y0, 0)
-    edges.y_last = wp.min(last_centre(y_high) - window.y0, window.height - 1)
-    if edges.x_first > edges.x_last or edges.y_first > edges.y_last:
-        return edges
+    box = Box()
+    # Centres are at 256 i + 128: lows are rounded up to them, highs down.
+    box.x_first = wp.max(((x_low - reach + 127) >> 8) - window.x0, 0)
+    box.x_last = wp.min(((x_high + reach - 128) >> 8) - window.x0, window.width - 1)
+    box.y_first = wp.max(((y_low - reach + 127) >> 8) - window.y0, 0)
+    box.y_last = wp.min(((y_high + reach - 128) >> 8) - window.y0, window.height - 1)
+    return box
+
+
+@wp.func
+def is_empty(box: Box):
+    """Whether a box has no pixels."""
+    return box.x_first > box.x_last or box.y_first > box.y_last
+
+
+@wp.func
+def make_edges(p: wp.vec2i, q: wp.vec2i, r: wp.vec2i, window: Window, box: Box, reach: int):
+    """Edge functions over a box of pixels, of a triangle of either orientation."""
+    edges = Edges()
+    edges.box = box
     area = wp.int64(q[0] - p[0]) * wp.int64(r[1] - p[1])
     area -= wp.int64(r[0] - p[0]) * wp.int64(q[1] - p[1])
     # Degenerate after snapping: it covers no centre.
     if area == wp.int64(0):
         return edges
     # Centre of the first pixel, in snapped units.
-    x = ((edges.x_first + window.x0) << 8) + 128
-    y = ((edges.y_first + window.y0) << 8) + 128
+    x = ((box.x_first + window.x0) << 8) + 128
+    y = ((box.y_first + window.y0) << 8) + 128
     if area > wp.int64(0):
-        edges.a = edge_between(p, q, x, y)
-        edges.b = edge_between(q, r, x, y)
-        edges.c = edge_between(r, p, x, y)
+        edges.a = edge_between(p, q, x, y, reach)
+        edges.b = edge_between(q, r, x, y, reach)
+        edges.c = edge_between(r, p, x, y, reach)
     else:
-        edges.a = edge_between(q, p, x, y)
-        edges.b = edge_between(r, q, x, y)
-        edges.c = edge_between(p, r, x, y)
+        edges.a = edge_between(q, p, x, y, reach)
+        edges.b = edge_between(r, q, x, y, reach)
+        edges.c = edge_between(p, r, x, y, reach)
     edges.covers = 1
     return edges
 
 
 @wp.func
-def span_start(e: wp.int64, dx: wp.int64, first: int):
-    """Smallest step >= first at which ``e + step * dx >= 0``."""
-    start = first
-    if e < wp.int64(0):
-        if dx > wp.int64(0):
-            # Rounded up; the limit keeps the 64-bit quotient within 32 bits.
-            start = wp.max(first, int(wp.min((dx - e - wp.int64(1)) / dx, wp.int64(1 << 30))))
-        else:
-            start = 1 << 30
-    return start
-
-
-@wp.func
-def span_end(e: wp.int64, dx: wp.int64, last: int):
-    """Largest step <= last at which ``e + step * dx >= 0``."""
-    end = last
-    if dx < wp.int64(0) and e >= wp.int64(0):
-        end = wp.min(last, int(wp.min(e / -dx, wp.int64(1 << 30))))
-    return end
+def largest_nearness(p0: wp.vec3, p1: wp.vec3, p2: wp.vec3):
+    """1/z of the nearest of three camera-frame points, bounded [1/m]."""
+    z_low = wp.min(p0[2], wp.min(p1[2], p2[2]))
+    # Snapping moves edges by up to 1/512 px: depth beyond the triangle is clamped to its corners'.
+    return 1.0 / wp.max(z_low, 0.5 * Z_NEAR_M)
 
 
 @wp.func
 def depth_plane(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3, window: Window):
     """1/z over the window's pixels, of the plane through three camera-frame points."""
     plane = DepthPlane()
-    z_low = wp.min(p0[2], wp.min(p1[2], p2[2]))
-    z_high = wp.max(p0[2], wp.max(p1[2], p2[2]))
-    plane.low = 1.0 / z_high
-    # Snapping moves edges by up to 1/512 px: depth beyond the triangle is clamped to its corners'.
-    plane.high = 1.0 / wp.max(z_low, 0.5 * Z_NEAR_M)
+    plane.low = 1.0 / wp.max(p0[2], wp.max(p1[2], p2[2]))
+    plane.high = largest_nearness(p0, p1, p2)
     n = wp.cross(p1 - p0, p2 - p0)
     d = wp.dot(n, p0)
     if d == 0.0:
@@ -258,10 +258,103 @@ def depth_plane(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3, window: Windo
     return plane
 
 
-@wp.func
+# Visit the groups of LANES pixels of a triangle's box: ``visit(x, y, inside, a, b, c)`` gets the first
+# pixel, a mask of the pixels inside all edges, and the edge functions. Needs ``edges`` and SIMD.
+SCAN = """
+    // Edge functions of such triangles fit into 32 bits: their boxes are below 100 px.
+    constexpr long long SHORT = 100 << 16;
+
+    // Steps of a row of ``width`` at which an edge function may be positive, rounded outwards.
+    auto narrow = [](double value, long long dx, double inverse, int width, int& first, int& end) {
+        const double root = -value * inverse;
+        if (dx > 0 && root > first)
+            first = root < width ? (int)root : width;
+        else if (dx < 0 && root < end - 2)
+            end = root > 0.0 ? (int)root + 2 : 2;
+        else if (dx == 0 && value < 0.0)
+            end = 0;
+    };
+
+    // ``step`` is 0, 1, 2 and so on, in the type of the edge functions.
+    auto scan_with = [&](auto step, auto visit) {
+        typedef decltype(step) Numbers;
+        const auto &box = edges.box;
+        const auto &ea = edges.a, &eb = edges.b, &ec = edges.c;
+        Numbers row_a = step * Numbers(ea.dx) + Numbers(ea.value);
+        Numbers row_b = step * Numbers(eb.dx) + Numbers(eb.value);
+        Numbers row_c = step * Numbers(ec.dx) + Numbers(ec.value);
+        const int width = box.x_last - box.x_first + 1;
+        const bool is_wide = width > 3 * LANES;
+        double inverse_a = 0.0, inverse_b = 0.0, inverse_c = 0.0;
+        if (is_wide) {
+            inverse_a = 1.0 / (double)ea.dx;
+            inverse_b = 1.0 / (double)eb.dx;
+            inverse_c = 1.0 / (double)ec.dx;
+        }
+        for (int y = box.y_first; y <= box.y_last; ++y) {
+            Numbers a = row_a, b = row_b, c = row_c;
+            int first = 0, end = width;
+            if (is_wide) {
+                narrow(get(a, 0), ea.dx, inverse_a, width, first, end);
+                narrow(get(b, 0), eb.dx, inverse_b, width, first, end);
+                narrow(get(c, 0), ec.dx, inverse_c, width, first, end);
+                a += Numbers(first * ea.dx);
+                b += Numbers(first * eb.dx);
+                c += Numbers(first * ec.dx);
+            }
+            for (int x = first; x < end; x += LANES) {
+                const auto inside = as_ints(least(a, least(b, c)) >= Numbers(0));
+                visit(box.x_first + x, y, inside & (lane < Ints(width - x)), a, b, c);
+                a += Numbers(LANES * ea.dx);
+                b += Numbers(LANES * eb.dx);
+                c += Numbers(LANES * ec.dx);
+            }
+            row_a += Numbers(ea.dy);
+            row_b += Numbers(eb.dy);
+            row_c += Numbers(ec.dy);
+        }
+    };
+
+    auto scan = [&](auto visit) {
+        auto is_short = [](const auto& edge) {
+            return edge.dx < SHORT && edge.dx > -SHORT && edge.dy < SHORT && edge.dy > -SHORT;
+        };
+        if (is_short(edges.a) && is_short(edges.b) && is_short(edges.c))
+            scan_with(lane, visit);
+        else
+            scan_with(lane_double, visit);
+    };
+"""
+
+
+@wp.func_native(
+    SIMD
+    + SOLID
+    + SCAN
+    + """
+    const Floats low = plane.low, high = plane.high;
+    const long long hit = (unsigned)body | (long long)face << 32;
+    scan([&](int x, int y, auto covered, auto, auto, auto) {
+        const Floats xs = floats(lane) + (float)x;
+        const Floats w = clamped(plane.c + (float)y * plane.dy + xs * plane.dx, low, high);
+        auto& nearest = *(FloatsInMemory*)(nearness.data + y * stride + x);
+        auto nearer = covered & (w > nearest);
+        unsigned drawn = bits(nearer);
+        if (drawn && cutout.texture >= 0) {
+            drawn = solid(drawn, xs + 0.5f, Floats((float)y + 0.5f), w);
+            nearer = from_bits(drawn, lane);
+        }
+        if (drawn) {
+            auto& shown = *(LongsInMemory*)(hits.data + y * stride + x);
+            nearest = nearer ? w : (Floats)nearest;
+            shown = as_longs(nearer) ? Longs(hit) : (Longs)shown;
+        }
+    });
+"""
+)
 def draw_nearest(
     world: World,
-    e: Edges,
+    edges: Edges,
     plane: DepthPlane,
     cutout: Cutout,
     body: int,
@@ -274,46 +367,32 @@ def draw_nearest(
 
     The window's first pixel must be the image's.
     """
-    a = e.a.value
-    b = e.b.value
-    c = e.c.value
-    count = e.x_last - e.x_first
-    for y in range(e.y_first, e.y_last + 1):
-        first = int(0)
-        last = count
-        # Short rows are tested pixel by pixel: faster than the divisions.
-        if count > 8:
-            first = span_start(a, e.a.dx, span_start(b, e.b.dx, span_start(c, e.c.dx, 0)))
-            last = span_end(a, e.a.dx, span_end(b, e.b.dx, span_end(c, e.c.dx, count)))
-        a_here = a + wp.int64(first) * e.a.dx
-        b_here = b + wp.int64(first) * e.b.dx
-        c_here = c + wp.int64(first) * e.c.dx
-        row = plane.c + float(y) * plane.dy
-        pixel = y * stride + e.x_first + first
-        # A while loop: Warp's range loops cost more than this body.
-        x = int(e.x_first + first)
-        while x <= e.x_first + last:
-            # One sign test for three edges: the sign bit of the bitwise or is set if any is.
-            if (a_here | b_here | c_here) >= wp.int64(0):
-                w = wp.clamp(row + float(x) * plane.dx, plane.low, plane.high)
-                if w > nearness[pixel]:
-                    if is_solid_at(world, cutout, float(x) + 0.5, float(y) + 0.5, w):
-                        nearness[pixel] = w
-                        hits[pixel] = wp.vec2i(body, face)
-            a_here += e.a.dx
-            b_here += e.b.dx
-            c_here += e.c.dx
-            pixel += 1
-            x += 1
-        a += e.a.dy
-        b += e.b.dy
-        c += e.c.dy
+    ...
 
 
-@wp.func
+@wp.func_native(
+    SIMD
+    + SOLID
+    + SCAN
+    + """
+    const auto& window = outline.window;
+    const Floats low = plane.low, high = plane.high;
+    scan([&](int x, int y, auto covered, auto, auto, auto) {
+        unsigned drawn = bits(covered);
+        if (drawn && cutout.texture >= 0) {
+            const Floats xs = floats(lane) + (float)x;
+            const Floats w = clamped(plane.c + (float)y * plane.dy + xs * plane.dx, low, high);
+            const Floats x_px = floats(lane) + (float)(x + window.x0) + 0.5f;
+            drawn = solid(drawn, x_px, Floats((float)(y + window.y0) + 0.5f), w);
+        }
+        for (; drawn; drawn &= drawn - 1)
+            mask.data[outline.first_pixel + y * outline.stride + x + first_bit(drawn)] = 1;
+    });
+"""
+)
 def draw_coverage(
     world: World,
-    e: Edges,
+    edges: Edges,
     plane: DepthPlane,
     cutout: Cutout,
     outline: Outline,
@@ -324,38 +403,24 @@ def draw_coverage(
     Args:
         plane: Needed only for a cutout with a texture.
     """
-    a = e.a.value
-    b = e.b.value
-    c = e.c.value
-    count = e.x_last - e.x_first
-    for y in range(e.y_first, e.y_last + 1):
-        first = int(0)
-        last = count
-        if count > 8:
-            first = span_start(a, e.a.dx, span_start(b, e.b.dx, span_start(c, e.c.dx, 0)))
-            last = span_end(a, e.a.dx, span_end(b, e.b.dx, span_end(c, e.c.dx, count)))
-        a_here = a + wp.int64(first) * e.a.dx
-        b_here = b + wp.int64(first) * e.b.dx
-        c_here = c + wp.int64(first) * e.c.dx
-        pixel = int(outline.first_pixel + y * outline.stride + e.x_first + first)
-        end = pixel + last - first
-        row = plane.c + float(y) * plane.dy
-        x = int(e.x_first + first)
-        while pixel <= end:
-            if (a_here | b_here | c_here) >= wp.int64(0):
-                w = wp.clamp(row + float(x) * plane.dx, plane.low, plane.high)
-                x_px = float(x + outline.window.x0) + 0.5
-                y_px = float(y + outline.window.y0) + 0.5
-                if is_solid_at(world, cutout, x_px, y_px, w):
-                    mask[pixel] = wp.uint8(1)
-            a_here += e.a.dx
-            b_here += e.b.dx
-            c_here += e.c.dx
-            pixel += 1
-            x += 1
-        a += e.a.dy
-        b += e.b.dy
-        c += e.c.dy
+    ...
+
+
+@wp.func_native(
+    SIMD
+    + """
+    for (int y = box.y_first; y <= box.y_last; ++y)
+        for (int x = box.x_first; x <= box.x_last; x += LANES) {
+            const auto& nearest = *(const FloatsInMemory*)(nearness.data + y * stride + x);
+            if (bits((nearest < nearness_max) & (lane <= Ints(box.x_last - x))))
+                return false;
+        }
+    return true;
+"""
+)
+def is_hidden(box: Box, nearness_max: float, stride: int, nearness: wp.array[float]) -> bool:
+    """Whether all pixels of a box of an image are at least as near as ``nearness_max`` [1/m]."""
+    ...
 
 
 @wp.func
@@ -394,12 +459,16 @@ def clip(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3):
 
 
 @wp.func
-def fan_edges(view: View, polygon: Polygon, t: int, window: Window):
+def fan_edges(view: View, polygon: Polygon, t: int, window: Window, reach: int):
     """Edge functions of the t-th triangle of a polygon's fan."""
     p = snap_to_grid(view, polygon[0])
     q = snap_to_grid(view, polygon[t])
     r = snap_to_grid(view, polygon[t + 1])
-    return make_edges(p, q, r, window)
+    edges = Edges()
+    box = pixel_box(p, q, r, window, reach)
+    if not is_empty(box):
+        edges = make_edges(p, q, r, window, box, reach)
+    return edges
 
 
 @wp.func
@@ -417,20 +486,14 @@ def is_beyond_guard(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3):
 
 
 @wp.func
-def is_hidden(drawn: DrawnBody, width: int, height: int, nearness: wp.array[float]):
-    """Whether nearer surfaces fill all pixels of an image that a body may cover."""
-    hidden = bool(True)
-    y = int(wp.max(drawn.window.y0, 0))
-    y_end = wp.min(drawn.window.y0 + drawn.window.height, height)
-    x_first = wp.max(drawn.window.x0, 0)
-    x_end = wp.min(drawn.window.x0 + drawn.window.width, width)
-    while hidden and y < y_end:
-        x = int(x_first)
-        while hidden and x < x_end:
-            hidden = nearness[y * width + x] >= drawn.nearness_max
-            x += 1
-        y += 1
-    return hidden
+def window_in_image(window: Window, image: Window):
+    """The box of an image's pixels in a window."""
+    box = Box()
+    box.x_first = wp.max(window.x0, 0)
+    box.x_last = wp.min(window.x0 + window.width, image.width) - 1
+    box.y_first = wp.max(window.y0, 0)
+    box.y_last = wp.min(window.y0 + window.height, image.height) - 1
+    return box
 
 
 @wp.kernel
@@ -449,11 +512,13 @@ def draw_bodies(
     Bodies with cut-outs come last, so that few of their pixels need the alpha test.
 
     Args:
-        nearness: 1/z [1/m]; must be 0 on entry.
+        nearness: 1/z [1/m]; must be 0 on entry. It and ``hits`` are LANES longer than the image.
         hits: Unchanged where nothing is hit.
     """
     drawn = bodies[wp.tid()]
-    if is_hidden(drawn, window.width, window.height, nearness):
+    stride = window.width
+    whole = window_in_image(drawn.window, window)
+    if is_hidden(whole, drawn.nearness_max, stride, nearness):
         return
     b = drawn.body
     geometry = world.geometries[world.bodies[b].geometry]
@@ -463,11 +528,15 @@ def draw_bodies(
         j = first + geometry.faces[3 * f + 1]
         k = first + geometry.faces[3 * f + 2]
         if xy[i][0] != UNSNAPPED and xy[j][0] != UNSNAPPED and xy[k][0] != UNSNAPPED:
-            e = make_edges(xy[i], xy[j], xy[k], window)
-            if e.covers != 0:
-                plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
-                cutout = make_cutout(view, world, b, f)
-                draw_nearest(world, e, plane, cutout, b, f, window.width, nearness, hits)
+            box = pixel_box(xy[i], xy[j], xy[k], window, 0)
+            if not is_empty(box):
+                nearest = largest_nearness(p_camera[i], p_camera[j], p_camera[k])
+                if not is_hidden(box, nearest, stride, nearness):
+                    e = make_edges(xy[i], xy[j], xy[k], window, box, 0)
+                    if e.covers != 0:
+                        plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
+                        cutout = make_cutout(view, world, b, f)
+                        draw_nearest(world, e, plane, cutout, b, f, stride, nearness, hits)
         # A vertex lies outside the guard band: clip, and draw the polygon as a fan.
         elif not is_beyond_guard(view, p_camera[i], p_camera[j], p_camera[k]):
             polygon, corners = clip(view, p_camera[i], p_camera[j], p_camera[k])
@@ -476,6 +545,6 @@ def draw_bodies(
             plane.high = 1.0 / Z_NEAR_M
             cutout = make_cutout(view, world, b, f)
             for t in range(1, corners - 1):
-                e = fan_edges(view, polygon, t, window)
+                e = fan_edges(view, polygon, t, window, 0)
                 if e.covers != 0:
-                    draw_nearest(world, e, plane, cutout, b, f, window.width, nearness, hits)
+                    draw_nearest(world, e, plane, cutout, b, f, stride, nearness, hits)

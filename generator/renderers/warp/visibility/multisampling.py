@@ -1,0 +1,41 @@
+"""Samples of pixels on edges: what the rasteriser sees there."""
+
+from __future__ import annotations
+
+import numpy as np
+import warp as wp
+
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.renderers.warp.frame_context import CameraView
+from gen_data.generator.renderers.warp.scene.kernels.simd import LANES
+from gen_data.generator.renderers.warp.visibility.gbuffer import Projected
+from gen_data.generator.renderers.warp.visibility.kernels import msaa, rasterizer
+
+_QUAD = 4
+
+
+def draw_samples(
+    frame: CameraView, projected: Projected, pixels: wp.array, positions: Array
+) -> wp.array:
+    """Visible (body, face) at samples of listed pixels, [pixels, samples]; (-1, -1) for none.
+
+    Args:
+        positions: Of the samples in a pixel, [0, 1), [2, 4 or 8, 2]. Two are drawn twice.
+    """
+    cache, view, world = frame.cache, frame.view, frame.world
+    numbers = cache.scratch("numbers", frame.pixels, wp.int32)
+    floors = cache.scratch("floors", frame.pixels + LANES, float)
+    floors.fill_(msaa.UNLISTED)
+    inputs = [view, frame.gbuffer.record, pixels]
+    frame.launch(msaa.number_pixels, len(pixels), inputs, [numbers, floors])
+    repeats = -(-_QUAD // len(positions))
+    offsets = np.tile((positions * 256.0 - 128.0).astype(np.int32).T, repeats)
+    shape = (max(len(pixels), 1), offsets.shape[1])
+    nearness = wp.zeros(shape, dtype=float, device=cache.device)
+    hits = wp.full(shape, wp.vec2i(-1, -1), dtype=wp.vec2i, device=cache.device)
+    window = rasterizer.Window()
+    window.width, window.height = view.width, view.height
+    inputs = [view, window, world.record, projected.in_view, projected.p_camera, projected.xy]
+    inputs += [numbers, floors, wp.array(offsets, dtype=wp.int32, device=cache.device)]
+    frame.launch(msaa.draw_samples, len(projected.in_view), inputs, [nearness, hits])
+    return hits
