@@ -259,70 +259,51 @@ def depth_plane(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3, window: Windo
 
 
 # Visit the groups of LANES pixels of a triangle's box: ``visit(x, y, inside, a, b, c)`` gets the first
-# pixel, a mask of the pixels inside all edges, and the edge functions. Needs ``edges`` and SIMD.
+# pixel, a mask of the pixels inside all edges, and the edge functions. They are integers below
+# 2^51, which double precision holds and adds exactly. Needs ``edges``, and SIMD before it.
 SCAN = """
-    // Edge functions of such triangles fit into 32 bits: their boxes are below 100 px.
-    constexpr long long SHORT = 100 << 16;
-
     // Steps of a row of ``width`` at which an edge function may be positive, rounded outwards.
-    auto narrow = [](double value, long long dx, double inverse, int width, int& first, int& end) {
+    auto narrow = [](double value, double dx, double inverse, int width, int& first, int& end) {
         const double root = -value * inverse;
-        if (dx > 0 && root > first)
+        if (dx > 0.0 && root > first)
             first = root < width ? (int)root : width;
-        else if (dx < 0 && root < end - 2)
+        else if (dx < 0.0 && root < end - 2)
             end = root > 0.0 ? (int)root + 2 : 2;
-        else if (dx == 0 && value < 0.0)
+        else if (dx == 0.0 && value < 0.0)
             end = 0;
     };
-
-    // ``step`` is 0, 1, 2 and so on, in the type of the edge functions.
-    auto scan_with = [&](auto step, auto visit) {
-        typedef decltype(step) Numbers;
-        const auto &box = edges.box;
-        const auto &ea = edges.a, &eb = edges.b, &ec = edges.c;
-        Numbers row_a = step * Numbers(ea.dx) + Numbers(ea.value);
-        Numbers row_b = step * Numbers(eb.dx) + Numbers(eb.value);
-        Numbers row_c = step * Numbers(ec.dx) + Numbers(ec.value);
-        const int width = box.x_last - box.x_first + 1;
+    auto scan = [&](auto visit) {
+        const double a_dx = edges.a.dx, b_dx = edges.b.dx, c_dx = edges.c.dx;
+        const double a_dy = edges.a.dy, b_dy = edges.b.dy, c_dy = edges.c.dy;
+        double row_a = edges.a.value, row_b = edges.b.value, row_c = edges.c.value;
+        const Doubles lanes_a = lane_double * a_dx, lanes_b = lane_double * b_dx;
+        const Doubles lanes_c = lane_double * c_dx;
+        const int width = edges.box.x_last - edges.box.x_first + 1;
         const bool is_wide = width > 3 * LANES;
         double inverse_a = 0.0, inverse_b = 0.0, inverse_c = 0.0;
         if (is_wide) {
-            inverse_a = 1.0 / (double)ea.dx;
-            inverse_b = 1.0 / (double)eb.dx;
-            inverse_c = 1.0 / (double)ec.dx;
+            inverse_a = 1.0 / a_dx;
+            inverse_b = 1.0 / b_dx;
+            inverse_c = 1.0 / c_dx;
         }
-        for (int y = box.y_first; y <= box.y_last; ++y) {
-            Numbers a = row_a, b = row_b, c = row_c;
+        for (int y = edges.box.y_first; y <= edges.box.y_last; ++y) {
             int first = 0, end = width;
             if (is_wide) {
-                narrow(get(a, 0), ea.dx, inverse_a, width, first, end);
-                narrow(get(b, 0), eb.dx, inverse_b, width, first, end);
-                narrow(get(c, 0), ec.dx, inverse_c, width, first, end);
-                a += Numbers(first * ea.dx);
-                b += Numbers(first * eb.dx);
-                c += Numbers(first * ec.dx);
+                narrow(row_a, a_dx, inverse_a, width, first, end);
+                narrow(row_b, b_dx, inverse_b, width, first, end);
+                narrow(row_c, c_dx, inverse_c, width, first, end);
             }
             for (int x = first; x < end; x += LANES) {
-                const auto inside = as_ints(least(a, least(b, c)) >= Numbers(0));
-                visit(box.x_first + x, y, inside & (lane < Ints(width - x)), a, b, c);
-                a += Numbers(LANES * ea.dx);
-                b += Numbers(LANES * eb.dx);
-                c += Numbers(LANES * ec.dx);
+                const Doubles a = lanes_a + (row_a + x * a_dx);
+                const Doubles b = lanes_b + (row_b + x * b_dx);
+                const Doubles c = lanes_c + (row_c + x * c_dx);
+                const auto inside = as_ints(least(a, least(b, c)) >= Doubles(0.0));
+                visit(edges.box.x_first + x, y, inside & (lane < Ints(width - x)), a, b, c);
             }
-            row_a += Numbers(ea.dy);
-            row_b += Numbers(eb.dy);
-            row_c += Numbers(ec.dy);
+            row_a += a_dy;
+            row_b += b_dy;
+            row_c += c_dy;
         }
-    };
-
-    auto scan = [&](auto visit) {
-        auto is_short = [](const auto& edge) {
-            return edge.dx < SHORT && edge.dx > -SHORT && edge.dy < SHORT && edge.dy > -SHORT;
-        };
-        if (is_short(edges.a) && is_short(edges.b) && is_short(edges.c))
-            scan_with(lane, visit);
-        else
-            scan_with(lane_double, visit);
     };
 """
 
