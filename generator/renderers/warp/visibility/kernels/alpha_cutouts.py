@@ -122,10 +122,12 @@ SOLID = """
         const Points y = (1.0f - (v - floats(whole(v)))) * (float)height - 0.5f;
         const auto x0 = whole(x), y0 = whole(y);
         const Points right = x - floats(x0), down = y - floats(y0);
+        const auto *columns = (const int*)&x0, *rows = (const int*)&y0;
+        const auto *rights = (const float*)&right, *downs = (const float*)&down;
         unsigned kept = 0;
         for (unsigned left = candidates; left; left &= left - 1) {
-            const int k = first_bit(left), column = get(x0, k), row = get(y0, k);
-            const float r = get(right, k), d = get(down, k);
+            const int k = first_bit(left), column = columns[k], row = rows[k];
+            const float r = rights[k], d = downs[k];
             const auto* top = texture.cover.data + (row < 0 ? height - 1 : row) * width;
             const auto* below = texture.cover.data + (row + 1 >= height ? 0 : row + 1) * width;
             const int a = column < 0 ? width - 1 : column, b = column + 1 >= width ? 0 : column + 1;

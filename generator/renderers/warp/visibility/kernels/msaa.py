@@ -97,8 +97,8 @@ def number_pixels(
     struct { DoubleQuad a, b, c; FloatQuad right, down; } changes[SAMPLES_MAX / QUAD];
     for (int s = 0; s < samples; s += QUAD) {
         auto& change = changes[s / QUAD];
-        const IntQuad right = *(const IntQuadInMemory*)(offsets.data + s);
-        const IntQuad down = *(const IntQuadInMemory*)(offsets.data + samples + s);
+        const IntQuad right = load(offsets.data + s, IntQuad());
+        const IntQuad down = load(offsets.data + samples + s, IntQuad());
         auto between = [&](const auto& edge) {
             const double x = (double)(edge.dx >> 8), y = (double)(edge.dy >> 8);
             const double enlarged = HALF * ((x < 0.0 ? -x : x) + (y < 0.0 ? -y : y));
@@ -111,36 +111,34 @@ def number_pixels(
         change.down = floats(down) * FROM_GRID;
     }
 
-    scan([&](int x, int y, auto reached, auto a, auto b, auto c) {
-        const int i = y * stride + x;
-        const Floats limit = *(const FloatsInMemory*)(floors.data + i);
-        const Floats centres = plane.c + (float)y * dy + (floats(lane) + (float)x) * dx;
-        unsigned left = bits(reached & (limit <= Floats(plane.high)) & (limit <= centres + slack));
+    auto limits = [&](int x, int y) { return load(floors.data + y * stride + x, Floats()); };
+    auto matter = [&](int x, int y) { return bits(limits(x, y) <= Floats(plane.high)); };
+    scan(matter, [&](int x, int y, unsigned reached, auto a, auto b, auto c) {
+        const Floats centres = plane.c + (float)y * dy + (lane + (float)x) * dx;
+        const struct { Doubles a, b, c; Floats centres; } group = {a, b, c, centres};
+        const double *at_a = (const double*)&group.a, *at_b = (const double*)&group.b;
+        const double* at_c = (const double*)&group.c;
+        const float* at_centre = (const float*)&group.centres;
+        unsigned left = reached & bits(limits(x, y) <= centres + slack);
         for (; left; left &= left - 1) {
             const int pixel = first_bit(left);
-            const float centre = get(centres, pixel);
             for (int s = 0; s < samples; s += QUAD) {
                 const auto& change = changes[s / QUAD];
-                const DoubleQuad at_a = change.a + (double)get(a, pixel);
-                const DoubleQuad at_b = change.b + (double)get(b, pixel);
-                const DoubleQuad at_c = change.c + (double)get(c, pixel);
-                auto nearer = as_ints(least(at_a, least(at_b, at_c)) >= DoubleQuad(0.0));
-                if (!bits(nearer))
+                const DoubleQuad inside = least(
+                    change.a + at_a[pixel], least(change.b + at_b[pixel], change.c + at_c[pixel]));
+                unsigned drawn = bits(inside >= DoubleQuad(0.0));
+                if (!drawn)
                     continue;
-                const int row = numbers.data[i + pixel] * samples + s;
-                auto& nearest = *(FloatQuadInMemory*)(nearness.data + row);
-                const FloatQuad w = clamped(centre + (change.right * dx + change.down * dy), low, high);
-                nearer = nearer & (w > nearest);
-                unsigned drawn = bits(nearer);
-                if (drawn && cutout.texture >= 0) {
-                    const float x_px = (float)(x + pixel) + 0.5f, y_px = (float)y + 0.5f;
-                    drawn = solid(drawn, x_px + change.right, y_px + change.down, w);
-                    nearer = from_bits(drawn, quad_lane);
-                }
+                const int row = numbers.data[y * stride + x + pixel] * samples + s;
+                const FloatQuad w = clamped(
+                    at_centre[pixel] + (change.right * dx + change.down * dy), low, high);
+                drawn &= bits(w > load(nearness.data + row, w));
+                if (drawn)
+                    drawn = solid(drawn, change.right + ((float)(x + pixel) + 0.5f),
+                                  change.down + ((float)y + 0.5f), w);
                 if (drawn) {
-                    auto& shown = *(LongQuadInMemory*)(hits.data + row);
-                    nearest = nearer ? w : (FloatQuad)nearest;
-                    shown = as_longs(nearer) ? LongQuad(hit) : (LongQuad)shown;
+                    put(nearness.data + row, drawn, w);
+                    put(hits.data + row, drawn, LongQuad(hit));
                 }
             }
         }

@@ -258,9 +258,11 @@ def depth_plane(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3, window: Windo
     return plane
 
 
-# Visit the groups of LANES pixels of a triangle's box: ``visit(x, y, inside, a, b, c)`` gets the first
-# pixel, a mask of the pixels inside all edges, and the edge functions. They are integers below
-# 2^51, which double precision holds and adds exactly. Needs ``edges``, and SIMD before it.
+# Visit the groups of LANES pixels of a triangle's box. ``matter(x, y)`` gets the first pixel of a group
+# and tells which of its pixels matter, before edges are evaluated; ``visit(x, y, inside, a, b, c)``
+# gets those of them that are inside all edges, and the edge functions. Sets have one bit per pixel.
+# Edge functions are integers below 2^51, which double precision holds and adds exactly.
+# Needs ``edges``, and SIMD before it.
 SCAN = """
     // Steps of a row of ``width`` at which an edge function may be positive, rounded outwards.
     auto narrow = [](double value, double dx, double inverse, int width, int& first, int& end) {
@@ -272,13 +274,13 @@ SCAN = """
         else if (dx == 0.0 && value < 0.0)
             end = 0;
     };
-    auto scan = [&](auto visit) {
+    auto scan = [&](auto matter, auto visit) {
         const double a_dx = edges.a.dx, b_dx = edges.b.dx, c_dx = edges.c.dx;
         const double a_dy = edges.a.dy, b_dy = edges.b.dy, c_dy = edges.c.dy;
         double row_a = edges.a.value, row_b = edges.b.value, row_c = edges.c.value;
-        const Doubles lanes_a = lane_double * a_dx, lanes_b = lane_double * b_dx;
-        const Doubles lanes_c = lane_double * c_dx;
-        const int width = edges.box.x_last - edges.box.x_first + 1;
+        const Doubles lanes_a = doubles(lane) * a_dx, lanes_b = doubles(lane) * b_dx;
+        const Doubles lanes_c = doubles(lane) * c_dx;
+        const int x_first = edges.box.x_first, width = edges.box.x_last - x_first + 1;
         const bool is_wide = width > 3 * LANES;
         double inverse_a = 0.0, inverse_b = 0.0, inverse_c = 0.0;
         if (is_wide) {
@@ -294,11 +296,15 @@ SCAN = """
                 narrow(row_c, c_dx, inverse_c, width, first, end);
             }
             for (int x = first; x < end; x += LANES) {
+                unsigned inside = matter(x_first + x, y) & first_bits(width - x);
+                if (!inside)
+                    continue;
                 const Doubles a = lanes_a + (row_a + x * a_dx);
                 const Doubles b = lanes_b + (row_b + x * b_dx);
                 const Doubles c = lanes_c + (row_c + x * c_dx);
-                const auto inside = as_ints(least(a, least(b, c)) >= Doubles(0.0));
-                visit(edges.box.x_first + x, y, inside & (lane < Ints(width - x)), a, b, c);
+                inside &= bits(least(a, least(b, c)) >= Doubles(0.0));
+                if (inside)
+                    visit(x_first + x, y, inside, a, b, c);
             }
             row_a += a_dy;
             row_b += b_dy;
@@ -315,20 +321,17 @@ SCAN = """
     + """
     const Floats low = plane.low, high = plane.high;
     const long long hit = (unsigned)body | (long long)face << 32;
-    scan([&](int x, int y, auto covered, auto, auto, auto) {
-        const Floats xs = floats(lane) + (float)x;
+    auto nearest = [&](int x, int y) { return load(nearness.data + y * stride + x, Floats()); };
+    auto matter = [&](int x, int y) { return bits(nearest(x, y) < high); };
+    scan(matter, [&](int x, int y, unsigned inside, auto, auto, auto) {
+        const Floats xs = lane + (float)x;
         const Floats w = clamped(plane.c + (float)y * plane.dy + xs * plane.dx, low, high);
-        auto& nearest = *(FloatsInMemory*)(nearness.data + y * stride + x);
-        auto nearer = covered & (w > nearest);
-        unsigned drawn = bits(nearer);
-        if (drawn && cutout.texture >= 0) {
+        unsigned drawn = inside & bits(w > nearest(x, y));
+        if (drawn)
             drawn = solid(drawn, xs + 0.5f, Floats((float)y + 0.5f), w);
-            nearer = from_bits(drawn, lane);
-        }
         if (drawn) {
-            auto& shown = *(LongsInMemory*)(hits.data + y * stride + x);
-            nearest = nearer ? w : (Floats)nearest;
-            shown = as_longs(nearer) ? Longs(hit) : (Longs)shown;
+            put(nearness.data + y * stride + x, drawn, w);
+            put(hits.data + y * stride + x, drawn, Longs(hit));
         }
     });
 """
@@ -358,14 +361,12 @@ def draw_nearest(
     + """
     const auto& window = outline.window;
     const Floats low = plane.low, high = plane.high;
-    scan([&](int x, int y, auto covered, auto, auto, auto) {
-        unsigned drawn = bits(covered);
-        if (drawn && cutout.texture >= 0) {
-            const Floats xs = floats(lane) + (float)x;
-            const Floats w = clamped(plane.c + (float)y * plane.dy + xs * plane.dx, low, high);
-            const Floats x_px = floats(lane) + (float)(x + window.x0) + 0.5f;
-            drawn = solid(drawn, x_px, Floats((float)(y + window.y0) + 0.5f), w);
-        }
+    auto matter = [](int x, int y) { return ~0u; };
+    scan(matter, [&](int x, int y, unsigned inside, auto, auto, auto) {
+        const Floats w = clamped(
+            plane.c + (float)y * plane.dy + (lane + (float)x) * plane.dx, low, high);
+        const Floats x_px = lane + ((float)(x + window.x0) + 0.5f);
+        unsigned drawn = solid(inside, x_px, Floats((float)(y + window.y0) + 0.5f), w);
         for (; drawn; drawn &= drawn - 1)
             mask.data[outline.first_pixel + y * outline.stride + x + first_bit(drawn)] = 1;
     });
@@ -392,8 +393,8 @@ def draw_coverage(
     + """
     for (int y = box.y_first; y <= box.y_last; ++y)
         for (int x = box.x_first; x <= box.x_last; x += LANES) {
-            const auto& nearest = *(const FloatsInMemory*)(nearness.data + y * stride + x);
-            if (bits((nearest < nearness_max) & (lane <= Ints(box.x_last - x))))
+            const Floats nearest = load(nearness.data + y * stride + x, Floats());
+            if (bits(nearest < Floats(nearness_max)) & first_bits(box.x_last - x + 1))
                 return false;
         }
     return true;
