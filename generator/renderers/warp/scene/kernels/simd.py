@@ -25,6 +25,7 @@ SIMD = """
     auto doubles = [](auto v) { return (double)v; };
     auto ints = [](float v) { return (int)v; };
     auto chosen = [](unsigned set, auto a, auto b) { return set ? a : b; };
+    auto gather = [](const auto* array, int i) { return (int)array[i]; };
 #else
     constexpr int LANES = 8, QUAD = 4;
     typedef float Floats __attribute__((ext_vector_type(8)));
@@ -69,6 +70,14 @@ SIMD = """
             return (Integers(set) & Integers{1, 2, 4, 8, 16, 32, 64, 128}) != 0 ? a : b;
         else
             return (Integers(set) & Integers{1, 2, 4, 8}) != 0 ? a : b;
+    };
+    // Elements of an array of integers.
+    auto gather = [](const auto* array, auto i) {
+        if constexpr (sizeof(i) / sizeof(i[0]) == 8)
+            return Ints{array[i[0]], array[i[1]], array[i[2]], array[i[3]],
+                        array[i[4]], array[i[5]], array[i[6]], array[i[7]]};
+        else
+            return IntQuad{array[i[0]], array[i[1]], array[i[2]], array[i[3]]};
     };
 #endif
     // As many elements of an array as ``like`` has, from any address.

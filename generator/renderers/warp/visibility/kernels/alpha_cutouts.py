@@ -122,19 +122,12 @@ SOLID = """
         const Points y = (1.0f - (v - floats(whole(v)))) * (float)height - 0.5f;
         const auto x0 = whole(x), y0 = whole(y);
         const Points right = x - floats(x0), down = y - floats(y0);
-        const auto *columns = (const int*)&x0, *rows = (const int*)&y0;
-        const auto *rights = (const float*)&right, *downs = (const float*)&down;
-        unsigned kept = 0;
-        for (unsigned left = candidates; left; left &= left - 1) {
-            const int k = first_bit(left), column = columns[k], row = rows[k];
-            const float r = rights[k], d = downs[k];
-            const auto* top = texture.cover.data + (row < 0 ? height - 1 : row) * width;
-            const auto* below = texture.cover.data + (row + 1 >= height ? 0 : row + 1) * width;
-            const int a = column < 0 ? width - 1 : column, b = column + 1 >= width ? 0 : column + 1;
-            const float upper = (float)top[a] * (1.0f - r) + (float)top[b] * r;
-            const float lower = (float)below[a] * (1.0f - r) + (float)below[b] * r;
-            kept |= (unsigned)(upper * (1.0f - d) + lower * d >= 127.5f) << k;
-        }
-        return kept;
+        const auto left = x0 < 0 ? width - 1 : x0, next = x0 + 1 >= width ? 0 : x0 + 1;
+        const auto top = (y0 < 0 ? height - 1 : y0) * width;
+        const auto below = (y0 + 1 >= height ? 0 : y0 + 1) * width;
+        auto texels = [&](auto i) { return floats(gather(texture.cover.data, i)); };
+        const Points upper = texels(top + left) * (1.0f - right) + texels(top + next) * right;
+        const Points lower = texels(below + left) * (1.0f - right) + texels(below + next) * right;
+        return candidates & bits(upper * (1.0f - down) + lower * down >= Points(127.5f));
     };
 """

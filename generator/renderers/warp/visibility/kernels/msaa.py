@@ -126,13 +126,12 @@ def number_pixels(
                 const auto& change = changes[s / QUAD];
                 const DoubleQuad inside = least(
                     change.a + at_a[pixel], least(change.b + at_b[pixel], change.c + at_c[pixel]));
-                unsigned drawn = bits(inside >= DoubleQuad(0.0));
-                if (!drawn)
-                    continue;
                 const int row = numbers.data[y * stride + x + pixel] * samples + s;
                 const FloatQuad w = clamped(
                     at_centre[pixel] + (change.right * dx + change.down * dy), low, high);
-                drawn &= bits(w > load(nearness.data + row, w));
+                // One branch for both tests: it cannot be predicted.
+                unsigned drawn = bits(inside >= DoubleQuad(0.0))
+                    & bits(w > load(nearness.data + row, w));
                 if (drawn)
                     drawn = solid(drawn, change.right + ((float)(x + pixel) + 0.5f),
                                   change.down + ((float)y + 0.5f), w);
