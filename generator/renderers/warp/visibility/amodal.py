@@ -27,6 +27,7 @@ from gen_data.generator.renderers.warp.frame_context import (
     pack_state,
 )
 from gen_data.generator.renderers.warp.scene.kernels import records
+from gen_data.generator.renderers.warp.scene.kernels.simd import LANES
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld, pack_view
 from gen_data.generator.renderers.warp.visibility.distortion_lut import NODE_STRIDE_PX
 from gen_data.generator.renderers.warp.visibility.gbuffer import (
@@ -76,7 +77,7 @@ def _rasterize_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.ui
         for number in projected.reached.tolist()
     }
     outlines, size = _outline_records(scene, boxes, whole)
-    mask = wp.zeros(size, dtype=wp.uint8, device=cache.device)
+    mask = wp.zeros(size + LANES, dtype=wp.uint8, device=cache.device)
     listed = wp.array(outlines, dtype=Outline, device=cache.device)
     inputs = [view, world.record, projected.p_camera, projected.xy, listed]
     frame.launch(draw_silhouettes, len(outlines), inputs, [mask])

@@ -18,6 +18,7 @@ SIMD = """
     typedef double Doubles, DoubleQuad;
     typedef int IntQuad;
     typedef long long Longs, LongQuad;
+    typedef unsigned char Bytes;
     const float lane = 0.0f;
     auto bits = [](bool truth) { return (unsigned)truth; };
     auto first_bit = [](unsigned set) { return __ffs(set) - 1; };
@@ -32,6 +33,7 @@ SIMD = """
     typedef double Doubles __attribute__((ext_vector_type(8)));
     typedef int Ints __attribute__((ext_vector_type(8)));
     typedef long long Longs __attribute__((ext_vector_type(8)));
+    typedef unsigned char Bytes __attribute__((ext_vector_type(8)));
     typedef float FloatQuad __attribute__((ext_vector_type(4)));
     typedef double DoubleQuad __attribute__((ext_vector_type(4)));
     typedef int IntQuad __attribute__((ext_vector_type(4)));

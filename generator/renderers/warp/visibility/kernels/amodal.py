@@ -17,6 +17,7 @@ from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
     fan_edges,
     is_beyond_guard,
     is_empty,
+    is_filled,
     make_edges,
     pixel_box,
 )
@@ -46,7 +47,7 @@ def draw_silhouettes(
         k = first + geometry.faces[3 * f + 2]
         if xy[i][0] != UNSNAPPED and xy[j][0] != UNSNAPPED and xy[k][0] != UNSNAPPED:
             box = pixel_box(xy[i], xy[j], xy[k], outline.window, 0)
-            if is_empty(box):
+            if is_empty(box) or is_filled(box, outline, mask):
                 continue
             e = make_edges(xy[i], xy[j], xy[k], outline.window, box, 0)
             if e.covers != 0:

@@ -113,22 +113,21 @@ def number_pixels(
 
     auto limits = [&](int x, int y) { return load(floors.data + y * stride + x, Floats()); };
     auto matter = [&](int x, int y) { return bits(limits(x, y) <= Floats(plane.high)); };
-    scan(matter, [&](int x, int y, unsigned reached, auto a, auto b, auto c) {
-        const Floats centres = plane.c + (float)y * dy + (lane + (float)x) * dx;
-        const struct { Doubles a, b, c; Floats centres; } group = {a, b, c, centres};
-        const double *at_a = (const double*)&group.a, *at_b = (const double*)&group.b;
-        const double* at_c = (const double*)&group.c;
-        const float* at_centre = (const float*)&group.centres;
+    scan(matter, [&](int x, int y, unsigned reached, auto at) {
+        const float row_centre = plane.c + (float)y * dy;
+        const Floats centres = row_centre + (lane + (float)x) * dx;
         unsigned left = reached & bits(limits(x, y) <= centres + slack);
         for (; left; left &= left - 1) {
             const int pixel = first_bit(left);
+            const Values values = at(pixel);
+            const float centre = row_centre + (float)(x + pixel) * dx;
             for (int s = 0; s < samples; s += QUAD) {
                 const auto& change = changes[s / QUAD];
                 const DoubleQuad inside = least(
-                    change.a + at_a[pixel], least(change.b + at_b[pixel], change.c + at_c[pixel]));
+                    change.a + values.a, least(change.b + values.b, change.c + values.c));
                 const int row = numbers.data[y * stride + x + pixel] * samples + s;
                 const FloatQuad w = clamped(
-                    at_centre[pixel] + (change.right * dx + change.down * dy), low, high);
+                    centre + (change.right * dx + change.down * dy), low, high);
                 // One branch for both tests: it cannot be predicted.
                 unsigned drawn = bits(inside >= DoubleQuad(0.0))
                     & bits(w > load(nearness.data + row, w));

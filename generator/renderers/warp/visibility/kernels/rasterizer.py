@@ -259,12 +259,15 @@ def depth_plane(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3, window: Windo
 
 
 # Visit the groups of LANES pixels of a triangle's box. ``matter(x, y)`` gets the first pixel of a group
-# and tells which of its pixels matter, before edges are evaluated; ``visit(x, y, inside, a, b, c)``
-# gets those of them that are inside all edges, and the edge functions. Sets have one bit per pixel.
+# and tells which of its pixels matter, before edges are evaluated; ``visit(x, y, inside, at)`` gets
+# those of them that are inside all edges. ``at(k)`` has the edge functions at the group's k-th pixel.
 # Edge functions are integers below 2^51, which double precision holds and adds exactly.
 # Needs ``edges``, and SIMD before it.
 SCAN = """
-    // Steps of a row of ``width`` at which an edge function may be positive, rounded outwards.
+    struct Values { double a, b, c; };
+    // Steps of a row of ``width`` at which an edge function may be positive, rounded outwards by
+    // less than ROUNDED pixels.
+    constexpr int ROUNDED = 3;
     auto narrow = [](double value, double dx, double inverse, int width, int& first, int& end) {
         const double root = -value * inverse;
         if (dx > 0.0 && root > first)
@@ -275,40 +278,41 @@ SCAN = """
             end = 0;
     };
     auto scan = [&](auto matter, auto visit) {
-        const double a_dx = edges.a.dx, b_dx = edges.b.dx, c_dx = edges.c.dx;
-        const double a_dy = edges.a.dy, b_dy = edges.b.dy, c_dy = edges.c.dy;
-        double row_a = edges.a.value, row_b = edges.b.value, row_c = edges.c.value;
-        const Doubles lanes_a = doubles(lane) * a_dx, lanes_b = doubles(lane) * b_dx;
-        const Doubles lanes_c = doubles(lane) * c_dx;
+        const Values dx = {(double)edges.a.dx, (double)edges.b.dx, (double)edges.c.dx};
+        const Values dy = {(double)edges.a.dy, (double)edges.b.dy, (double)edges.c.dy};
+        Values row = {(double)edges.a.value, (double)edges.b.value, (double)edges.c.value};
+        const Doubles lanes_a = doubles(lane) * dx.a, lanes_b = doubles(lane) * dx.b;
+        const Doubles lanes_c = doubles(lane) * dx.c;
         const int x_first = edges.box.x_first, width = edges.box.x_last - x_first + 1;
         const bool is_wide = width > 3 * LANES;
-        double inverse_a = 0.0, inverse_b = 0.0, inverse_c = 0.0;
-        if (is_wide) {
-            inverse_a = 1.0 / a_dx;
-            inverse_b = 1.0 / b_dx;
-            inverse_c = 1.0 / c_dx;
-        }
+        Values inverse = {};
+        if (is_wide)
+            inverse = {1.0 / dx.a, 1.0 / dx.b, 1.0 / dx.c};
         for (int y = edges.box.y_first; y <= edges.box.y_last; ++y) {
             int first = 0, end = width;
             if (is_wide) {
-                narrow(row_a, a_dx, inverse_a, width, first, end);
-                narrow(row_b, b_dx, inverse_b, width, first, end);
-                narrow(row_c, c_dx, inverse_c, width, first, end);
+                narrow(row.a, dx.a, inverse.a, width, first, end);
+                narrow(row.b, dx.b, inverse.b, width, first, end);
+                narrow(row.c, dx.c, inverse.c, width, first, end);
             }
             for (int x = first; x < end; x += LANES) {
                 unsigned inside = matter(x_first + x, y) & first_bits(width - x);
                 if (!inside)
                     continue;
-                const Doubles a = lanes_a + (row_a + x * a_dx);
-                const Doubles b = lanes_b + (row_b + x * b_dx);
-                const Doubles c = lanes_c + (row_c + x * c_dx);
-                inside &= bits(least(a, least(b, c)) >= Doubles(0.0));
-                if (inside)
-                    visit(x_first + x, y, inside, a, b, c);
+                auto at = [&](int k) {
+                    const double step = x + k;
+                    return Values{row.a + step * dx.a, row.b + step * dx.b, row.c + step * dx.c};
+                };
+                if (!is_wide || x < first + ROUNDED || x + LANES > end - ROUNDED) {
+                    const Values e = at(0);
+                    const Doubles a = lanes_a + e.a, b = lanes_b + e.b, c = lanes_c + e.c;
+                    inside &= bits(least(a, least(b, c)) >= Doubles(0.0));
+                    if (!inside)
+                        continue;
+                }
+                visit(x_first + x, y, inside, at);
             }
-            row_a += a_dy;
-            row_b += b_dy;
-            row_c += c_dy;
+            row = {row.a + dy.a, row.b + dy.b, row.c + dy.c};
         }
     };
 """
@@ -323,7 +327,7 @@ SCAN = """
     const long long hit = (unsigned)body | (long long)face << 32;
     auto nearest = [&](int x, int y) { return load(nearness.data + y * stride + x, Floats()); };
     auto matter = [&](int x, int y) { return bits(nearest(x, y) < high); };
-    scan(matter, [&](int x, int y, unsigned inside, auto, auto, auto) {
+    scan(matter, [&](int x, int y, unsigned inside, auto) {
         const Floats xs = lane + (float)x;
         const Floats w = clamped(plane.c + (float)y * plane.dy + xs * plane.dx, low, high);
         unsigned drawn = inside & bits(w > nearest(x, y));
@@ -361,14 +365,19 @@ def draw_nearest(
     + """
     const auto& window = outline.window;
     const Floats low = plane.low, high = plane.high;
-    auto matter = [](int x, int y) { return ~0u; };
-    scan(matter, [&](int x, int y, unsigned inside, auto, auto, auto) {
-        const Floats w = clamped(
-            plane.c + (float)y * plane.dy + (lane + (float)x) * plane.dx, low, high);
-        const Floats x_px = lane + ((float)(x + window.x0) + 0.5f);
-        unsigned drawn = solid(inside, x_px, Floats((float)(y + window.y0) + 0.5f), w);
-        for (; drawn; drawn &= drawn - 1)
-            mask.data[outline.first_pixel + y * outline.stride + x + first_bit(drawn)] = 1;
+    auto pixels = [&](int x, int y) {
+        return mask.data + outline.first_pixel + y * outline.stride + x;
+    };
+    auto matter = [&](int x, int y) { return bits(load(pixels(x, y), Bytes()) == Bytes(0)); };
+    scan(matter, [&](int x, int y, unsigned inside, auto) {
+        if (cutout.texture >= 0) {
+            const Floats xs = lane + (float)x;
+            const Floats w = clamped(plane.c + (float)y * plane.dy + xs * plane.dx, low, high);
+            const Floats x_px = lane + ((float)(x + window.x0) + 0.5f);
+            inside = solid(inside, x_px, Floats((float)(y + window.y0) + 0.5f), w);
+        }
+        if (inside)
+            put(pixels(x, y), inside, Bytes(1));
     });
 """
 )
@@ -384,7 +393,25 @@ def draw_coverage(
 
     Args:
         plane: Needed only for a cutout with a texture.
+        mask: LANES longer than all outlines.
     """
+    ...
+
+
+@wp.func_native(
+    SIMD
+    + """
+    for (int y = box.y_first; y <= box.y_last; ++y)
+        for (int x = box.x_first; x <= box.x_last; x += LANES) {
+            const auto* pixels = mask.data + outline.first_pixel + y * outline.stride + x;
+            if (bits(load(pixels, Bytes()) == Bytes(0)) & first_bits(box.x_last - x + 1))
+                return false;
+        }
+    return true;
+"""
+)
+def is_filled(box: Box, outline: Outline, mask: wp.array[wp.uint8]) -> bool:
+    """Whether all pixels of a box of an outline's window are drawn."""
     ...
 
 
