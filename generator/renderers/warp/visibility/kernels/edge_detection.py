@@ -11,11 +11,14 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     GBufferRecord,
     View,
 )
+from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 # Faces that meet at less than 25 degrees count as one surface.
 CREASE_COSINE = wp.constant(0.9)
+# Pixels that are tested together.
+GROUP_PX = wp.constant(8)
 # Positions in a 3 x 3 block, row by row, as hexadecimal digits from the last: centre, sides,
 # corners.
 ORDER = wp.constant(wp.int64(0x862075314))
@@ -27,22 +30,44 @@ def clamped_pixel(view: View, x: int, y: int):
     return wp.clamp(y, 0, view.height - 1) * view.width + wp.clamp(x, 0, view.width - 1)
 
 
-@wp.func
-def is_edge_between(images: GBufferRecord, i: int, j: int):
-    """Whether an edge runs between two neighbouring pixels."""
-    a = images.hits[i]
-    b = images.hits[j]
-    edge = bool(False)
-    if a[0] != b[0]:
-        edge = True
-    elif a[1] != b[1]:
-        edge = wp.dot(images.normals[i], images.normals[j]) < CREASE_COSINE
-        # Self-occlusion: depths that a continuous surface would not have.
-        nearer = wp.min(images.z_m[i], images.z_m[j])
-        # Floors seen at more than two degrees change less between rows (640 x 480, 60 degrees).
-        if wp.abs(images.z_m[i] - images.z_m[j]) > 0.05 * nearer:
-            edge = True
-    return edge
+@wp.func_native(
+    SIMD
+    + """
+    const auto* hits = images.hits.data;
+    auto is_edge = [&](int i, int j) {
+        if (hits[i][0] != hits[j][0])
+            return true;
+        const auto &m = images.normals.data[i], &n = images.normals.data[j];
+        const float near = least(images.z_m.data[i], images.z_m.data[j]);
+        const float far = least(-images.z_m.data[i], -images.z_m.data[j]);
+        // Self-occlusion: depths that a continuous surface would not have. Floors seen at more than
+        // two degrees change less between rows (640 x 480, 60 degrees).
+        return m[0] * n[0] + m[1] * n[1] + m[2] * n[2] < crease_cosine || -far - near > 0.05f * near;
+    };
+    int edges = 0;
+    for (int k = 0; k < n; k += LANES) {
+        unsigned faces = 0;
+        if (n - k >= LANES)
+            faces = bits(load(hits + i + k, Longs()) != load(hits + i + k + step, Longs()));
+        else
+            for (int m = k; m < n; ++m)
+                faces |= (unsigned)!(hits[i + m] == hits[i + m + step]) << (m - k);
+        // Most neighbours show the same face.
+        for (; faces; faces &= faces - 1) {
+            const int m = k + first_bit(faces);
+            edges |= (int)is_edge(i + m, i + m + step) << m;
+        }
+    }
+    return edges;
+"""
+)
+def edges_along(images: GBufferRecord, i: int, step: int, n: int, crease_cosine: float) -> int:
+    """Whether an edge runs between each of ``n`` pixels from i and the pixel ``step`` further.
+
+    Returns:
+        One bit per pixel, the first lowest.
+    """
+    ...
 
 
 @wp.kernel
@@ -54,18 +79,24 @@ def find_edges(view: View, images: GBufferRecord, count: wp.array[int], pixels: 
         pixels: The list, in any order.
     """
     y = wp.tid()
-    left = bool(False)
-    for x in range(view.width):
-        i = y * view.width + x
-        right = is_edge_between(images, i, clamped_pixel(view, x + 1, y))
-        if (
-            left
-            or right
-            or is_edge_between(images, i, clamped_pixel(view, x, y + 1))
-            or is_edge_between(images, i, clamped_pixel(view, x, y - 1))
-        ):
-            pixels[wp.atomic_add(count, 0, 1)] = i
-        left = right
+    width = view.width
+    left = int(0)
+    x = int(0)
+    while x < width:
+        i = y * width + x
+        n = wp.min(GROUP_PX, width - x)
+        right = edges_along(images, i, 1, wp.min(n, width - 1 - x), CREASE_COSINE)
+        crossed = right | (right << 1) | left
+        if y > 0:
+            crossed |= edges_along(images, i, -width, n, CREASE_COSINE)
+        if y + 1 < view.height:
+            crossed |= edges_along(images, i, width, n, CREASE_COSINE)
+        left = right >> (GROUP_PX - 1)
+        if crossed != 0:
+            for k in range(n):
+                if (crossed >> k) & 1:
+                    pixels[wp.atomic_add(count, 0, 1)] = i + k
+        x += GROUP_PX
 
 
 @wp.func
@@ -74,6 +105,16 @@ def neighbour_pixel(view: View, x: int, y: int, k: int):
     # Four bits per position: a shift replaces a table.
     m = int((ORDER >> wp.int64(4 * k)) & wp.int64(15))
     return clamped_pixel(view, x + m % 3 - 1, y + m / 3 - 1)
+
+
+# The nine pixels of ``neighbour_pixel``, in its order, as ``block``. Needs ``view``, ``x``, ``y``.
+BLOCK = """
+    const int left = x > 0 ? x - 1 : 0, right = x + 1 < view.width ? x + 1 : x;
+    const int row = y * view.width, up = y > 0 ? row - view.width : row;
+    const int down = y + 1 < view.height ? row + view.width : row;
+    const int block[9] = {row + x, up + x, row + left, row + right, down + x,
+                          up + left, up + right, down + left, down + right};
+"""
 
 
 @wp.func

@@ -22,8 +22,8 @@ from gen_data.generator.renderers.warp.visibility.kernels.alpha_cutouts import (
     make_cutout,
 )
 from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import (
+    BLOCK,
     most_similar_normal,
-    neighbour_pixel,
 )
 from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
     SCAN,
@@ -53,6 +53,21 @@ UNLISTED = wp.constant(1.0e30)
 HALF = wp.constant(128)
 
 
+@wp.func_native(
+    SIMD
+    + BLOCK
+    + """
+    float farthest = 0.0f;
+    for (int k = 0; k < 9; ++k)
+        farthest = -least(-farthest, -images.z_m.data[block[k]]);
+    return farthest;
+"""
+)
+def farthest_nearby(view: View, images: GBufferRecord, x: int, y: int) -> float:
+    """The largest depth of the nine pixels around (x, y) [m]."""
+    ...
+
+
 @wp.kernel
 def number_pixels(
     view: View,
@@ -70,13 +85,9 @@ def number_pixels(
     """
     k = wp.tid()
     i = pixels[k]
-    farthest = float(0.0)
-    for m in range(9):
-        j = neighbour_pixel(view, i % view.width, i / view.width, m)
-        farthest = wp.max(farthest, images.z_m[j])
     numbers[i] = k
     # Two percent of slack: a surface's depth changes within a pixel.
-    floors[i] = 0.98 / farthest
+    floors[i] = 0.98 / farthest_nearby(view, images, i % view.width, i / view.width)
 
 
 @wp.func_native(
@@ -229,23 +240,37 @@ def draw_samples(
                     )  # fmt: skip
 
 
+@wp.func_native(
+    BLOCK
+    + """
+    int first = -1, others = 0;
+    for (int k = 0; k < 9; ++k) {
+        const auto& shown = images.hits.data[block[k]];
+        if (shown[0] != hit[0])
+            continue;
+        if (shown[1] == hit[1])
+            return wp::vec2i(block[k], 0);
+        if (others++ == 0)
+            first = block[k];
+    }
+    return wp::vec2i(first, others);
+"""
+)
+def pixel_showing(view: View, images: GBufferRecord, x: int, y: int, hit: wp.vec2i) -> wp.vec2i:
+    """The first of the nine pixels around (x, y) that shows a (body, face).
+
+    Returns:
+        It and 0; else the first that shows the body, -1 for none, and the number of those.
+    """
+    ...
+
+
 @wp.func
 def color_source(view: View, world: World, images: GBufferRecord, x: int, y: int, hit: wp.vec2i):
     """The pixel around (x, y) that provides the colour of a sample; -1 if none shows its body."""
-    source = int(-1)
-    same_face = bool(False)
-    others = int(0)
-    for k in range(9):
-        j = neighbour_pixel(view, x, y, k)
-        if not same_face and images.hits[j][0] == hit[0]:
-            if images.hits[j][1] == hit[1] or hit[0] < 0:
-                same_face = True
-                source = j
-            else:
-                others += 1
-                if source < 0:
-                    source = j
-    if not same_face and others > 1:
+    found = pixel_showing(view, images, x, y, hit)
+    source = found[0]
+    if found[1] > 1:
         # Several faces of the body are near, none of them the sample's: choose by orientation.
         source = most_similar_normal(view, images, x, y, source, flat_normal(world, hit))
     return source
