@@ -27,6 +27,7 @@ SIMD = """
     auto ints = [](float v) { return (int)v; };
     auto chosen = [](unsigned set, auto a, auto b) { return set ? a : b; };
     auto gather = [](const auto* array, int i) { return (int)array[i]; };
+    auto greatest = [](double number, double v) { return number > v ? number : v; };
 #else
     constexpr int LANES = 8, QUAD = 4;
     typedef float Floats __attribute__((ext_vector_type(8)));
@@ -72,6 +73,12 @@ SIMD = """
             return (Integers(set) & Integers{1, 2, 4, 8, 16, 32, 64, 128}) != 0 ? a : b;
         else
             return (Integers(set) & Integers{1, 2, 4, 8}) != 0 ? a : b;
+    };
+    // The largest of a number and a quad.
+    auto greatest = [](double number, DoubleQuad v) {
+        for (int k = 0; k < 4; ++k)
+            number = v[k] > number ? v[k] : number;
+        return number;
     };
     // Elements of an array of integers.
     auto gather = [](const auto* array, auto i) {

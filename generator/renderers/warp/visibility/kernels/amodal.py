@@ -49,7 +49,7 @@ def draw_silhouettes(
             box = pixel_box(xy[i], xy[j], xy[k], outline.window, 0)
             if is_empty(box) or is_filled(box, outline, mask):
                 continue
-            e = make_edges(xy[i], xy[j], xy[k], outline.window, box, 0)
+            e = make_edges(xy[i], xy[j], xy[k], outline.window, box)
             if e.covers != 0:
                 cutout = make_cutout(view, world, outline.body, f)
                 plane = DepthPlane()

@@ -95,7 +95,8 @@ def number_pixels(
     + SOLID
     + SCAN
     + """
-    constexpr int HALF = 128, SAMPLES_MAX = 8;
+    constexpr int SAMPLES_MAX = 8;
+    constexpr double FAR = 1.0e18;
     constexpr float FROM_GRID = 0.00390625f;  // offsets are in steps of 1/256 px
     const int samples = offsets.shape[1];
     const FloatQuad low = plane.low, high = plane.high;
@@ -104,27 +105,34 @@ def number_pixels(
     const float dx = plane.dx, dy = plane.dy;
     const float slack = 0.5f * ((dx < 0.0f ? -dx : dx) + (dy < 0.0f ? -dy : dy));
 
-    // Edge functions at the samples less those at the pixel's centre, which are enlarged by HALF.
+    // Changes of the edge functions from a pixel's centre to its samples, and the largest of them.
     struct { DoubleQuad a, b, c; FloatQuad right, down; } changes[SAMPLES_MAX / QUAD];
+    Values reach = {-FAR, -FAR, -FAR};
     for (int s = 0; s < samples; s += QUAD) {
         auto& change = changes[s / QUAD];
         const IntQuad right = load(offsets.data + s, IntQuad());
         const IntQuad down = load(offsets.data + samples + s, IntQuad());
-        auto between = [&](const auto& edge) {
-            const double x = (double)(edge.dx >> 8), y = (double)(edge.dy >> 8);
-            const double enlarged = HALF * ((x < 0.0 ? -x : x) + (y < 0.0 ? -y : y));
-            return doubles(right) * x + doubles(down) * y - enlarged;
+        auto between = [&](const auto& edge, double& most) {
+            const DoubleQuad steps = doubles(right) * (double)(edge.dx >> 8)
+                + doubles(down) * (double)(edge.dy >> 8);
+            most = greatest(most, steps);
+            return steps;
         };
-        change.a = between(edges.a);
-        change.b = between(edges.b);
-        change.c = between(edges.c);
+        change.a = between(edges.a, reach.a);
+        change.b = between(edges.b, reach.b);
+        change.c = between(edges.c, reach.c);
         change.right = floats(right) * FROM_GRID;
         change.down = floats(down) * FROM_GRID;
+    }
+    for (int s = 0; s < samples; s += QUAD) {
+        changes[s / QUAD].a -= reach.a;
+        changes[s / QUAD].b -= reach.b;
+        changes[s / QUAD].c -= reach.c;
     }
 
     auto limits = [&](int x, int y) { return load(floors.data + y * stride + x, Floats()); };
     auto matter = [&](int x, int y) { return bits(limits(x, y) <= Floats(plane.high)); };
-    scan(matter, [&](int x, int y, unsigned reached, auto at) {
+    scan(reach, matter, [&](int x, int y, unsigned reached, auto at) {
         const float row_centre = plane.c + (float)y * dy;
         const Floats centres = row_centre + (lane + (float)x) * dx;
         unsigned left = reached & bits(limits(x, y) <= centres + slack);
@@ -171,7 +179,7 @@ def draw_face_samples(
     """Write (body, face) into the samples of numbered pixels where a triangle is nearest.
 
     Args:
-        edges: Enlarged by half a pixel.
+        edges: Over all pixels in which the triangle may cover a sample.
     """
     ...
 
@@ -218,7 +226,7 @@ def draw_samples(
             if not is_empty(box):
                 nearest = largest_nearness(p_camera[i], p_camera[j], p_camera[k])
                 if not is_hidden(box, nearest, stride, floors):
-                    e = make_edges(xy[i], xy[j], xy[k], window, box, HALF)
+                    e = make_edges(xy[i], xy[j], xy[k], window, box)
                     if e.covers != 0:
                         plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
                         cutout = make_cutout(view, world, b, f)

@@ -160,17 +160,12 @@ def project_vertices(
 
 
 @wp.func
-def edge_between(p: wp.vec2i, q: wp.vec2i, x: int, y: int, reach: int):
-    """Edge function from p to q at a snapped point; positive on its right (y is down).
-
-    Args:
-        reach: Distance along each axis by which the edge is moved outwards [1/256 px].
-    """
+def edge_between(p: wp.vec2i, q: wp.vec2i, x: int, y: int):
+    """Edge function from p to q at a snapped point; positive on its right (y is down)."""
     dx = wp.int64(p[1] - q[1])
     dy = wp.int64(q[0] - p[0])
     edge = Edge()
     edge.value = wp.int64(x - p[0]) * dx + wp.int64(y - p[1]) * dy
-    edge.value += wp.int64(reach) * (wp.abs(dx) + wp.abs(dy))
     # Top-left rule: left and top edges own the centres on them.
     if not (dx > wp.int64(0) or (dx == wp.int64(0) and dy > wp.int64(0))):
         edge.value -= wp.int64(1)
@@ -204,7 +199,7 @@ def is_empty(box: Box):
 
 
 @wp.func
-def make_edges(p: wp.vec2i, q: wp.vec2i, r: wp.vec2i, window: Window, box: Box, reach: int):
+def make_edges(p: wp.vec2i, q: wp.vec2i, r: wp.vec2i, window: Window, box: Box):
     """Edge functions over a box of pixels, of a triangle of either orientation."""
     edges = Edges()
     edges.box = box
@@ -217,13 +212,13 @@ def make_edges(p: wp.vec2i, q: wp.vec2i, r: wp.vec2i, window: Window, box: Box, 
     x = ((box.x_first + window.x0) << 8) + 128
     y = ((box.y_first + window.y0) << 8) + 128
     if area > wp.int64(0):
-        edges.a = edge_between(p, q, x, y, reach)
-        edges.b = edge_between(q, r, x, y, reach)
-        edges.c = edge_between(r, p, x, y, reach)
+        edges.a = edge_between(p, q, x, y)
+        edges.b = edge_between(q, r, x, y)
+        edges.c = edge_between(r, p, x, y)
     else:
-        edges.a = edge_between(q, p, x, y, reach)
-        edges.b = edge_between(r, q, x, y, reach)
-        edges.c = edge_between(p, r, x, y, reach)
+        edges.a = edge_between(q, p, x, y)
+        edges.b = edge_between(r, q, x, y)
+        edges.c = edge_between(p, r, x, y)
     edges.covers = 1
     return edges
 
@@ -260,7 +255,8 @@ def depth_plane(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3, window: Windo
 
 # Visit the groups of LANES pixels of a triangle's box. ``matter(x, y)`` gets the first pixel of a group
 # and tells which of its pixels matter, before edges are evaluated; ``visit(x, y, inside, at)`` gets
-# those of them that are inside all edges. ``at(k)`` has the edge functions at the group's k-th pixel.
+# those of them that are inside all edges. ``at(k)`` has the edge functions at the group's k-th pixel,
+# enlarged by ``reach``.
 # Edge functions are integers below 2^51, which double precision holds and adds exactly.
 # Needs ``edges``, and SIMD before it.
 SCAN = """
@@ -277,14 +273,14 @@ SCAN = """
         else if (dx == 0.0 && value < 0.0)
             end = 0;
     };
-    auto scan = [&](auto matter, auto visit) {
+    auto scan = [&](Values reach, auto matter, auto visit) {
         const Values dx = {(double)edges.a.dx, (double)edges.b.dx, (double)edges.c.dx};
         const Values dy = {(double)edges.a.dy, (double)edges.b.dy, (double)edges.c.dy};
-        Values row = {(double)edges.a.value, (double)edges.b.value, (double)edges.c.value};
+        Values row = {edges.a.value + reach.a, edges.b.value + reach.b, edges.c.value + reach.c};
         const Doubles lanes_a = doubles(lane) * dx.a, lanes_b = doubles(lane) * dx.b;
         const Doubles lanes_c = doubles(lane) * dx.c;
         const int x_first = edges.box.x_first, width = edges.box.x_last - x_first + 1;
-        const bool is_wide = width > 3 * LANES;
+        const bool is_wide = width > LANES;
         Values inverse = {};
         if (is_wide)
             inverse = {1.0 / dx.a, 1.0 / dx.b, 1.0 / dx.c};
@@ -327,7 +323,7 @@ SCAN = """
     const long long hit = (unsigned)body | (long long)face << 32;
     auto nearest = [&](int x, int y) { return load(nearness.data + y * stride + x, Floats()); };
     auto matter = [&](int x, int y) { return bits(nearest(x, y) < high); };
-    scan(matter, [&](int x, int y, unsigned inside, auto) {
+    scan({}, matter, [&](int x, int y, unsigned inside, auto) {
         const Floats xs = lane + (float)x;
         const Floats w = clamped(plane.c + (float)y * plane.dy + xs * plane.dx, low, high);
         unsigned drawn = inside & bits(w > nearest(x, y));
@@ -369,7 +365,7 @@ def draw_nearest(
         return mask.data + outline.first_pixel + y * outline.stride + x;
     };
     auto matter = [&](int x, int y) { return bits(load(pixels(x, y), Bytes()) == Bytes(0)); };
-    scan(matter, [&](int x, int y, unsigned inside, auto) {
+    scan({}, matter, [&](int x, int y, unsigned inside, auto) {
         if (cutout.texture >= 0) {
             const Floats xs = lane + (float)x;
             const Floats w = clamped(plane.c + (float)y * plane.dy + xs * plane.dx, low, high);
@@ -476,7 +472,7 @@ def fan_edges(view: View, polygon: Polygon, t: int, window: Window, reach: int):
     edges = Edges()
     box = pixel_box(p, q, r, window, reach)
     if not is_empty(box):
-        edges = make_edges(p, q, r, window, box, reach)
+        edges = make_edges(p, q, r, window, box)
     return edges
 
 
@@ -541,7 +537,7 @@ def draw_bodies(
             if not is_empty(box):
                 nearest = largest_nearness(p_camera[i], p_camera[j], p_camera[k])
                 if not is_hidden(box, nearest, stride, nearness):
-                    e = make_edges(xy[i], xy[j], xy[k], window, box, 0)
+                    e = make_edges(xy[i], xy[j], xy[k], window, box)
                     if e.covers != 0:
                         plane = depth_plane(view, p_camera[i], p_camera[j], p_camera[k], window)
                         cutout = make_cutout(view, world, b, f)
