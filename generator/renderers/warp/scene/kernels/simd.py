@@ -25,7 +25,11 @@ SIMD = """
     auto floats = [](int v) { return (float)v; };
     auto doubles = [](auto v) { return (double)v; };
     auto ints = [](float v) { return (int)v; };
-    auto chosen = [](unsigned set, auto a, auto b) { return set ? a : b; };
+    auto load = [](const void* memory, auto like) { return *(const decltype(like)*)memory; };
+    auto put = [](void* memory, unsigned set, auto value) {
+        if (set)
+            *(decltype(value)*)memory = value;
+    };
     auto gather = [](const auto* array, int i) { return (int)array[i]; };
     auto greatest = [](double number, double v) { return number > v ? number : v; };
 #else
@@ -88,7 +92,6 @@ SIMD = """
         else
             return IntQuad{array[i[0]], array[i[1]], array[i[2]], array[i[3]]};
     };
-#endif
     // As many elements of an array as ``like`` has, from any address.
     auto load = [](const void* memory, auto like) {
         __builtin_memcpy(&like, memory, sizeof(like));
@@ -99,6 +102,7 @@ SIMD = """
         value = chosen(set, value, load(memory, value));
         __builtin_memcpy(memory, &value, sizeof(value));
     };
+#endif
     // The first ``n`` lanes, of which there may be fewer.
     auto first_bits = [](int n) { return n < LANES ? (1u << n) - 1u : ~0u; };
     auto least = [](auto a, auto b) { return a < b ? a : b; };
