@@ -50,6 +50,17 @@ def test_an_edge_is_as_grey_as_it_is_covered() -> None:
     np.testing.assert_allclose(smooth, [0.0, 0.0, 75.0, 300.0, 300.0], rtol=1e-5)
 
 
+@pytest.mark.parametrize("samples", [2, 4, 8])
+def test_half_a_pixel_is_half_as_bright_at_any_number_of_samples(samples: int) -> None:
+    """The left half of a pixel is black, its right half on a glowing box of 300 cd/m^2."""
+    left_m = (22.5 - 32.0) / 50.0 * 2.0
+    scene = Scene("t", (glowing(SE3((left_m + 0.5, 0.0, 2.5)), emission=300.0),), environment=DARK)
+
+    row = radiance_of(scene, forward_camera(), RenderSettings(antialias=samples))[24, 20:25, 0]
+
+    np.testing.assert_allclose(row, [0.0, 0.0, 150.0, 300.0, 300.0], rtol=1e-5)
+
+
 def test_anti_aliasing_does_not_touch_labels() -> None:
     """Ids and depth are those of pixel centres, with or without it."""
     scene = Scene("t", (Body("b", "ball", SE3((0.1, 0.0, 2.0)), instance_id=3),))

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.se3 import Array

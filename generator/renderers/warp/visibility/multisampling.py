@@ -20,7 +20,11 @@ def draw_samples(
     """Visible (body, face) at samples of listed pixels, [pixels, samples]; (-1, -1) for none.
 
     Args:
-        positions: Of the samples in a pixel, [0, 1), [2, 4 or 8, 2]. Two are drawn twice.
+        frame: The image.
+        projected: Its rasterised vertices.
+        pixels: Flat numbers of the pixels.
+        positions: Of the samples in a pixel, [0, 1), [2, 4 or 8, 2]. Two are drawn twice: the
+            rasteriser takes multiples of four.
     """
     cache, view, world = frame.cache, frame.view, frame.world
     numbers = cache.scratch("numbers", frame.pixels, wp.int32)

@@ -38,11 +38,11 @@ def clamped_pixel(view: View, x: int, y: int):
         if (hits[i][0] != hits[j][0])
             return true;
         const auto &m = images.normals.data[i], &n = images.normals.data[j];
-        const float near = least(images.z_m.data[i], images.z_m.data[j]);
-        const float far = least(-images.z_m.data[i], -images.z_m.data[j]);
+        const float a = images.z_m.data[i], b = images.z_m.data[j], near = least(a, b);
+        const float apart = a > b ? a - b : b - a;
         // Self-occlusion: depths that a continuous surface would not have. Floors seen at more than
         // two degrees change less between rows (640 x 480, 60 degrees).
-        return m[0] * n[0] + m[1] * n[1] + m[2] * n[2] < crease_cosine || -far - near > 0.05f * near;
+        return m[0] * n[0] + m[1] * n[1] + m[2] * n[2] < crease_cosine || apart > 0.05f * near;
     };
     int edges = 0;
     for (int k = 0; k < n; k += LANES) {

@@ -88,7 +88,7 @@ class Edge:
 
 @wp.struct
 class Edges:
-    """The edge functions of a triangle over its box of pixels; ``covers`` is 0 if it has no area."""
+    """Edge functions of a triangle over a box of pixels; ``covers`` is 0 if it has no area."""
 
     covers: int
     box: Box
@@ -253,12 +253,11 @@ def depth_plane(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3, window: Windo
     return plane
 
 
-# Visit the groups of LANES pixels of a triangle's box. ``matter(x, y)`` gets the first pixel of a group
-# and tells which of its pixels matter, before edges are evaluated; ``visit(x, y, inside, at)`` gets
-# those of them that are inside all edges. ``at(k)`` has the edge functions at the group's k-th pixel,
-# enlarged by ``reach``.
-# Edge functions are integers below 2^51, which double precision holds and adds exactly.
-# Needs ``edges``, and SIMD before it.
+# Visit the groups of LANES pixels of a triangle's box. ``matter(x, y)`` gets the first pixel of a
+# group and tells which of its pixels matter, before edges are evaluated. ``visit(x, y, inside, at)``
+# gets those of them that are inside all edges, moved outwards by ``reach``; ``at(k)`` has the edge
+# functions at the group's k-th pixel: integers below 2^51, which double precision holds and adds
+# exactly. Needs ``edges``, and SIMD before it.
 SCAN = """
     struct Values { double a, b, c; };
     // Steps of a row of ``width`` at which an edge function may be positive, rounded outwards by
