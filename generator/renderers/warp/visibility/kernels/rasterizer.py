@@ -253,9 +253,9 @@ def depth_plane(view: View, p0: wp.vec3, p1: wp.vec3, p2: wp.vec3, window: Windo
     return plane
 
 
-# Visit the groups of LANES pixels of a triangle's box. ``matter(x, y)`` gets the first pixel of a
-# group and tells which of its pixels matter, before edges are evaluated. ``visit(x, y, inside, at)``
-# gets those of them that are inside all edges, moved outwards by ``reach``; ``at(k)`` has the edge
+# Visit the groups of LANES pixels of a triangle's box. ``matter(x, y)`` gets a group's first pixel
+# and tells which of its pixels matter, before edges are evaluated. ``visit(x, y, inside, at)`` gets
+# those of them that are inside all edges, moved outwards by ``reach``; ``at(k)`` has the edge
 # functions at the group's k-th pixel: integers below 2^51, which double precision holds and adds
 # exactly. Needs ``edges``, and SIMD before it.
 SCAN = """
