@@ -28,7 +28,7 @@ from gen_data.generator.renderers.warp.frame_context import (
 )
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.scene.kernels.simd import LANES
-from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld, pack_view
+from gen_data.generator.renderers.warp.scene.scene_packing import pack_view
 from gen_data.generator.renderers.warp.visibility.distortion_lut import NODE_STRIDE_PX
 from gen_data.generator.renderers.warp.visibility.gbuffer import (
     CORNERS,
@@ -71,7 +71,7 @@ def _rasterize_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.ui
     """A bounding box of each annotated instance's silhouette, and the masks of all boxes."""
     scene, world, view, cache = frame.state.scene, frame.world, frame.view, frame.cache
     projected = frame.gbuffer.projected or project_vertices(world, view, cache)
-    boxes = _boxes_px(scene, world, view, projected)
+    boxes = _boxes_px(scene, view, projected)
     whole = {
         number: boxes.get(scene.bodies[number].instance_id, EMPTY)
         for number in projected.reached.tolist()
@@ -85,23 +85,15 @@ def _rasterize_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.ui
     return boxes, drawn
 
 
-def _boxes_px(
-    scene: Scene, world: PackedWorld, view: records.View, projected: Projected
-) -> dict[int, BoxPx]:
+def _boxes_px(scene: Scene, view: records.View, projected: Projected) -> dict[int, BoxPx]:
     """Pixels of the canvas that each annotated instance's vertices span; may be empty."""
     canvas = canvas_box(view)
     annotated = sorted(i.instance_id for i in scene.instances if i.annotated)
     boxes = dict.fromkeys(annotated, EMPTY)
-    # All bodies at once: hundreds of small queries take longer than drawing them.
-    first = world.body_records["first_vertex"]
-    solid = np.flatnonzero(np.diff([*first, world.vertex_count]))
-    p_camera, xy = projected.p_camera.numpy(), projected.xy.numpy()
-    nearest = np.maximum.reduceat(p_camera[:, 2], first[solid])
-    lows = np.minimum.reduceat(xy, first[solid], axis=0)
-    highs = np.maximum.reduceat(xy, first[solid], axis=0)
-    drawn = np.isin(solid, projected.reached) & (nearest >= Z_NEAR_M)
-    for k in np.flatnonzero(drawn).tolist():
-        instance_id = scene.bodies[solid[k]].instance_id
+    extents = projected.extents.numpy()
+    lows, highs = extents["low"], extents["high"]
+    for k in np.flatnonzero(extents["farthest_m"] >= Z_NEAR_M).tolist():
+        instance_id = scene.bodies[projected.reached[k]].instance_id
         if instance_id in boxes:
             reached = BoxPx(*(lows[k] >> 8).tolist(), *((highs[k] >> 8) + 1).tolist())
             # A triangle clipped at the camera's plane may reach anywhere.

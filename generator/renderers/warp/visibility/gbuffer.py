@@ -100,12 +100,14 @@ class Projected:
         p_camera: Vertices in the camera frame [m].
         xy: Vertices snapped to the image plane; see
             gen_data.generator.renderers.warp.visibility.kernels.rasterizer.
+        extents: Extent record of each reached body.
     """
 
     reached: NDArray[np.int32]
     in_view: wp.array
     p_camera: wp.array
     xy: wp.array
+    extents: wp.array
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -175,10 +177,11 @@ def project_vertices(world: PackedWorld, view: records.View, cache: DeviceCache)
         list_drawn(world, view, in_view, cache.device),
         cache.scratch("p camera", count, wp.vec3),
         cache.scratch("xy", count, wp.vec2i),
+        wp.zeros(len(reached), dtype=rasterizer.Extent, device=cache.device),
     )
     bodies = wp.array(projected.reached, dtype=wp.int32, device=cache.device)
     inputs = [view, world.record, bodies]
-    outputs = [projected.p_camera, projected.xy]
+    outputs = [projected.p_camera, projected.xy, projected.extents]
     wp.launch(rasterizer.project_vertices, len(bodies), inputs, outputs, device=cache.device)
     return projected
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.records import View, World
+from gen_data.generator.renderers.warp.scene.kernels.records import View, World, max_of_two
 from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 from gen_data.generator.renderers.warp.visibility.kernels.alpha_cutouts import (
     SOLID,
@@ -49,6 +49,15 @@ class DrawnBody:
     body: int
     window: Window
     nearness_max: float
+
+
+@wp.struct
+class Extent:
+    """Least and largest snapped coordinates of a body's vertices, and their largest depth [m]."""
+
+    low: wp.vec2i
+    high: wp.vec2i
+    farthest_m: float
 
 
 @wp.struct
@@ -139,13 +148,21 @@ def project_vertices(
     bodies: wp.array[int],
     p_camera: wp.array[wp.vec3],
     xy: wp.array[wp.vec2i],
+    extents: wp.array[Extent],
 ):
-    """Vertices in the camera frame and on the snapped image plane, one listed body per thread."""
+    """Vertices in the camera frame and on the snapped image plane, one listed body per thread.
+
+    Args:
+        extents: Of each listed body; the depth of a body without vertices is negative.
+    """
     b = bodies[wp.tid()]
     A = world.bodies[b].A_camera_mesh
     t = world.bodies[b].t_camera_mesh
     geometry = world.geometries[world.bodies[b].geometry]
     first = world.bodies[b].first_vertex
+    low = wp.vec2i(2147483647, 2147483647)
+    high = wp.vec2i(UNSNAPPED, UNSNAPPED)
+    farthest_m = float(-1.0)
     for i in range(geometry.vertices_m.shape[0]):
         p = A @ geometry.vertices_m[i] + t
         q = wp.vec2i(UNSNAPPED, UNSNAPPED)
@@ -157,6 +174,14 @@ def project_vertices(
             q = snap_to_grid(view, p)
         p_camera[first + i] = p
         xy[first + i] = q
+        low = wp.vec2i(wp.min(low[0], q[0]), wp.min(low[1], q[1]))
+        high = wp.vec2i(wp.max(high[0], q[0]), wp.max(high[1], q[1]))
+        farthest_m = max_of_two(farthest_m, p[2])
+    extent = Extent()
+    extent.low = low
+    extent.high = high
+    extent.farthest_m = farthest_m
+    extents[wp.tid()] = extent
 
 
 @wp.func
