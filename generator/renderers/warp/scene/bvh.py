@@ -18,7 +18,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.renderers.warp.scene.kernels import bvh_build
+from gen_data.generator.renderers.warp.scene.kernels import box_groups, bvh_build
 
 _WIDTH = int(bvh_build.WIDTH)
 _NODE_GROUPS, _LEAF_GROUPS = 7, 10
@@ -58,6 +58,14 @@ def body_tree(lows_m: Floats, highs_m: Floats) -> Floats:
     """Tree over the bodies' boxes."""
     order, nodes, codes, leaves = _grow(lows_m, highs_m, 1)
     return _pack(nodes, codes, 1 + order[leaves[:, 0]], np.zeros((0, 1, _WIDTH), np.float32))
+
+
+def group_boxes(lows: Floats, highs: Floats) -> Floats:
+    """Boxes in the layout that ``kernels.box_groups`` reads, flat."""
+    groups = np.full((-(-len(lows) // _WIDTH), _WIDTH, 3, 2), box_groups.NOWHERE_M, np.float32)
+    flat = groups.reshape(-1, 3, 2)
+    flat[: len(lows), :, 0], flat[: len(highs), :, 1] = lows, highs
+    return groups.transpose(0, 2, 3, 1).reshape(-1)
 
 
 def _pack(nodes: Floats, codes: Ints, leaf_places: NDArray[np.integer], tail: Floats) -> Floats:

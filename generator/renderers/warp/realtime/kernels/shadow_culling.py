@@ -9,9 +9,9 @@ import warp as wp
 
 from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, SUN_DISTANCE_M
+from gen_data.generator.renderers.warp.scene.kernels.box_groups import next_in_shaft
 from gen_data.generator.renderers.warp.scene.kernels.material_eval import is_translucent
 from gen_data.generator.renderers.warp.scene.kernels.records import (
-    LightRecord,
     World,
     max_of_two,
     min_of_two,
@@ -164,14 +164,6 @@ def any_box_touches(shaft: Shaft, world: World, g: int):
 @wp.func
 def may_shade(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
     """Whether a body may block light between a tile and a sphere at the end of a way."""
-    # A test of world boxes comes first: it decides most cases.
-    here = wp.vec3(tile.radius_m, tile.radius_m, tile.radius_m)
-    there = wp.vec3(radius_m, radius_m, radius_m)
-    end = tile.centre_m + way
-    low = wp.min(tile.centre_m - here, end - there) - world.bodies[b].high_m
-    high = wp.max(tile.centre_m + here, end + there) - world.bodies[b].low_m
-    if wp.max(low) > 0.0 or wp.min(high) < 0.0:
-        return False
     g = world.bodies[b].geometry
     shaft = make_shaft(world, b, tile, way, radius_m)
     shades = may_touch(shaft, world.geometries[g].low_m, world.geometries[g].high_m)
@@ -182,14 +174,17 @@ def may_shade(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
 
 
 @wp.func
-def may_shade_from(world: World, b: int, tile: Tile, lamp: LightRecord):
-    """Whether a body may block light between a tile and a lamp."""
-    way = lamp.position_m - tile.centre_m
-    radius_m = lamp.radius
-    if lamp.kind == SUN:
-        way = lamp.direction * -SUN_DISTANCE_M
-        radius_m = lamp.radius * SUN_DISTANCE_M
-    return may_shade(world, b, tile, way, radius_m)
+def list_shaft(
+    world: World, tile: Tile, way: wp.vec3, radius_m: float, lists: wp.array3d[int], i: int, j: int
+):
+    """List the bodies that may block light between a tile and a sphere at the end of a way."""
+    inverse = reciprocals(way)
+    # Boxes in the world, eight at a time, exclude most bodies.
+    b = next_in_shaft(world.boxes, tile.centre_m, inverse, tile.radius_m, radius_m, -1)
+    while b >= 0 and lists[i, j, 0] >= 0:
+        if may_shade(world, b, tile, way, radius_m):
+            append_occluder(lists, i, j, b)
+        b = next_in_shaft(world.boxes, tile.centre_m, inverse, tile.radius_m, radius_m, b)
 
 
 @wp.func
@@ -247,9 +242,11 @@ def list_occluders(
     near.radius_m = tile.radius_m + ambient_radius_m
     for j in range(lamps):
         if is_lamp_relevant(lattice, shares, j, column, row):
-            for b in range(world.bodies.shape[0]):
-                if may_shade_from(world, b, tile, world.lamps[j]):
-                    append_occluder(lists, i, j, b)
-    for b in range(world.bodies.shape[0]):
-        if may_shade(world, b, near, wp.vec3(0.0), near.radius_m):
-            append_occluder(lists, i, lamps, b)
+            lamp = world.lamps[j]
+            way = lamp.position_m - tile.centre_m
+            radius_m = lamp.radius
+            if lamp.kind == SUN:
+                way = lamp.direction * -SUN_DISTANCE_M
+                radius_m = lamp.radius * SUN_DISTANCE_M
+            list_shaft(world, tile, way, radius_m, lists, i, j)
+    list_shaft(world, near, wp.vec3(0.0), near.radius_m, lists, i, lamps)

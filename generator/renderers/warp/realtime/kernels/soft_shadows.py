@@ -32,10 +32,11 @@ from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_irradiance
 from gen_data.generator.renderers.warp.scene.kernels.material_eval import is_translucent
 from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
+    NOBODY,
     free_path_before,
     free_path_of_listed,
     is_occluded,
-    is_occluded_by_listed,
+    listed_blocker,
     path_along,
 )
 from gen_data.generator.renderers.warp.scene.kernels.records import (
@@ -47,6 +48,9 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
+# Edge of the aligned blocks of lattice points. Kernels on blocks have up to a thread per point: the
+# last number of a thread and ``run`` tell its points. On the CPU one thread takes a whole block.
+BLOCK = wp.constant(4)
 # Marks points without a value: off all surfaces, or where a lamp contributes nothing.
 UNSEEN = wp.constant(-1.0)
 # Shadows of lamps with a smaller share of a point's light are too faint for further rays.
@@ -131,9 +135,17 @@ def square_of_disc(part: wp.vec2):
 
 
 @wp.func
-def tile_index(lattice: Lattice, i: int, tile_columns: int):
-    """The tile of a lattice point."""
-    return ((i / lattice.width) / TILE) * tile_columns + (i % lattice.width) / TILE
+def block_tile(row: int, column: int, tile_columns: int):
+    """The tile that contains a block."""
+    return BLOCK * row / TILE * tile_columns + BLOCK * column / TILE
+
+
+@wp.func
+def block_point(lattice: Lattice, row: int, column: int, k: int):
+    """Lattice point k of a block, row by row; -1 off the lattice."""
+    x = BLOCK * column + k % BLOCK
+    y = BLOCK * row + k / BLOCK
+    return wp.where(x < lattice.width and y < lattice.height, y * lattice.width + x, -1)
 
 
 @wp.func
@@ -155,10 +167,15 @@ def agreed_value(lattice: Lattice, values: wp.array2d[float], j: int, x: int, y:
 
 
 @wp.kernel
-def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float]):
+def weigh_lamps(
+    world: World, lattice: Lattice, shares: wp.array2d[float], matters: wp.array[int]
+):
     """Share of each lamp in each point's unshadowed light [lamp, point]; UNSEEN behind surfaces.
 
     Lamps behind a translucent surface count like those before it.
+
+    Args:
+        matters: Set to 1 for lamps that are more than faint anywhere.
     """
     i = wp.tid()
     if lattice.body[i] < 0:
@@ -181,6 +198,8 @@ def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float]):
     for j in range(world.lamps.shape[0]):
         if shares[j, i] > 0.0:
             shares[j, i] = shares[j, i] / total
+            if shares[j, i] > FAINT_SHARE:
+                matters[j] = 1
 
 
 @wp.func
@@ -206,6 +225,7 @@ def probe_lamps(
     lists: wp.array3d[int],
     disc: wp.array[wp.vec2],
     shares: wp.array2d[float],
+    run: int,
     parity: int,
     lit: wp.array2d[float],
 ):
@@ -214,51 +234,56 @@ def probe_lamps(
     Args:
         disc: Forty-eight points of the unit disk; each lattice point uses one of three in a row.
         shares: As computed by weigh_lamps.
+        run: Points per thread.
         parity: 0 probes the black squares of a checkerboard, 1 then the white ones, which trace a
             ray only where their black neighbours differ.
     """
-    i = wp.tid()
-    x = i % lattice.width
-    y = i / lattice.width
-    if ((x + y) & 1) != parity:
+    row, column, j, part = wp.tid()
+    tile = block_tile(row, column, tile_columns)
+    shaded = lists[tile, j, 0] != 0
+    # Where nothing can shade, the first pass writes both colours.
+    if not shaded and parity == 1:
         return
-    tile = tile_index(lattice, i, tile_columns)
-    for j in range(world.lamps.shape[0]):
-        value = float(UNSEEN)
-        if lattice.body[i] >= 0 and shares[j, i] > FAINT_SHARE:
-            if parity == 1:
-                value = agreed_value(lattice, lit, j, x, y)
-                if value == UNSEEN and shares[j, i] < SMOOTHED_SHARE:
-                    # Faint lamps: an interpolated shadow is as good as a traced one.
-                    value = mean_of_neighbours(lattice, lit, j, x, y)
-            if value == UNSEEN:
-                value = probe_lamp(world, lattice, lists, tile, i, j, disc[3 * bayer(x, y) + 1])
-        lit[j, i] = value
-
-
-@wp.func
-def probe_lamp(
-    world: World, lattice: Lattice, lists: wp.array3d[int], tile: int, i: int, j: int, part: wp.vec2
-):
-    """Visibility of a part of lamp j from point i, 1 or 0, by one ray."""
-    value = float(1.0)
-    if lists[tile, j, 0] != 0:
-        start = departure_to(world, lattice, i, lamp_vector(world.lamps[j], lattice.p_m[i]))
-        way = path_to_lamp(world.lamps[j], start.origin_m, start.normal, part)
-        path = path_along(start.origin_m, way)
-        if is_occluded_by_listed(world, lists, tile, j, start.skip, path):
-            value = 0.0
-    return value
+    likely = int(NOBODY)
+    k = int(part * run)
+    while k < (part + 1) * run:
+        i = block_point(lattice, row, column, k)
+        if i >= 0 and (not shaded or ((k ^ (k / BLOCK)) & 1) == parity):
+            value = float(UNSEEN)
+            if lattice.body[i] >= 0 and shares[j, i] > FAINT_SHARE:
+                value = 1.0
+                if shaded:
+                    x = i % lattice.width
+                    y = i / lattice.width
+                    value = float(UNSEEN)
+                    if parity == 1:
+                        value = agreed_value(lattice, lit, j, x, y)
+                        if value == UNSEEN and shares[j, i] < SMOOTHED_SHARE:
+                            # Faint lamps: an interpolated shadow is as good as a traced one.
+                            value = mean_of_neighbours(lattice, lit, j, x, y)
+                    if value == UNSEEN:
+                        start = departure_to(
+                            world, lattice, i, lamp_vector(world.lamps[j], lattice.p_m[i])
+                        )
+                        at = disc[3 * bayer(k % BLOCK, k / BLOCK) + 1]
+                        way = path_to_lamp(world.lamps[j], start.origin_m, start.normal, at)
+                        path = path_along(start.origin_m, way)
+                        blocker = listed_blocker(world, lists, tile, j, start.skip, likely, path)
+                        value = wp.where(blocker == NOBODY, 1.0, 0.0)
+                        # The next path is close by.
+                        likely = wp.where(blocker == NOBODY, likely, blocker)
+            lit[j, i] = value
+        k += 1
 
 
 @wp.kernel
 def classify_blocks(lattice: Lattice, values: wp.array2d[float], classes: wp.array3d[int]):
-    """Values in each aligned 4 x 4 block, as bits: 1 zeros, 2 ones, 4 others."""
+    """Values in each block, as bits: 1 zeros, 2 ones, 4 others."""
     row, column, j = wp.tid()
     found = int(0)
-    for y in range(4 * row, wp.min(4 * row + 4, lattice.height)):
-        k = int(y * lattice.width + 4 * column)
-        end = y * lattice.width + wp.min(4 * column + 4, lattice.width)
+    for y in range(BLOCK * row, wp.min(BLOCK * row + BLOCK, lattice.height)):
+        k = int(y * lattice.width + BLOCK * column)
+        end = y * lattice.width + wp.min(BLOCK * column + BLOCK, lattice.width)
         # A while loop: Warp's range loops cost more than this body.
         while k < end:
             value = values[j, k]
@@ -273,15 +298,17 @@ def classify_blocks(lattice: Lattice, values: wp.array2d[float], classes: wp.arr
 
 
 @wp.func
-def classes_around(classes: wp.array3d[int], x: int, y: int, j: int):
-    """Union of the classes of the blocks that a point's window touches."""
-    last_row = classes.shape[0] - 1
-    last_column = classes.shape[1] - 1
-    x0 = wp.max((x - 2) >> 2, 0)
-    y0 = wp.max((y - 2) >> 2, 0)
-    x1 = wp.min((x + 2) >> 2, last_column)
-    y1 = wp.min((y + 2) >> 2, last_row)
-    return classes[y0, x0, j] | classes[y0, x1, j] | classes[y1, x0, j] | classes[y1, x1, j]
+def classes_near(classes: wp.array3d[int], row: int, column: int, j: int):
+    """Union of the classes of a block and of those around it."""
+    found = int(0)
+    y = wp.max(row - 1, 0)
+    while y <= wp.min(row + 1, classes.shape[0] - 1):
+        x = wp.max(column - 1, 0)
+        while x <= wp.min(column + 1, classes.shape[1] - 1):
+            found = found | classes[y, x, j]
+            x += 1
+        y += 1
+    return found
 
 
 @wp.func
@@ -310,6 +337,7 @@ def refine_lamps(
     lists: wp.array3d[int],
     disc: wp.array[wp.vec2],
     shares: wp.array2d[float],
+    run: int,
     classes: wp.array3d[int],
     probed: wp.array2d[float],
     lit: wp.array2d[float],
@@ -317,28 +345,37 @@ def refine_lamps(
     """Trace two more rays where a lamp is visible from part of the neighbourhood only.
 
     Args:
-        disc, shares: As for probe_lamps.
+        disc, shares, run: As for probe_lamps.
     """
-    i = wp.tid()
-    x = i % lattice.width
-    y = i / lattice.width
-    tile = tile_index(lattice, i, tile_columns)
-    for j in range(world.lamps.shape[0]):
-        value = probed[j, i]
-        mixed = value != UNSEEN and (classes_around(classes, x, y, j) & 3) == 3
-        if mixed and shares[j, i] > SMOOTHED_SHARE:
-            if window_bits(lattice, probed, j, i) == 3:
-                seen = value
-                start = departure_to(world, lattice, i, lamp_vector(world.lamps[j], lattice.p_m[i]))
-                for k in range(2):
-                    # The two points of the triple that probe_lamps has left out.
-                    part = disc[3 * bayer(x, y) + 2 * k]
-                    way = path_to_lamp(world.lamps[j], start.origin_m, start.normal, part)
-                    path = path_along(start.origin_m, way)
-                    if not is_occluded_by_listed(world, lists, tile, j, start.skip, path):
-                        seen += 1.0
-                value = seen / 3.0
-        lit[j, i] = value
+    row, column, j, part = wp.tid()
+    tile = block_tile(row, column, tile_columns)
+    mixed = (classes_near(classes, row, column, j) & 3) == 3
+    likely = int(NOBODY)
+    k = int(part * run)
+    while k < (part + 1) * run:
+        i = block_point(lattice, row, column, k)
+        if i >= 0:
+            value = probed[j, i]
+            if mixed and value != UNSEEN and shares[j, i] > SMOOTHED_SHARE:
+                if window_bits(lattice, probed, j, i) == 3:
+                    seen = value
+                    start = departure_to(
+                        world, lattice, i, lamp_vector(world.lamps[j], lattice.p_m[i])
+                    )
+                    rank = bayer(k % BLOCK, k / BLOCK)
+                    for more in range(2):
+                        # The two points of the triple that probe_lamps has left out.
+                        at = disc[3 * rank + 2 * more]
+                        way = path_to_lamp(world.lamps[j], start.origin_m, start.normal, at)
+                        path = path_along(start.origin_m, way)
+                        blocker = listed_blocker(world, lists, tile, j, start.skip, likely, path)
+                        if blocker == NOBODY:
+                            seen += 1.0
+                        else:
+                            likely = blocker
+                    value = seen / 3.0
+            lit[j, i] = value
+        k += 1
 
 
 @wp.func
@@ -372,31 +409,40 @@ def is_same_surface(lattice: Lattice, i: int, k: int, tolerance_m: float):
 def sum_rows(
     view: View,
     lattice: Lattice,
+    run: int,
     classes: wp.array3d[int],
     values: wp.array2d[float],
     sums: wp.array2d[wp.vec2],
 ):
     """Sum and number of the values beside each point on its own surface.
 
-    Skipped where all values agree and neither row above nor below needs the sums.
+    Skipped where all values around agree, which need no sums.
     """
-    i = wp.tid()
-    x = i % lattice.width
-    y = i / lattice.width
-    for j in range(values.shape[0]):
-        found = classes_around(classes, x, wp.max(y - 2, 0), j)
-        found = found | classes_around(classes, x, wp.min(y + 2, lattice.height - 1), j)
-        total = wp.vec2(0.0, 0.0)
-        if lattice.surface[i] >= 0 and not (found == 1 or found == 2):  # noqa: PLR1714
-            tolerance_m = surface_tolerance(view, lattice.p_m[i])
-            k = int(i + wp.max(-x, -2))
-            end = i + wp.min(lattice.width - 1 - x, 2)
-            while k <= end:
-                value = values[j, k]
-                if value != UNSEEN and is_same_surface(lattice, i, k, tolerance_m):
-                    total += wp.vec2(value, 1.0) * rim_weight(k - i, 2)
-                k += 1
-        sums[j, i] = total
+    row, column, j, part = wp.tid()
+    found = classes_near(classes, row, column, j)
+    k = int(part * run)
+    while k < (part + 1) * run:
+        i = block_point(lattice, row, column, k)
+        if i >= 0:
+            total = wp.vec2(0.0, 0.0)
+            if lattice.surface[i] >= 0 and not is_uniform(found):
+                tolerance_m = surface_tolerance(view, lattice.p_m[i])
+                x = i % lattice.width
+                q = int(i + wp.max(-x, -2))
+                end = i + wp.min(lattice.width - 1 - x, 2)
+                while q <= end:
+                    value = values[j, q]
+                    if value != UNSEEN and is_same_surface(lattice, i, q, tolerance_m):
+                        total += wp.vec2(value, 1.0) * rim_weight(q - i, 2)
+                    q += 1
+            sums[j, i] = total
+        k += 1
+
+
+@wp.func
+def is_uniform(classes: int):
+    """Whether all values are zeros, or all are ones."""
+    return classes == 1 or classes == 2  # noqa: PLR1714
 
 
 @wp.func
@@ -419,23 +465,22 @@ def column_sum(
 def smooth_lattice(
     view: View,
     lattice: Lattice,
+    run: int,
     classes: wp.array3d[int],
     values: wp.array2d[float],
     sums: wp.array2d[wp.vec2],
     smoothed: wp.array2d[float],
 ):
     """Average differing values over neighbours on one surface."""
-    i = wp.tid()
-    x = i % lattice.width
-    y = i / lattice.width
-    for j in range(values.shape[0]):
-        value = values[j, i]
-        if value != UNSEEN:
-            found = classes_around(classes, x, y, j)
-            if found == 1 or found == 2:  # noqa: PLR1714
-                # Only zeros (1) or only ones (2) around: the mean is exact.
-                value = float(found - 1)
-            else:
+    row, column, j, part = wp.tid()
+    # With only zeros or only ones around, the mean is the value itself.
+    uniform = is_uniform(classes_near(classes, row, column, j))
+    k = int(part * run)
+    while k < (part + 1) * run:
+        i = block_point(lattice, row, column, k)
+        if i >= 0:
+            value = values[j, i]
+            if not uniform and value != UNSEEN:
                 tolerance_m = surface_tolerance(view, lattice.p_m[i])
                 total = column_sum(lattice, sums, j, i, 2, tolerance_m)
                 if total[1] < 8.0:
@@ -444,7 +489,8 @@ def smooth_lattice(
                     total = column_sum(lattice, sums, j, i, 4, tolerance_m)
                 if total[1] > 0.0:
                     value = total[0] / total[1]
-        smoothed[j, i] = value
+            smoothed[j, i] = value
+        k += 1
 
 
 @wp.kernel
@@ -455,6 +501,7 @@ def probe_ambient(
     lists: wp.array3d[int],
     hemisphere: wp.array[wp.vec3],
     radius_m: float,
+    run: int,
     open_sky: wp.array2d[float],
 ):
     """Ambient occlusion by one short ray per point: 1 if free, less the nearer the obstacle.
@@ -464,35 +511,42 @@ def probe_ambient(
 
     Args:
         hemisphere: Sixteen directions about +Z, distributed by the cosine.
+        run: As for probe_lamps.
     """
-    i = wp.tid()
-    value = float(UNSEEN)
-    if lattice.body[i] >= 0:
-        value = 1.0
-        lamps = world.lamps.shape[0]
-        tile = tile_index(lattice, i, tile_columns)
-        if lists[tile, lamps, 0] != 0:
-            n = lattice.normal[i]
-            x, y = make_frame(n)
-            rank = bayer(i % lattice.width, i / lattice.width)
-            h = hemisphere[rank]
-            way = x * h[0] + y * h[1] + n * h[2]
-            start = Departure()
-            start.origin_m = lattice.origin_m[i]
-            start.skip = lattice.skip[i]
-            within = float(1.0)
-            if is_translucent(world, lattice.surface[i]):
-                way = way * wp.where((rank & 2) != 0, 1.0, -1.0)
-                start = departure_to(world, lattice, i, way)
-                start.skip = lattice.body[i]
-                within = free_path_before(
-                    world, lattice.body[i], path_along(start.origin_m, way * CROWN_M), 1.0
-                )
-            path = path_along(start.origin_m, way * radius_m)
-            t = free_path_of_listed(world, lists, tile, start.skip, path)
-            # Full occlusion on contact, fading with zero slope at the radius: no visible boundary.
-            value = wp.min(t * (2.0 - t), within)
-    open_sky[0, i] = value
+    row, column, _, part = wp.tid()
+    tile = block_tile(row, column, tile_columns)
+    shaded = lists[tile, world.lamps.shape[0], 0] != 0
+    k = int(part * run)
+    while k < (part + 1) * run:
+        i = block_point(lattice, row, column, k)
+        if i >= 0:
+            value = float(UNSEEN)
+            if lattice.body[i] >= 0:
+                value = 1.0
+                if shaded:
+                    n = lattice.normal[i]
+                    x, y = make_frame(n)
+                    rank = bayer(k % BLOCK, k / BLOCK)
+                    h = hemisphere[rank]
+                    way = x * h[0] + y * h[1] + n * h[2]
+                    start = Departure()
+                    start.origin_m = lattice.origin_m[i]
+                    start.skip = lattice.skip[i]
+                    within = float(1.0)
+                    if is_translucent(world, lattice.surface[i]):
+                        way = way * wp.where((rank & 2) != 0, 1.0, -1.0)
+                        start = departure_to(world, lattice, i, way)
+                        start.skip = lattice.body[i]
+                        within = free_path_before(
+                            world, lattice.body[i], path_along(start.origin_m, way * CROWN_M), 1.0
+                        )
+                    path = path_along(start.origin_m, way * radius_m)
+                    t = free_path_of_listed(world, lists, tile, start.skip, path)
+                    # Full occlusion on contact, fading with zero slope at the radius: no visible
+                    # boundary.
+                    value = wp.min(t * (2.0 - t), within)
+            open_sky[0, i] = value
+        k += 1
 
 
 @wp.kernel

@@ -239,10 +239,10 @@ def _snippet(cpu: str, cuda: str, *, first: bool) -> str:
 
     Args:
         cpu, cuda: Code that finds a ``body`` and its ``strike``: any one (if ``ANY``) or the first.
-        first: Whether to return the first intersection, or whether there is any.
+        first: Whether to return the first intersection, or only the body of any.
     """
     any_only = f"constexpr bool ANY = {str(not first).lower()};"
-    told = _FOUND if first else "    return body >= 0;\n"
+    told = _FOUND if first else "    return body;\n"
     return f"""
 #ifdef __CUDA_ARCH__
     {any_only}{_STRIKE_ON_CUDA}{cuda}{told}
@@ -266,8 +266,8 @@ def first_in_mesh(
 @wp.func_native(_snippet(_IN_MESH, _IN_MESH_ON_CUDA, first=False))
 def any_in_mesh(
     tree: wp.array[wp.float32], mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
-) -> bool:
-    """Whether a ray in the mesh frame meets a face before a parameter."""
+) -> int:
+    """0 if a ray in the mesh frame meets a face before a parameter; else -1."""
     ...
 
 
@@ -296,6 +296,6 @@ def any_in_scene(
     d: wp.vec3,
     reach: float,
     through: int,
-) -> bool:
-    """Whether a ray meets any body without the cut-outs that ``through`` names."""
+) -> int:
+    """A body without the cut-outs that ``through`` names that a ray meets; -1 for none."""
     ...

@@ -421,6 +421,7 @@ class World:
     """The scene without the camera.
 
     Attributes:
+        boxes: The bodies' boxes in the world, see box_groups.
         tree: Hierarchy over the bodies' boxes, see gen_data.generator.renderers.warp.scene.bvh;
             empty on CUDA.
         hierarchy: Warp's hierarchy over the same boxes, on CUDA; 0 on the CPU.
@@ -429,6 +430,7 @@ class World:
         lobes: Directional albedo of specular lobes, see brdf.directional_albedo.
     """
 
+    boxes: wp.array[wp.float32]
     tree: wp.array[wp.float32]
     hierarchy: wp.uint64
     cutouts: wp.array[wp.int32]
