@@ -14,6 +14,21 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 # Coordinate of the boxes that fill the last group [m].
 NOWHERE_M = 1.0e9
 
+
+@wp.func
+def low_corner(boxes: wp.array[wp.float32], k: int):
+    """Low corner of box k."""
+    first = 48 * (k / 8) + k % 8
+    return wp.vec3(boxes[first], boxes[first + 16], boxes[first + 32])
+
+
+@wp.func
+def high_corner(boxes: wp.array[wp.float32], k: int):
+    """High corner of box k."""
+    first = 48 * (k / 8) + k % 8 + 8
+    return wp.vec3(boxes[first], boxes[first + 16], boxes[first + 32])
+
+
 _NEXT_IN_SHAFT = (
     LANES
     + """

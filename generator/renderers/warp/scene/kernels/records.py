@@ -57,7 +57,7 @@ class Geometry:
         mesh: Warp's hierarchy, on CUDA; 0 on the CPU.
         tree: Hierarchy of gen_data.generator.renderers.warp.scene.bvh, on the CPU; empty on CUDA.
         faces: Three vertex indices per face, flat.
-        box_lows_m, box_highs_m: Corners of boxes that together bound all faces.
+        boxes: Boxes that together bound all faces, see box_groups.
         convex: 1 for a convex solid, which never shadows itself when seen from outside.
     """
 
@@ -68,8 +68,7 @@ class Geometry:
     uvs: wp.array[wp.vec2]
     faces: wp.array[wp.int32]
     face_slots: wp.array[wp.int32]
-    box_lows_m: wp.array[wp.vec3]
-    box_highs_m: wp.array[wp.vec3]
+    boxes: wp.array[wp.float32]
     low_m: wp.vec3
     high_m: wp.vec3
     convex: int

@@ -14,6 +14,7 @@ LANES = """
     auto load = [](const float* from) { return *from; };
     auto bits_of = [](bool condition) { return (unsigned)condition; };
     auto first_of = [](unsigned bits) { return 0; };
+    auto at = [](Lanes lanes, int lane) { return lanes; };
 #else
     constexpr int WIDTH = 8;
     typedef float Lanes __attribute__((ext_vector_type(8)));
@@ -27,6 +28,7 @@ LANES = """
     };
     // The first lane whose bit is set.
     auto first_of = [](unsigned bits) { return __builtin_ctz(bits); };
+    auto at = [](Lanes lanes, int lane) -> float { return lanes[lane]; };
 #endif
     // Selects by comparison: NaN is treated the same on every processor.
     auto smaller = [](Lanes a, Lanes b) -> Lanes { return a < b ? a : b; };
