@@ -389,9 +389,11 @@ def _sky_visibility(frame: CameraView, lattice: Lattice, inputs: list[Any]) -> w
 
 
 def _smooth(frame: CameraView, lattice: Lattice, values: wp.array, smoothed: wp.array) -> None:
-    sums = frame.cache.scratch("row sums", values.shape, wp.vec2)
-    shape, run = _blocks(frame, lattice, len(values))
-    inputs = [frame.view, lattice, run, _classify(frame, lattice, values), values]
+    lights, points = values.shape
+    sums = frame.cache.scratch("row sums", (lights, 2, points), float)
+    lanes = 8 if frame.cache.device.is_cpu else 1
+    shape = (lattice.height, -(-lattice.width // lanes), lights)
+    inputs = [frame.view, lattice, lanes, _classify(frame, lattice, values), values]
     frame.launch(soft_shadows.sum_rows, shape, inputs, [sums])
     frame.launch(soft_shadows.smooth_lattice, shape, [*inputs, sums], [smoothed])
 

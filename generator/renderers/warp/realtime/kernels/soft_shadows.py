@@ -19,7 +19,6 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     Departure,
     Lattice,
     departure_to,
-    points_agree,
 )
 from gen_data.generator.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE, TILE
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
@@ -45,6 +44,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     World,
     fast_normalize,
 )
+from gen_data.generator.renderers.warp.scene.kernels.simd import LANES
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -55,6 +55,8 @@ BLOCK = wp.constant(4)
 UNSEEN = wp.constant(-1.0)
 # Shadows of lamps with a smaller share of a point's light are too faint for further rays.
 SMOOTHED_SHARE = wp.constant(0.08)
+# Neighbours within three pixels' width of a point's tangent plane are on its surface.
+SAME_SURFACE_PX = wp.constant(3.0)
 # Leaves of one body hide the sky from one another up to this distance, the less the farther they
 # are, since they scatter light themselves [m]. With it, crowns are as bright as path-traced ones.
 CROWN_M = wp.constant(18.0)
@@ -298,16 +300,16 @@ def classify_blocks(lattice: Lattice, values: wp.array2d[float], classes: wp.arr
 
 
 @wp.func
-def classes_near(classes: wp.array3d[int], row: int, column: int, j: int):
-    """Union of the classes of a block and of those around it."""
+def classes_near(classes: wp.array3d[int], first_x: int, last_x: int, y: int, j: int):
+    """Union of the classes of the blocks of points in a row, and of the blocks around them."""
     found = int(0)
-    y = wp.max(row - 1, 0)
-    while y <= wp.min(row + 1, classes.shape[0] - 1):
-        x = wp.max(column - 1, 0)
-        while x <= wp.min(column + 1, classes.shape[1] - 1):
-            found = found | classes[y, x, j]
-            x += 1
-        y += 1
+    row = wp.max(y / BLOCK - 1, 0)
+    while row <= wp.min(y / BLOCK + 1, classes.shape[0] - 1):
+        column = wp.max(first_x / BLOCK - 1, 0)
+        while column <= wp.min(last_x / BLOCK + 1, classes.shape[1] - 1):
+            found = found | classes[row, column, j]
+            column += 1
+        row += 1
     return found
 
 
@@ -349,7 +351,8 @@ def refine_lamps(
     """
     row, column, j, part = wp.tid()
     tile = block_tile(row, column, tile_columns)
-    mixed = (classes_near(classes, row, column, j) & 3) == 3
+    x = BLOCK * column
+    mixed = (classes_near(classes, x, x, BLOCK * row, j) & 3) == 3
     likely = int(NOBODY)
     k = int(part * run)
     while k < (part + 1) * run:
@@ -380,63 +383,8 @@ def refine_lamps(
 
 @wp.func
 def surface_tolerance(view: View, p: wp.vec3):
-    """Allowed distance of neighbours from a point's tangent plane: three pixels' width [m]."""
-    return 3.0 * view.pixel_rad * wp.length(p - view.eye_m)
-
-
-@wp.func
-def rim_weight(offset: int, half: int):
-    """Weight of a window's offset: points at the rims of windows of width 2 ``half`` count half.
-
-    Windows are thus centred and contain every part of a 4 x 4 pattern equally often.
-    """
-    return wp.where(wp.abs(offset) == half, 0.5, 1.0)
-
-
-@wp.func
-def is_same_surface(lattice: Lattice, i: int, k: int, tolerance_m: float):
-    """Whether two lattice points lie on one smooth stretch of surface."""
-    same = bool(False)
-    if lattice.surface[i] == lattice.surface[k]:
-        p = lattice.p_m[i]
-        same = (
-            points_agree(p, lattice.normal[i], lattice.p_m[k], lattice.normal[k], tolerance_m) > 0.0
-        )
-    return same
-
-
-@wp.kernel
-def sum_rows(
-    view: View,
-    lattice: Lattice,
-    run: int,
-    classes: wp.array3d[int],
-    values: wp.array2d[float],
-    sums: wp.array2d[wp.vec2],
-):
-    """Sum and number of the values beside each point on its own surface.
-
-    Skipped where all values around agree, which need no sums.
-    """
-    row, column, j, part = wp.tid()
-    found = classes_near(classes, row, column, j)
-    k = int(part * run)
-    while k < (part + 1) * run:
-        i = block_point(lattice, row, column, k)
-        if i >= 0:
-            total = wp.vec2(0.0, 0.0)
-            if lattice.surface[i] >= 0 and not is_uniform(found):
-                tolerance_m = surface_tolerance(view, lattice.p_m[i])
-                x = i % lattice.width
-                q = int(i + wp.max(-x, -2))
-                end = i + wp.min(lattice.width - 1 - x, 2)
-                while q <= end:
-                    value = values[j, q]
-                    if value != UNSEEN and is_same_surface(lattice, i, q, tolerance_m):
-                        total += wp.vec2(value, 1.0) * rim_weight(q - i, 2)
-                    q += 1
-            sums[j, i] = total
-        k += 1
+    """Allowed distance of neighbours from a point's tangent plane [m]."""
+    return SAME_SURFACE_PX * view.pixel_rad * wp.length(p - view.eye_m)
 
 
 @wp.func
@@ -445,52 +393,211 @@ def is_uniform(classes: int):
     return classes == 1 or classes == 2  # noqa: PLR1714
 
 
-@wp.func
-def column_sum(
-    lattice: Lattice, sums: wp.array2d[wp.vec2], j: int, i: int, half: int, tolerance_m: float
+_WINDOW = (
+    LANES
+    + f"""
+    constexpr float UNSEEN = {float(UNSEEN)}f;
+"""
+    + """
+    const int points = values.shape[1];
+    auto is_inside = [&](int x, int y) {
+        return x >= 0 && x < lattice.width && y >= 0 && y < lattice.height;
+    };
+    auto are_inside = [&](int x, int y) {
+        return is_inside(x, y) && x + WIDTH <= lattice.width;
+    };
+    // Neighbours in a row; those off the lattice lie on no surface.
+    struct Points { Ints surface; Lanes p[3], n[3]; };
+    auto points_at = [&](int x, int y) {
+        const int first = y * lattice.width + x;
+        Points points;
+        if (are_inside(x, y)) {
+            points.surface = load_ints(lattice.surface.data + first);
+            load_triples((const float*)(lattice.p_m.data + first), points.p);
+            load_triples((const float*)(lattice.normal.data + first), points.n);
+        } else {
+            int surface[WIDTH];
+            wp::vec3 p[WIDTH], n[WIDTH];
+            for (int lane = 0; lane < WIDTH; ++lane) {
+                const bool inside = is_inside(x + lane, y);
+                surface[lane] = inside ? lattice.surface.data[first + lane] : -1;
+                p[lane] = lattice.p_m.data[inside ? first + lane : 0];
+                n[lane] = lattice.normal.data[inside ? first + lane : 0];
+            }
+            points.surface = load_ints(surface);
+            load_triples((const float*)p, points.p);
+            load_triples((const float*)n, points.n);
+        }
+        return points;
+    };
+    auto values_at = [&](const float* from, int x, int y) {
+        const int first = y * lattice.width + x;
+        if (are_inside(x, y))
+            return load(from + first);
+        float values[WIDTH];
+        for (int lane = 0; lane < WIDTH; ++lane)
+            values[lane] = is_inside(x + lane, y) ? from[first + lane] : UNSEEN;
+        return load(values);
+    };
+    auto write = [&](float* to, Lanes lanes) {
+        for (int lane = 0; lane < WIDTH && x + lane < lattice.width; ++lane)
+            to[y * lattice.width + x + lane] = at(lanes, lane);
+    };
+    auto dot = [](const Lanes* a, const Lanes* b) {
+        return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    };
+    const Lanes zero = 0.0f;
+    const Points here = points_at(x, y);
+    const Lanes away[3] = {here.p[0] - eye_m[0], here.p[1] - eye_m[1], here.p[2] - eye_m[2]};
+    const Lanes squared_tolerance = dot(away, away) * (tolerance * tolerance);
+    // A term where points lie on one smooth stretch of surface, as lattice.points_agree; else 0.
+    auto where_one = [&](const Points& there, Lanes term) -> Lanes {
+        const Lanes way[3] = {there.p[0] - here.p[0], there.p[1] - here.p[1],
+                              there.p[2] - here.p[2]};
+        const Lanes height = dot(here.n, way), least = 0.9f;
+        const auto one = (here.surface == there.surface) & (dot(here.n, there.n) >= least)
+                         & (height * height <= squared_tolerance);
+        return one ? term : zero;
+    };
+    // Points at the rims of windows count half: windows are thus centred and contain every part of
+    // a 4 x 4 pattern equally often.
+    auto rim_weight = [](int offset, int half) -> Lanes {
+        return offset == half || offset == -half ? 0.5f : 1.0f;
+    };
+"""
+)
+
+_SUM_ROW = (
+    _WINDOW
+    + """
+    const float* given = values.data + j * points;
+    Lanes total = 0.0f, count = 0.0f;
+    for (int k = -2; k <= 2; ++k) {
+        const Points there = points_at(x + k, y);
+        const Lanes value = values_at(given, x + k, y), weight = rim_weight(k, 2);
+        total += where_one(there, value != UNSEEN ? value * weight : zero);
+        count += where_one(there, value != UNSEEN ? weight : zero);
+    }
+    write(sums.data + 2 * j * points, total);
+    write(sums.data + (2 * j + 1) * points, count);
+"""
+)
+
+
+@wp.func_native(_SUM_ROW)
+def sum_row(
+    lattice: Lattice,
+    eye_m: wp.vec3,
+    tolerance: float,
+    values: wp.array2d[wp.float32],
+    x: int,
+    y: int,
+    j: int,
+    sums: wp.array3d[wp.float32],
 ):
-    """Row sums added over the points above and below a point on its own surface."""
-    y = i / lattice.width
-    total = wp.vec2(0.0, 0.0)
-    v = int(wp.max(-y, -half))
-    while v <= wp.min(lattice.height - 1 - y, half):
-        k = i + v * lattice.width
-        if is_same_surface(lattice, i, k, tolerance_m):
-            total += sums[j, k] * rim_weight(v, half)
-        v += 1
-    return total
+    """Sum and number of the values beside points on their own surface, for neighbours in a row.
+
+    Args:
+        tolerance: Allowed distance from a point's tangent plane over its distance from the eye.
+        x, y: The first of eight points; of one on CUDA.
+        sums: [light, sum or number, point].
+    """
+    ...
+
+
+_SMOOTH_COLUMN = (
+    _WINDOW
+    + """
+    auto sum_column = [&](int half, Lanes& total, Lanes& count) {
+        total = 0.0f;
+        count = 0.0f;
+        for (int k = -half; k <= half; ++k) {
+            const Points there = points_at(x, y + k);
+            const Lanes weight = rim_weight(k, half);
+            const float* given = sums.data + 2 * j * points;
+            total += where_one(there, values_at(given, x, y + k) * weight);
+            count += where_one(there, values_at(given + points, x, y + k) * weight);
+        }
+    };
+    Lanes total, count, wide_total, wide_count;
+    sum_column(2, total, count);
+    const Lanes value = values_at(values.data + j * points, x, y), enough = 8.0f;
+    const auto lacks = (value != UNSEEN) & (count < enough);
+    if (bits_of(lacks)) {
+        // At the end of a surface a window holds part of the pattern only: take a larger one.
+        sum_column(4, wide_total, wide_count);
+        total = lacks ? wide_total : total;
+        count = lacks ? wide_count : count;
+    }
+    const auto known = (value != UNSEEN) & (count > zero);
+    write(smoothed.data + j * points, known ? total / count : value);
+"""
+)
+
+
+@wp.func_native(_SMOOTH_COLUMN)
+def smooth_column(
+    lattice: Lattice,
+    eye_m: wp.vec3,
+    tolerance: float,
+    values: wp.array2d[wp.float32],
+    x: int,
+    y: int,
+    j: int,
+    sums: wp.array3d[wp.float32],
+    smoothed: wp.array2d[wp.float32],
+):
+    """Mean of row sums above and below points on their own surface; arguments as for sum_row."""
+    ...
+
+
+@wp.kernel
+def sum_rows(
+    view: View,
+    lattice: Lattice,
+    lanes: int,
+    classes: wp.array3d[int],
+    values: wp.array2d[float],
+    sums: wp.array3d[float],
+):
+    """Sum and number of the values beside each point on its own surface.
+
+    Skipped where all values around agree, which need no sums.
+
+    Args:
+        lanes: Points per thread: 8 on the CPU, 1 on CUDA.
+    """
+    y, group, j = wp.tid()
+    x = group * lanes
+    if is_uniform(classes_near(classes, x, x + lanes - 1, y, j)):
+        for k in range(wp.min(lanes, lattice.width - x)):
+            sums[j, 0, y * lattice.width + x + k] = 0.0
+            sums[j, 1, y * lattice.width + x + k] = 0.0
+    else:
+        sum_row(lattice, view.eye_m, SAME_SURFACE_PX * view.pixel_rad, values, x, y, j, sums)
 
 
 @wp.kernel
 def smooth_lattice(
     view: View,
     lattice: Lattice,
-    run: int,
+    lanes: int,
     classes: wp.array3d[int],
     values: wp.array2d[float],
-    sums: wp.array2d[wp.vec2],
+    sums: wp.array3d[float],
     smoothed: wp.array2d[float],
 ):
     """Average differing values over neighbours on one surface."""
-    row, column, j, part = wp.tid()
-    # With only zeros or only ones around, the mean is the value itself.
-    uniform = is_uniform(classes_near(classes, row, column, j))
-    k = int(part * run)
-    while k < (part + 1) * run:
-        i = block_point(lattice, row, column, k)
-        if i >= 0:
-            value = values[j, i]
-            if not uniform and value != UNSEEN:
-                tolerance_m = surface_tolerance(view, lattice.p_m[i])
-                total = column_sum(lattice, sums, j, i, 2, tolerance_m)
-                if total[1] < 8.0:
-                    # At the end of a surface a window holds part of the pattern only: take a larger
-                    # one.
-                    total = column_sum(lattice, sums, j, i, 4, tolerance_m)
-                if total[1] > 0.0:
-                    value = total[0] / total[1]
-            smoothed[j, i] = value
-        k += 1
+    y, group, j = wp.tid()
+    x = group * lanes
+    if is_uniform(classes_near(classes, x, x + lanes - 1, y, j)):
+        # With only zeros or only ones around, the mean is the value itself.
+        for k in range(wp.min(lanes, lattice.width - x)):
+            i = y * lattice.width + x + k
+            smoothed[j, i] = values[j, i]
+    else:
+        tolerance = SAME_SURFACE_PX * view.pixel_rad
+        smooth_column(lattice, view.eye_m, tolerance, values, x, y, j, sums, smoothed)
 
 
 @wp.kernel

@@ -1,8 +1,6 @@
 """Ray traversal of bounding volume hierarchies, eight boxes or eight triangles at a time.
 
-On the CPU, trees are those of gen_data.generator.renderers.warp.scene.bvh, and the traversal uses
-the vector extensions of the compiler that Warp ships: plain IEEE arithmetic, the same on every
-processor. It takes a third of the time of ``wp.mesh_query_ray``, which tests boxes and triangles
+On the CPU, trees are those of gen_data.generator.renderers.warp.scene.bvh, and the traversal takes a third of the time of ``wp.mesh_query_ray``, which tests boxes and triangles
 one by one. On CUDA the same functions query Warp's own hierarchies.
 
 Sources: Wald, Benthin and Boulos, "Getting rid of packets: efficient SIMD single-ray traversal
@@ -15,6 +13,7 @@ from __future__ import annotations
 import warp as wp
 
 from gen_data.generator.renderers.warp.scene.kernels.records import BodyRecord, Geometry
+from gen_data.generator.renderers.warp.scene.kernels.simd import LANES
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -22,10 +21,9 @@ Found = wp.spatial_vectord
 """Intersection of a ray: parameter, weights of a face's first and second corner, face, body
 (0 within a mesh), and an unused number; face and body are -1 for a miss."""
 
-_RAY = """
-    typedef float Lanes __attribute__((ext_vector_type(8)));
-    typedef float LanesInMemory __attribute__((ext_vector_type(8), aligned(4)));
-    typedef bool Mask __attribute__((ext_vector_type(8)));
+_RAY = (
+    LANES
+    + """
     // Parameter and code in one integer: positive floats compare like integers, nearest first.
     typedef unsigned long long Entry;
     // Ize 2013: 1 + twice the rounding error of a slab's parameter, so that no box is missed.
@@ -59,29 +57,27 @@ _RAY = """
         ray.sy = ray.d[ray.ky] * ray.sz;
     };
 
-    // Slab test of a node's eight boxes: push those that the ray enters, the nearest on top.
-    auto enter = [](Walk& walk, const Ray& ray, const float* node, float reach, bool sorted) {
+    // Slab test of a node's eight boxes: push those that the ray enters, the nearest on top. If it
+    // enters only one, that is the next code and the stack is left alone.
+    auto enter = [&](Walk& walk, const Ray& ray, const float* node, float reach, bool sorted,
+                     int& code) {
         auto slab = [&](int k, int lanes) {
-            return (*(const LanesInMemory*)(node + lanes) - Lanes(ray.o[k])) * ray.inverse[k];
+            return (load(node + lanes) - Lanes(ray.o[k])) * ray.inverse[k];
         };
         const Lanes enters_x = slab(0, ray.near[0]), leaves_x = slab(0, ray.near[0] ^ 8);
         const Lanes enters_y = slab(1, ray.near[1]), leaves_y = slab(1, ray.near[1] ^ 8);
         const Lanes enters_z = slab(2, ray.near[2]), leaves_z = slab(2, ray.near[2] ^ 8);
-        const Lanes begin = 0.0f, end = reach;
-        // Selects by comparison: NaN is treated the same on every processor.
-        Lanes enters = enters_z > begin ? enters_z : begin;
-        enters = enters_y > enters ? enters_y : enters;
-        enters = enters_x > enters ? enters_x : enters;
-        Lanes leaves = leaves_x < leaves_y ? leaves_x : leaves_y;
-        leaves = leaves < leaves_z ? leaves : leaves_z;
-        leaves = leaves * FARTHER;
-        leaves = leaves < end ? leaves : end;
-        unsigned hits = __builtin_bit_cast(
-            unsigned char, __builtin_convertvector(enters <= leaves, Mask));
+        const Lanes enters = larger(enters_x, larger(enters_y, larger(enters_z, 0.0f)));
+        const Lanes leaves = smaller(smaller(leaves_x, leaves_y), leaves_z);
+        unsigned hits = bits_of(enters <= smaller(leaves * FARTHER, reach));
         const int* codes = (const int*)(node + 48);
+        if (hits && !(hits & (hits - 1))) {
+            code = codes[first_of(hits)];
+            return true;
+        }
         const int first = walk.top;
         while (hits) {
-            const int lane = __builtin_ctz(hits);
+            const int lane = first_of(hits);
             hits &= hits - 1;
             const unsigned bits = __builtin_bit_cast(unsigned, (float)enters[lane]);
             const Entry entry = (Entry)bits << 32 | (unsigned)codes[lane];
@@ -91,6 +87,7 @@ _RAY = """
                 walk.stack[at] = walk.stack[at - 1];
             walk.stack[at] = entry;
         }
+        return false;
     };
 
     // Pop the next code that begins within reach, down to a floor; false if there is none.
@@ -105,10 +102,10 @@ _RAY = """
     };
 
     // Watertight test of eight triangles (Woop et al. 2013): whether any hit is nearer than before.
-    auto meet = [](const float* faces, const Ray& ray, Strike& strike) {
+    auto meet = [&](const float* faces, const Ray& ray, Strike& strike) {
         const Lanes ox = ray.o[ray.kx], oy = ray.o[ray.ky], oz = ray.o[ray.kz];
         auto corner = [&](int axis, int k) {
-            return *(const LanesInMemory*)(faces + 24 * axis + 8 * k);
+            return load(faces + 24 * axis + 8 * k);
         };
         const Lanes az = corner(ray.kz, 0) - oz;
         const Lanes bz = corner(ray.kz, 1) - oz;
@@ -121,19 +118,16 @@ _RAY = """
         const Lanes cy = corner(ray.ky, 2) - oy - cz * ray.sy;
         // Scaled barycentric weights: edge functions in the sheared plane.
         const Lanes u = cx * by - cy * bx, v = ax * cy - ay * cx, w = bx * ay - by * ax;
-        Lanes low = u < v ? u : v, high = u > v ? u : v;
-        low = low < w ? low : w;
-        high = high > w ? high : w;
+        const Lanes low = smaller(smaller(u, v), w), high = larger(larger(u, v), w);
         const Lanes sum = u + v + w;
         const Lanes t = (u * az + v * bz + w * cz) * ray.sz / sum;
         const Lanes zero = 0.0f, reach = strike.t;
         // All weights of one sign: faces have two sides, and shared edges leave no gap.
         const auto inside = (low >= zero) | (high <= zero);
-        unsigned hits = __builtin_bit_cast(unsigned char, __builtin_convertvector(
-            inside & (t >= zero) & (t < reach), Mask));
+        unsigned hits = bits_of(inside & (t >= zero) & (t < reach));
         const bool any = hits != 0;
         while (hits) {
-            const int lane = __builtin_ctz(hits);
+            const int lane = first_of(hits);
             hits &= hits - 1;
             // In lane order: equal distances keep the first face, whatever the processor.
             if (t[lane] < strike.t) {
@@ -152,15 +146,16 @@ _RAY = """
         int code = *(const int*)tree;
         bool met = false;
         do {
-            if (code >= 0)
-                enter(walk, ray, tree + 8 * code, strike.t, !any);
-            else
+            while (code >= 0 && enter(walk, ray, tree + 8 * code, strike.t, !any, code)) {
+            }
+            if (code < 0)
                 met |= meet(tree - 8 * code, ray, strike);
         } while (!(any && met) && next(walk, floor, strike.t, code));
         walk.top = floor;
         return met;
     };
 """
+)
 
 _IN_MESH = """
     Ray ray;
@@ -179,10 +174,10 @@ _IN_SCENE = """
     Strike strike = {reach, 0.0f, 0.0f, -1};
     int body = -1, code = *(const int*)tree.data;
     do {
-        if (code >= 0) {
-            enter(walk, ray, tree.data + 8 * code, strike.t, !ANY);
-            continue;
+        while (code >= 0 && enter(walk, ray, tree.data + 8 * code, strike.t, !ANY, code)) {
         }
+        if (code >= 0)
+            continue;
         const auto& placed = bodies.data[-1 - code];
         if (placed.cutouts & through)
             continue;
