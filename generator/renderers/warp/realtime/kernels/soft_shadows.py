@@ -169,9 +169,7 @@ def agreed_value(lattice: Lattice, values: wp.array2d[float], j: int, x: int, y:
 
 
 @wp.kernel
-def weigh_lamps(
-    world: World, lattice: Lattice, shares: wp.array2d[float], matters: wp.array[int]
-):
+def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float], matters: wp.array[int]):
     """Share of each lamp in each point's unshadowed light [lamp, point]; UNSEEN behind surfaces.
 
     Lamps behind a translucent surface count like those before it.

@@ -57,10 +57,8 @@ _RAY = (
         ray.sy = ray.d[ray.ky] * ray.sz;
     };
 
-    // Slab test of a node's eight boxes: push those that the ray enters, the nearest on top. If it
-    // enters only one, that is the next code and the stack is left alone.
-    auto enter = [&](Walk& walk, const Ray& ray, const float* node, float reach, bool sorted,
-                     int& code) {
+    // Slab test of a node's eight boxes: push those that the ray enters, the nearest on top.
+    auto enter = [&](Walk& walk, const Ray& ray, const float* node, float reach, bool sorted) {
         auto slab = [&](int k, int lanes) {
             return (load(node + lanes) - Lanes(ray.o[k])) * ray.inverse[k];
         };
@@ -71,10 +69,6 @@ _RAY = (
         const Lanes leaves = smaller(smaller(leaves_x, leaves_y), leaves_z);
         unsigned hits = bits_of(enters <= smaller(leaves * FARTHER, reach));
         const int* codes = (const int*)(node + 48);
-        if (hits && !(hits & (hits - 1))) {
-            code = codes[first_of(hits)];
-            return true;
-        }
         const int first = walk.top;
         while (hits) {
             const int lane = first_of(hits);
@@ -87,7 +81,6 @@ _RAY = (
                 walk.stack[at] = walk.stack[at - 1];
             walk.stack[at] = entry;
         }
-        return false;
     };
 
     // Pop the next code that begins within reach, down to a floor; false if there is none.
@@ -146,9 +139,9 @@ _RAY = (
         int code = *(const int*)tree;
         bool met = false;
         do {
-            while (code >= 0 && enter(walk, ray, tree + 8 * code, strike.t, !any, code)) {
-            }
-            if (code < 0)
+            if (code >= 0)
+                enter(walk, ray, tree + 8 * code, strike.t, !any);
+            else
                 met |= meet(tree - 8 * code, ray, strike);
         } while (!(any && met) && next(walk, floor, strike.t, code));
         walk.top = floor;
@@ -174,10 +167,10 @@ _IN_SCENE = """
     Strike strike = {reach, 0.0f, 0.0f, -1};
     int body = -1, code = *(const int*)tree.data;
     do {
-        while (code >= 0 && enter(walk, ray, tree.data + 8 * code, strike.t, !ANY, code)) {
-        }
-        if (code >= 0)
+        if (code >= 0) {
+            enter(walk, ray, tree.data + 8 * code, strike.t, !ANY);
             continue;
+        }
         const auto& placed = bodies.data[-1 - code];
         if (placed.cutouts & through)
             continue;
