@@ -231,7 +231,7 @@ def grow_tree(
     """Build one tree; launched with a single thread, on the CPU.
 
     Args:
-        boxes: Low corner, number, minus high corner, 0 [n, 8]; permuted, so that those of a node are
+        boxes: Low corner, number, minus high corner, 0 [n, 8]; permuted: those of a node are
             contiguous.
         leaf: Maximum number of boxes in a leaf.
         nodes: Bounds: low x, high x, low y, ... [., 6, 8]; no ray enters unused lanes.

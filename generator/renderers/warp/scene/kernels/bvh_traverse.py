@@ -1,7 +1,8 @@
 """Ray traversal of bounding volume hierarchies, eight boxes or eight triangles at a time.
 
-On the CPU, trees are those of gen_data.generator.renderers.warp.scene.bvh, and the traversal takes a third of the time of ``wp.mesh_query_ray``, which tests boxes and triangles
-one by one. On CUDA the same functions query Warp's own hierarchies.
+On the CPU, trees are those of gen_data.generator.renderers.warp.scene.bvh, and the traversal takes
+a third of the time of ``wp.mesh_query_ray``, which tests boxes and triangles one by one. On CUDA
+the same functions query Warp's own hierarchies.
 
 Sources: Wald, Benthin and Boulos, "Getting rid of packets: efficient SIMD single-ray traversal
 using multi-branching BVHs", 2008; Woop, Benthin and Wald, "Watertight ray/triangle intersection",

@@ -251,7 +251,8 @@ def listed_blocker(
         b = int(likely)
         if k >= 0:
             b = lists[tile, j, 1 + k]
-        if b != NOBODY and b != skip and (k < 0 or b != likely):
+        again = k >= 0 and b == likely
+        if b >= 0 and b != skip and not again:
             if is_blocked_by(world, b, path):
                 blocker = b
         k += 1

@@ -1,8 +1,8 @@
 """Vocabulary of native snippets that process eight numbers at once.
 
-On the CPU, ``Lanes`` and ``Ints`` are eight numbers in the vector extensions of the compiler that Warp ships:
-plain IEEE arithmetic, the same on every processor. On CUDA, where threads are lanes themselves, it
-is one number, so that one source serves both.
+On the CPU, ``Lanes`` and ``Ints`` are eight numbers in the vector extensions of the compiler that
+Warp ships: plain IEEE arithmetic, the same on every processor. On CUDA, where threads are lanes
+themselves, they are one number, so that one source serves both.
 """
 
 from __future__ import annotations
