@@ -223,7 +223,7 @@ def is_mesh_intersected(world: World, b: int, o: wp.vec3, d: wp.vec3, reach: flo
     """Whether a body blocks a ray; arguments as for closest_solid_hit."""
     g = world.bodies[b].geometry
     # The cheaper any-hit query comes first: only hits on cut-outs need the test at every face.
-    hit = any_in_mesh(world.geometries[g].tree, world.geometries[g].mesh, o, d, reach) >= 0
+    hit = any_in_mesh(world.geometries[g].tree, world.geometries[g].mesh, o, d, reach)
     if hit and (world.bodies[b].cutouts & through) != 0:
         hit = first_opaque_hit(world, b, o, d, reach, through).face >= 0
     return hit

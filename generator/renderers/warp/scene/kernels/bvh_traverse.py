@@ -221,17 +221,25 @@ _FOUND = """
 """
 
 
-def _snippet(cpu: str, cuda: str, *, first: bool) -> str:
+_BODY = """
+    return body;
+"""
+
+_MET = """
+    return body >= 0;
+"""
+
+
+def _snippet(cpu: str, cuda: str, told: str) -> str:
     """Source of one native function for both devices.
 
     On the CPU it is compiled out of line: most modules traverse trees in several places.
 
     Args:
         cpu, cuda: Code that finds a ``body`` and its ``strike``: any one (if ``ANY``) or the first.
-        first: Whether to return the first intersection, or only the body of any.
+        told: What to return: the first intersection, the body of any, or whether there is any.
     """
-    any_only = f"constexpr bool ANY = {str(not first).lower()};"
-    told = _FOUND if first else "    return body;\n"
+    any_only = f"constexpr bool ANY = {str(told != _FOUND).lower()};"
     return f"""
 #ifdef __CUDA_ARCH__
     {any_only}{_STRIKE_ON_CUDA}{cuda}{told}
@@ -244,7 +252,7 @@ def _snippet(cpu: str, cuda: str, *, first: bool) -> str:
 """
 
 
-@wp.func_native(_snippet(_IN_MESH, _IN_MESH_ON_CUDA, first=True))
+@wp.func_native(_snippet(_IN_MESH, _IN_MESH_ON_CUDA, _FOUND))
 def first_in_mesh(
     tree: wp.array[wp.float32], mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
 ) -> wp.spatial_vectord:
@@ -252,15 +260,15 @@ def first_in_mesh(
     ...
 
 
-@wp.func_native(_snippet(_IN_MESH, _IN_MESH_ON_CUDA, first=False))
+@wp.func_native(_snippet(_IN_MESH, _IN_MESH_ON_CUDA, _MET))
 def any_in_mesh(
     tree: wp.array[wp.float32], mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
-) -> int:
-    """0 if a ray in the mesh frame meets a face before a parameter; else -1."""
+) -> bool:
+    """Whether a ray in the mesh frame meets a face before a parameter."""
     ...
 
 
-@wp.func_native(_snippet(_IN_SCENE, _IN_SCENE_ON_CUDA, first=True))
+@wp.func_native(_snippet(_IN_SCENE, _IN_SCENE_ON_CUDA, _FOUND))
 def first_in_scene(
     tree: wp.array[wp.float32],
     hierarchy: wp.uint64,
@@ -275,7 +283,7 @@ def first_in_scene(
     ...
 
 
-@wp.func_native(_snippet(_IN_SCENE, _IN_SCENE_ON_CUDA, first=False))
+@wp.func_native(_snippet(_IN_SCENE, _IN_SCENE_ON_CUDA, _BODY))
 def any_in_scene(
     tree: wp.array[wp.float32],
     hierarchy: wp.uint64,
