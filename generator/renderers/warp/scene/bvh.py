@@ -61,7 +61,7 @@ def group_boxes(lows: Floats, highs: Floats) -> Floats:
     groups = np.full((-(-len(lows) // _WIDTH), _WIDTH, 3, 2), box_groups.NOWHERE_M, np.float32)
     flat = groups.reshape(-1, 3, 2)
     flat[: len(lows), :, 0], flat[: len(highs), :, 1] = lows, highs
-    return groups.transpose(0, 2, 3, 1).reshape(-1)
+    return np.asarray(groups.transpose(0, 2, 3, 1).reshape(-1))
 
 
 def _pack(nodes: Floats, codes: Ints, leaf_places: NDArray[np.integer], tail: Floats) -> Floats:
