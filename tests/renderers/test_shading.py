@@ -76,6 +76,22 @@ def test_a_lamp_falls_off_with_the_square_of_its_distance() -> None:
     assert np.abs(measured / expected - 1.0).max() < 0.03
 
 
+def test_a_lamp_that_is_faint_everywhere_is_left_out() -> None:
+    """A candle far below half a step of eight bits, beside a sun: not one bit of the image."""
+    sun = Light("sun", "sun", direction=(0.6, 0.0, -0.8), illuminance_lux=50_000.0)
+    candle = Light("candle", "sphere", (0.0, 0.0, 1.5), intensity_cd=1.0, radius_m=0.02)
+    bodies = (Body("p", "plane"), Body("b", "box", SE3((0.1, 0.0, 0.2)), 0.3))
+    alone, beside = (
+        luminance_of(
+            Scene("t", bodies, lights=lights, environment=DARK), from_above((96, 72)), ground()
+        )
+        for lights in ((sun,), (candle, sun))
+    )
+
+    assert alone.max() > 0.0
+    np.testing.assert_array_equal(beside, alone)
+
+
 def test_a_spot_lights_its_cone_and_nothing_beside() -> None:
     """Full within 0.8 of its half angle, dark beyond it."""
     spot = Light(

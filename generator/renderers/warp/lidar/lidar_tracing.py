@@ -27,6 +27,7 @@ from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.lidar.infrared_materials import infrared_surfaces
 from gen_data.generator.renderers.warp.lidar.kernels import lidar_rays as kernels
 from gen_data.generator.renderers.warp.lidar.kernels.ray_packets import LISTED_MAX, Boxes
+from gen_data.generator.renderers.warp.scene.bvh import group_boxes
 from gen_data.generator.renderers.warp.scene.material_packing import BodyMaterials, body_materials
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld, pack_world
 from gen_data.generator.renderers.warp.scene.struct_dtypes import to_device
@@ -313,6 +314,8 @@ def trace_scan(scene: Scene, lidar: Lidar, beams: LidarRays, cache: DeviceCache)
 def _boxes(world: PackedWorld, threads: int, cache: DeviceCache) -> Boxes:
     boxes = Boxes()
     boxes.lows_m, boxes.highs_m = world.lows_m, world.highs_m
+    groups = group_boxes(world.lows_m.numpy(), world.highs_m.numpy())
+    boxes.groups = wp.array(groups, dtype=float, device=cache.device)
     shape = (threads, int(LISTED_MAX))
     boxes.listed = cache.scratch("listed bodies", shape, int)
     boxes.enters_m = cache.scratch("listed distances", shape, float)

@@ -231,6 +231,7 @@ def _shade_layers(
 
 _STRIDE_PX = 3
 _TILE = int(shadow_culling.TILE)
+_BLOCK = int(soft_shadows.BLOCK)
 _LIST_LENGTH = int(shadow_culling.LIST_LENGTH)
 # Column of the sample in each row of a pixel, far from those of neighbouring rows (n-rooks).
 _ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
@@ -265,22 +266,39 @@ def make_lattice(frame: CameraView) -> Lattice:
 
 
 def find_light_visibility(frame: CameraView, lattice: Lattice) -> LightVisibility:
-    """Compute shadows and ambient occlusion of all points."""
-    world, cache = frame.world.record, frame.cache
-    lamps = world.lamps.shape[0]
+    """Compute shadows and ambient occlusion of all points.
+
+    Lamps that are faint everywhere are removed from the world, in place.
+    """
+    cache, world = frame.cache, frame.world.record
+    shares = _weigh_lamps(frame, lattice)
     columns = -(-lattice.width // _TILE)
     tiles = columns * -(-lattice.height // _TILE)
+    lamps = world.lamps.shape[0]
     lists = cache.scratch("occluders", (tiles, lamps + 1, 1 + _LIST_LENGTH), wp.int32)
     radius_m = frame.settings.ambient_occlusion_radius_m
-    points = lattice.width * lattice.height
-    shares = cache.scratch("shares", (max(lamps, 1), points), float)
-    frame.launch(soft_shadows.weigh_lamps, points, [world, lattice], [shares])
     inputs = [world, lattice, columns, radius_m, shares, lists]
     frame.launch(shadow_culling.list_occluders, tiles, inputs)
     inputs = [world, lattice, columns, lists]
     return LightVisibility(
         _lamp_visibility(frame, lattice, inputs, shares), _sky_visibility(frame, lattice, inputs)
     )
+
+
+def _weigh_lamps(frame: CameraView, lattice: Lattice) -> wp.array:
+    """Shares of the lamps that matter at any point, [lamps, points]; others are removed."""
+    cache, world = frame.cache, frame.world.record
+    count, points = world.lamps.shape[0], lattice.width * lattice.height
+    shares = cache.scratch("shares", (max(count, 1), points), float)
+    matters = wp.zeros(max(count, 1), dtype=wp.int32, device=cache.device)
+    frame.launch(soft_shadows.weigh_lamps, points, [world, lattice], [shares, matters])
+    kept = np.flatnonzero(matters.numpy())
+    if len(kept) < count:
+        lamps = world.lamps.numpy()[kept]
+        world.lamps = wp.array(lamps, dtype=records.LightRecord, device=cache.device)
+        if len(kept):
+            shares = wp.array(shares.numpy()[kept], dtype=float, device=cache.device)
+    return shares
 
 
 def sunflower(n: int) -> Array:
@@ -311,17 +329,17 @@ def cosine_hemisphere(n: int) -> Array:
 def _lamp_visibility(
     frame: CameraView, lattice: Lattice, inputs: list[Any], shares: wp.array
 ) -> wp.array:
-    cache, lamps = frame.cache, frame.world.record.lamps.shape[0]
-    n = lattice.width * lattice.height
-    probed, lit = (cache.scratch(name, (max(lamps, 1), n), float) for name in ("probed", "lit"))
-    if lamps == 0:
+    cache = frame.cache
+    probed, lit = (cache.scratch(name, shares.shape, float) for name in ("probed", "lit"))
+    if frame.world.record.lamps.shape[0] == 0:
         return lit
     disc = cache.constant(wp.vec2, lamp_samples, 48, frame.settings.shadows)
-    inputs = [*inputs, disc, shares]
+    shape, run = _blocks(frame, lattice, len(shares))
+    inputs = [*inputs, disc, shares, run]
     for parity in (0, 1):
-        frame.launch(soft_shadows.probe_lamps, n, [*inputs, parity], [probed])
+        frame.launch(soft_shadows.probe_lamps, shape, [*inputs, parity], [probed])
     classes = _classify(frame, lattice, probed)
-    frame.launch(soft_shadows.refine_lamps, n, [*inputs, classes, probed], [lit])
+    frame.launch(soft_shadows.refine_lamps, shape, [*inputs, classes, probed], [lit])
     _smooth(frame, lattice, lit, probed)
     return probed
 
@@ -334,20 +352,35 @@ def _sky_visibility(frame: CameraView, lattice: Lattice, inputs: list[Any]) -> w
         open_sky.fill_(1.0)
         return open_sky
     hemisphere = cache.constant(wp.vec3, cosine_hemisphere, 16)
-    frame.launch(soft_shadows.probe_ambient, n, [*inputs, hemisphere, radius_m], [probed])
+    shape, run = _blocks(frame, lattice, 1)
+    frame.launch(soft_shadows.probe_ambient, shape, [*inputs, hemisphere, radius_m, run], [probed])
     _smooth(frame, lattice, probed, open_sky)
     return open_sky
 
 
 def _smooth(frame: CameraView, lattice: Lattice, values: wp.array, smoothed: wp.array) -> None:
-    sums = frame.cache.scratch("row sums", values.shape, wp.vec2)
-    inputs = [frame.view, lattice, _classify(frame, lattice, values), values]
-    frame.launch(soft_shadows.sum_rows, values.shape[1], inputs, [sums])
-    frame.launch(soft_shadows.smooth_lattice, values.shape[1], [*inputs, sums], [smoothed])
+    lights, points = values.shape
+    sums = frame.cache.scratch("row sums", (lights, 2, points), float)
+    lanes = 8 if frame.cache.device.is_cpu else 1
+    shape = (lattice.height, -(-lattice.width // lanes), lights)
+    inputs = [frame.view, lattice, lanes, _classify(frame, lattice, values), values]
+    frame.launch(soft_shadows.sum_rows, shape, inputs, [sums])
+    frame.launch(soft_shadows.smooth_lattice, shape, [*inputs, sums], [smoothed])
 
 
 def _classify(frame: CameraView, lattice: Lattice, values: wp.array) -> wp.array:
-    shape = (-(-lattice.height // 4), -(-lattice.width // 4), values.shape[0])
+    shape = _blocks(frame, lattice, len(values))[0][:3]
     classes = frame.cache.scratch("classes", shape, wp.int32)
     frame.launch(soft_shadows.classify_blocks, shape, [lattice, values], [classes])
     return classes
+
+
+def _blocks(
+    frame: CameraView, lattice: Lattice, lights: int
+) -> tuple[tuple[int, int, int, int], int]:
+    """Shape of a launch on the blocks of lights: rows, columns, lights, threads; and the run."""
+    points = _BLOCK * _BLOCK
+    # One thread per block on the CPU, where threads run one after the other anyway.
+    run = points if frame.cache.device.is_cpu else 1
+    shape = (-(-lattice.height // _BLOCK), -(-lattice.width // _BLOCK), lights, points // run)
+    return shape, run

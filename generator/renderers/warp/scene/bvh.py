@@ -11,20 +11,16 @@ A tree is one array of floats, in groups of eight; integers are stored by their 
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.renderers.warp.scene.kernels import bvh_build
+from gen_data.generator.renderers.warp.scene.kernels import box_groups, bvh_build
 
-_WIDTH = int(bvh_build.WIDTH)
+_WIDTH = 8
 _NODE_GROUPS, _LEAF_GROUPS = 7, 10
-# Stack for up to 2**24 boxes: eight levels of arbitrary splits and eight of halves, each pushing
-# seven more than it pops.
-_WAITING_MAX = 128
 
 Floats = NDArray[np.float32]
 Ints = NDArray[np.int32]
@@ -60,6 +56,14 @@ def body_tree(lows_m: Floats, highs_m: Floats) -> Floats:
     return _pack(nodes, codes, 1 + order[leaves[:, 0]], np.zeros((0, 1, _WIDTH), np.float32))
 
 
+def group_boxes(lows: Floats, highs: Floats) -> Floats:
+    """Boxes in the layout that ``kernels.box_groups`` reads, flat."""
+    groups = np.full((-(-len(lows) // _WIDTH), _WIDTH, 3, 2), box_groups.NOWHERE_M, np.float32)
+    flat = groups.reshape(-1, 3, 2)
+    flat[: len(lows), :, 0], flat[: len(highs), :, 1] = lows, highs
+    return np.asarray(groups.transpose(0, 2, 3, 1).reshape(-1))
+
+
 def _pack(nodes: Floats, codes: Ints, leaf_places: NDArray[np.integer], tail: Floats) -> Floats:
     """Concatenate a tree into one array of groups."""
     if len(leaf_places):
@@ -85,13 +89,15 @@ def _grow(lows: Floats, highs: Floats, leaf: int) -> tuple[Ints, Floats, Ints, I
     if n == 0:
         nodes[:, ::2], nodes[:, 1::2] = bvh_build.NOWHERE, -bvh_build.NOWHERE
         return order, nodes, codes, leaves
-    boxes = _workspace()
-    boxes.lows, boxes.highs = _wrap(lows, wp.vec3), _wrap(highs, wp.vec3)
-    boxes.order = _wrap(order, wp.int32)
-    todo = np.zeros((_WAITING_MAX, 4), np.int32)
+    boxes = np.zeros((n, 2, 4), np.float32)
+    boxes[:, 0, :3], boxes[:, 1, :3] = lows, -highs
+    # Numbers up to 2**24 are exact.
+    boxes[:, 0, 3] = order
     outputs = [_wrap(nodes, wp.float32), _wrap(codes, wp.int32), _wrap(leaves, wp.vec2i)]
     outputs.append(_wrap(counts, wp.int32))
-    wp.launch(bvh_build.grow_tree, 1, [boxes, leaf, _wrap(todo, wp.vec4i)], outputs, device="cpu")
+    given = [_wrap(boxes.reshape(n, 8), wp.float32), leaf]
+    wp.launch(bvh_build.grow_tree, 1, given, outputs, device="cpu")
+    order = boxes[:, 0, 3].astype(np.int32)
     return order, nodes[: counts[0]], codes[: counts[0]], leaves[: counts[1]]
 
 
@@ -99,15 +105,3 @@ def _wrap(values: NDArray[np.generic], dtype: Any) -> wp.array:
     """Wrap a host array for kernels on the CPU without a copy; it must outlive them."""
     shape = values.shape if dtype in (wp.int32, wp.float32) else values.shape[:-1]
     return wp.array(ptr=values.ctypes.data, dtype=dtype, shape=shape, device="cpu")
-
-
-def _workspace() -> bvh_build.Boxes:
-    boxes = bvh_build.Boxes()
-    boxes.bin_lows, boxes.bin_highs, boxes.bin_counts, boxes.costs = _bins()
-    return boxes
-
-
-@cache
-def _bins() -> tuple[wp.array, ...]:
-    dtypes = (wp.vec3, wp.vec3, wp.int32, wp.float32)
-    return tuple(wp.empty(int(bvh_build.BINS), dtype=dtype, device="cpu") for dtype in dtypes)

@@ -19,7 +19,7 @@ from gen_data.generator.core.colorimetry import srgb_decode
 from gen_data.generator.core.mapped_files import owned_bytes
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.scene import bvh
-from gen_data.generator.renderers.warp.scene.bvh import face_boxes, mesh_tree
+from gen_data.generator.renderers.warp.scene.bvh import face_boxes, group_boxes, mesh_tree
 from gen_data.generator.renderers.warp.scene.kernels import bvh_build
 from gen_data.generator.renderers.warp.scene.kernels.records import Geometry, TextureRecord
 from gen_data.generator.renderers.warp.scene.struct_dtypes import struct_dtype
@@ -73,13 +73,13 @@ def prepare_mesh(data: MeshData, with_tree: bool) -> Arrays:
     """Compute what rendering a mesh takes beside its own arrays.
 
     Returns:
-        ``box_lows_m`` and ``box_highs_m`` [n, 3] of ``boxes_around``; ``convex`` [1], 0 or 1; with
+        ``boxes`` of ``boxes_around`` as by ``group_boxes``; ``convex`` [1], 0 or 1; with
         a tree, ``tree``: that of ``mesh_tree``.
     """
     face_lows, face_highs = face_boxes(data.vertices_m, data.faces)
     lows, highs = boxes_around(face_lows, face_highs)
     is_convex = is_convex_solid(data.vertices_m, data.faces)
-    arrays: Arrays = {"box_lows_m": lows, "box_highs_m": highs, "convex": np.array([is_convex])}
+    arrays: Arrays = {"boxes": group_boxes(lows, highs), "convex": np.array([is_convex])}
     if with_tree:
         arrays["tree"] = mesh_tree(data.vertices_m, data.faces, face_lows, face_highs)
     return arrays
@@ -100,8 +100,7 @@ def upload_mesh(data: MeshData, prepared: Arrays, device: wp.Device) -> DeviceMe
         "uvs": _upload(data.uvs, wp.vec2, device),
         "faces": _upload(data.faces.reshape(-1), wp.int32, device),
         "face_slots": _upload(data.face_slots, wp.int32, device),
-        "box_lows_m": _upload(prepared["box_lows_m"], wp.vec3, device),
-        "box_highs_m": _upload(prepared["box_highs_m"], wp.vec3, device),
+        "boxes": _upload(prepared["boxes"], wp.float32, device),
     }
     if device.is_cuda:
         arrays["tree"] = _upload(np.zeros(0, np.float32), wp.float32, device)

@@ -201,6 +201,7 @@ def _strength(lamp: SkyLamp) -> float:
 
 _GLOSSY_LEVELS = 4
 _GLOSSY_SIZE = 24
+_LANES = 8
 # Source resolution of each level: its lobe is wider than a texel of that size.
 _SOURCE_HEIGHTS = (48, 24, 24, 24)
 _IRRADIANCE_HEIGHT = 32
@@ -302,17 +303,20 @@ def _prefilter_level(image: Float32, level: int, device: wp.Device) -> wp.array:
     shares = _texel_weights(source.shape[0], level, device.alias)
     smoothed = wp.zeros(_GLOSSY_SIZE**2, dtype=wp.vec3, device=device)
     radiance = wp.array(source.reshape(-1, 3), dtype=wp.vec3, device=device)
-    wp.launch(prefilter, _GLOSSY_SIZE**2 // 4, [shares, radiance], [smoothed], device=device)
+    lanes = _LANES if device.is_cpu else 1
+    inputs = [shares, radiance, lanes]
+    wp.launch(prefilter, _GLOSSY_SIZE**2 // lanes, inputs, [smoothed], device=device)
     return smoothed.reshape((_GLOSSY_SIZE, _GLOSSY_SIZE))
 
 
 # Environments of one size share these weights, and every view may have another environment.
 @lru_cache(maxsize=_GLOSSY_LEVELS)
 def _texel_weights(height: int, level: int, device: str) -> wp.array:
-    """Weights computed by ``weigh_texels``, float [map texels, texels]."""
+    """Weights computed by ``weigh_texels``, float [groups of map texels, texels, lanes]."""
     directions, solid = texel_directions(height)
     roughness = level / _GLOSSY_LEVELS
-    shares = wp.zeros((_GLOSSY_SIZE**2, solid.size), dtype=float, device=device)
+    shape = (_GLOSSY_SIZE**2 // _LANES, solid.size, _LANES)
+    shares = wp.zeros(shape, dtype=float, device=device)
     inputs = [
         wp.array(directions.reshape(-1, 3), dtype=wp.vec3, device=device),
         wp.array(solid.reshape(-1), dtype=float, device=device),

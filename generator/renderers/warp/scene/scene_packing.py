@@ -24,7 +24,7 @@ from gen_data.generator.core.scene import (
 )
 from gen_data.generator.core.se3 import Array, unit_quaternions_to_rotations
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
-from gen_data.generator.renderers.warp.scene.bvh import body_tree
+from gen_data.generator.renderers.warp.scene.bvh import body_tree, group_boxes
 from gen_data.generator.renderers.warp.scene.device_assets import DeviceMesh
 from gen_data.generator.renderers.warp.scene.environment_maps import DeviceEnvironment
 from gen_data.generator.renderers.warp.scene.kernels import records
@@ -230,6 +230,7 @@ def _build_hierarchies(
     corners = (wp.array(of[cutouts], dtype=wp.vec3, device=device) for of in (low, high))
     hierarchy = wp.Bvh(lows_m, highs_m) if device.is_cuda else None
     cutout_hierarchy = wp.Bvh(*corners) if len(cutouts) else None
+    record.boxes = wp.array(group_boxes(low, high), dtype=wp.float32, device=device)
     record.tree = wp.array(tree, dtype=wp.float32, device=device)
     record.cutouts = wp.array(cutouts, dtype=wp.int32, device=device)
     record.hierarchy = hierarchy.id if hierarchy else 0

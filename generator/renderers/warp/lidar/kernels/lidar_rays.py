@@ -269,9 +269,14 @@ def hit_normal(scan: Scan, world: World, motion: BodyMotion, ray: Ray, hit: Near
 @wp.func
 def make_ray(scan: Scan, motion: BodyMotion, axes: wp.array[wp.vec3], i: int):
     """Ray i of all, in the lidar frame."""
-    beam = i / scan.subrays
+    beam = int(i)
+    k = int(0)
+    if scan.subrays > 1:
+        # Divisions are slow.
+        beam = i / scan.subrays
+        k = i % scan.subrays
     ray = Ray()
-    ray.direction = beam_direction(axes[beam], i % scan.subrays, scan.spread)
+    ray.direction = beam_direction(axes[beam], k, scan.spread)
     if motion.keys > 0:
         ray.origin_m = motion.origins_m[beam]
         # A pulse emitted exactly at the last key belongs to the step before it.
@@ -376,7 +381,10 @@ def ray_index(scan: Scan, order: wp.array[int], j: int):
     """Index of the ray at a position in the order of beams; an empty order is the identity."""
     i = int(j)
     if order.shape[0] > 0:
-        i = order[j / scan.subrays] * scan.subrays + j % scan.subrays
+        if scan.subrays > 1:
+            i = order[j / scan.subrays] * scan.subrays + j % scan.subrays
+        else:
+            i = order[j]
     return i
 
 

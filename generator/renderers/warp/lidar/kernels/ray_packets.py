@@ -16,6 +16,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     min_of_two,
     slab_interval,
 )
+from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -33,12 +34,14 @@ class Boxes:
 
     Attributes:
         lows_m, highs_m: Their corners.
+        groups: The same by eights, see box_groups.
         listed: Bodies that a run may hit [row, LISTED_MAX].
         enters_m: Smallest distance at which a ray of the run may enter the body's box, ascending.
     """
 
     lows_m: wp.array[wp.vec3]
     highs_m: wp.array[wp.vec3]
+    groups: wp.array[wp.float32]
     listed: wp.array2d[int]
     enters_m: wp.array2d[float]
 
@@ -127,30 +130,84 @@ def entry_distance(bundle: Bundle, low_m: wp.vec3, high_m: wp.vec3):
     return wp.where(enter > leave * (1.0 + SLACK), FAR_M, enter)
 
 
+_NEXT_ENTERED = (
+    SIMD
+    + f"""
+    constexpr float FAR = {float(FAR_M)}f, SLACK_M = {float(SLACK_M)}f, SLACK = {float(SLACK)}f;
+"""
+    + """
+    const int count = groups.shape[0] / 6;
+    for (int b = after + 1; b < count; b += LANES - b % LANES) {
+        const float* group = groups.data + 48 * (b / 8) + (LANES == 8 ? 0 : b % 8);
+        const Floats none = 0.0f, never = FAR;
+        Floats enter = none, leave = never;
+        // As entry_distance.
+        for (int k = 0; k < 3; ++k) {
+            const Floats near = load(group + 16 * k, Floats()) - SLACK_M - origin_high_m[k];
+            const Floats far = load(group + 16 * k + 8, Floats()) + SLACK_M - origin_low_m[k];
+            const Floats forth = way_high[k] > 0.0f ? near / way_high[k] : never;
+            const Floats back = way_low[k] < 0.0f ? far / way_low[k] : never;
+            enter = larger(enter, near > none ? forth : far < none ? back : none);
+            leave = smaller(leave, way_low[k] > 0.0f    ? far / way_low[k]
+                                   : way_high[k] < 0.0f ? near / way_high[k]
+                                                        : never);
+        }
+        enter = enter * (1.0f - SLACK);
+        const Floats reach = reach_m;
+        const unsigned hits = bits(enter <= leave * (1.0f + SLACK)) & bits(enter < reach)
+                              & ~0u << b % LANES;
+        if (hits)
+            return b - b % LANES + first_bit(hits);
+    }
+    return -1;
+"""
+)
+
+
+@wp.func_native(_NEXT_ENTERED)
+def next_entered(
+    groups: wp.array[wp.float32],
+    origin_low_m: wp.vec3,
+    origin_high_m: wp.vec3,
+    way_low: wp.vec3,
+    way_high: wp.vec3,
+    reach_m: float,
+    after: int,
+) -> int:
+    """The first box behind number ``after`` that a bundle may enter within reach; -1 for none.
+
+    The bundle is given by the fields of a Bundle.
+    """
+    ...
+
+
 @wp.func
 def list_bodies(boxes: Boxes, row: int, bundle: Bundle, reach_m: float):
     """List the bodies that a bundle may hit within reach, the nearest first."""
     count = int(0)
-    for b in range(boxes.lows_m.shape[0]):
-        enter = entry_distance(bundle, boxes.lows_m[b], boxes.highs_m[b])
-        if enter < reach_m and enter < FAR_M and count >= 0:
-            if count == LISTED_MAX:
-                count = -1
-            else:
-                # Insertion sort: lists are short.
-                k = count
-                moving = bool(True)
-                while moving:
-                    moving = False
-                    if k > 0:
-                        if boxes.enters_m[row, k - 1] > enter:
-                            boxes.enters_m[row, k] = boxes.enters_m[row, k - 1]
-                            boxes.listed[row, k] = boxes.listed[row, k - 1]
-                            k -= 1
-                            moving = True
-                boxes.enters_m[row, k] = enter
-                boxes.listed[row, k] = b
-                count += 1
+    low, high = bundle.origin_low_m, bundle.origin_high_m
+    ways_low, ways_high = bundle.way_low, bundle.way_high
+    b = next_entered(boxes.groups, low, high, ways_low, ways_high, reach_m, -1)
+    while b >= 0 and count >= 0:
+        if count == LISTED_MAX:
+            count = -1
+        else:
+            enter = entry_distance(bundle, boxes.lows_m[b], boxes.highs_m[b])
+            # Insertion sort: lists are short.
+            k = int(count)
+            moving = bool(True)
+            while moving:
+                moving = False
+                if k > 0:
+                    if boxes.enters_m[row, k - 1] > enter:
+                        boxes.enters_m[row, k] = boxes.enters_m[row, k - 1]
+                        boxes.listed[row, k] = boxes.listed[row, k - 1]
+                        k -= 1
+                        moving = True
+            boxes.enters_m[row, k] = enter
+            boxes.listed[row, k] = b
+            count += 1
+        b = next_entered(boxes.groups, low, high, ways_low, ways_high, reach_m, b)
     listed = ListedBodies()
     listed.row = row
     listed.count = count

@@ -351,6 +351,89 @@ def is_gatherable(world: World, surface: int):
     return smooth
 
 
+_INTERPOLATE = """
+    // Inverse fourth powers of the distance in cells: the nearest point dominates, without a seam
+    // where it changes.
+    auto weight_at = [](float dx, float dy) {
+        const float squared = dx * dx + dy * dy;
+        return 1.0f / (0.05f + squared * squared);
+    };
+    // Points on the same body, near the pixel and similarly oriented: within 37 degrees, neighbours
+    // on round surfaces pass, those across an edge of a box do not. Visibility varies less than
+    // appearance: they need not share the pixel's material.
+    auto is_usable = [&](int q) {
+        return lattice.body.data[q] == body && wp::dot(n, lattice.normal.data[q]) > 0.8f
+               && wp::abs(wp::dot(n, lattice.p_m.data[q] - p)) < tolerance_m;
+    };
+    int points[16], count = 0;
+    float weights[16], whole = 0.0f;
+    // First the cell's corners; the ring around them only if none of the four is usable.
+    for (int reach = 0; reach < 2 && count == 0; ++reach) {
+        for (int v = row - reach; v < row + 2 + reach; ++v) {
+            for (int u = column - reach; u < column + 2 + reach; ++u) {
+                if (v < 0 || v >= lattice.height || u < 0 || u >= lattice.width)
+                    continue;
+                const int q = v * lattice.width + u;
+                if (is_usable(q)) {
+                    const float weight = weight_at((float)(column - u) + right,
+                                                   (float)(row - v) + down);
+                    points[count] = q;
+                    weights[count++] = weight;
+                    whole += weight;
+                }
+            }
+        }
+    }
+    if (count == 0)
+        return false;
+    auto mean = [&](const float* values) {
+        float sum = 0.0f;
+        for (int k = 0; k < count; ++k) {
+            // UNSEEN is negative and counts as dark.
+            const float value = values[points[k]];
+            sum += (value > 0.0f ? value : 0.0f) * weights[k];
+        }
+        return sum / whole;
+    };
+    const int length = listed.lit.shape[1], size = lit.shape[1];
+    for (int j = 0; j < lamps; ++j)
+        listed.lit.data[j * length + k] = mean(lit.data + j * size);
+    listed.open_sky.data[k] = mean(open_sky.data);
+    listed.exposed.data[k] = covered ? mean(exposed.data) : 1.0f;
+    return true;
+"""
+
+
+@wp.func_native(_INTERPOLATE)
+def interpolate_visibility(
+    lattice: Lattice,
+    lamps: int,
+    lit: wp.array2d[wp.float32],
+    open_sky: wp.array2d[wp.float32],
+    covered: int,
+    exposed: wp.array[wp.float32],
+    body: int,
+    p: wp.vec3,
+    n: wp.vec3,
+    tolerance_m: float,
+    column: int,
+    row: int,
+    right: float,
+    down: float,
+    listed: ListedPixels,
+    k: int,
+) -> bool:
+    """Visibility at listed pixel k from the lattice's points around it; whether there are any.
+
+    Args:
+        lit, open_sky, exposed: Of the lattice's points; ``exposed`` if the ground is covered.
+        body, p, n: Body, point and normal of the pixel.
+        tolerance_m: Largest distance of points from its tangent plane.
+        column, row, right, down: Its cell and its position there.
+    """
+    ...
+
+
 @wp.kernel
 def find_pixel_visibility(
     view: View,
@@ -369,40 +452,28 @@ def find_pixel_visibility(
     y = i / view.width
     d = pixel_ray(view, i)
     p = view.eye_m + d * images.z_m[i]
+    n = images.normals[i]
+    body = images.hits[i][0]
     cell = cell_at(view, lattice, x, y)
-    for j in range(world.lamps.shape[0]):
-        listed.lit[j, k] = 0.0
-    # Visibility varies less than appearance: the points need not share the pixel's material.
-    column = x / lattice.stride
-    row = y / lattice.stride
-    found = float(0.0)
-    sky = float(0.0)
-    rained_on = float(0.0)
-    for reach in range(2):
-        # First the cell's corners; the ring around them only if none of the four is usable.
-        if found == 0.0:
-            for v in range(wp.max(row - reach, 0), wp.min(row + 2 + reach, lattice.height)):
-                for u in range(
-                    wp.max(column - reach, 0), wp.min(column + 2 + reach, lattice.width)
-                ):
-                    q = v * lattice.width + u
-                    if is_usable_point(view, images, lattice, i, p, q):
-                        right = float(column - u) + cell.right
-                        down = float(row - v) + cell.down
-                        w = distance_weight(right, down)
-                        found += w
-                        sky += lattice_sky[0, q] * w
-                        rained_on += lattice_exposure(world, q) * w
-                        for j in range(world.lamps.shape[0]):
-                            # UNSEEN is negative and counts as dark.
-                            listed.lit[j, k] = listed.lit[j, k] + wp.max(lattice_lit[j, q], 0.0) * w
-    if found > 0.0:
-        listed.open_sky[0, k] = sky / found
-        listed.exposed[k] = rained_on / found
-        for j in range(world.lamps.shape[0]):
-            listed.lit[j, k] = listed.lit[j, k] / found
-    else:
-        n = images.normals[i]
+    found = interpolate_visibility(
+        lattice,
+        world.lamps.shape[0],
+        lattice_lit,
+        lattice_sky,
+        world.ground.covered,
+        world.ground.exposed,
+        body,
+        p,
+        n,
+        2.0 * surface_tolerance(view, p),
+        x / lattice.stride,
+        y / lattice.stride,
+        cell.right,
+        cell.down,
+        listed,
+        k,
+    )
+    if not found:
         origin = ray_origin(world, images.hits[i], images.weights[i], p, d * images.z_m[i])
         side = sheet_normal(
             world, surface_index(world, images.hits[i]), images.hits[i], images.weights[i]
@@ -411,23 +482,12 @@ def find_pixel_visibility(
             listed.lit[j, k] = visible_lamp_fraction(
                 world, world.lamps[j], p, origin, n, side, probe.parts
             )
-        sky, found = body_sky_visibility(lattice, lattice_sky, cell.first, images.hits[i][0])
-        if found == 0.0:
-            sky = visible_sky_fraction(
-                world, images.hits[i][0], p, origin, n, side, probe.disc, probe.radius_m
-            )
-            found = 1.0
-        listed.open_sky[0, k] = sky / found
+        sky, corners = body_sky_visibility(lattice, lattice_sky, cell.first, body)
+        if corners == 0.0:
+            sky = visible_sky_fraction(world, body, p, origin, n, side, probe.disc, probe.radius_m)
+            corners = 1.0
+        listed.open_sky[0, k] = sky / corners
         listed.exposed[k] = sky_exposure_at(world, origin, n)
-
-
-@wp.func
-def lattice_exposure(world: World, q: int):
-    """Exposure of lattice point q to precipitation."""
-    exposed = float(1.0)
-    if world.ground.covered != 0:
-        exposed = world.ground.exposed[q]
-    return exposed
 
 
 @wp.func
@@ -455,29 +515,6 @@ def body_sky_visibility(lattice: Lattice, lattice_sky: wp.array2d[float], q: int
             total += lattice_sky[0, corner]
             found += 1.0
     return total, found
-
-
-@wp.func
-def distance_weight(dx: float, dy: float):
-    """Weight of a lattice point by its distance in cells."""
-    squared = dx * dx + dy * dy
-    # Fourth powers of the distance: the nearest point dominates, without a seam where it changes.
-    return 1.0 / (0.05 + squared * squared)
-
-
-@wp.func
-def is_usable_point(
-    view: View, images: GBufferRecord, lattice: Lattice, i: int, p: wp.vec3, q: int
-):
-    """Whether a lattice point lies on the body of pixel i, near it and similarly oriented."""
-    same = lattice.body[q] == images.hits[i][0]
-    if same:
-        n = images.normals[i]
-        tolerance_m = 2.0 * surface_tolerance(view, p)
-        # 37 degrees: neighbours on round surfaces pass, those across an edge of a box do not.
-        same = wp.dot(n, lattice.normal[q]) > 0.8
-        same = same and wp.abs(wp.dot(n, lattice.p_m[q] - p)) < tolerance_m
-    return same
 
 
 @wp.func

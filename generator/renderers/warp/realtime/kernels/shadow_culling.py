@@ -9,14 +9,15 @@ import warp as wp
 
 from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, SUN_DISTANCE_M
+from gen_data.generator.renderers.warp.scene.kernels.box_groups import (
+    high_corner,
+    low_corner,
+    next_in_shaft,
+)
 from gen_data.generator.renderers.warp.scene.kernels.material_eval import is_translucent
 from gen_data.generator.renderers.warp.scene.kernels.records import (
-    LightRecord,
     World,
-    max_of_two,
-    min_of_two,
     reciprocals,
-    slab_interval,
     to_mesh_point,
     to_mesh_vector,
 )
@@ -119,77 +120,55 @@ def make_shaft(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
 
 
 @wp.func
-def overlap(shaft: Shaft, low: wp.vec3, high: wp.vec3, grown: float):
-    """Interval of a shaft's axis inside an enlarged box; empty if its start exceeds its end."""
-    margin = wp.vec3(grown, grown, grown)
-    first = low - shaft.start - margin
-    t0, t1 = slab_interval(first, high - shaft.start + margin, shaft.inverse)
-    return max_of_two(t0, 0.0), min_of_two(t1, 1.0)
-
-
-@wp.func
-def may_touch(shaft: Shaft, low: wp.vec3, high: wp.vec3):
-    """Whether a box may intersect a shaft; conservative."""
+def is_below(shaft: Shaft, low: wp.vec3, high: wp.vec3):
+    """Whether a box lies below the plane of a flat tile, which it then cannot shade."""
+    below = bool(False)
     if shaft.flat != 0:
         # The box's highest point above the tile's plane.
         top = wp.dot(shaft.normal, (low + high) * 0.5)
-        if top + wp.dot(wp.abs(shaft.normal), (high - low) * 0.5) <= shaft.height:
-            return False
-    # Start with the wider end's radius, then narrow the shaft to where the box may touch it.
-    t0, t1 = overlap(shaft, low, high, wp.max(shaft.radius, shaft.end_radius))
-    for _ in range(2):
-        if t0 <= t1:
-            widening = shaft.end_radius - shaft.radius
-            grown = shaft.radius + wp.max(widening * t0, widening * t1)
-            t0, t1 = overlap(shaft, low, high, grown)
-    return t0 <= t1
+        below = top + wp.dot(wp.abs(shaft.normal), (high - low) * 0.5) <= shaft.height
+    return below
 
 
 @wp.func
 def any_box_touches(shaft: Shaft, world: World, g: int):
-    """Whether any of a mesh's boxes may intersect a shaft.
+    """Whether any of a mesh's boxes may intersect a shaft; conservative.
 
     The single box of a room, of a body with holes or of a long slanted body touches everything; the
     boxes around groups of its faces do not.
     """
+    boxes = world.geometries[g].boxes
     found = bool(False)
-    for k in range(world.geometries[g].box_lows_m.shape[0]):
-        low = world.geometries[g].box_lows_m[k]
-        if may_touch(shaft, low, world.geometries[g].box_highs_m[k]):
-            found = True
-            break
+    k = next_in_shaft(boxes, shaft.start, shaft.inverse, shaft.radius, shaft.end_radius, -1)
+    while k >= 0 and not found:
+        found = not is_below(shaft, low_corner(boxes, k), high_corner(boxes, k))
+        k = next_in_shaft(boxes, shaft.start, shaft.inverse, shaft.radius, shaft.end_radius, k)
     return found
 
 
 @wp.func
 def may_shade(world: World, b: int, tile: Tile, way: wp.vec3, radius_m: float):
     """Whether a body may block light between a tile and a sphere at the end of a way."""
-    # A test of world boxes comes first: it decides most cases.
-    here = wp.vec3(tile.radius_m, tile.radius_m, tile.radius_m)
-    there = wp.vec3(radius_m, radius_m, radius_m)
-    end = tile.centre_m + way
-    low = wp.min(tile.centre_m - here, end - there) - world.bodies[b].high_m
-    high = wp.max(tile.centre_m + here, end + there) - world.bodies[b].low_m
-    if wp.max(low) > 0.0 or wp.min(high) < 0.0:
-        return False
     g = world.bodies[b].geometry
     shaft = make_shaft(world, b, tile, way, radius_m)
-    shades = may_touch(shaft, world.geometries[g].low_m, world.geometries[g].high_m)
+    shades = not is_below(shaft, world.geometries[g].low_m, world.geometries[g].high_m)
     if shades:
-        # Then the many boxes: they exclude rooms and slanted bodies.
         shades = any_box_touches(shaft, world, g)
     return shades
 
 
 @wp.func
-def may_shade_from(world: World, b: int, tile: Tile, lamp: LightRecord):
-    """Whether a body may block light between a tile and a lamp."""
-    way = lamp.position_m - tile.centre_m
-    radius_m = lamp.radius
-    if lamp.kind == SUN:
-        way = lamp.direction * -SUN_DISTANCE_M
-        radius_m = lamp.radius * SUN_DISTANCE_M
-    return may_shade(world, b, tile, way, radius_m)
+def list_shaft(
+    world: World, tile: Tile, way: wp.vec3, radius_m: float, lists: wp.array3d[int], i: int, j: int
+):
+    """List the bodies that may block light between a tile and a sphere at the end of a way."""
+    inverse = reciprocals(way)
+    # Boxes in the world, eight at a time, exclude most bodies.
+    b = next_in_shaft(world.boxes, tile.centre_m, inverse, tile.radius_m, radius_m, -1)
+    while b >= 0 and lists[i, j, 0] >= 0:
+        if may_shade(world, b, tile, way, radius_m):
+            append_occluder(lists, i, j, b)
+        b = next_in_shaft(world.boxes, tile.centre_m, inverse, tile.radius_m, radius_m, b)
 
 
 @wp.func
@@ -247,9 +226,11 @@ def list_occluders(
     near.radius_m = tile.radius_m + ambient_radius_m
     for j in range(lamps):
         if is_lamp_relevant(lattice, shares, j, column, row):
-            for b in range(world.bodies.shape[0]):
-                if may_shade_from(world, b, tile, world.lamps[j]):
-                    append_occluder(lists, i, j, b)
-    for b in range(world.bodies.shape[0]):
-        if may_shade(world, b, near, wp.vec3(0.0), near.radius_m):
-            append_occluder(lists, i, lamps, b)
+            lamp = world.lamps[j]
+            way = lamp.position_m - tile.centre_m
+            radius_m = lamp.radius
+            if lamp.kind == SUN:
+                way = lamp.direction * -SUN_DISTANCE_M
+                radius_m = lamp.radius * SUN_DISTANCE_M
+            list_shaft(world, tile, way, radius_m, lists, i, j)
+    list_shaft(world, near, wp.vec3(0.0), near.radius_m, lists, i, lamps)

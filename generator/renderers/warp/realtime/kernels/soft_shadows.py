@@ -19,7 +19,6 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     Departure,
     Lattice,
     departure_to,
-    points_agree,
 )
 from gen_data.generator.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE, TILE
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
@@ -32,10 +31,11 @@ from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_irradiance
 from gen_data.generator.renderers.warp.scene.kernels.material_eval import is_translucent
 from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
+    NOBODY,
     free_path_before,
     free_path_of_listed,
     is_occluded,
-    is_occluded_by_listed,
+    listed_blocker,
     path_along,
 )
 from gen_data.generator.renderers.warp.scene.kernels.records import (
@@ -44,13 +44,19 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     World,
     fast_normalize,
 )
+from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
+# Edge of the aligned blocks of lattice points. Kernels on blocks have up to a thread per point: the
+# last number of a thread and ``run`` tell its points. On the CPU one thread takes a whole block.
+BLOCK = wp.constant(4)
 # Marks points without a value: off all surfaces, or where a lamp contributes nothing.
 UNSEEN = wp.constant(-1.0)
 # Shadows of lamps with a smaller share of a point's light are too faint for further rays.
 SMOOTHED_SHARE = wp.constant(0.08)
+# Neighbours within three pixels' width of a point's tangent plane are on its surface.
+SAME_SURFACE_PX = wp.constant(3.0)
 # Leaves of one body hide the sky from one another up to this distance, the less the farther they
 # are, since they scatter light themselves [m]. With it, crowns are as bright as path-traced ones.
 CROWN_M = wp.constant(18.0)
@@ -131,9 +137,17 @@ def square_of_disc(part: wp.vec2):
 
 
 @wp.func
-def tile_index(lattice: Lattice, i: int, tile_columns: int):
-    """The tile of a lattice point."""
-    return ((i / lattice.width) / TILE) * tile_columns + (i % lattice.width) / TILE
+def block_tile(row: int, column: int, tile_columns: int):
+    """The tile that contains a block."""
+    return BLOCK * row / TILE * tile_columns + BLOCK * column / TILE
+
+
+@wp.func
+def block_point(lattice: Lattice, row: int, column: int, k: int):
+    """Lattice point k of a block, row by row; -1 off the lattice."""
+    x = BLOCK * column + k % BLOCK
+    y = BLOCK * row + k / BLOCK
+    return wp.where(x < lattice.width and y < lattice.height, y * lattice.width + x, -1)
 
 
 @wp.func
@@ -155,10 +169,13 @@ def agreed_value(lattice: Lattice, values: wp.array2d[float], j: int, x: int, y:
 
 
 @wp.kernel
-def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float]):
+def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float], matters: wp.array[int]):
     """Share of each lamp in each point's unshadowed light [lamp, point]; UNSEEN behind surfaces.
 
     Lamps behind a translucent surface count like those before it.
+
+    Args:
+        matters: Set to 1 for lamps that are more than faint anywhere.
     """
     i = wp.tid()
     if lattice.body[i] < 0:
@@ -181,6 +198,8 @@ def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float]):
     for j in range(world.lamps.shape[0]):
         if shares[j, i] > 0.0:
             shares[j, i] = shares[j, i] / total
+            if shares[j, i] > FAINT_SHARE:
+                matters[j] = 1
 
 
 @wp.func
@@ -206,6 +225,7 @@ def probe_lamps(
     lists: wp.array3d[int],
     disc: wp.array[wp.vec2],
     shares: wp.array2d[float],
+    run: int,
     parity: int,
     lit: wp.array2d[float],
 ):
@@ -214,51 +234,56 @@ def probe_lamps(
     Args:
         disc: Forty-eight points of the unit disk; each lattice point uses one of three in a row.
         shares: As computed by weigh_lamps.
+        run: Points per thread.
         parity: 0 probes the black squares of a checkerboard, 1 then the white ones, which trace a
             ray only where their black neighbours differ.
     """
-    i = wp.tid()
-    x = i % lattice.width
-    y = i / lattice.width
-    if ((x + y) & 1) != parity:
+    row, column, j, part = wp.tid()
+    tile = block_tile(row, column, tile_columns)
+    shaded = lists[tile, j, 0] != 0
+    # Where nothing can shade, the first pass writes both colours.
+    if not shaded and parity == 1:
         return
-    tile = tile_index(lattice, i, tile_columns)
-    for j in range(world.lamps.shape[0]):
-        value = float(UNSEEN)
-        if lattice.body[i] >= 0 and shares[j, i] > FAINT_SHARE:
-            if parity == 1:
-                value = agreed_value(lattice, lit, j, x, y)
-                if value == UNSEEN and shares[j, i] < SMOOTHED_SHARE:
-                    # Faint lamps: an interpolated shadow is as good as a traced one.
-                    value = mean_of_neighbours(lattice, lit, j, x, y)
-            if value == UNSEEN:
-                value = probe_lamp(world, lattice, lists, tile, i, j, disc[3 * bayer(x, y) + 1])
-        lit[j, i] = value
-
-
-@wp.func
-def probe_lamp(
-    world: World, lattice: Lattice, lists: wp.array3d[int], tile: int, i: int, j: int, part: wp.vec2
-):
-    """Visibility of a part of lamp j from point i, 1 or 0, by one ray."""
-    value = float(1.0)
-    if lists[tile, j, 0] != 0:
-        start = departure_to(world, lattice, i, lamp_vector(world.lamps[j], lattice.p_m[i]))
-        way = path_to_lamp(world.lamps[j], start.origin_m, start.normal, part)
-        path = path_along(start.origin_m, way)
-        if is_occluded_by_listed(world, lists, tile, j, start.skip, path):
-            value = 0.0
-    return value
+    likely = int(NOBODY)
+    k = int(part * run)
+    while k < (part + 1) * run:
+        i = block_point(lattice, row, column, k)
+        if i >= 0 and (not shaded or ((k ^ (k / BLOCK)) & 1) == parity):
+            value = float(UNSEEN)
+            if lattice.body[i] >= 0 and shares[j, i] > FAINT_SHARE:
+                value = 1.0
+                if shaded:
+                    x = i % lattice.width
+                    y = i / lattice.width
+                    value = float(UNSEEN)
+                    if parity == 1:
+                        value = agreed_value(lattice, lit, j, x, y)
+                        if value == UNSEEN and shares[j, i] < SMOOTHED_SHARE:
+                            # Faint lamps: an interpolated shadow is as good as a traced one.
+                            value = mean_of_neighbours(lattice, lit, j, x, y)
+                    if value == UNSEEN:
+                        start = departure_to(
+                            world, lattice, i, lamp_vector(world.lamps[j], lattice.p_m[i])
+                        )
+                        at = disc[3 * bayer(k % BLOCK, k / BLOCK) + 1]
+                        way = path_to_lamp(world.lamps[j], start.origin_m, start.normal, at)
+                        path = path_along(start.origin_m, way)
+                        blocker = listed_blocker(world, lists, tile, j, start.skip, likely, path)
+                        value = wp.where(blocker == NOBODY, 1.0, 0.0)
+                        # The next path is close by.
+                        likely = wp.where(blocker == NOBODY, likely, blocker)
+            lit[j, i] = value
+        k += 1
 
 
 @wp.kernel
 def classify_blocks(lattice: Lattice, values: wp.array2d[float], classes: wp.array3d[int]):
-    """Values in each aligned 4 x 4 block, as bits: 1 zeros, 2 ones, 4 others."""
+    """Values in each block, as bits: 1 zeros, 2 ones, 4 others."""
     row, column, j = wp.tid()
     found = int(0)
-    for y in range(4 * row, wp.min(4 * row + 4, lattice.height)):
-        k = int(y * lattice.width + 4 * column)
-        end = y * lattice.width + wp.min(4 * column + 4, lattice.width)
+    for y in range(BLOCK * row, wp.min(BLOCK * row + BLOCK, lattice.height)):
+        k = int(y * lattice.width + BLOCK * column)
+        end = y * lattice.width + wp.min(BLOCK * column + BLOCK, lattice.width)
         # A while loop: Warp's range loops cost more than this body.
         while k < end:
             value = values[j, k]
@@ -273,15 +298,17 @@ def classify_blocks(lattice: Lattice, values: wp.array2d[float], classes: wp.arr
 
 
 @wp.func
-def classes_around(classes: wp.array3d[int], x: int, y: int, j: int):
-    """Union of the classes of the blocks that a point's window touches."""
-    last_row = classes.shape[0] - 1
-    last_column = classes.shape[1] - 1
-    x0 = wp.max((x - 2) >> 2, 0)
-    y0 = wp.max((y - 2) >> 2, 0)
-    x1 = wp.min((x + 2) >> 2, last_column)
-    y1 = wp.min((y + 2) >> 2, last_row)
-    return classes[y0, x0, j] | classes[y0, x1, j] | classes[y1, x0, j] | classes[y1, x1, j]
+def classes_near(classes: wp.array3d[int], first_x: int, last_x: int, y: int, j: int):
+    """Union of the classes of the blocks of points in a row, and of the blocks around them."""
+    found = int(0)
+    row = wp.max(y / BLOCK - 1, 0)
+    while row <= wp.min(y / BLOCK + 1, classes.shape[0] - 1):
+        column = wp.max(first_x / BLOCK - 1, 0)
+        while column <= wp.min(last_x / BLOCK + 1, classes.shape[1] - 1):
+            found = found | classes[row, column, j]
+            column += 1
+        row += 1
+    return found
 
 
 @wp.func
@@ -310,6 +337,7 @@ def refine_lamps(
     lists: wp.array3d[int],
     disc: wp.array[wp.vec2],
     shares: wp.array2d[float],
+    run: int,
     classes: wp.array3d[int],
     probed: wp.array2d[float],
     lit: wp.array2d[float],
@@ -317,134 +345,257 @@ def refine_lamps(
     """Trace two more rays where a lamp is visible from part of the neighbourhood only.
 
     Args:
-        disc, shares: As for probe_lamps.
+        disc, shares, run: As for probe_lamps.
     """
-    i = wp.tid()
-    x = i % lattice.width
-    y = i / lattice.width
-    tile = tile_index(lattice, i, tile_columns)
-    for j in range(world.lamps.shape[0]):
-        value = probed[j, i]
-        mixed = value != UNSEEN and (classes_around(classes, x, y, j) & 3) == 3
-        if mixed and shares[j, i] > SMOOTHED_SHARE:
-            if window_bits(lattice, probed, j, i) == 3:
-                seen = value
-                start = departure_to(world, lattice, i, lamp_vector(world.lamps[j], lattice.p_m[i]))
-                for k in range(2):
-                    # The two points of the triple that probe_lamps has left out.
-                    part = disc[3 * bayer(x, y) + 2 * k]
-                    way = path_to_lamp(world.lamps[j], start.origin_m, start.normal, part)
-                    path = path_along(start.origin_m, way)
-                    if not is_occluded_by_listed(world, lists, tile, j, start.skip, path):
-                        seen += 1.0
-                value = seen / 3.0
-        lit[j, i] = value
+    row, column, j, part = wp.tid()
+    tile = block_tile(row, column, tile_columns)
+    x = BLOCK * column
+    mixed = (classes_near(classes, x, x, BLOCK * row, j) & 3) == 3
+    likely = int(NOBODY)
+    k = int(part * run)
+    while k < (part + 1) * run:
+        i = block_point(lattice, row, column, k)
+        if i >= 0:
+            value = probed[j, i]
+            if mixed and value != UNSEEN and shares[j, i] > SMOOTHED_SHARE:
+                if window_bits(lattice, probed, j, i) == 3:
+                    seen = value
+                    start = departure_to(
+                        world, lattice, i, lamp_vector(world.lamps[j], lattice.p_m[i])
+                    )
+                    rank = bayer(k % BLOCK, k / BLOCK)
+                    for more in range(2):
+                        # The two points of the triple that probe_lamps has left out.
+                        at = disc[3 * rank + 2 * more]
+                        way = path_to_lamp(world.lamps[j], start.origin_m, start.normal, at)
+                        path = path_along(start.origin_m, way)
+                        blocker = listed_blocker(world, lists, tile, j, start.skip, likely, path)
+                        if blocker == NOBODY:
+                            seen += 1.0
+                        else:
+                            likely = blocker
+                    value = seen / 3.0
+            lit[j, i] = value
+        k += 1
 
 
 @wp.func
 def surface_tolerance(view: View, p: wp.vec3):
-    """Allowed distance of neighbours from a point's tangent plane: three pixels' width [m]."""
-    return 3.0 * view.pixel_rad * wp.length(p - view.eye_m)
+    """Allowed distance of neighbours from a point's tangent plane [m]."""
+    return SAME_SURFACE_PX * view.pixel_rad * wp.length(p - view.eye_m)
 
 
 @wp.func
-def rim_weight(offset: int, half: int):
-    """Weight of a window's offset: points at the rims of windows of width 2 ``half`` count half.
+def is_uniform(classes: int):
+    """Whether all values are zeros, or all are ones."""
+    return classes == 1 or classes == 2  # noqa: PLR1714
 
-    Windows are thus centred and contain every part of a 4 x 4 pattern equally often.
+
+_WINDOW = (
+    SIMD
+    + f"""
+    constexpr float UNSEEN = {float(UNSEEN)}f;
+"""
+    + """
+    const int points = values.shape[1];
+    auto is_inside = [&](int x, int y) {
+        return x >= 0 && x < lattice.width && y >= 0 && y < lattice.height;
+    };
+    auto are_inside = [&](int x, int y) {
+        return is_inside(x, y) && x + LANES <= lattice.width;
+    };
+    // Neighbours in a row; those off the lattice lie on no surface.
+    struct Points { Ints surface; Floats p[3], n[3]; };
+    auto points_at = [&](int x, int y) {
+        const int first = y * lattice.width + x;
+        Points points;
+        if (are_inside(x, y)) {
+            points.surface = load(lattice.surface.data + first, Ints());
+            load_triples((const float*)(lattice.p_m.data + first), points.p);
+            load_triples((const float*)(lattice.normal.data + first), points.n);
+        } else {
+            int surface[LANES];
+            wp::vec3 p[LANES], n[LANES];
+            for (int lane = 0; lane < LANES; ++lane) {
+                const bool inside = is_inside(x + lane, y);
+                surface[lane] = inside ? lattice.surface.data[first + lane] : -1;
+                p[lane] = lattice.p_m.data[inside ? first + lane : 0];
+                n[lane] = lattice.normal.data[inside ? first + lane : 0];
+            }
+            points.surface = load(surface, Ints());
+            load_triples((const float*)p, points.p);
+            load_triples((const float*)n, points.n);
+        }
+        return points;
+    };
+    auto values_at = [&](const float* from, int x, int y) {
+        const int first = y * lattice.width + x;
+        if (are_inside(x, y))
+            return load(from + first, Floats());
+        float values[LANES];
+        for (int lane = 0; lane < LANES; ++lane)
+            values[lane] = is_inside(x + lane, y) ? from[first + lane] : UNSEEN;
+        return load(values, Floats());
+    };
+    auto write = [&](float* to, Floats lanes) {
+        for (int lane = 0; lane < LANES && x + lane < lattice.width; ++lane)
+            to[y * lattice.width + x + lane] = at(lanes, lane);
+    };
+    auto dot = [](const Floats* a, const Floats* b) {
+        return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    };
+    const Floats zero = 0.0f;
+    const Points here = points_at(x, y);
+    const Floats away[3] = {here.p[0] - eye_m[0], here.p[1] - eye_m[1], here.p[2] - eye_m[2]};
+    const Floats squared_tolerance = dot(away, away) * (tolerance * tolerance);
+    // A term where points lie on one smooth stretch of surface, as lattice.points_agree; else 0.
+    auto where_one = [&](const Points& there, Floats term) -> Floats {
+        const Floats way[3] = {there.p[0] - here.p[0], there.p[1] - here.p[1],
+                              there.p[2] - here.p[2]};
+        const Floats height = dot(here.n, way), least = 0.9f;
+        const auto one = (here.surface == there.surface) & (dot(here.n, there.n) >= least)
+                         & (height * height <= squared_tolerance);
+        return one ? term : zero;
+    };
+    // Points at the rims of windows count half: windows are thus centred and contain every part of
+    // a 4 x 4 pattern equally often.
+    auto rim_weight = [](int offset, int half) -> Floats {
+        return offset == half || offset == -half ? 0.5f : 1.0f;
+    };
+"""
+)
+
+_SUM_ROW = (
+    _WINDOW
+    + """
+    const float* given = values.data + j * points;
+    Floats total = 0.0f, count = 0.0f;
+    for (int k = -2; k <= 2; ++k) {
+        const Points there = points_at(x + k, y);
+        const Floats value = values_at(given, x + k, y), weight = rim_weight(k, 2);
+        total += where_one(there, value != UNSEEN ? value * weight : zero);
+        count += where_one(there, value != UNSEEN ? weight : zero);
+    }
+    write(sums.data + 2 * j * points, total);
+    write(sums.data + (2 * j + 1) * points, count);
+"""
+)
+
+
+@wp.func_native(_SUM_ROW)
+def sum_row(
+    lattice: Lattice,
+    eye_m: wp.vec3,
+    tolerance: float,
+    values: wp.array2d[wp.float32],
+    x: int,
+    y: int,
+    j: int,
+    sums: wp.array3d[wp.float32],
+):
+    """Sum and number of the values beside points on their own surface, for neighbours in a row.
+
+    Args:
+        tolerance: Allowed distance from a point's tangent plane over its distance from the eye.
+        x, y: The first of eight points; of one on CUDA.
+        sums: [light, sum or number, point].
     """
-    return wp.where(wp.abs(offset) == half, 0.5, 1.0)
+    ...
 
 
-@wp.func
-def is_same_surface(lattice: Lattice, i: int, k: int, tolerance_m: float):
-    """Whether two lattice points lie on one smooth stretch of surface."""
-    same = bool(False)
-    if lattice.surface[i] == lattice.surface[k]:
-        p = lattice.p_m[i]
-        same = (
-            points_agree(p, lattice.normal[i], lattice.p_m[k], lattice.normal[k], tolerance_m) > 0.0
-        )
-    return same
+_SMOOTH_COLUMN = (
+    _WINDOW
+    + """
+    auto sum_column = [&](int half, Floats& total, Floats& count) {
+        total = 0.0f;
+        count = 0.0f;
+        for (int k = -half; k <= half; ++k) {
+            const Points there = points_at(x, y + k);
+            const Floats weight = rim_weight(k, half);
+            const float* given = sums.data + 2 * j * points;
+            total += where_one(there, values_at(given, x, y + k) * weight);
+            count += where_one(there, values_at(given + points, x, y + k) * weight);
+        }
+    };
+    Floats total, count, wide_total, wide_count;
+    sum_column(2, total, count);
+    const Floats value = values_at(values.data + j * points, x, y), enough = 8.0f;
+    const auto lacks = (value != UNSEEN) & (count < enough);
+    if (bits(lacks)) {
+        // At the end of a surface a window holds part of the pattern only: take a larger one.
+        sum_column(4, wide_total, wide_count);
+        total = lacks ? wide_total : total;
+        count = lacks ? wide_count : count;
+    }
+    const auto known = (value != UNSEEN) & (count > zero);
+    write(smoothed.data + j * points, known ? total / count : value);
+"""
+)
+
+
+@wp.func_native(_SMOOTH_COLUMN)
+def smooth_column(
+    lattice: Lattice,
+    eye_m: wp.vec3,
+    tolerance: float,
+    values: wp.array2d[wp.float32],
+    x: int,
+    y: int,
+    j: int,
+    sums: wp.array3d[wp.float32],
+    smoothed: wp.array2d[wp.float32],
+):
+    """Mean of row sums above and below points on their own surface; arguments as for sum_row."""
+    ...
 
 
 @wp.kernel
 def sum_rows(
     view: View,
     lattice: Lattice,
+    lanes: int,
     classes: wp.array3d[int],
     values: wp.array2d[float],
-    sums: wp.array2d[wp.vec2],
+    sums: wp.array3d[float],
 ):
     """Sum and number of the values beside each point on its own surface.
 
-    Skipped where all values agree and neither row above nor below needs the sums.
+    Skipped where all values around agree, which need no sums.
+
+    Args:
+        lanes: Points per thread: 8 on the CPU, 1 on CUDA.
     """
-    i = wp.tid()
-    x = i % lattice.width
-    y = i / lattice.width
-    for j in range(values.shape[0]):
-        found = classes_around(classes, x, wp.max(y - 2, 0), j)
-        found = found | classes_around(classes, x, wp.min(y + 2, lattice.height - 1), j)
-        total = wp.vec2(0.0, 0.0)
-        if lattice.surface[i] >= 0 and not (found == 1 or found == 2):  # noqa: PLR1714
-            tolerance_m = surface_tolerance(view, lattice.p_m[i])
-            k = int(i + wp.max(-x, -2))
-            end = i + wp.min(lattice.width - 1 - x, 2)
-            while k <= end:
-                value = values[j, k]
-                if value != UNSEEN and is_same_surface(lattice, i, k, tolerance_m):
-                    total += wp.vec2(value, 1.0) * rim_weight(k - i, 2)
-                k += 1
-        sums[j, i] = total
-
-
-@wp.func
-def column_sum(
-    lattice: Lattice, sums: wp.array2d[wp.vec2], j: int, i: int, half: int, tolerance_m: float
-):
-    """Row sums added over the points above and below a point on its own surface."""
-    y = i / lattice.width
-    total = wp.vec2(0.0, 0.0)
-    v = int(wp.max(-y, -half))
-    while v <= wp.min(lattice.height - 1 - y, half):
-        k = i + v * lattice.width
-        if is_same_surface(lattice, i, k, tolerance_m):
-            total += sums[j, k] * rim_weight(v, half)
-        v += 1
-    return total
+    y, group, j = wp.tid()
+    x = group * lanes
+    if is_uniform(classes_near(classes, x, x + lanes - 1, y, j)):
+        for k in range(wp.min(lanes, lattice.width - x)):
+            sums[j, 0, y * lattice.width + x + k] = 0.0
+            sums[j, 1, y * lattice.width + x + k] = 0.0
+    else:
+        sum_row(lattice, view.eye_m, SAME_SURFACE_PX * view.pixel_rad, values, x, y, j, sums)
 
 
 @wp.kernel
 def smooth_lattice(
     view: View,
     lattice: Lattice,
+    lanes: int,
     classes: wp.array3d[int],
     values: wp.array2d[float],
-    sums: wp.array2d[wp.vec2],
+    sums: wp.array3d[float],
     smoothed: wp.array2d[float],
 ):
     """Average differing values over neighbours on one surface."""
-    i = wp.tid()
-    x = i % lattice.width
-    y = i / lattice.width
-    for j in range(values.shape[0]):
-        value = values[j, i]
-        if value != UNSEEN:
-            found = classes_around(classes, x, y, j)
-            if found == 1 or found == 2:  # noqa: PLR1714
-                # Only zeros (1) or only ones (2) around: the mean is exact.
-                value = float(found - 1)
-            else:
-                tolerance_m = surface_tolerance(view, lattice.p_m[i])
-                total = column_sum(lattice, sums, j, i, 2, tolerance_m)
-                if total[1] < 8.0:
-                    # At the end of a surface a window holds part of the pattern only: take a larger
-                    # one.
-                    total = column_sum(lattice, sums, j, i, 4, tolerance_m)
-                if total[1] > 0.0:
-                    value = total[0] / total[1]
-        smoothed[j, i] = value
+    y, group, j = wp.tid()
+    x = group * lanes
+    if is_uniform(classes_near(classes, x, x + lanes - 1, y, j)):
+        # With only zeros or only ones around, the mean is the value itself.
+        for k in range(wp.min(lanes, lattice.width - x)):
+            i = y * lattice.width + x + k
+            smoothed[j, i] = values[j, i]
+    else:
+        tolerance = SAME_SURFACE_PX * view.pixel_rad
+        smooth_column(lattice, view.eye_m, tolerance, values, x, y, j, sums, smoothed)
 
 
 @wp.kernel
@@ -455,6 +606,7 @@ def probe_ambient(
     lists: wp.array3d[int],
     hemisphere: wp.array[wp.vec3],
     radius_m: float,
+    run: int,
     open_sky: wp.array2d[float],
 ):
     """Ambient occlusion by one short ray per point: 1 if free, less the nearer the obstacle.
@@ -464,35 +616,42 @@ def probe_ambient(
 
     Args:
         hemisphere: Sixteen directions about +Z, distributed by the cosine.
+        run: As for probe_lamps.
     """
-    i = wp.tid()
-    value = float(UNSEEN)
-    if lattice.body[i] >= 0:
-        value = 1.0
-        lamps = world.lamps.shape[0]
-        tile = tile_index(lattice, i, tile_columns)
-        if lists[tile, lamps, 0] != 0:
-            n = lattice.normal[i]
-            x, y = make_frame(n)
-            rank = bayer(i % lattice.width, i / lattice.width)
-            h = hemisphere[rank]
-            way = x * h[0] + y * h[1] + n * h[2]
-            start = Departure()
-            start.origin_m = lattice.origin_m[i]
-            start.skip = lattice.skip[i]
-            within = float(1.0)
-            if is_translucent(world, lattice.surface[i]):
-                way = way * wp.where((rank & 2) != 0, 1.0, -1.0)
-                start = departure_to(world, lattice, i, way)
-                start.skip = lattice.body[i]
-                within = free_path_before(
-                    world, lattice.body[i], path_along(start.origin_m, way * CROWN_M), 1.0
-                )
-            path = path_along(start.origin_m, way * radius_m)
-            t = free_path_of_listed(world, lists, tile, start.skip, path)
-            # Full occlusion on contact, fading with zero slope at the radius: no visible boundary.
-            value = wp.min(t * (2.0 - t), within)
-    open_sky[0, i] = value
+    row, column, _, part = wp.tid()
+    tile = block_tile(row, column, tile_columns)
+    shaded = lists[tile, world.lamps.shape[0], 0] != 0
+    k = int(part * run)
+    while k < (part + 1) * run:
+        i = block_point(lattice, row, column, k)
+        if i >= 0:
+            value = float(UNSEEN)
+            if lattice.body[i] >= 0:
+                value = 1.0
+                if shaded:
+                    n = lattice.normal[i]
+                    x, y = make_frame(n)
+                    rank = bayer(k % BLOCK, k / BLOCK)
+                    h = hemisphere[rank]
+                    way = x * h[0] + y * h[1] + n * h[2]
+                    start = Departure()
+                    start.origin_m = lattice.origin_m[i]
+                    start.skip = lattice.skip[i]
+                    within = float(1.0)
+                    if is_translucent(world, lattice.surface[i]):
+                        way = way * wp.where((rank & 2) != 0, 1.0, -1.0)
+                        start = departure_to(world, lattice, i, way)
+                        start.skip = lattice.body[i]
+                        within = free_path_before(
+                            world, lattice.body[i], path_along(start.origin_m, way * CROWN_M), 1.0
+                        )
+                    path = path_along(start.origin_m, way * radius_m)
+                    t = free_path_of_listed(world, lists, tile, start.skip, path)
+                    # Full occlusion on contact, fading with zero slope at the radius: no visible
+                    # boundary.
+                    value = wp.min(t * (2.0 - t), within)
+            open_sky[0, i] = value
+        k += 1
 
 
 @wp.kernel

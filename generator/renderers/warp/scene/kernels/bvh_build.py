@@ -9,269 +9,234 @@ from __future__ import annotations
 
 import warp as wp
 
-from gen_data.generator.renderers.warp.scene.kernels.records import (
-    componentwise_max,
-    componentwise_min,
-)
+from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-WIDTH = wp.constant(8)
-# Wald 2007: with 16 bins, trees are nearly as good as those of a full sweep.
-BINS = wp.constant(16)
-# Deeper nodes are split at the median, which bounds the depth by the stack of the traversal.
-EVEN_DEPTH = wp.constant(8)
-FARTHEST = wp.constant(3.0e38)
 # Bounds of an empty lane, which no ray enters.
-NOWHERE = wp.constant(1.0e30)
+NOWHERE = 1.0e30
 
-Bounds = wp.types.vector(length=9, dtype=wp.int32)
-Worths = wp.types.vector(length=9, dtype=wp.float32)
+_GROW = (
+    "#ifndef __CUDA_ARCH__"  # Trees are built on the CPU; CUDA has Warp's own.
+    + SIMD
+    + f"""
+    constexpr float NOWHERE = {NOWHERE}f;
+"""
+    + """
+    // Wald 2007: with 16 bins, trees are nearly as good as those of a full sweep.
+    constexpr int BINS = 16;
+    // Deeper nodes are split at the median. With it, the stack suffices for 2^24 boxes: eight
+    // levels of arbitrary splits and eight of halves, each pushing seven more than it pops.
+    constexpr int EVEN_DEPTH = 8, WAITING_MAX = 128;
+    constexpr float FARTHEST = 3.0e38f;
+
+    // A box: its low corner, its number, minus its high corner, 0. Its union with another is one
+    // minimum. Boxes are moved, so that those of a part are contiguous.
+    auto box_at = [&](int i) { return load(boxes.data + 8 * i, Floats()); };
+    auto set_box = [&](int i, Floats box) { put(boxes.data + 8 * i, ~0u, box); };
+    auto half_area = [](Floats box) {
+        const float x = -box[4] - box[0], y = -box[5] - box[1], z = -box[6] - box[2];
+        return x * y + y * z + z * x;
+    };
+    // Twice the centre: only the order matters, and halving would add a rounding for nothing.
+    auto doubled_centre = [](Floats box) -> Floats {
+        return box - __builtin_shufflevector(box, box, 4, 5, 6, 7, 0, 1, 2, 3);
+    };
+    auto bin_of = [](float steps) {
+        const int k = (int)steps;
+        return k < 0 ? 0 : k >= BINS ? BINS - 1 : k;
+    };
+
+    // Part of a node: its bounds, and those of its boxes' doubled centres.
+    struct Part { int begin, end; Floats bounds, low, high; };
+    auto add = [&](Part& part, Floats box) {
+        const Floats centre = doubled_centre(box);
+        part.bounds = smaller(part.bounds, box);
+        part.low = smaller(part.low, centre);
+        part.high = larger(part.high, centre);
+    };
+    auto part_of = [&](int begin, int end) {
+        Part part = {begin, end, FARTHEST, FARTHEST, -FARTHEST};
+        for (int i = begin; i < end; ++i)
+            add(part, box_at(i));
+        return part;
+    };
+
+    auto halve = [&](const Part& part, Part& left, Part& right) {
+        const int middle = (part.begin + part.end) / 2;
+        left = part_of(part.begin, middle);
+        right = part_of(middle, part.end);
+    };
+    // Cut a part in two by the best split.
+    auto cut = [&](const Part& part, Part& left, Part& right) {
+        const int begin = part.begin, end = part.end;
+        const Floats low = part.low, high = part.high;
+        Floats scale = 0.0f;
+        for (int axis = 0; axis < 3; ++axis)
+            if (high[axis] > low[axis])
+                scale[axis] = (float)BINS / (high[axis] - low[axis]);
+        Floats bins[3][BINS];
+        int counts[3][BINS] = {};
+        for (auto& of_axis : bins)
+            for (auto& bin : of_axis)
+                bin = FARTHEST;
+        for (int i = begin; i < end; ++i) {
+            const Floats box = box_at(i), steps = (doubled_centre(box) - low) * scale;
+            for (int axis = 0; axis < 3; ++axis) {
+                const int k = bin_of(steps[axis]);
+                bins[axis][k] = smaller(bins[axis][k], box);
+                ++counts[axis][k];
+            }
+        }
+        // Surface area heuristic; leaves are intersected eight faces at once, so leaves count, not
+        // faces.
+        auto cost_of = [&](Floats bounds, int count) {
+            return half_area(bounds) * (float)((count + leaf - 1) / leaf);
+        };
+        float best = FARTHEST;
+        int best_axis = -1, split_at = 0;
+        for (int axis = 0; axis < 3; ++axis) {
+            if (!(high[axis] > low[axis]))
+                continue;
+            // Costs to the right of each plane, then those to its left.
+            float beyond[BINS];
+            Floats bounds = FARTHEST;
+            int count = 0;
+            for (int k = BINS - 1; k > 0; --k) {
+                bounds = smaller(bounds, bins[axis][k]);
+                count += counts[axis][k];
+                beyond[k] = count > 0 ? cost_of(bounds, count) : FARTHEST;
+            }
+            bounds = FARTHEST;
+            count = 0;
+            for (int k = 1; k < BINS; ++k) {
+                bounds = smaller(bounds, bins[axis][k - 1]);
+                count += counts[axis][k - 1];
+                if (count == 0 || beyond[k] >= FARTHEST)
+                    continue;
+                const float cost = beyond[k] + cost_of(bounds, count);
+                if (cost < best) {
+                    best = cost;
+                    best_axis = axis;
+                    split_at = k;
+                }
+            }
+        }
+        left = {begin, begin, FARTHEST, FARTHEST, -FARTHEST};
+        right = {end, end, FARTHEST, FARTHEST, -FARTHEST};
+        // All centres coincide: any split is as good, and the median keeps the depth logarithmic.
+        if (best_axis < 0)
+            return halve(part, left, right);
+        // In place, as in quicksort.
+        while (left.end < right.begin) {
+            const Floats box = box_at(left.end);
+            const float centre = doubled_centre(box)[best_axis];
+            if (bin_of((centre - low[best_axis]) * scale[best_axis]) < split_at) {
+                add(left, box);
+                ++left.end;
+            } else {
+                add(right, box);
+                set_box(left.end, box_at(--right.begin));
+                set_box(right.begin, box);
+            }
+        }
+    };
+
+    struct Task { int begin, end, depth, lane; };
+    Task waiting[WAITING_MAX];
+    waiting[0] = {0, (int)boxes.shape[0], 0, -1};
+    int waiting_count = 1, node_count = 0, leaf_count = 0;
+    while (waiting_count > 0) {
+        const Task task = waiting[--waiting_count];
+        int code = node_count;
+        if (task.end - task.begin <= leaf) {
+            leaves.data[leaf_count] = wp::vec2i(task.begin, task.end);
+            code = -++leaf_count;
+        } else {
+            Part parts[8];
+            parts[0] = part_of(task.begin, task.end);
+            int count = 1, chosen = 0;
+            while (chosen >= 0) {
+                Part left, right;
+                if (task.depth < EVEN_DEPTH)
+                    cut(parts[chosen], left, right);
+                else
+                    halve(parts[chosen], left, right);
+                // Parts stay in order.
+                for (int k = count++; k > chosen + 1; --k)
+                    parts[k] = parts[k - 1];
+                parts[chosen] = left;
+                parts[chosen + 1] = right;
+                // Continue with the largest part, in deep nodes that of most boxes, until the node
+                // is full.
+                chosen = -1;
+                float most = -1.0f;
+                for (int k = 0; count < 8 && k < count; ++k) {
+                    const int size = parts[k].end - parts[k].begin;
+                    const float priority = size <= leaf              ? -1.0f
+                                           : task.depth < EVEN_DEPTH ? half_area(parts[k].bounds)
+                                                                     : (float)size;
+                    if (priority > most) {
+                        most = priority;
+                        chosen = k;
+                    }
+                }
+            }
+            float* node = nodes.data + 48 * node_count;
+            for (int k = 0; k < 8; ++k) {
+                const bool used = k < count;
+                if (used)
+                    waiting[waiting_count++] = {parts[k].begin, parts[k].end, task.depth + 1,
+                                                8 * node_count + k};
+                for (int axis = 0; axis < 3; ++axis) {
+                    node[16 * axis + k] = used ? parts[k].bounds[axis] : NOWHERE;
+                    node[16 * axis + 8 + k] = used ? -parts[k].bounds[4 + axis] : -NOWHERE;
+                }
+            }
+            ++node_count;
+        }
+        // A node's number is known only now: write it into its parent's lane.
+        if (task.lane >= 0)
+            codes.data[task.lane] = code;
+    }
+    counts.data[0] = node_count;
+    counts.data[1] = leaf_count;
+#endif
+"""
+)
 
 
-@wp.struct
-class Boxes:
-    """Boxes to build a tree over, and scratch memory.
-
-    Attributes:
-        lows, highs: Corners [n].
-        order: Permutation of the boxes; those of a node are contiguous [n].
-        bin_lows, bin_highs, bin_counts: Of one axis [BINS].
-        costs: SAH cost to the right of each split plane [BINS].
-    """
-
-    lows: wp.array[wp.vec3]
-    highs: wp.array[wp.vec3]
-    order: wp.array[wp.int32]
-    bin_lows: wp.array[wp.vec3]
-    bin_highs: wp.array[wp.vec3]
-    bin_counts: wp.array[wp.int32]
-    costs: wp.array[wp.float32]
-
-
-@wp.func
-def half_area(low: wp.vec3, high: wp.vec3):
-    """Half the surface area of a box."""
-    e = high - low
-    return e[0] * e[1] + e[1] * e[2] + e[2] * e[0]
-
-
-@wp.func
-def doubled_centre(boxes: Boxes, i: int):
-    """Twice the centre of a box."""
-    # Only the order matters: halving would add a rounding for nothing.
-    return boxes.lows[i] + boxes.highs[i]
-
-
-@wp.func
-def bin_index(x: float, origin: float, scale: float):
-    """Bin of a centre along an axis."""
-    return wp.clamp(int((x - origin) * scale), 0, BINS - 1)
-
-
-@wp.func
-def range_bounds(boxes: Boxes, begin: int, end: int):
-    """Corners of the bounding box of a range."""
-    low = wp.vec3(FARTHEST, FARTHEST, FARTHEST)
-    high = -low
-    i = int(begin)
-    while i < end:
-        low = componentwise_min(low, boxes.lows[boxes.order[i]])
-        high = componentwise_max(high, boxes.highs[boxes.order[i]])
-        i += 1
-    return low, high
-
-
-@wp.func
-def best_cut(boxes: Boxes, begin: int, end: int, axis: int, origin: float, scale: float, leaf: int):
-    """Cost and split plane (number of bins to its left) of the best split across an axis."""
-    nothing = wp.vec3(FARTHEST, FARTHEST, FARTHEST)
-    for k in range(BINS):
-        boxes.bin_lows[k] = nothing
-        boxes.bin_highs[k] = -nothing
-        boxes.bin_counts[k] = 0
-    # Bin the boxes by their centres.
-    i = int(begin)
-    while i < end:
-        box = boxes.order[i]
-        k = bin_index(doubled_centre(boxes, box)[axis], origin, scale)
-        boxes.bin_lows[k] = componentwise_min(boxes.bin_lows[k], boxes.lows[box])
-        boxes.bin_highs[k] = componentwise_max(boxes.bin_highs[k], boxes.highs[box])
-        boxes.bin_counts[k] = boxes.bin_counts[k] + 1
-        i += 1
-    low = nothing
-    high = -nothing
-    count = int(0)
-    # Sweep from the right: costs to the right of each plane.
-    k = int(BINS - 1)
-    while k > 0:
-        low = componentwise_min(low, boxes.bin_lows[k])
-        high = componentwise_max(high, boxes.bin_highs[k])
-        count += boxes.bin_counts[k]
-        boxes.costs[k] = FARTHEST
-        if count > 0:
-            # Surface area heuristic; leaves are intersected eight faces at once, so leaves count,
-            # not faces.
-            boxes.costs[k] = half_area(low, high) * float((count + leaf - 1) / leaf)
-        k -= 1
-    # Sweep from the left: add the costs to the left and keep the cheapest plane.
-    best = float(FARTHEST)
-    cut = int(0)
-    low = nothing
-    high = -nothing
-    count = int(0)
-    k = int(1)
-    while k < BINS:
-        low = componentwise_min(low, boxes.bin_lows[k - 1])
-        high = componentwise_max(high, boxes.bin_highs[k - 1])
-        count += boxes.bin_counts[k - 1]
-        if count > 0 and boxes.costs[k] < FARTHEST:
-            cost = boxes.costs[k] + half_area(low, high) * float((count + leaf - 1) / leaf)
-            if cost < best:
-                best = cost
-                cut = k
-        k += 1
-    return best, cut
-
-
-@wp.func
-def partition(boxes: Boxes, begin: int, end: int, leaf: int):
-    """Partition a range by the best split; returns where the second group begins."""
-    low = wp.vec3(FARTHEST, FARTHEST, FARTHEST)
-    high = -low
-    # In-place partition as in quicksort.
-    i = int(begin)
-    while i < end:
-        low = componentwise_min(low, doubled_centre(boxes, boxes.order[i]))
-        high = componentwise_max(high, doubled_centre(boxes, boxes.order[i]))
-        i += 1
-    best = float(FARTHEST)
-    best_axis = int(-1)
-    split_at = int(0)
-    for axis in range(3):
-        size = high[axis] - low[axis]
-        if size > 0.0:
-            scale = float(BINS) / size
-            cost, cut = best_cut(boxes, begin, end, axis, low[axis], scale, leaf)
-            if cost < best:
-                best = cost
-                best_axis = axis
-                split_at = cut
-    # All centres coincide: any split is as good, and the median keeps the depth logarithmic.
-    if best_axis < 0:
-        return (begin + end) / 2
-    scale = float(BINS) / (high[best_axis] - low[best_axis])
-    i = int(begin)
-    j = int(end)
-    while i < j:
-        box = boxes.order[i]
-        if bin_index(doubled_centre(boxes, box)[best_axis], low[best_axis], scale) < split_at:
-            i += 1
-        else:
-            j -= 1
-            boxes.order[i] = boxes.order[j]
-            boxes.order[j] = box
-    return i
-
-
-@wp.func
-def split_priority(boxes: Boxes, begin: int, end: int, leaf: int, depth: int):
-    """Priority of splitting a range: its area, or its size in deep nodes; -1 for a leaf."""
-    size = float(-1.0)
-    if end - begin > leaf:
-        size = float(end - begin)
-        if depth < EVEN_DEPTH:
-            low, high = range_bounds(boxes, begin, end)
-            size = half_area(low, high)
-    return size
-
-
-@wp.func
-def split_node(boxes: Boxes, begin: int, end: int, leaf: int, depth: int):
-    """Bounds of a node's parts, and their number."""
-    bounds = Bounds()
-    worths = Worths()
-    bounds[0] = begin
-    bounds[1] = end
-    parts = int(1)
-    chosen = int(0)
-    while chosen >= 0:
-        first = bounds[chosen]
-        last = bounds[chosen + 1]
-        cut = (first + last) / 2
-        if depth < EVEN_DEPTH:
-            cut = partition(boxes, first, last, leaf)
-        # Insert the new bound and keep the parts in order.
-        k = int(parts)
-        while k > chosen:
-            bounds[k + 1] = bounds[k]
-            worths[k] = worths[k - 1]
-            k -= 1
-        bounds[chosen + 1] = cut
-        worths[chosen] = split_priority(boxes, first, cut, leaf, depth)
-        worths[chosen + 1] = split_priority(boxes, cut, last, leaf, depth)
-        parts += 1
-        # Continue with the part of highest priority until the node is full.
-        chosen = int(-1)
-        most = float(-1.0)
-        k = int(0)
-        while k < parts < WIDTH:
-            if worths[k] > most:
-                most = worths[k]
-                chosen = k
-            k += 1
-    return bounds, parts
+@wp.func_native(_GROW)
+def grow(
+    boxes: wp.array2d[wp.float32],
+    leaf: int,
+    nodes: wp.array3d[wp.float32],
+    codes: wp.array2d[wp.int32],
+    leaves: wp.array[wp.vec2i],
+    counts: wp.array[wp.int32],
+):
+    """Build one tree; arguments as for ``grow_tree``."""
+    ...
 
 
 @wp.kernel
 def grow_tree(
-    boxes: Boxes,
+    boxes: wp.array2d[float],
     leaf: int,
-    todo: wp.array[wp.vec4i],
     nodes: wp.array3d[float],
     codes: wp.array2d[int],
     leaves: wp.array[wp.vec2i],
     counts: wp.array[int],
 ):
-    """Build one tree; launched with a single thread.
+    """Build one tree; launched with a single thread, on the CPU.
 
     Args:
+        boxes: Low corner, number, minus high corner, 0 [n, 8]; permuted: those of a node are
+            contiguous.
         leaf: Maximum number of boxes in a leaf.
-        todo: Stack of ranges to split: (begin, end, depth, 8 * node + lane).
         nodes: Bounds: low x, high x, low y, ... [., 6, 8]; no ray enters unused lanes.
         codes: Child of each lane: the number of a node, or -1 - number of a leaf [., 8].
-        leaves: (begin, end) into ``order``.
+        leaves: (begin, end) into ``boxes``.
         counts: (nodes, leaves).
     """
-    node_count = int(0)
-    leaf_count = int(0)
-    n = boxes.order.shape[0]
-    todo[0] = wp.vec4i(0, n, 0, -1)
-    waiting = int(1)
-    while waiting > 0:
-        waiting -= 1
-        task = todo[waiting]
-        code = node_count
-        if task[1] - task[0] <= leaf:
-            leaves[leaf_count] = wp.vec2i(task[0], task[1])
-            leaf_count += 1
-            code = -leaf_count
-        else:
-            bounds, parts = split_node(boxes, task[0], task[1], leaf, task[2])
-            for k in range(WIDTH):
-                low = wp.vec3(NOWHERE, NOWHERE, NOWHERE)
-                high = -low
-                if k < parts:
-                    low, high = range_bounds(boxes, bounds[k], bounds[k + 1])
-                    lane = WIDTH * node_count + k
-                    todo[waiting] = wp.vec4i(bounds[k], bounds[k + 1], task[2] + 1, lane)
-                    waiting += 1
-                for axis in range(3):
-                    nodes[node_count, 2 * axis, k] = low[axis]
-                    nodes[node_count, 2 * axis + 1, k] = high[axis]
-            node_count += 1
-        if task[3] >= 0:
-            # A node's number is known only now: write it into its parent's lane.
-            codes[task[3] / WIDTH, task[3] % WIDTH] = code
-    counts[0] = node_count
-    counts[1] = leaf_count
+    grow(boxes, leaf, nodes, codes, leaves, counts)

@@ -1,9 +1,8 @@
 """Ray traversal of bounding volume hierarchies, eight boxes or eight triangles at a time.
 
-On the CPU, trees are those of gen_data.generator.renderers.warp.scene.bvh, and the traversal uses
-the vector extensions of the compiler that Warp ships: plain IEEE arithmetic, the same on every
-processor. It takes a third of the time of ``wp.mesh_query_ray``, which tests boxes and triangles
-one by one. On CUDA the same functions query Warp's own hierarchies.
+On the CPU, trees are those of gen_data.generator.renderers.warp.scene.bvh, and the traversal takes
+a third of the time of ``wp.mesh_query_ray``, which tests boxes and triangles one by one. On CUDA
+the same functions query Warp's own hierarchies.
 
 Sources: Wald, Benthin and Boulos, "Getting rid of packets: efficient SIMD single-ray traversal
 using multi-branching BVHs", 2008; Woop, Benthin and Wald, "Watertight ray/triangle intersection",
@@ -15,6 +14,7 @@ from __future__ import annotations
 import warp as wp
 
 from gen_data.generator.renderers.warp.scene.kernels.records import BodyRecord, Geometry
+from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -22,10 +22,9 @@ Found = wp.spatial_vectord
 """Intersection of a ray: parameter, weights of a face's first and second corner, face, body
 (0 within a mesh), and an unused number; face and body are -1 for a miss."""
 
-_RAY = """
-    typedef float Lanes __attribute__((ext_vector_type(8)));
-    typedef float LanesInMemory __attribute__((ext_vector_type(8), aligned(4)));
-    typedef bool Mask __attribute__((ext_vector_type(8)));
+_RAY = (
+    SIMD
+    + """
     // Parameter and code in one integer: positive floats compare like integers, nearest first.
     typedef unsigned long long Entry;
     // Ize 2013: 1 + twice the rounding error of a slab's parameter, so that no box is missed.
@@ -60,28 +59,20 @@ _RAY = """
     };
 
     // Slab test of a node's eight boxes: push those that the ray enters, the nearest on top.
-    auto enter = [](Walk& walk, const Ray& ray, const float* node, float reach, bool sorted) {
+    auto enter = [&](Walk& walk, const Ray& ray, const float* node, float reach, bool sorted) {
         auto slab = [&](int k, int lanes) {
-            return (*(const LanesInMemory*)(node + lanes) - Lanes(ray.o[k])) * ray.inverse[k];
+            return (load(node + lanes, Floats()) - Floats(ray.o[k])) * ray.inverse[k];
         };
-        const Lanes enters_x = slab(0, ray.near[0]), leaves_x = slab(0, ray.near[0] ^ 8);
-        const Lanes enters_y = slab(1, ray.near[1]), leaves_y = slab(1, ray.near[1] ^ 8);
-        const Lanes enters_z = slab(2, ray.near[2]), leaves_z = slab(2, ray.near[2] ^ 8);
-        const Lanes begin = 0.0f, end = reach;
-        // Selects by comparison: NaN is treated the same on every processor.
-        Lanes enters = enters_z > begin ? enters_z : begin;
-        enters = enters_y > enters ? enters_y : enters;
-        enters = enters_x > enters ? enters_x : enters;
-        Lanes leaves = leaves_x < leaves_y ? leaves_x : leaves_y;
-        leaves = leaves < leaves_z ? leaves : leaves_z;
-        leaves = leaves * FARTHER;
-        leaves = leaves < end ? leaves : end;
-        unsigned hits = __builtin_bit_cast(
-            unsigned char, __builtin_convertvector(enters <= leaves, Mask));
+        const Floats enters_x = slab(0, ray.near[0]), leaves_x = slab(0, ray.near[0] ^ 8);
+        const Floats enters_y = slab(1, ray.near[1]), leaves_y = slab(1, ray.near[1] ^ 8);
+        const Floats enters_z = slab(2, ray.near[2]), leaves_z = slab(2, ray.near[2] ^ 8);
+        const Floats enters = larger(enters_x, larger(enters_y, larger(enters_z, 0.0f)));
+        const Floats leaves = smaller(smaller(leaves_x, leaves_y), leaves_z);
+        unsigned hits = bits(enters <= smaller(leaves * FARTHER, reach));
         const int* codes = (const int*)(node + 48);
         const int first = walk.top;
         while (hits) {
-            const int lane = __builtin_ctz(hits);
+            const int lane = first_bit(hits);
             hits &= hits - 1;
             const unsigned bits = __builtin_bit_cast(unsigned, (float)enters[lane]);
             const Entry entry = (Entry)bits << 32 | (unsigned)codes[lane];
@@ -105,35 +96,32 @@ _RAY = """
     };
 
     // Watertight test of eight triangles (Woop et al. 2013): whether any hit is nearer than before.
-    auto meet = [](const float* faces, const Ray& ray, Strike& strike) {
-        const Lanes ox = ray.o[ray.kx], oy = ray.o[ray.ky], oz = ray.o[ray.kz];
+    auto meet = [&](const float* faces, const Ray& ray, Strike& strike) {
+        const Floats ox = ray.o[ray.kx], oy = ray.o[ray.ky], oz = ray.o[ray.kz];
         auto corner = [&](int axis, int k) {
-            return *(const LanesInMemory*)(faces + 24 * axis + 8 * k);
+            return load(faces + 24 * axis + 8 * k, Floats());
         };
-        const Lanes az = corner(ray.kz, 0) - oz;
-        const Lanes bz = corner(ray.kz, 1) - oz;
-        const Lanes cz = corner(ray.kz, 2) - oz;
-        const Lanes ax = corner(ray.kx, 0) - ox - az * ray.sx;
-        const Lanes bx = corner(ray.kx, 1) - ox - bz * ray.sx;
-        const Lanes cx = corner(ray.kx, 2) - ox - cz * ray.sx;
-        const Lanes ay = corner(ray.ky, 0) - oy - az * ray.sy;
-        const Lanes by = corner(ray.ky, 1) - oy - bz * ray.sy;
-        const Lanes cy = corner(ray.ky, 2) - oy - cz * ray.sy;
+        const Floats az = corner(ray.kz, 0) - oz;
+        const Floats bz = corner(ray.kz, 1) - oz;
+        const Floats cz = corner(ray.kz, 2) - oz;
+        const Floats ax = corner(ray.kx, 0) - ox - az * ray.sx;
+        const Floats bx = corner(ray.kx, 1) - ox - bz * ray.sx;
+        const Floats cx = corner(ray.kx, 2) - ox - cz * ray.sx;
+        const Floats ay = corner(ray.ky, 0) - oy - az * ray.sy;
+        const Floats by = corner(ray.ky, 1) - oy - bz * ray.sy;
+        const Floats cy = corner(ray.ky, 2) - oy - cz * ray.sy;
         // Scaled barycentric weights: edge functions in the sheared plane.
-        const Lanes u = cx * by - cy * bx, v = ax * cy - ay * cx, w = bx * ay - by * ax;
-        Lanes low = u < v ? u : v, high = u > v ? u : v;
-        low = low < w ? low : w;
-        high = high > w ? high : w;
-        const Lanes sum = u + v + w;
-        const Lanes t = (u * az + v * bz + w * cz) * ray.sz / sum;
-        const Lanes zero = 0.0f, reach = strike.t;
+        const Floats u = cx * by - cy * bx, v = ax * cy - ay * cx, w = bx * ay - by * ax;
+        const Floats low = smaller(smaller(u, v), w), high = larger(larger(u, v), w);
+        const Floats sum = u + v + w;
+        const Floats t = (u * az + v * bz + w * cz) * ray.sz / sum;
+        const Floats zero = 0.0f, reach = strike.t;
         // All weights of one sign: faces have two sides, and shared edges leave no gap.
         const auto inside = (low >= zero) | (high <= zero);
-        unsigned hits = __builtin_bit_cast(unsigned char, __builtin_convertvector(
-            inside & (t >= zero) & (t < reach), Mask));
+        unsigned hits = bits(inside & (t >= zero) & (t < reach));
         const bool any = hits != 0;
         while (hits) {
-            const int lane = __builtin_ctz(hits);
+            const int lane = first_bit(hits);
             hits &= hits - 1;
             // In lane order: equal distances keep the first face, whatever the processor.
             if (t[lane] < strike.t) {
@@ -161,6 +149,7 @@ _RAY = """
         return met;
     };
 """
+)
 
 _IN_MESH = """
     Ray ray;
@@ -232,17 +221,25 @@ _FOUND = """
 """
 
 
-def _snippet(cpu: str, cuda: str, *, first: bool) -> str:
+_BODY = """
+    return body;
+"""
+
+_MET = """
+    return body >= 0;
+"""
+
+
+def _snippet(cpu: str, cuda: str, told: str) -> str:
     """Source of one native function for both devices.
 
     On the CPU it is compiled out of line: most modules traverse trees in several places.
 
     Args:
         cpu, cuda: Code that finds a ``body`` and its ``strike``: any one (if ``ANY``) or the first.
-        first: Whether to return the first intersection, or whether there is any.
+        told: What to return: the first intersection, the body of any, or whether there is any.
     """
-    any_only = f"constexpr bool ANY = {str(not first).lower()};"
-    told = _FOUND if first else "    return body >= 0;\n"
+    any_only = f"constexpr bool ANY = {str(told != _FOUND).lower()};"
     return f"""
 #ifdef __CUDA_ARCH__
     {any_only}{_STRIKE_ON_CUDA}{cuda}{told}
@@ -255,7 +252,7 @@ def _snippet(cpu: str, cuda: str, *, first: bool) -> str:
 """
 
 
-@wp.func_native(_snippet(_IN_MESH, _IN_MESH_ON_CUDA, first=True))
+@wp.func_native(_snippet(_IN_MESH, _IN_MESH_ON_CUDA, _FOUND))
 def first_in_mesh(
     tree: wp.array[wp.float32], mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
 ) -> wp.spatial_vectord:
@@ -263,7 +260,7 @@ def first_in_mesh(
     ...
 
 
-@wp.func_native(_snippet(_IN_MESH, _IN_MESH_ON_CUDA, first=False))
+@wp.func_native(_snippet(_IN_MESH, _IN_MESH_ON_CUDA, _MET))
 def any_in_mesh(
     tree: wp.array[wp.float32], mesh: wp.uint64, o: wp.vec3, d: wp.vec3, reach: float
 ) -> bool:
@@ -271,7 +268,7 @@ def any_in_mesh(
     ...
 
 
-@wp.func_native(_snippet(_IN_SCENE, _IN_SCENE_ON_CUDA, first=True))
+@wp.func_native(_snippet(_IN_SCENE, _IN_SCENE_ON_CUDA, _FOUND))
 def first_in_scene(
     tree: wp.array[wp.float32],
     hierarchy: wp.uint64,
@@ -286,7 +283,7 @@ def first_in_scene(
     ...
 
 
-@wp.func_native(_snippet(_IN_SCENE, _IN_SCENE_ON_CUDA, first=False))
+@wp.func_native(_snippet(_IN_SCENE, _IN_SCENE_ON_CUDA, _BODY))
 def any_in_scene(
     tree: wp.array[wp.float32],
     hierarchy: wp.uint64,
@@ -296,6 +293,6 @@ def any_in_scene(
     d: wp.vec3,
     reach: float,
     through: int,
-) -> bool:
-    """Whether a ray meets any body without the cut-outs that ``through`` names."""
+) -> int:
+    """A body without the cut-outs that ``through`` names that a ray meets; -1 for none."""
     ...

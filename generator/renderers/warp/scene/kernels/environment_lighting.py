@@ -14,6 +14,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     fast_normalize,
     floor_int,
 )
+from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
@@ -151,7 +152,7 @@ def weigh_texels(
     solid_angles: wp.array[float],
     alpha: float,
     size: int,
-    shares: wp.array2d[float],
+    shares: wp.array3d[float],
 ):
     """Weights of an environment's texels in the GGX lobe around each direction of a map.
 
@@ -160,7 +161,7 @@ def weigh_texels(
     Args:
         directions, solid_angles: Of the environment's texels.
         size: Texels along the octahedral map's edge, without its border.
-        shares: One row per texel of the map, one column per texel of the environment.
+        shares: By groups of eight texels of the map, texels of the environment, and lanes.
     """
     texel = wp.tid()
     x = float(texel % size) + 0.5
@@ -176,30 +177,50 @@ def weigh_texels(
             # With the viewer along n, cos^2 of the half angle is (1 + c) / 2.
             q = 0.5 * (1.0 + c) * (a2 - 1.0) + 1.0
             share = c / (q * q) * solid_angles[i]
-        shares[texel, i] = share
+        shares[texel / 8, i, texel % 8] = share
         weight += share
     for i in range(directions.shape[0]):
-        shares[texel, i] = shares[texel, i] / weight
+        shares[texel / 8, i, texel % 8] = shares[texel / 8, i, texel % 8] / weight
+
+
+_WEIGHTED_MEANS = (
+    SIMD
+    + """
+    const int count = radiance.shape[0];
+    const float* share = shares.data + 8 * count * (first / 8) + first % 8;
+    const float* rgb = (const float*)radiance.data;
+    Floats red = 0.0f, green = 0.0f, blue = 0.0f;
+    for (int i = 0; i < count; ++i, share += 8, rgb += 3) {
+        const Floats weight = load(share, Floats());
+        red += weight * rgb[0];
+        green += weight * rgb[1];
+        blue += weight * rgb[2];
+    }
+    for (int lane = 0; lane < LANES; ++lane)
+        means.data[first + lane] = wp::vec3(at(red, lane), at(green, lane), at(blue, lane));
+"""
+)
+
+
+@wp.func_native(_WEIGHTED_MEANS)
+def weighted_means(
+    shares: wp.array3d[wp.float32],
+    radiance: wp.array[wp.vec3],
+    first: int,
+    means: wp.array[wp.vec3],
+):
+    """Write the weighted means of eight texels of a map; of one on CUDA."""
+    ...
 
 
 @wp.kernel
-def prefilter(shares: wp.array2d[float], radiance: wp.array[wp.vec3], smoothed: wp.array[wp.vec3]):
+def prefilter(
+    shares: wp.array3d[float], radiance: wp.array[wp.vec3], lanes: int, smoothed: wp.array[wp.vec3]
+):
     """Average an environment over the lobe around each direction of an octahedral map.
 
-    Four texels of the map per thread: independent sums hide the latency of additions.
+    Args:
+        shares: Weights as written by ``weigh_texels``.
+        lanes: Texels of the map per thread: 8 on the CPU, 1 on CUDA.
     """
-    first = 4 * wp.tid()
-    a = wp.vec3(0.0)
-    b = wp.vec3(0.0)
-    c = wp.vec3(0.0)
-    d = wp.vec3(0.0)
-    for i in range(radiance.shape[0]):
-        light = radiance[i]
-        a += light * shares[first, i]
-        b += light * shares[first + 1, i]
-        c += light * shares[first + 2, i]
-        d += light * shares[first + 3, i]
-    smoothed[first] = a
-    smoothed[first + 1] = b
-    smoothed[first + 2] = c
-    smoothed[first + 3] = d
+    weighted_means(shares, radiance, wp.tid() * lanes, smoothed)

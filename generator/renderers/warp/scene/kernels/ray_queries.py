@@ -72,6 +72,8 @@ def passed_origin(p: wp.vec3, d: wp.vec3, eye_m: wp.vec3):
 FARTHEST = wp.constant(1.0e6)
 # Only obstacles lower than this above a surface shelter it from rain and snow.
 SHELTER_M = wp.constant(2.5)
+# No body.
+NOBODY = wp.constant(-1)
 # Shadow rays pass both holes and clear faces.
 LIGHT = wp.constant(HOLES | CLEAR)
 
@@ -197,7 +199,13 @@ def is_occluded(world: World, path: Path):
 @wp.func
 def is_intersected(world: World, path: Path, through: int):
     """Whether anything intersects a path that passes ``through``."""
-    hit = any_in_scene(
+    return blocker_of(world, path, through) != NOBODY
+
+
+@wp.func
+def blocker_of(world: World, path: Path, through: int):
+    """A body that intersects a path that passes ``through``; NOBODY if there is none."""
+    b = any_in_scene(
         world.tree,
         world.hierarchy,
         world.bodies,
@@ -207,43 +215,51 @@ def is_intersected(world: World, path: Path, through: int):
         1.0,
         through,
     )
-    if not hit and world.cutout_hierarchy != wp.uint64(0):
-        hit = is_cut_by_cutouts(world, path, through)
-    return hit
+    if b == NOBODY and world.cutout_hierarchy != wp.uint64(0):
+        b = blocker_with_cutouts(world, path, through)
+    return b
 
 
 @wp.func(**OUT_OF_LINE)
-def is_cut_by_cutouts(world: World, path: Path, through: int):
-    """Whether a body with cut-outs intersects a path."""
-    hit = bool(False)
+def blocker_with_cutouts(world: World, path: Path, through: int):
+    """As ``blocker_of``, among bodies with cut-outs."""
+    blocker = int(NOBODY)
     candidates = wp.bvh_query_ray(world.cutout_hierarchy, path.origin, path.way)
     k = int(0)
     while wp.bvh_query_next(candidates, k, 1.0):
         b = world.cutouts[k]
         if (world.bodies[b].cutouts & through) != 0:
-            hit = is_cut_by(world, b, path, through)
-            if hit:
+            if is_cut_by(world, b, path, through):
+                blocker = b
                 break
-    return hit
+    return blocker
 
 
 @wp.func
-def is_occluded_by_listed(
-    world: World, lists: wp.array3d[int], tile: int, j: int, skip: int, path: Path
+def listed_blocker(
+    world: World, lists: wp.array3d[int], tile: int, j: int, skip: int, likely: int, path: Path
 ):
-    """Whether any body but ``skip`` blocks the path from a point of a tile to lamp j."""
-    hit = bool(False)
+    """A body but ``skip`` that blocks the path from a point of a tile to lamp j, or NOBODY.
+
+    Args:
+        likely: The body to test first, such as one that has blocked a neighbouring path; or NOBODY.
+    """
+    blocker = int(NOBODY)
     count = lists[tile, j, 0]
-    if count < 0:
+    k = int(-1)
+    while k < wp.max(count, 0) and blocker == NOBODY:
+        b = int(likely)
+        if k >= 0:
+            b = lists[tile, j, 1 + k]
+        again = k >= 0 and b == likely
+        if b >= 0 and b != skip and not again:
+            if is_blocked_by(world, b, path):
+                blocker = b
+        k += 1
+    if blocker == NOBODY and count < 0:
         # The list was too long to keep: query the whole scene.
-        return is_occluded(world, path)
-    for k in range(count):
-        b = lists[tile, j, 1 + k]
-        if b != skip:
-            hit = is_blocked_by(world, b, path)
-            if hit:
-                break
-    return hit
+        blocker = blocker_of(world, path, LIGHT)
+    return blocker
 
 
 @wp.func

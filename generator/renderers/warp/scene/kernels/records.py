@@ -57,7 +57,7 @@ class Geometry:
         mesh: Warp's hierarchy, on CUDA; 0 on the CPU.
         tree: Hierarchy of gen_data.generator.renderers.warp.scene.bvh, on the CPU; empty on CUDA.
         faces: Three vertex indices per face, flat.
-        box_lows_m, box_highs_m: Corners of boxes that together bound all faces.
+        boxes: Boxes that together bound all faces, see box_groups.
         convex: 1 for a convex solid, which never shadows itself when seen from outside.
     """
 
@@ -68,8 +68,7 @@ class Geometry:
     uvs: wp.array[wp.vec2]
     faces: wp.array[wp.int32]
     face_slots: wp.array[wp.int32]
-    box_lows_m: wp.array[wp.vec3]
-    box_highs_m: wp.array[wp.vec3]
+    boxes: wp.array[wp.float32]
     low_m: wp.vec3
     high_m: wp.vec3
     convex: int
@@ -421,6 +420,7 @@ class World:
     """The scene without the camera.
 
     Attributes:
+        boxes: The bodies' boxes in the world, see box_groups.
         tree: Hierarchy over the bodies' boxes, see gen_data.generator.renderers.warp.scene.bvh;
             empty on CUDA.
         hierarchy: Warp's hierarchy over the same boxes, on CUDA; 0 on the CPU.
@@ -429,6 +429,7 @@ class World:
         lobes: Directional albedo of specular lobes, see brdf.directional_albedo.
     """
 
+    boxes: wp.array[wp.float32]
     tree: wp.array[wp.float32]
     hierarchy: wp.uint64
     cutouts: wp.array[wp.int32]

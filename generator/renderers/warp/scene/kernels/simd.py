@@ -16,7 +16,7 @@ SIMD = """
     constexpr int LANES = 1, QUAD = 1;
     typedef float Floats, FloatQuad;
     typedef double Doubles, DoubleQuad;
-    typedef int IntQuad;
+    typedef int Ints, IntQuad;
     typedef long long Longs, LongQuad;
     typedef unsigned char Bytes;
     const float lane = 0.0f;
@@ -32,6 +32,11 @@ SIMD = """
     };
     auto gather = [](const auto* array, int i) { return (int)array[i]; };
     auto greatest = [](double number, double v) { return number > v ? number : v; };
+    auto at = [](auto value, int) { return value; };
+    auto load_triples = [](const float* memory, Floats* components) {
+        for (int k = 0; k < 3; ++k)
+            components[k] = memory[k];
+    };
 #else
     constexpr int LANES = 8, QUAD = 4;
     typedef float Floats __attribute__((ext_vector_type(8)));
@@ -102,10 +107,25 @@ SIMD = """
         value = chosen(set, value, load(memory, value));
         __builtin_memcpy(memory, &value, sizeof(value));
     };
+    auto at = [](auto vector, int k) { return vector[k]; };
+    // Eight triples of floats, one after another, to their components.
+    auto load_triples = [&](const float* memory, Floats* components) {
+        const Floats a = load(memory, Floats()), b = load(memory + 8, Floats());
+        const Floats c = load(memory + 16, Floats());
+        const Floats x = __builtin_shufflevector(a, b, 0, 3, 6, 9, 12, 15, -1, -1);
+        const Floats y = __builtin_shufflevector(a, b, 1, 4, 7, 10, 13, -1, -1, -1);
+        const Floats z = __builtin_shufflevector(a, b, 2, 5, 8, 11, 14, -1, -1, -1);
+        components[0] = __builtin_shufflevector(x, c, 0, 1, 2, 3, 4, 5, 10, 13);
+        components[1] = __builtin_shufflevector(y, c, 0, 1, 2, 3, 4, 8, 11, 14);
+        components[2] = __builtin_shufflevector(z, c, 0, 1, 2, 3, 4, 9, 12, 15);
+    };
 #endif
     // The first ``n`` lanes, of which there may be fewer.
     auto first_bits = [](int n) { return n < LANES ? (1u << n) - 1u : ~0u; };
     auto least = [](auto a, auto b) { return a < b ? a : b; };
+    // A single float stands for a vector of them.
+    auto smaller = [](Floats a, Floats b) -> Floats { return a < b ? a : b; };
+    auto larger = [](Floats a, Floats b) -> Floats { return a > b ? a : b; };
     auto clamped = [](auto v, auto low, auto high) {
         // NaN becomes the low end.
         const auto raised = v > low ? v : low;
