@@ -1,8 +1,8 @@
 """Interpolation of light from the lattice to all pixels.
 
 A cell lies between four lattice points, and its pixels that show one face are a stretch: they share
-the lattice points whose light they blend, and a texture's mapping and mip level. A row of a stretch
-is shaded at once.
+the lattice points whose light they blend, and a texture's mapping and mip level. Four of them are
+shaded at once.
 """
 
 from __future__ import annotations
@@ -10,11 +10,10 @@ from __future__ import annotations
 import warp as wp
 
 from gen_data.generator.renderers.warp.atmosphere.kernels.ground_weathering import (
+    COAT_QUAD,
     SNOW_BLUE,
     SNOW_GREEN,
     SNOW_RED,
-    bump_visibility,
-    mixed_snow,
 )
 from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     Lattice,
@@ -79,6 +78,7 @@ class Stretch:
 
     Attributes:
         first: The cell's upper left lattice point.
+        columns: Lattice points per row.
         agrees: 1 for each of the cell's corners whose light is blended, 0 for others.
         turns: 1 for each corner from which the surface turns too sharply.
         texture: -1 for none; ``patch`` and ``sampler`` are then unused.
@@ -112,17 +112,23 @@ def stretch_at(
     images: GBufferRecord,
     lattice: Lattice,
     lights: wp.array[LatticeLight],
+    surface: int,
+    patch: Patch,
     first: int,
     x: int,
     y: int,
 ):
-    """The stretch of a pixel in the cell to the right of and below a lattice point."""
+    """The stretch of a pixel in the cell to the right of and below a lattice point.
+
+    Args:
+        surface: The pixel's.
+        patch: Any; kept if it is the face's.
+    """
     i = y * view.width + x
     stretch = Stretch()
     stretch.face = images.hits[i]
     stretch.first = first
     stretch.columns = lattice.width
-    surface = surface_index(world, stretch.face)
     d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
     p = view.eye_m + view.R_world_camera @ (d * images.z_m[i])
     tolerance_m = surface_tolerance(view, p)
@@ -144,10 +150,12 @@ def stretch_at(
     stretch.albedo = world.surfaces[surface].base_color
     stretch.roughness = world.surfaces[surface].roughness
     stretch.texture = world.surfaces[surface].texture
+    stretch.patch = patch
     if stretch.texture >= 0 and found > 0.0:
+        if patch.face[0] != stretch.face[0] or patch.face[1] != stretch.face[1]:
+            stretch.patch = patch_at(world, surface, stretch.face)
         n = images.normals[i]
         v = fast_normalize(view.eye_m - p)
-        stretch.patch = patch_at(world, surface, stretch.face, n)
         # Footprints are ellipses: use the level of the geometric mean of both axes.
         slant = wp.max(wp.dot(n, v), 0.05)
         width_m = pixel_width(view, i, images.z_m[i])
@@ -162,166 +170,135 @@ def stretch_at(
     return stretch
 
 
-@wp.struct
-class Weather:
-    """Water and snow on the pixels of a row.
+# Bits of a cell's pixels: column in the lower two of their numbers, row in the upper two.
+CELL_ROW = wp.constant(4)
 
-    Attributes:
-        wet: Factors on albedo.
-        snow: Shares of snow, to be added to albedo.
-        bumps: Visibility of the surface's own bumps.
-    """
-
-    wet: wp.vec4
-    snow: wp.vec4
-    bumps: wp.vec4
-
-
-@wp.func
-def weather_at(stretch: Stretch, coats: wp.array[wp.vec4], pixels: int, down: float, step: float):
-    """Weather of a stretch's pixels, interpolated from lattice points; at most four in a row."""
-    weather = Weather()
-    up = 1.0 - down
-    below = stretch.first + stretch.columns
-    agrees = stretch.agrees
-    left = coats[stretch.first] * (agrees[0] * up) + coats[below] * (agrees[2] * down)
-    right = coats[stretch.first + 1] * (agrees[1] * up) + coats[below + 1] * (agrees[3] * down)
-    for k in range(pixels):
-        w = float(k) * step
-        total = (agrees[0] * up + agrees[2] * down) * (1.0 - w)
-        total += (agrees[1] * up + agrees[3] * down) * w
-        coat = (left * (1.0 - w) + right * w) / wp.max(total, 1.0e-6)
-        weather.snow[k] = mixed_snow(coat)
-        weather.wet[k] = coat[0] * wp.max(1.0 - weather.snow[k], 0.0)
-        weather.bumps[k] = bump_visibility(coat)
-    return weather
-
-
-_SHADE_ROW = (
+_SHADE_STRETCH = (
     SAMPLE_QUAD
+    + COAT_QUAD
     + """
-    // Blended light at the row's ends, and its change over the row; the last one is the sum of
-    // weights, and that of corners from which the surface turns.
-    const auto& a = lights.data[stretch.first];
-    const auto& b = lights.data[stretch.first + 1];
-    const auto& c = lights.data[stretch.first + stretch.columns];
-    const auto& d = lights.data[stretch.first + stretch.columns + 1];
-    const float up = 1.0f - down;
-    auto weight = [&](const wp::vec4& corners, int k) { return corners[k] * (k < 2 ? up : down); };
-    const float wa = weight(stretch.agrees, 0), wb = weight(stretch.agrees, 1);
-    const float wc = weight(stretch.agrees, 2), wd = weight(stretch.agrees, 3);
-    float begin[6], change[6];
-    for (int k = 0; k < 3; ++k) {
-        begin[k] = a.diffuse[k] * wa + c.diffuse[k] * wc;
-        change[k] = b.diffuse[k] * wb + d.diffuse[k] * wd - begin[k];
-        begin[3 + k] = a.rest[k] * wa + c.rest[k] * wc;
-        change[3 + k] = b.rest[k] * wb + d.rest[k] * wd - begin[3 + k];
-    }
-    const float turn = weight(stretch.turns, 0) + weight(stretch.turns, 2);
-    const float turn_change = weight(stretch.turns, 1) + weight(stretch.turns, 3) - turn;
+    const int x1 = x0 + stride < view.width ? x0 + stride : view.width;
+    const int y1 = y0 + stride < view.height ? y0 + stride : view.height;
+    int mine = 0;
+    for (int y = y0; y < y1; ++y)
+        for (int x = x0; x < x1; ++x)
+            if (images.hits.data[y * view.width + x] == stretch.face)
+                mine |= 1 << (4 * (y - y0) + x - x0);
 
-    int done = 0;
-    for (int x = x0; x < x1; x += QUAD) {
-        const int row = y * view.width + x;
-        int mine = 0;
+    const int corners[4] = {
+        stretch.first, stretch.first + 1,
+        stretch.first + stretch.columns, stretch.first + stretch.columns + 1};
+    const bool textured = stretch.texture >= 0, bumpy = stretch.bumpy != 0;
+    const auto& patch = stretch.patch;
+    int missed = 0;
+    for (int rest = mine; rest;) {
+        // Lanes to spare repeat the last pixel.
+        int bits[QUAD], at[QUAD];
+        Floats across, down;
         for (int k = 0; k < QUAD; ++k) {
-            if (x + k < x1 && images.hits.data[row + k] == stretch.face)
-                mine |= 1 << k;
+            bits[k] = rest ? lowest_bit(rest) : bits[k - 1];
+            rest &= rest - 1;
+            at[k] = (y0 + (bits[k] >> 2)) * view.width + x0 + (bits[k] & 3);
+            put(across, k, (float)(bits[k] & 3));
+            put(down, k, (float)(bits[k] >> 2));
         }
-        if (!mine)
-            continue;
-        // Other lanes repeat a pixel of the stretch, so that all their values are defined.
-        const int stand_in = row + first_bit(mine);
-        int at[QUAD];
-        for (int k = 0; k < QUAD; ++k)
-            at[k] = mine >> k & 1 ? row + k : stand_in;
 
-        const Floats part = (floats(LANE) + (float)(x - x0)) * step;
-        const Floats total = (wa + wc) + (wb + wd - (wa + wc)) * part;
-        const Floats turned = turn + turn_change * part;
-        Floats color[3], diffuse = one, shine = one;
-        for (int k = 0; k < 3; ++k)
-            color[k] = stretch.albedo[k];
-        if (stretch.texture >= 0) {
-            const auto& texture = textures.data[stretch.texture];
-            const auto& patch = stretch.patch;
-            Floats p[3], n[3], z;
+        // Bilinear weights of the corners.
+        const Floats right = across * step_x, lower = down * step_y;
+        Floats weights[4], total = 0.0f, turned = 0.0f;
+        for (int k = 0; k < 4; ++k) {
+            const Floats w = (k & 1 ? right : 1.0f - right) * (k & 2 ? lower : 1.0f - lower);
+            weights[k] = w * stretch.agrees[k];
+            total += weights[k];
+            turned += w * stretch.turns[k];
+        }
+        const Floats inverse_total = 1.0f / larger(total, 1.0e-6f);
+        for (int k = 0; k < 4; ++k)
+            weights[k] = weights[k] * inverse_total;
+
+        Coat coat;
+        if (covered) {
+            Floats mixable[4] = {zero, zero, zero, zero};
+            for (int k = 0; k < 4; ++k)
+                for (int c = 0; c < 4; ++c)
+                    mixable[c] += weights[k] * coats.data[corners[k]][c];
+            coat = coat_of(mixable);
+        }
+
+        Floats color[3], diffuse = 1.0f, shine = 1.0f;
+        for (int c = 0; c < 3; ++c)
+            color[c] = stretch.albedo[c];
+        if (textured) {
+            Floats z, d[3], n[3];
             for (int k = 0; k < QUAD; ++k) {
                 put(z, k, images.z_m.data[at[k]]);
                 for (int c = 0; c < 3; ++c)
                     put(n[c], k, images.normals.data[at[k]][c]);
             }
             if (view.lens == 0) {
-                p[0] = (floats(LANE) + ((float)x + 0.5f - view.cx)) * view.inverse_fx * z;
-                p[1] = ((float)y + 0.5f - view.cy) * view.inverse_fy * z;
-                p[2] = z;
+                d[0] = (across + ((float)x0 + 0.5f - view.cx)) * view.inverse_fx;
+                d[1] = (down + ((float)y0 + 0.5f - view.cy)) * view.inverse_fy;
+                d[2] = one;
             } else {
                 for (int k = 0; k < QUAD; ++k)
                     for (int c = 0; c < 3; ++c)
-                        put(p[c], k, view.directions.data[at[k]][c]);
-                for (int c = 0; c < 3; ++c)
-                    p[c] = p[c] * z;
+                        put(d[c], k, view.directions.data[at[k]][c]);
             }
-            Floats at_texture[3];
+            Floats coordinates[3], shares[3] = {zero, zero, one};
             for (int k = 0; k < 3; ++k) {
                 const auto& g = patch.gradients.data[k];
-                at_texture[k] = patch.start[k] + (p[0] * g[0] + p[1] * g[1] + p[2] * g[2]);
+                coordinates[k] = patch.start[k] + (d[0] * g[0] + d[1] * g[1] + d[2] * g[2]) * z;
             }
-            // Weights of projections: eighth powers blend them in a narrow band only.
-            Floats shares[3] = {zero, zero, one};
             if (patch.triplanar) {
+                // Eighth powers: projections blend in a narrow band only.
+                Floats sum = 0.0f;
                 for (int k = 0; k < 3; ++k) {
                     const auto& m = patch.axes.data;
                     Floats w = n[0] * m[0][k] + n[1] * m[1][k] + n[2] * m[2][k];
                     w = w * w;
                     w = w * w;
                     shares[k] = w * w;
+                    sum += shares[k];
                 }
-                const Floats sum = 1.0f / (shares[0] + shares[1] + shares[2]);
                 for (int k = 0; k < 3; ++k)
-                    shares[k] = shares[k] * sum;
+                    shares[k] = shares[k] / sum;
             }
-            const bool bumpy = stretch.bumpy != 0;
-            Floats albedo[3] = {zero, zero, zero}, rough = zero, m[3] = {zero, zero, zero};
-            for (int axis = 0; axis < 3; ++axis) {
+            Floats albedo[3] = {zero, zero, zero}, rough = 0.0f, m[3] = {zero, zero, zero};
+            for (int axis = patch.triplanar ? 0 : 2; axis < 3; ++axis) {
                 // A weight below one step of 8 bits is not worth a texture lookup.
-                if (!any(shares[axis] > 0.004f))
+                const Floats share = shares[axis];
+                if (!any(share > 0.004f))
                     continue;
                 const int along_u = axis == 0 ? 1 : 0, along_v = axis == 2 ? 1 : 2;
-                const Floats share = shares[axis];
-                const Sample s = sample(
-                    texture, stretch.sampler, at_texture[along_u], at_texture[along_v], bumpy);
-                for (int k = 0; k < 3; ++k)
-                    albedo[k] += s.albedo[k] * share;
+                Sample s = sample(
+                    textures.data[stretch.texture], stretch.sampler, coordinates[along_u],
+                    coordinates[along_v], bumpy);
+                for (int c = 0; c < 3; ++c)
+                    albedo[c] += s.albedo[c] * share;
                 rough += s.roughness * share;
-                if (bumpy) {
-                    Floats bump[3] = {s.bump[0], s.bump[1], s.bump[2]};
-                    if (covered) {
-                        Floats seen;
-                        for (int k = 0; k < QUAD; ++k)
-                            put(seen, k, weather.bumps[(x - x0 + k) & 3]);
-                        for (int k = 0; k < 3; ++k)
-                            bump[k] = bump[k] * seen;
-                        bump[2] += 1.0f - seen;
-                    }
-                    // A texture tilts a normal by at most 84 degrees: no side of it may face away.
-                    const Floats height = larger(bump[2], 0.1f);
-                    for (int k = 0; k < 3; ++k) {
-                        const auto& axes = patch.axes.data[k];
-                        const Floats tilted =
-                            bump[0] * axes[along_u] + bump[1] * axes[along_v] + n[k] * height;
-                        m[k] += tilted * share;
-                    }
+                if (!bumpy)
+                    continue;
+                if (covered) {
+                    s.bump[0] = s.bump[0] * coat.bumps;
+                    s.bump[1] = s.bump[1] * coat.bumps;
+                    s.bump[2] = s.bump[2] * coat.bumps + (1.0f - coat.bumps);
+                }
+                // A texture tilts a normal by at most 84 degrees: no side of it may face away.
+                const Floats height = larger(s.bump[2], 0.1f);
+                for (int c = 0; c < 3; ++c) {
+                    const auto& axes = patch.axes.data[c];
+                    m[c] += share * (
+                        s.bump[0] * axes[along_u] + s.bump[1] * axes[along_v] + n[c] * height);
                 }
             }
-            for (int k = 0; k < 3; ++k)
-                color[k] = color[k] * albedo[k];
+            for (int c = 0; c < 3; ++c)
+                color[c] = color[c] * albedo[c];
             if (bumpy) {
                 auto dot = [](const Floats* u, const wp::vec3& v) {
                     return u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
                 };
-                const Floats inverse =
-                    1.0f / root(larger(m[0] * m[0] + m[1] * m[1] + m[2] * m[2], 1.0e-30f));
+                const Floats length = larger(m[0] * m[0] + m[1] * m[1] + m[2] * m[2], 1.0e-30f);
+                const Floats inverse = 1.0f / root(length);
                 const Floats after = larger(dot(m, stretch.towards) * inverse, 0.0f);
                 // The ratio of cosines diverges at grazing light.
                 const Floats before = larger(dot(n, stretch.towards), 0.1f);
@@ -337,122 +314,60 @@ _SHADE_ROW = (
                 shine = 1.0f + (smaller(lobe * lobe, 8.0f) - 1.0f) * stretch.shine;
             }
         }
-        if (covered) {
-            Floats wet, snow;
-            for (int k = 0; k < QUAD; ++k) {
-                put(wet, k, weather.wet[(x - x0 + k) & 3]);
-                put(snow, k, weather.snow[(x - x0 + k) & 3]);
-            }
-            for (int k = 0; k < 3; ++k)
-                color[k] = color[k] * wet + snow * white[k];
-        }
-        const Floats inverse = 1.0f / larger(total, 1.0e-6f);
+
         Floats light[3];
-        for (int k = 0; k < 3; ++k) {
-            const Floats lit = (begin[k] + change[k] * part) * diffuse;
-            light[k] = (lit * color[k] + (begin[3 + k] + change[3 + k] * part) * shine) * inverse;
+        for (int c = 0; c < 3; ++c) {
+            Floats lit = 0.0f, rest_light = 0.0f;
+            for (int k = 0; k < 4; ++k) {
+                lit += weights[k] * lights.data[corners[k]].diffuse[c];
+                rest_light += weights[k] * lights.data[corners[k]].rest[c];
+            }
+            if (covered)
+                color[c] = color[c] * coat.wet + coat.snow * white[c];
+            light[c] = lit * diffuse * color[c] + rest_light * shine;
         }
         for (int k = 0; k < QUAD; ++k) {
-            if (!(mine >> k & 1))
-                continue;
-            const int bit = 1 << (x - x0 + k);
-            done |= bit;
             if (get(total, k) > 0.0f && !(get(turned, k) > 0.0f))
-                radiance.data[row + k] = wp::vec3(get(light[0], k), get(light[1], k), get(light[2], k));
+                radiance.data[at[k]] =
+                    wp::vec3(get(light[0], k), get(light[1], k), get(light[2], k));
             else
-                done |= bit << 8;
+                missed |= 1 << bits[k];
         }
     }
-    return done;
+    return mine | missed << 16;
 """
 )
 
 
-@wp.func_native(_SHADE_ROW)
-def shade_row(
+@wp.func_native(_SHADE_STRETCH)
+def shade_stretch(
     view: View,
     images: GBufferRecord,
     textures: wp.array[TextureRecord],
     lights: wp.array[LatticeLight],
-    stretch: Stretch,
+    coats: wp.array[wp.vec4],
     covered: bool,
-    weather: Weather,
     white: wp.vec3,
+    stretch: Stretch,
+    stride: int,
     x0: int,
-    x1: int,
-    y: int,
-    down: float,
-    step: float,
+    y0: int,
+    step_x: float,
+    step_y: float,
     radiance: wp.array[wp.vec3],
 ) -> int:
-    """Shade the pixels of a stretch in one row of its cell.
+    """Shade the pixels of a stretch.
 
     Args:
-        white: Albedo of snow.
-        x0, x1: The cell's pixels.
-        down: Fraction of the row towards the lower lattice points, [0, 1).
-        step: Width of a pixel in units of its cell.
+        covered: Whether ``coats`` count, as of GroundRecord; ``white`` is the albedo of snow.
+        stride, x0, y0: Size of the cell and its first pixel.
+        step_x, step_y: Size of a pixel in units of its cell.
 
     Returns:
-        Bits of the pixels of the stretch, from x0 on; 256 times those that cannot be interpolated,
+        Bits of the stretch's pixels in the cell, and 2^16 times those that cannot be interpolated,
         because the surface turns too sharply or no lattice point lies on it.
     """
     ...
-
-
-@wp.func
-def shade_stretch(
-    view: View,
-    world: World,
-    images: GBufferRecord,
-    lattice: Lattice,
-    lights: wp.array[LatticeLight],
-    coats: wp.array[wp.vec4],
-    stretch: Stretch,
-    x0: int,
-    y0: int,
-    y: int,
-    count: wp.array[int],
-    pixels: wp.array[int],
-    radiance: wp.array[wp.vec3],
-):
-    """Shade a stretch from its row y on; bits of its pixels, those of each row above the last's."""
-    x1 = wp.min(x0 + lattice.stride, view.width)
-    y1 = wp.min(y0 + lattice.stride, view.height)
-    covered = world.ground.covered != 0
-    step = step_at(lattice, x0, view.width)
-    weather = Weather()
-    bits = int(0)
-    while y < y1:
-        down = float(y - y0) * step_at(lattice, y0, view.height)
-        if covered:
-            weather = weather_at(stretch, coats, x1 - x0, down, step)
-        row = shade_row(
-            view,
-            images,
-            world.textures,
-            lights,
-            stretch,
-            covered,
-            weather,
-            wp.vec3(SNOW_RED, SNOW_GREEN, SNOW_BLUE),
-            x0,
-            x1,
-            y,
-            down,
-            step,
-            radiance,
-        )
-        bits |= (row & 255) << (8 * (y - y0))
-        row = row >> 8
-        x = int(x0)
-        while row != 0:
-            if (row & 1) != 0:
-                pixels[wp.atomic_add(count, 0, 1)] = y * view.width + x
-            row = row >> 1
-            x += 1
-        y += 1
-    return bits
 
 
 @wp.kernel
@@ -479,41 +394,58 @@ def gather_light(
     row, segment = wp.tid()
     y0 = row * lattice.stride
     y1 = wp.min(y0 + lattice.stride, view.height)
+    step_y = step_at(lattice, y0, view.height)
+    covered = world.ground.covered != 0
+    white = wp.vec3(SNOW_RED, SNOW_GREEN, SNOW_BLUE)
+    patch = Patch()
+    patch.face = wp.vec2i(-1, -1)
     for column in range(segment * run, wp.min((segment + 1) * run, lattice.width - 1)):
         x0 = column * lattice.stride
         x1 = wp.min(x0 + lattice.stride, view.width)
+        step_x = step_at(lattice, x0, view.width)
         done = int(0)
+        missed = int(0)
         for y in range(y0, y1):
             x = int(x0)
             while x < x1:
                 i = y * view.width + x
-                if ((done >> (8 * (y - y0) + x - x0)) & 1) == 0:
+                bit = 1 << (CELL_ROW * (y - y0) + x - x0)
+                if (done & bit) == 0:
                     hit = images.hits[i]
-                    if hit[0] < 0:
+                    if hit[0] >= 0:
+                        surface = surface_index(world, hit)
+                        missed |= bit
+                        if is_gatherable(world, surface):
+                            first = row * lattice.width + column
+                            stretch = stretch_at(
+                                view, world, images, lattice, lights, surface, patch, first, x, y
+                            )
+                            patch = stretch.patch
+                            bits = shade_stretch(
+                                view,
+                                images,
+                                world.textures,
+                                lights,
+                                coats,
+                                covered,
+                                white,
+                                stretch,
+                                lattice.stride,
+                                x0,
+                                y0,
+                                step_x,
+                                step_y,
+                                radiance,
+                            )
+                            done |= bits & 65535
+                            missed = (missed & ~bit) | (bits >> 16)
+                    else:
                         c = wp.vec3(0.0)
                         if world.sky.visible != 0:
                             d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
                             c = sky_image(world.sky, view.R_world_camera @ d)
                         radiance[i] = c
-                    elif is_gatherable(world, surface_index(world, hit)):
-                        first = row * lattice.width + column
-                        stretch = stretch_at(view, world, images, lattice, lights, first, x, y)
-                        done |= shade_stretch(
-                            view,
-                            world,
-                            images,
-                            lattice,
-                            lights,
-                            coats,
-                            stretch,
-                            x0,
-                            y0,
-                            y,
-                            count,
-                            pixels,
-                            radiance,
-                        )
-                    else:
-                        # An atomic counter appends the pixel to the list.
-                        pixels[wp.atomic_add(count, 0, 1)] = i
+                if (missed & bit) != 0:
+                    # An atomic counter appends the pixel to the list.
+                    pixels[wp.atomic_add(count, 0, 1)] = i
                 x += 1
