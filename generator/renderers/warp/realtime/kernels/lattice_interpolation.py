@@ -113,17 +113,11 @@ def stretch_at(
     lattice: Lattice,
     lights: wp.array[LatticeLight],
     surface: int,
-    patch: Patch,
     first: int,
     x: int,
     y: int,
 ):
-    """The stretch of a pixel in the cell to the right of and below a lattice point.
-
-    Args:
-        surface: The pixel's.
-        patch: Any; kept if it is the face's.
-    """
+    """The stretch of a pixel with a surface in the cell to the right of and below a lattice point."""
     i = y * view.width + x
     stretch = Stretch()
     stretch.face = images.hits[i]
@@ -150,10 +144,8 @@ def stretch_at(
     stretch.albedo = world.surfaces[surface].base_color
     stretch.roughness = world.surfaces[surface].roughness
     stretch.texture = world.surfaces[surface].texture
-    stretch.patch = patch
     if stretch.texture >= 0 and found > 0.0:
-        if patch.face[0] != stretch.face[0] or patch.face[1] != stretch.face[1]:
-            stretch.patch = patch_at(world, surface, stretch.face)
+        stretch.patch = patch_at(world, surface, stretch.face)
         n = images.normals[i]
         v = fast_normalize(view.eye_m - p)
         # Footprints are ellipses: use the level of the geometric mean of both axes.
@@ -397,8 +389,6 @@ def gather_light(
     step_y = step_at(lattice, y0, view.height)
     covered = world.ground.covered != 0
     white = wp.vec3(SNOW_RED, SNOW_GREEN, SNOW_BLUE)
-    patch = Patch()
-    patch.face = wp.vec2i(-1, -1)
     for column in range(segment * run, wp.min((segment + 1) * run, lattice.width - 1)):
         x0 = column * lattice.stride
         x1 = wp.min(x0 + lattice.stride, view.width)
@@ -418,9 +408,8 @@ def gather_light(
                         if is_gatherable(world, surface):
                             first = row * lattice.width + column
                             stretch = stretch_at(
-                                view, world, images, lattice, lights, surface, patch, first, x, y
+                                view, world, images, lattice, lights, surface, first, x, y
                             )
-                            patch = stretch.patch
                             bits = shade_stretch(
                                 view,
                                 images,

@@ -291,13 +291,11 @@ class Patch:
     other two coordinates, as alpha_test.project_uv; UVs are the projection along the third.
 
     Attributes:
-        face: (body, face).
         triplanar: 1 if all three projections count, weighted by the normal.
         axes: Unit directions in which the coordinates grow, in columns; world.
         texels_per_m: Square root of texels per area, at the finest mip level.
     """
 
-    face: wp.vec2i
     triplanar: int
     start: wp.vec3
     gradients: wp.mat33
@@ -371,5 +369,4 @@ def patch_at(world: World, surface: int, hit: wp.vec2i):
         patch = triplanar_patch(world, surface, hit[0])
     else:
         patch = uv_patch(world, world.surfaces[surface].texture, hit)
-    patch.face = hit
     return patch
