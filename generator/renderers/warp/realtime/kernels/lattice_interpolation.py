@@ -79,9 +79,9 @@ class Stretch:
     Attributes:
         first: The cell's upper left lattice point.
         columns: Lattice points per row.
-        agrees: 1 for each of the cell's corners whose light is blended, 0 for others.
-        turns: 1 for each corner from which the surface turns too sharply.
-        texture: -1 for none; ``patch`` and ``sampler`` are then unused.
+        agrees: Bits of the cell's corners whose light is blended.
+        turns: Bits of the corners from which the surface turns too sharply.
+        texture: -1 for none.
         bumpy: 1 if the texture tilts normals and there is light that depends on them.
         towards: Unit direction towards the lamps.
         half: Half vector between it and the viewer.
@@ -91,13 +91,11 @@ class Stretch:
     face: wp.vec2i
     first: int
     columns: int
-    agrees: wp.vec4
-    turns: wp.vec4
+    agrees: int
+    turns: int
     albedo: wp.vec3
     roughness: float
     texture: int
-    patch: Patch
-    sampler: Sampler
     bumpy: int
     towards: wp.vec3
     half: wp.vec3
@@ -117,9 +115,14 @@ def stretch_at(
     x: int,
     y: int,
 ):
-    """The stretch of a pixel with a surface in the cell to the right of and below a lattice point."""
+    """The stretch of a pixel with a surface in the cell to the right of and below a lattice point.
+
+    Its texture's patch and sampler come second and third, undefined without a texture.
+    """
     i = y * view.width + x
     stretch = Stretch()
+    patch = Patch()
+    sampler = Sampler()
     stretch.face = images.hits[i]
     stretch.first = first
     stretch.columns = lattice.width
@@ -134,32 +137,32 @@ def stretch_at(
         q = first + (k & 1) + wp.where(k >= 2, lattice.width, 0)
         cosine = agreement(images, lattice, surface, i, p, tolerance_m, q)
         if cosine > SMOOTH_COSINE:
-            stretch.agrees[k] = 1.0
+            stretch.agrees |= 1 << k
             towards += lights[q].towards
             lamps += lights[q].lamps
             shine += lights[q].shine
             found += 1.0
         elif cosine > 0.0:
-            stretch.turns[k] = 1.0
+            stretch.turns |= 1 << k
     stretch.albedo = world.surfaces[surface].base_color
     stretch.roughness = world.surfaces[surface].roughness
     stretch.texture = world.surfaces[surface].texture
     if stretch.texture >= 0 and found > 0.0:
-        stretch.patch = patch_at(world, surface, stretch.face)
+        patch = patch_at(world, surface, stretch.face)
         n = images.normals[i]
         v = fast_normalize(view.eye_m - p)
         # Footprints are ellipses: use the level of the geometric mean of both axes.
         slant = wp.max(wp.dot(n, v), 0.05)
         width_m = pixel_width(view, i, images.z_m[i])
-        texels = width_m * stretch.patch.texels_per_m / wp.sqrt(slant)
-        stretch.sampler = make_sampler(world, stretch.texture, wp.log2(texels))
+        texels = width_m * patch.texels_per_m / wp.sqrt(slant)
+        sampler = make_sampler(world, stretch.texture, wp.log2(texels))
         if world.textures[stretch.texture].has_bumps != 0 and wp.dot(towards, towards) > 0.0:
             stretch.bumpy = 1
             stretch.towards = fast_normalize(towards)
             stretch.half = fast_normalize(stretch.towards + v)
             stretch.lamps = lamps / found
             stretch.shine = shine / found
-    return stretch
+    return stretch, patch, sampler
 
 
 # Bits of a cell's pixels: column in the lower two of their numbers, row in the upper two.
@@ -181,7 +184,6 @@ _SHADE_STRETCH = (
         stretch.first, stretch.first + 1,
         stretch.first + stretch.columns, stretch.first + stretch.columns + 1};
     const bool textured = stretch.texture >= 0, bumpy = stretch.bumpy != 0;
-    const auto& patch = stretch.patch;
     int missed = 0;
     for (int rest = mine; rest;) {
         // Lanes to spare repeat the last pixel.
@@ -200,9 +202,9 @@ _SHADE_STRETCH = (
         Floats weights[4], total = 0.0f, turned = 0.0f;
         for (int k = 0; k < 4; ++k) {
             const Floats w = (k & 1 ? right : 1.0f - right) * (k & 2 ? lower : 1.0f - lower);
-            weights[k] = w * stretch.agrees[k];
+            weights[k] = stretch.agrees >> k & 1 ? w : zero;
             total += weights[k];
-            turned += w * stretch.turns[k];
+            turned += stretch.turns >> k & 1 ? w : zero;
         }
         const Floats inverse_total = 1.0f / larger(total, 1.0e-6f);
         for (int k = 0; k < 4; ++k)
@@ -263,7 +265,7 @@ _SHADE_STRETCH = (
                     continue;
                 const int along_u = axis == 0 ? 1 : 0, along_v = axis == 2 ? 1 : 2;
                 Sample s = sample(
-                    textures.data[stretch.texture], stretch.sampler, coordinates[along_u],
+                    textures.data[stretch.texture], sampler, coordinates[along_u],
                     coordinates[along_v], bumpy);
                 for (int c = 0; c < 3; ++c)
                     albedo[c] += s.albedo[c] * share;
@@ -341,6 +343,8 @@ def shade_stretch(
     covered: bool,
     white: wp.vec3,
     stretch: Stretch,
+    patch: Patch,
+    sampler: Sampler,
     stride: int,
     x0: int,
     y0: int,
@@ -407,7 +411,7 @@ def gather_light(
                         missed |= bit
                         if is_gatherable(world, surface):
                             first = row * lattice.width + column
-                            stretch = stretch_at(
+                            stretch, patch, sampler = stretch_at(
                                 view, world, images, lattice, lights, surface, first, x, y
                             )
                             bits = shade_stretch(
@@ -419,6 +423,8 @@ def gather_light(
                                 covered,
                                 white,
                                 stretch,
+                                patch,
+                                sampler,
                                 lattice.stride,
                                 x0,
                                 y0,
