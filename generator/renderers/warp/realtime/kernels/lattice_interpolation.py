@@ -223,11 +223,13 @@ _SHADE_STRETCH = (
         for (int c = 0; c < 3; ++c)
             color[c] = stretch.albedo[c];
         if (textured) {
-            Floats z, d[3], n[3];
-            for (int k = 0; k < QUAD; ++k) {
+            Floats z, d[3], n[3] = {zero, zero, zero};
+            for (int k = 0; k < QUAD; ++k)
                 put(z, k, images.z_m.data[at[k]]);
-                for (int c = 0; c < 3; ++c)
-                    put(n[c], k, images.normals.data[at[k]][c]);
+            if (bumpy || patch.triplanar) {
+                for (int k = 0; k < QUAD; ++k)
+                    for (int c = 0; c < 3; ++c)
+                        put(n[c], k, images.normals.data[at[k]][c]);
             }
             if (view.lens == 0) {
                 d[0] = (across + ((float)x0 + 0.5f - view.cx)) * view.inverse_fx;

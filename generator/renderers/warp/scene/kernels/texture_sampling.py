@@ -183,9 +183,7 @@ SAMPLE_QUAD = """
     auto floats = [](Ints v) { return __builtin_convertvector(v, Floats); };
     auto ints = [](Floats v) { return __builtin_convertvector(v, Ints); };
     auto root = [](Floats v) { return __builtin_elementwise_sqrt(v); };
-    auto any = [](Ints mask) {
-        return ((mask[0] | mask[1]) | (mask[2] | mask[3])) != 0;
-    };
+    auto any = [](Ints mask) { return __builtin_reduce_or(mask) != 0; };
     auto get = [](auto v, int k) { return v[k]; };
     auto put = [](auto& v, int k, auto value) { v[k] = value; };
     auto lowest_bit = [](int bits) { return __builtin_ctz(bits); };
