@@ -52,7 +52,13 @@ SMOOTH_COSINE = wp.constant(0.99)
 
 @wp.func
 def agreement(
-    images: GBufferRecord, lattice: Lattice, surface: int, i: int, p: wp.vec3, tolerance_m: float, q: int
+    images: GBufferRecord,
+    lattice: Lattice,
+    surface: int,
+    i: int,
+    p: wp.vec3,
+    tolerance_m: float,
+    q: int,
 ):
     """Cosine between the normals of pixel i and lattice point q; 0 on different surfaces.
 
@@ -305,7 +311,7 @@ _SHADE_STRETCH = (
                 // The ratio of two GGX densities is the square of this; alpha^2 cancels.
                 const Floats lobe =
                     (1.0f - n_h * n_h * narrow) / larger(1.0f - m_h * m_h * narrow, 1.0e-4f);
-                // Bounded: several lamps have no single direction, and isolated bumps would sparkle.
+                // Bounded: several lamps have no one direction, and isolated bumps would sparkle.
                 diffuse = 1.0f + (smaller(after / before, 3.0f) - 1.0f) * stretch.lamps;
                 shine = 1.0f + (smaller(lobe * lobe, 8.0f) - 1.0f) * stretch.shine;
             }

@@ -265,8 +265,8 @@ SAMPLE_QUAD = """
             const int width = sampler.width > 1 ? sampler.width >> 1 : 1;
             const int height = sampler.height > 1 ? sampler.height >> 1 : 1;
             Floats coarser[4];
-            mix_quad(
-                texture.texels.data, find_taps(sampler.coarser_first, width, height, u, v), coarser);
+            const QuadTaps upper = find_taps(sampler.coarser_first, width, height, u, v);
+            mix_quad(texture.texels.data, upper, coarser);
             for (int k = 0; k < 4; ++k)
                 c[k] = c[k] * (1.0f - sampler.part) + coarser[k] * sampler.part;
         }
