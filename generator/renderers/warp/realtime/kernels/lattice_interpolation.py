@@ -268,8 +268,8 @@ _SHADE_STRETCH = (
             Floats albedo[3] = {zero, zero, zero}, rough = 0.0f, m[3] = {zero, zero, zero};
             for (int axis = patch.triplanar ? 0 : 2; axis < 3; ++axis) {
                 // A weight below one step of 8 bits is not worth a texture lookup.
-                const Floats share = shares[axis];
-                if (!any(share > 0.004f))
+                const Floats share = shares[axis] > 0.004f ? shares[axis] : zero;
+                if (!any(share > zero))
                     continue;
                 const int along_u = axis == 0 ? 1 : 0, along_v = axis == 2 ? 1 : 2;
                 Sample s = sample(

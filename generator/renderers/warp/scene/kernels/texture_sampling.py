@@ -164,7 +164,6 @@ SAMPLE_QUAD = """
     typedef float Floats;
     typedef int Ints;
     typedef unsigned Words;
-    const Ints LANE = 0;
     auto floats = [](Ints v) { return (float)v; };
     auto ints = [](Floats v) { return (int)v; };
     auto root = [](Floats v) { return sqrtf(v); };
@@ -179,7 +178,6 @@ SAMPLE_QUAD = """
     typedef int Ints __attribute__((ext_vector_type(4)));
     typedef unsigned Words __attribute__((ext_vector_type(4)));
     typedef unsigned short Halves __attribute__((ext_vector_type(8)));
-    const Ints LANE = {0, 1, 2, 3};
     auto floats = [](Ints v) { return __builtin_convertvector(v, Floats); };
     auto ints = [](Floats v) { return __builtin_convertvector(v, Ints); };
     auto root = [](Floats v) { return __builtin_elementwise_sqrt(v); };
