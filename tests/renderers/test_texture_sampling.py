@@ -51,7 +51,9 @@ def sample_quad(
 
 
 @wp.kernel
-def sample_each(world: World, level: float, at: wp.array[wp.vec2], values: wp.array[Values]):
+def sample_each(
+    world: World, level: float, at: wp.array[wp.vec2], values: wp.array[Values]
+) -> None:
     """Sample a texture at one point per thread."""
     i = wp.tid()
     texel = texel_at(world, 0, make_sampler(world, 0, level), at[i][0], at[i][1], True)
@@ -62,7 +64,9 @@ def sample_each(world: World, level: float, at: wp.array[wp.vec2], values: wp.ar
 
 
 @wp.kernel
-def sample_four(world: World, level: float, at: wp.array[wp.vec2], values: wp.array[Values]):
+def sample_four(
+    world: World, level: float, at: wp.array[wp.vec2], values: wp.array[Values]
+) -> None:
     """Sample a texture at four points per thread."""
     i = wp.tid()
     sample_quad(world.textures, make_sampler(world, 0, level), at, 4 * i, values)
