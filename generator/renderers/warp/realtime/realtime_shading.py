@@ -323,7 +323,8 @@ def sunflower(n: int) -> Array:
 
 def _dealt_sunflower(n: int, samples: int) -> Array:
     """``sunflower`` points dealt out to the samples of a pixel, [samples, n / samples, 2]."""
-    return sunflower(n).reshape(-1, samples, 2).swapaxes(0, 1)
+    dealt: Array = sunflower(n).reshape(-1, samples, 2).swapaxes(0, 1)
+    return dealt
 
 
 def lamp_samples(n: int, shadows: str) -> Array:
