@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -318,6 +319,27 @@ def test_mesh_uvs_put_v_0_at_the_bottom_of_the_image() -> None:
     clear &= (np.abs(p[..., :2]) < 0.9).all(axis=-1)
     expected = np.where(p[..., 0] < 0, 0, np.where(p[..., 1] > 0, 1, 2))
     assert (strongest == expected)[clear].all()
+
+
+def test_uvs_along_a_line_show_the_texture_along_that_line() -> None:
+    """A plane whose u is 3/4 everywhere, without an area in UV space, shows green above blue."""
+    material = Material((1.0, 1.0, 1.0), 1.0, specular=0.0, texture="t")
+    mesh = plane_mesh(2.0, (material,))
+    line = replace(
+        mesh, uvs=np.stack([np.full(4, 0.75), mesh.uvs[:, 1]], axis=-1, dtype=np.float32)
+    )
+    library = FakeLibrary({"plane": line}, {"t": halves()})
+    scene = Scene("t", (Body("p", "plane"),), environment=Environment(luminance_cd_m2=200.0))
+    camera = camera_at((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (64, 64), hfov_deg=28.0)
+    reading = WarpRenderer(library, "cpu", OPEN).render(
+        scene, camera, frozenset({Channel.RADIANCE, Channel.Z_DEPTH})
+    )
+
+    p = camera.T_world_camera.apply(camera.intrinsics.unproject(reading.channels[Channel.Z_DEPTH]))
+    strongest = reading.channels[Channel.RADIANCE].argmax(axis=-1)
+    clear = np.isfinite(p).all(axis=-1) & (np.abs(p[..., 1]) > 0.1)
+    clear &= (np.abs(p[..., :2]) < 0.9).all(axis=-1)
+    assert (strongest == np.where(p[..., 1] > 0, 1, 2))[clear].all()
 
 
 def pointing_sky(direction: Vec3) -> Float32:

@@ -188,7 +188,7 @@ def _shade(frame: CameraView, lattice: Lattice) -> wp.array:
     probe.parts = cache.constant(wp.vec2, lamp_samples, 4, settings.shadows)
     probe.disc = cache.constant(wp.vec2, sunflower, 4)
     probe.centre = cache.constant(wp.vec2, lamp_samples, 1, "hard")
-    probe.pair = cache.constant(wp.vec2, sunflower, 2)
+    probe.few = cache.constant(wp.vec2, _dealt_sunflower, 2, 1)
     probe.radius_m = settings.ambient_occlusion_radius_m
     frame.launch(lattice_lighting.find_pixel_visibility, number, [*seen, probe, listed])
     frame.launch(lattice_lighting.shade_points, number, [*frame.inputs, listed], [radiance])
@@ -224,6 +224,7 @@ def _shade_layers(
     pixels = cache.scratch("contrast pixels", frame.pixels, wp.int32)
     mixed = cache.scratch("contrast colours", frame.pixels, wp.vec3)
     offsets = cache.constant(wp.vec2, pixel_samples, _PARTS)
+    probe.few = cache.constant(wp.vec2, _dealt_sunflower, _PARTS, _PARTS)
     inputs = [*frame.inputs, places, listed, probe, offsets]
     frame.launch(clearcoat_glass.shade_contrasts, found, inputs, [pixels, mixed])
     frame.launch(write_mixed, found, [pixels, mixed], [radiance])
@@ -306,6 +307,12 @@ def sunflower(n: int) -> Array:
     k = np.arange(n)
     radius, angle = np.sqrt((k + 0.5) / n), k * math.pi * (3.0 - math.sqrt(5.0))
     return np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1)
+
+
+def _dealt_sunflower(n: int, samples: int) -> Array:
+    """``sunflower`` points dealt out to the samples of a pixel, [samples, n / samples, 2]."""
+    dealt: Array = sunflower(n).reshape(-1, samples, 2).swapaxes(0, 1)
+    return dealt
 
 
 def lamp_samples(n: int, shadows: str) -> Array:

@@ -37,6 +37,7 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import 
     visible_sky_fraction,
 )
 from gen_data.generator.renderers.warp.scene.kernels.alpha_test import OUT_OF_LINE, uv_at
+from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import beam_from
 from gen_data.generator.renderers.warp.scene.kernels.brdf import (
     fresnel_dielectric,
     make_brdf,
@@ -94,6 +95,8 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 1})
 AMBIENT_SHARE = wp.constant(0.2)
 # Ends of rays that contribute less than this share take fewer samples of each light.
 SAMPLED_SHARE = wp.constant(0.6)
+# Lamps with a smaller share of the light at a ray's end cast no visible shadows there.
+FAINT_SHARE = wp.constant(1.0 / 256.0)
 # Surfaces clearer than this show little but highlights: their shadows are not traced.
 MOSTLY_CLEAR = wp.constant(0.9)
 # Neighbours on a layered surface with more contrast than this are supersampled.
@@ -267,6 +270,7 @@ def light_at_hit(
     d: wp.vec3,
     share: float,
     clear: float,
+    sample: int,
     k: int,
 ):
     """Light of the surface at the end of a ray, towards the ray's origin [cd/m^2].
@@ -274,19 +278,24 @@ def light_at_hit(
     Args:
         share: Largest weight of that light in the pixel.
         clear: Share of clear glass, whose highlights need no shadows.
+        sample: Number of the pixel's sample.
     """
     origin = ray_origin(world, m.hit, m.weight, p, d)
     parts = probe.parts
     disc = probe.disc
-    if share < SAMPLED_SHARE:
+    if share < SAMPLED_SHARE * float(probe.few.shape[0]):
         parts = probe.centre
-        disc = probe.pair
+        disc = probe.few[sample]
     surface = surface_index(world, m.hit)
     side = sheet_normal(world, surface, m.hit, m.weight)
+    faint_lux = FAINT_SHARE * wp.pi * wp.max(sky_irradiance(world.sky, m.normal))
+    for j in range(world.lamps.shape[0]):
+        faint_lux += FAINT_SHARE * wp.max(beam_from(world.lamps[j], p).normal_lux)
     for j in range(world.lamps.shape[0]):
         # Scratch memory holds values of earlier rays: set every lamp.
         probe.lit[j, k] = 1.0
-        if clear < MOSTLY_CLEAR:
+        bright = wp.max(beam_from(world.lamps[j], p).normal_lux) > faint_lux
+        if clear < MOSTLY_CLEAR and bright:
             probe.lit[j, k] = visible_lamp_fraction(
                 world, world.lamps[j], p, origin, m.normal, side, parts
             )
@@ -378,7 +387,7 @@ def continue_ray(
 
 
 @wp.func
-def radiance_along(view: View, world: World, probe: Probe, ray: Ray, k: int):
+def radiance_along(view: View, world: World, probe: Probe, ray: Ray, sample: int, k: int):
     """Weighted radiance along a ray, including what lies behind clear surfaces."""
     total = wp.vec3(0.0)
     surfaces = int(0)
@@ -408,7 +417,7 @@ def radiance_along(view: View, world: World, probe: Probe, ray: Ray, k: int):
             if clear == 0.0 or m.entering != 0 or world.surfaces[surface].thin != 0:
                 share = wp.max(ray.share)
                 light = light_at_hit(
-                    world, probe, m, material, maps.occlusion, p, ray.d, share, clear, k
+                    world, probe, m, material, maps.occlusion, p, ray.d, share, clear, sample, k
                 )
                 own = wp.cw_mul(light.diffuse, material.albedo) * (1.0 - clear) + light.rest
                 own += wp.cw_mul(world.surfaces[surface].emission_cd_m2, maps.glow - wp.vec3(1.0))
@@ -657,9 +666,14 @@ def layered_radiance(
     y_px: float,
     listed: ListedPixels,
     probe: Probe,
+    sample: int,
     k: int,
 ):
-    """Radiance of the layered surface of the k-th pixel, at a point of the image within it."""
+    """Radiance of the layered surface of the k-th pixel, at a point of the image within it.
+
+    Args:
+        sample: Number of the pixel's sample.
+    """
     i = listed.pixels[k]
     hit = images.hits[i]
     surface = surface_index(world, hit)
@@ -681,7 +695,7 @@ def layered_radiance(
     for part in range(4):
         ray = make_layer_ray(view, world, layers, part, hit, point.weight, n, p, point.way, width_m)
         if wp.max(ray.share) > 0.0:
-            c += radiance_along(view, world, probe, ray, k)
+            c += radiance_along(view, world, probe, ray, sample, k)
     return c
 
 
@@ -701,7 +715,7 @@ def shade_layers(
     if world.surfaces[surface_index(world, images.hits[i])].layered != 0:
         x = float(i % view.width) + 0.5
         y = float(i / view.width) + 0.5
-        radiance[i] = layered_radiance(view, world, images, x, y, listed, probe, k)
+        radiance[i] = layered_radiance(view, world, images, x, y, listed, probe, 0, k)
 
 
 @wp.func
@@ -773,7 +787,7 @@ def shade_contrasts(
     total = wp.vec3(0.0)
     for s in range(offsets.shape[0]):
         total += layered_radiance(
-            view, world, images, x + offsets[s][0], y + offsets[s][1], listed, probe, k
+            view, world, images, x + offsets[s][0], y + offsets[s][1], listed, probe, s, k
         )
     pixels[place] = i
     mixed[place] = total / float(offsets.shape[0])

@@ -1,8 +1,8 @@
 """Interpolation of light from the lattice to all pixels.
 
-A cell lies between four lattice points. Where all four lie on one smooth stretch of surface, the
-cell's pixels share the work: light takes a few multiplications per pixel, and a texture only its
-addresses and texels. Elsewhere each pixel tests each point.
+A cell lies between four lattice points, and its pixels that show one face are a stretch: they share
+the lattice points whose light they blend, and a texture's mapping and mip level. Four of them are
+shaded at once.
 """
 
 from __future__ import annotations
@@ -10,14 +10,13 @@ from __future__ import annotations
 import warp as wp
 
 from gen_data.generator.renderers.warp.atmosphere.kernels.ground_weathering import (
-    albedo_below_coat,
-    bump_visibility,
+    COAT_QUAD,
+    SNOW_BLUE,
+    SNOW_GREEN,
+    SNOW_RED,
 )
 from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
-    Cell,
     Lattice,
-    cell_at,
-    cell_corner,
     points_agree,
     step_at,
 )
@@ -27,9 +26,9 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import 
 )
 from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import surface_tolerance
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_image
-from gen_data.generator.renderers.warp.scene.kernels.material_eval import evaluate_material
 from gen_data.generator.renderers.warp.scene.kernels.records import (
     GBufferRecord,
+    TextureRecord,
     View,
     World,
     fast_normalize,
@@ -38,11 +37,11 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     surface_index,
 )
 from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import (
+    SAMPLE_QUAD,
     Patch,
     Sampler,
     make_sampler,
     patch_at,
-    texel_at,
 )
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
@@ -53,7 +52,13 @@ SMOOTH_COSINE = wp.constant(0.99)
 
 @wp.func
 def agreement(
-    view: View, images: GBufferRecord, lattice: Lattice, surface: int, i: int, p: wp.vec3, q: int
+    images: GBufferRecord,
+    lattice: Lattice,
+    surface: int,
+    i: int,
+    p: wp.vec3,
+    tolerance_m: float,
+    q: int,
 ):
     """Cosine between the normals of pixel i and lattice point q; 0 on different surfaces.
 
@@ -65,7 +70,6 @@ def agreement(
         if hit[0] == images.hits[i][0] and hit[1] == images.hits[i][1]:
             cosine = 1.0
         else:
-            tolerance_m = surface_tolerance(view, p)
             cosine = points_agree(
                 p, images.normals[i], lattice.p_m[q], lattice.normal[q], tolerance_m
             )
@@ -73,302 +77,301 @@ def agreement(
 
 
 @wp.struct
-class Quad:
-    """A cell whose corners lie on one smooth stretch of surface, if ``smooth``.
+class Stretch:
+    """The pixels of a cell that show one face.
+
+    Light that depends on the normal is approximated by one lamp in the mean direction of all.
 
     Attributes:
-        face: (body, face) of the first corner.
-        normal: Mean unit normal of the corners, world frame.
-        to_viewer: Unit direction to the viewer from the middle.
-    """
-
-    smooth: int
-    face: wp.vec2i
-    normal: wp.vec3
-    to_viewer: wp.vec3
-
-
-@wp.func
-def quad_at(view: View, world: World, images: GBufferRecord, lattice: Lattice, q: int):
-    """The cell to the right of and below lattice point q."""
-    quad = Quad()
-    surface = lattice.surface[q]
-    if surface < 0:
-        return quad
-    if not is_gatherable(world, surface):
-        return quad
-    quad.face = images.hits[lattice.pixel[q]]
-    p = lattice.p_m[q]
-    n = lattice.normal[q]
-    tolerance_m = surface_tolerance(view, p)
-    middle = p
-    mean = n
-    smooth = bool(True)
-    for k in range(1, 4):
-        r = q + (k & 1) + wp.where(k >= 2, lattice.width, 0)
-        if smooth:
-            smooth = False
-            if lattice.surface[r] == surface:
-                other = images.hits[lattice.pixel[r]]
-                # One face is flat, whatever its vertex normals.
-                smooth = other[0] == quad.face[0] and other[1] == quad.face[1]
-                if not smooth:
-                    cosine = points_agree(p, n, lattice.p_m[r], lattice.normal[r], tolerance_m)
-                    smooth = cosine > SMOOTH_COSINE
-                middle += lattice.p_m[r]
-                mean += lattice.normal[r]
-    if smooth:
-        quad.smooth = 1
-        middle = middle * 0.25
-        quad.normal = fast_normalize(mean)
-        quad.to_viewer = fast_normalize(view.eye_m - middle)
-    return quad
-
-
-@wp.struct
-class Tilt:
-    """Dependence of a cell's light on the normal: see bump_factors.
-
-    Attributes:
-        towards: Unit direction towards the lamps; 0 for none.
+        first: The cell's upper left lattice point.
+        columns: Lattice points per row.
+        agrees: Bits of the cell's corners whose light is blended.
+        turns: Bits of the corners from which the surface turns too sharply.
+        texture: -1 for none.
+        bumpy: 1 if the texture tilts normals and there is light that depends on them.
+        towards: Unit direction towards the lamps.
         half: Half vector between it and the viewer.
-        before: Cosine between ``towards`` and the surface's normal.
-        n_h: Cosine between ``half`` and the surface's normal.
         lamps, shine: As in LatticeLight.
     """
 
+    face: wp.vec2i
+    first: int
+    columns: int
+    agrees: int
+    turns: int
+    albedo: wp.vec3
+    roughness: float
+    texture: int
+    bumpy: int
     towards: wp.vec3
     half: wp.vec3
-    before: float
-    n_h: float
     lamps: float
     shine: float
 
 
 @wp.func
-def make_tilt(towards: wp.vec3, lamps: float, shine: float, n: wp.vec3, v: wp.vec3):
-    """Tilt from the sum of the light's directions, the normal and the viewer."""
-    tilt = Tilt()
-    if wp.dot(towards, towards) > 0.0:
-        tilt.towards = fast_normalize(towards)
-        tilt.half = fast_normalize(tilt.towards + v)
-        # The ratio of cosines diverges at grazing light.
-        tilt.before = wp.max(wp.dot(n, tilt.towards), 0.1)
-        tilt.n_h = wp.dot(n, tilt.half)
-        tilt.lamps = lamps
-        tilt.shine = shine
-    return tilt
-
-
-@wp.func
-def bump_factors(tilt: Tilt, roughness: float, m: wp.vec3):
-    """Factors on diffuse light and on the rest where a texture tilts the normal to m.
-
-    All lamps are approximated by one in their mean direction.
-    """
-    after = wp.max(wp.dot(m, tilt.towards), 0.0)
-    alpha = roughness * roughness
-    narrow = 1.0 - alpha * alpha
-    m_h = wp.dot(m, tilt.half)
-    # The ratio of two GGX densities is the square of this; alpha^2 cancels.
-    lobe = (1.0 - tilt.n_h * tilt.n_h * narrow) / wp.max(1.0 - m_h * m_h * narrow, 1.0e-4)
-    # Bounded: several lamps have no single direction, and isolated bumps would sparkle.
-    diffuse = 1.0 + tilt.lamps * (wp.min(after / tilt.before, 3.0) - 1.0)
-    return wp.vec2(diffuse, 1.0 + tilt.shine * (wp.min(lobe * lobe, 8.0) - 1.0))
-
-
-@wp.func
-def quad_tilt(lattice: Lattice, lights: wp.array[LatticeLight], q: int, quad: Quad):
-    """The tilt of a whole cell, from the mean of its corners."""
-    a = lights[q]
-    b = lights[q + 1]
-    c = lights[q + lattice.width]
-    d = lights[q + lattice.width + 1]
-    towards = a.towards + b.towards + c.towards + d.towards
-    lamps = 0.25 * (a.lamps + b.lamps + c.lamps + d.lamps)
-    shine = 0.25 * (a.shine + b.shine + c.shine + d.shine)
-    return make_tilt(towards, lamps, shine, quad.normal, quad.to_viewer)
-
-
-@wp.func
-def gathered_radiance(
+def stretch_at(
     view: View,
     world: World,
     images: GBufferRecord,
     lattice: Lattice,
     lights: wp.array[LatticeLight],
-    coats: wp.array[wp.vec4],
-    cell: Cell,
-    i: int,
-    d: wp.vec3,
+    surface: int,
+    first: int,
+    x: int,
+    y: int,
 ):
-    """Radiance of a pixel interpolated from lattice points; negative if that is impossible.
+    """The stretch of a pixel with a surface in the cell to the right of and below a lattice point.
 
-    That is where the surface turns too sharply, or where no point lies on the pixel's surface;
-    points on other surfaces are left out.
+    Its texture's patch and sampler come second and third, undefined without a texture.
     """
-    hit = images.hits[i]
-    surface = surface_index(world, hit)
-    p = view.eye_m + d * images.z_m[i]
-    texture = world.surfaces[surface].texture
-    bumpy = texture >= 0
-    if bumpy:
-        bumpy = world.textures[texture].has_bumps != 0
-    covered = world.ground.covered != 0
-    coat = wp.vec4(0.0)
-    light = LatticeLight()
-    total = float(0.0)
-    turns = bool(False)
-    if is_gatherable(world, surface):
-        for k in range(4):
-            q, w = cell_corner(lattice, cell, k)
-            if w > 0.0:
-                cosine = agreement(view, images, lattice, surface, i, p, q)
-                if cosine > 0.0 and cosine <= SMOOTH_COSINE:
-                    turns = True
-                if cosine > SMOOTH_COSINE:
-                    total += w
-                    light.diffuse += lights[q].diffuse * w
-                    light.rest += lights[q].rest * w
-                    if covered:
-                        coat += coats[q] * w
-                    if bumpy:
-                        light.towards += lights[q].towards * w
-                        light.lamps += lights[q].lamps * w
-                        light.shine += lights[q].shine * w
-    if turns or total == 0.0:
-        return wp.vec3(-1.0)
-    share = 1.0 / total
-    albedo = world.surfaces[surface].base_color
-    if texture >= 0:
-        v = fast_normalize(-d)
-        n = images.normals[i]
-        width_m = pixel_width(view, i, images.z_m[i])
-        material = evaluate_material(world, surface, hit, images.weights[i], n, width_m, v)
-        albedo = material.albedo
-        if bumpy:
-            if covered:
-                material.normal = fast_normalize(
-                    n + (material.normal - n) * bump_visibility(coat * share)
-                )
-            tilt = make_tilt(light.towards, light.lamps * share, light.shine * share, n, v)
-            factors = bump_factors(tilt, material.roughness, material.normal)
-            light.diffuse *= factors[0]
-            light.rest *= factors[1]
-    if covered:
-        albedo = albedo_below_coat(coat * share, albedo)
-    return (wp.cw_mul(light.diffuse, albedo) + light.rest) * share
-
-
-@wp.func
-def is_one_face(
-    view: View, images: GBufferRecord, face: wp.vec2i, x0: int, x1: int, y0: int, y1: int
-):
-    """Whether all pixels of a rectangle show one face."""
-    same = bool(True)
-    y = int(y0)
-    while y < y1 and same:
-        i = int(y * view.width + x0)
-        while i < y * view.width + x1 and same:
-            hit = images.hits[i]
-            same = hit[0] == face[0] and hit[1] == face[1]
-            i += 1
-        y += 1
-    return same
-
-
-@wp.func
-def quad_sampler(world: World, texture: int, quad: Quad, patch: Patch, footprint_m: float):
-    """The texture sampler of a cell whose pixels have the given footprint."""
-    # Footprints are ellipses: use the level of the geometric mean of both axes.
-    slant = wp.max(wp.dot(quad.normal, quad.to_viewer), 0.05)
-    return make_sampler(world, texture, wp.log2(footprint_m * patch.texels_per_m / wp.sqrt(slant)))
-
-
-@wp.func
-def bump_normal(patch: Patch, bump: wp.vec3, covered: bool, coat: wp.vec4):
-    """Normal of a patch with the texture's bumps, attenuated by water and snow on them."""
-    b = bump
-    if covered:
-        bumps = bump_visibility(coat)
-        b = b * bumps + wp.vec3(0.0, 0.0, 1.0 - bumps)
-    m = patch.tangent * b[0] + patch.bitangent * b[1]
-    # The floor keeps the normal on the outer side, as in material_eval.tilt_normal.
-    return fast_normalize(m + patch.normal * wp.max(b[2], 0.1))
-
-
-@wp.func
-def light_patch(
-    view: View,
-    world: World,
-    images: GBufferRecord,
-    lattice: Lattice,
-    lights: wp.array[LatticeLight],
-    coats: wp.array[wp.vec4],
-    quad: Quad,
-    patch: Patch,
-    column: int,
-    row: int,
-    radiance: wp.array[wp.vec3],
-):
-    """Shade a smooth cell all of whose pixels show one face."""
-    q = row * lattice.width + column
-    x0 = column * lattice.stride
-    y0 = row * lattice.stride
-    x1 = wp.min(x0 + lattice.stride, view.width)
-    y1 = wp.min(y0 + lattice.stride, view.height)
-    right_step = step_at(lattice, x0, view.width)
-    surface = lattice.surface[q]
-    texture = world.surfaces[surface].texture
-    albedo = world.surfaces[surface].base_color
-    roughness = world.surfaces[surface].roughness
+    i = y * view.width + x
+    stretch = Stretch()
+    patch = Patch()
     sampler = Sampler()
-    tilt = Tilt()
-    if texture >= 0:
-        width_m = pixel_width(view, lattice.pixel[q], images.z_m[lattice.pixel[q]])
-        sampler = quad_sampler(world, texture, quad, patch, width_m)
-        if world.textures[texture].has_bumps != 0:
-            tilt = quad_tilt(lattice, lights, q, quad)
-    bumpy = tilt.before > 0.0
-    covered = world.ground.covered != 0
-    coat, coat_step = wp.vec4(0.0), wp.vec4(0.0)
-    below = q + lattice.width
-    for y in range(y0, y1):
-        down = float(y - y0) * step_at(lattice, y0, view.height)
-        up = 1.0 - down
-        # Bilinear interpolation by steps: the row's ends once, then one addition per pixel.
-        diffuse = lights[q].diffuse * up + lights[below].diffuse * down
-        rest = lights[q].rest * up + lights[below].rest * down
-        diffuse_step = lights[q + 1].diffuse * up + lights[below + 1].diffuse * down
-        rest_step = lights[q + 1].rest * up + lights[below + 1].rest * down
-        diffuse_step = (diffuse_step - diffuse) * right_step
-        rest_step = (rest_step - rest) * right_step
-        if covered:
-            coat = coats[q] * up + coats[below] * down
-            coat_step = (coats[q + 1] * up + coats[below + 1] * down - coat) * right_step
-        x = int(x0)  # While: Warp's range loops cost more than this body.
-        while x < x1:
-            color = albedo
-            lit, shine = diffuse, rest
-            if texture >= 0:
-                p = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
-                p = p * images.z_m[y * view.width + x]
-                u = patch.u + wp.dot(patch.to_u, p)
-                v = patch.v + wp.dot(patch.to_v, p)
-                texel = texel_at(world, texture, sampler, u, v, bumpy)
-                color = wp.cw_mul(albedo, texel.albedo)
-                if bumpy:
-                    m = bump_normal(patch, texel.bump, covered, coat)
-                    factors = bump_factors(tilt, roughness * texel.roughness, m)
-                    lit = lit * factors[0]
-                    shine = shine * factors[1]
-            if covered:
-                color = albedo_below_coat(coat, color)
-            coat += coat_step
-            radiance[y * view.width + x] = wp.cw_mul(lit, color) + shine
-            diffuse += diffuse_step
-            rest += rest_step
-            x += 1
+    stretch.face = images.hits[i]
+    stretch.first = first
+    stretch.columns = lattice.width
+    d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+    p = view.eye_m + view.R_world_camera @ (d * images.z_m[i])
+    tolerance_m = surface_tolerance(view, p)
+    towards = wp.vec3(0.0)
+    lamps = float(0.0)
+    shine = float(0.0)
+    found = float(0.0)
+    for k in range(4):
+        q = first + (k & 1) + wp.where(k >= 2, lattice.width, 0)
+        cosine = agreement(images, lattice, surface, i, p, tolerance_m, q)
+        if cosine > SMOOTH_COSINE:
+            stretch.agrees |= 1 << k
+            towards += lights[q].towards
+            lamps += lights[q].lamps
+            shine += lights[q].shine
+            found += 1.0
+        elif cosine > 0.0:
+            stretch.turns |= 1 << k
+    stretch.albedo = world.surfaces[surface].base_color
+    stretch.roughness = world.surfaces[surface].roughness
+    stretch.texture = world.surfaces[surface].texture
+    if stretch.texture >= 0 and found > 0.0:
+        patch = patch_at(world, surface, stretch.face)
+        n = images.normals[i]
+        v = fast_normalize(view.eye_m - p)
+        # Footprints are ellipses: use the level of the geometric mean of both axes.
+        slant = wp.max(wp.dot(n, v), 0.05)
+        width_m = pixel_width(view, i, images.z_m[i])
+        texels = width_m * patch.texels_per_m / wp.sqrt(slant)
+        sampler = make_sampler(world, stretch.texture, wp.log2(texels))
+        if world.textures[stretch.texture].has_bumps != 0 and wp.dot(towards, towards) > 0.0:
+            stretch.bumpy = 1
+            stretch.towards = fast_normalize(towards)
+            stretch.half = fast_normalize(stretch.towards + v)
+            stretch.lamps = lamps / found
+            stretch.shine = shine / found
+    return stretch, patch, sampler
+
+
+# Bits of a cell's pixels: column in the lower two of their numbers, row in the upper two.
+CELL_ROW = wp.constant(4)
+
+_SHADE_STRETCH = (
+    SAMPLE_QUAD
+    + COAT_QUAD
+    + """
+    const int x1 = x0 + stride < view.width ? x0 + stride : view.width;
+    const int y1 = y0 + stride < view.height ? y0 + stride : view.height;
+    int mine = 0;
+    for (int y = y0; y < y1; ++y)
+        for (int x = x0; x < x1; ++x)
+            if (images.hits.data[y * view.width + x] == stretch.face)
+                mine |= 1 << (4 * (y - y0) + x - x0);
+
+    const int corners[4] = {
+        stretch.first, stretch.first + 1,
+        stretch.first + stretch.columns, stretch.first + stretch.columns + 1};
+    const bool textured = stretch.texture >= 0, bumpy = stretch.bumpy != 0;
+    int missed = 0;
+    for (int rest = mine; rest;) {
+        // Lanes to spare repeat the last pixel.
+        int bits[QUAD], at[QUAD];
+        Floats across, down;
+        for (int k = 0; k < QUAD; ++k) {
+            bits[k] = rest ? lowest_bit(rest) : bits[k - 1];
+            rest &= rest - 1;
+            at[k] = (y0 + (bits[k] >> 2)) * view.width + x0 + (bits[k] & 3);
+            put(across, k, (float)(bits[k] & 3));
+            put(down, k, (float)(bits[k] >> 2));
+        }
+
+        // Bilinear weights of the corners.
+        const Floats right = across * step_x, lower = down * step_y;
+        Floats weights[4], total = 0.0f, turned = 0.0f;
+        for (int k = 0; k < 4; ++k) {
+            const Floats w = (k & 1 ? right : 1.0f - right) * (k & 2 ? lower : 1.0f - lower);
+            weights[k] = stretch.agrees >> k & 1 ? w : zero;
+            total += weights[k];
+            turned += stretch.turns >> k & 1 ? w : zero;
+        }
+        const Floats inverse_total = 1.0f / larger(total, 1.0e-6f);
+        for (int k = 0; k < 4; ++k)
+            weights[k] = weights[k] * inverse_total;
+
+        Coat coat;
+        if (covered) {
+            Floats mixable[4] = {zero, zero, zero, zero};
+            for (int k = 0; k < 4; ++k)
+                for (int c = 0; c < 4; ++c)
+                    mixable[c] += weights[k] * coats.data[corners[k]][c];
+            coat = coat_of(mixable);
+        }
+
+        Floats color[3], diffuse = 1.0f, shine = 1.0f;
+        for (int c = 0; c < 3; ++c)
+            color[c] = stretch.albedo[c];
+        if (textured) {
+            Floats z, d[3], n[3] = {zero, zero, zero};
+            for (int k = 0; k < QUAD; ++k)
+                put(z, k, images.z_m.data[at[k]]);
+            if (bumpy || patch.triplanar) {
+                for (int k = 0; k < QUAD; ++k)
+                    for (int c = 0; c < 3; ++c)
+                        put(n[c], k, images.normals.data[at[k]][c]);
+            }
+            if (view.lens == 0) {
+                d[0] = (across + ((float)x0 + 0.5f - view.cx)) * view.inverse_fx;
+                d[1] = (down + ((float)y0 + 0.5f - view.cy)) * view.inverse_fy;
+                d[2] = one;
+            } else {
+                for (int k = 0; k < QUAD; ++k)
+                    for (int c = 0; c < 3; ++c)
+                        put(d[c], k, view.directions.data[at[k]][c]);
+            }
+            Floats coordinates[3], shares[3] = {zero, zero, one};
+            for (int k = 0; k < 3; ++k) {
+                const auto& g = patch.gradients.data[k];
+                coordinates[k] = patch.start[k] + (d[0] * g[0] + d[1] * g[1] + d[2] * g[2]) * z;
+            }
+            if (patch.triplanar) {
+                // Eighth powers: projections blend in a narrow band only.
+                Floats sum = 0.0f;
+                for (int k = 0; k < 3; ++k) {
+                    const auto& m = patch.axes.data;
+                    Floats w = n[0] * m[0][k] + n[1] * m[1][k] + n[2] * m[2][k];
+                    w = w * w;
+                    w = w * w;
+                    shares[k] = w * w;
+                    sum += shares[k];
+                }
+                for (int k = 0; k < 3; ++k)
+                    shares[k] = shares[k] / sum;
+            }
+            Floats albedo[3] = {zero, zero, zero}, rough = 0.0f, m[3] = {zero, zero, zero};
+            for (int axis = patch.triplanar ? 0 : 2; axis < 3; ++axis) {
+                // A weight below one step of 8 bits is not worth a texture lookup.
+                const Floats share = shares[axis] > 0.004f ? shares[axis] : zero;
+                if (!any(share > zero))
+                    continue;
+                const int along_u = axis == 0 ? 1 : 0, along_v = axis == 2 ? 1 : 2;
+                Sample s = sample(
+                    textures.data[stretch.texture], sampler, coordinates[along_u],
+                    coordinates[along_v], bumpy);
+                for (int c = 0; c < 3; ++c)
+                    albedo[c] += s.albedo[c] * share;
+                rough += s.roughness * share;
+                if (!bumpy)
+                    continue;
+                if (covered) {
+                    s.bump[0] = s.bump[0] * coat.bumps;
+                    s.bump[1] = s.bump[1] * coat.bumps;
+                    s.bump[2] = s.bump[2] * coat.bumps + (1.0f - coat.bumps);
+                }
+                // A texture tilts a normal by at most 84 degrees: no side of it may face away.
+                const Floats height = larger(s.bump[2], 0.1f);
+                for (int c = 0; c < 3; ++c) {
+                    const auto& axes = patch.axes.data[c];
+                    m[c] += share * (
+                        s.bump[0] * axes[along_u] + s.bump[1] * axes[along_v] + n[c] * height);
+                }
+            }
+            for (int c = 0; c < 3; ++c)
+                color[c] = color[c] * albedo[c];
+            if (bumpy) {
+                auto dot = [](const Floats* u, const wp::vec3& v) {
+                    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+                };
+                const Floats length = larger(m[0] * m[0] + m[1] * m[1] + m[2] * m[2], 1.0e-30f);
+                const Floats inverse = 1.0f / root(length);
+                const Floats after = larger(dot(m, stretch.towards) * inverse, 0.0f);
+                // The ratio of cosines diverges at grazing light.
+                const Floats before = larger(dot(n, stretch.towards), 0.1f);
+                const Floats m_h = dot(m, stretch.half) * inverse, n_h = dot(n, stretch.half);
+                const Floats roughness = rough * stretch.roughness;
+                const Floats alpha = roughness * roughness;
+                const Floats narrow = 1.0f - alpha * alpha;
+                // The ratio of two GGX densities is the square of this; alpha^2 cancels.
+                const Floats lobe =
+                    (1.0f - n_h * n_h * narrow) / larger(1.0f - m_h * m_h * narrow, 1.0e-4f);
+                // Bounded: several lamps have no one direction, and isolated bumps would sparkle.
+                diffuse = 1.0f + (smaller(after / before, 3.0f) - 1.0f) * stretch.lamps;
+                shine = 1.0f + (smaller(lobe * lobe, 8.0f) - 1.0f) * stretch.shine;
+            }
+        }
+
+        Floats light[3];
+        for (int c = 0; c < 3; ++c) {
+            Floats lit = 0.0f, rest_light = 0.0f;
+            for (int k = 0; k < 4; ++k) {
+                lit += weights[k] * lights.data[corners[k]].diffuse[c];
+                rest_light += weights[k] * lights.data[corners[k]].rest[c];
+            }
+            if (covered)
+                color[c] = color[c] * coat.wet + coat.snow * white[c];
+            light[c] = lit * diffuse * color[c] + rest_light * shine;
+        }
+        for (int k = 0; k < QUAD; ++k) {
+            if (get(total, k) > 0.0f && !(get(turned, k) > 0.0f))
+                radiance.data[at[k]] =
+                    wp::vec3(get(light[0], k), get(light[1], k), get(light[2], k));
+            else
+                missed |= 1 << bits[k];
+        }
+    }
+    return mine | missed << 16;
+"""
+)
+
+
+@wp.func_native(_SHADE_STRETCH)
+def shade_stretch(
+    view: View,
+    images: GBufferRecord,
+    textures: wp.array[TextureRecord],
+    lights: wp.array[LatticeLight],
+    coats: wp.array[wp.vec4],
+    covered: bool,
+    white: wp.vec3,
+    stretch: Stretch,
+    patch: Patch,
+    sampler: Sampler,
+    stride: int,
+    x0: int,
+    y0: int,
+    step_x: float,
+    step_y: float,
+    radiance: wp.array[wp.vec3],
+) -> int:
+    """Shade the pixels of a stretch.
+
+    Args:
+        covered: Whether ``coats`` count, as of GroundRecord; ``white`` is the albedo of snow.
+        stride, x0, y0: Size of the cell and its first pixel.
+        step_x, step_y: Size of a pixel in units of its cell.
+
+    Returns:
+        Bits of the stretch's pixels in the cell, and 2^16 times those that cannot be interpolated,
+        because the surface turns too sharply or no lattice point lies on it.
+    """
+    ...
 
 
 @wp.kernel
@@ -395,42 +398,57 @@ def gather_light(
     row, segment = wp.tid()
     y0 = row * lattice.stride
     y1 = wp.min(y0 + lattice.stride, view.height)
+    step_y = step_at(lattice, y0, view.height)
+    covered = world.ground.covered != 0
+    white = wp.vec3(SNOW_RED, SNOW_GREEN, SNOW_BLUE)
     for column in range(segment * run, wp.min((segment + 1) * run, lattice.width - 1)):
         x0 = column * lattice.stride
         x1 = wp.min(x0 + lattice.stride, view.width)
-        quad = quad_at(view, world, images, lattice, row * lattice.width + column)
-        # Fast path: the whole cell shows one smooth, flat face.
-        whole = quad.smooth != 0
-        if whole:
-            whole = is_one_face(view, images, quad.face, x0, x1, y0, y1)
-        if whole:
-            surface = lattice.surface[row * lattice.width + column]
-            patch = Patch()
-            if world.surfaces[surface].texture >= 0:
-                patch = patch_at(world, surface, quad.face, quad.normal)
-                whole = patch.flat != 0
-            if whole:
-                light_patch(
-                    view, world, images, lattice, lights, coats, quad, patch, column, row, radiance
-                )
-        if not whole:
-            for y in range(y0, y1):
-                x = int(x0)
-                while x < x1:
-                    i = y * view.width + x
-                    d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
-                    d_world = view.R_world_camera @ d
-                    c = wp.vec3(0.0)
-                    if images.hits[i][0] >= 0:
-                        cell = cell_at(view, lattice, x, y)
-                        c = gathered_radiance(
-                            view, world, images, lattice, lights, coats, cell, i, d_world
-                        )
-                    elif world.sky.visible != 0:
-                        c = sky_image(world.sky, d_world)
-                    # Not interpolable: an atomic counter appends the pixel to the list.
-                    if c[0] < 0.0:
-                        pixels[wp.atomic_add(count, 0, 1)] = i
+        step_x = step_at(lattice, x0, view.width)
+        done = int(0)
+        missed = int(0)
+        for y in range(y0, y1):
+            x = int(x0)
+            while x < x1:
+                i = y * view.width + x
+                bit = 1 << (CELL_ROW * (y - y0) + x - x0)
+                if (done & bit) == 0:
+                    hit = images.hits[i]
+                    if hit[0] >= 0:
+                        surface = surface_index(world, hit)
+                        missed |= bit
+                        if is_gatherable(world, surface):
+                            first = row * lattice.width + column
+                            stretch, patch, sampler = stretch_at(
+                                view, world, images, lattice, lights, surface, first, x, y
+                            )
+                            bits = shade_stretch(
+                                view,
+                                images,
+                                world.textures,
+                                lights,
+                                coats,
+                                covered,
+                                white,
+                                stretch,
+                                patch,
+                                sampler,
+                                lattice.stride,
+                                x0,
+                                y0,
+                                step_x,
+                                step_y,
+                                radiance,
+                            )
+                            done |= bits & 65535
+                            missed = (missed & ~bit) | (bits >> 16)
                     else:
+                        c = wp.vec3(0.0)
+                        if world.sky.visible != 0:
+                            d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+                            c = sky_image(world.sky, view.R_world_camera @ d)
                         radiance[i] = c
-                    x += 1
+                if (missed & bit) != 0:
+                    # An atomic counter appends the pixel to the list.
+                    pixels[wp.atomic_add(count, 0, 1)] = i
+                x += 1

@@ -90,7 +90,8 @@ class Probe:
     Attributes:
         parts: Points of the unit disk at which shadow rays aim.
         disc: Points of the unit disk, lifted to the hemisphere for ambient occlusion.
-        centre, pair: Fewer of both, for light that is a small share of a pixel.
+        centre, few: Fewer of both, for light that is a small share of a pixel; ``few`` by the
+            pixel's sample, [samples, points].
         radius_m: Radius of ambient occlusion.
         lit: Scratch: visible fraction of each lamp at the end of a pixel's ray [lamp, pixel].
     """
@@ -98,7 +99,7 @@ class Probe:
     parts: wp.array[wp.vec2]
     disc: wp.array[wp.vec2]
     centre: wp.array[wp.vec2]
-    pair: wp.array[wp.vec2]
+    few: wp.array2d[wp.vec2]
     radius_m: float
     lit: wp.array2d[float]
 
