@@ -69,9 +69,12 @@ def fields_from_plain(kind: type, plain: Mapping[str, Any]) -> dict[str, Any]:
 
 def canonical_json(value: Any) -> str:
     """One line of canonical JSON."""
-    return json.dumps(
-        to_plain(value), sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False
-    )
+    return _ENCODER.encode(to_plain(value))
+
+
+_ENCODER = json.JSONEncoder(
+    sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False
+)
 
 
 def find_not_finite(plain: Any, place: str = "") -> str:

@@ -37,31 +37,40 @@ class Timeline:
             return self.view
         if time_s not in self._scenes:
             moved = scene_at(self.view, time_s)
-            self._scenes[time_s] = finalize_scene(moved, self.assets, self.category_ids)
+            ids = self.category_ids
+            self._scenes[time_s] = finalize_scene(moved, self.assets, ids, before=self.view)
         return self._scenes[time_s]
 
 
-def finalize_scene(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Scene:
+def finalize_scene(
+    scene: Scene,
+    assets: AssetLibrary,
+    category_ids: Mapping[str, int],
+    before: Scene | None = None,
+) -> Scene:
     """Fill in category id, attributes, frame, keypoints and tight box of every instance.
 
     An instance of one body has that body's frame. An instance of several bodies (a robot) has
     the frame of its articulation's base, and the box around all its bodies' vertices. Bounds
-    without mirrors are those of the single body's asset, if ``scene.box3d`` is ``body``.
+    without mirrors are those of the single body's asset, if ``scene.box3d`` is ``body``. What a
+    finalized scene ``before`` has as the same objects is not measured again.
     """
+    known = () if before is None else (*before.bodies, *before.instances)
+    still = {id(item) for item in known}
     members: dict[int, list[Body]] = {}
     for body in scene.bodies:
         members.setdefault(body.instance_id, []).append(body)
     bases = {a.instance_id: a.T_world_base for a in scene.articulations}
-    instances = tuple(
-        _measure(
-            _describe(instance, assets, category_ids),
-            members.get(instance.instance_id, []),
-            bases.get(instance.instance_id),
-            assets,
-            scene.box3d,
-        )
-        for instance in scene.instances
-    )
+
+    def finalize(instance: Instance) -> Instance:
+        bodies = members.get(instance.instance_id, [])
+        T_world_base = bases.get(instance.instance_id)
+        if T_world_base is None and still.issuperset(map(id, (instance, *bodies))):
+            return instance
+        described = _describe(instance, assets, category_ids)
+        return _measure(described, bodies, T_world_base, assets, scene.box3d)
+
+    instances = tuple(map(finalize, scene.instances))
     return add_twists(replace(scene, instances=instances))
 
 
