@@ -60,6 +60,7 @@ class DeviceCache:
     """Meshes, textures and environments on one device, each cache bounded in bytes.
 
     Attributes:
+        bodies: The latest packed bodies, which all views of a scene share.
         scenes: The latest packed scene, which all cameras and scanners of a sample share.
         material_records, infrared: Records of a body's materials, by their tuple.
     """
@@ -68,6 +69,7 @@ class DeviceCache:
         self.assets = assets
         self.device = device
         self.lobes = wp.array(lobe_albedo(), dtype=wp.vec2, device=device)
+        self.bodies: ObjectCache[Any] = ObjectCache(1)
         self.scenes: ObjectCache[Any] = ObjectCache(1)
         self.material_records: ObjectCache[Any] = ObjectCache(_BODIES)
         self.infrared: ObjectCache[NDArray[np.void]] = ObjectCache(_BODIES)

@@ -56,10 +56,10 @@ def _fill_green(sites: Float32, padded: Float32) -> None:
         own, beside, above = (
             np.ascontiguousarray(around[y::2, x::2]) for y, x in ((0, 0), (2, 1), (1, 2))
         )
-        rows, columns = np.s_[1 : n + 1], np.s_[1 : width + 1]
+        rows, columns, after = np.s_[1 : n + 1], np.s_[1 : width + 1], np.s_[2 : width + 2]
         here = own[rows, columns]
         change_x, along_x = _interpolate(
-            own[rows, :width], beside[:n, :width], here, beside[:n, columns], own[rows, 2 : width + 2]
+            own[rows, :width], beside[:n, :width], here, beside[:n, columns], own[rows, after]
         )
         change_y, along_y = _interpolate(
             own[:n, columns], above[:n, :width], here, above[rows, :width], own[2 : n + 2, columns]

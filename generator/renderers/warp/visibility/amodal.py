@@ -91,23 +91,39 @@ def _boxes_px(
     canvas = canvas_box(view)
     annotated = sorted(i.instance_id for i in scene.instances if i.annotated)
     boxes = dict.fromkeys(annotated, EMPTY)
-    # All bodies at once: hundreds of small queries take longer than drawing them.
-    first = world.body_records["first_vertex"]
-    solid = np.flatnonzero(np.diff([*first, world.vertex_count]))
+    first = world.body_records["first_vertex"].tolist()
+    end = [*first[1:], world.vertex_count]
+    numbers = [
+        k
+        for k in projected.reached.tolist()
+        if scene.bodies[k].instance_id in boxes and end[k] > first[k]
+    ]
+    if not numbers:
+        return boxes
+    spans = [slice(first[k], end[k]) for k in numbers]
+    starts = np.cumsum([0, *(span.stop - span.start for span in spans[:-1])])
+    # All bodies at once: hundreds of small queries take longer than drawing them; and column by
+    # column: NumPy is slow along short axes.
     p_camera, xy = projected.p_camera.numpy(), projected.xy.numpy()
-    nearest = np.maximum.reduceat(p_camera[:, 2], first[solid])
-    lows = np.minimum.reduceat(xy, first[solid], axis=0)
-    highs = np.maximum.reduceat(xy, first[solid], axis=0)
-    drawn = np.isin(solid, projected.reached) & (nearest >= Z_NEAR_M)
-    for k in np.flatnonzero(drawn).tolist():
-        instance_id = scene.bodies[solid[k]].instance_id
-        if instance_id in boxes:
-            reached = BoxPx(*(lows[k] >> 8).tolist(), *((highs[k] >> 8) + 1).tolist())
-            # A triangle clipped at the camera's plane may reach anywhere.
-            cut = lows[k, 0] == _UNSNAPPED
-            boxes[instance_id] = boxes[instance_id].union(
-                canvas if cut else reached.intersection(canvas)
-            )
+    depths, x, y = (
+        np.concatenate([column[span] for span in spans])
+        for column in (p_camera[:, 2], xy[:, 0], xy[:, 1])
+    )
+    furthest = np.maximum.reduceat(depths, starts).tolist()
+    lows, highs = (
+        np.stack([extreme.reduceat(x, starts), extreme.reduceat(y, starts)], axis=1)
+        for extreme in (np.minimum, np.maximum)
+    )
+    for k, number in enumerate(numbers):
+        if furthest[k] < Z_NEAR_M:
+            continue
+        instance_id = scene.bodies[number].instance_id
+        reached = BoxPx(*(lows[k] >> 8).tolist(), *((highs[k] >> 8) + 1).tolist())
+        # A triangle clipped at the camera's plane may reach anywhere.
+        cut = lows[k, 0] == _UNSNAPPED
+        boxes[instance_id] = boxes[instance_id].union(
+            canvas if cut else reached.intersection(canvas)
+        )
     return boxes
 
 
