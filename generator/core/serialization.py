@@ -64,7 +64,10 @@ def fields_from_plain(kind: type, plain: Mapping[str, Any]) -> dict[str, Any]:
         TypeError, KeyError: if a value does not fit the type of its field.
     """
     builders = _field_builders(kind)
-    return {name: builders[name](item) for name, item in plain.items()}
+    return {
+        name: item if (build := builders[name]) is _itself else build(item)
+        for name, item in plain.items()
+    }
 
 
 def canonical_json(value: Any) -> str:

@@ -67,6 +67,8 @@ class DeviceCache:
 
     def __init__(self, assets: AssetLibrary, device: wp.Device) -> None:
         self.assets = assets
+        # Asked once: it takes as long as loading a small mesh.
+        self._store = assets if isinstance(assets, DerivedArrays) else None
         self.device = device
         self.lobes = wp.array(lobe_albedo(), dtype=wp.vec2, device=device)
         self.bodies: ObjectCache[Any] = ObjectCache(1)
@@ -116,9 +118,9 @@ class DeviceCache:
 
     def _derived(self, asset_id: str, name: str, compute: Callable[[], Arrays]) -> Arrays:
         """Arrays computed from an asset by the present code; stored if the library can do so."""
-        if not isinstance(self.assets, DerivedArrays):
+        if self._store is None:
             return compute()
-        return self.assets.derived(asset_id, f"{name} {arrays_version()}", compute)
+        return self._store.derived(asset_id, f"{name} {arrays_version()}", compute)
 
     def environment(self, environment_id: str) -> DeviceEnvironment:
         """Light of an environment, as an image."""
