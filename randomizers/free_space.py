@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import InitVar, dataclass, field
-from functools import cached_property
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
-from gen_data.generator.core.bounded_cache import ObjectCache
 from gen_data.generator.core.boxes import Rectangle, overlap_of
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Camera, Scene
-from gen_data.generator.core.se3 import SE3, Array, Vec3, rotate_by_quaternion
+from gen_data.generator.core.se3 import SE3, Vec3, rotate_by_quaternion
 
 _GRID = (16, 9)
 """Columns and rows of the rays that test a view."""
@@ -47,36 +45,31 @@ class Footprint:
         half_x_m, half_y_m = self.half_x_m + margin_m, self.half_y_m + margin_m
         return Footprint(self.x_m, self.y_m, half_x_m, half_y_m, self.yaw_rad)
 
-    @cached_property
+    @property
     def rectangle(self) -> Rectangle:
         """Centre, cosine and sine of the yaw, half extents."""
         c, s = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
         return (self.x_m, self.y_m, c, s, self.half_x_m, self.half_y_m)
 
-    @cached_property
+    @property
     def disc(self) -> tuple[float, float, float]:
         """Centre and half of the diagonal [m]."""
         return (self.x_m, self.y_m, math.hypot(self.half_x_m, self.half_y_m))
 
 
-@dataclass
 class Ground:
-    """Footprints of existing objects.
+    """Footprints of existing objects."""
 
-    Attributes:
-        footprints: At first; ``add`` adds others.
-    """
+    def __init__(self) -> None:
+        """No footprint; their discs, centres and half diagonals [m], will be a table [3, n]."""
+        self._rectangles: list[Rectangle] = []
+        self._discs = np.zeros((3, 64))
 
-    footprints: InitVar[Sequence[Footprint]] = ()
-    _rectangles: list[Rectangle] = field(init=False)
-    _discs: Array = field(init=False)
-
-    def __post_init__(self, footprints: Sequence[Footprint]) -> None:
-        """Collect rectangles, and a table of their centres and half diagonals [m], [3, n]."""
-        self._rectangles = [footprint.rectangle for footprint in footprints]
-        self._discs = np.zeros((3, 2 * len(footprints) + 64))
-        rows = [footprint.disc for footprint in footprints]
-        self._discs[:, : len(rows)] = np.reshape(rows, (len(rows), 3)).T
+    def copy(self) -> Ground:
+        """A ground with the same footprints."""
+        other = Ground()
+        other._rectangles, other._discs = self._rectangles.copy(), self._discs.copy()
+        return other
 
     def add(self, footprint: Footprint) -> None:
         """Add a footprint."""
@@ -92,7 +85,7 @@ class Ground:
         own_x, own_y, own_reach = footprint.disc
         dx, dy, reach = x - own_x, y - own_y, reach + own_reach
         # Few are near: for them, numbers are quicker than arrays.
-        near = np.flatnonzero(dx * dx + dy * dy < reach * reach).tolist()
+        near = (dx * dx + dy * dy < reach * reach).nonzero()[0].tolist()
         if not near:
             return True
         own = footprint.rectangle
@@ -109,20 +102,30 @@ def standing_bodies(scene: Scene) -> Iterator[Body]:
 
 def make_ground(bodies: Iterable[Body], assets: AssetIndex) -> Ground:
     """Collect the footprints of bodies."""
-    return Ground([_standing_footprint(body, assets) for body in bodies])
+    return _grounds.get(tuple(bodies), assets)
 
 
-_footprints: ObjectCache[tuple[AssetIndex, Footprint]] = ObjectCache(4096)
-"""Of the latest bodies: each of a street's randomizers collects those of all before it."""
+class _Grounds:
+    """The latest ground: each of a street's randomizers asks for that of the bodies so far."""
+
+    def __init__(self) -> None:
+        self._assets: AssetIndex | None = None
+        self._bodies: tuple[Body, ...] = ()
+        self._ground = Ground()
+
+    def get(self, bodies: tuple[Body, ...], assets: AssetIndex) -> Ground:
+        """The ground of these bodies: of the latest ones and more, as a rule."""
+        known = len(self._bodies)
+        if assets is not self._assets or bodies[:known] != self._bodies:
+            known, self._ground = 0, Ground()
+        for body in bodies[known:]:
+            bounds_m = standing_bounds_m(assets, body.asset)
+            self._ground.add(Footprint.of(body.T_world_body, bounds_m, body.scale))
+        self._assets, self._bodies = assets, bodies
+        return self._ground.copy()
 
 
-def _standing_footprint(body: Body, assets: AssetIndex) -> Footprint:
-    def find() -> tuple[AssetIndex, Footprint]:
-        bounds_m = standing_bounds_m(assets, body.asset)
-        return assets, Footprint.of(body.T_world_body, bounds_m, body.scale)
-
-    library, footprint = _footprints.get(body, find)
-    return footprint if library is assets else find()[1]
+_grounds = _Grounds()
 
 
 def standing_bounds_m(assets: AssetIndex, asset: str) -> tuple[Vec3, Vec3]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache, partial
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -41,6 +42,8 @@ SCATTER_TRIES = 20
 
 
 Bounds = tuple[Vec3, Vec3]
+BoundsOf = Callable[[str], tuple[Bounds, Bounds]]
+"""``_bounds_m`` of a library; most assets are drawn again and again."""
 Thing = tuple[str, float, Bounds, Bounds]
 """Asset, scale, its scaled bounds [m], and the part of them that nothing else may enter."""
 
@@ -117,7 +120,8 @@ class LaneObjects(GroupRandomizer):
         lines = self._select_lanes(scene, group)
         ground = make_ground(standing_bodies(scene), assets)
         fill = self._scatter if self.uniform_area else self._fill_rows
-        members = list(fill(lines, group, weights, ground, assets, rng))
+        bounds_of = cache(partial(_bounds_m, assets))
+        members = list(fill(lines, group, weights, ground, bounds_of, rng))
         if len(members) < self.min_count:
             remedy = "a smaller min_count, gap_m or min_clearance_m, or longer roads"
             raise self.reject("too few free places along lanes", remedy)
@@ -145,13 +149,13 @@ class LaneObjects(GroupRandomizer):
         group: ObjectGroup,
         weights: CategoryWeights,
         ground: Ground,
-        assets: AssetIndex,
+        bounds_of: BoundsOf,
         rng: Rng,
     ) -> Iterator[Member]:
         """Alternate objects and gaps along every lane, once per pass."""
         for line in lines * self.passes:
             at_m = float(rng.uniform()) * self.gap_m.draw(rng)
-            run = self._draw_run(at_m, weights, assets, rng)
+            run = self._draw_run(at_m, weights, bounds_of, rng)
             for _ in range(PER_LANE_MAX):
                 asset, scale, bounds_m, solid_m = run.thing
                 length_m, width_m = _extent_m(bounds_m, group.facing)
@@ -175,7 +179,7 @@ class LaneObjects(GroupRandomizer):
                     at_m += JOINT_M
                 else:
                     at_m += self.gap_m.draw(rng)
-                    run = self._draw_run(at_m, weights, assets, rng)
+                    run = self._draw_run(at_m, weights, bounds_of, rng)
             else:
                 raise ConfigError(
                     f"randomizers.{self.name}.gap_m: objects and gaps are so short that a lane of "
@@ -189,7 +193,7 @@ class LaneObjects(GroupRandomizer):
         group: ObjectGroup,
         weights: CategoryWeights,
         ground: Ground,
-        assets: AssetIndex,
+        bounds_of: BoundsOf,
         rng: Rng,
     ) -> Iterator[Member]:
         """Scatter objects over the bounding rectangle of the lanes."""
@@ -199,7 +203,7 @@ class LaneObjects(GroupRandomizer):
         high = [max(point[k] for point in points) for k in range(3)]
         for _ in range(self.count.draw(rng) if self.count is not None else 10):
             for _ in range(SCATTER_TRIES):
-                asset, scale, bounds_m, solid_m = self._draw_thing(weights, assets, rng)
+                asset, scale, bounds_m, solid_m = self._draw_thing(weights, bounds_of, rng)
                 x, y = (float(rng.uniform(low[k], high[k])) for k in range(2))
                 stand = SE3.about_z(float(rng.uniform(0.0, 2.0 * math.pi)), (x, y, low[2]))
                 pose = (stand @ SE3((0.0, 0.0, -bounds_m[0][2]))).rounded()
@@ -219,21 +223,26 @@ class LaneObjects(GroupRandomizer):
         return True
 
     def _draw_run(
-        self, at_m: float, weights: CategoryWeights, assets: AssetIndex, rng: Rng
+        self, at_m: float, weights: CategoryWeights, bounds_of: BoundsOf, rng: Rng
     ) -> _Run:
         """Draw the next object, or run of equal ones."""
-        thing = self._draw_thing(weights, assets, rng)
+        thing = self._draw_thing(weights, bounds_of, rng)
         reach_m = self.run_m.draw(rng)
         return _Run(thing, at_m + reach_m, self.occupancy.draw(rng) if reach_m > 0.0 else None)
 
-    def _draw_thing(self, weights: CategoryWeights, assets: AssetIndex, rng: Rng) -> Thing:
+    def _draw_thing(self, weights: CategoryWeights, bounds_of: BoundsOf, rng: Rng) -> Thing:
         """Draw an asset and its scale; also return its scaled bounds."""
         asset = draw_asset(weights, rng)
         scale = round(self.scale.draw(rng), 4)
-        bounds_m, standing_m = assets.bounds_m(asset), standing_bounds_m(assets, asset)
-        scaled_m = _scale_bounds(bounds_m, scale)
-        solid_m = scaled_m if standing_m == bounds_m else _scale_bounds(standing_m, scale)
-        return asset, scale, scaled_m, solid_m
+        bounds_m, solid_m = bounds_of(asset)
+        if scale != 1.0:
+            bounds_m, solid_m = _scale_bounds(bounds_m, scale), _scale_bounds(solid_m, scale)
+        return asset, scale, bounds_m, solid_m
+
+
+def _bounds_m(assets: AssetIndex, asset: str) -> tuple[Bounds, Bounds]:
+    """Bounds of an asset [m], and the part of them that nothing else may enter."""
+    return assets.bounds_m(asset), standing_bounds_m(assets, asset)
 
 
 def _scale_bounds(bounds_m: Bounds, scale: float) -> Bounds:

@@ -116,7 +116,11 @@ class VehiclePaint(SurfaceRandomizer):
         """Return the body with another licence plate, if it has one."""
         seed, other = int(rng.integers(SEEDS)), _pick(self.countries, rng)
         country = other if self.foreign.draw(rng) else home
-        slots = (replace(m, texture=reseed_plate(m.texture, seed, country)) for m in body.materials)
+        textures = (reseed_plate(m.texture, seed, country) for m in body.materials)
+        slots = (
+            m if m.texture == texture else replace(m, texture=texture)
+            for m, texture in zip(body.materials, textures, strict=True)
+        )
         return replace(body, materials=tuple(slots))
 
     def _draw_paint(self, rng: Rng) -> dict[str, Any]:

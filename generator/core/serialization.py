@@ -64,14 +64,20 @@ def fields_from_plain(kind: type, plain: Mapping[str, Any]) -> dict[str, Any]:
         TypeError, KeyError: if a value does not fit the type of its field.
     """
     builders = _field_builders(kind)
-    return {name: builders[name](item) for name, item in plain.items()}
+    return {
+        name: item if (build := builders[name]) is _itself else build(item)
+        for name, item in plain.items()
+    }
 
 
 def canonical_json(value: Any) -> str:
     """One line of canonical JSON."""
-    return json.dumps(
-        to_plain(value), sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False
-    )
+    return _ENCODER.encode(to_plain(value))
+
+
+_ENCODER = json.JSONEncoder(
+    sort_keys=True, separators=(",", ":"), allow_nan=False, ensure_ascii=False
+)
 
 
 def find_not_finite(plain: Any, place: str = "") -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -37,67 +38,71 @@ class Timeline:
             return self.view
         if time_s not in self._scenes:
             moved = scene_at(self.view, time_s)
-            self._scenes[time_s] = finalize_scene(moved, self.assets, self.category_ids)
+            ids = self.category_ids
+            self._scenes[time_s] = finalize_scene(moved, self.assets, ids, before=self.view)
         return self._scenes[time_s]
 
 
-def finalize_scene(scene: Scene, assets: AssetLibrary, category_ids: Mapping[str, int]) -> Scene:
+def finalize_scene(
+    scene: Scene,
+    assets: AssetLibrary,
+    category_ids: Mapping[str, int],
+    before: Scene | None = None,
+) -> Scene:
     """Fill in category id, attributes, frame, keypoints and tight box of every instance.
 
     An instance of one body has that body's frame. An instance of several bodies (a robot) has
     the frame of its articulation's base, and the box around all its bodies' vertices. Bounds
-    without mirrors are those of the single body's asset, if ``scene.box3d`` is ``body``.
+    without mirrors are those of the single body's asset, if ``scene.box3d`` is ``body``. What a
+    finalized scene ``before`` has as the same objects is not measured again.
     """
+    known = () if before is None else (*before.bodies, *before.instances)
+    still = {id(item) for item in known}
     members: dict[int, list[Body]] = {}
     for body in scene.bodies:
         members.setdefault(body.instance_id, []).append(body)
     bases = {a.instance_id: a.T_world_base for a in scene.articulations}
-    instances = tuple(
-        _measure(
-            _describe(instance, assets, category_ids),
-            members.get(instance.instance_id, []),
-            bases.get(instance.instance_id),
-            assets,
-            scene.box3d,
-        )
-        for instance in scene.instances
-    )
+
+    def finalize(instance: Instance) -> Instance:
+        bodies = members.get(instance.instance_id, [])
+        T_world_base = bases.get(instance.instance_id)
+        if T_world_base is None and still.issuperset(map(id, (instance, *bodies))):
+            return instance
+        found = _describe(instance, assets, category_ids)
+        if bodies:
+            found |= _measure(bodies, T_world_base, assets, scene.box3d)
+        return replace(instance, **found)
+
+    instances = tuple(map(finalize, scene.instances))
     return add_twists(replace(scene, instances=instances))
 
 
 def _describe(
     instance: Instance, assets: AssetLibrary, category_ids: Mapping[str, int]
-) -> Instance:
-    """Add category id and the asset's attributes to an instance; its own attributes win."""
+) -> dict[str, Any]:
+    """Category id, and attributes of the asset and of the instance; the latter win."""
     asset = assets.get(instance.asset)
     attributes = {**dict(asset.attributes), **dict(instance.attributes)}
-    return replace(
-        instance,
-        category_id=category_ids.get(instance.category, 0),
-        subcategory=instance.subcategory or asset.subcategory,
-        attributes=tuple(sorted(attributes.items())),
-    )
+    return {
+        "category_id": category_ids.get(instance.category, 0),
+        "subcategory": instance.subcategory or asset.subcategory,
+        "attributes": tuple(sorted(attributes.items())),
+    }
 
 
 def _measure(
-    instance: Instance,
-    bodies: list[Body],
-    T_world_base: SE3 | None,
-    assets: AssetLibrary,
-    box3d: Box3dExtent,
-) -> Instance:
-    if not bodies:
-        return instance
+    bodies: list[Body], T_world_base: SE3 | None, assets: AssetLibrary, box3d: Box3dExtent
+) -> dict[str, Any]:
+    """Frame, box and keypoints of an instance that consists of these bodies."""
     if T_world_base is None and len(bodies) == 1:
         body = bodies[0]
         low, high = assets.bounds_m(body.asset)
-        return replace(
-            instance,
-            T_world_instance=body.T_world_body,
-            box_min_m=_scale(low, body.scale),
-            box_max_m=_scale(high, body.scale),
-            body_bounds_m=_body_bounds(body, assets) if box3d == "body" else None,
-            keypoints=tuple(
+        return {
+            "T_world_instance": body.T_world_body,
+            "box_min_m": _scale(low, body.scale),
+            "box_max_m": _scale(high, body.scale),
+            "body_bounds_m": _body_bounds(body, assets) if box3d == "body" else None,
+            "keypoints": tuple(
                 Keypoint(
                     point.name,
                     _scale(point.position_m, body.scale),
@@ -105,7 +110,7 @@ def _measure(
                 )
                 for point in assets.keypoints(body.asset)
             ),
-        )
+        }
     T_world_instance = bodies[0].T_world_body if T_world_base is None else T_world_base
     T_instance_world = T_world_instance.inverse()
     lows, highs = [], []
@@ -114,12 +119,11 @@ def _measure(
         placed = (T_instance_world @ body.T_world_body).apply(vertices_m)
         lows.append(placed.min(axis=0))
         highs.append(placed.max(axis=0))
-    return replace(
-        instance,
-        T_world_instance=T_world_instance,
-        box_min_m=_round_to_micrometre(np.min(lows, axis=0)),
-        box_max_m=_round_to_micrometre(np.max(highs, axis=0)),
-    )
+    return {
+        "T_world_instance": T_world_instance,
+        "box_min_m": _round_to_micrometre(np.min(lows, axis=0)),
+        "box_max_m": _round_to_micrometre(np.max(highs, axis=0)),
+    }
 
 
 def _body_bounds(body: Body, assets: AssetLibrary) -> tuple[Vec3, Vec3] | None:

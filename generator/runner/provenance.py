@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
+from gen_data.generator.core.bounded_cache import ObjectCache
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import canonical_json, fields_from_plain, from_plain
@@ -42,19 +44,38 @@ def scene_line(sample: Sample, base: Sample | None) -> str:
     fields = {f.name: getattr(sample.scene, f.name) for f in dataclasses.fields(Scene)}
     if base is not None:
         fields = {k: v for k, v in fields.items() if not _same(v, getattr(base.scene, k))}
-    return canonical_json(
-        {
-            "index": sample.index,
-            "scene_index": sample.scene_index,
-            "view_index": sample.view_index,
-            "step_index": sample.step_index,
-            "split": sample.split,
-            "attempts": sample.attempts,
-            "view_attempts": sample.view_attempts,
-            "base": None if base is None else base.index,
-            "scene": fields,
-        }
-    )
+    texts = {
+        name: _list_text(value) if name in _RECURRING else canonical_json(value)
+        for name, value in fields.items()
+    }
+    facts = {
+        "index": sample.index,
+        "scene_index": sample.scene_index,
+        "view_index": sample.view_index,
+        "step_index": sample.step_index,
+        "split": sample.split,
+        "attempts": sample.attempts,
+        "view_attempts": sample.view_attempts,
+        "base": None if base is None else base.index,
+    }
+    plain = {name: canonical_json(value) for name, value in facts.items()}
+    return _object_text({**plain, "scene": _object_text(texts)})
+
+
+_RECURRING = ("bodies", "instances")
+"""Fields most of whose items are the same objects at all steps of a sequence."""
+_texts: ObjectCache[str] = ObjectCache(4096)
+"""Canonical JSON of the latest of these items, half a kilobyte each."""
+
+
+def _list_text(items: Sequence[object]) -> str:
+    texts = (_texts.get(item, partial(canonical_json, item)) for item in items)
+    return f"[{','.join(texts)}]"
+
+
+def _object_text(texts: Mapping[str, str]) -> str:
+    """Canonical JSON of an object, from that of its values."""
+    return "{" + ",".join(f'"{name}":{texts[name]}' for name in sorted(texts)) + "}"
 
 
 def parse_scene(line: bytes | str, scene_of: Callable[[int], Scene]) -> KeptScene:

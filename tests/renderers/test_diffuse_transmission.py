@@ -147,7 +147,7 @@ def test_either_technique_alone_agrees_on_light_through_a_leaf() -> None:
 def test_a_sheet_never_scatters_more_than_it_receives() -> None:
     """A transmittance beyond what reflection leaves is reduced, per channel."""
     scene, library = over(sheet(replace(LEAF, diffuse_transmission=(0.9, 0.5, 0.7))))
-    (packed,) = body_materials(scene, DeviceCache(library, open_device("cpu")))
+    (packed,) = body_materials(scene.bodies, DeviceCache(library, open_device("cpu")))
 
     passed = packed.surfaces["translucency"][0] * packed.surfaces["base_color"][0]
     np.testing.assert_allclose(passed, (0.7, 0.5, 0.7), rtol=1e-6)

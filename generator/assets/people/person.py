@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Literal
 
 from gen_data.generator.assets.people.posing import BEHAVIOURS, PHASES, POSES, SHARES
@@ -248,6 +248,7 @@ class Person:
     step: int
 
 
+@lru_cache(maxsize=256)
 def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
     """The person of a seed.
 

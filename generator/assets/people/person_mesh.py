@@ -164,13 +164,13 @@ def _stance(person: Person) -> Stance:
 
 
 def _pose_piece(piece: _Piece, body: BodyTemplate, transforms: Array) -> Sheet:
-    bones, weights = body.weight_bones[piece.used], body.weights[piece.used]
+    bones, weights = (of.take(piece.used, axis=0) for of in (body.weight_bones, body.weights))
     moved = skin_points(piece.vertices_m, bones, weights, transforms)
     normals = vertex_normals(moved, piece.faces)
     # Normals come from the whole surface: fields of the texture must not show in its shading.
     return Sheet(
-        moved[piece.corners],
-        normals[piece.corners],
+        moved.take(piece.corners, axis=0),
+        normals.take(piece.corners, axis=0),
         piece.corner_faces,
         piece.slots,
         piece.materials,

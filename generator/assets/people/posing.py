@@ -247,16 +247,18 @@ def skin_points(points_m: Array, bones: Indices, weights: Array, transforms: Arr
     Returns:
         After the pose [m], float64 [n, 3].
     """
-    flat = transforms.reshape(len(transforms), 12)
-    blended = weights[:, 0, None] * flat[bones[:, 0]]
-    for k in range(1, bones.shape[1]):
-        blended += weights[:, k, None] * flat[bones[:, k]]
-    matrices = blended.reshape(-1, 3, 4)
-    x, y, z = points_m.T[:, :, None]
-    moved: Array = (
-        matrices[:, :, 0] * x + matrices[:, :, 1] * y + matrices[:, :, 2] * z + matrices[:, :, 3]
-    )
-    return moved
+    # Entries of matrices as rows: NumPy is slow along short axes.
+    flat = np.ascontiguousarray(transforms.reshape(len(transforms), 12).T)
+    shares, numbers = weights.T.copy(), bones.T.copy()
+    matrices = flat.take(numbers[0], axis=1)
+    matrices *= shares[0]
+    for share, number in zip(shares[1:], numbers[1:], strict=True):
+        part = flat.take(number, axis=1)
+        part *= share
+        matrices += part
+    x, y, z = points_m.T.copy()
+    rows = (matrices[k : k + 4] for k in (0, 4, 8))
+    return np.stack([a * x + b * y + c * z + d for a, b, c, d in rows], axis=1)
 
 
 def vertex_normals(points_m: Array, faces: Indices) -> Array:

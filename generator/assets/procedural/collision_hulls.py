@@ -74,9 +74,11 @@ def extreme(points: Array, count: int = 48, turn_rad: float = 0.0) -> Array:
     z = 1.0 - 2.0 * i / count
     turn = math.pi * (3.0 - math.sqrt(5.0)) * i + turn_rad
     radius = np.sqrt(1.0 - z * z)
-    directions = np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=1)
-    reach = np.einsum("dk,nk->dn", directions, points.reshape(-1, 3), optimize=False)
-    chosen = np.unique(np.argmax(np.round(reach, 9), axis=1))
+    directions = zip(radius * np.cos(turn), radius * np.sin(turn), z, strict=True)
+    x, y, z = points.reshape(-1, 3).T.astype(np.float64, order="C")
+    # In nanometres: the furthest of equal ones is the first, whatever the last bit of a product.
+    reaches_nm = (np.rint(1e9 * (x * dx + y * dy + z * dz)) for dx, dy, dz in directions)
+    chosen = np.unique([int(np.argmax(reach_nm)) for reach_nm in reaches_nm])
     return np.array(points.reshape(-1, 3)[chosen], dtype=np.float64)
 
 

@@ -156,14 +156,17 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float, pale: float =
     x = float((np.array(_TABLES["zenith_x"]) * terms).sum()) * relative("x")
     y = float((np.array(_TABLES["zenith_y"]) * terms).sum()) * relative("y")
     luminance = relative("luminance")
-    xyz = np.stack([x / y, np.ones_like(x), (1.0 - x - y) / y], axis=-1)
-    rgb = np.maximum(np.einsum("hwc,kc->hwk", xyz, REC709_FROM_XYZ, optimize=False), 0.02)
+    # Sum by sum: numpy is slow on products of three by three.
+    red_blue = x / y, (1.0 - x - y) / y
+    rgb = np.stack([a * red_blue[0] + b + c * red_blue[1] for a, b, c in REC709_FROM_XYZ], axis=-1)
+    rgb = np.maximum(rgb, 0.02, out=rgb)
     # Preetham's fit turns pink at the horizon of clear air, which in truth is pale.
     high = pale * _ramp(4.0, 20.0, math.degrees(sun_altitude_rad))
     rgb += np.exp(-rows_up / 0.22)[..., None] * high * (_HORIZON - rgb)
-    rgb /= np.einsum("hwc,c->hw", rgb, REC709_LUMINANCE, optimize=False)[..., None]
-    sky_rgb: Array = rgb * luminance[..., None]
-    return sky_rgb
+    red, green, blue = (rgb[..., k] * share for k, share in enumerate(REC709_LUMINANCE))
+    rgb /= (red + green + blue)[..., None]
+    rgb *= luminance[..., None]
+    return rgb
 
 
 def overcast_sky(d: Array) -> Array:
@@ -272,8 +275,10 @@ def _with_land(image: Float32, model: SkyModel) -> Float32:
     whole = np.zeros((2 * rows, *image.shape[1:]), np.float32)
     whole[:rows] = image
     heights = np.cos(math.pi * (np.arange(2 * rows) + 0.5) / (2 * rows))
-    for row, far in enumerate(np.exp(heights[rows:] / 0.02), rows):
-        whole[row] = land + haze * far
+    far = np.exp(heights[rows:] / 0.02)
+    for first in range(0, rows, _STRIP_ROWS):
+        strip = slice(first, first + _STRIP_ROWS)
+        whole[rows:][strip] = land + haze * far[strip, None, None]
     return whole
 
 

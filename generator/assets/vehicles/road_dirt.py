@@ -133,7 +133,7 @@ def road_dirt(seed: int, amount: float, paint: str) -> TextureData:
     colors = _encode(below + steps[:, None] * (dust - below))
     index = traces.to_bytes(share)
     factor = np.round(255.0 * (_CLEAN + (1.0 - _CLEAN) * np.minimum(1.6 * steps, 1.0)))
-    return TextureData(colors[index], factor.astype(np.uint8)[index])
+    return TextureData(colors.take(index, axis=0), factor.astype(np.uint8).take(index))
 
 
 @lru_cache(maxsize=SEEDS)

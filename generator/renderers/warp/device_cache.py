@@ -60,14 +60,18 @@ class DeviceCache:
     """Meshes, textures and environments on one device, each cache bounded in bytes.
 
     Attributes:
+        bodies: The latest packed bodies, which all views of a scene share.
         scenes: The latest packed scene, which all cameras and scanners of a sample share.
         material_records, infrared: Records of a body's materials, by their tuple.
     """
 
     def __init__(self, assets: AssetLibrary, device: wp.Device) -> None:
         self.assets = assets
+        # Asked once: it takes as long as loading a small mesh.
+        self._store = assets if isinstance(assets, DerivedArrays) else None
         self.device = device
         self.lobes = wp.array(lobe_albedo(), dtype=wp.vec2, device=device)
+        self.bodies: ObjectCache[Any] = ObjectCache(1)
         self.scenes: ObjectCache[Any] = ObjectCache(1)
         self.material_records: ObjectCache[Any] = ObjectCache(_BODIES)
         self.infrared: ObjectCache[NDArray[np.void]] = ObjectCache(_BODIES)
@@ -114,9 +118,9 @@ class DeviceCache:
 
     def _derived(self, asset_id: str, name: str, compute: Callable[[], Arrays]) -> Arrays:
         """Arrays computed from an asset by the present code; stored if the library can do so."""
-        if not isinstance(self.assets, DerivedArrays):
+        if self._store is None:
             return compute()
-        return self.assets.derived(asset_id, f"{name} {arrays_version()}", compute)
+        return self._store.derived(asset_id, f"{name} {arrays_version()}", compute)
 
     def environment(self, environment_id: str) -> DeviceEnvironment:
         """Light of an environment, as an image."""

@@ -71,16 +71,27 @@ def estimate_illuminant(image: Float32, norm: float) -> Array:
     6 estimated best (Finlayson and Trezzi, "Shades of gray and colour constancy", 2004). Clipped
     pixels, at 1, are left out; the light is white if hardly any other is left.
     """
-    seen = image.reshape(-1, 3)[::7]
     # Channel by channel: numpy is slow on reductions over three neighbours.
-    red, green, blue = np.ascontiguousarray(seen.T)
+    seen = np.ascontiguousarray(image.reshape(-1, 3)[::7].T)
+    red, green, blue = seen
     dark_enough = np.maximum(np.maximum(red, green), blue) < 0.95
-    seen = seen[dark_enough & (np.minimum(np.minimum(red, green), blue) > 0.0)]
-    if len(seen) < 16:
+    counted = np.flatnonzero(dark_enough & (np.minimum(np.minimum(red, green), blue) > 0.0))
+    if len(counted) < 16:
         return np.ones(3)
+    light = seen.take(counted, axis=1).astype(np.float64)
     if norm == 1.0:
-        return np.asarray(seen.mean(axis=0, dtype=np.float64))
-    return np.asarray((seen.astype(np.float64) ** norm).mean(axis=0) ** (1.0 / norm))
+        return np.asarray(light.mean(axis=1))
+    return np.asarray(_power(light, norm).mean(axis=1) ** (1.0 / norm))
+
+
+def _power(base: Array, exponent: float) -> Array:
+    """Positive numbers to a power; by products, which take a tenth of the time, if it is even."""
+    if exponent % 2.0 or exponent > 16.0:
+        return np.asarray(base**exponent)
+    power = square = base * base
+    for _ in range(round(exponent) // 2 - 1):
+        power = power * square
+    return power
 
 
 COLDEST_K, HOTTEST_K = 2000.0, 10_000.0

@@ -270,17 +270,18 @@ def add_glare(image: Float32, share: float) -> Float32:
     coarse = scatter(image) * np.float32(share / len(_LEVELS))
     veil = _widen(coarse, width)
     first, after, part = bilinear(height, FACTOR, len(veil))
-    out: Float32 = image * np.float32(1.0 - share)
+    out: Float32 = np.empty_like(image)
     # In bands that fit into the processor's cache.
     for top in range(0, height, _ROWS_AT_ONCE):
         rows = slice(top, top + _ROWS_AT_ONCE)
         weight = part[rows, None, None]
-        band = veil[first[rows]]
+        shown = np.multiply(image[rows], np.float32(1.0 - share), out=out[rows])
+        band = veil.take(first[rows], axis=0)
         band *= 1 - weight
-        out[rows] += band
-        band = veil[after[rows]]
+        shown += band
+        band = veil.take(after[rows], axis=0)
         band *= weight
-        out[rows] += band
+        shown += band
     return out
 
 

@@ -272,7 +272,7 @@ def trace_scan(scene: Scene, lidar: Lidar, beams: LidarRays, cache: DeviceCache)
     eye = Camera(lidar.name, lidar.T_world_lidar, Intrinsics(1, 1, 1.0, 1.0, 0.5, 0.5))
     world, motion = pack_moving_bodies(scene, lidar, beams, pack_world(scene, eye, cache), cache)
     world.record.ground = ground_record(scene.weather)
-    per_body = body_materials(scene, cache)
+    per_body = body_materials(scene.bodies, cache)
     device = cache.device
     shape = (len(beams.directions), beams.subrays)
     count = shape[0] * shape[1]

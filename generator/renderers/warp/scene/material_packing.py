@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.core.asset_types import SURFACES, Material
-from gen_data.generator.core.scene import Scene
+from gen_data.generator.core.scene import Body
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.scene.device_assets import DeviceTexture
 from gen_data.generator.renderers.warp.scene.kernels import records
@@ -42,9 +42,9 @@ class BodyMaterials:
     roles: NDArray[np.uint8]
 
 
-def body_materials(scene: Scene, cache: DeviceCache) -> list[BodyMaterials]:
+def body_materials(bodies: Sequence[Body], cache: DeviceCache) -> list[BodyMaterials]:
     """Materials of every body, packed once and cached."""
-    own = [body.materials or cache.materials(body.asset) for body in scene.bodies]
+    own = [body.materials or cache.materials(body.asset) for body in bodies]
     return [
         cache.material_records.get(materials, partial(_pack_materials, materials))
         for materials in own

@@ -169,33 +169,41 @@ def _pack_for_camera(
 
 
 def _pack_scene(scene: Scene, cache: DeviceCache) -> _PackedScene:
-    asset_ids = sorted({body.asset for body in scene.bodies})
+    """Pack a scene; its bodies are packed once for all views that have the same ones."""
+    bodies: _PackedScene = cache.bodies.get(scene.bodies, lambda: _pack_bodies(scene.bodies, cache))
+    environment = cache.environment(scene.environment.image)
+    world = copy_struct(bodies.record, records.World)
+    world.lamps = to_device(lamp_records(scene.lights), records.LightRecord, cache.device)
+    world.sky = sky_record(scene.environment, environment)
+    return replace(bodies, record=world, assets=(*bodies.assets, environment))
+
+
+def _pack_bodies(bodies: tuple[Body, ...], cache: DeviceCache) -> _PackedScene:
+    """Pack a scene of bodies alone, without light."""
+    asset_ids = sorted({body.asset for body in bodies})
     place = {asset_id: k for k, asset_id in enumerate(asset_ids)}
     meshes = [cache.mesh(asset_id) for asset_id in asset_ids]
-    per_body = body_materials(scene, cache)
+    per_body = body_materials(bodies, cache)
     texture_ids = sorted({texture_id for entry in per_body for texture_id in entry.textures})
     textures = {texture_id: cache.texture(texture_id) for texture_id in texture_ids}
     surfaces = surface_records(per_body, textures)
-    environment = cache.environment(scene.environment.image)
-    body_records = np.zeros(len(scene.bodies), dtype=struct_dtype(records.BodyRecord))
-    body_records["geometry"] = [place[body.asset] for body in scene.bodies]
+    body_records = np.zeros(len(bodies), dtype=struct_dtype(records.BodyRecord))
+    body_records["geometry"] = [place[body.asset] for body in bodies]
     counts = np.array([len(entry.materials) for entry in per_body], dtype=np.int64)
     body_records["first_material"] = np.cumsum(counts) - counts
     body_records["cutouts"] = cutout_bodies(cutout_slots(surfaces, textures), counts)
-    body_meshes = [meshes[place[body.asset]] for body in scene.bodies]
+    body_meshes = [meshes[place[body.asset]] for body in bodies]
     device = cache.device
     world = records.World()
-    placement = _place_bodies(world, body_records, scene.bodies, body_meshes, cache)
+    placement = _place_bodies(world, body_records, bodies, body_meshes, cache)
     geometries = stack_records([mesh.record for mesh in meshes], records.Geometry)
     images = stack_records([texture.record for texture in textures.values()], records.TextureRecord)
     world.geometries = to_device(geometries, records.Geometry, device)
     world.surfaces = to_device(surfaces, records.MaterialRecord, device)
     world.textures = to_device(images, records.TextureRecord, device)
-    world.lamps = to_device(lamp_records(scene.lights), records.LightRecord, device)
     world.lobes = cache.lobes
-    world.sky = sky_record(scene.environment, environment)
     layered = bool(surfaces["layered"].any())
-    return _PackedScene(world, (meshes, textures, environment), placement, layered)
+    return _PackedScene(world, (meshes, textures), placement, layered)
 
 
 def _place_bodies(
