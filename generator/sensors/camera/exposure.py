@@ -17,8 +17,9 @@ from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.shutter import Shutter
 
 EV100_RANGE = (1.0, 17.0)
-"""Exposure values of a camera without limits of its own: from 1/30 s at f/1.4 and ISO 3200 to sunlit
-snow. Automatic exposure stops there, so that night scenes stay dark."""
+"""Of a camera without limits of its own: from 1/30 s at f/1.4 and ISO 3200 to sunlit snow.
+
+Automatic exposure stops there, so that night scenes stay dark."""
 _METERED_EVERY = 4
 _EV100_STEPS = 256.0
 """Steps per exposure value: on a grid, as the last bit of a sum differs between processors."""
