@@ -19,7 +19,7 @@ _WAVE_M, _SCALLOP_M = 0.012, 0.03
 """Depth of a valance's folds and height of its scallops; assumed."""
 _FOLD_M, _FOLD_SHARE = 0.16, 0.05
 """Distance between folds of a hanging, and their depth as a share of its height; assumed."""
-_ROWS, _COLUMNS = 4, 6
+_ROWS, _COLUMNS = 4, 7
 
 
 def awning_cloth(
