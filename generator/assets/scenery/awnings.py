@@ -38,7 +38,7 @@ def awning_cloth(
         slots: Material of each stripe.
         valance_m: Height of the valance, scallops included.
     """
-    parts = []
+    parts: list[Patch] = []
     t = np.linspace(0.0, 1.0, _ROWS)
     (x0, z0), (x1, z1) = front_m, back_m
     x, z = x0 + (x1 - x0) * t, z0 + (z1 - z0) * t - 4.0 * _SAG * abs(x1 - x0) * t * (1.0 - t)
