@@ -20,6 +20,8 @@ from gen_data.randomizers.free_space import Footprint, standing_bodies
 from gen_data.randomizers.traffic_lights import Signal, runs_along
 
 PERSON = "person"
+SCENERY = "scenery"
+"""Tag of assets that never move of themselves."""
 POSTS = ("street_light", "traffic_light", "traffic_sign", "tree", "utility_pole")
 POST_M = 0.12
 """Half width of the post at the origin of ``POSTS``; only parts above head height reach further."""
@@ -81,7 +83,8 @@ class OnFoot:
 def find_drivers(scene: Scene, graph: LaneGraph, assets: AssetIndex) -> list[OnRoad]:
     """Find the vehicles on the graph's lanes, in order: members of groups and carriers of rigs.
 
-    Vehicles across a lane or against its direction are left out.
+    Vehicles across a lane or against its direction are left out, and scenery at a lane's edge, such
+    as parked bicycles, cones and grass.
     """
     groups = {group.name for group in scene.groups}
     carriers = {rig.body for rig in scene.rigs}
@@ -90,9 +93,14 @@ def find_drivers(scene: Scene, graph: LaneGraph, assets: AssetIndex) -> list[OnR
     for body in scene.bodies:
         if not body.instance_id or not (body.group in groups or body.name in carriers):
             continue
-        category = assets.get(body.asset).category
+        asset = assets.get(body.asset)
         near = graph.nearest(*body.T_world_body.translation_m[:2])
-        if category == PERSON or near is None or near.away_m > near_m:
+        if (
+            asset.category == PERSON
+            or SCENERY in asset.tags
+            or near is None
+            or near.away_m > near_m
+        ):
             continue
         axles = find_axles(assets, body.asset, body.scale)
         T_world_rear = body.T_world_body @ axles.T_body_rear
@@ -101,7 +109,7 @@ def find_drivers(scene: Scene, graph: LaneGraph, assets: AssetIndex) -> list[OnR
             continue
         (ax, ay), (bx, by) = heading_direction(body), _lane_direction(graph, place)
         if ax * bx + ay * by > 0.7:
-            found.append(OnRoad(body, axles, T_world_rear, place, category))
+            found.append(OnRoad(body, axles, T_world_rear, place, asset.category))
     return found
 
 

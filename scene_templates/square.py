@@ -21,6 +21,7 @@ from gen_data.scene_templates.element import (
     parametric_id,
     stand_upright,
 )
+from gen_data.scene_templates.horizon import Season
 from gen_data.scene_templates.road import Ground
 from gen_data.scene_templates.road_places import RoadPlace, cut_lanes, find_place
 
@@ -41,6 +42,7 @@ class Square(Element):
         depth_m: Extent away from the road.
         cover: Paving.
         houses: Style of the houses around it, a family ``building/<houses>``.
+        season: Foliage of the trees.
         seed: Seed of houses, trees and the fountain.
     """
 
@@ -52,6 +54,7 @@ class Square(Element):
     depth_m: float = Field(30.0, ge=15, le=120)
     cover: Ground = "cobbles"
     houses: Literal["old_town", "residential", "house", "commercial"] = "old_town"
+    season: Season = "summer"
     seed: int = Field(0, ge=0, le=1_000_000)
 
     @property
@@ -108,7 +111,8 @@ class Square(Element):
         """A fountain in the middle, rows of trees with benches below, lamps at the corners."""
         x, half = 0.5 * self.depth_m, 0.5 * self.length_m
         yield parametric_id("fountain", seed=self.seed % 6), SE3((x, 0.0, 0.0))
-        tree = parametric_id(f"tree/{rng.choose(_TREES)}", seed=int(rng.between(0, 4)))
+        species, variant = rng.choose(_TREES), int(rng.between(0, 4))
+        tree = parametric_id(f"tree/{species}", season=self.season, seed=variant)
         bench = parametric_id("bench", seed=int(rng.between(0, 8)))
         for way in (-1.0, 1.0):
             for share in (-0.55, 0.0, 0.55):

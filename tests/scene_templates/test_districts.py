@@ -17,6 +17,7 @@ from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.scene import Scene, SharedValue
 from gen_data.generator.core.streams import Streams
 from gen_data.randomizers.lane_objects import LaneObjects as DrawLaneObjects
+from gen_data.randomizers.weather import PRESETS
 from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.crosswalk import Crosswalk
 from gen_data.scene_templates.element import Element
@@ -228,3 +229,20 @@ def test_towers_stand_where_one_sees_a_city() -> None:
 
     assert share["village"] == share["country_road"] == share["garden_villas"] == 0.0
     assert share["leafy_suburb"] < share["residential"] < 0.5 < share["arterial"] < 0.9
+
+
+def test_trees_are_bare_where_snow_lies() -> None:
+    """Every weather with snow on the ground draws winter, whose deciduous trees are bare."""
+    snowy = [name for name, preset in PRESETS.items() if preset.condition.weather.snow_cover > 0.0]
+    assert len(snowy) == 15
+    for weather in snowy:
+        config = load_config("street", overrides=[f"shared.weather={weather}"])
+        shared = config.shared(Streams(3, 0, index=0))
+        assert dict(shared)["season"] == "winter"
+    parts = config.scene_config(shared).elements
+    trees = [part for part in parts if isinstance(part, LaneObjects) and "trees" in part.name]
+    found = {a for part in trees for a in part.assets.resolve(library(), part.name)}
+    leafy = {a.split("?")[0] for a in found if "bare" not in str(library().get(a).attributes)}
+
+    assert leafy == {"tree/conifer", "tree/pine", "tree/thuja"}
+    assert [part.season for part in parts if isinstance(part, Horizon)][:1] == ["winter"]

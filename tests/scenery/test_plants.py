@@ -12,6 +12,7 @@ from gen_data.generator.assets.scenery.branching import Lobe, grow_skeleton, poi
 from gen_data.generator.assets.scenery.textures.leaves import leaves
 from gen_data.generator.assets.scenery.trees import SPECIES, tree, tree_facts
 from gen_data.generator.core.asset_types import MeshData
+from gen_data.generator.core.colorimetry import luminance
 from tests.scenery.rays import cast
 
 LEAFY = [name for name in SPECIES if name != "conifer"]
@@ -57,6 +58,17 @@ def test_deciduous_trees_are_bare_in_winter(species: str, season: str, foliage: 
 
     assert dict(tree_facts(2, species, 1.0, season).attributes)["foliage"] == foliage
     assert leaves_of(mesh).any() == (foliage == "leafy")
+
+
+@pytest.mark.parametrize("species", SPECIES)
+def test_leaves_in_the_depth_of_a_crown_are_as_bright_as_at_its_surface(species: str) -> None:
+    """Reflectance is the leaf's own: renderers find how little light reaches the depth."""
+    leafy = [m.base_color for m in tree(2, species, 1.0).mesh.materials if m.role == "leaf"]
+
+    levels = luminance(np.array(leafy))
+
+    assert len(levels) == 4
+    assert levels.max() < 1.03 * levels.min()
 
 
 def test_autumn_is_redder_than_summer_and_spring_blossoms() -> None:

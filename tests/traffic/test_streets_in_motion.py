@@ -16,12 +16,16 @@ from gen_data.generator.assemble.pipeline_factory import (
 from gen_data.generator.assets.library import Library, open_library
 from gen_data.generator.core.errors import ConfigError, LayoutRejected
 from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.scene import Body, ObjectGroup, Scene
 from gen_data.generator.core.scene_time import scene_at
+from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.core.streams import Streams
+from gen_data.generator.traffic.lane_routes import LaneGraph
 from gen_data.randomizers.free_space import Footprint, Ground
+from gen_data.randomizers.traffic_actors import find_drivers
 from gen_data.randomizers.traffic_flow import TrafficFlow
+from tests.traffic.roads import lane
 
 SMALL = (
     "sensors[0].size_px=[64, 32]",
@@ -303,3 +307,18 @@ def test_a_given_route_is_driven() -> None:
     away = np.hypot(*(np.array(left.center_m)[:, :2] - end).T)
 
     assert away.min() < 1.5
+
+
+def test_what_is_parked_at_the_edge_of_a_lane_does_not_drive() -> None:
+    """On one lane: a car is a driver; a parked bicycle, a cone and a tuft of grass are scenery."""
+    assets = ("car?seed=0", "parked_bicycle?seed=1", "traffic_cone?seed=0", "grass_tuft?seed=0")
+    bodies = tuple(
+        Body(asset, asset, SE3((20.0 * k, 0.0, 0.0)), group="things", instance_id=k + 1)
+        for k, asset in enumerate(assets)
+    )
+    group = ObjectGroup("things", (), assets, 0, "lane")
+    graph = LaneGraph.of([lane("east", (-50.0, 0.0), (150.0, 0.0))], "driving")
+
+    drivers = find_drivers(Scene("test", bodies, groups=(group,)), graph, library())
+
+    assert [driver.body.name for driver in drivers] == ["car?seed=0"]

@@ -271,7 +271,8 @@ def _backpack(carrier: Carrier) -> list[Sheet]:
 
 
 _BACKPACK_STRAP = ((-0.07, 0.09, 0.5), (0.0, 0.1, 0.56), (0.07, 0.1, 0.52), (0.12, 0.105, 0.45),
-                   (0.13, 0.11, 0.38), (0.1, 0.13, 0.31), (0.04, 0.155, 0.27))  # fmt: skip
+                   (0.13, 0.11, 0.38), (0.1, 0.13, 0.31), (0.04, 0.155, 0.25),
+                   (-0.04, 0.15, 0.2), (-0.1, 0.12, 0.18))  # fmt: skip
 _SHOULDER_STRAP = ((-0.06, -0.08, 0.5), (0.0, -0.085, 0.57), (0.08, -0.07, 0.5), (0.13, -0.02, 0.4),
                    (0.13, 0.05, 0.28), (0.11, 0.1, 0.17), (0.06, 0.15, 0.06))  # fmt: skip
 """Courses of straps over a shoulder, in the template frame [m]."""
@@ -287,24 +288,53 @@ def _shoulder_bag(carrier: Carrier) -> list[Sheet]:
 
 
 def _strap(carrier: Carrier, course: Sequence[tuple[float, float, float]], width_m: float) -> Sheet:
-    """A ribbon on the clothes along a course in the template frame [m]."""
+    """A padded band on the clothes along a course in the template frame [m]."""
     template, posed, normals = carrier.surface
-    away = ((template[None] - np.array(course)[:, None]) ** 2).sum(axis=2)
-    # Of the nearest few the outermost layer's mean place: single vertices zigzag.
-    nearest = np.argsort(away, axis=1, kind="stable")[:, :4]
-    up = normals[nearest].mean(axis=1)
+    # The course passes the armpits: it lies on the trunk, never on a sleeve.
+    trunk = np.abs(template[:, 1]) < _TRUNK_M
+    template, posed, normals = template[trunk], posed[trunk], normals[trunk]
+    knots = np.array(course)
+    at = np.linspace(0.0, len(knots) - 1.0, _STRAP_ROWS)
+    way = np.stack([np.interp(at, np.arange(len(knots)), axis) for axis in knots.T], axis=1)
+    nearest = np.argsort(_squared_m(way, template), axis=1, kind="stable")[:, :6]
+    up = _smooth(normals[nearest].mean(axis=1), 2)
     up /= np.maximum(np.sqrt((up * up).sum(axis=1, keepdims=True)), 1e-9)
-    places = posed[nearest].mean(axis=1) + 0.026 * carrier.scale * up
-    places[1:-1] = 0.5 * places[1:-1] + 0.25 * (places[:-2] + places[2:])
+    places = _smooth(posed[nearest].mean(axis=1), 2)
+    # It rests on whatever stands out most below it.
+    rise = ((posed[None] - places[:, None]) * up[:, None]).sum(axis=2)
+    below = _squared_m(places, posed) < (0.6 * width_m * carrier.scale) ** 2
+    lift = np.where(below & (rise < 0.03), rise, 0.0).max(axis=1)
+    lift = np.maximum(lift, np.maximum(np.roll(lift, 1), np.roll(lift, -1)))
+    places += _smooth(lift[:, None], 3) * up
     along = np.gradient(places, axis=0)
     side = np.cross(up, along)
     side *= 0.5 * width_m / np.maximum(np.sqrt((side * side).sum(axis=1, keepdims=True)), 1e-9)
-    ribbon = np.stack([places - side, places + side], axis=1).reshape(-1, 3)
-    faces = grid_faces(len(places), 2)
+    band = np.stack([places + x * side + z * up for x, z in _BAND], axis=1).reshape(-1, 3)
+    faces = grid_faces(len(places), len(_BAND))
     material = carrier.person.outfit.bag_material
-    return Sheet(
-        ribbon, np.repeat(up, 2, axis=0), faces, np.zeros(len(faces), np.int64), (material,)
-    )
+    slots = np.zeros(len(faces), np.int64)
+    return Sheet(band, vertex_normals(band, faces), faces, slots, (material,))
+
+
+_STRAP_ROWS, _TRUNK_M = 33, 0.185
+"""Cross-sections of a strap; half of the trunk's width in the template frame [m]."""
+_BAND = ((-1.0, -0.012), (-1.0, 0.004), (-0.8, 0.009), (0.8, 0.009), (1.0, 0.004), (1.0, -0.012))
+"""Cross-section of a strap: shares of half of its width, and height above the clothes [m]."""
+
+
+def _squared_m(a: Array, b: Array) -> Array:
+    """Squared distances of points [n, 3] and [m, 3] from each other, [n, m]."""
+    squared: Array = ((b[None] - a[:, None]) ** 2).sum(axis=2)
+    return squared
+
+
+def _smooth(rows: Array, passes: int) -> Array:
+    """Rows averaged with their neighbours; the ends stay."""
+    for _ in range(passes):
+        rows = np.concatenate(
+            [rows[:1], 0.5 * rows[1:-1] + 0.25 * (rows[:-2] + rows[2:]), rows[-1:]]
+        )
+    return rows
 
 
 def _visor(carrier: Carrier) -> list[Sheet]:

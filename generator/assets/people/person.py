@@ -13,15 +13,17 @@ from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Facts
 from gen_data.generator.assets.procedural.material_presets import (
     draw_linear,
-    hex_to_linear,
-    jitter_color,
 )
+from gen_data.generator.assets.procedural.skin import TONES, skin_color
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.se3 import Vec3
 
 _COLORS = load_table(__package__, "wardrobe", tuple[str, ...])
+_LIGHT, _DARK = 3, 6
+"""Tones below the first are light, from the second on dark. All ten tones are drawn alike often, so
+that none is rare in training; with which features and hair they go is assumed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,7 +219,7 @@ _HAIRCUTS = {
              "curly", "bald"),
 }  # fmt: skip
 _HORSESHOE_SHARE, _AFRO_SHARE = 0.4, 0.3
-"""Of men over 65 whose crown is bald; of short or cropped hair on the two darkest skins."""
+"""Of men over 65 whose crown is bald; of short or cropped hair on dark skin."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,7 +268,7 @@ def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
     sex: Sex = "female" if rng.chance(0.5) else "male"
     age_group = _drawn_age(rng)
     height_m = _drawn_height_m(sex, age_group, rng)
-    tone = rng.choose(range(len(_COLORS["skin"])))
+    tone = rng.choose(range(TONES))
     figure = _drawn_figure(sex, age_group, height_m, tone, rng)
     face_rng = variant_rng("person/face", seed)
     figure |= _drawn_features(age_group, face_rng)
@@ -277,7 +279,7 @@ def draw_person(seed: int, pose: str = "", phase: float = -1.0) -> Person:
         age_group,
         height_m,
         figure,
-        skin=jitter_color(hex_to_linear(_COLORS["skin"][tone]), 0.07, rng),
+        skin=skin_color(tone, rng),
         hair=_drawn_hair(age_group, tone, rng),
         haircut=_drawn_haircut(sex, age_group, tone, rng, face_rng),
         face=_drawn_face(sex, age_group, face_rng),
@@ -340,7 +342,7 @@ def _drawn_figure(
         mean, _ = _HEIGHT_M[sex]
         tall = max(-0.6, min(0.6, (height_m - mean) / 0.3))
         figure |= {"maxheight": max(0.0, tall), "minheight": max(0.0, -tall)}
-    main = ("caucasian", "asian", "african")[0 if tone < 2 else 1 if tone < 4 else 2]
+    main = ("caucasian", "asian", "african")[0 if tone < _LIGHT else 1 if tone < _DARK else 2]
     other = rng.choose(("caucasian", "asian", "african"))
     share = rng.between(0.0, 0.4)
     figure[main] = 1.0 - share
@@ -361,7 +363,9 @@ def _drawn_hair(age_group: AgeGroup, tone: int, rng: VariantRng) -> Vec3:
     if age_group == "senior" and rng.chance(0.8):
         return draw_linear(_COLORS["grey_hair"], 0.1, rng)
     # Fair hair belongs to fair skin.
-    return draw_linear(_COLORS["hair"][: 8 if tone < 2 else 4 if tone < 4 else 2], 0.12, rng)
+    return draw_linear(
+        _COLORS["hair"][: 8 if tone < _LIGHT else 4 if tone < _DARK else 2], 0.12, rng
+    )
 
 
 def _drawn_haircut(
@@ -372,7 +376,7 @@ def _drawn_haircut(
     if sex == "male" and age_group == "senior" and draw < _HORSESHOE_SHARE:
         return "horseshoe"
     short = haircut in ("short", "cropped", "curly", "fringe", "side_part")
-    if short and tone >= len(_COLORS["skin"]) - 2:
+    if short and tone >= _DARK:
         return "afro" if draw < _AFRO_SHARE else "cropped"
     return haircut
 
@@ -390,7 +394,7 @@ def _drawn_face(sex: Sex, age_group: AgeGroup, rng: VariantRng) -> int:
 
 def _drawn_eyes(tone: int, rng: VariantRng) -> int:
     """A row of ``eye_colors.yaml``: light eyes belong to light skin."""
-    return rng.choose((0, 1, 1, 2, 3, 4, 5, 6, 6, 7) if tone < 2 else (0, 0, 1, 1, 2))
+    return rng.choose((0, 1, 1, 2, 3, 4, 5, 6, 6, 7) if tone < _LIGHT else (0, 0, 1, 1, 2))
 
 
 def _drawn_features(age_group: AgeGroup, rng: VariantRng) -> dict[str, float]:

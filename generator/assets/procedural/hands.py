@@ -14,7 +14,6 @@ import numpy as np
 
 from gen_data.generator.assets.procedural import hand_shape
 from gen_data.generator.assets.procedural import surface_shapes as shapes
-from gen_data.generator.assets.procedural.data_tables import load_table
 from gen_data.generator.assets.procedural.family import Facts, Solid, choose_option
 from gen_data.generator.assets.procedural.food_shapes import wrap
 from gen_data.generator.assets.procedural.hand_shape import ARM_M, Bones
@@ -28,6 +27,7 @@ from gen_data.generator.assets.procedural.patches import (
     rotate,
     unit,
 )
+from gen_data.generator.assets.procedural.skin import SKIN, skin_color
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
 from gen_data.generator.core.asset_types import Keypoint, Material
 from gen_data.generator.core.se3 import Vec3
@@ -36,7 +36,6 @@ GRASP = "grasp"
 POSE_NAMES = ("relaxed", "flat", GRASP, "point", "pinch", "fist")
 RADII_M = (0.015, 0.046)
 """Smallest and largest radius that a hand holds."""
-SKIN = load_table(__package__, "skin_tones", tuple[str, ...])
 JOINTS = (
     "wrist",
     *(f"{finger}_{k}" for finger in ("thumb", *hand_shape.FINGERS) for k in (1, 2, 3, 4)),
@@ -304,9 +303,7 @@ def _with_keypoints(
 
 
 def _materials(seed: int, rng: VariantRng, has_sleeve: bool) -> list[Material]:
-    tone = jitter_color(hex_to_linear(SKIN["monk"][_tone(seed)]), 0.06, rng)
-    # Blood shows through skin: redder than the scale's swatches of makeup (assumed).
-    skin: Vec3 = (min(1.0, 1.04 * tone[0]), 0.94 * tone[1], 0.88 * tone[2])
+    skin = skin_color(_tone(seed), rng)
     rough = rng.between(0.42, 0.56)
     hand_texture, arm_texture = (
         f"texture/hand_skin?kind={k}&seed={seed % 8}" for k in ("hand", "arm")

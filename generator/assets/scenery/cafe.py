@@ -18,10 +18,11 @@ from gen_data.generator.assets.procedural.material_presets import (
     painted_material,
     patterned_material,
 )
-from gen_data.generator.assets.procedural.patches import Array, Patch, join_patches
+from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.surface_shapes import block, cone, grid, lathe
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn, variant_rng
-from gen_data.generator.assets.scenery.basic_shapes import facing_rectangle, make_solid, post, quad
+from gen_data.generator.assets.scenery.awnings import awning_cloth, hanging_cloth
+from gen_data.generator.assets.scenery.basic_shapes import make_solid, post
 from gen_data.generator.assets.scenery.clutter_shapes import (
     Rectangle,
     bar,
@@ -208,8 +209,7 @@ def market_stall(seed: int) -> Solid:
     for y in np.linspace(-half + 0.3, half - 0.3, 3).tolist():
         for x in (-0.3, front - 0.05):
             parts.append(block((x, y - 0.03, 0.0), (x + 0.05, y + 0.03, table - 0.04), 0.0, 1))
-    cloth = facing_rectangle(front + 0.005, (-half + 0.1, half - 0.1), (0.12, table), 2)
-    parts += [cloth, cloth.flipped().moved(-0.004)]
+    parts += hanging_cloth(front + 0.03, (-half + 0.1, half - 0.1), (0.12, table), 2)
     columns = max(3, int((2 * half - 0.3) / 0.55))
     for row in range(2):
         for k in range(columns):
@@ -238,16 +238,9 @@ def market_stall(seed: int) -> Solid:
 
 def _awning(half: float, deep: float, striped: bool) -> list[Patch]:
     """A sloping sheet over a stall with a valance in front, striped along Y."""
-    (x0, z0), (x1, z1) = (-deep - 0.1, 2.52), (deep + 0.25, 2.12)
-    fields, parts = 8, []
-    edges: Array = np.linspace(-half - 0.1, half + 0.1, fields + 1)
-    for k in range(fields):
-        a, b = float(edges[k]), float(edges[k + 1])
-        slot = _SLOT_STRIPE if striped and k % 2 else _SLOT_CANVAS
-        sheet = quad([(x1, a, z1), (x1, b, z1), (x0, b, z0), (x0, a, z0)], slot)
-        hem = quad([(x1, a, z1 - 0.22), (x1, b, z1 - 0.22), (x1, b, z1), (x1, a, z1)], slot)
-        parts += [sheet, sheet.flipped().moved(z=-0.006), hem, hem.flipped().moved(-0.006)]
-    return parts
+    edges = np.linspace(-half - 0.1, half + 0.1, 9).tolist()
+    slots = [_SLOT_STRIPE if striped and k % 2 else _SLOT_CANVAS for k in range(8)]
+    return awning_cloth((deep + 0.25, 2.12), (-deep - 0.1, 2.52), edges, slots, 0.24)
 
 
 def _crate(slot: int, rng: VariantRng) -> list[Patch]:

@@ -17,6 +17,7 @@ from gen_data.generator.assets.procedural.patches import GRID_M, Array, Indices,
 from gen_data.generator.assets.scenery.foliage import Sprays, directions
 from gen_data.generator.assets.scenery.textures.leaves import TILES
 from gen_data.generator.core.asset_types import Material, MeshData
+from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
 
@@ -174,6 +175,24 @@ def leaf_material(kind: str, color: str, level: float = 1.0, warm: float = 1.0) 
     texture = f"texture/leaves?kind={kind}&seed=0"
     leaf = Material(tint, roughness=0.75, specular=0.35, texture=texture, role="leaf")
     return transmitting(leaf, _TISSUES.get(kind, BROAD))
+
+
+def crown_shades(
+    kind: str, codes: Sequence[str], level: float = 1.0, warm: float = 1.0
+) -> tuple[Material, ...]:
+    """Leaves from a crown's depth to its surface; arguments as for ``leaf_material``."""
+    levels = [level * factor for factor in depth_levels(codes)]
+    return tuple(leaf_material(kind, code, k, warm) for code, k in zip(codes, levels, strict=True))
+
+
+def depth_levels(codes: Sequence[str]) -> list[float]:
+    """Factors that make all of a crown's colours as bright as the last, that of its surface.
+
+    Leaves in a crown's depth are dark for want of light, which renderers find; that they reflect
+    as much as others is assumed.
+    """
+    levels = luminance(np.array([hex_to_linear(code) for code in codes]))
+    return [float(k) for k in np.round(levels[-1] / levels, 6)]
 
 
 def drop_unused_slots(mesh: MeshData) -> MeshData:

@@ -29,6 +29,7 @@ from gen_data.generator.assets.scenery.leaf_cards import (
     Cards,
     card_mesh,
     cards_about,
+    crown_shades,
     drop_unused_slots,
     join_cards,
     leaf_material,
@@ -248,7 +249,7 @@ def _planted(
 
 def _leaves(kind: str, codes: Sequence[str], rng: VariantRng) -> tuple[Material, ...]:
     level, warm = rng.between(0.95, 1.3), rng.between(0.9, 1.12)
-    return tuple(leaf_material(kind, code, level, warm) for code in codes)
+    return crown_shades(kind, codes, level, warm)
 
 
 def _shades(count: int, rng: VariantRng) -> Indices:

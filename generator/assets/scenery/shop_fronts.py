@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.assets.scenery import facade
-from gen_data.generator.assets.scenery.basic_shapes import Span, facing_rectangle, quad
+from gen_data.generator.assets.scenery.awnings import awning_cloth
+from gen_data.generator.assets.scenery.basic_shapes import Span, tube
 from gen_data.generator.assets.scenery.facade import (
     ACCENT,
     AWNING,
@@ -190,22 +190,23 @@ def _joinery(shop: Premises, rng: VariantRng) -> list[Patch]:
 
 
 def awning(y_m: Span, z1: float, out_m: float, rng: VariantRng) -> Patch:
-    """A cloth roof over a shop window with a short valance, in one colour or striped."""
+    """A cloth roof over a shop window with a valance, in one colour or striped, and its arms."""
     (y0, y1), low = y_m, z1 - 0.32 * out_m
-    count = max(2, round((y1 - y0) / 0.3)) if rng.chance(0.4) else 1
+    is_striped = rng.chance(0.4)
+    count = max(2, round((y1 - y0) / 0.3))
     edges = [y0 + (y1 - y0) * k / count for k in range(count + 1)]
     paints = (rng.choose((AWNING, ACCENT)), facade.WHITE)
-    parts: list[Patch] = []
-    for k in range(count):
-        a, b, slot = edges[k], edges[k + 1], paints[k % 2]
-        cloth = [(0.02, a, z1), (out_m, a, low), (out_m, b, low), (0.02, b, z1)]
-        under = [(x, y, z - 0.01) for x, y, z in cloth[::-1]]
-        parts += [quad(cloth, slot), quad(under, slot)]
-        parts.append(facing_rectangle(out_m, (a, b), (low - 0.18, low), slot))
-    end = [(0.02, z1 - 0.12), (out_m, low - 0.18), (out_m, low), (0.02, z1)]
-    for y in y_m:
-        loop: Sequence[tuple[float, float]] = end if y == y0 else end[::-1]
-        parts.append(quad([(x, y, z) for x, z in loop], paints[0]))
+    slots = [paints[k % 2 if is_striped else 0] for k in range(count)]
+    parts = awning_cloth((out_m, low), (0.02, z1), edges, slots, 0.2)
+    # The box that it rolls into, the bar in front, and the arms.
+    box = (0.0, 0.1, y0, y1, z1 - 0.01, z1 + 0.1)
+    bar = (out_m - 0.04, out_m - 0.006, y0, y1, low - 0.035, low - 0.006)
+    parts.append(ledges([box, bar], METAL))
+    parts += [
+        tube([(0.02, y, z1 - 0.16), (0.5 * out_m, y, low - 0.1), (out_m - 0.03, y, low - 0.02)],
+             0.014, 5).painted(METAL)
+        for y in (y0 + 0.12, y1 - 0.12)
+    ]  # fmt: skip
     return join_patches(parts)
 
 

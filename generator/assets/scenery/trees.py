@@ -42,6 +42,8 @@ from gen_data.generator.assets.scenery.leaf_cards import (
     BROAD,
     Cards,
     card_mesh,
+    crown_shades,
+    depth_levels,
     drop_unused_slots,
     first_cards,
     leaf_material,
@@ -58,8 +60,8 @@ _TWIGS = 1100
 _COVER = 0.58
 """Share of a card that counts as leaf, fitted so that 0.9 to 0.99 of level rays through the middle
 of a crown meet one."""
-_LEAF_LEVEL = 1.45
-"""Leaves in the textures have this part of the colours in ``species.yaml``, inverted."""
+_LEAF_LEVEL = 1.2
+"""Leaves in the textures have this part of the surface's colours in ``species.yaml``, inverted."""
 _ATTRACTORS = 900
 _STEP = 0.12
 """Length of an internode, of the widest lobe's radius."""
@@ -220,7 +222,7 @@ def _season_leaves(
     codes = kind.autumn if season == "autumn" and kind.autumn else shape.green
     if season == "spring":
         level *= 1.25
-    made = [leaf_material(kind.leaf, code, level, warm) for code in codes]
+    made = list(crown_shades(kind.leaf, codes, level, warm))
     if kind.blossom:
         made.append(leaf_material("blossom", kind.blossom, 1.1))
     return tuple(made)
@@ -307,7 +309,7 @@ def _conifer(rng: VariantRng) -> Solid:
     sprays = Sprays(places, outward, growth, reach_m, slots)
     warm = rng.between(0.9, 1.1)
     codes = ("#2a3926", "#364a30", "#435839", "#526845")
-    greens = tuple(leaf_material("needle", code, _LEAF_LEVEL, warm) for code in codes)
+    greens = crown_shades("needle", codes, _LEAF_LEVEL, warm)
     wooden = finish_mesh(trunk, (_bark("#6a5a4c"),), 60.0)
     mesh = merge_meshes(wooden, card_mesh(spray_cards(sprays, rng), greens, OUTWARD, rng))
     hull = hulls.frustum((base_m, 0.0), (0.6 * base_m, 0.5 * height), 10)
@@ -350,8 +352,8 @@ def leaf_greens(codes: tuple[str, ...], rng: VariantRng) -> tuple[Material, ...]
     r, g, b = jitter_color((1.0, 1.0, 1.0), 0.0, rng)
     warm, level = rng.between(0.85, 1.18), rng.between(0.85, 1.15)
     colors = (
-        (level * warm * c[0] * r, level * c[1] * g, level * c[2] * b)
-        for c in map(hex_to_linear, codes)
+        (k * level * warm * c[0] * r, k * level * c[1] * g, k * level * c[2] * b)
+        for c, k in zip(map(hex_to_linear, codes), depth_levels(codes), strict=True)
     )
     plain = (Material(c, roughness=0.75, specular=0.35, role="leaf") for c in colors)
     return tuple(transmitting(leaf, BROAD) for leaf in plain)

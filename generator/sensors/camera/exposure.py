@@ -16,9 +16,10 @@ from gen_data.generator.core.colorimetry import MIDDLE_GREY, luminance
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.shutter import Shutter
 
-# From 1/30 s at f/1.4 and ISO 3200 to sunlit snow. Automatic exposure stops there, so that night
-# scenes stay dark.
-_EV100_RANGE = (1.0, 17.0)
+EV100_RANGE = (1.0, 17.0)
+"""Of a camera without limits of its own: from 1/30 s at f/1.4 and ISO 3200 to sunlit snow.
+
+Automatic exposure stops there, so that night scenes stay dark."""
 _METERED_EVERY = 4
 _EV100_STEPS = 256.0
 """Steps per exposure value: on a grid, as the last bit of a sum differs between processors."""
@@ -68,7 +69,13 @@ def saturation_cd_m2(ev100: float) -> float:
     return float(1.2 * 2.0**ev100)
 
 
-def meter_ev100(radiance: Float32) -> float:
+def reachable_ev100(control: ExposureControl) -> tuple[float, float]:
+    """The lowest and the highest exposure value within the limits of a camera."""
+    low, high = (exposure_settings(ev100, control).ev100 for ev100 in (-100.0, 100.0))
+    return low, high
+
+
+def meter_ev100(radiance: Float32, limits_ev100: tuple[float, float] = EV100_RANGE) -> float:
     """The exposure value that puts the centre-weighted log-average luminance at middle grey.
 
     Source: Reinhard et al., "Photographic tone reproduction for digital images", 2002. Radiance is
@@ -79,7 +86,7 @@ def meter_ev100(radiance: Float32) -> float:
     weights = _centre_weights(*levels.shape)
     brightest = float(levels.max(initial=0.0))
     if brightest <= 0.0:
-        return _EV100_RANGE[0]
+        return limits_ev100[0]
     # Black pixels (a missing background) are left out. "Black" is relative to a quantile, as the
     # maximum would depend on lamps in the image.
     bright = float(np.quantile(levels[levels > 0.0], 0.95))
@@ -87,12 +94,19 @@ def meter_ev100(radiance: Float32) -> float:
     logs = np.log2(levels[counted])
     average = float((logs * weights[counted]).sum() / weights[counted].sum())
     ev100 = average - math.log2(1.2 * MIDDLE_GREY)
-    ev100 = min(max(ev100, _EV100_RANGE[0]), _EV100_RANGE[1])
+    ev100 = min(max(ev100, limits_ev100[0]), limits_ev100[1])
     return round(ev100 * _EV100_STEPS) / _EV100_STEPS
 
 
-def meter_mean_ev100(radiance: Float32, mean: float) -> float:
-    """The exposure value at which the image has this mean, where what saturates counts as 1.
+def meter_mean_ev100(
+    radiance: Float32,
+    mean: float,
+    clipped: float = 1.0,
+    limits_ev100: tuple[float, float] = EV100_RANGE,
+) -> float:
+    """The lowest exposure value at which the image is no brighter than this mean.
+
+    What saturates counts as 1.
 
     Automatic exposure of machine vision cameras: "to achieve a specific average image intensity"
     of the whole image (Point Grey, Flea3 FL3-U3 Technical Reference, section 7.10). Bright surfaces
@@ -101,6 +115,8 @@ def meter_mean_ev100(radiance: Float32, mean: float) -> float:
     Args:
         radiance: Linear RGB [cd/m^2], shape [h, w, 3].
         mean: Share of saturation, above 0 and below 1.
+        clipped: Largest share of the image that may saturate, above 0.
+        limits_ev100: The lowest and the highest exposure value.
     """
     levels = np.sort(luminance(radiance[::_METERED_EVERY, ::_METERED_EVERY]).ravel())
     below = np.concatenate([[0.0], np.cumsum(levels, dtype=np.float64)])
@@ -108,9 +124,12 @@ def meter_mean_ev100(radiance: Float32, mean: float) -> float:
     def is_dark_enough(step: int) -> bool:
         white = saturation_cd_m2(step / _EV100_STEPS)
         lit = int(np.searchsorted(levels, white))
-        return float(below[lit]) / white + len(levels) - lit <= mean * len(levels)
+        over = len(levels) - lit
+        return over <= clipped * len(levels) and float(below[lit]) / white + over <= mean * len(
+            levels
+        )
 
-    steps = range(*(round(ev100 * _EV100_STEPS) for ev100 in _EV100_RANGE))
+    steps = range(*(round(ev100 * _EV100_STEPS) for ev100 in limits_ev100))
     return (steps.start + bisect_left(steps, True, key=is_dark_enough)) / _EV100_STEPS
 
 

@@ -29,11 +29,13 @@ from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.camera import isp, optics
 from gen_data.generator.sensors.camera.exposure import (
+    EV100_RANGE,
     ExposureControl,
     ExposureSettings,
     exposure_settings,
     meter_ev100,
     meter_mean_ev100,
+    reachable_ev100,
     saturation_cd_m2,
 )
 from gen_data.generator.sensors.camera.image_sensor import (
@@ -89,6 +91,8 @@ class ImagePipeline(Strict):
         metered_mean: Mean of the linear image that automatic exposure sets, as a share of
             saturation, where what saturates counts as 1; null = the log-average luminance becomes
             middle grey.
+        metered_clip: Largest share of the image that automatic exposure with a ``metered_mean``
+            lets saturate; 1 = any.
         exposure_compensation_ev: Added to the exposure, in stops; positive is brighter.
         exposure_error_ev: Error of metering, in stops; positive is brighter.
         exposure_control: Limits of aperture, time and gain of an image sensor; without a sensor
@@ -123,6 +127,7 @@ class ImagePipeline(Strict):
     fisheye_pupil: float = Field(0.0, ge=0, le=1)
     vignetting: UnitInterval = NONE
     metered_mean: float | None = Field(None, gt=0, lt=1)
+    metered_clip: float = Field(1.0, gt=0, le=1)
     exposure_compensation_ev: Annotated[Scalar, Bounds(-10, 10)] = NONE
     exposure_error_ev: Annotated[Scalar, Bounds(-8, 8)] = NONE
     exposure_control: ExposureControl = ExposureControl()
@@ -274,9 +279,13 @@ def develop(
 
 
 def _metered(radiance: Float32, pipeline: ImagePipeline) -> float:
-    """The exposure value by the pipeline's meter."""
-    mean = pipeline.metered_mean
-    return meter_ev100(radiance) if mean is None else meter_mean_ev100(radiance, mean)
+    """The exposure value by the pipeline's meter, within the limits of a camera with a sensor."""
+    mean, limits_ev100 = pipeline.metered_mean, EV100_RANGE
+    if pipeline.image_sensor is not None:
+        limits_ev100 = reachable_ev100(pipeline.exposure_control)
+    if mean is None:
+        return meter_ev100(radiance, limits_ev100)
+    return meter_mean_ev100(radiance, mean, pipeline.metered_clip, limits_ev100)
 
 
 def _lens_drops(light: Light, shot: Shot) -> Light:

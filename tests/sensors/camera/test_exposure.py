@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from gen_data.generator.sensors.camera.exposure import (
+    ExposureControl,
     meter_ev100,
     meter_mean_ev100,
+    reachable_ev100,
     saturation_cd_m2,
 )
 
@@ -85,6 +87,30 @@ def test_metering_of_the_mean_stops_where_cameras_do() -> None:
     """Darkness and endless light meet the ends of the range."""
     assert meter_mean_ev100(np.zeros((8, 8, 3), np.float32), 0.36) == 1.0
     assert meter_mean_ev100(np.full((8, 8, 3), 1e9, np.float32), 0.36) == 17.0
+
+
+def test_metering_of_the_mean_stops_before_too_much_saturates() -> None:
+    """Sunlit snow of 9000 cd/m^2 on 0.3 of a dark view stays below white if 0.2 may saturate."""
+    view = np.full((80, 80, 3), 200.0, np.float32)
+    view[:24] = 9000.0
+
+    white = saturation_cd_m2(meter_mean_ev100(view, 0.36, clipped=0.2))
+
+    assert saturation_cd_m2(meter_mean_ev100(view, 0.36)) < 9000.0
+    assert white == pytest.approx(9000.0, rel=0.003)
+    assert white > 9000.0
+
+
+def test_metering_stops_where_the_camera_does() -> None:
+    """ISO 12232 by hand: f/2, 1/32 s and ISO 6400 reach log2(4 * 32 / 64) = 1."""
+    limits = reachable_ev100(
+        ExposureControl(f_number=2.0, time_s=(1 / 8192, 1 / 32), iso=(100, 6400))
+    )
+    dark, endless = np.full((8, 8, 3), 1e-6, np.float32), np.full((8, 8, 3), 1e9, np.float32)
+
+    assert limits == pytest.approx((1.0, 15.0))
+    assert meter_ev100(dark, limits) == meter_mean_ev100(dark, 0.36, 1.0, limits) == 1.0
+    assert meter_ev100(endless, limits) == meter_mean_ev100(endless, 0.36, 1.0, limits) == 15.0
 
 
 @pytest.mark.parametrize(("lux", "ev100"), [(2.5, 0.0), (2500.0, 9.966), (80_000.0, 14.966)])

@@ -132,8 +132,9 @@ def _metal(wear: float, size_px: Size, rng: VariantRng) -> Marks:
 def _plastic(wear: float, size_px: Size, rng: VariantRng) -> Marks:
     """Grease where hands hold it, scuffs and fingerprints."""
     held = traces.noise_bytes(COARSE, size_px, rng)
-    soiled = traces.ramp_bytes(held, 0.5, 1.0, 0.18 * wear)
-    specks = traces.ramp_bytes(traces.noise_bytes(FINE, size_px, rng), 0.68, 0.95, 0.25 * wear)
+    # A film without edges: what has edges at this scale reads as marble.
+    soiled = traces.ramp_bytes(held, 0.2, 1.0, 0.16 * wear)
+    specks = traces.ramp_bytes(traces.noise_bytes(FINE, size_px, rng), 0.8, 1.0, 0.15 * wear)
     fine = traces.scratches(int(6 + 90 * wear), 110.0, size_px, rng, 0.6)
     prints = _fingerprints(int(1 + 6 * wear), _SCALES_M["plastic"], size_px, rng)
     films = [Film(soiled, _GREASE), Film(specks, _GREASE),

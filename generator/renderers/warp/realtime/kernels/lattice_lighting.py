@@ -16,6 +16,7 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     sheet_side,
 )
 from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import (
+    CROWN_GLOW,
     CROWN_M,
     make_frame,
     path_to_lamp,
@@ -594,5 +595,5 @@ def visible_sky_fraction(
             within = free_path_before(world, body, path_along(start, way * CROWN_M), 1.0)
         t = free_path(world, path_along(start, way * radius_m))
         # Full occlusion on contact, fading with zero slope at the radius.
-        total += wp.min(t * (2.0 - t), within)
+        total += wp.min(t * (2.0 - t), wp.max(within, CROWN_GLOW))
     return total / float(disc.shape[0])
