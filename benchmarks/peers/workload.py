@@ -5,12 +5,18 @@ Everything is made here, from formulas, so that the workload is the same whereve
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.peers.worlds import Lamp, World, write_worlds
 from gen_data.generator.assemble.config import Config, load_config
+from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+from gen_data.generator.core.interfaces import Sensor
+from gen_data.generator.core.scene import Scene
+from gen_data.generator.pipeline.pipeline import DrawnView
 
 OBJECTS = 10
 RINGS, SECTORS = 78, 78
@@ -120,3 +126,40 @@ def make_config(assets: Path, folder: Path, *, full: bool) -> Config:
     path = folder / f"workload_{'full' if full else 'plain'}.yaml"
     path.write_text(text)
     return load_config(str(path), seed=1)
+
+
+VIEWS_NAME = "views.pickle"
+"""File of the settled views, with the sensors that read them."""
+Views = list[tuple[DrawnView, tuple[Sensor, ...]]]
+
+
+def prepare(folder: Path, count: int) -> None:
+    """Draw and settle ``count`` scenes; write them for this renderer, and as worlds for others."""
+    assets = folder / "assets"
+    write_assets(assets)
+    views: Views = []
+    with PipelineFactory(make_config(assets, folder, full=False), count)() as pipeline:
+        for k in range(count):
+            accepted = pipeline.accepted_scene(k)
+            views.append((pipeline.drawn_view(accepted, 0), tuple(accepted.sensors)))
+    (folder / VIEWS_NAME).write_bytes(pickle.dumps(views))
+    write_worlds([describe_world(view.scene, assets) for view, _ in views], folder)
+
+
+def describe_world(scene: Scene, assets: Path) -> World:
+    """The scene without anything of this project."""
+    (camera,) = scene.cameras
+    names = [body.asset.rpartition("/")[2] for body in scene.bodies]
+    lens = camera.intrinsics
+    return World(
+        meshes=tuple(str(assets / name / f"{name}.obj") for name in names),
+        T_world_bodies=tuple(body.T_world_body.matrix().tolist() for body in scene.bodies),
+        ids=tuple(body.instance_id for body in scene.bodies),
+        lamps=tuple(
+            Lamp(lamp.position_m, lamp.radius_m, tuple(lamp.intensity_cd * c for c in lamp.color))
+            for lamp in scene.lights
+        ),
+        T_world_camera=camera.T_world_camera.matrix().tolist(),
+        size_px=(lens.width_px, lens.height_px),
+        focal_px=lens.fx_px,
+    )
