@@ -10,7 +10,7 @@ bpy and pyrender need an older NumPy than this project. They run in an environme
 
     python3.11 -m venv peers
     peers/bin/pip install bpy pyrender OpenEXR opencv-python-headless
-    python -m benchmarks.bench_peers --python "Blender Cycles=peers/bin/python" pyrender=...
+    p=peers/bin/python; python -m benchmarks.bench_peers --python "Blender Cycles=$p" "pyrender=$p"
 """
 
 from __future__ import annotations
@@ -41,6 +41,10 @@ AGREEMENT_MIN = 0.9
 """Mean IoU of masks below which a renderer does not draw the scenes; edges alone cost 0.05."""
 
 
+SLOW_S = 2.0
+"""CPU seconds per sample above which a renderer takes part in one round only."""
+
+
 @dataclass(frozen=True)
 class Figures:
     """Figures of one renderer.
@@ -62,7 +66,7 @@ class Renderer:
     def __init__(self, name: str, folder: Path, interpreter: str, core: int) -> None:
         self.name = name
         command = [interpreter, "-m", "benchmarks.peers.worker", name, str(folder), str(core)]
-        one_thread = {k: "1" for k in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "LP_NUM_THREADS")}
+        limits = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "LP_NUM_THREADS")
         log = output_folder(folder, name).with_suffix(".log").open("w")
         self._process = subprocess.Popen(
             command,
@@ -70,14 +74,16 @@ class Renderer:
             stdout=subprocess.PIPE,
             stderr=log,
             text=True,
-            env={**os.environ, **one_thread},
+            env={**os.environ, **dict.fromkeys(limits, "1")},
         )
         log.close()
 
     def __enter__(self) -> Renderer:
+        """Nothing: it starts when it is made."""
         return self
 
     def __exit__(self, *exception: object) -> None:
+        """End the process."""
         self._process.kill()
         self._process.communicate()
 
@@ -118,9 +124,10 @@ def compare(
             else:
                 found[name] = str(answer["missing"])
         spent_s: dict[Renderer, list[float]] = {renderer: [] for renderer in ready}
-        for _ in range(rounds):
+        for number in range(rounds):
             for renderer, mine in spent_s.items():
-                mine.append(renderer.measure_round() / count)
+                if number == 0 or ready[renderer] < SLOW_S * count:
+                    mine.append(renderer.measure_round() / count)
         for renderer, mine in spent_s.items():
             start_s = ready[renderer] - count * statistics.median(mine)
             agreement = measure_agreement(folder, renderer.name, count)

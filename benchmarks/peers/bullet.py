@@ -55,13 +55,16 @@ def _open(
                 body, T[:3, 3], quaternion_xyzw(T[:3, :3]), physicsClientId=client
             )
         view = np.linalg.inv(world.T_world_gl)
+        to_lamp_m = np.array(world.lamps[0].position_m) - world.focus_m
+        distance_m = float(np.linalg.norm(to_lamp_m))
         width_px, height_px = world.size_px
         _, _, rgba, depth, found = pybullet.getCameraImage(
             width_px,
             height_px,
             viewMatrix=view.T.ravel().tolist(),
             projectionMatrix=projection(world).T.ravel().tolist(),
-            lightDirection=(np.array(world.lamps[0].position_m) - world.focus_m).tolist(),
+            lightDirection=(to_lamp_m / distance_m).tolist(),
+            lightDistance=distance_m,
             shadow=int(shadow),
             renderer=renderer,
             physicsClientId=client,

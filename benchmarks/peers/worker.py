@@ -36,7 +36,9 @@ RENDERERS = {
 def open_round(name: str, folder: Path) -> Round:
     """Load a renderer with the meshes of a folder."""
     module_name, _, function = RENDERERS[name].partition(":")
-    opener: Callable[[Any], Any] = getattr(import_module(f"benchmarks.peers.{module_name}"), function)
+    opener: Callable[[Any], Any] = getattr(
+        import_module(f"benchmarks.peers.{module_name}"), function
+    )
     out = output_folder(folder, name)
     out.mkdir(exist_ok=True)
     if module_name == "own":

@@ -43,7 +43,11 @@ randomizers:
     distance_m: {{uniform: [1.6, 2.2]}}
     elevation_deg: {{uniform: [30, 65]}}
 sensors:
-  - {{type: rgb_camera, name: color, size_px: [640, 480], hfov_deg: 50, channels: [rgb, depth, instance]}}
+  - type: rgb_camera
+    name: color
+    size_px: [640, 480]
+    hfov_deg: 50
+    channels: [rgb, depth, instance]
 annotations: [{annotations}]
 exporters: [{exporters}]
 """
@@ -95,7 +99,9 @@ def ground_mesh() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
     vertices_m = corners * [GROUND_SIDE_M / 2, GROUND_SIDE_M / 2, 0.01]
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return vertices_m, np.array([t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))])
+    first = 4 * np.arange(6)[:, None]  # every side has vertices of its own: renderers smooth others
+    faces = np.concatenate([first + np.array(corner) for corner in ((0, 1, 2), (0, 2, 3))])
+    return vertices_m[np.ravel(quads)], faces
 
 
 def write_assets(folder: Path) -> None:

@@ -6,8 +6,9 @@ Renderers run in interpreters of their own, so that this module needs NumPy and 
 from __future__ import annotations
 
 import json
+import pickle
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,10 +16,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-WORLDS_NAME = "worlds.json"
+WORLDS_NAME = "worlds.pickle"
 DEPTH_UNIT_M = 0.001
-NEAR_M, FAR_M = 0.1, 20.0
-"""Of renderers with a depth buffer."""
+NEAR_M, FAR_M = 0.01, 100.0
+"""Of renderers with a depth buffer; with a larger ``NEAR_M`` TinyRenderer shadows everything."""
 
 
 class Lamp(NamedTuple):
@@ -86,13 +87,13 @@ class Images(NamedTuple):
 
 def write_worlds(worlds: Sequence[World], folder: Path) -> None:
     """Write all worlds of a run."""
-    (folder / WORLDS_NAME).write_text(json.dumps([asdict(world) for world in worlds]))
+    (folder / WORLDS_NAME).write_bytes(pickle.dumps(list(worlds)))
 
 
 def read_worlds(folder: Path) -> list[World]:
     """Read what ``write_worlds`` wrote."""
-    plain = json.loads((folder / WORLDS_NAME).read_text())
-    return [World(**{**item, "lamps": tuple(Lamp(*lamp) for lamp in item["lamps"])}) for item in plain]
+    worlds: list[World] = pickle.loads((folder / WORLDS_NAME).read_bytes())
+    return worlds
 
 
 def unproject_depth(buffer: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -122,7 +123,11 @@ def write_files(images: Images, folder: Path, number: int) -> None:
     """Write RGB, depth and ids as PNG files, and the boxes of the visible pixels as JSON."""
     depth = np.where(images.depth_m < 0.999 * FAR_M, images.depth_m / DEPTH_UNIT_M, 0)
     ids = images.ids.astype(np.uint16)
-    planes = {"rgb": images.rgb[..., ::-1], "depth": depth.round().astype(np.uint16), "instance": ids}
+    planes = {
+        "rgb": images.rgb[..., ::-1],
+        "depth": depth.round().astype(np.uint16),
+        "instance": ids,
+    }
     for name, plane in planes.items():
         path = plane_path(folder, name, number)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -141,7 +146,8 @@ def plane_path(folder: Path, name: str, number: int) -> Path:
 def mask_agreement(ids: NDArray[np.integer], reference: NDArray[np.integer]) -> float:
     """Mean intersection over union of the masks of all instances in the reference."""
     shares = [
-        np.count_nonzero((ids == k) & (reference == k)) / np.count_nonzero((ids == k) | (reference == k))
+        np.count_nonzero((ids == k) & (reference == k))
+        / np.count_nonzero((ids == k) | (reference == k))
         for k in np.unique(reference)
         if k
     ]
