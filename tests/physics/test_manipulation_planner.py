@@ -7,7 +7,6 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import pybullet
 import pytest
 
 from gen_data.generator.core.kinematics import link_poses
@@ -70,6 +69,7 @@ def instants(scene: Scene) -> list[float]:
 
 def overlap_m(bodies: list[Body], pairs: list[tuple[str, str]]) -> float:
     """Deepest overlap of pairs of convex bodies, by a simulator without the engine's shells."""
+    pybullet = pytest.importorskip("pybullet")
     client = pybullet.connect(pybullet.DIRECT)
     numbers: dict[str, int] = {}
     for body in bodies:
