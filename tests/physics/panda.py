@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-import pybullet_data
+import pytest
 
 from gen_data.generator.core.asset_types import Gripper, Joint, RobotModel
 from gen_data.generator.core.se3 import SE3, multiply_quaternions
 
-URDF = Path(pybullet_data.getDataPath()) / "franka_panda" / "panda.urdf"
 HOME = (0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.785398, 0.04, 0.04)
 HAND, GRASP = "panda_hand", "panda_grasptarget"
 
 
+@cache
+def urdf_path() -> Path:
+    """The file; without pybullet's data the calling test is skipped."""
+    data = pytest.importorskip("pybullet_data", reason="the Panda comes with pybullet's data")
+    return Path(data.getDataPath()) / "franka_panda" / "panda.urdf"
+
+
 def panda() -> RobotModel:
     """The arm with its hand: seven joints and two fingers."""
-    root = ElementTree.parse(URDF).getroot()
+    root = ElementTree.parse(urdf_path()).getroot()
     joints = tuple(_joint(element) for element in root.findall("joint"))
     meshes = {
         link.attrib["name"]: mesh.attrib["filename"].removeprefix("package://")
@@ -44,10 +51,10 @@ def panda() -> RobotModel:
 
 def mesh_vertices(link: str) -> np.ndarray:
     """Vertices of a link's collision mesh in the link frame [m], shape [n, 3]."""
-    element = ElementTree.parse(URDF).getroot().find(f"link[@name='{link}']/collision")
+    element = ElementTree.parse(urdf_path()).getroot().find(f"link[@name='{link}']/collision")
     assert element is not None
     name = element.find("geometry/mesh").attrib["filename"].removeprefix("package://")  # type: ignore[union-attr]
-    lines = (URDF.parent / name).read_text().splitlines()
+    lines = (urdf_path().parent / name).read_text().splitlines()
     rows = [[float(v) for v in line.split()[1:4]] for line in lines if line.startswith("v ")]
     return _origin(element.find("origin")).apply(np.array(rows))
 

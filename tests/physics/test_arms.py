@@ -6,7 +6,6 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import pybullet
 import pytest
 
 from gen_data.generator.core.kinematics import link_poses
@@ -186,6 +185,7 @@ def test_a_held_object_sits_between_closed_fingers(engine: Engine, asset: str) -
 
 def distance_m(one: Body, other: Body) -> float:
     """Distance of two convex bodies by a simulator of its own, without the engine's shells."""
+    pybullet = pytest.importorskip("pybullet")
     client = pybullet.connect(pybullet.DIRECT)
     numbers = []
     for body in (one, other):

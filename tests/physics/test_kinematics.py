@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
-import pybullet
 import pytest
 
 from gen_data.generator.core.asset_types import Gripper, Joint, RobotModel
@@ -23,24 +22,30 @@ from gen_data.generator.core.kinematics import (
 )
 from gen_data.generator.core.scene import Articulation
 from gen_data.generator.core.se3 import SE3
-from tests.physics.panda import HOME, URDF, panda
+from tests.physics.panda import HOME, panda, urdf_path
 
 
 @pytest.fixture
 def client() -> Iterator[int]:
     """A pybullet connection of its own."""
-    number = pybullet.connect(pybullet.DIRECT)
+    pybullet = pytest.importorskip("pybullet")
+    number: int = pybullet.connect(pybullet.DIRECT)
     yield number
     pybullet.disconnect(number)
 
 
 def test_link_poses_are_those_of_an_independent_simulator(client: int) -> None:
     """Every link of the Panda, at random joints and a turned base, within a micrometre."""
+    pybullet = pytest.importorskip("pybullet")
     robot = panda()
     base = SE3.about_z(0.7, (0.3, -0.2, 0.75))
     w, x, y, z = base.quaternion_wxyz
     number = pybullet.loadURDF(
-        str(URDF), base.translation_m, (x, y, z, w), useFixedBase=True, physicsClientId=client
+        str(urdf_path()),
+        base.translation_m,
+        (x, y, z, w),
+        useFixedBase=True,
+        physicsClientId=client,
     )
     rng = np.random.Generator(np.random.Philox(key=1))
 

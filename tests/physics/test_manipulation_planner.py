@@ -7,7 +7,6 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-import pybullet
 import pytest
 
 from gen_data.generator.core.kinematics import link_poses
@@ -20,6 +19,9 @@ from gen_data.generator.physics.manipulation.joint_trajectories import smooth_st
 from gen_data.generator.physics.physics_config import EngineName
 from tests.physics.doubles import TABLE_TOP_Z_M, Solids, table_scene, thing, world_vertices
 from tests.physics.panda import panda
+
+pytest.importorskip("pybullet_data")
+
 from tests.physics.test_arms import above_table, armed
 
 ROBOT = panda()
@@ -70,6 +72,7 @@ def instants(scene: Scene) -> list[float]:
 
 def overlap_m(bodies: list[Body], pairs: list[tuple[str, str]]) -> float:
     """Deepest overlap of pairs of convex bodies, by a simulator without the engine's shells."""
+    pybullet = pytest.importorskip("pybullet")
     client = pybullet.connect(pybullet.DIRECT)
     numbers: dict[str, int] = {}
     for body in bodies:

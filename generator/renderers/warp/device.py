@@ -9,6 +9,7 @@ first use.
 from __future__ import annotations
 
 import hashlib
+import os
 import subprocess
 import sys
 import warnings
@@ -67,19 +68,21 @@ def kernel_folder() -> Path:
 
 EVERY_FRAME = (
     "realtime.kernels.lattice_lighting",
+    "realtime.kernels.lattice_interpolation",
     "realtime.kernels.soft_shadows",
     "visibility.kernels.rasterizer",
-    "realtime.kernels.lattice_interpolation",
-    "visibility.kernels.amodal",
     "visibility.kernels.msaa",
-    "realtime.kernels.shadow_culling",
+    "visibility.kernels.amodal",
     "visibility.kernels.label_resolve",
-    "visibility.kernels.edge_detection",
-    "realtime.kernels.lattice",
-    "scene.kernels.environment_lighting",
+    "realtime.kernels.shadow_culling",
     "scene.kernels.bvh_build",
+    "realtime.kernels.lattice",
+    "visibility.kernels.edge_detection",
+    "scene.kernels.environment_lighting",
 )
-"""Kernel modules, below this package, that every image needs; their order balances the load."""
+"""Kernel modules, below this package, that every image needs; the slowest to compile come first."""
+_RECORD_BYTES = 64
+"""Of a module's name in the pipe: longer than any, and short enough to be read in one piece."""
 
 
 @cache
@@ -116,20 +119,29 @@ def load_kernels(device_name: str, names: Sequence[str]) -> None:
 
 
 def _compile_in_parallel(device: str, cores: int) -> bool:
-    """Distribute the modules over one process per core; returns whether all succeeded."""
-    shares = [EVERY_FRAME[k::cores] for k in range(min(cores, len(EVERY_FRAME)))]
+    """Let one process per core take modules from a pipe; returns whether all succeeded."""
+    queue, feed = os.pipe()
     running: list[subprocess.Popen[bytes]] = []
     try:
-        for share in shares:
-            command = tie([sys.executable, "-m", __name__, device, *share])
+        with os.fdopen(feed, "wb") as file:
+            file.writelines(name.encode().ljust(_RECORD_BYTES) for name in EVERY_FRAME)
+        for _ in range(min(cores, len(EVERY_FRAME))):
+            command = tie([sys.executable, "-m", __name__, device])
             with interrupts_blocked():
-                running.append(subprocess.Popen(command, stdout=subprocess.DEVNULL))
+                running.append(subprocess.Popen(command, stdin=queue, stdout=subprocess.DEVNULL))
         codes = [process.wait() for process in running]
     finally:
+        os.close(queue)
         # After an interruption, the host program may go on.
         for process in running:
             process.kill()
     return not any(codes)
+
+
+def _compile_queued(device: str) -> None:
+    """Compile the modules whose names arrive on standard input, which other processes share."""
+    while record := os.read(sys.stdin.fileno(), _RECORD_BYTES):
+        load_kernels(device, [record.decode().strip()])
 
 
 def _digest() -> str:
@@ -141,4 +153,4 @@ def _digest() -> str:
 
 
 if __name__ == "__main__":
-    load_kernels(sys.argv[1], sys.argv[2:])
+    _compile_queued(sys.argv[1])
