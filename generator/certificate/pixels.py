@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.certificate.examined import Examined
-from gen_data.generator.certificate.finding import Contradictions, Finding, not_checked
+from gen_data.generator.certificate.finding import Finding, not_checked
 from gen_data.generator.certificate.ray_casting import (
-    DISAGREEING_MAX,
     MISSING,
+    Agreement,
     RayCaster,
     Seen,
-    is_perforated,
+    has_holes,
 )
 from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.sample import Sample
@@ -34,74 +34,54 @@ def check_pixels(examined: Examined) -> Iterator[Finding]:
         name: [c for c in (*DISTANCES, Channel.INSTANCE) if c in channels]
         for name, channels in examined.stored.info.media.items()
     }
-    judged = {name: Tally() for name, channels in cameras.items() if channels}
+    judged = {name: Agreement() for name, channels in cameras.items() if channels}
     for name in sorted({*cameras} - {*judged}):
         yield not_checked(name, "the camera writes none of the channels depth, range and instance")
-    if not judged:
-        return
     try:
-        for sample in examined.chosen_samples():
+        for sample in examined.chosen_samples() if judged else ():
             for name in sorted({*judged} & {*sample.capture.readings}):
-                judged[name].add(examined, sample, sample.capture.readings[name])
-    except ImportError:
-        yield from (not_checked(name, MISSING) for name in sorted(judged))
+                _compare(examined, sample, sample.capture.readings[name], judged[name])
+    except ImportError as error:
+        yield from (not_checked(name, f"{MISSING} ({error})") for name in sorted(judged))
         return
-    for name, tally in sorted(judged.items()):
-        yield tally.finding(name)
+    for name, agreement in sorted(judged.items()):
+        yield agreement.finding(name, "images", "pixels")
 
 
-class Tally:
-    """Agreement of the pixels of one camera."""
-
-    def __init__(self) -> None:
-        self._contradictions = Contradictions()
-        self._images = self._pixels = self._empty = 0
-
-    def add(self, examined: Examined, sample: Sample, reading: SensorReading) -> None:
-        """Compare pixels of one image."""
-        camera = reading.camera
-        intrinsics = camera.intrinsics
-        rng = examined.rng(f"pixels/{sample.index}/{reading.sensor}")
-        u = rng.integers(0, intrinsics.width_px, examined.scope.rays)
-        v = rng.integers(0, intrinsics.height_px, examined.scope.rays)
-        timeline, time_s = examined.timeline(sample), reading.time_s
-        if camera.shutter.rolls and sample.scene.tracks:
-            # Every row has an instant of its own: one row costs one world.
-            v[:] = v[0]
-            time_s += float(camera.shutter.delay_s(v[0] + 0.5, intrinsics.height_px))
-        scene = timeline.at(time_s)
-        pose = scene.camera(reading.sensor).T_world_camera
-        directions = intrinsics.rays(np.stack([u, v], axis=1) + 0.5)
-        # Nothing is known of pixels outside the lens's field, and of depths beside the camera.
-        inside = np.isfinite(directions).all(axis=1)
-        if Channel.RANGE not in reading.channels:
-            inside &= np.nan_to_num(directions[:, 2]) > 1e-3
-        u, v, directions = u[inside], v[inside], directions[inside]
-        caster = RayCaster(
-            scene,
-            examined.library,
-            np.array(pose.translation_m),
-            is_perforated(examined.library),
+def _compare(
+    examined: Examined, sample: Sample, reading: SensorReading, agreement: Agreement
+) -> None:
+    """Compare pixels of one image."""
+    camera, intrinsics = reading.camera, reading.camera.intrinsics
+    rng = examined.rng(f"pixels/{sample.index}/{reading.sensor}")
+    u = rng.integers(0, intrinsics.width_px, examined.scope.rays)
+    v = rng.integers(0, intrinsics.height_px, examined.scope.rays)
+    time_s = reading.time_s
+    if camera.shutter.rolls and sample.scene.tracks:
+        # Every row has an instant of its own: one row costs one world.
+        v[:] = v[0]
+        time_s += float(camera.shutter.delay_s(v[0] + 0.5, intrinsics.height_px))
+    directions = intrinsics.rays(np.stack([u, v], axis=1) + 0.5)
+    # Nothing is known of pixels outside the lens's field, and of depths beside the camera.
+    inside = np.isfinite(directions).all(axis=1)
+    if Channel.RANGE not in reading.channels:
+        inside &= np.nan_to_num(directions[:, 2]) > 1e-3
+    u, v, directions = u[inside], v[inside], directions[inside]
+    scene = examined.timeline(sample).at(time_s)
+    pose = scene.camera(reading.sensor).T_world_camera
+    origin_m = np.array(pose.translation_m)
+    caster = RayCaster(scene, examined.library, origin_m, has_holes(examined.library))
+    seen = stated_by(reading, u, v, directions, examined.stored.info.depth_scale_m)
+    origins_m = np.broadcast_to(origin_m, directions.shape)
+    agreed = caster.agrees(origins_m, pose.rotate(directions), seen)
+    agreement.readings += 1
+    agreement.rays += len(u)
+    agreement.others["empty"] += int(np.isinf(seen.distance).sum())
+    for k in np.flatnonzero(~agreed):
+        agreement.contradictions.add(
+            f"sample {sample.index}, pixel ({u[k]}, {v[k]}): a ray does not meet what is stated, "
+            f"{seen.distance[k]:.3f} m away, instance {seen.instance_id[k]}"
         )
-        origins = np.broadcast_to(pose.translation_m, directions.shape)
-        scale_m = examined.stored.info.depth_scale_m
-        seen = stated_by(reading, u, v, directions, scale_m)
-        agreed = caster.agrees(origins, pose.rotate(directions), seen)
-        self._images += 1
-        self._pixels += len(u)
-        self._empty += int(np.isinf(seen.distance).sum())
-        for k in np.flatnonzero(~agreed):
-            self._contradictions.add(
-                f"sample {sample.index}, {reading.sensor}, pixel ({u[k]}, {v[k]}): "
-                f"{seen.distance[k]:.3f} m, instance {seen.instance_id[k]}, is not what a ray meets"
-            )
-
-    def finding(self, camera: str) -> Finding:
-        """The finding about the camera."""
-        figures = {"images": self._images, "pixels": self._pixels, "empty": self._empty}
-        if not self._pixels:
-            return not_checked(camera, "no image of the camera was among the sampled ones")
-        return self._contradictions.judge(camera, figures, int(DISAGREEING_MAX * self._pixels))
 
 
 def stated_by(

@@ -8,21 +8,27 @@ hides nothing behind it.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.generator.certificate.finding import Contradictions, Finding, not_checked
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetLibrary
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.se3 import Array
 
 MISSING = "install open3d: pip install 'gen-data[certify]'"
-DISAGREEING_MAX = 0.001
-"""Share of rays that may disagree: rays through edges, where either surface is right."""
+DISAGREEING_SHARE = 0.001
+"""Largest share of rays that may disagree: rays through edges, where either surface is right."""
+FALSE_ALARM = 1e-6
+"""Probability that a sensor whose rays disagree in this share is refused."""
+CONFIDENCE = 0.99
+"""Of the stated limit to the share of rays of the whole data set that disagree."""
 
 Passes = Callable[[Material], bool]
 """Whether rays may go through surfaces of a material."""
@@ -43,6 +49,45 @@ class Seen:
     tolerance: Array
     instance_id: NDArray[np.int64]
     reach: Array
+
+
+@dataclass
+class Agreement:
+    """Agreement of the rays of one sensor.
+
+    Attributes:
+        readings: Number of images or scans.
+        rays: Number of pixels or points.
+        contradictions: The rays that disagree.
+        others: Further counts, by name.
+    """
+
+    readings: int = 0
+    rays: int = 0
+    contradictions: Contradictions = field(default_factory=Contradictions)
+    others: Counter[str] = field(default_factory=Counter)
+
+    def finding(self, sensor: str, reading: str, ray: str) -> Finding:
+        """The finding about a sensor, whose readings and rays have these names in the plural.
+
+        Disagreements fail a sensor if so many are improbable at ``DISAGREEING_SHARE`` (binomial
+        test). The limit to their share in all samples is that of Clopper and Pearson (Biometrika
+        26, 1934), for rays that are drawn independently.
+        """
+        from scipy import stats
+
+        if not self.rays:
+            return not_checked(sensor, f"none of the {reading} of the sampled steps has {ray}")
+        tolerated = int(stats.binom.isf(FALSE_ALARM, self.rays, DISAGREEING_SHARE))
+        k, n = self.contradictions.count, self.rays
+        limit = 1.0 if k >= n else float(stats.beta.ppf(CONFIDENCE, k + 1, n - k))
+        figures = {
+            reading: self.readings,
+            ray: n,
+            **dict(sorted(self.others.items())),
+            "disagreeing share, at most (99 %)": round(limit, 5),
+        }
+        return self.contradictions.judge(sensor, figures, tolerated)
 
 
 class RayCaster:
@@ -133,10 +178,20 @@ def _solids_before(ray: NDArray[np.intp], solid: NDArray[np.bool_]) -> NDArray[n
     return np.asarray(total - total[first], np.intp)
 
 
-def is_perforated(library: AssetLibrary) -> Passes:
-    """Whether textures of a material have holes, for labels of cameras."""
+def has_holes(library: AssetLibrary) -> Passes:
+    """Whether the texture of a material has holes, which labels of cameras go through."""
 
     def passes(material: Material) -> bool:
         return bool(material.texture) and library.texture(material.texture).alpha is not None
+
+    return passes
+
+
+def lets_light_through(library: AssetLibrary) -> Passes:
+    """Whether a laser may go through a material: glass, or a texture with holes."""
+    holes = has_holes(library)
+
+    def passes(material: Material) -> bool:
+        return material.transmission > 0.0 or material.opacity < 1.0 or holes(material)
 
     return passes
