@@ -35,7 +35,7 @@ from gen_data.generator.sensors.lidar.scan_pattern import LidarModel
 ELSEWHERE = tuple(SURFACES.index(name) for name in ("air", "mirrored"))
 """Surfaces of points at whose place there is nothing."""
 
-INSTANTS = 2
+INSTANTS = 4
 """Instants of a scan that are examined if the world moves: each is a world of its own."""
 
 NOISE_MAX = 6.0

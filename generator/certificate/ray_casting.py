@@ -187,11 +187,16 @@ def has_holes(library: AssetLibrary) -> Passes:
     return passes
 
 
+GLASS = "glass"
+"""Role of panes that stop what is seen and let laser light through; house windows do not."""
+
+
 def lets_light_through(library: AssetLibrary) -> Passes:
-    """Whether a laser may go through a material: glass, or a texture with holes."""
+    """Whether a laser may go through a material: panes, other clear ones, textures with holes."""
     holes = has_holes(library)
 
     def passes(material: Material) -> bool:
-        return material.transmission > 0.0 or material.opacity < 1.0 or holes(material)
+        clear = material.transmission > 0.0 or material.opacity < 1.0
+        return clear or material.role == GLASS or holes(material)
 
     return passes

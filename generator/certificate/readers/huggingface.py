@@ -1,0 +1,41 @@
+"""Hugging Face data sets, read by the package datasets."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import warnings
+from pathlib import Path
+
+from gen_data.generator.certificate.labelled_images import LabelledImage, LabelledObject, Loaded
+from gen_data.generator.core.interfaces import DatasetInfo
+
+
+def load_huggingface(root: Path, info: DatasetInfo) -> Loaded:
+    """Read every split offline, by the card of the data set; images are decoded."""
+    # Read by the package when it is imported: nothing is asked of its hub.
+    for name in ("HF_HUB_OFFLINE", "HF_DATASETS_OFFLINE"):
+        os.environ[name] = "1"
+    import datasets
+
+    del info
+    images = []
+    with tempfile.TemporaryDirectory(prefix="gen-data-datasets-") as cache, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        datasets.disable_progress_bars()
+        loaded = datasets.load_dataset(str(root), cache_dir=cache)
+        for split in sorted(loaded):
+            names = loaded[split].features["objects"]["category"].feature.names
+            for row in loaded[split]:
+                size_px = (row["width"], row["height"])
+                objects, things = [], row["objects"]
+                for k, (x, y, width, height) in enumerate(things["bbox"]):
+                    box = (x, y, x + width, y + height)
+                    runs = things["rle"] and things["rle"][k]
+                    mask = {"size": [size_px[1], size_px[0]], "counts": runs} if runs else None
+                    objects.append(LabelledObject(names[things["category"][k]], box, mask))
+                image = LabelledImage(row["sample"], row["sensor"], split, size_px, tuple(objects))
+                images.append(image)
+                if row["image"].size != size_px:
+                    raise ValueError(f"{image}: its picture has {row['image'].size} px")
+    return Loaded(images)
