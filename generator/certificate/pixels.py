@@ -7,71 +7,74 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.exporters.image_files import DEPTH_UNITS_MAX
 from gen_data.generator.certificate.examined import Examined
 from gen_data.generator.certificate.finding import Finding, not_checked
 from gen_data.generator.certificate.ray_casting import (
     MISSING,
+    UNSTATED,
     Agreement,
     RayCaster,
     Seen,
     has_holes,
 )
 from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.sample import ImageTruth, Sample
 from gen_data.generator.core.se3 import Array
 
-DISTANCES = (Channel.Z_DEPTH, Channel.RANGE)
 RELATIVE_TOLERANCE = 1e-4
 """Of distances: 32-bit coordinates of the renderer, in worlds of some hundred metres (assumed)."""
 
-UNITS_MAX = 65_535
-"""Largest value of a 16-bit image of depths (``exporters.image_files``)."""
-
-
 def check_pixels(examined: Examined) -> Iterator[Finding]:
     """Cast rays through pixels of random images of every camera."""
-    cameras = {
-        name: [c for c in (*DISTANCES, Channel.INSTANCE) if c in channels]
-        for name, channels in examined.stored.info.media.items()
-    }
-    judged = {name: Agreement() for name, channels in cameras.items() if channels}
-    for name in sorted({*cameras} - {*judged}):
-        yield not_checked(name, "the camera writes none of the channels depth, range and instance")
+    judged = {name: Agreement() for name in sorted(examined.stored.info.cameras)}
     try:
-        for sample in examined.chosen_samples() if judged else ():
-            for name in sorted({*judged} & {*sample.capture.readings}):
-                _compare(examined, sample, sample.capture.readings[name], judged[name])
+        for sample in examined.chosen_samples():
+            for name in sorted(sample.capture.readings):
+                _compare(examined, sample, name, judged[name])
     except ImportError as error:
-        yield from (not_checked(name, f"{MISSING} ({error})") for name in sorted(judged))
+        yield from (not_checked(name, f"{MISSING} ({error})") for name in judged)
         return
-    for name, agreement in sorted(judged.items()):
-        yield agreement.finding(name, "images", "pixels")
+    for name, agreement in judged.items():
+        if agreement.rays:
+            yield agreement.finding(name, "images", "pixels")
+        else:
+            yield not_checked(name, "no depth, range, image of instances or mask was sampled")
 
 
-def _compare(
-    examined: Examined, sample: Sample, reading: SensorReading, agreement: Agreement
-) -> None:
+def _compare(examined: Examined, sample: Sample, name: str, agreement: Agreement) -> None:
     """Compare pixels of one image."""
+    reading = sample.capture.readings[name]
     camera, intrinsics = reading.camera, reading.camera.intrinsics
-    rng = examined.rng(f"pixels/{sample.index}/{reading.sensor}")
-    u = rng.integers(0, intrinsics.width_px, examined.scope.rays)
-    v = rng.integers(0, intrinsics.height_px, examined.scope.rays)
+    ids = stated_ids(reading, sample.truth.get(name))
+    stored = next((c for c in (Channel.RANGE, Channel.Z_DEPTH) if c in reading.channels), None)
+    rng = examined.rng(f"pixels/{sample.index}/{name}")
+    v, u = np.nonzero(ids != UNSTATED) if stored is None else np.indices(ids.shape).reshape(2, -1)
     time_s = reading.time_s
-    if camera.shutter.rolls and sample.scene.tracks:
+    if camera.shutter.rolls and sample.scene.tracks and len(v):
         # Every row has an instant of its own: one row costs one world.
-        v[:] = v[0]
-        time_s += float(camera.shutter.delay_s(v[0] + 0.5, intrinsics.height_px))
+        row = v[int(rng.integers(0, len(v)))]
+        u, v = u[v == row], v[v == row]
+        time_s += float(camera.shutter.delay_s(row + 0.5, intrinsics.height_px))
+    chosen = np.sort(rng.permutation(len(u))[: examined.scope.rays])
+    u, v = u[chosen], v[chosen]
     directions = intrinsics.rays(np.stack([u, v], axis=1) + 0.5)
     # Nothing is known of pixels outside the lens's field, and of depths beside the camera.
     inside = np.isfinite(directions).all(axis=1)
-    if Channel.RANGE not in reading.channels:
+    if stored is Channel.Z_DEPTH:
         inside &= np.nan_to_num(directions[:, 2]) > 1e-3
     u, v, directions = u[inside], v[inside], directions[inside]
+    if not len(u):
+        return
+    seen = Seen(*(np.full(len(u), x) for x in (np.nan, 0.0)), ids[v, u], np.full(len(u), np.inf))
+    if stored is not None:
+        image = reading.channels[stored][v, u].astype(np.float64)
+        per_ray = np.ones(len(u)) if stored is Channel.RANGE else directions[:, 2]
+        seen = state_distances(image, per_ray, ids[v, u], examined.stored.info.depth_scale_m)
     scene = examined.timeline(sample).at(time_s)
-    pose = scene.camera(reading.sensor).T_world_camera
+    pose = scene.camera(name).T_world_camera
     origin_m = np.array(pose.translation_m)
     caster = RayCaster(scene, examined.library, origin_m, has_holes(examined.library))
-    seen = stated_by(reading, u, v, directions, examined.stored.info.depth_scale_m)
     origins_m = np.broadcast_to(origin_m, directions.shape)
     agreed = caster.agrees(origins_m, pose.rotate(directions), seen)
     agreement.readings += 1
@@ -84,28 +87,37 @@ def _compare(
         )
 
 
-def stated_by(
-    reading: SensorReading,
-    u: NDArray[np.int64],
-    v: NDArray[np.int64],
-    directions: Array,
-    scale_m: float,
-) -> Seen:
-    """Distances along unit rays, and ids, that the images of a reading state in pixels.
+def stated_ids(reading: SensorReading, truth: ImageTruth | None) -> NDArray[np.int64]:
+    """Instance ids, [height, width]: of the image of instances, or else of the masks.
 
-    Ranges are preferred to depths; a camera with images of ids only states no distance.
+    ``UNSTATED`` where neither says anything.
     """
-    count = len(u)
-    ids = np.full(count, -1, np.int64)
     if Channel.INSTANCE in reading.channels:
-        ids = reading.channels[Channel.INSTANCE][v, u].astype(np.int64)
-    stored = next((c for c in reversed(DISTANCES) if c in reading.channels), None)
-    if stored is None:
-        return Seen(np.full(count, np.nan), np.zeros(count), ids, np.full(count, np.inf))
-    per_ray = np.ones(count) if stored is Channel.RANGE else directions[:, 2]
-    distance = reading.channels[stored][v, u].astype(np.float64) / per_ray
+        return reading.channels[Channel.INSTANCE].astype(np.int64)
+    size = reading.camera.intrinsics
+    ids = np.full((size.height_px, size.width_px), UNSTATED, np.int64)
+    for thing in truth.objects if truth is not None else ():
+        if thing.mask is not None:
+            height, width = thing.mask.pixels.shape
+            x, y = thing.mask.x_px, thing.mask.y_px
+            ids[y : y + height, x : x + width][thing.mask.pixels] = thing.instance.instance_id
+    return ids
+
+
+def state_distances(
+    image: Array, per_ray: Array, ids: NDArray[np.int64], scale_m: float
+) -> Seen:
+    """Distances along unit rays that the pixels of a depth or range image state; arrays [n].
+
+    Args:
+        image: Depths or ranges [m]; inf = nothing, or farther than the file can say.
+        per_ray: Depth per distance along the ray; 1 for ranges.
+        ids: Instance ids.
+        scale_m: Metres per unit of the file.
+    """
+    distance = image / per_ray
     vacant = np.isinf(distance)
     tolerance = 0.51 * scale_m / per_ray + RELATIVE_TOLERANCE * np.where(vacant, 0.0, distance)
-    reach = (UNITS_MAX - 0.5) * scale_m / per_ray
+    reach = (DEPTH_UNITS_MAX - 0.5) * scale_m / per_ray
     # Beyond the reach of the file there may be a thing, at an unknown distance.
-    return Seen(distance, tolerance, np.where(vacant, -1, ids), reach)
+    return Seen(distance, tolerance, np.where(vacant, UNSTATED, ids), reach)

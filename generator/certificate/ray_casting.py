@@ -25,6 +25,8 @@ from gen_data.generator.core.se3 import Array
 MISSING = "install open3d: pip install 'gen-data[certify]'"
 DISAGREEING_SHARE = 0.001
 """Largest share of rays that may disagree: rays through edges, where either surface is right."""
+UNSTATED = -1
+"""Instance id where none is stated."""
 FALSE_ALARM = 1e-6
 """Probability that a sensor whose rays disagree in this share is refused."""
 CONFIDENCE = 0.99
@@ -41,7 +43,7 @@ class Seen:
     Attributes:
         distance: To the first surface; inf = nothing, NaN = not stated.
         tolerance: Of the distance.
-        instance_id: Of what is there; -1 = not stated.
+        instance_id: Of what is there; ``UNSTATED`` = not stated.
         reach: Farthest distance that would have been stated.
     """
 
@@ -146,7 +148,7 @@ class RayCaster:
         stopped[ray[solid & within]] = True
         deviation = np.abs(distance - seen.distance[ray])
         near = (deviation <= seen.tolerance[ray]) | np.isnan(deviation)
-        here = (seen.instance_id[ray] == -1) | (ids == seen.instance_id[ray])
+        here = (seen.instance_id[ray] == UNSTATED) | (ids == seen.instance_id[ray])
         met = np.zeros(len(seen.distance), bool)
         met[ray[near & here & (_solids_before(ray, solid) == 0)]] = True
         vacant = np.isinf(seen.distance) | (np.isnan(seen.distance) & (seen.instance_id == 0))
