@@ -62,7 +62,7 @@ def _check_export(
     contradictions = Contradictions()
     figures: dict[str, Figure] = {"reader": " ".join(f"{k} {v}" for k, v in _releases(reader))}
     try:
-        loaded = reader.load()(root, examined.stored.info)
+        loaded = reader.load()(root, examined.stored)
     except ImportError as error:
         return not_checked(root.name, f"{reader.package} cannot be loaded: {error}")
     # A reader may refuse a damaged file with an exception of any kind.

@@ -14,13 +14,13 @@ from pathlib import Path
 from typing import Protocol
 
 from gen_data.generator.certificate.labelled_images import Loaded
-from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.runner.stored import StoredSamples
 
 
 class Load(Protocol):
     """Reads an export."""
 
-    def __call__(self, root: Path, info: DatasetInfo) -> Loaded:
+    def __call__(self, root: Path, stored: StoredSamples) -> Loaded:
         """Read the export in the folder ``root``.
 
         Raises:

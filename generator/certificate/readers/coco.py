@@ -7,14 +7,14 @@ import io
 from pathlib import Path
 
 from gen_data.generator.certificate.labelled_images import LabelledImage, LabelledObject, Loaded
-from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.runner.stored import StoredSamples
 
 
-def load_coco(root: Path, info: DatasetInfo) -> Loaded:
+def load_coco(root: Path, stored: StoredSamples) -> Loaded:
     """Read the instances of every split."""
     from pycocotools.coco import COCO
 
-    del info
+    del stored
     images = []
     paths = sorted((root / "annotations").glob("instances_*.json"))
     for path in paths:

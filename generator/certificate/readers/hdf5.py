@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from gen_data.generator.certificate.labelled_images import LabelledImage, LabelledObject, Loaded
-from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.runner.stored import StoredSamples
 
 
-def load_hdf5(root: Path, info: DatasetInfo) -> Loaded:
+def load_hdf5(root: Path, stored: StoredSamples) -> Loaded:
     """Read all arrays of every image; boxes are those of the pixels of each listed instance.
 
     Counts files only if cameras write no image of instances.

@@ -8,17 +8,17 @@ import warnings
 from pathlib import Path
 
 from gen_data.generator.certificate.labelled_images import LabelledImage, LabelledObject, Loaded
-from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.runner.stored import StoredSamples
 
 
-def load_huggingface(root: Path, info: DatasetInfo) -> Loaded:
+def load_huggingface(root: Path, stored: StoredSamples) -> Loaded:
     """Read every split offline, by the card of the data set; images are decoded."""
     # Read by the package when it is imported: nothing is asked of its hub.
     for name in ("HF_HUB_OFFLINE", "HF_DATASETS_OFFLINE"):
         os.environ[name] = "1"
     import datasets
 
-    del info
+    del stored
     images = []
     with tempfile.TemporaryDirectory(prefix="gen-data-datasets-") as cache, warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -7,14 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from gen_data.generator.certificate.labelled_images import Loaded
-from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.runner.stored import StoredSamples
 
 
-def load_pointclouds(root: Path, info: DatasetInfo) -> Loaded:
-    """Read every file; coordinates must be finite."""
+def load_pointclouds(root: Path, stored: StoredSamples) -> Loaded:
+    """Read every file; there must be as many points as in the scans of the data set."""
     import open3d
 
-    del info
     faults, points = [], 0
     paths = sorted(p for p in root.rglob("*") if p.suffix in (".ply", ".pcd"))
     for path in paths:
@@ -22,4 +21,11 @@ def load_pointclouds(root: Path, info: DatasetInfo) -> Loaded:
         points += len(at_m)
         if not np.isfinite(at_m).all():
             faults.append(f"{path.relative_to(root)}: a coordinate is not finite")
+    expected = sum(
+        len(cloud.points)
+        for index in range(stored.n)
+        for cloud in stored.labelled(index).capture.clouds.values()
+    )
+    if points != expected:
+        faults.append(f"there are {points} points, expected {expected}")
     return Loaded(None, {"files": len(paths), "points": points}, faults)

@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import Any
 
 from gen_data.generator.certificate.labelled_images import LabelledImage, LabelledObject, Loaded
-from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.runner.stored import StoredSamples
 
 SIDES = ("xmin", "ymin", "xmax", "ymax")
 
 
-def load_tfrecord(root: Path, info: DatasetInfo) -> Loaded:
+def load_tfrecord(root: Path, stored: StoredSamples) -> Loaded:
     """Read all records; boxes are fractions in 32 bits."""
     from tfrecord.reader import tfrecord_iterator
 
-    del info
+    del stored
     paths = sorted(root.glob("*.tfrecord"))
     images = [
         _image(path.name.split("-")[0], _features(bytes(record)))

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from gen_data.generator.certificate.labelled_images import LabelledImage, LabelledObject, Loaded
-from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.runner.stored import StoredSamples
 
 
-def load_webdataset(root: Path, info: DatasetInfo) -> Loaded:
+def load_webdataset(root: Path, stored: StoredSamples) -> Loaded:
     """Read all tar files of every split; images are decoded."""
-    del info
+    del stored
     images: list[LabelledImage] = []
     tars = 0
     for folder in sorted(path for path in root.iterdir() if path.is_dir()):
