@@ -20,6 +20,7 @@ def certify(
     rays: int = 500,
     scenes: int = 100,
     alpha: float = 1e-3,
+    date: str = "",
     on_progress: Callable[[str], None] = lambda _: None,
 ) -> Certificate:
     """Check all claims about a finished data set, and write its certificate beside the manifest.
@@ -33,6 +34,7 @@ def certify(
         rays: Pixels per image, and points per scan, of these samples.
         scenes: Scenes whose parameters are drawn again.
         alpha: Probability that a correct data set fails the claim on distributions, in (0, 0.1].
+        date: Of the certificate, such as ``2026-11-23``; empty = none, as no clock is asked.
         on_progress: Called with the name of each claim when its check begins.
 
     Returns:
@@ -59,7 +61,7 @@ def certify(
     path = Path(folder)
     # Poses of scenes that are drawn again must have the last bits of the stored ones.
     with threadpool_limits(limits=1):
-        certificate = examine(path, Scope(samples, rays, scenes, alpha), on_progress)
+        certificate = examine(path, Scope(samples, rays, scenes, alpha), date, on_progress)
     documents = (certificate.to_bytes(), format_page(certificate).encode())
     with storage_errors(path, ""):
         for name, data in zip(CERTIFICATE_NAMES, documents, strict=True):

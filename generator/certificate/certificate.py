@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import platform
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
-from datetime import datetime, timezone
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -21,7 +19,6 @@ from gen_data.generator.core.errors import (
     AssetError,
     ConfigError,
     GenDataError,
-    StorageError,
     VerificationError,
 )
 from gen_data.generator.core.serialization import from_plain
@@ -76,8 +73,7 @@ class Certificate:
         scope: How much of it was sampled.
         versions: Releases of gen-data, Python and the packages that checked.
         claims: All claims.
-        date: Of the environment variable SOURCE_DATE_EPOCH, as ``2026-11-23``; else empty, as
-            clocks are no part of certificates.
+        date: As the caller gave it, such as ``2026-11-23``; empty = none. Clocks are not asked.
     """
 
     dataset: Identity
@@ -109,12 +105,15 @@ class Certificate:
         return (json.dumps(plain, ensure_ascii=False, indent=1, allow_nan=False) + "\n").encode()
 
 
-def examine(folder: Path, scope: Scope, progress: Progress = lambda _: None) -> Certificate:
+def examine(
+    folder: Path, scope: Scope, date: str = "", progress: Progress = lambda _: None
+) -> Certificate:
     """Check all claims about a finished data set.
 
     Args:
         folder: Of the data set.
         scope: How much is sampled.
+        date: Of the certificate; empty = none.
         progress: Called with the name of each claim when its check begins.
 
     Raises:
@@ -131,7 +130,7 @@ def examine(folder: Path, scope: Scope, progress: Progress = lambda _: None) -> 
         claims.append(CheckedClaim(claim.name, claim.statement, tuple(findings)))
         if claim is FILES and findings[0].status is Status.FAILED:
             damaged = "the files are not those of the manifest"
-    return Certificate(identify(examined.stored), scope, _versions(), tuple(claims), _date())
+    return Certificate(identify(examined.stored), scope, _versions(), tuple(claims), date)
 
 
 def identify(stored: StoredSamples) -> Identity:
@@ -238,15 +237,3 @@ def _versions() -> dict[str, str]:
         except PackageNotFoundError:
             continue
     return found
-
-
-def _date() -> str:
-    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
-    if not epoch:
-        return ""
-    try:
-        return datetime.fromtimestamp(int(epoch), timezone.utc).date().isoformat()
-    except (ValueError, OverflowError, OSError):
-        raise ConfigError(
-            f"SOURCE_DATE_EPOCH: {epoch!r} is no number of seconds since 1970"
-        ) from None

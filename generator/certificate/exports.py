@@ -14,7 +14,6 @@ from gen_data.generator.certificate.examined import Examined
 from gen_data.generator.certificate.finding import Contradictions, Figure, Finding, not_checked
 from gen_data.generator.certificate.labelled_images import (
     LabelledImage,
-    Loaded,
     compare_images,
     image_of,
 )

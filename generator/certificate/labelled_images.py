@@ -1,4 +1,4 @@
-"""Labelled images, as labels state them and as readers of exports find them, and their comparison."""
+"""Labelled images, as labels state them and as readers of exports find them, compared."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def _compare_masks(thing: LabelledObject, other: LabelledObject) -> str:
     if list(thing.mask["size"]) != list(other.mask["size"]):
         return f"its mask is of an image of {other.mask['size']} px"
     overlap = float(coco_mask.iou([other.mask], [thing.mask], [0])[0, 0])
-    return "" if overlap == 1.0 else f"its mask covers the labelled one with an IoU of {overlap:.4f}"
+    return "" if overlap == 1.0 else f"its mask has an IoU of {overlap:.4f} with the labelled one"
 
 
 def _deviation_px(one: LabelledObject, other: LabelledObject) -> float:

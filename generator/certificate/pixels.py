@@ -25,6 +25,7 @@ from gen_data.generator.core.se3 import Array
 RELATIVE_TOLERANCE = 1e-4
 """Of distances: 32-bit coordinates of the renderer, in worlds of some hundred metres (assumed)."""
 
+
 def check_pixels(examined: Examined) -> Iterator[Finding]:
     """Cast rays through pixels of random images of every camera."""
     judged = {name: Agreement() for name in sorted(examined.stored.info.cameras)}
@@ -104,9 +105,7 @@ def stated_ids(reading: SensorReading, truth: ImageTruth | None) -> NDArray[np.i
     return ids
 
 
-def state_distances(
-    image: Array, per_ray: Array, ids: NDArray[np.int64], scale_m: float
-) -> Seen:
+def state_distances(image: Array, per_ray: Array, ids: NDArray[np.int64], scale_m: float) -> Seen:
     """Distances along unit rays that the pixels of a depth or range image state; arrays [n].
 
     Args:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import os
+from datetime import datetime, timezone
 from pathlib import Path
 
 import click
 
-from gen_data.generator.core.errors import CertificationError
+from gen_data.generator.core.errors import CertificationError, ConfigError
 
 
 @click.command()
@@ -43,7 +45,8 @@ def certify(folder: Path, samples: int, rays: int, scenes: int, alpha: float) ->
     """Check a data set by independent means, and write CERTIFICATE.json and a page beside it.
 
     What could not be checked on this machine is listed with what to install. verify --deep repeats
-    the checks. Exit code 8 if a claim fails.
+    the checks. Exit code 8 if a claim fails. A certificate has the date of SOURCE_DATE_EPOCH, if
+    that is set.
     """
     from rich.console import Console
 
@@ -59,6 +62,7 @@ def certify(folder: Path, samples: int, rays: int, scenes: int, alpha: float) ->
             rays=rays,
             scenes=scenes,
             alpha=alpha,
+            date=_date(os.environ.get("SOURCE_DATE_EPOCH", "")),
             on_progress=lambda claim: status.update(f"{folder}: {claim}"),
         )
     for claim, finding in certificate.findings():
@@ -72,3 +76,15 @@ def certify(folder: Path, samples: int, rays: int, scenes: int, alpha: float) ->
         raise CertificationError(f"{folder}: {len(failures)} claim(s) failed:\n{listed}")
     if not certificate.count(Status.PASSED):
         raise CertificationError(f"{folder}: nothing could be checked")
+
+
+def _date(epoch_s: str) -> str:
+    """The day, UTC, that so many seconds since 1970 make; empty for none."""
+    if not epoch_s:
+        return ""
+    try:
+        return datetime.fromtimestamp(int(epoch_s), timezone.utc).date().isoformat()
+    except (ValueError, OverflowError, OSError):
+        raise ConfigError(
+            f"SOURCE_DATE_EPOCH: {epoch_s!r} is no number of seconds since 1970"
+        ) from None

@@ -222,6 +222,8 @@ def main() -> None:
         os.environ[name] = "1"
     # A cluster that a run starts reports nothing to anybody.
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    # A reader of exports that certificates use asks no hub.
+    os.environ.setdefault("HF_HUB_OFFLINE", "1")
     warnings.showwarning = partial(_show_warning, warnings.showwarning)
     code = _exit_code()
     if code == Interrupted.exit_code:

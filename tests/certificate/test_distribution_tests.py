@@ -1,7 +1,7 @@
 """Statistics of the claim on distributions: uniform scores, false-alarm rates, power.
 
-Seeds are fixed, so each test passes or fails for good. ALPHA is the rate at which correct code would
-have been refused by one test, had the seed been chosen at random.
+Seeds are fixed, so each test passes or fails for good. ALPHA is the rate at which correct code
+would have been refused by one test, had the seed been chosen at random.
 """
 
 from __future__ import annotations
@@ -169,8 +169,9 @@ def test_families_of_true_parameters_fail_at_the_stated_rate() -> None:
 
 
 def test_holm_names_what_bonferroni_would_not() -> None:
-    """The worked numbers of the procedure: 0.01, 0.02, 0.03, 0.5 at 0.1."""
-    family = [Comparison(n, 9, 0.5, p) for n, p in (("d", 0.5), ("a", 0.01), ("c", 0.04), ("b", 0.03))]
+    """The smallest p-value is compared with alpha / 4, the next one with alpha / 3, and so on."""
+    p_values = {"d": 0.5, "a": 0.01, "c": 0.04, "b": 0.03}
+    family = [Comparison(name, 9, 0.5, p) for name, p in p_values.items()]
 
     # 0.01 <= 0.1 / 4, 0.03 <= 0.1 / 3, 0.04 <= 0.1 / 2, 0.5 > 0.1; Bonferroni refuses a only.
     assert [test.name for test in refused(family, 0.1)] == ["a", "b", "c"]

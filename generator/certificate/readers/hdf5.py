@@ -18,6 +18,7 @@ def load_hdf5(root: Path, stored: StoredSamples) -> Loaded:
     """
     import h5py
 
+    del stored
     names = {int(k): v for k, v in json.loads((root / "categories.json").read_bytes()).items()}
     images = []
     paths = sorted(root.glob("*/*.hdf5"))

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 import warnings
 from pathlib import Path
 
 from gen_data.generator.certificate.labelled_images import LabelledImage, LabelledObject, Loaded
+from gen_data.generator.core.temporary_folders import temporary_folder
 from gen_data.generator.runner.stored import StoredSamples
 
 
 def load_huggingface(root: Path, stored: StoredSamples) -> Loaded:
-    """Read every split offline, by the card of the data set; images are decoded."""
-    # Read by the package when it is imported: nothing is asked of its hub.
-    for name in ("HF_HUB_OFFLINE", "HF_DATASETS_OFFLINE"):
-        os.environ[name] = "1"
+    """Read every split by the card of the data set; images are decoded."""
     import datasets
 
     del stored
     images = []
-    with tempfile.TemporaryDirectory(prefix="gen-data-datasets-") as cache, warnings.catch_warnings():
+    with temporary_folder("datasets") as cache, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         datasets.disable_progress_bars()
-        loaded = datasets.load_dataset(str(root), cache_dir=cache)
+        loaded = datasets.load_dataset(str(root), cache_dir=str(cache))
         for split in sorted(loaded):
             names = loaded[split].features["objects"]["category"].feature.names
             for row in loaded[split]:
