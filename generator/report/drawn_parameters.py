@@ -35,6 +35,10 @@ from gen_data.generator.runner.plan import differences
 from gen_data.generator.runner.provenance import KeptScene
 from gen_data.generator.runner.stored import StoredSamples
 
+ROUNDING = 1e-5
+"""Numbers of a scene that differ by less are equal: processors may differ in last bits, and poses
+are rounded to a micrometre."""
+
 EXPECTED_DRAWS = 50_000
 """Draws that represent a declared distribution."""
 
@@ -237,8 +241,20 @@ def _first_difference(kept: KeptScene, drawn: Scene) -> str:
     """The first difference of a scene from the one that was drawn again; empty if equal."""
     if canonical_json(drawn) == canonical_json(kept.scene):
         return ""
-    found = differences("", to_plain(kept.scene), to_plain(drawn))
-    return f"sample {kept.index}, drawn again: {next(found)}"
+    was, now = to_plain(kept.scene), to_plain(drawn)
+    found = next((line for line in differences("", was, _snap(was, now))), "")
+    return found and f"sample {kept.index}, drawn again: {found}"
+
+
+def _snap(was: Any, now: Any) -> Any:
+    """The plain value ``now`` with those numbers of ``was`` that are the same but for rounding."""
+    if isinstance(was, dict) and isinstance(now, dict):
+        return {k: _snap(was[k], v) if k in was else v for k, v in now.items()}
+    if isinstance(was, list) and isinstance(now, list) and len(was) == len(now):
+        return [_snap(left, right) for left, right in zip(was, now, strict=True)]
+    if isinstance(was, float) and isinstance(now, float):
+        return was if math.isclose(was, now, rel_tol=ROUNDING, abs_tol=ROUNDING) else now
+    return now
 
 
 def _observe_randomizer(randomizer: Randomizer, log: list[Draw]) -> Randomizer:

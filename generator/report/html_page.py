@@ -1,4 +1,4 @@
-"""A report as one self-contained HTML file that requests nothing.
+"""Reports and certificates as self-contained HTML files that request nothing.
 
 The page holds the data as JSON, and one script that draws it. A content security policy permits
 only this script and style sheet, by their digests, and images in ``data:`` URLs.
