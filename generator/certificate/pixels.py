@@ -59,7 +59,7 @@ def _compare(examined: Examined, sample: Sample, name: str, agreement: Agreement
         time_s += float(camera.shutter.delay_s(row + 0.5, intrinsics.height_px))
     chosen = np.sort(rng.permutation(len(u))[: examined.scope.rays])
     u, v = u[chosen], v[chosen]
-    directions = intrinsics.rays(np.stack([u, v], axis=1) + 0.5)
+    directions = intrinsics.rays(np.stack([u, v], axis=1).astype(np.float64) + 0.5)
     # Nothing is known of pixels outside the lens's field, and of depths beside the camera.
     inside = np.isfinite(directions).all(axis=1)
     if stored is Channel.Z_DEPTH:
@@ -67,8 +67,10 @@ def _compare(examined: Examined, sample: Sample, name: str, agreement: Agreement
     u, v, directions = u[inside], v[inside], directions[inside]
     if not len(u):
         return
-    seen = Seen(*(np.full(len(u), x) for x in (np.nan, 0.0)), ids[v, u], np.full(len(u), np.inf))
-    if stored is not None:
+    if stored is None:
+        unknown = np.full(len(u), np.nan)
+        seen = Seen(unknown, unknown, ids[v, u], np.full(len(u), np.inf))
+    else:
         image = reading.channels[stored][v, u].astype(np.float64)
         per_ray = np.ones(len(u)) if stored is Channel.RANGE else directions[:, 2]
         seen = state_distances(image, per_ray, ids[v, u], examined.stored.info.depth_scale_m)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -109,7 +110,7 @@ class RayCaster:
         self, scene: Scene, library: AssetLibrary, origin_m: Array, passes: Passes
     ) -> None:
         try:
-            import open3d
+            open3d: Any = import_module("open3d")
         except OSError as error:
             raise ImportError(f"open3d cannot be loaded: {error}") from error
         self._tensor = open3d.core.Tensor
@@ -152,7 +153,7 @@ class RayCaster:
         met = np.zeros(len(seen.distance), bool)
         met[ray[near & here & (_solids_before(ray, solid) == 0)]] = True
         vacant = np.isinf(seen.distance) | (np.isnan(seen.distance) & (seen.instance_id == 0))
-        return met | (vacant & ~stopped)
+        return np.asarray(met | (vacant & ~stopped), np.bool_)
 
     def _crossings(
         self, origins_m: Array, directions: Array
@@ -175,7 +176,7 @@ class RayCaster:
 
 def _solids_before(ray: NDArray[np.intp], solid: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Number of solid crossings before each crossing on its ray."""
-    total = np.cumsum(solid) - solid
+    total: NDArray[np.intp] = np.cumsum(solid) - solid
     first = np.searchsorted(ray, ray)
     return np.asarray(total - total[first], np.intp)
 

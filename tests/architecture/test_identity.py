@@ -18,6 +18,7 @@ BYTES_DO_NOT_DEPEND_ON = {
     "click": "parses the command line",
     "datasets": "reads exports for certificates",
     "fsspec": "copies finished files",
+    "mlcroissant": "reads exports for certificates",
     "open3d": "casts rays for certificates",
     "platformdirs": "names the folders of caches",
     "pydantic": "checks values; the checked configuration is part of the plan",

@@ -72,6 +72,7 @@ _HERE = "gen_data.generator.certificate.readers"
 
 READERS: Mapping[str, Reader] = {
     "coco": Reader("pycocotools", f"{_HERE}.coco:load_coco"),
+    "croissant": Reader("mlcroissant", f"{_HERE}.croissant:load_croissant"),
     "hdf5": Reader("h5py", f"{_HERE}.hdf5:load_hdf5"),
     "huggingface": Reader("datasets", f"{_HERE}.huggingface:load_huggingface"),
     "mcap": Reader("mcap", f"{_HERE}.mcap:load_mcap", further=("mcap-protobuf-support",)),

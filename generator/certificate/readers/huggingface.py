@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 
 from gen_data.generator.certificate.labelled_images import LabelledImage, LabelledObject, Loaded
@@ -16,8 +15,7 @@ def load_huggingface(root: Path, stored: StoredSamples) -> Loaded:
 
     del stored
     images = []
-    with temporary_folder("datasets") as cache, warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with temporary_folder("datasets") as cache:
         datasets.disable_progress_bars()
         loaded = datasets.load_dataset(str(root), cache_dir=str(cache))
         for split in sorted(loaded):

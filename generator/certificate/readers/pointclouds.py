@@ -17,7 +17,7 @@ def load_pointclouds(root: Path, stored: StoredSamples) -> Loaded:
     faults, points = [], 0
     paths = sorted(p for p in root.rglob("*") if p.suffix in (".ply", ".pcd"))
     for path in paths:
-        at_m = open3d.t.io.read_point_cloud(str(path)).point.positions.numpy()
+        at_m = open3d.t.io.read_point_cloud(path).point.positions.numpy()
         points += len(at_m)
         if not np.isfinite(at_m).all():
             faults.append(f"{path.relative_to(root)}: a coordinate is not finite")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -33,13 +32,11 @@ def load_webdataset(root: Path, stored: StoredSamples) -> Loaded:
 def _samples(paths: list[Path]) -> Iterator[Mapping[str, Any]]:
     import webdataset
 
-    with warnings.catch_warnings():
-        # The reader leaves closing of its files to the garbage collector.
-        warnings.simplefilter("ignore", ResourceWarning)
-        loaded = webdataset.WebDataset([str(p) for p in paths], shardshuffle=False)
-        yield from loaded.decode("pil")
-        del loaded
-        gc.collect()
+    loaded = webdataset.WebDataset([str(path) for path in paths], shardshuffle=False)
+    yield from loaded.decode("pil")
+    # The reader leaves closing of its files to the garbage collector.
+    del loaded
+    gc.collect()
 
 
 def _has_photograph(sample: Mapping[str, Any], camera: str) -> bool:
