@@ -47,7 +47,7 @@ def format_page(certificate: Certificate) -> str:
                 for name, value, kind in tiles
             ),
             '</div><div class="card">',
-            *(_row(name, value) for name, value in facts.items()),
+            *(f"<p>{escape(name)}: {escape(value)}</p>" for name, value in facts.items()),
             "</div>",
             *(part for claim in certificate.claims for part in _claim(claim)),
             f"<h2>What this does not say</h2><p>{escape(LIMITS)}</p>",
@@ -75,7 +75,7 @@ def _facts(finding: Finding) -> Iterator[str]:
     yield from finding.evidence
 
 
-def _row(name: str, value: str, kind: str = "") -> str:
+def _row(name: str, value: str, kind: str) -> str:
     return (
         f'<div class="check"><span>{escape(name)}</span>'
         f'<span class="{kind}">{escape(value)}</span></div>'

@@ -11,8 +11,6 @@ import pytest
 import gen_data
 from tests.certificate.sealing import SMALL
 
-pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
-
 
 @pytest.fixture(scope="session")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
