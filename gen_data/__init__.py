@@ -21,6 +21,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
+    from gen_data.generator.api.certify import certify
     from gen_data.generator.api.dataset import Dataset, SampleSequence, StoredDataset
     from gen_data.generator.api.dataset import open_dataset as open  # noqa: A004
     from gen_data.generator.api.export import export
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from gen_data.generator.api.write_sample import write_sample
     from gen_data.generator.core.errors import (
         AssetError,
+        CertificationError,
         ConfigError,
         ConfigWarning,
         DeterminismError,
@@ -55,11 +57,13 @@ _HOMES = {
     "SampleSequence": "gen_data.generator.api.dataset",
     "Scene": "gen_data.generator.core.scene",
     "StoredDataset": "gen_data.generator.api.dataset",
+    "certify": "gen_data.generator.api.certify",
     "export": "gen_data.generator.api.export",
     "generate": "gen_data.generator.api.generate",
     "write_sample": "gen_data.generator.api.write_sample",
     "rerender": "gen_data.generator.api.rerender",
     "AssetError": "gen_data.generator.core.errors",
+    "CertificationError": "gen_data.generator.core.errors",
     "ConfigError": "gen_data.generator.core.errors",
     "ConfigWarning": "gen_data.generator.core.errors",
     "DeterminismError": "gen_data.generator.core.errors",
@@ -79,6 +83,7 @@ __all__ = [
     "Box2d",
     "Box3d",
     "CameraReading",
+    "CertificationError",
     "ConfigError",
     "ConfigWarning",
     "Dataset",
@@ -97,6 +102,7 @@ __all__ = [
     "UnknownNameError",
     "VerificationError",
     "__version__",
+    "certify",
     "export",
     "generate",
     "open",

@@ -40,7 +40,7 @@ from gen_data.generator.core.processes import SINGLE_THREADED
 from gen_data.generator.core.urls import is_url, needs_folder
 
 FOLDERS_ONLY = frozenset(
-    "contact-sheet diff export merge preview repair report repro rerender sample".split()  # noqa: SIM905
+    "certify contact-sheet diff export merge preview repair report repro rerender sample".split()  # noqa: SIM905
 )
 """Commands that read no data set at a URL."""
 
@@ -60,6 +60,7 @@ class LazyCommands(click.Group):
         "cache": "gen_data.generator.cli.cache_commands:cache",
         "report": "gen_data.generator.cli.report_command:report",
         "verify": "gen_data.generator.cli.verification_commands:verify",
+        "certify": "gen_data.generator.cli.certify_command:certify",
         "merge": "gen_data.generator.cli.merge_command:merge",
         "repair": "gen_data.generator.cli.verification_commands:repair",
         "diff": "gen_data.generator.cli.verification_commands:diff",
@@ -82,6 +83,7 @@ class LazyCommands(click.Group):
         "cache": "Show or clear caches of assets, data sets at URLs, and kernels.",
         "report": "Statistics of a data set, and an HTML page with its samples.",
         "verify": "Check a data set: sizes, checksums, labels, reproducibility.",
+        "certify": "Check a data set by independent means; write its certificate.",
         "merge": "Join parts that were generated with --shards.",
         "repair": "Restore damaged files of a data set, byte for byte.",
         "diff": "Name the first difference of two data sets.",
@@ -138,7 +140,8 @@ gen-data --config tabletop.yaml --n 1000 --set randomizers.clutter.count=20
 gen-data --config tabletop.yaml --n 1000 --without colors --out ablation
 
 An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configuration or usage,
-3 asset, 4 storage (resumable), 5 determinism, 6 sample, 7 verification, 130 interrupted.
+3 asset, 4 storage (resumable), 5 determinism, 6 sample, 7 verification, 8 certification,
+130 interrupted.
 """
 
 
@@ -219,6 +222,8 @@ def main() -> None:
         os.environ[name] = "1"
     # A cluster that a run starts reports nothing to anybody.
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    # A reader of exports that certificates use asks no hub.
+    os.environ.setdefault("HF_HUB_OFFLINE", "1")
     warnings.showwarning = partial(_show_warning, warnings.showwarning)
     code = _exit_code()
     if code == Interrupted.exit_code:

@@ -27,7 +27,8 @@ VERIFY_HELP = """Check a data set against its manifest. Exit code 7 if it deviat
 \b
 gen-data verify out/street                  sizes, records, manifest, foreign files
 gen-data verify out/street --full           every sha256
-gen-data verify out/street --deep           every sample decoded, its labels checked
+gen-data verify out/street --deep           every sample decoded, its labels checked; the claims
+                                            of its certificate repeated, if it has one
 gen-data verify out/street --regenerate 20  20 random samples generated again
 """
 
@@ -35,7 +36,7 @@ gen-data verify out/street --regenerate 20  20 random samples generated again
 @click.command(help=VERIFY_HELP)
 @click.argument("place", metavar="FOLDER")
 @click.option("--full", is_flag=True, help="Hash every file, not only sizes.")
-@click.option("--deep", is_flag=True, help="Also decode every sample and check its labels.")
+@click.option("--deep", is_flag=True, help="Also decode every sample, and repeat a certificate.")
 @click.option(
     "--regenerate",
     type=click.IntRange(min=1),
@@ -114,6 +115,8 @@ def _verify(
         if not found and deep:
             found += _find_invalid(folder)
             notes.append("every sample decoded and valid")
+        if not found:
+            found += _check_certificate(folder, deep, notes)
         if not found and regenerate is not None:
             indices = choose_samples(folder, regenerate)
             found += _find_irreproducible(folder, indices, semantic, source)
@@ -139,6 +142,30 @@ def _find_invalid(folder: Path) -> list[Finding]:
     from gen_data.generator.runner.deep_verify import find_invalid_samples
 
     return list(find_invalid_samples(folder))
+
+
+def _check_certificate(folder: Path, deep: bool, notes: list[str]) -> list[Finding]:
+    """Compare a certificate with the manifest, and with ``deep`` with one that is made now."""
+    from gen_data.generator.runner.store import CERTIFICATE_NAME
+    from gen_data.generator.runner.verify import Finding
+
+    if not (folder / CERTIFICATE_NAME).is_file():
+        return []
+    from threadpoolctl import threadpool_limits
+
+    from gen_data.generator.certificate.certificate import compare, examine, load_certificate
+
+    try:
+        certificate = load_certificate(folder)
+    except VerificationError as error:
+        _, _, fact = str(error).partition(f"{CERTIFICATE_NAME}: ")
+        return [Finding("certificate", CERTIFICATE_NAME, fact)]
+    if certificate is None or not deep:
+        return []
+    with threadpool_limits(limits=1):
+        contradictions, unsure = compare(certificate, examine(folder, certificate.scope))
+    notes += ["the certificate's claims hold again" * (not contradictions), *unsure]
+    return [Finding("certificate", CERTIFICATE_NAME, text) for text in contradictions]
 
 
 def _find_irreproducible(

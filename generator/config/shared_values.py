@@ -112,7 +112,10 @@ def probe_values(section: Node, seed: int) -> Iterator[dict[str, SharedValue]]:
     Yields the values of the first scenes, then each outcome of each choice by itself, then scenes
     with those outcomes of choices within selections that none had: a forced one might contradict
     the values that it depends on. Outcomes that one scene in some hundreds has may be missing.
+
+    The order of keys means nothing: kept documents have theirs sorted, and give the same plan.
     """
+    entries = sorted(section.entries.items())
     seen: set[tuple[str, str]] = set()
 
     def record(shared: dict[str, SharedValue]) -> dict[str, SharedValue]:
@@ -122,10 +125,10 @@ def probe_values(section: Node, seed: int) -> Iterator[dict[str, SharedValue]]:
     for scene in range(_PROBED_SCENES):
         yield record(_evaluate(section, Streams(seed, scene, index=scene), {}))
     first = Streams(seed, 0)
-    for name, node in section.entries.items():
+    for name, node in entries:
         for outcome in _outcomes(node):
             yield record(_evaluate(section, first, {name: outcome}))
-    for name, node in section.entries.items():
+    for name, node in entries:
         for outcome, selected in _selected_outcomes(node, {}):
             if (name, repr(outcome)) in seen:
                 continue
@@ -157,7 +160,7 @@ def _selected_outcomes(
             yield from ((outcome, dict(selected)) for outcome in _outcomes(node))
         return
     name = str(node.entries[SWITCH].content)
-    for key, item in node.entries.items():
+    for key, item in sorted(node.entries.items()):
         if key != SWITCH:
             value = {} if key == DEFAULT else {name: _scalar(key)}
             yield from _selected_outcomes(item, {**selected, **value})
@@ -231,7 +234,7 @@ def _outcomes(node: Node) -> tuple[SharedValue, ...]:
         return ()
     values = (item.content for item in argument.items)
     listed = tuple(value for value in values if isinstance(value, (str, int, float)))
-    return listed or tuple(_scalar(key) for key in argument.entries)
+    return listed or tuple(_scalar(key) for key in sorted(argument.entries))
 
 
 def _select_entry(node: Node, shared: Shared, path: FieldPath) -> tuple[str, Node]:

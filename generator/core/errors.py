@@ -114,6 +114,12 @@ class VerificationError(GenDataError):
     exit_code = 7
 
 
+class CertificationError(GenDataError):
+    """A claim about a data set does not hold."""
+
+    exit_code = 8
+
+
 class Interrupted(GenDataError):
     """The user asked to stop; what was committed stays and the run can be resumed."""
 

@@ -12,6 +12,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import islice, starmap
 from typing import Any
 
 from pydantic import BaseModel
@@ -26,11 +27,17 @@ from gen_data.generator.core.errors import LayoutRejected
 from gen_data.generator.core.interfaces import PhysicsEngine, Randomizer, Stage
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.scene_time import place_sensors
-from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.core.serialization import canonical_json, to_plain
 from gen_data.generator.core.streams import Rng, Streams
 from gen_data.generator.physics import open_engine
 from gen_data.generator.pipeline.finalize_scene import finalize_scene
+from gen_data.generator.runner.plan import differences
+from gen_data.generator.runner.provenance import KeptScene
 from gen_data.generator.runner.stored import StoredSamples
+
+ROUNDING = 1e-5
+"""Numbers of a scene that differ by less are equal: processors may differ in last bits, and poses
+are rounded to a micrometre."""
 
 EXPECTED_DRAWS = 50_000
 """Draws that represent a declared distribution."""
@@ -50,6 +57,8 @@ class Parameter:
             several where a field depends on shared values.
         expected: Values drawn from the declared distributions, in these proportions.
         limits: Smallest and largest possible value; None where there are none.
+        firsts: The first value of every scene, or of every view, in its first attempt, with its
+            distribution: layouts that were rejected later have no influence on these.
     """
 
     name: str
@@ -57,6 +66,7 @@ class Parameter:
     declared: Counter[str] = field(default_factory=Counter)
     expected: list[Any] = field(default_factory=list)
     limits: tuple[float, float] | None = None
+    firsts: list[tuple[Distribution[Any], Any]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -66,7 +76,7 @@ class DrawnParameters:
     Attributes:
         parameters: Sorted by name.
         scenes: Number of scenes that were drawn again.
-        different: Number of these whose first view differs from the stored scene.
+        different: Number of these that differ from the stored scenes.
         rejections: Numbers of rejected attempts by reason and remedy.
     """
 
@@ -77,55 +87,78 @@ class DrawnParameters:
 
 
 def draw_parameters(stored: StoredSamples, scenes_max: int) -> DrawnParameters:
-    """Repeat the draws of some scenes, chosen evenly, and of all their views.
+    """Repeat the draws of some scenes, and represent their distributions by drawn values.
+
+    Raises:
+        ConfigError, AssetError: the configuration or an asset of the data set is not available.
+    """
+    replay = replay_scenes(stored, scenes_max)
+    parameters = tuple(replay.parameters[name] for name in sorted(replay.parameters))
+    for parameter in parameters:
+        declared = {text: replay.distributions[parameter.name, text] for text in parameter.declared}
+        parameter.expected = _expected_values(parameter, declared)
+        parameter.limits = _limits(declared.values())
+    return DrawnParameters(parameters, replay.scenes, len(replay.differences), replay.rejections)
+
+
+def replay_scenes(stored: StoredSamples, scenes_max: int) -> Replay:
+    """Draw some scenes again, chosen evenly, and all their views.
 
     Raises:
         ConfigError, AssetError: the configuration or an asset of the data set is not available.
     """
     config = load_config(str(stored.folder))
     library = open_library(config.asset_folders)
-    replayed = _Replay(stored, config, library)
+    replay = Replay(stored, config, library)
     per_scene = stored.info.views_per_scene * stored.info.steps_per_scene
     count = -(-stored.n // per_scene)
     chosen = sorted({k * count // scenes_max for k in range(scenes_max)}) if scenes_max else []
     with open_engine(library, config.general.physics) as physics:
-        different = sum(not replayed.draw_scene(scene, physics) for scene in chosen)
-    parameters = tuple(replayed.parameters[name] for name in sorted(replayed.parameters))
-    for parameter in parameters:
-        declared = {
-            text: replayed.distributions[parameter.name, text] for text in parameter.declared
-        }
-        parameter.expected = _expected_values(parameter, declared)
-        parameter.limits = _limits(declared.values())
-    return DrawnParameters(parameters, len(chosen), different, replayed.rejections)
+        for scene in chosen:
+            try:
+                replay.draw_scene(scene, physics)
+            except LayoutRejected as refused:
+                text = f"scene {scene}, drawn again: the accepted layout is rejected ({refused})"
+                replay.differences.append(text)
+    return replay
 
 
-class _Replay:
+class Replay:
     """Draws scenes again, and keeps the values and the rejections.
 
     Attributes:
+        parameters: By name, without ``expected`` and ``limits``.
         distributions: Declared distributions by parameter and YAML.
+        rejections: Numbers of rejected attempts by reason and remedy.
+        scenes: Number of scenes that were drawn.
+        differences: The first difference of each scene that is not the stored one, in words.
     """
 
     def __init__(self, stored: StoredSamples, config: Config, library: Library) -> None:
         self.parameters: dict[str, Parameter] = {}
         self.distributions: dict[tuple[str, str], Distribution[Any]] = {}
         self.rejections: Counter[tuple[str, str]] = Counter()
+        self.scenes = 0
+        self.differences: list[str] = []
         self._stored, self._config, self._library = stored, config, library
         self._open_scene = scene_source(config, library)
         self._category_ids = {name: i for i, name in enumerate(stored.info.categories, 1)}
 
-    def draw_scene(self, number: int, physics: PhysicsEngine) -> bool:
-        """Draw a scene and its views; return whether the first view equals the stored one."""
+    def draw_scene(self, number: int, physics: PhysicsEngine) -> None:
+        """Draw a scene and its views, and compare them with the stored ones.
+
+        Raises:
+            LayoutRejected: the attempt that the data set accepted.
+        """
+        self.scenes += 1
         info = self._stored.info
         first = number * info.views_per_scene * info.steps_per_scene
-        kept = self._stored.kept_scene(first)
         log: list[Draw] = []
 
         def settle(attempt: int) -> tuple[Scene, Sequence[Randomizer]]:
-            log.clear()
             streams = Streams(info.seed, number, attempt=attempt, index=number)
             nominal, randomizers, _ = self._open_scene(streams)
+            log.extend(self._shared_draws(nominal))
             observed = tuple(_observe_randomizer(randomizer, log) for randomizer in randomizers)
             drawn = self._randomize(nominal, observed, Stage.BUILD, streams)
             settled = physics.settle(drawn)
@@ -133,35 +166,39 @@ class _Replay:
                 raise LayoutRejected(settled.rejection)
             return finalize_scene(settled.scene, self._library, self._category_ids), observed
 
-        scene, observed = self._accept(kept.attempts, settle)
-        self._keep((*log, *self._shared_draws(scene)))
-        equal = True
+        scene, observed = self._accept(self._stored.kept_scene(first).attempts, settle, log)
+        views = []
         for view in range(min(info.views_per_scene, self._views_left(first))):
             index = number * info.views_per_scene + view
-            stored_view = self._stored.kept_scene(index * info.steps_per_scene)
+            kept = self._stored.kept_scene(index * info.steps_per_scene)
 
             def draw_view(attempt: int, view: int = view, index: int = index) -> Scene:
-                log.clear()
                 streams = Streams(info.seed, number, view=view, attempt=attempt, index=index)
                 return place_sensors(self._randomize(scene, observed, Stage.VIEW, streams))
 
-            placed = self._accept(stored_view.view_attempts, draw_view)
-            self._keep(log)
-            if view == 0:
-                equal = canonical_json(placed) == canonical_json(stored_view.scene)
-        return equal
+            views.append((kept, self._accept(kept.view_attempts, draw_view, log)))
+        self.differences += islice(filter(None, starmap(_first_difference, views)), 1)
 
     def _views_left(self, first: int) -> int:
         return -(-(self._stored.n - first) // self._stored.info.steps_per_scene)
 
-    def _accept(self, attempts: int, draw: Callable[[int], Any]) -> Any:
-        """Result of the attempt that the data set accepted; counts the ones before it."""
-        for attempt in range(attempts - 1):
+    def _accept(self, attempts: int, draw: Callable[[int], Any], log: list[Draw]) -> Any:
+        """Result of the attempt that the data set accepted; counts the ones before it.
+
+        Attempts leave their draws in the log.
+        """
+        for attempt in range(attempts):
+            log.clear()
             try:
-                draw(attempt)
+                accepted = draw(attempt)
             except LayoutRejected as refused:
+                if attempt == attempts - 1:
+                    raise
                 self.rejections[(refused.rejection.reason, refused.rejection.remedy)] += 1
-        return draw(attempts - 1)
+            if attempt == 0:
+                self._keep_firsts(log)
+        self._keep(log)
+        return accepted
 
     def _randomize(
         self, scene: Scene, randomizers: Sequence[Randomizer], stage: Stage, streams: Streams
@@ -186,9 +223,38 @@ class _Replay:
                 continue
             text = to_flow_yaml(distribution.to_yaml())
             self.distributions.setdefault((name, text), distribution)
-            parameter = self.parameters.setdefault(name, Parameter(name))
+            parameter = self._parameter(name)
             parameter.values.append(value)
             parameter.declared[text] += 1
+
+    def _keep_firsts(self, draws: Sequence[Draw]) -> None:
+        firsts = {name: (distribution, value) for name, distribution, value in reversed(draws)}
+        for name, (distribution, value) in firsts.items():
+            if not isinstance(distribution, Constant):
+                self._parameter(name).firsts.append((distribution, value))
+
+    def _parameter(self, name: str) -> Parameter:
+        return self.parameters.setdefault(name, Parameter(name))
+
+
+def _first_difference(kept: KeptScene, drawn: Scene) -> str:
+    """The first difference of a scene from the one that was drawn again; empty if equal."""
+    if canonical_json(drawn) == canonical_json(kept.scene):
+        return ""
+    was, now = to_plain(kept.scene), to_plain(drawn)
+    found = next((line for line in differences("", was, _snap(was, now))), "")
+    return found and f"sample {kept.index}, drawn again: {found}"
+
+
+def _snap(was: Any, now: Any) -> Any:
+    """The plain value ``now`` with those numbers of ``was`` that are the same but for rounding."""
+    if isinstance(was, dict) and isinstance(now, dict):
+        return {k: _snap(was[k], v) if k in was else v for k, v in now.items()}
+    if isinstance(was, list) and isinstance(now, list) and len(was) == len(now):
+        return [_snap(left, right) for left, right in zip(was, now, strict=True)]
+    if isinstance(was, float) and isinstance(now, float):
+        return was if math.isclose(was, now, rel_tol=ROUNDING, abs_tol=ROUNDING) else now
+    return now
 
 
 def _observe_randomizer(randomizer: Randomizer, log: list[Draw]) -> Randomizer:

@@ -1,4 +1,4 @@
-"""A report as one self-contained HTML file that requests nothing.
+"""Reports and certificates as self-contained HTML files that request nothing.
 
 The page holds the data as JSON, and one script that draws it. A content security policy permits
 only this script and style sheet, by their digests, and images in ``data:`` URLs.
@@ -24,20 +24,36 @@ def format_page(sets: Sequence[Mapping[str, Any]]) -> str:
     Args:
         sets: Reports as in ``gen_data.generator.report.report_data``.
     """
-    title = escape(" and ".join(str(report["name"]) for report in sets))
+    title = " and ".join(str(report["name"]) for report in sets)
+    body = (
+        f"<noscript>The report of {escape(title)} needs JavaScript; report.json beside it has "
+        "the same figures.</noscript>\n"
+        f'<script type="application/json" id="data">{embed_json(sets)}</script>\n'
+        f"<script>{SCRIPT}</script>"
+    )
+    return format_document(f"{title}: data set report", body, _digest(SCRIPT))
+
+
+def format_document(title: str, body: str, script_digest: str = "") -> str:
+    """Format an HTML document with the style sheet of reports.
+
+    Args:
+        title: Plain text.
+        body: HTML.
+        script_digest: Of the only script that may run, as in a content security policy; empty =
+            none may.
+    """
+    script = f"script-src '{script_digest}'; " if script_digest else ""
     policy = (
-        f"default-src 'none'; img-src data:; script-src '{_digest(SCRIPT)}'; "
+        f"default-src 'none'; img-src data:; {script}"
         f"style-src '{_digest(STYLE)}'; base-uri 'none'; form-action 'none'"
     )
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>{title}: data set report</title>\n<style>{STYLE}</style></head>\n"
-        f"<body><noscript>The report of {title} needs JavaScript; report.json beside it has "
-        "the same figures.</noscript>\n"
-        f'<script type="application/json" id="data">{embed_json(sets)}</script>\n'
-        f"<script>{SCRIPT}</script></body></html>\n"
+        f"<title>{escape(title)}</title>\n<style>{STYLE}</style></head>\n"
+        f"<body>{body}</body></html>\n"
     )
 
 

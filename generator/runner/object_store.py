@@ -35,6 +35,8 @@ from gen_data.generator.runner.plan import PLAN_NAME, Plan, parse_plan, plan_byt
 from gen_data.generator.runner.seal import parse_object
 from gen_data.generator.runner.shard_record import ShardRecord, parse_record
 from gen_data.generator.runner.store import (
+    CERTIFICATE_NAME,
+    CERTIFICATE_NAMES,
     MANIFEST_NAME,
     RUN_NAME,
     SHARDS_NAME,
@@ -231,7 +233,8 @@ class ObjectStore(LocalStore):
         self._clear_staging()
         super().prepare(plan)
         names = self.objects.names()
-        self.objects.remove(name for name in (MANIFEST_NAME, SUMS_NAME) if name in names)
+        sealed = (MANIFEST_NAME, SUMS_NAME, *CERTIFICATE_NAMES)
+        self.objects.remove(name for name in sealed if name in names)
         self.objects.put(PLAN_NAME, plan_bytes(plan))
 
     def _clear_staging(self) -> None:
@@ -412,7 +415,8 @@ def copy_outline(objects: ObjectFolder, folder: Path) -> None:
     contents (they are sparse). ``verify`` without ``full`` reads nothing else.
     """
     sizes = {n: s for n, s in objects.tree().items() if not n.startswith(f"{RUN_NAME}/")}
-    read = {n for n in sizes if n in (PLAN_NAME, MANIFEST_NAME, SUMS_NAME) or _is_record(n)}
+    documents = (PLAN_NAME, MANIFEST_NAME, SUMS_NAME, CERTIFICATE_NAME)
+    read = {n for n in sizes if n in documents or _is_record(n)}
     found = objects.read(sorted(read))
     for name, size in sizes.items():
         path = folder / name

@@ -5,8 +5,9 @@
     shards/000042.json      its record; from here on the shard is committed
     coco/ kitti/ ...        merged results of exporters
     README.md               data card; croissant.json: its facts for programs
-    SHA256SUMS              every file but run/ and itself, for ``sha256sum -c``
+    SHA256SUMS              every file but run/, certificates and itself, for ``sha256sum -c``
     manifest.json           written last: it marks the data set as finished
+    CERTIFICATE.json        results of ``gen-data certify``, with a page; no part of the data set
     run/                    lock, log, a copy of the plan, unfinished and quarantined files; no part
                             of the data set
 
@@ -56,6 +57,9 @@ MANIFEST_NAME = "manifest.json"
 SUMS_NAME = "SHA256SUMS"
 LICENCES_NAME = "LICENSES-ASSETS.md"
 RUN_NAME = "run"
+CERTIFICATE_NAME = "CERTIFICATE.json"
+CERTIFICATE_NAMES = (CERTIFICATE_NAME, "CERTIFICATE.html")
+"""Statements about a finished data set, beside its manifest; no part of its identity."""
 SHARDS_NAME = "shards"
 REMEDY = "choose another folder with --out"
 SCRATCH_FOLDERS_MAX = 1_000_000
@@ -277,6 +281,9 @@ class LocalStore:
             make_folder(self._shards_dir)
             if self.manifest_path.exists():
                 self.manifest_path.unlink()
+                # What was certified is no more.
+                for name in CERTIFICATE_NAMES:
+                    (self.root / name).unlink(missing_ok=True)
                 sync_path(self.root)
 
     def _clear_places(self) -> None:

@@ -24,6 +24,7 @@ from gen_data.generator.runner.plan import PLAN_NAME, Plan, load_plan
 from gen_data.generator.runner.seal import parse_object, read_or_empty, read_sums
 from gen_data.generator.runner.shard_record import ShardRecord, parse_unchecked_record
 from gen_data.generator.runner.store import (
+    CERTIFICATE_NAMES,
     MANIFEST_NAME,
     RUN_NAME,
     SHARDS_NAME,
@@ -101,7 +102,7 @@ def verify(folder: Path, full: bool = False) -> Report:
 
 
 def scan_finished(folder: Path) -> Contents:
-    """Files and empty folders of a data set, without ``run``.
+    """Files and empty folders of a data set, without ``run`` and certificates.
 
     Raises:
         VerificationError: the folder has no finished data set.
@@ -111,7 +112,12 @@ def scan_finished(folder: Path) -> Contents:
             f"{folder}: not a finished data set: {MANIFEST_NAME} is missing. "
             "The command that started it finishes it."
         )
-    return scan_tree(folder, without=RUN_NAME)
+    return _scan(folder)
+
+
+def _scan(folder: Path) -> Contents:
+    sizes, empty = scan_tree(folder, without=RUN_NAME)
+    return {n: size for n, size in sizes.items() if n not in CERTIFICATE_NAMES}, empty
 
 
 def summarize(folder: Path, full: bool = False, contents: Contents | None = None) -> Report:
@@ -177,7 +183,7 @@ class _Check:
             return
         yield from self._read_sums(manifest, manifest_bytes)
         yield from self._read_sizes(manifest)
-        actual, empty = self._contents or scan_tree(self._folder, without=RUN_NAME)
+        actual, empty = self._contents or _scan(self._folder)
         for path in sorted({*self._sums, *actual} - {SUMS_NAME}):
             yield from self._compare(path, actual.get(path), full)
         # Format version 1 does not say which folders are empty.

@@ -16,15 +16,20 @@ from tests.architecture.test_rules import OURS, ROOT, python_files
 
 BYTES_DO_NOT_DEPEND_ON = {
     "click": "parses the command line",
+    "datasets": "reads exports for certificates",
     "fsspec": "copies finished files",
+    "mlcroissant": "reads exports for certificates",
+    "open3d": "casts rays for certificates",
     "platformdirs": "names the folders of caches",
     "pydantic": "checks values; the checked configuration is part of the plan",
     "pydantic_core": "the same",
     "ray": "starts workers on other machines, which run the same code",
     "rerun_cli": "shows samples",
     "rich": "draws progress on the terminal",
+    "tfrecord": "reads exports for certificates",
     "threadpoolctl": "limits BLAS to one thread, as workers do",
     "typing_extensions": "helps type checkers",
+    "webdataset": "reads exports for certificates",
     "yaml": "reads text; the configuration that it gives is part of the plan",
 }
 """Imported libraries that are not part of the identity, and why."""

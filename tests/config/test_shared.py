@@ -98,6 +98,22 @@ def test_probes_show_every_outcome_of_every_choice() -> None:
     assert {p["road"] for p in probe_values(section, 0)} == {"street", "alley"}
 
 
+def test_probes_do_not_depend_on_the_order_of_keys() -> None:
+    """Plans keep documents with sorted keys: the copy must be probed like the original."""
+    one = """
+        road: {choice: {street: 5, avenue: 1, park: 1}}
+        age: {choice: {old: 1, new: 1}}
+        rails: {switch: road, street: {choice: {tram: 1, none: 40}}, default: {choice: [x, y, z]}}
+        """
+    other = """
+        rails: {switch: road, default: {choice: [x, y, z]}, street: {choice: {none: 40, tram: 1}}}
+        age: {choice: {new: 1, old: 1}}
+        road: {choice: {park: 1, avenue: 1, street: 5}}
+        """
+    probes = [list(probe_values(parse_yaml(text, "test"), 3)) for text in (one, other)]
+    assert probes[0] == probes[1]
+
+
 def test_probes_show_every_outcome_of_choices_within_selections_that_can_occur() -> None:
     """Two roads in a thousand have a track; parks have none, and there is no motorway."""
     section = parse_yaml(

@@ -1,0 +1,102 @@
+"""The data set under examination, and how much of it is sampled."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+from gen_data.generator.assemble.config import Config, load_config
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.core.errors import GenDataError
+from gen_data.generator.core.sample import Sample
+from gen_data.generator.core.streams import Rng, Streams
+from gen_data.generator.pipeline.finalize_scene import Timeline
+from gen_data.generator.report.drawn_parameters import Replay, replay_scenes
+from gen_data.generator.report.stored_labels import ImageLabels, read_images
+from gen_data.generator.runner.exports import StoredPipeline
+from gen_data.generator.runner.plan import load_plan
+from gen_data.generator.runner.regeneration import plan_regeneration
+from gen_data.generator.runner.stored import StoredSamples
+
+
+@dataclass(frozen=True)
+class Scope:
+    """How much is examined; everything that is not listed here is examined completely.
+
+    Attributes:
+        samples: Samples whose pixels and laser points are compared with an independent ray caster.
+        rays: Pixels of every image of these samples, and points of every scan.
+        scenes: Scenes whose parameters are drawn again.
+        alpha: Probability that a correct data set fails the claim on distributions.
+    """
+
+    samples: int = 20
+    rays: int = 500
+    scenes: int = 100
+    alpha: float = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """A finished data set, opened for all claims.
+
+    Attributes:
+        stored: Its samples.
+        scope: How much is sampled.
+    """
+
+    stored: StoredSamples
+    scope: Scope
+
+    @cached_property
+    def config(self) -> Config:
+        """Its configuration; ConfigError if it is not valid here."""
+        return load_config(str(self.stored.folder))
+
+    @cached_property
+    def library(self) -> Library:
+        """The assets of its configuration on this machine."""
+        return open_library(self.config.asset_folders)
+
+    @cached_property
+    def replay(self) -> Replay:
+        """Some of its scenes, drawn again.
+
+        Raises:
+            ConfigError, AssetError: the configuration or an asset is not available here.
+        """
+        return replay_scenes(self.stored, self.scope.scenes)
+
+    @cached_property
+    def changes(self) -> str:
+        """Why this installation does not draw the same scenes; empty if it does."""
+        plan = load_plan(self.stored.folder)
+        if plan.scenes_of:
+            return f"the scenes are those of the data set {plan.scenes_of[:16]}: certify that one"
+        try:
+            changes = plan_regeneration(self.stored.folder, plan).changes
+        except GenDataError as error:
+            return f"the scenes cannot be drawn on this machine: {error}"
+        listed = "; ".join(changes[:3]) + ("; ..." if len(changes) > 3 else "")
+        return f"this installation differs from the one of the data set: {listed}" * bool(changes)
+
+    def images(self) -> Iterator[ImageLabels]:
+        """The labels of every image, in order."""
+        return read_images(self.stored)
+
+    def rng(self, name: str) -> Rng:
+        """A stream for choosing what is sampled: the same for the same data set."""
+        return Streams(0, 0).rng(f"certificate/{self.stored.dataset_id}/{name}")
+
+    def chosen_samples(self) -> list[Sample]:
+        """Random samples, ascending; all if there are few."""
+        count = min(self.scope.samples, self.stored.n)
+        chosen = self.rng("samples").permutation(self.stored.n)[:count]
+        pipeline = StoredPipeline(self.stored, {}, self.config.asset_folders)
+        return [pipeline.sample(int(index)) for index in sorted(chosen)]
+
+    def timeline(self, sample: Sample) -> Timeline:
+        """The sample's world through time."""
+        ids = {name: number for number, name in enumerate(self.stored.categories, 1)}
+        return Timeline(sample.scene, self.library, ids)

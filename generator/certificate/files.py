@@ -1,0 +1,19 @@
+"""Claim: the files are those that the manifest names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from gen_data.generator.certificate.examined import Examined
+from gen_data.generator.certificate.finding import Contradictions, Finding
+from gen_data.generator.runner.verify import find_deviations, summarize
+
+
+def check_files(examined: Examined) -> Iterator[Finding]:
+    """Hash every file and compare it with the manifest."""
+    folder = examined.stored.folder
+    contradictions = Contradictions()
+    for deviation in find_deviations(folder, full=True):
+        contradictions.add(str(deviation))
+    report = summarize(folder, full=True)
+    yield contradictions.judge("", {"files": report.files, "bytes": report.bytes})

@@ -1,0 +1,52 @@
+"""WebDataset, read by the package of that name."""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from gen_data.generator.certificate.labelled_images import LabelledImage, LabelledObject, Loaded
+from gen_data.generator.runner.stored import StoredSamples
+
+
+def load_webdataset(root: Path, stored: StoredSamples) -> Loaded:
+    """Read all tar files of every split; images are decoded."""
+    del stored
+    images: list[LabelledImage] = []
+    tars = 0
+    for folder in sorted(path for path in root.iterdir() if path.is_dir()):
+        paths = sorted(folder.glob("*.tar"))
+        tars += len(paths)
+        for sample in _samples(paths):
+            labels = sample["json"]
+            images += (
+                _image(labels["index"], camera, folder.name, row)
+                for camera, row in labels["cameras"].items()
+                if _has_photograph(sample, camera)
+            )
+    return Loaded(images, {"files": tars})
+
+
+def _samples(paths: list[Path]) -> Iterator[Mapping[str, Any]]:
+    import webdataset
+
+    loaded = webdataset.WebDataset([str(path) for path in paths], shardshuffle=False)
+    yield from loaded.decode("pil")
+    # The reader leaves closing of its files to the garbage collector.
+    del loaded
+    gc.collect()
+
+
+def _has_photograph(sample: Mapping[str, Any], camera: str) -> bool:
+    return any(key.startswith(f"{camera}.rgb.".lower()) for key in sample)
+
+
+def _image(index: int, camera: str, split: str, row: Mapping[str, Any]) -> LabelledImage:
+    objects = []
+    for item in row["annotations"]:
+        x, y, width, height = item["bbox"]
+        box = (x, y, x + width, y + height)
+        objects.append(LabelledObject(item["category"], box, item["segmentation"] or None))
+    return LabelledImage(index, camera, split, (row["width"], row["height"]), tuple(objects))
