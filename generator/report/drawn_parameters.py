@@ -22,7 +22,7 @@ from gen_data.generator.assets.library import Library, open_library
 from gen_data.generator.config.distributions import Constant, Distribution, Numeric
 from gen_data.generator.config.shared_values import Shared, read_shared
 from gen_data.generator.config.yaml_scalars import to_flow_yaml
-from gen_data.generator.core.errors import LayoutRejected
+from gen_data.generator.core.errors import LayoutRejected, VerificationError
 from gen_data.generator.core.interfaces import PhysicsEngine, Randomizer, Stage
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.scene_time import place_sensors
@@ -76,6 +76,47 @@ class DrawnParameters:
     rejections: Mapping[tuple[str, str], int]
 
 
+@dataclass(frozen=True)
+class Drawn:
+    """A draw of a stored data set.
+
+    Attributes:
+        name: Name of the parameter.
+        distribution: The distribution that drew the value.
+        samples: Numbers of the samples that it is for: all of a scene, or those of a view.
+    """
+
+    name: str
+    distribution: Distribution[Any]
+    value: Any
+    samples: range
+
+
+def replay_draws(stored: StoredSamples) -> list[Drawn]:
+    """Repeat all draws of a data set that are not constant, in order.
+
+    Raises:
+        ConfigError, AssetError: the configuration or an asset of the data set is not available.
+        VerificationError: a scene that is drawn again differs from the stored one.
+    """
+    config = load_config(str(stored.folder))
+    library = open_library(config.asset_folders)
+    log: list[Drawn] = []
+
+    def keep(draws: Sequence[Draw], samples: range) -> None:
+        log.extend(Drawn(*draw, samples) for draw in draws if not isinstance(draw[1], Constant))
+
+    replayed = _Replay(stored, config, library, keep)
+    with open_engine(library, config.general.physics) as physics:
+        for scene in range(-(-stored.n // replayed.per_scene)):
+            if not replayed.draw_scene(scene, physics):
+                raise VerificationError(
+                    f"{stored.folder}: scene {scene} is different when it is drawn again; expected "
+                    "the version of gen-data that made the data set"
+                )
+    return log
+
+
 def draw_parameters(stored: StoredSamples, scenes_max: int) -> DrawnParameters:
     """Repeat the draws of some scenes, chosen evenly, and of all their views.
 
@@ -84,32 +125,59 @@ def draw_parameters(stored: StoredSamples, scenes_max: int) -> DrawnParameters:
     """
     config = load_config(str(stored.folder))
     library = open_library(config.asset_folders)
-    replayed = _Replay(stored, config, library)
-    per_scene = stored.info.views_per_scene * stored.info.steps_per_scene
-    count = -(-stored.n // per_scene)
+    kept = _Kept()
+    replayed = _Replay(stored, config, library, kept.keep)
+    count = -(-stored.n // replayed.per_scene)
     chosen = sorted({k * count // scenes_max for k in range(scenes_max)}) if scenes_max else []
     with open_engine(library, config.general.physics) as physics:
         different = sum(not replayed.draw_scene(scene, physics) for scene in chosen)
-    parameters = tuple(replayed.parameters[name] for name in sorted(replayed.parameters))
+    parameters = tuple(kept.parameters[name] for name in sorted(kept.parameters))
     for parameter in parameters:
-        declared = {
-            text: replayed.distributions[parameter.name, text] for text in parameter.declared
-        }
+        declared = {text: kept.distributions[parameter.name, text] for text in parameter.declared}
         parameter.expected = _expected_values(parameter, declared)
         parameter.limits = _limits(declared.values())
     return DrawnParameters(parameters, len(chosen), different, replayed.rejections)
 
 
-class _Replay:
-    """Draws scenes again, and keeps the values and the rejections.
+class _Kept:
+    """Drawn values by parameter.
 
     Attributes:
         distributions: Declared distributions by parameter and YAML.
     """
 
-    def __init__(self, stored: StoredSamples, config: Config, library: Library) -> None:
+    def __init__(self) -> None:
         self.parameters: dict[str, Parameter] = {}
         self.distributions: dict[tuple[str, str], Distribution[Any]] = {}
+
+    def keep(self, draws: Sequence[Draw], samples: range) -> None:
+        del samples
+        for name, distribution, value in draws:
+            if isinstance(distribution, Constant):
+                continue
+            text = to_flow_yaml(distribution.to_yaml())
+            self.distributions.setdefault((name, text), distribution)
+            parameter = self.parameters.setdefault(name, Parameter(name))
+            parameter.values.append(value)
+            parameter.declared[text] += 1
+
+
+class _Replay:
+    """Draws scenes again, hands the draws over, and keeps the rejections.
+
+    Attributes:
+        per_scene: Samples of a scene.
+    """
+
+    def __init__(
+        self,
+        stored: StoredSamples,
+        config: Config,
+        library: Library,
+        keep: Callable[[Sequence[Draw], range], None],
+    ) -> None:
+        self._keep = keep
+        self.per_scene = stored.info.views_per_scene * stored.info.steps_per_scene
         self.rejections: Counter[tuple[str, str]] = Counter()
         self._stored, self._config, self._library = stored, config, library
         self._open_scene = scene_source(config, library)
@@ -118,7 +186,7 @@ class _Replay:
     def draw_scene(self, number: int, physics: PhysicsEngine) -> bool:
         """Draw a scene and its views; return whether the first view equals the stored one."""
         info = self._stored.info
-        first = number * info.views_per_scene * info.steps_per_scene
+        first = number * self.per_scene
         kept = self._stored.kept_scene(first)
         log: list[Draw] = []
 
@@ -134,7 +202,8 @@ class _Replay:
             return finalize_scene(settled.scene, self._library, self._category_ids), observed
 
         scene, observed = self._accept(kept.attempts, settle)
-        self._keep((*log, *self._shared_draws(scene)))
+        samples = range(first, min(first + self.per_scene, self._stored.n))
+        self._keep((*log, *self._shared_draws(scene)), samples)
         equal = True
         for view in range(min(info.views_per_scene, self._views_left(first))):
             index = number * info.views_per_scene + view
@@ -146,7 +215,8 @@ class _Replay:
                 return place_sensors(self._randomize(scene, observed, Stage.VIEW, streams))
 
             placed = self._accept(stored_view.view_attempts, draw_view)
-            self._keep(log)
+            begin = index * info.steps_per_scene
+            self._keep(log, range(begin, min(begin + info.steps_per_scene, self._stored.n)))
             if view == 0:
                 equal = canonical_json(placed) == canonical_json(stored_view.scene)
         return equal
@@ -179,16 +249,6 @@ class _Replay:
             section = self._config.document.entries["shared"]
             for name, distribution in read_shared(section, values).items():
                 yield f"shared.{name}", distribution, values[name]
-
-    def _keep(self, draws: Sequence[Draw]) -> None:
-        for name, distribution, value in draws:
-            if isinstance(distribution, Constant):
-                continue
-            text = to_flow_yaml(distribution.to_yaml())
-            self.distributions.setdefault((name, text), distribution)
-            parameter = self.parameters.setdefault(name, Parameter(name))
-            parameter.values.append(value)
-            parameter.declared[text] += 1
 
 
 def _observe_randomizer(randomizer: Randomizer, log: list[Draw]) -> Randomizer:
