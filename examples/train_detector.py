@@ -1,4 +1,4 @@
-"""Train the detector of ``detector.py`` on two CPU cores; evaluate it on any COCO-style folder.
+"""Train the small detector on two CPU cores; evaluate it on any COCO- or KITTI-style folder.
 
     python examples/train_detector.py out/train --eval out/test/coco --save detector.pt
     python examples/train_detector.py tabletop.yaml --minutes 15 --eval photographs
@@ -14,27 +14,22 @@ interval from bootstrapping over images.
 from __future__ import annotations
 
 import argparse
-import contextlib
-import io
 import json
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import torch
-from detector import STRIDE, Detector, Truth, augment, compute_loss, detect, encode
 from numpy.typing import NDArray
-from pycocotools.coco import COCO
-from pycocotools.cocoeval import COCOeval
 
 import gen_data
+from gen_data.generator.study.detector import Detector
+from gen_data.generator.study.evaluation import evaluate
+from gen_data.generator.study.real_pictures import read_real
+from gen_data.generator.study.training import detect_all, fit
 from gen_data.targets import detection_target
-
-PEAK_RATE = 2e-3
-"""Largest learning rate of AdamW."""
 
 KEPT_MAX = 4000
 """Most samples of a data set that are kept in memory."""
@@ -88,140 +83,38 @@ def read_batches(
 def train(samples: gen_data.SampleSequence, args: argparse.Namespace) -> Detector:
     """Train for ``--minutes`` or ``--steps``, whichever ends first."""
     torch.manual_seed(args.seed)
-    rng = np.random.default_rng(args.seed)
-    model = Detector(samples.categories, args.size, args.width).to(
-        memory_format=torch.channels_last
-    )
-    optimizer = torch.optim.AdamW(model.parameters(), lr=PEAK_RATE, weight_decay=0.01)
+    model = Detector(samples.categories, args.size, args.width)
     started_s = time.monotonic()
-    for step, batch in enumerate(read_batches(samples, args)):
+
+    def used(step: int) -> float:
+        return max((time.monotonic() - started_s) / (60.0 * args.minutes), step / args.steps)
+
+    def report(step: int, loss: float) -> None:
         minutes = (time.monotonic() - started_s) / 60.0
-        used = max(minutes / args.minutes, step / args.steps)
-        if used >= 1.0:
-            break
-        # One cycle: a short warm-up, then a cosine down to zero.
-        rate = min(1.0, (step + 1) / 50) * 0.5 * (1.0 + np.cos(np.pi * used))
-        optimizer.param_groups[0]["lr"] = PEAK_RATE * rate
-        images, truths = zip(*(prepare(model, *pair, rng) for pair in batch), strict=True)
-        loss = compute_loss(*model(torch.stack(images)), truths)
-        optimizer.zero_grad()
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(model.parameters(), 10.0)
-        optimizer.step()
-        if step % 20 == 0:
-            print(f"{minutes:5.1f} min, step {step}: loss {loss.item():.3f}", flush=True)
-    return model.eval()
+        print(f"{minutes:5.1f} min, step {step}: loss {loss:.3f}", flush=True)
+
+    return fit(model, read_batches(samples, args), used, seed=args.seed, report=report)
 
 
-def prepare(
-    model: Detector, image: NDArray[np.uint8], target: dict[str, Any], rng: np.random.Generator
-) -> tuple[torch.Tensor, Truth]:
-    """An augmented image [3, h, w] in [0, 1] and its truth."""
-    moved, boxes = augment(image.transpose(1, 2, 0), target["boxes"], model.size_px, rng)
-    shape = len(model.classes), moved.shape[0] // STRIDE, moved.shape[1] // STRIDE
-    truth = encode(boxes, target["labels"], target["iscrowd"] == 1, shape)
-    return torch.from_numpy(moved).permute(2, 0, 1).float() / 255.0, truth
-
-
-def find_annotations(folder: Path, split: str) -> Path:
-    """The annotation file of a COCO-style folder: the only one, or the one of the split."""
-    files = sorted(folder.glob("annotations/*.json")) or sorted(folder.glob("*.json"))
-    files = [path for path in files if "keypoints" not in path.stem]
-    chosen = [path for path in files if split in path.stem]
-    if split == "" and len(files) > 1:
-        chosen = [path for path in files if "val" in path.stem]
-    if len(chosen) != 1:
-        names = ", ".join(path.name for path in files) or "none"
-        raise SystemExit(f"{folder}: expected one annotation file *{split}*.json; found {names}")
-    return chosen[0]
-
-
-def find_images(folder: Path, annotations: Path, names: list[str]) -> list[Path]:
-    """Images by their names in an annotation file.
-
-    Of several with one name, those in ``<split>/`` win, then those in the fewest folders: an export
-    holds depth and label images of the same names in folders of their own.
-    """
-    known: dict[str, list[Path]] = {}
-    for path in sorted(folder.rglob("*.*")):
-        known.setdefault(path.name, []).append(path)
-    images = []
-    for name in map(Path, names):
-        found = [p for p in known.get(name.name, []) if p.parts[-len(name.parts) :] == name.parts]
-        if not found:
-            raise SystemExit(f"{annotations}: there is no image {name} in {folder}")
-        images.append(max(found, key=lambda p: (p.parent.name in annotations.stem, -len(p.parts))))
-    return images
-
-
-def detect_all(
-    model: Detector, truth: COCO, files: list[Path], ids: dict[str, int]
-) -> list[dict[str, Any]]:
-    """Detections in all images in COCO's format of results; ``ids`` are its categories by name."""
-    results = []
-    for entry, file in zip(truth.dataset["images"], files, strict=True):
-        image = cv2.imread(str(file))
-        if image is None:
-            raise SystemExit(f"{file}: cannot be read as an image")
-        for (x0, y0, x1, y1), score, label in zip(*detect(model, image[..., ::-1]), strict=True):
-            name = model.classes[label - 1]
-            if name in ids:
-                box = [float(v) for v in (x0, y0, x1 - x0, y1 - y0)]
-                result = {"image_id": entry["id"], "category_id": ids[name], "bbox": box}
-                results.append(result | {"score": float(score)})
-    return results
-
-
-def evaluate(model: Detector, args: argparse.Namespace) -> dict[str, Any]:
+def evaluate_on(model: Detector, args: argparse.Namespace) -> dict[str, Any]:
     """Print AP and AP50 with confidence intervals, and AP50 per class; return them."""
-    path = find_annotations(args.eval, args.split)
-    with contextlib.redirect_stdout(io.StringIO()):
-        truth = COCO(str(path))
-    ids = {c["name"]: c["id"] for c in truth.dataset["categories"] if c["name"] in model.classes}
-    if not ids:
-        raise SystemExit(f"{path}: has none of the classes {', '.join(model.classes)}")
-    names = [image["file_name"] for image in truth.dataset["images"]]
-    results = detect_all(model, truth, find_images(args.eval, path, names), ids)
-    if not results:
-        raise SystemExit(f"{path}: none of its classes was detected in the images")
-    with contextlib.redirect_stdout(io.StringIO()):
-        judged = COCOeval(truth, truth.loadRes(results), "bbox")
-        judged.params.catIds = sorted(ids.values())
-        judged.evaluate()
-    count = len(judged.params.imgIds)
-    measured = average_precisions(judged, np.arange(count))
+    real = read_real(args.eval, args.split).restrict(model.classes)
+    judged = evaluate(real, detect_all(model, real, real.pictures))
+    count = len(real.pictures)
     rng = np.random.default_rng(0)
-    drawn = [
-        np.nanmean(average_precisions(judged, rng.integers(0, count, count)), axis=1)
-        for _ in range(args.bootstrap)
-    ]
+    drawn = [judged.summary(rng.integers(0, count, count)) for _ in range(args.bootstrap)]
     summary: dict[str, Any] = {"images": count}
     low, high = np.nanpercentile(drawn, [2.5, 97.5], axis=0)
     for name, row in (("AP", 0), ("AP50", 1)):
-        mean = float(np.nanmean(measured[row]))
+        mean = float(judged.summary()[row])
         print(f"{name:<5} {mean:.3f}  (95 %: {low[row]:.3f} to {high[row]:.3f}; {count} images)")
         summary[name.lower()] = mean
-    classes = sorted(ids, key=ids.__getitem__)
-    by_class = zip(classes, measured[1].tolist(), strict=True)
+    classes = sorted(real.category_ids, key=real.category_ids.__getitem__)
+    by_class = zip(classes, judged.average_precisions()[1].tolist(), strict=True)
     summary["ap50_by_class"] = {name: ap for name, ap in by_class if not np.isnan(ap)}
     parts = [f"{name} {ap:.2f}" for name, ap in summary["ap50_by_class"].items()]
     print(f"AP50 by class: {', '.join(parts)}")
     return summary
-
-
-def average_precisions(judged: COCOeval, chosen: NDArray[np.int64]) -> NDArray[np.float64]:
-    """AP and AP50 [2, classes] over the images with these numbers; NaN = class without objects."""
-    evaluated, params = judged.evalImgs, judged.params
-    table = np.empty(len(evaluated), object)
-    table[:] = evaluated
-    table = table.reshape(len(params.catIds), len(params.areaRng), len(params.imgIds))
-    judged.evalImgs = table[..., chosen].ravel().tolist()
-    with contextlib.redirect_stdout(io.StringIO()):
-        judged.accumulate()
-    judged.evalImgs = evaluated
-    precision = judged.eval["precision"][:, :, :, 0, -1]  # IoU, recall, class; all areas
-    precision = np.where(precision > -1, precision, np.nan)
-    return np.stack([precision.mean(axis=(0, 1)), precision[0].mean(axis=0)])
 
 
 def parse_arguments() -> argparse.Namespace:
@@ -251,11 +144,11 @@ def parse_arguments() -> argparse.Namespace:
 def main() -> None:
     """Train or load, evaluate, print."""
     args = parse_arguments()
-    find_annotations(args.eval, args.split)  # a wrong folder fails before training
+    read_real(args.eval, args.split)  # a wrong folder fails before training
     model = Detector.load(args.load) if args.load else train(open_source(args), args)
     if args.save is not None:
         model.save(args.save)
-    summary = evaluate(model, args)
+    summary = evaluate_on(model, args)
     if args.out is not None:
         args.out.write_text(json.dumps(summary) + "\n")
 

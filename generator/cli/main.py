@@ -40,7 +40,10 @@ from gen_data.generator.core.processes import SINGLE_THREADED
 from gen_data.generator.core.urls import is_url, needs_folder
 
 FOLDERS_ONLY = frozenset(
-    "certify contact-sheet diff export merge preview repair report repro rerender sample".split()  # noqa: SIM905
+    (
+        "adapt", "certify", "contact-sheet", "diff", "export", "merge", "preview", "repair", "report",
+        "repro", "rerender", "sample", "study",
+    )  # fmt: skip
 )
 """Commands that read no data set at a URL."""
 
@@ -59,6 +62,8 @@ class LazyCommands(click.Group):
         "assets": "gen_data.generator.cli.asset_commands:assets",
         "cache": "gen_data.generator.cli.cache_commands:cache",
         "report": "gen_data.generator.cli.report_command:report",
+        "study": "gen_data.generator.cli.study_command:study",
+        "adapt": "gen_data.generator.cli.adapt_command:adapt",
         "verify": "gen_data.generator.cli.verification_commands:verify",
         "certify": "gen_data.generator.cli.certify_command:certify",
         "merge": "gen_data.generator.cli.merge_command:merge",
@@ -82,6 +87,8 @@ class LazyCommands(click.Group):
         "assets": "Install, list, show, verify and remove packs of assets.",
         "cache": "Show or clear caches of assets, data sets at URLs, and kernels.",
         "report": "Statistics of a data set, and an HTML page with its samples.",
+        "study": "Measure what a change of a configuration is worth on real pictures.",
+        "adapt": "Draw more of what a detector missed: the next round of a curriculum.",
         "verify": "Check a data set: sizes, checksums, labels, reproducibility.",
         "certify": "Check a data set by independent means; write its certificate.",
         "merge": "Join parts that were generated with --shards.",

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from gen_data.generator.cli.tables import print_tables
 from gen_data.generator.core.errors import ConfigError, StorageError
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def report(folder: Path, compare: Path | None, html: Path | None, scenes: int) -
     for number, described in enumerate(sets):
         if len(sets) > 1:
             console.rule(str(folders[number]))
-        _print_tables(console, described["tables"])
+        print_tables(console, described["tables"])
     if page is not None:
         _write(page, sets)
         click.echo(f"wrote {page}")
@@ -81,21 +81,6 @@ def _describe(folder: Path, scenes: int, sets: int, console: Console) -> dict[st
             browser_bytes_max=BROWSER_BYTES_MAX // sets,
             progress=lambda step: status.update(f"{folder}: {step}"),
         )
-
-
-def _print_tables(console: Console, tables: Iterable[Mapping[str, Any]]) -> None:
-    from rich import box
-    from rich.table import Table
-    from rich.text import Text
-
-    for table in tables:
-        shown = Table(title=table["title"], caption=table["note"] or None, box=box.SIMPLE_HEAD)
-        for number, name in enumerate(table["header"]):
-            shown.add_column(name, justify="right" if number else "left")
-        for row in table["rows"]:
-            # Names are text: brackets in them are no markup.
-            shown.add_row(*map(Text, row))
-        console.print(shown)
 
 
 def _write(page: Path, sets: list[dict[str, Any]]) -> None:

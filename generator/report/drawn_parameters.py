@@ -46,6 +46,22 @@ Draw = tuple[str, Distribution[Any], Any]
 """Name of a parameter, its distribution, and a drawn value."""
 
 
+@dataclass(frozen=True)
+class Drawn:
+    """A draw of a stored data set.
+
+    Attributes:
+        name: Name of the parameter.
+        distribution: The distribution that drew the value.
+        samples: Numbers of the samples that it is for: all of a scene, or those of a view.
+    """
+
+    name: str
+    distribution: Distribution[Any]
+    value: Any
+    samples: range
+
+
 @dataclass
 class Parameter:
     """All drawn values of one parameter.
@@ -110,8 +126,7 @@ def replay_scenes(stored: StoredSamples, scenes_max: int) -> Replay:
     config = load_config(str(stored.folder))
     library = open_library(config.asset_folders)
     replay = Replay(stored, config, library)
-    per_scene = stored.info.views_per_scene * stored.info.steps_per_scene
-    count = -(-stored.n // per_scene)
+    count = -(-stored.n // replay.per_scene)
     chosen = sorted({k * count // scenes_max for k in range(scenes_max)}) if scenes_max else []
     with open_engine(library, config.general.physics) as physics:
         for scene in chosen:
@@ -130,8 +145,10 @@ class Replay:
         parameters: By name, without ``expected`` and ``limits``.
         distributions: Declared distributions by parameter and YAML.
         rejections: Numbers of rejected attempts by reason and remedy.
+        per_scene: Samples of a scene.
         scenes: Number of scenes that were drawn.
         differences: The first difference of each scene that is not the stored one, in words.
+        draws: All draws of accepted attempts, in order, but for constants.
     """
 
     def __init__(self, stored: StoredSamples, config: Config, library: Library) -> None:
@@ -140,6 +157,8 @@ class Replay:
         self.rejections: Counter[tuple[str, str]] = Counter()
         self.scenes = 0
         self.differences: list[str] = []
+        self.draws: list[Drawn] = []
+        self.per_scene = stored.info.views_per_scene * stored.info.steps_per_scene
         self._stored, self._config, self._library = stored, config, library
         self._open_scene = scene_source(config, library)
         self._category_ids = {name: i for i, name in enumerate(stored.info.categories, 1)}
@@ -152,7 +171,7 @@ class Replay:
         """
         self.scenes += 1
         info = self._stored.info
-        first = number * info.views_per_scene * info.steps_per_scene
+        first = number * self.per_scene
         log: list[Draw] = []
 
         def settle(attempt: int) -> tuple[Scene, Sequence[Randomizer]]:
@@ -166,23 +185,29 @@ class Replay:
                 raise LayoutRejected(settled.rejection)
             return finalize_scene(settled.scene, self._library, self._category_ids), observed
 
-        scene, observed = self._accept(self._stored.kept_scene(first).attempts, settle, log)
+        samples = range(first, min(first + self.per_scene, self._stored.n))
+        attempts = self._stored.kept_scene(first).attempts
+        scene, observed = self._accept(attempts, settle, log, samples)
         views = []
         for view in range(min(info.views_per_scene, self._views_left(first))):
             index = number * info.views_per_scene + view
-            kept = self._stored.kept_scene(index * info.steps_per_scene)
+            begin = index * info.steps_per_scene
+            samples = range(begin, min(begin + info.steps_per_scene, self._stored.n))
+            kept = self._stored.kept_scene(begin)
 
             def draw_view(attempt: int, view: int = view, index: int = index) -> Scene:
                 streams = Streams(info.seed, number, view=view, attempt=attempt, index=index)
                 return place_sensors(self._randomize(scene, observed, Stage.VIEW, streams))
 
-            views.append((kept, self._accept(kept.view_attempts, draw_view, log)))
+            views.append((kept, self._accept(kept.view_attempts, draw_view, log, samples)))
         self.differences += islice(filter(None, starmap(_first_difference, views)), 1)
 
     def _views_left(self, first: int) -> int:
         return -(-(self._stored.n - first) // self._stored.info.steps_per_scene)
 
-    def _accept(self, attempts: int, draw: Callable[[int], Any], log: list[Draw]) -> Any:
+    def _accept(
+        self, attempts: int, draw: Callable[[int], Any], log: list[Draw], samples: range
+    ) -> Any:
         """Result of the attempt that the data set accepted; counts the ones before it.
 
         Attempts leave their draws in the log.
@@ -197,7 +222,7 @@ class Replay:
                 self.rejections[(refused.rejection.reason, refused.rejection.remedy)] += 1
             if attempt == 0:
                 self._keep_firsts(log)
-        self._keep(log)
+        self._keep(log, samples)
         return accepted
 
     def _randomize(
@@ -217,10 +242,11 @@ class Replay:
             for name, distribution in read_shared(section, values).items():
                 yield f"shared.{name}", distribution, values[name]
 
-    def _keep(self, draws: Sequence[Draw]) -> None:
+    def _keep(self, draws: Sequence[Draw], samples: range) -> None:
         for name, distribution, value in draws:
             if isinstance(distribution, Constant):
                 continue
+            self.draws.append(Drawn(name, distribution, value, samples))
             text = to_flow_yaml(distribution.to_yaml())
             self.distributions.setdefault((name, text), distribution)
             parameter = self._parameter(name)

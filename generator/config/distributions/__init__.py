@@ -29,6 +29,7 @@ from gen_data.generator.config.distributions.base import (
     reader,
 )
 from gen_data.generator.config.distributions.discrete import Choice, Constant, Probability, Sequence
+from gen_data.generator.config.distributions.mixture import Mixture
 from gen_data.generator.config.distributions.numeric import (
     LogUniform,
     Normal,
@@ -54,9 +55,9 @@ __all__ = [
     "CHANCE", "DIRECTION", "DISTRIBUTIONS", "DISTRIBUTION_TITLE", "FLAG", "MEANT", "NAME", "NUMBER",
     "POSITION", "ROTATION", "WHOLE_NUMBER", "AboutZ", "Bounds", "Box", "Cap", "Chance", "Choice",
     "Constant", "Count", "Direction", "Distribution", "EulerDeg", "FieldOf", "Flag", "LogUniform",
-    "Malformed", "Name", "NonNegative", "Normal", "Numeric", "Position", "Positive", "Probability",
-    "QuaternionWxyz", "Rotation", "Scalar", "Sequence", "Shell", "So3", "Sphere", "Uniform",
-    "UniformInteger", "UnitInterval", "distribution_schema",
+    "Malformed", "Mixture", "Name", "NonNegative", "Normal", "Numeric", "Position", "Positive",
+    "Probability", "QuaternionWxyz", "Rotation", "Scalar", "Sequence", "Shell", "So3", "Sphere",
+    "Uniform", "UniformInteger", "UnitInterval", "distribution_schema",
 ]  # fmt: skip
 
 if TYPE_CHECKING:

@@ -46,6 +46,7 @@ DISTRIBUTIONS: PluginTable[Distribution[Any]] = PluginTable(
         "log_uniform": "gen_data.generator.config.distributions.numeric:LogUniform",
         "normal": "gen_data.generator.config.distributions.numeric:Normal",
         "uniform_integer": "gen_data.generator.config.distributions.numeric:UniformInteger",
+        "mixture": "gen_data.generator.config.distributions.mixture:Mixture",
         "quaternion_wxyz": "gen_data.generator.config.distributions.space:QuaternionWxyz",
         "euler_deg": "gen_data.generator.config.distributions.space:EulerDeg",
         "so3": "gen_data.generator.config.distributions.space:So3",

@@ -109,7 +109,8 @@ class Detector(nn.Module):
         content = torch.load(path, weights_only=True)
         model = Detector(content["classes"], content["size_px"], content["width"])
         model.load_state_dict(content["weights"])
-        return model.eval()
+        model.eval()
+        return model
 
 
 def input_size(image: Image, size_px: int) -> tuple[int, int]:
@@ -228,7 +229,6 @@ def compute_giou(first: Tensor, second: Tensor) -> Tensor:
     return common / union.clamp(min=1e-6) - (hull - union) / hull.clamp(min=1e-6)
 
 
-@torch.no_grad()
 def detect(
     model: Detector, image: Image, most: int = 100
 ) -> tuple[Floats, Floats, NDArray[np.int64]]:
@@ -243,7 +243,8 @@ def detect(
     small = cv2.resize(image, None, fx=scale, fy=scale, interpolation=filter_)
     padded = np.zeros((down, across, 3), np.float32)
     padded[: small.shape[0], : small.shape[1]] = small / 255.0
-    logits, boxes = model(torch.from_numpy(padded).permute(2, 0, 1)[None])
+    with torch.inference_mode():
+        logits, boxes = model(torch.from_numpy(padded).permute(2, 0, 1)[None])
     heat = torch.sigmoid(logits[0])
     peaks = heat * (functional.max_pool2d(heat, 3, 1, 1) == heat)
     scores, places = peaks.flatten().topk(min(most, peaks.numel()))

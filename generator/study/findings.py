@@ -1,0 +1,182 @@
+"""Findings of a study: average precision and what is missed, as data, tables and a page."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
+
+import cv2
+
+from gen_data.generator.study.comparison import Interval, adjust, interval, score
+from gen_data.generator.study.evaluation import Evaluation
+from gen_data.generator.study.failures import count_groups, draw_faults, worst_pictures
+
+ALPHA = 0.05
+"""False alarm rate of all verdicts of a study together."""
+PICTURES_MAX = 12
+"""Pictures of faults per variant."""
+
+Table = dict[str, Any]
+"""``title``, ``header``, ``rows`` of texts, ``note``."""
+
+
+def describe(runs: Mapping[str, Sequence[Evaluation]]) -> dict[str, Any]:
+    """Compare variants.
+
+    Args:
+        runs: Evaluations by name of the variant, one per seed, on the same pictures; the first
+            variant is the baseline.
+
+    Returns:
+        ``pictures``, ``objects``, ``seeds``, ``variants`` by name (AP, AP50 and the difference of
+        AP to the baseline, with intervals, adjusted p and verdict), and ``groups``.
+    """
+    names = list(runs)
+    scores = {name: score(runs[name]) for name in names}
+    ap = {name: first for name, (first, _) in scores.items()}
+    differences = {name: interval(ap[name] - ap[names[0]]) for name in names[1:]}
+    adjusted = dict(zip(differences, adjust([d.p for d in differences.values()]), strict=True))
+    first = runs[names[0]][0]
+    return {
+        "pictures": len(first.pictures),
+        "objects": sum(not t.is_ignored for p in first.pictures for t in p.objects),
+        "seeds": len(runs[names[0]]),
+        "variants": {
+            name: {
+                "ap": _plain(interval(ap[name])),
+                "ap50": _plain(interval(scores[name][1])),
+                "ap_by_seed": ap[name].measured.tolist(),
+            }
+            | (
+                {
+                    "difference": _plain(differences[name]),
+                    "p_adjusted": adjusted[name],
+                    "verdict": _verdict(differences[name], adjusted[name]),
+                }
+                if name in differences
+                else {}
+            )
+            for name in names
+        },
+        "groups": {
+            name: [
+                {"kind": kind, "group": group, "found": share.found, "objects": share.count}
+                for (kind, group), share in count_groups(runs[name]).items()
+            ]
+            for name in names
+        },
+    }
+
+
+def tabulate(findings: Mapping[str, Any]) -> list[Table]:
+    """Tables of findings: variants, and shares of objects found by group."""
+    rows = []
+    for name, facts in findings["variants"].items():
+        difference = facts.get("difference")
+        rows.append(
+            [
+                name,
+                _with_interval(facts["ap"]),
+                _with_interval(facts["ap50"]),
+                _with_interval(difference, "+") if difference else "",
+                f"{facts['p_adjusted']:.3f}" if difference else "",
+                facts.get("verdict", ""),
+            ]
+        )
+    seeds = findings["seeds"]
+    note = (
+        f"{findings['pictures']} real pictures, {findings['objects']} objects, {seeds} "
+        f"{'seed: how much results vary between seeds is unknown' if seeds == 1 else 'seeds'}; "
+        "95 % intervals; p adjusted by Holm"
+    )
+    header = ["variant", "AP", "AP50", "AP - baseline", "p", "verdict"]
+    tables: list[Table] = [{"title": "variants", "header": header, "rows": rows, "note": note}]
+    names = list(findings["groups"])
+    groups = sorted({(g["kind"], g["group"]) for rows in findings["groups"].values() for g in rows})
+    shares = {
+        name: {(g["kind"], g["group"]): g for g in findings["groups"][name]} for name in names
+    }
+    tables.append(
+        {
+            "title": "objects found, by group",
+            "header": ["group", "objects", *names],
+            "rows": [
+                [
+                    f"{kind}: {group}",
+                    str(shares[names[0]][kind, group]["objects"] // seeds),
+                    *(_percent(shares[name].get((kind, group))) for name in names),
+                ]
+                for kind, group in groups
+            ],
+            "note": "IoU of 0.5 at least, at the score with the best F1 of each run",
+        }
+    )
+    return tables
+
+
+def format_page(
+    title: str, tables: Sequence[Table], runs: Mapping[str, Sequence[Evaluation]]
+) -> str:
+    """One HTML page with the tables and the pictures with most faults, which requests nothing."""
+    sections = [_format_table(table) for table in tables]
+    for name, evaluations in runs.items():
+        figures = [
+            f'<figure><img alt="" src="{_data_url(evaluations[0], number)}"><figcaption>'
+            f"{escape(evaluations[0].pictures[number].path.name)}: {count} faults in "
+            f"{len(evaluations)} runs</figcaption></figure>"
+            for number, count in worst_pictures(evaluations, PICTURES_MAX)
+        ]
+        sections.append(f"<h2>{escape(name)}: pictures with most faults</h2>{''.join(figures)}")
+    legend = "green: found; red: missed; orange: false alarm (of the first seed)"
+    return (
+        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
+        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
+        "style-src 'unsafe-inline'\">\n"
+        f"<title>{escape(title)}</title>\n<style>{_STYLE}</style></head>\n"
+        f"<body><h1>{escape(title)}</h1><p>{legend}</p>{''.join(sections)}</body></html>\n"
+    )
+
+
+_STYLE = (
+    "body{font:15px/1.4 sans-serif;margin:2em;max-width:80em}table{border-collapse:collapse}"
+    "td,th{padding:.2em .8em;text-align:right;border-bottom:1px solid #ccc}"
+    "td:first-child,th:first-child{text-align:left}figure{display:inline-block;margin:.5em}"
+    "figcaption{font-size:12px}caption{caption-side:bottom;text-align:left;color:#555}"
+)
+
+
+def _plain(value: Interval) -> dict[str, float]:
+    return {"mean": value.mean, "low": value.low, "high": value.high, "p": value.p}
+
+
+def _verdict(difference: Interval, p: float) -> str:
+    if p >= ALPHA:
+        return "no difference found"
+    return "better" if difference.mean > 0 else "worse"
+
+
+def _with_interval(value: Mapping[str, float], sign: str = "") -> str:
+    mean, low, high = (f"{value[key]:{sign}.3f}" for key in ("mean", "low", "high"))
+    return f"{mean} ({low} to {high})"
+
+
+def _percent(group: Mapping[str, Any] | None) -> str:
+    return "" if group is None else f"{100.0 * group['found'] / group['objects']:.0f} %"
+
+
+def _format_table(table: Table) -> str:
+    def line(cells: Sequence[str], tag: str) -> str:
+        return "<tr>" + "".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+
+    rows = "".join(line(row, "td") for row in table["rows"])
+    return (
+        f"<h2>{escape(table['title'])}</h2><table><caption>{escape(table['note'])}</caption>"
+        f"{line(table['header'], 'th')}{rows}</table>"
+    )
+
+
+def _data_url(run: Evaluation, number: int) -> str:
+    encoded = cv2.imencode(".jpg", draw_faults(run, number)[..., ::-1])[1]
+    return "data:image/jpeg;base64," + base64.b64encode(encoded.tobytes()).decode()

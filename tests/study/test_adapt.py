@@ -1,0 +1,156 @@
+"""A curriculum draws more of what was missed, and says exactly what it did."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+import gen_data
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.report.drawn_parameters import replay_scenes
+from gen_data.generator.runner.stored import StoredSamples
+from gen_data.generator.study.adapt import adapt
+
+CONFIG = """\
+extends: tabletop.yaml
+without: {sensors: [pseudo_lidar], exporters: all}
+views_per_scene: 1
+randomizers:
+  - {name: clutter, count: {uniform_integer: [1, 4]}}
+sensors:
+  - {name: color, size_px: [64, 48], channels: [rgb]}
+annotations: [boxes2d, visibility]
+exporters: [{type: coco}]
+splits: {train: 1, val: 0, test: 0}
+"""
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small tabletop."""
+    path = tmp_path_factory.mktemp("config") / "small.yaml"
+    path.write_text(CONFIG)
+    return path
+
+
+@pytest.fixture(scope="module")
+def data(config: Path) -> Path:
+    """Forty samples of it."""
+    out = config.parent / "data"
+    gen_data.generate(config, 40, out=out, workers=0)
+    return out
+
+
+def weak_results(data: Path) -> list[dict[str, Any]]:
+    """A detector that finds nothing beyond 1.2 m; the configuration draws 0.9 to 1.5 m."""
+    stored = StoredSamples(data)
+    draws = replay_scenes(stored, stored.n).draws
+    near = {d.samples[0] for d in draws if d.name == "orbit.distance_m" and d.value < 1.2}
+    truth = json.loads((data / "coco/annotations/instances_train.json").read_text())
+    return [
+        {key: row[key] for key in ("image_id", "category_id", "bbox")} | {"score": 0.9}
+        for row in truth["annotations"]
+        if row["image_id"] - 1 in near
+    ]
+
+
+@pytest.fixture(scope="module")
+def results(data: Path) -> Path:
+    """Its detections."""
+    path = data.parent / "results.json"
+    path.write_text(json.dumps(weak_results(data)))
+    return path
+
+
+def test_the_next_round_draws_more_of_what_was_missed(
+    config: Path, data: Path, results: Path, tmp_path: Path
+) -> None:
+    """Only the distance changes; the file loads, and most of its weight is beyond 1.2 m."""
+    made = adapt(str(config), data, tmp_path, results=results)
+
+    assert made.changed == ("orbit.distance_m",)
+    document = yaml.safe_load(made.config.read_text())
+    assert (document["seed"], list(document)) == (8, ["extends", "seed", "randomizers"])
+    (orbit,) = document["randomizers"]
+    far = sum(w for w, part in orbit["distance_m"]["mixture"] if part["uniform"][0] >= 1.2)
+    assert 0.6 < far < 1.0
+    loaded = load_config(str(made.config))
+    (distance,) = [r for r in loaded.probes[0].randomizers if r.name == "orbit"]
+    assert distance.distance_m.support() == (0.9, 1.5)
+
+
+def test_the_same_input_writes_the_same_bytes(
+    config: Path, data: Path, results: Path, tmp_path: Path
+) -> None:
+    """Of the configuration and of the curriculum, which names what was judged."""
+    first, second = tmp_path / "a", tmp_path / "b"
+    for out in (first, second):
+        adapt(str(config), data, out, results=results)
+
+    for name in ("round_1.yaml", "curriculum.yaml"):
+        assert (first / name).read_bytes() == (second / name).read_bytes()
+    (entry,) = yaml.safe_load((first / "curriculum.yaml").read_text())["rounds"]
+    assert entry["judged"] == StoredSamples(data).dataset_id
+    assert (entry["round"], entry["config"], entry["seed"]) == (1, "round_1.yaml", 8)
+    assert list(entry["weights"]) == ["orbit.distance_m"]
+
+
+def test_a_second_round_extends_the_first(
+    config: Path, data: Path, results: Path, tmp_path: Path
+) -> None:
+    """Its parts are those of the mixture of the first round."""
+    first = adapt(str(config), data, tmp_path, results=results)
+    judged = tmp_path / "judged"
+    gen_data.generate(str(first.config), 30, out=judged, workers=0)
+    path = tmp_path / "second.json"
+    path.write_text(json.dumps(weak_results(judged)))
+
+    second = adapt(str(first.config), judged, tmp_path, results=path)
+
+    assert second.config.name == "round_2.yaml"
+    assert yaml.safe_load(second.config.read_text())["extends"] == "round_1.yaml"
+    rounds = yaml.safe_load((tmp_path / "curriculum.yaml").read_text())["rounds"]
+    assert [entry["seed"] for entry in rounds] == [8, 9]
+
+
+def test_results_of_another_data_set_are_refused_by_its_id(
+    config: Path, data: Path, tmp_path: Path
+) -> None:
+    """Where the file names its data set."""
+    path = tmp_path / "other.json"
+    path.write_text(json.dumps({"dataset": "0123456789abcdef", "results": []}))
+
+    with pytest.raises(ConfigError) as caught:
+        adapt(str(config), data, tmp_path / "out", results=path)
+
+    assert str(caught.value) == (
+        f"{path}: has results of the data set 0123456789abcdef; expected those of "
+        f"{StoredSamples(data).dataset_id} in {data}"
+    )
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_data_set_of_another_configuration_is_refused(data: Path, tmp_path: Path) -> None:
+    """With the sections that differ."""
+    with pytest.raises(
+        ConfigError, match=r"was not generated from tabletop: the sections .*sensors"
+    ):
+        adapt("tabletop.yaml", data, tmp_path, results=tmp_path / "none.json")
+
+
+def test_a_detector_that_misses_nothing_teaches_nothing(
+    config: Path, data: Path, tmp_path: Path
+) -> None:
+    """The truth as results."""
+    truth = json.loads((data / "coco/annotations/instances_train.json").read_text())
+    rows = [row | {"score": 1.0} for row in truth["annotations"]]
+    path = tmp_path / "perfect.json"
+    path.write_text(json.dumps(rows))
+
+    with pytest.raises(ConfigError, match=r"found all \d+ objects; expected misses to learn from"):
+        adapt(str(config), data, tmp_path / "out", results=path)

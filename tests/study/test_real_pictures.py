@@ -1,0 +1,127 @@
+"""Folders of users are read as they are, and what cannot be used is counted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gen_data.generator.core.errors import ConfigError, StorageError
+from gen_data.generator.study.real_pictures import RealObject, read_real
+from tests.study.conftest import write_coco, write_picture
+
+LABELS = """\
+Car 0.00 1 -1.57 10.00 12.00 29.00 31.00 1.5 1.6 3.9 1.0 1.7 20.0 -1.5
+Pedestrian 0.00 3 0.10 40.00 5.00 49.00 24.00 1.7 0.6 0.6 4.0 1.7 12.0 0.4
+DontCare -1 -1 -10 0.00 0.00 9.00 9.00 -1 -1 -1 -1000 -1000 -1000 -10
+"""
+
+
+def test_cocos_boxes_crowds_and_occlusion_are_read(tmp_path: Path) -> None:
+    """A hidden fraction has KITTI's level; ids are those of the file."""
+    write_coco(
+        tmp_path,
+        [[{"bbox": [1, 2, 10, 20], "occlusion": 0.7}, {"bbox": [5, 5, 4, 4], "iscrowd": 1}], []],
+    )
+
+    real = read_real(tmp_path)
+
+    assert real.category_ids == {"cup": 7, "plate": 3}
+    assert [(p.image_id, p.size_px, len(p.objects)) for p in real.pictures] == [
+        (10, (64, 48), 2),
+        (11, (64, 48), 0),
+    ]
+    assert real.pictures[0].objects == (
+        RealObject("cup", (1, 2, 11, 22), False, "largely occluded"),
+        RealObject("cup", (5, 5, 9, 9), True, ""),
+    )
+
+
+def test_kittis_inclusive_sides_and_regions_are_read(tmp_path: Path) -> None:
+    """Column 29 belongs to the box: it ends at 30. DontCare is ignored for every class."""
+    write_picture(tmp_path / "training/image_2/000007.png")
+    (tmp_path / "training/label_2").mkdir()
+    (tmp_path / "training/label_2/000007.txt").write_text(LABELS)
+
+    real = read_real(tmp_path).restrict(["car", "cyclist"])
+
+    (picture,) = real.pictures
+    assert picture.objects == (
+        RealObject("car", (10, 12, 30, 32), False, "partly occluded"),
+        RealObject("", (0, 0, 10, 10), True, ""),
+    )
+    assert real.skipped == {"object of class 'Pedestrian', which the configuration lacks": 1}
+    assert real.category_ids == {"car": 1}
+    assert [row["iscrowd"] for row in real.to_coco()["annotations"]] == [0, 1]
+
+
+def test_what_cannot_be_used_is_counted(tmp_path: Path) -> None:
+    """A missing image, a damaged one, an empty box."""
+    write_coco(tmp_path, [[{"bbox": [1, 2, 10, 20]}, {"bbox": [1, 2, 0, 20]}], [], []])
+    (tmp_path / "images/1.png").unlink()
+    (tmp_path / "images/2.png").write_bytes(b"no image")
+
+    real = read_real(tmp_path)
+
+    assert [p.image_id for p in real.pictures] == [10]
+    assert real.skipped == {
+        "image that is missing": 1,
+        "image that cannot be read": 1,
+        "object with an empty box": 1,
+    }
+
+
+def test_a_folder_without_labels_is_refused(tmp_path: Path) -> None:
+    """With both layouts that are looked for."""
+    with pytest.raises(ConfigError) as caught:
+        read_real(tmp_path)
+
+    assert str(caught.value) == (
+        f"{tmp_path}: there are no labels; expected annotations/*.json in COCO's format, or "
+        "label_2 and image_2 in KITTI's"
+    )
+
+
+def test_other_class_names_are_refused_with_both_lists(tmp_path: Path) -> None:
+    """And a remedy."""
+    path = write_coco(tmp_path, [[{"bbox": [1, 2, 10, 20]}]])
+
+    with pytest.raises(ConfigError) as caught:
+        read_real(tmp_path).restrict(["car", "tram"])
+
+    assert str(caught.value) == (
+        f"{path}: has no object of the classes car, tram; it has cup: give the configuration a "
+        "label map with these names"
+    )
+
+
+def test_several_annotation_files_need_a_split(tmp_path: Path) -> None:
+    """The validation set is the default."""
+    write_coco(tmp_path, [[{"bbox": [1, 2, 10, 20]}]])
+    source = tmp_path / "annotations/instances_val.json"
+    (tmp_path / "annotations/instances_train.json").write_text(source.read_text())
+
+    assert read_real(tmp_path).source == source
+    assert read_real(tmp_path, "train").source.name == "instances_train.json"
+    with pytest.raises(ConfigError, match="expected one annotation file, or a split that names"):
+        read_real(tmp_path, "test")
+
+
+@pytest.mark.parametrize("text", ["[]", "{", '{"images": [], "categories": []}'])
+def test_a_file_that_is_no_annotation_file_is_named(text: str, tmp_path: Path) -> None:
+    """Not a traceback."""
+    (tmp_path / "annotations").mkdir()
+    (tmp_path / "annotations/x.json").write_text(text)
+
+    with pytest.raises(StorageError, match=r"x\.json: not annotations in COCO's format"):
+        read_real(tmp_path)
+
+
+def test_a_wrong_label_line_is_named(tmp_path: Path) -> None:
+    """With file and line."""
+    write_picture(tmp_path / "image_2/1.png")
+    (tmp_path / "label_2").mkdir()
+    (tmp_path / "label_2/1.txt").write_text("Car 0 0 0 1 2 3 4\nCar 0 0 0 1 2\n")
+
+    with pytest.raises(StorageError, match=r"1\.txt:2: not a label in KITTI's format"):
+        read_real(tmp_path)

@@ -1,0 +1,172 @@
+"""Studies compare, resume, and refuse what cannot be compared."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+import gen_data
+from gen_data.generator.cli.study_command import list_variants
+from gen_data.generator.core.errors import ConfigError, StorageError
+from gen_data.generator.study.experiment import Experiment, Variant, perform, prepare
+from gen_data.generator.study.study import compare_results, run_study
+from tests.study.conftest import write_coco
+from tests.study.test_adapt import CONFIG
+
+BOXES = [[{"bbox": [4 + k, 4, 20, 20]}, {"bbox": [40, 20 + k % 5, 16, 16]}] for k in range(24)]
+
+TOYS = "labels.map={classes: {toy: [toy block]}}"
+
+
+def write_results(path: Path, found: float) -> Path:
+    """Every object of the first part of the pictures is found, and none of the rest."""
+    rows = [
+        {"image_id": 10 + k, "category_id": 7, "bbox": row["bbox"], "score": 0.9}
+        for k, listed in enumerate(BOXES[: int(found * len(BOXES))])
+        for row in listed
+    ]
+    path.write_text(json.dumps(rows))
+    return path
+
+
+def test_results_of_detectors_are_compared(tmp_path: Path) -> None:
+    """One finds half of the objects, one all, one the same half: better, and no difference."""
+    write_coco(tmp_path / "real", BOXES)
+    shares = {"old": 0.5, "new": 1.0, "same": 0.5}
+    files = {name: write_results(tmp_path / f"{name}.json", x) for name, x in shares.items()}
+
+    findings = compare_results(tmp_path / "real", files, tmp_path / "out")
+
+    variants = findings["variants"]
+    assert {name: round(v["ap"]["mean"], 2) for name, v in variants.items()} == {
+        "old": 0.5, "new": 1.0, "same": 0.5
+    }  # fmt: skip
+    assert [v.get("verdict") for v in variants.values()] == [None, "better", "no difference found"]
+    assert variants["new"]["difference"]["low"] > 0.2
+    assert json.loads((tmp_path / "out/findings.json").read_text()) == json.loads(
+        json.dumps(findings)
+    )
+    groups = {(g["kind"], g["group"]): g for g in findings["groups"]["old"]}
+    assert groups["class", "cup"] == {"kind": "class", "group": "cup", "found": 24, "objects": 48}
+    assert groups["size", "small"]["objects"] == 48
+
+
+def test_the_page_shows_the_worst_pictures_and_requests_nothing(tmp_path: Path) -> None:
+    """Twelve pictures of the worse detector, none of the perfect one."""
+    write_coco(tmp_path / "real", BOXES)
+    files = {
+        name: write_results(tmp_path / f"{name}.json", share)
+        for name, share in (("<old>", 0.5), ("new", 1.0))
+    }
+
+    compare_results(tmp_path / "real", files, tmp_path / "out")
+
+    page = (tmp_path / "out/study.html").read_text()
+    assert page.count("<figure>") == 12
+    assert "&lt;old&gt;" in page
+    assert "<old>" not in page
+    assert not re.search(r"https?://|<script", page)
+
+
+def test_options_become_variants() -> None:
+    """``each`` stands for every randomizer."""
+    variants = list_variants(
+        "tabletop.yaml", ("each",), ("randomizers.clutter.count=20",), ("closeup.yaml",), (50,)
+    )
+
+    assert variants[0] == Variant("baseline", "tabletop.yaml")
+    assert "without orbit" in [variant.name for variant in variants]
+    assert variants[-3:] == (
+        Variant(
+            "randomizers.clutter.count=20",
+            "tabletop.yaml",
+            overrides=("randomizers.clutter.count=20",),
+        ),
+        Variant("closeup.yaml", "closeup.yaml"),
+        Variant("with 50 real", "tabletop.yaml", real=50),
+    )
+
+
+def test_pictures_that_train_a_variant_judge_none(tmp_path: Path) -> None:
+    """The same ones are kept for all seeds; their order depends on the seed."""
+    config = tmp_path / "small.yaml"
+    config.write_text(CONFIG)
+    write_coco(tmp_path / "real", BOXES)
+    variants = (Variant("baseline", str(config)), Variant("mixed", str(config), real=6))
+
+    prepared = prepare(Experiment(tmp_path / "real", variants))
+
+    judged = {picture.image_id for picture in prepared.judged_pictures()}
+    orders = [[p.image_id for p in prepared.training_pictures(6, seed)] for seed in range(4)]
+    assert len(judged) == 18
+    assert all(len(order) == 6 and not judged & set(order) for order in orders)
+    assert len({tuple(order) for order in orders}) > 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"seeds": 0}, r"seeds: 0; expected at least 1"),
+        ({"variants": (Variant("b", "tabletop.yaml", real=13),)}, r"has 24 pictures, of which 13"),
+        (
+            {"variants": (Variant("b", "tabletop.yaml"), Variant("s", "tabletop.yaml", (TOYS,)))},
+            r"variant 's': has the classes toy, which the baseline lacks",
+        ),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(
+    changes: dict[str, object], message: str, tmp_path: Path
+) -> None:
+    """Before anything is generated."""
+    write_coco(tmp_path / "real", BOXES)
+    given = {"variants": (Variant("b", "tabletop.yaml"),), **changes}
+
+    with pytest.raises(ConfigError, match=message):
+        prepare(Experiment(tmp_path / "real", **given))  # type: ignore[arg-type]
+
+
+def test_a_folder_of_another_study_is_refused(tmp_path: Path) -> None:
+    """Its runs would be taken for those of this one."""
+    write_coco(tmp_path / "real", BOXES)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/study.json").write_text("{}")
+    prepared = prepare(Experiment(tmp_path / "real", (Variant("b", "tabletop.yaml"),)))
+
+    with pytest.raises(StorageError, match="holds a study with other variants"):
+        perform(prepared, tmp_path / "out", 1, print)
+
+
+@pytest.mark.slow
+def test_an_interrupted_study_is_continued(tmp_path: Path) -> None:
+    """With the figures of one that was not; the finished run is not repeated."""
+    config = tmp_path / "small.yaml"
+    config.write_text(CONFIG)
+    gen_data.generate(str(config), 16, out=tmp_path / "real", seed=900, workers=0)
+    variants = (
+        Variant("baseline", str(config)),
+        Variant("without lamps", str(config), without=("lamps",)),
+        Variant("with 4 real", str(config), real=4),
+    )
+    experiment = Experiment(
+        tmp_path / "real/coco", variants, n=12, seeds=2, steps=8, batch=4, size_px=64
+    )
+
+    def stop(line: str) -> None:
+        if "trained" in line:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_study(experiment, tmp_path / "stopped", workers=1, report=stop)
+    done = tmp_path / "stopped/runs/00-0/results.json"
+    written_ns = done.stat().st_mtime_ns
+
+    continued = run_study(experiment, tmp_path / "stopped", workers=1)
+    whole = run_study(experiment, tmp_path / "whole", workers=2)
+
+    assert done.stat().st_mtime_ns == written_ns
+    assert continued["variants"] == whole["variants"]
+    assert continued["pictures"] == 12
+    assert not list((tmp_path / "whole").glob("data/*"))
