@@ -40,7 +40,7 @@ from gen_data.generator.core.processes import SINGLE_THREADED
 from gen_data.generator.core.urls import is_url, needs_folder
 
 FOLDERS_ONLY = frozenset(
-    "contact-sheet diff export merge preview repair report repro rerender sample".split()  # noqa: SIM905
+    "contact-sheet diff export match merge preview repair report repro rerender sample".split()  # noqa: SIM905
 )
 """Commands that read no data set at a URL."""
 
@@ -59,6 +59,7 @@ class LazyCommands(click.Group):
         "assets": "gen_data.generator.cli.asset_commands:assets",
         "cache": "gen_data.generator.cli.cache_commands:cache",
         "report": "gen_data.generator.cli.report_command:report",
+        "match": "gen_data.generator.cli.match_command:match",
         "verify": "gen_data.generator.cli.verification_commands:verify",
         "merge": "gen_data.generator.cli.merge_command:merge",
         "repair": "gen_data.generator.cli.verification_commands:repair",
@@ -81,6 +82,7 @@ class LazyCommands(click.Group):
         "assets": "Install, list, show, verify and remove packs of assets.",
         "cache": "Show or clear caches of assets, data sets at URLs, and kernels.",
         "report": "Statistics of a data set, and an HTML page with its samples.",
+        "match": "Fit exposure, colour, noise, blur and laser to real recordings.",
         "verify": "Check a data set: sizes, checksums, labels, reproducibility.",
         "merge": "Join parts that were generated with --shards.",
         "repair": "Restore damaged files of a data set, byte for byte.",

@@ -59,7 +59,7 @@ def report(folder: Path, compare: Path | None, html: Path | None, scenes: int) -
     for number, described in enumerate(sets):
         if len(sets) > 1:
             console.rule(str(folders[number]))
-        _print_tables(console, described["tables"])
+        print_tables(console, described["tables"])
     if page is not None:
         _write(page, sets)
         click.echo(f"wrote {page}")
@@ -83,7 +83,8 @@ def _describe(folder: Path, scenes: int, sets: int, console: Console) -> dict[st
         )
 
 
-def _print_tables(console: Console, tables: Iterable[Mapping[str, Any]]) -> None:
+def print_tables(console: Console, tables: Iterable[Mapping[str, Any]]) -> None:
+    """Print tables as ``report_tables.Table`` has them."""
     from rich import box
     from rich.table import Table
     from rich.text import Text

@@ -240,6 +240,8 @@ def _robust_variance(values: Array) -> Array:
 def direct_estimate(values: Array, axis: Axis) -> Estimate:
     """Mean, interval and spread of a parameter that every recording states by itself, [n]."""
     column = values[:, None]
-    exact = Solution(trimmed_mean(column), np.eye(1), np.ones(1, np.bool_), trimmed_mean(column)[None])
+    exact = Solution(
+        trimmed_mean(column), np.eye(1), np.ones(1, np.bool_), trimmed_mean(column)[None]
+    )
     (found,) = estimate(column, exact, [axis])
     return replace(found, spread=float(values.std()))

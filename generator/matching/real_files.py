@@ -100,8 +100,8 @@ def find_files(folder: Path) -> RealFiles:
             kitti.append(path)
     if not photos and not scans:
         raise StorageError(
-            f"{folder}: holds no photographs ({', '.join(sorted(PHOTO_ENDINGS))}) and no laser scans"
-            f" ({', '.join(sorted(SCAN_ENDINGS))})"
+            f"{folder}: holds no photographs ({', '.join(sorted(PHOTO_ENDINGS))}) and no laser"
+            f" scans ({', '.join(sorted(SCAN_ENDINGS))})"
         )
     instances = [path for path in coco if path.stem.startswith("instances")]
     return RealFiles(folder, tuple(photos), tuple(scans), tuple(instances or coco), tuple(kitti))

@@ -17,15 +17,16 @@ import numpy as np
 from gen_data.generator.assemble.config import Config
 from gen_data.generator.assemble.pipeline_factory import open_pipeline
 from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.boxes import BoxPx
 from gen_data.generator.core.capture import Channel, LidarHits
 from gen_data.generator.core.scene import Camera, Scene, Weather
-from gen_data.generator.pipeline.finalize_scene import Timeline
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Streams
 from gen_data.generator.core.system_calls import usable_cores
 from gen_data.generator.matching.picture import Picture
 from gen_data.generator.matching.quantities import CameraQuantity, LidarQuantity
-from gen_data.generator.matching.recordings import ImageLabels, Scan
+from gen_data.generator.matching.recordings import Box, ImageLabels, Scan
+from gen_data.generator.pipeline.finalize_scene import Timeline
 from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline, develop
 from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
 from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
@@ -105,7 +106,8 @@ def simulate_scenes(
 
     Args:
         config: The configuration.
-        camera, lidar: Names of its sensors; empty = none.
+        camera: Name of the camera; empty = none.
+        lidar: Name of the laser scanner; empty = none.
         count: Number of scenes; each shows its first view.
         progress: Called before each scene.
     """
@@ -221,13 +223,17 @@ def label_scenes(config: Config, camera: str, count: int) -> list[ImageLabels]:
             sensors = [sensor for sensor in accepted.sensors if sensor.name == camera]
             truth = pipeline.read_sensors(view, sensors, 0).truth[camera]
             boxes = tuple(
-                (o.instance.category, float(b.x_min), float(b.y_min), float(b.width_px), float(b.height_px))
-                for o in truth.objects
-                if (b := o.box) is not None
+                _box(o.instance.category, o.box) for o in truth.objects if o.box is not None
             )
             intrinsics = truth.camera.intrinsics
             labelled.append(ImageLabels(intrinsics.width_px, intrinsics.height_px, boxes))
     return labelled
+
+
+def _box(category: str, box: BoxPx) -> Box:
+    sides = (box.x_min, box.y_min, box.width_px, box.height_px)
+    left, top, width, height = (float(side) for side in sides)
+    return category, left, top, width, height
 
 
 def map_in_threads(function: Callable[[Any], T], items: Sequence[Any]) -> Iterator[T]:

@@ -35,7 +35,7 @@ class CameraQuantity:
         start: Coordinate of a pipeline's own, typical value.
         apply: The pipeline with one value of the parameter, given by its coordinate.
         to_value: Value in the unit, from the coordinate.
-        fields: Entries of ``image_pipeline`` in YAML for a distribution or a number.
+        fields: Values in YAML by dotted path in ``image_pipeline``, for a number or a distribution.
         axis: Range of the coordinate.
         varies: Whether the parameter may differ from picture to picture.
     """
@@ -55,7 +55,7 @@ class CameraQuantity:
 
 @dataclass(frozen=True)
 class LidarQuantity:
-    """A parameter of a laser scanner, the same in all scans; attributes as in ``CameraQuantity``."""
+    """A parameter of a laser scanner, one value for all scans; see ``CameraQuantity``."""
 
     name: str
     unit: str
@@ -80,9 +80,8 @@ class LabelQuantity:
     Attributes:
         slope: Derivative of the statistic with the coordinate, which is 0 for no change, for a
             camera whose focal length is so many heights of its image.
-        change: Path, and value in YAML, of the field of a configuration for a camera by name and a
-            coordinate.
-            Raises ``NoParameter`` if it has none.
+        change: The field that a configuration gets for a camera by name and a coordinate. Raises
+            ``NoParameter`` if it has none.
     """
 
     name: str
@@ -90,12 +89,29 @@ class LabelQuantity:
     statistic: str
     measure: Callable[[ImageLabels], float]
     slope: Callable[[float], float]
-    change: Callable[[Config, str, float], tuple[str, Any]]
+    change: Callable[[Config, str, float], FieldChange]
     axis: Axis
     to_value: Coordinate = identity
 
 
-class NoParameter(Exception):  # noqa: N818  (a fact, which becomes a line of a table)
+@dataclass(frozen=True, slots=True)
+class FieldChange:
+    """A new value of one field of a plug-in.
+
+    Attributes:
+        section: List of the configuration, such as ``randomizers``.
+        number: Position in it.
+        field: Dotted path in the plug-in.
+        value: In YAML.
+    """
+
+    section: str
+    number: int
+    field: str
+    value: Any
+
+
+class NoParameter(Exception):
     """A configuration has no parameter that a quantity could fit; the text says why."""
 
 

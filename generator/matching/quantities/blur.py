@@ -23,7 +23,7 @@ from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline
 
 FINE_PX, COARSE_PX = 0.8, 1.6
 EDGES = 0.02
-"""Share of the pixels, those with the largest gradients at the coarse scale, among which edges lie."""
+"""Share of the pixels, those with the largest gradients, among which edges lie."""
 SHARPEST = 70.0
 """Percentile of sharpness among edges: shadows and round things are blurred by themselves."""
 LEAST_GRADIENT = 2.0

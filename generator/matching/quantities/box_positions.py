@@ -7,13 +7,17 @@ small angle moves its image down by that angle times its focal length.
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
 from gen_data.generator.assemble.config import Config
 from gen_data.generator.matching.indirect_inference import Axis
-from gen_data.generator.matching.quantities.base import LabelQuantity, NoParameter, map_numbers
+from gen_data.generator.matching.quantities.base import (
+    FieldChange,
+    LabelQuantity,
+    NoParameter,
+    map_numbers,
+)
 from gen_data.generator.matching.recordings import ImageLabels
 from gen_data.generator.sensors.mounting import Mounted
 from gen_data.randomizers.camera_on_lane import CameraOnLane
@@ -27,20 +31,21 @@ def measure(labels: ImageLabels) -> float:
     return float(np.mean(centres)) / labels.height_px - 0.5
 
 
-def _change(config: Config, camera: str, coordinate: float) -> tuple[str, Any]:
+def _change(config: Config, camera: str, coordinate: float) -> FieldChange:
     def shifted(value: float) -> float:
         return value + coordinate
 
     def kept(value: float) -> float:
         return value
 
-    for randomizer in config.probes[0].randomizers:
+    for number, randomizer in enumerate(config.probes[0].randomizers):
         if isinstance(randomizer, CameraOnLane):
             value = map_numbers(randomizer.pitch_deg.to_yaml(), shifted, kept)
-            return f"randomizers.{randomizer.name}.pitch_deg", value
-    for sensor in config.sensors:
+            return FieldChange("randomizers", number, "pitch_deg", value)
+    for number, sensor in enumerate(config.sensors):
         if isinstance(sensor, Mounted) and sensor.name == camera and sensor.rig:
-            return f"sensors.{camera}.pitch_deg", map_numbers(sensor.pitch_deg, shifted, kept)
+            value = map_numbers(sensor.pitch_deg, shifted, kept)
+            return FieldChange("sensors", number, "pitch_deg", value)
     raise NoParameter("no camera_on_lane and no rig sets a pitch; camera_pose aims at things")
 
 

@@ -11,8 +11,14 @@ from typing import Any
 import numpy as np
 
 from gen_data.generator.assemble.config import Config
+from gen_data.generator.config.distributions import Distribution
 from gen_data.generator.matching.indirect_inference import Axis
-from gen_data.generator.matching.quantities.base import LabelQuantity, NoParameter, map_numbers
+from gen_data.generator.matching.quantities.base import (
+    FieldChange,
+    LabelQuantity,
+    NoParameter,
+    map_numbers,
+)
 from gen_data.generator.matching.recordings import ImageLabels
 from gen_data.randomizers.camera_pose import CameraPose
 
@@ -24,22 +30,22 @@ def measure(labels: ImageLabels) -> float:
     return float(0.5 * np.log2(areas / pixels).mean()) if len(areas) else float("nan")
 
 
-def _change(config: Config, camera: str, coordinate: float) -> tuple[str, Any]:
-    factor = 2.0**coordinate
-    for pose in config.probes[0].randomizers:
+def _change(config: Config, camera: str, coordinate: float) -> FieldChange:
+    for number, pose in enumerate(config.probes[0].randomizers):
         if isinstance(pose, CameraPose) and pose.camera in ("", camera):
-            field, own = ("distance_m", pose.distance_m)
-            if pose.fills is not None:
-                field, own = "fills", pose.fills
-            else:
-                factor = 1.0 / factor
-
-            def scaled(value: float) -> float:
-                return value * factor
-
-            value = map_numbers(own.to_yaml(), scaled, scaled)
-            return f"randomizers.{pose.name}.{field}", value
+            if pose.fills is None:
+                value = _scaled(pose.distance_m, 2.0**-coordinate)
+                return FieldChange("randomizers", number, "distance_m", value)
+            value = _scaled(pose.fills, 2.0**coordinate)
+            return FieldChange("randomizers", number, "fills", value)
     raise NoParameter("no camera_pose sets a distance")
+
+
+def _scaled(distribution: Distribution[float], factor: float) -> Any:
+    def scale(value: float) -> float:
+        return factor * value
+
+    return map_numbers(distribution.to_yaml(), scale, scale)
 
 
 def _slope(focal_heights: float) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 from gen_data.generator.matching.indirect_inference import Axis
-from gen_data.generator.matching.quantities.base import LidarQuantity
+from gen_data.generator.matching.quantities.base import LidarQuantity, round_digits
 from gen_data.generator.matching.recordings import Scan
 from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
 
@@ -24,7 +24,7 @@ def _start(sensor: LidarSensor) -> float:
 
 
 def _apply(sensor: LidarSensor, coordinate: float) -> LidarSensor:
-    return sensor.model_copy(update={"window": 2.0**coordinate})
+    return sensor.model_copy(update={"window": round_digits(2.0**coordinate)})
 
 
 def to_transmittance(coordinate: float) -> float:

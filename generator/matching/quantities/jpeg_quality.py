@@ -1,8 +1,8 @@
 """JPEG quality, on the scale of libjpeg: from a file's tables, or from the pixels.
 
 A JPEG file states its quantisation steps. Where pixels were decoded and stored otherwise, the
-coefficients of the discrete cosine transform lie near multiples of the steps; the quality is the one
-whose steps are most likely (Fan and de Queiroz, "Identification of bitmap compression history: JPEG
+coefficients of the discrete cosine transform lie near multiples of the steps; the quality is that
+with the most likely steps (Fan and de Queiroz, "Identification of bitmap compression history: JPEG
 detection and quantizer estimation", IEEE Transactions on Image Processing 12, 2003). Scaling,
 cropping off the grid of blocks and strong processing after compression hide it.
 

@@ -10,7 +10,11 @@ import math
 import numpy as np
 
 from gen_data.generator.matching.indirect_inference import Axis
-from gen_data.generator.matching.quantities.base import LidarQuantity, with_model
+from gen_data.generator.matching.quantities.base import (
+    LidarQuantity,
+    round_digits,
+    with_model,
+)
 from gen_data.generator.matching.recordings import Scan
 from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
 
@@ -28,7 +32,9 @@ def _start(sensor: LidarSensor) -> float:
 
 def _apply(sensor: LidarSensor, coordinate: float) -> LidarSensor:
     nearest_m = sensor.device.range_m[0]
-    return with_model(sensor, range_m=(nearest_m, max(2.0**coordinate, 1.01 * nearest_m)))
+    return with_model(
+        sensor, range_m=(nearest_m, max(round_digits(2.0**coordinate), 1.01 * nearest_m))
+    )
 
 
 def to_range_m(coordinate: float) -> float:

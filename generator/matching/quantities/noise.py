@@ -77,7 +77,7 @@ def _apply(pipeline: ImagePipeline, coordinate: float) -> ImagePipeline:
 
 
 def _fields(value: Any) -> Mapping[str, Any]:
-    return {"image_sensor": {"full_well_e": value}}
+    return {"image_sensor.full_well_e": value}
 
 
 NOISE = CameraQuantity(

@@ -11,7 +11,11 @@ import math
 import numpy as np
 
 from gen_data.generator.matching.indirect_inference import Axis
-from gen_data.generator.matching.quantities.base import LidarQuantity, with_model
+from gen_data.generator.matching.quantities.base import (
+    LidarQuantity,
+    round_digits,
+    with_model,
+)
 from gen_data.generator.matching.recordings import Scan
 from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
 
@@ -28,7 +32,7 @@ def _start(sensor: LidarSensor) -> float:
 
 
 def _apply(sensor: LidarSensor, coordinate: float) -> LidarSensor:
-    return with_model(sensor, white_intensity=2.0**coordinate)
+    return with_model(sensor, white_intensity=round_digits(2.0**coordinate))
 
 
 def to_intensity(coordinate: float) -> float:

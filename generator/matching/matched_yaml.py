@@ -1,0 +1,91 @@
+"""The configuration that a fit writes: it extends the fitted one by what was fitted."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from gen_data.generator.matching.results import FittedField, FittedQuantity, Match
+
+WIDTH = 1 << 16
+"""Of a line: values stay on their lines."""
+
+
+def format_config(match: Match, out: Path) -> str:
+    """Format the configuration with its fitted values, each under a comment with its interval.
+
+    Args:
+        match: The fit.
+        out: Its file, from whose folder ``extends`` starts.
+    """
+    lines = [
+        f"# Fitted to {_one_line(match.folder.name)} by gen-data match;"
+        f" {match.scenes} simulated scenes. Intervals: 95 %.",
+        f"extends: {_flow(_base(match.source, out))}",
+    ]
+    sections: dict[str, dict[int, list[FittedField]]] = {}
+    for field in match.fields:
+        change = field.change
+        sections.setdefault(change.section, {}).setdefault(change.number, []).append(field)
+    for section, plugins in sections.items():
+        lines += ["", f"{section}:"]
+        for number, fields in sorted(plugins.items()):
+            lines += _plugin(match.resolved[section][number], fields)
+    return "\n".join(lines) + "\n"
+
+
+def _base(source: str, out: Path) -> str:
+    """What ``extends`` names: a file relative to the new one, or a shipped name."""
+    if not Path(source).expanduser().is_file():
+        return source
+    target = Path(source).expanduser().resolve()
+    try:
+        return Path(os.path.relpath(target, out.resolve().parent)).as_posix()
+    except ValueError:
+        # Another drive of Windows.
+        return target.as_posix()
+
+
+def _plugin(item: Mapping[str, Any], fields: Sequence[FittedField]) -> Iterator[str]:
+    """Lines of one plug-in of a list, which merges by its name, or else its type."""
+    key = "name" if "name" in item else "type"
+    yield f"  - {key}: {_flow(item[key])}"
+    open_path: tuple[str, ...] = ()
+    for field in fields:
+        *parents, name = field.change.field.split(".")
+        shared = os.path.commonprefix([open_path, tuple(parents)])
+        for depth in range(len(shared), len(parents)):
+            yield f"{_indent(depth)}{parents[depth]}:"
+        open_path = tuple(parents)
+        for quantity in field.quantities:
+            yield f"{_indent(len(parents))}# {_comment(quantity)}"
+        yield f"{_indent(len(parents))}{name}: {_flow(field.change.value)}"
+
+
+def _indent(depth: int) -> str:
+    return "    " + "  " * depth
+
+
+def _comment(row: FittedQuantity) -> str:
+    """What is known about a value, in a line."""
+    if row.mean is None:
+        return f"{row.name}: {row.note}; n = {row.n}"
+    interval = "" if row.low is None else f" ({row.low:.4g} to {row.high:.4g})"
+    spread = f", spread {row.spread:.2g}" if row.spread else ""
+    note = f"; {row.note}" if row.note else ""
+    return f"{row.name}: {row.mean:.4g} {row.unit}{interval}{spread}, n = {row.n}{note}"
+
+
+def _flow(value: Any) -> str:
+    """YAML of a value in one line."""
+    text = yaml.safe_dump(value, default_flow_style=True, width=WIDTH, allow_unicode=True)
+    return text.removesuffix("\n").removesuffix("...").rstrip("\n")
+
+
+def _one_line(text: str) -> str:
+    """A name that cannot leave its comment."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
