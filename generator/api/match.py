@@ -22,7 +22,7 @@ def match(  # noqa: PLR0913  (keywords of one front door)
     *,
     images: int = 200,
     scans: int = 60,
-    scenes: int = 24,
+    scenes: int = 48,
     camera: str = "",
     lidar: str = "",
     on_progress: Callable[[str], None] | None = None,

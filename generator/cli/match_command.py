@@ -8,9 +8,9 @@ import click
 
 HELP = """Fit the sensors of CONFIG to a folder of unlabelled recordings.
 
-Exposure, tone, colour, noise, blur and JPEG quality follow from photographs; reflectance, dropout and
-range from laser scans; distance and pitch of the camera from boxes of COCO or KITTI, if there are any.
-The result extends CONFIG; a .json and an .html file beside it have the report.
+Exposure, tone, colour, noise, blur and JPEG quality follow from photographs; reflectance, dropout
+and range from laser scans; distance and pitch of the camera from boxes of COCO or KITTI, if there
+are any. The result extends CONFIG; a .json and an .html file beside it have the report.
 
 \b
 gen-data match recordings/ street.yaml --out matched.yaml
@@ -34,7 +34,7 @@ gen-data --config matched.yaml --n 1000
 )
 @click.option("--scans", type=int, default=60, show_default=True, help="Scans to read at most.")
 @click.option(
-    "--scenes", type=int, default=24, show_default=True, help="Scenes of CONFIG to simulate."
+    "--scenes", type=int, default=48, show_default=True, help="Scenes of CONFIG to simulate."
 )
 @click.option("--camera", default="", metavar="NAME", help="Camera to fit [default: the first].")
 @click.option(

@@ -169,9 +169,8 @@ def _unmeasurable(
             reason = "not measurable in any photograph"
         elif not len(ours):
             reason = "not measurable in any simulated photograph"
-        elif sensorless and quantity is NOISE:
-            if float(np.median(theirs)) < float(np.median(ours)) + NOISE_EXCESS:
-                reason = "no noise beyond that of eight bits; the camera has no image_sensor"
+        elif quantity not in quiet and np.median(theirs) < np.median(ours) + NOISE_EXCESS:
+            reason = "no noise beyond that of eight bits; the camera has no image_sensor"
         reasons.append(reason)
     return reasons
 
@@ -180,7 +179,7 @@ def _distribution(quantity: CameraQuantity, found: Estimate) -> Any:
     """YAML of a fitted parameter: a number, or a clipped normal distribution."""
     mean = quantity.to_value(found.mean)
     stddev = round_digits(spread_of(found, quantity.to_value))
-    if not quantity.varies or stddev <= 0.0:
+    if not quantity.axis.varies or stddev <= 0.0:
         return round_digits(mean)
     lowest, highest = (quantity.to_value(v) for v in (quantity.axis.low, quantity.axis.high))
     clip = max(mean - CLIP * stddev, lowest), min(mean + CLIP * stddev, highest)

@@ -5,25 +5,33 @@ Applied Econometrics 8, 1993): a statistic need not estimate its parameter, as l
 with it, since simulated recordings pass through the same statistic. There are as many statistics as
 parameters; Newton's method solves for equal means, with derivatives by finite differences and the
 same scenes and noise for all candidates.
+
+Variances are solved for in the same way: what real statistics vary more than simulated ones, whose
+parameters are constant, is the spread of the parameters between recordings.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.core.se3 import Array
+from gen_data.generator.core.streams import Streams
 
-Simulate = Callable[[Array], Array]
-"""Statistics [scenes, k] of simulated recordings for parameters [k]."""
+Simulate = Callable[[Array, int], Array]
+"""Statistics [scenes, k] for parameters [k] of so many of the simulated scenes, at most."""
+EVERY = 1 << 30
+"""All scenes."""
 
 ROUNDS_MAX = 6
 DERIVATIVES = 2
 """Rounds that compute derivatives; later ones reuse the last."""
+DERIVATIVE_SCENES = 12
+"""Scenes for derivatives: differences within a scene scatter less than scenes do."""
 CONVERGED = 0.02
 """Change of a parameter, in steps of its axis, at which the search ends."""
 TRIMMED = 0.1
@@ -49,6 +57,7 @@ class Axis:
         plausible: Standard deviation of the values to expect, before anything is measured. Wide:
             it decides only where recordings hardly determine the parameter.
         enough: Half width of an interval that is narrow enough for most uses.
+        varies: Whether the parameter may differ from recording to recording.
     """
 
     low: float
@@ -57,6 +66,7 @@ class Axis:
     stride: float
     plausible: float
     enough: float
+    varies: bool = True
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -65,12 +75,14 @@ class Solution:
 
     Attributes:
         parameters: [k], in the coordinates of their axes.
+        slopes: Derivatives, statistics by parameters, [k, k].
         gain: Change of the parameters with the statistics, [k, k].
         determined: Whether the recordings determine each parameter, [k].
         simulated: Statistics of the simulation with these parameters, [scenes, k].
     """
 
     parameters: Array
+    slopes: Array
     gain: Array
     determined: NDArray[np.bool_]
     simulated: Array
@@ -126,29 +138,32 @@ def solve(
     step = np.array([axis.step for axis in axes])
     target = trimmed_mean(real)
     at = np.clip(start, low, high)
-    found = simulate(at)
+    found = simulate(at, EVERY)
     derivatives = slopes
     for number in range(ROUNDS_MAX):
         if slopes is None and number < DERIVATIVES:
             derivatives = _derivatives(simulate, at, found, axes)
-        assert derivatives is not None
+        assert derivatives is not None, "the first round computes them"
         gain, determined = _gain(derivatives, real, found, axes)
         change = np.clip(gain @ (target - trimmed_mean(found)), -stride, stride)
         moved = np.clip(at + change, low, high)
         if np.all(np.abs(moved - at) < CONVERGED * step):
             break
-        at, found = moved, simulate(moved)
-    return Solution(at, gain, determined, found)
+        at, found = moved, simulate(moved, EVERY)
+    assert derivatives is not None, "the first round computes them"
+    return Solution(at, derivatives, gain, determined, found)
 
 
 def _derivatives(simulate: Simulate, at: Array, found: Array, axes: Sequence[Axis]) -> Array:
     """Change of the mean statistics with each parameter, [k, k]: statistics by parameters."""
     columns = []
+    here = trimmed_mean(found[:DERIVATIVE_SCENES])
     for number, axis in enumerate(axes):
         step = axis.step if at[number] + axis.step <= axis.high else -axis.step
         moved = at.copy()
         moved[number] += step
-        columns.append((trimmed_mean(simulate(moved)) - trimmed_mean(found)) / step)
+        there = trimmed_mean(simulate(moved, DERIVATIVE_SCENES))
+        columns.append((there - here) / step)
     return np.stack(columns, axis=1)
 
 
@@ -183,31 +198,53 @@ def estimate(real: Array, solution: Solution, axes: Sequence[Axis]) -> list[Esti
     root of n / (n - 1) that corrects the narrowness of bootstrap errors of small samples
     (Hesterberg, "What teachers should know about the bootstrap", The American Statistician 2015).
 
-    The spread is the deviation of estimates of single recordings, from which that of simulated
-    recordings, which have one and the same parameter in different scenes, is subtracted in
-    quadrature.
+    See ``_spreads`` for the spread.
     """
-    from scipy.stats import t
-
-    rng = np.random.default_rng(0)
+    rng = Streams(seed=0, scene=0).rng("match/bootstrap")
     real_errors = _bootstrap_errors(real, solution.gain, rng)
     scene_errors = _bootstrap_errors(solution.simulated, solution.gain, rng)
-    estimates = []
-    n_of = np.isfinite(real).sum(axis=0)
-    spreads = _spreads(real, solution, rng)
-    for k, axis in enumerate(axes):
-        n = int(n_of[k])
-        factor = float(t.ppf(0.975, n - 1)) * math.sqrt(n / (n - 1)) if n > 1 else math.inf
-        half = factor * math.hypot(real_errors[k], scene_errors[k]) if n > 1 else math.inf
-        room = (axis.enough / 1.96) ** 2 - scene_errors[k] ** 2
-        enough = max(2, math.ceil(n * real_errors[k] ** 2 / room)) if room > 0 and n > 1 else None
-        estimates.append(
-            Estimate(
-                float(solution.parameters[k]), half, float(spreads[k]) if n >= SPREAD_N else 0.0,
-                n, enough, bool(solution.determined[k]) and n > 0,
-            )
-        )  # fmt: skip
-    return estimates
+    spreads = _spreads(real, solution, axes, rng)
+    numbers = np.isfinite(real).sum(axis=0)
+    return [
+        _estimate(
+            float(solution.parameters[k]),
+            (float(real_errors[k]), float(scene_errors[k])),
+            float(spreads[k]),
+            int(numbers[k]),
+            axis,
+            bool(solution.determined[k]),
+        )
+        for k, axis in enumerate(axes)
+    ]
+
+
+def direct_estimate(values: Array, axis: Axis) -> Estimate:
+    """Mean, interval and spread of a parameter that every recording states by itself, [n]."""
+    rng = Streams(seed=0, scene=0).rng("match/bootstrap")
+    (error,) = _bootstrap_errors(values[:, None], np.eye(1), rng)
+    (mean,) = trimmed_mean(values[:, None])
+    errors = float(error), 0.0
+    return _estimate(float(mean), errors, float(values.std()), len(values), axis, True)
+
+
+def _estimate(
+    mean: float,
+    errors: tuple[float, float],
+    spread: float,
+    n: int,
+    axis: Axis,
+    determined: bool,
+) -> Estimate:
+    """Estimate with an interval from the standard errors by recordings and by scenes."""
+    from scipy.stats import t
+
+    if n < 2:
+        return Estimate(mean, math.inf, 0.0, n, None, determined and n > 0)
+    narrow = math.sqrt(n / (n - 1))
+    half = float(t.ppf(0.975, n - 1)) * math.hypot(narrow * errors[0], errors[1])
+    room = (axis.enough / 1.96) ** 2 - errors[1] ** 2
+    enough = max(2, math.ceil(n * errors[0] ** 2 / room)) if room > 0.0 else None
+    return Estimate(mean, half, spread if n >= SPREAD_N else 0.0, n, enough, determined)
 
 
 def _bootstrap_errors(values: Array, gain: Array, rng: np.random.Generator) -> Array:
@@ -218,30 +255,41 @@ def _bootstrap_errors(values: Array, gain: Array, rng: np.random.Generator) -> A
     return np.asarray(np.nanstd(means @ gain.T, axis=0))
 
 
-def _spreads(real: Array, solution: Solution, rng: np.random.Generator) -> Array:
-    """Standard deviations [k] of parameters between recordings; 0 where they are insignificant."""
-    own, scenes = real @ solution.gain.T, solution.simulated @ solution.gain.T
-    excess = _robust_variance(own) - _robust_variance(scenes)
+def _spreads(
+    real: Array, solution: Solution, axes: Sequence[Axis], rng: np.random.Generator
+) -> Array:
+    """Standard deviations [k] of parameters between recordings; 0 where they are insignificant.
+
+    A parameter with variance v adds v times the square of its slope to the variance of a statistic:
+    variances are the non-negative solution for all statistics by least squares.
+    """
+    from scipy.optimize import nnls
+
+    varying = np.array([axis.varies for axis in axes]) & solution.determined
+    spreads = np.zeros(len(axes))
+    if not varying.any():
+        return spreads
+    simulated = solution.simulated
+    scale = 1.0 / np.maximum(_robust_variance(simulated), 1e-9)
+    effects = solution.slopes[:, varying] ** 2 * scale[:, None]
+
+    def variances(own: Array, scenes: Array) -> Array:
+        excess = (_robust_variance(own) - _robust_variance(scenes)) * scale
+        return np.asarray(nnls(effects, np.nan_to_num(excess))[0])
+
     again = np.array([
-        _robust_variance(own[rng.integers(len(own), size=len(own))])
-        - _robust_variance(scenes[rng.integers(len(scenes), size=len(scenes))])
+        variances(
+            real[rng.integers(len(real), size=len(real))],
+            simulated[rng.integers(len(simulated), size=len(simulated))],
+        )
         for _ in range(RESAMPLES)
     ])  # fmt: skip
     significant = (again > 0.0).mean(axis=0) >= SPREAD_CONFIDENCE
-    return np.where(significant & np.isfinite(excess), np.sqrt(np.maximum(excess, 0.0)), 0.0)
+    spreads[varying] = np.where(significant, np.sqrt(variances(real, simulated)), 0.0)
+    return spreads
 
 
 def _robust_variance(values: Array) -> Array:
     """Variance [k] of the normal distributions with the quartiles of values [n, k]."""
     low, high = np.nanpercentile(values, [25.0, 75.0], axis=0)
     return np.asarray((_QUARTILES_TO_STDDEV * (high - low)) ** 2)
-
-
-def direct_estimate(values: Array, axis: Axis) -> Estimate:
-    """Mean, interval and spread of a parameter that every recording states by itself, [n]."""
-    column = values[:, None]
-    exact = Solution(
-        trimmed_mean(column), np.eye(1), np.ones(1, np.bool_), trimmed_mean(column)[None]
-    )
-    (found,) = estimate(column, exact, [axis])
-    return replace(found, spread=float(values.std()))

@@ -94,10 +94,12 @@ def _fit(
     slope = quantity.slope(intrinsics.fy_px / intrinsics.height_px)
     simulated: list[Array] = []
 
-    def simulate(coordinates: Array) -> Array:
+    def simulate(coordinates: Array, count: int) -> Array:
         change = quantity.change(config, camera.name, float(coordinates[0]))
         found = label_scenes(
-            with_fields(source, [*earlier, FittedField(change, ())]), camera.name, scenes
+            with_fields(source, [*earlier, FittedField(change, ())]),
+            camera.name,
+            min(scenes, count),
         )
         values = [[quantity.measure(_of_classes(image, classes))] for image in found]
         simulated.append(np.array(values))

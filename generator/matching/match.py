@@ -35,7 +35,7 @@ from gen_data.generator.matching.simulation import (
 from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
 from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
 
-IMAGES, SCANS, SCENES = 200, 60, 24
+IMAGES, SCANS, SCENES = 200, 60, 48
 LEAST = 4
 """Smallest number of recordings to read, and of scenes to compare them with."""
 S = TypeVar("S", RgbCamera, LidarSensor)

@@ -55,13 +55,17 @@ def _plugin(item: Mapping[str, Any], fields: Sequence[FittedField]) -> Iterator[
     key = "name" if "name" in item else "type"
     yield f"  - {key}: {_flow(item[key])}"
     open_path: tuple[str, ...] = ()
+    stated: set[str] = set()
     for field in fields:
         *parents, name = field.change.field.split(".")
-        shared = os.path.commonprefix([open_path, tuple(parents)])
-        for depth in range(len(shared), len(parents)):
-            yield f"{_indent(depth)}{parents[depth]}:"
+        for depth, parent in enumerate(parents):
+            if open_path[: depth + 1] != tuple(parents[: depth + 1]):
+                yield f"{_indent(depth)}{parent}:"
         open_path = tuple(parents)
         for quantity in field.quantities:
+            if quantity.name in stated:
+                continue
+            stated.add(quantity.name)
             yield f"{_indent(len(parents))}# {_comment(quantity)}"
         yield f"{_indent(len(parents))}{name}: {_flow(field.change.value)}"
 
@@ -76,14 +80,22 @@ def _comment(row: FittedQuantity) -> str:
         return f"{row.name}: {row.note}; n = {row.n}"
     interval = "" if row.low is None else f" ({row.low:.4g} to {row.high:.4g})"
     spread = f", spread {row.spread:.2g}" if row.spread else ""
-    note = f"; {row.note}" if row.note else ""
-    return f"{row.name}: {row.mean:.4g} {row.unit}{interval}{spread}, n = {row.n}{note}"
+    return f"{row.name}: {row.mean:.4g} {row.unit}{interval}{spread}, n = {row.n}"
 
 
 def _flow(value: Any) -> str:
     """YAML of a value in one line."""
-    text = yaml.safe_dump(value, default_flow_style=True, width=WIDTH, allow_unicode=True)
+    text = yaml.safe_dump(_whole(value), default_flow_style=True, width=WIDTH, allow_unicode=True)
     return text.removesuffix("\n").removesuffix("...").rstrip("\n")
+
+
+def _whole(value: Any) -> Any:
+    """The value with whole numbers as such: 2610 instead of 2610.0."""
+    if isinstance(value, Mapping):
+        return {key: _whole(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_whole(item) for item in value]
+    return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def _one_line(text: str) -> str:

@@ -151,7 +151,7 @@ def fitted_quantity(
         value: Fitted value in YAML.
         path: Of its field.
     """
-    varies = isinstance(quantity, CameraQuantity) and quantity.varies
+    varies = quantity.axis.varies
     notes = (
         (NOT_DETERMINED, not found.determined),
         ("a single recording has no interval", found.n == 1),

@@ -171,6 +171,7 @@ def measure_exposures(
     exposures: Sequence[Exposure],
     quantities: Sequence[CameraQuantity],
     coordinates: Array,
+    count: int,
     prepare: Callable[[ImagePipeline], ImagePipeline],
 ) -> Array:
     """Statistics [scenes, k] of photographs with parameters [k].
@@ -179,6 +180,7 @@ def measure_exposures(
         exposures: The scenes.
         quantities: Parameters and their statistics.
         coordinates: Values of the parameters.
+        count: Number of scenes, at most.
         prepare: Further changes to every scene's own pipeline, before these.
     """
 
@@ -189,21 +191,22 @@ def measure_exposures(
         picture = photograph(exposure, pipeline)
         return [quantity.measure(picture) for quantity in quantities]
 
-    return np.array(list(map_in_threads(measure, exposures)))
+    return np.array(list(map_in_threads(measure, exposures[:count])))
 
 
 def measure_illuminations(
     illuminations: Sequence[Illumination],
     quantities: Sequence[LidarQuantity],
     coordinates: Array,
+    count: int,
 ) -> Array:
-    """Statistics [scenes, k] of scans with parameters [k]."""
+    """Statistics [scenes, k] of scans with parameters [k], of so many scenes at most."""
     rows = []
-    for one in illuminations:
+    for one in illuminations[:count]:
         sensor = one.sensor
         for quantity, coordinate in zip(quantities, coordinates, strict=True):
             sensor = quantity.apply(sensor, float(coordinate))
-        scan = scan_with(sensor, one.scene, _RecordedHits(one.hits), one.streams)
+        scan = rescan(one, sensor)
         rows.append([quantity.measure(scan) for quantity in quantities])
     return np.array(rows)
 

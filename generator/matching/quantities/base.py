@@ -37,7 +37,6 @@ class CameraQuantity:
         to_value: Value in the unit, from the coordinate.
         fields: Values in YAML by dotted path in ``image_pipeline``, for a number or a distribution.
         axis: Range of the coordinate.
-        varies: Whether the parameter may differ from picture to picture.
     """
 
     name: str
@@ -50,7 +49,6 @@ class CameraQuantity:
     fields: Callable[[Any], Mapping[str, Any]]
     axis: Axis
     to_value: Coordinate = identity
-    varies: bool = True
 
 
 @dataclass(frozen=True)
