@@ -6,8 +6,8 @@ with it, since simulated recordings pass through the same statistic. There are a
 parameters; Newton's method solves for equal means, with derivatives by finite differences and the
 same scenes and noise for all candidates.
 
-Variances are solved for in the same way: what real statistics vary more than simulated ones, whose
-parameters are constant, is the spread of the parameters between recordings.
+What real statistics vary more than simulated ones, whose parameters are constant, is the spread of
+the parameters between recordings.
 """
 
 from __future__ import annotations
@@ -41,7 +41,10 @@ DETERMINED = 0.5
 """Largest standard error of a determined parameter, in units of its axis's plausible deviation."""
 SPREAD_N = 8
 """Smallest number of recordings from which a spread between recordings is estimated."""
-SPREAD_CONFIDENCE = 0.975
+SPREAD_ERRORS = 2.0
+"""Standard errors above which an excess of variance is significant."""
+_ROUNDING = 1e-8
+"""Variance of a mean of equal values, so that its weight is finite."""
 _QUARTILES_TO_STDDEV = 0.7413
 """Of a normal distribution: its standard deviation over the distance of its quartiles."""
 
@@ -176,7 +179,7 @@ def _gain(
     centre is the present value.
     """
     plausible = np.array([axis.plausible for axis in axes])
-    weight = 1.0 / np.maximum(_variance_of_mean(real) + _variance_of_mean(simulated), 1e-12)
+    weight = 1.0 / (_variance_of_mean(real) + _variance_of_mean(simulated))
     weighted = derivatives.T * weight
     covariance = np.linalg.inv(weighted @ derivatives + np.diag(plausible**-2.0))
     errors = np.sqrt(np.diag(covariance))
@@ -184,10 +187,21 @@ def _gain(
 
 
 def _variance_of_mean(values: Array) -> Array:
-    """Squared standard errors [k] of the means of statistics [n, k]; those of 2 for n = 1."""
-    known = np.isfinite(values).sum(axis=0)
-    spread = np.nanvar(values, axis=0) if len(values) > 1 else np.ones(values.shape[1])
-    return np.asarray((spread + 1e-8) / np.maximum(known - 1, 1))
+    """Squared standard errors [k] of the trimmed means of statistics [n, k].
+
+    By Winsorised variances (Tukey and McLaughlin, "Less vulnerable confidence and significance
+    procedures for location based on a single sample", Sankhya A 25, 1963); 1 for n = 1.
+    """
+    errors = []
+    for column in values.T:
+        known = np.sort(column[np.isfinite(column)])
+        n, cut = len(known), int(TRIMMED * len(known))
+        if n < 2:
+            errors.append(1.0)
+            continue
+        known = np.clip(known, known[cut], known[n - 1 - cut])
+        errors.append(known.var(ddof=1) / (n * (1.0 - 2.0 * cut / n) ** 2) + _ROUNDING)
+    return np.array(errors)
 
 
 def estimate(real: Array, solution: Solution, axes: Sequence[Axis]) -> list[Estimate]:
@@ -260,32 +274,29 @@ def _spreads(
 ) -> Array:
     """Standard deviations [k] of parameters between recordings; 0 where they are insignificant.
 
-    A parameter with variance v adds v times the square of its slope to the variance of a statistic:
-    variances are the non-negative solution for all statistics by least squares.
+    A parameter of variance v adds v times its squared slope to the variances of all statistics.
+    The most significant excess is attributed to the statistic's own parameter, its effect on the
+    others is subtracted, and so on: several parameters could explain one excess.
     """
-    from scipy.optimize import nnls
+    scenes = solution.simulated
 
-    varying = np.array([axis.varies for axis in axes]) & solution.determined
+    def resampled(values: Array) -> Array:
+        return _robust_variance(values[rng.integers(len(values), size=len(values))])
+
+    drawn = [resampled(real) - resampled(scenes) for _ in range(RESAMPLES)]
+    errors = np.maximum(np.nanstd(drawn, axis=0), 1e-12)
+    excess = _robust_variance(real) - _robust_variance(scenes)
+    effects = solution.slopes**2
+    left = {k for k, axis in enumerate(axes) if axis.varies and solution.determined[k]}
     spreads = np.zeros(len(axes))
-    if not varying.any():
-        return spreads
-    simulated = solution.simulated
-    scale = 1.0 / np.maximum(_robust_variance(simulated), 1e-9)
-    effects = solution.slopes[:, varying] ** 2 * scale[:, None]
-
-    def variances(own: Array, scenes: Array) -> Array:
-        excess = (_robust_variance(own) - _robust_variance(scenes)) * scale
-        return np.asarray(nnls(effects, np.nan_to_num(excess))[0])
-
-    again = np.array([
-        variances(
-            real[rng.integers(len(real), size=len(real))],
-            simulated[rng.integers(len(simulated), size=len(simulated))],
-        )
-        for _ in range(RESAMPLES)
-    ])  # fmt: skip
-    significant = (again > 0.0).mean(axis=0) >= SPREAD_CONFIDENCE
-    spreads[varying] = np.where(significant, np.sqrt(variances(real, simulated)), 0.0)
+    while left:
+        k = max(left, key=lambda number: float(excess[number] / errors[number]))
+        if not excess[k] > SPREAD_ERRORS * errors[k] or effects[k, k] <= 0.0:
+            break
+        variance = excess[k] / effects[k, k]
+        spreads[k] = math.sqrt(variance)
+        excess = excess - variance * effects[:, k]
+        left.remove(k)
     return spreads
 
 

@@ -15,7 +15,7 @@ from gen_data.generator.matching.quantities.base import FieldChange
 from gen_data.generator.matching.real_files import Inventory
 
 NOT_DETERMINED = "the recordings do not determine it"
-TOO_FEW_SCENES = "more scenes narrow the interval, not more recordings"
+TOO_FEW_SCENES = "narrower with more --scenes only"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """Colour: saturation.
 
-Statistic: mean distance of colours from grey of their luminance, over mean luminance; the factor of
-``saturation`` multiplies it.
+Statistic: mean distance of colours from grey of their luminance, over mean luminance, after a
+scaling of the channels to equal means: the tint of the light is the white balance's matter.
 """
 
 from __future__ import annotations
@@ -20,14 +20,16 @@ from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline
 
 
 def measure(picture: Picture) -> float:
-    """Mean colourfulness relative to mean luminance; NaN if all pixels are black or clipped."""
+    """Logarithm, base 2, of mean colourfulness over mean luminance; NaN without usable pixels."""
     colors = picture.colors
     if not len(colors):
         return float("nan")
+    means = colors.mean(axis=0, dtype=np.float64) + FLOOR
+    colors = colors * (means.mean() / means).astype(np.float32)
     level = luminance(colors)
     red, _, blue = colors.T
     chroma = np.hypot(red - level, blue - level)
-    return float(chroma.mean() / (level.mean() + FLOOR))
+    return float(np.log2((chroma.mean() + FLOOR) / (level.mean() + FLOOR)))
 
 
 def _start(pipeline: ImagePipeline) -> float:
@@ -43,7 +45,7 @@ def _fields(value: Any) -> Mapping[str, Any]:
 
 
 SATURATION = CameraQuantity(
-    "saturation", "factor", "mean distance from grey over luminance", "image_pipeline.saturation",
+    "saturation", "factor", "log2 of distance from grey", "image_pipeline.saturation",
     measure, _start, _apply, _fields,
     Axis(0.1, 2.5, step=0.15, stride=0.5, plausible=0.5, enough=0.05),
 )  # fmt: skip
