@@ -14,8 +14,7 @@ from gen_data.generator.matching.descriptions import PICTURES
 from gen_data.generator.matching.indirect_inference import (
     Estimate,
     direct_estimate,
-    estimate,
-    solve,
+    fit,
 )
 from gen_data.generator.matching.picture import Picture
 from gen_data.generator.matching.quantities import CAMERA, CameraQuantity, jpeg_quality
@@ -95,11 +94,13 @@ def fit_camera(exposures: Sequence[Exposure], photos: Sequence[MeasuredPhoto], s
     start = np.array([quantity.start(pipeline) for quantity in CAMERA])
     reasons = _unmeasurable(exposures, real, prepare, start)
     used = [k for k, reason in enumerate(reasons) if not reason]
-    found = _estimates(exposures, real, prepare, start, used)
-    determined = [k for k, one in found.items() if one.determined]
-    if 0 < len(determined) < len(used):
-        # The others keep the configuration's values, with which the fit must agree.
-        found |= _estimates(exposures, real, prepare, start, determined)
+    axes = [quantity.axis for quantity in CAMERA]
+
+    def simulate(positions: Sequence[int], coordinates: Array, count: int) -> Array:
+        quantities = [CAMERA[k] for k in positions]
+        return measure_exposures(exposures, quantities, coordinates, count, prepare)
+
+    found = fit(real, simulate, axes, start, used)
     rows: list[FittedQuantity] = [jpeg]
     fields = [_field(sensor, "jpeg_quality", jpeg.value, jpeg)]
     for k, quantity in enumerate(CAMERA):
@@ -113,17 +114,6 @@ def fit_camera(exposures: Sequence[Exposure], photos: Sequence[MeasuredPhoto], s
             fields += [_field(sensor, key, v, row) for key, v in quantity.fields(value).items()]
     fitted = [(CAMERA[k], one) for k, one in found.items() if one.determined]
     return Part(tuple(rows), _compare(exposures, photos, prepare, fitted), tuple(fields))
-
-
-def _estimates(
-    exposures: Sequence[Exposure], real: Array, prepare: Prepare, start: Array, used: Sequence[int]
-) -> dict[int, Estimate]:
-    """Estimates of some of ``CAMERA`` together, by their positions."""
-    quantities = [CAMERA[k] for k in used]
-    axes = [quantity.axis for quantity in quantities]
-    simulate = partial(measure_exposures, exposures, quantities, prepare=prepare)
-    solution = solve(real[:, used], simulate, axes, start[used])
-    return dict(zip(used, estimate(real[:, used], solution, axes), strict=True))
 
 
 def _field(sensor: int, key: str, value: Any, row: FittedQuantity) -> FittedField:

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,8 +46,9 @@ SPREAD_ERRORS = 2.0
 """Standard errors above which an excess of variance is significant."""
 _ROUNDING = 1e-8
 """Variance of a mean of equal values, so that its weight is finite."""
-_QUARTILES_TO_STDDEV = 0.7413
-"""Of a normal distribution: its standard deviation over the distance of its quartiles."""
+WINSORISED = 0.05
+_WINSORISED_VARIANCE = 0.8313
+"""Of a standard normal distribution whose extreme twentieths are moved to their limits."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +124,38 @@ def trimmed_mean(values: Array) -> Array:
         cut = int(TRIMMED * len(known))
         means.append(known[cut : len(known) - cut].mean() if len(known) else np.nan)
     return np.array(means)
+
+
+def fit(
+    real: Array,
+    simulate: Callable[[Sequence[int], Array, int], Array],
+    axes: Sequence[Axis],
+    start: Array,
+    used: Sequence[int],
+) -> dict[int, Estimate]:
+    """Estimate some of the parameters, by their positions among all.
+
+    Those that are not determined are estimated once, and keep their first values while the others
+    are estimated again: the fit must agree with a configuration that keeps them.
+
+    Args:
+        real: Statistics of the recordings, [n, all]; NaN = not measurable.
+        simulate: Simulation of the statistics at some positions, as ``Simulate``.
+        axes: Of all parameters.
+        start: First values of all parameters.
+        used: Positions to estimate.
+    """
+
+    def estimate_some(positions: Sequence[int]) -> dict[int, Estimate]:
+        own, columns = [axes[k] for k in positions], list(positions)
+        solution = solve(real[:, columns], partial(simulate, columns), own, start[columns])
+        return dict(zip(positions, estimate(real[:, columns], solution, own), strict=True))
+
+    found = estimate_some(used) if used else {}
+    determined = [k for k, one in found.items() if one.determined]
+    if 0 < len(determined) < len(found):
+        found |= estimate_some(determined)
+    return found
 
 
 def solve(
@@ -301,6 +335,6 @@ def _spreads(
 
 
 def _robust_variance(values: Array) -> Array:
-    """Variance [k] of the normal distributions with the quartiles of values [n, k]."""
-    low, high = np.nanpercentile(values, [25.0, 75.0], axis=0)
-    return np.asarray((_QUARTILES_TO_STDDEV * (high - low)) ** 2)
+    """Variance [k] of statistics [n, k] whose extreme twentieths are moved to their limits."""
+    low, high = np.nanpercentile(values, [100.0 * WINSORISED, 100.0 * (1.0 - WINSORISED)], axis=0)
+    return np.asarray(np.nanvar(np.clip(values, low, high), axis=0) / _WINSORISED_VARIANCE)

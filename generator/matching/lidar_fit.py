@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.matching.descriptions import SCANS
-from gen_data.generator.matching.indirect_inference import Estimate, estimate, solve, trimmed_mean
+from gen_data.generator.matching.indirect_inference import Estimate, fit, trimmed_mean
 from gen_data.generator.matching.quantities import LIDAR
 from gen_data.generator.matching.quantities.base import FieldChange, round_digits
 from gen_data.generator.matching.quantities.lidar_range import RANGE
@@ -24,6 +23,7 @@ from gen_data.generator.matching.results import (
 )
 from gen_data.generator.matching.simulation import Illumination, measure_illuminations, rescan
 from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
+from gen_data.generator.sensors.lidar.scan_pattern import LidarModel
 
 
 def fit_lidar(illuminations: Sequence[Illumination], scans: Sequence[Scan], sensor: int) -> Part:
@@ -42,9 +42,13 @@ def fit_lidar(illuminations: Sequence[Illumination], scans: Sequence[Scan], sens
     real = np.array([[quantity.measure(scan) for quantity in LIDAR] for scan in scans])
     axes = [quantity.axis for quantity in LIDAR]
     own = np.array([quantity.start(scanner) for quantity in LIDAR])
-    simulate = partial(measure_illuminations, illuminations, LIDAR)
-    solution = solve(real, simulate, axes, _start(own, trimmed_mean(real)))
-    found = estimate(real, solution, axes)
+
+    def simulate(positions: Sequence[int], coordinates: Array, count: int) -> Array:
+        quantities = [LIDAR[k] for k in positions]
+        return measure_illuminations(illuminations, quantities, coordinates, count)
+
+    start = _start(own, trimmed_mean(real))
+    found = list(fit(real, simulate, axes, start, range(len(LIDAR))).values())
     rows = tuple(
         fitted_quantity(
             quantity, one, float(before), round_digits(quantity.to_value(one.mean)), quantity.path
@@ -79,7 +83,9 @@ def _fields(
     for key in dict.fromkeys(quantity.key for quantity in LIDAR):
         stated = tuple(row for row in rows if row.is_fitted and row.path.partition(".")[0] == key)
         if stated:
-            value = fitted.model_dump(mode="json", include={key}, exclude_none=True)[key]
+            value = getattr(fitted, key)
+            if isinstance(value, LidarModel):
+                value = value.model_dump(mode="json", exclude_defaults=True)
             made.append(FittedField(FieldChange("sensors", sensor, key, value), stated))
     return tuple(made)
 
