@@ -85,7 +85,7 @@ def fit_camera(exposures: Sequence[Exposure], photos: Sequence[MeasuredPhoto], s
         sensor: Position of the camera among the sensors.
     """
     if not exposures or not photos:
-        return Part(not_fitted(CAMERA, "no photographs" if exposures else "no camera"))
+        return Part(not_fitted(CAMERA, "no camera" if photos else "no photographs"))
     pipeline = exposures[0].pipeline
     real = np.array([photo.statistics for photo in photos])
     jpeg = _fit_jpeg(pipeline, np.array([photo.jpeg_quality for photo in photos]))

@@ -3,8 +3,9 @@
 This is indirect inference (Gourieroux, Monfort and Renault, "Indirect inference", Journal of
 Applied Econometrics 8, 1993): a statistic need not estimate its parameter, as long as it changes
 with it, since simulated recordings pass through the same statistic. There are as many statistics as
-parameters; Newton's method solves for equal means, with derivatives by finite differences and the
-same scenes and noise for all candidates.
+parameters; Newton's method solves for equal means, with the same scenes and noise for all
+candidates. Derivatives are finite differences, updated by Broyden's method ("A class of methods
+for solving nonlinear simultaneous equations", Mathematics of Computation 19, 1965).
 
 What real statistics vary more than simulated ones, whose parameters are constant, is the spread of
 the parameters between recordings.
@@ -28,9 +29,9 @@ Simulate = Callable[[Array, int], Array]
 EVERY = 1 << 30
 """All scenes."""
 
-ROUNDS_MAX = 6
+ROUNDS_MAX = 12
 DERIVATIVES = 2
-"""Rounds that compute derivatives; later ones reuse the last."""
+"""Rounds that compute derivatives; later ones update them."""
 DERIVATIVE_SCENES = 12
 """Scenes for derivatives: differences within a scene scatter less than scenes do."""
 CONVERGED = 0.02
@@ -47,6 +48,7 @@ SPREAD_ERRORS = 2.0
 _ROUNDING = 1e-8
 """Variance of a mean of equal values, so that its weight is finite."""
 WINSORISED = 0.05
+"""Share of the values that are moved to the next one at either end before a variance."""
 _WINSORISED_VARIANCE = 0.8313
 """Of a standard normal distribution whose extreme twentieths are moved to their limits."""
 
@@ -117,13 +119,32 @@ class Estimate:
 
 
 def trimmed_mean(values: Array) -> Array:
-    """Mean [k] of statistics [n, k] without the extreme tenths; NaN are left out."""
-    means = []
-    for column in values.T:
-        known = np.sort(column[np.isfinite(column)])
-        cut = int(TRIMMED * len(known))
-        means.append(known[cut : len(known) - cut].mean() if len(known) else np.nan)
-    return np.array(means)
+    """Mean [..., k] of statistics [..., n, k] without the extreme tenths; NaN are left out."""
+    ordered, count = _ordered(values)
+    cut = (TRIMMED * count).astype(int)
+    rank = np.arange(ordered.shape[-2])[:, None]
+    kept = (rank >= cut[..., None, :]) & (rank < (count - cut)[..., None, :])
+    total = np.where(kept, ordered, 0.0).sum(axis=-2)
+    number = count - 2 * cut
+    return np.where(number > 0, total / np.maximum(number, 1), np.nan)
+
+
+def _ordered(values: Array) -> tuple[Array, NDArray[np.int64]]:
+    """Values [..., n, k] sorted, missing ones last, and the number [..., k] of the others."""
+    known = np.where(np.isfinite(values), values, np.nan)
+    return np.sort(known, axis=-2), np.isfinite(values).sum(axis=-2)
+
+
+def _limited(values: Array, share: float) -> tuple[Array, NDArray[np.int64], NDArray[np.int64]]:
+    """Values [..., n, k] with this share at either end moved to the next value that remains.
+
+    Also the number [..., k] of values, and of those that were moved at each end.
+    """
+    ordered, count = _ordered(values)
+    cut = (share * count).astype(int)
+    ends = (cut, np.maximum(count - 1 - cut, 0))
+    low, high = (np.take_along_axis(ordered, end[..., None, :], axis=-2) for end in ends)
+    return np.clip(ordered, low, high), count, cut
 
 
 def fit(
@@ -186,7 +207,10 @@ def solve(
         moved = np.clip(at + change, low, high)
         if np.all(np.abs(moved - at) < CONVERGED * step):
             break
-        at, found = moved, simulate(moved, EVERY)
+        before = trimmed_mean(found)
+        moves, at, found = moved - at, moved, simulate(moved, EVERY)
+        if slopes is None:
+            derivatives = _updated(derivatives, moves, trimmed_mean(found) - before, step)
     assert derivatives is not None, "the first round computes them"
     return Solution(at, derivatives, gain, determined, found)
 
@@ -202,6 +226,13 @@ def _derivatives(simulate: Simulate, at: Array, found: Array, axes: Sequence[Axi
         there = trimmed_mean(simulate(moved, DERIVATIVE_SCENES))
         columns.append((there - here) / step)
     return np.stack(columns, axis=1)
+
+
+def _updated(derivatives: Array, moves: Array, changes: Array, step: Array) -> Array:
+    """Broyden's update: the nearest derivatives that agree with the last move, in steps [k]."""
+    scaled = moves / step**2
+    missed = changes - derivatives @ moves
+    return np.asarray(derivatives + np.outer(missed, scaled) / float(moves @ scaled))
 
 
 def _gain(
@@ -226,16 +257,12 @@ def _variance_of_mean(values: Array) -> Array:
     By Winsorised variances (Tukey and McLaughlin, "Less vulnerable confidence and significance
     procedures for location based on a single sample", Sankhya A 25, 1963); 1 for n = 1.
     """
-    errors = []
-    for column in values.T:
-        known = np.sort(column[np.isfinite(column)])
-        n, cut = len(known), int(TRIMMED * len(known))
-        if n < 2:
-            errors.append(1.0)
-            continue
-        known = np.clip(known, known[cut], known[n - 1 - cut])
-        errors.append(known.var(ddof=1) / (n * (1.0 - 2.0 * cut / n) ** 2) + _ROUNDING)
-    return np.array(errors)
+    limited, count, cut = _limited(values, TRIMMED)
+    if len(values) < 2:
+        return np.ones(values.shape[1])
+    n = np.maximum(count, 2)
+    squares = np.nansum((limited - np.nanmean(limited, axis=0)) ** 2, axis=0)
+    return np.asarray(squares / (n - 1) / (n * (1.0 - 2.0 * cut / n) ** 2) + _ROUNDING)
 
 
 def estimate(real: Array, solution: Solution, axes: Sequence[Axis]) -> list[Estimate]:
@@ -298,9 +325,8 @@ def _estimate(
 def _bootstrap_errors(values: Array, gain: Array, rng: np.random.Generator) -> Array:
     """Standard errors [k] of parameters by resampling the statistics [n, k]."""
     drawn = rng.integers(len(values), size=(RESAMPLES, len(values)))
-    means = np.array([trimmed_mean(values[rows]) for rows in drawn])
     # A resample may hold nothing that was measurable.
-    return np.asarray(np.nanstd(means @ gain.T, axis=0))
+    return np.asarray(np.nanstd(trimmed_mean(values[drawn]) @ gain.T, axis=0))
 
 
 def _spreads(
@@ -315,9 +341,9 @@ def _spreads(
     scenes = solution.simulated
 
     def resampled(values: Array) -> Array:
-        return _robust_variance(values[rng.integers(len(values), size=len(values))])
+        return _robust_variance(values[rng.integers(len(values), size=(RESAMPLES, len(values)))])
 
-    drawn = [resampled(real) - resampled(scenes) for _ in range(RESAMPLES)]
+    drawn = resampled(real) - resampled(scenes)
     errors = np.maximum(np.nanstd(drawn, axis=0), 1e-12)
     excess = _robust_variance(real) - _robust_variance(scenes)
     effects = solution.slopes**2
@@ -335,6 +361,6 @@ def _spreads(
 
 
 def _robust_variance(values: Array) -> Array:
-    """Variance [k] of statistics [n, k] whose extreme twentieths are moved to their limits."""
-    low, high = np.nanpercentile(values, [100.0 * WINSORISED, 100.0 * (1.0 - WINSORISED)], axis=0)
-    return np.asarray(np.nanvar(np.clip(values, low, high), axis=0) / _WINSORISED_VARIANCE)
+    """Variance [..., k] of statistics [..., n, k], from Winsorised ones."""
+    limited, _, _ = _limited(values, WINSORISED)
+    return np.asarray(np.nanvar(limited, axis=-2) / _WINSORISED_VARIANCE)

@@ -48,7 +48,7 @@ def fit_labels(
         progress: Called with the name of each step.
     """
     if camera is None or not labels:
-        return Part(not_fitted(LABELS, NO_LABELS if camera is not None else "no camera"))
+        return Part(not_fitted(LABELS, "no camera or no photographs" if labels else NO_LABELS))
     real, remarks = _of_common_classes(load_config(source), labels)
     if not any(image.boxes for image in real):
         return Part(

@@ -35,7 +35,7 @@ def fit_lidar(illuminations: Sequence[Illumination], scans: Sequence[Scan], sens
         sensor: Position of the scanner among the sensors.
     """
     if not illuminations or not scans:
-        return Part(not_fitted(LIDAR, "no scans" if illuminations else "no laser scanner"))
+        return Part(not_fitted(LIDAR, "no laser scanner" if scans else "no scans"))
     scanner = illuminations[0].sensor
     if scanner.ideal:
         return Part(not_fitted(LIDAR, "the scanner is ideal"))

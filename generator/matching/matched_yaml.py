@@ -90,9 +90,9 @@ def _flow(value: Any) -> str:
 
 
 def _whole(value: Any) -> Any:
-    """The value with whole numbers as such: 2610 instead of 2610.0."""
+    """The value with whole numbers as such: 2610 instead of 2610.0, and 92 as a key, not '92'."""
     if isinstance(value, Mapping):
-        return {key: _whole(item) for key, item in value.items()}
+        return {int(k) if k.isdigit() else k: _whole(item) for k, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [_whole(item) for item in value]
     return int(value) if isinstance(value, float) and value.is_integer() else value

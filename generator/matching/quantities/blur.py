@@ -39,7 +39,7 @@ def measure(picture: Picture) -> float:
         across, along = np.abs(coarse[axis]), np.abs(coarse[1 - axis])
         least = max(float(np.quantile(across[::4, ::4], 1.0 - EDGES)), LEAST_GRADIENT)
         ridge = (across >= np.roll(across, 1, axis)) & (across > np.roll(across, -1, axis))
-        edge = ridge & (across > least) & (along < 0.5 * across)
+        edge = ridge & (across >= least) & (along < 0.5 * across)
         edge[:4], edge[-4:], edge[:, :4], edge[:, -4:] = False, False, False, False
         ratio2 = np.square(fine[axis][edge] / coarse[axis][edge]).astype(np.float64)
         # A ratio of 1 is an edge without end, one of COARSE / FINE a perfect step.

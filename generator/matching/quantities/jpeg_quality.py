@@ -113,6 +113,6 @@ def distribution(qualities: Array) -> Any:
     if len(values) == 1:
         return int(values[0])
     if len(values) <= 3:
-        return {"choice": {int(v): int(n) for v, n in zip(values, counts, strict=True)}}
+        return {"choice": {str(v): int(n) for v, n in zip(values, counts, strict=True)}}
     low, high = np.percentile(qualities, [2.5, 97.5])
     return {"uniform": [round(float(low)), round(float(high))]}
