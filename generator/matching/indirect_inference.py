@@ -3,9 +3,11 @@
 This is indirect inference (Gourieroux, Monfort and Renault, "Indirect inference", Journal of
 Applied Econometrics 8, 1993): a statistic need not estimate its parameter, as long as it changes
 with it, since simulated recordings pass through the same statistic. There are as many statistics as
-parameters; Newton's method solves for equal means, with the same scenes and noise for all
-candidates. Derivatives are finite differences, updated by Broyden's method ("A class of methods
-for solving nonlinear simultaneous equations", Mathematics of Computation 19, 1965).
+parameters; the search for equal means is a bounded trust-region one, with the same scenes and noise
+for all candidates, and derivatives by finite differences.
+
+The configuration's own values are a prior, whose wide deviations matter only where the recordings
+hardly determine a parameter.
 
 What real statistics vary more than simulated ones, whose parameters are constant, is the spread of
 the parameters between recordings.
@@ -29,9 +31,9 @@ Simulate = Callable[[Array, int], Array]
 EVERY = 1 << 30
 """All scenes."""
 
-ROUNDS_MAX = 12
-DERIVATIVES = 2
-"""Rounds that compute derivatives; later ones update them."""
+CANDIDATES_MAX = 14
+CONVERGED = 1e-3
+"""Relative change of the parameters, and of the remaining distance, at which the search ends."""
 DERIVATIVE_SCENES = 12
 """Scenes for derivatives: differences within a scene scatter less than scenes do."""
 CONVERGED = 0.02
@@ -60,9 +62,7 @@ class Axis:
     Attributes:
         low, high: Range.
         step: For derivatives.
-        stride: Largest change in a round.
-        plausible: Standard deviation of the values to expect, before anything is measured. Wide:
-            it decides only where recordings hardly determine the parameter.
+        plausible: Standard deviation of the values to expect around the configuration's own.
         enough: Half width of an interval that is narrow enough for most uses.
         varies: Whether the parameter may differ from recording to recording.
     """
@@ -70,7 +70,6 @@ class Axis:
     low: float
     high: float
     step: float
-    stride: float
     plausible: float
     enough: float
     varies: bool = True
@@ -191,28 +190,37 @@ def solve(
         start: First parameters, [k].
         slopes: Derivatives of the statistics [k, k] where they are known; None = measured.
     """
-    low, high = (np.array([getattr(axis, name) for axis in axes]) for name in ("low", "high"))
-    stride = np.array([axis.stride for axis in axes])
-    step = np.array([axis.step for axis in axes])
-    target = trimmed_mean(real)
-    at = np.clip(start, low, high)
-    found = simulate(at, EVERY)
-    derivatives = slopes
-    for number in range(ROUNDS_MAX):
-        if slopes is None and number < DERIVATIVES:
-            derivatives = _derivatives(simulate, at, found, axes)
-        assert derivatives is not None, "the first round computes them"
-        gain, determined = _gain(derivatives, real, found, axes)
-        change = np.clip(gain @ (target - trimmed_mean(found)), -stride, stride)
-        moved = np.clip(at + change, low, high)
-        if np.all(np.abs(moved - at) < CONVERGED * step):
-            break
-        before = trimmed_mean(found)
-        moves, at, found = moved - at, moved, simulate(moved, EVERY)
-        if slopes is None:
-            derivatives = _updated(derivatives, moves, trimmed_mean(found) - before, step)
-    assert derivatives is not None, "the first round computes them"
-    return Solution(at, derivatives, gain, determined, found)
+    from scipy.optimize import least_squares
+
+    bounds = tuple(np.array([getattr(axis, name) for axis in axes]) for name in ("low", "high"))
+    plausible = np.array([axis.plausible for axis in axes])
+    start = np.clip(start, *bounds)
+    target, known = trimmed_mean(real), {start.tobytes(): simulate(start, EVERY)}
+    error = np.sqrt(_variance_of_mean(real) + _variance_of_mean(known[start.tobytes()]))
+
+    def found(at: Array) -> Array:
+        if at.tobytes() not in known:
+            known[at.tobytes()] = simulate(at, EVERY)
+        return known[at.tobytes()]
+
+    def residuals(at: Array) -> Array:
+        gap = np.nan_to_num(trimmed_mean(found(at)) - target)
+        return np.concatenate([gap / error, (at - start) / plausible])
+
+    def derivatives(at: Array) -> Array:
+        return _derivatives(simulate, at, found(at), axes) if slopes is None else slopes
+
+    def jacobian(at: Array) -> Array:
+        return np.vstack([derivatives(at) / error[:, None], np.diag(1.0 / plausible)])
+
+    search = least_squares(
+        residuals, start, jacobian, bounds, x_scale=plausible, xtol=CONVERGED, ftol=CONVERGED,
+        gtol=None, max_nfev=CANDIDATES_MAX,
+    )  # fmt: skip
+    at = np.asarray(search.x)
+    last = search.jac[: len(axes)] * error[:, None]
+    gain, determined = _gain(last, real, found(at), axes)
+    return Solution(at, last, gain, determined, found(at))
 
 
 def _derivatives(simulate: Simulate, at: Array, found: Array, axes: Sequence[Axis]) -> Array:
@@ -224,15 +232,8 @@ def _derivatives(simulate: Simulate, at: Array, found: Array, axes: Sequence[Axi
         moved = at.copy()
         moved[number] += step
         there = trimmed_mean(simulate(moved, DERIVATIVE_SCENES))
-        columns.append((there - here) / step)
+        columns.append(np.nan_to_num((there - here) / step))
     return np.stack(columns, axis=1)
-
-
-def _updated(derivatives: Array, moves: Array, changes: Array, step: Array) -> Array:
-    """Broyden's update: the nearest derivatives that agree with the last move, in steps [k]."""
-    scaled = moves / step**2
-    missed = changes - derivatives @ moves
-    return np.asarray(derivatives + np.outer(missed, scaled) / float(moves @ scaled))
 
 
 def _gain(
@@ -240,8 +241,7 @@ def _gain(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Regularised inverse of the derivatives, and which parameters are determined.
 
-    The inverse is that of a linear model with normal errors of the means and a normal prior, whose
-    centre is the present value.
+    The inverse is that of a linear model with normal errors of the means and a normal prior.
     """
     plausible = np.array([axis.plausible for axis in axes])
     weight = 1.0 / (_variance_of_mean(real) + _variance_of_mean(simulated))
@@ -285,7 +285,7 @@ def estimate(real: Array, solution: Solution, axes: Sequence[Axis]) -> list[Esti
             float(solution.parameters[k]),
             (float(real_errors[k]), float(scene_errors[k])),
             float(spreads[k]),
-            int(numbers[k]),
+            (int(numbers[k]), len(solution.simulated)),
             axis,
             bool(solution.determined[k]),
         )
@@ -299,24 +299,25 @@ def direct_estimate(values: Array, axis: Axis) -> Estimate:
     (error,) = _bootstrap_errors(values[:, None], np.eye(1), rng)
     (mean,) = trimmed_mean(values[:, None])
     errors = float(error), 0.0
-    return _estimate(float(mean), errors, float(values.std()), len(values), axis, True)
+    return _estimate(float(mean), errors, float(values.std()), (len(values), EVERY), axis, True)
 
 
 def _estimate(
     mean: float,
     errors: tuple[float, float],
     spread: float,
-    n: int,
+    numbers: tuple[int, int],
     axis: Axis,
     determined: bool,
 ) -> Estimate:
-    """Estimate with an interval from the standard errors by recordings and by scenes."""
+    """Estimate with an interval from the standard errors by recordings and by scenes, so many."""
     from scipy.stats import t
 
+    n, scenes = numbers
     if n < 2:
         return Estimate(mean, math.inf, 0.0, n, None, determined and n > 0)
-    narrow = math.sqrt(n / (n - 1))
-    half = float(t.ppf(0.975, n - 1)) * math.hypot(narrow * errors[0], errors[1])
+    widths = (error * math.sqrt(m / (m - 1)) for error, m in zip(errors, numbers, strict=True))
+    half = float(t.ppf(0.975, min(n, scenes) - 1)) * math.hypot(*widths)
     room = (axis.enough / 1.96) ** 2 - errors[1] ** 2
     enough = max(2, math.ceil(n * errors[0] ** 2 / room)) if room > 0.0 else None
     return Estimate(mean, half, spread if n >= SPREAD_N else 0.0, n, enough, determined)

@@ -17,7 +17,7 @@ from gen_data.generator.matching.indirect_inference import (
     trimmed_mean,
 )
 
-AXIS = Axis(-10.0, 10.0, step=0.5, stride=2.0, plausible=3.0, enough=0.1)
+AXIS = Axis(-10.0, 10.0, step=0.5, plausible=3.0, enough=0.1)
 AXES = (AXIS, AXIS)
 SLOPES = np.array([[2.0, 0.5], [-1.0, 1.5]])
 """Statistics of a linear model by parameters."""

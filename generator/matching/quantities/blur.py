@@ -79,6 +79,6 @@ def _fields(value: Any) -> Mapping[str, Any]:
 BLUR = CameraQuantity(
     "blur", "px", "squared blur of sharp edges", "image_pipeline.blur_px",
     measure, _start, _apply, _fields,
-    Axis(0.0, 64.0, step=0.3, stride=2.0, plausible=4.0, enough=0.1),
+    Axis(0.0, 64.0, step=0.3, plausible=4.0, enough=0.1),
     to_value=to_px,
 )  # fmt: skip

@@ -56,5 +56,5 @@ def _slope(focal_heights: float) -> float:
 BOX_POSITIONS = LabelQuantity(
     "box positions", "degrees", "mean height of the centres of boxes",
     measure, _slope, _change,
-    Axis(-20.0, 20.0, step=1.0, stride=5.0, plausible=5.0, enough=0.5, varies=False),
+    Axis(-20.0, 20.0, step=1.0, plausible=5.0, enough=0.5, varies=False),
 )  # fmt: skip

@@ -61,6 +61,6 @@ def to_factor(coordinate: float) -> float:
 BOX_SIZES = LabelQuantity(
     "box sizes", "factor", "mean log2 of the size of boxes over that of the image",
     measure, _slope, _change,
-    Axis(-3.0, 3.0, step=0.25, stride=1.0, plausible=1.0, enough=0.15, varies=False),
+    Axis(-3.0, 3.0, step=0.25, plausible=1.0, enough=0.15, varies=False),
     to_value=to_factor,
 )  # fmt: skip

@@ -40,5 +40,5 @@ def _fields(value: Any) -> Mapping[str, Any]:
 CONTRAST = CameraQuantity(
     "tone", "power", "stops between 10 % and 90 % of luminance", "image_pipeline.contrast",
     measure, _start, _apply, _fields,
-    Axis(0.5, 3.0, step=0.1875, stride=0.5, plausible=0.6, enough=0.1),
+    Axis(0.5, 3.0, step=0.1875, plausible=0.6, enough=0.1),
 )  # fmt: skip

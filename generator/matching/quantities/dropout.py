@@ -34,6 +34,6 @@ def to_transmittance(coordinate: float) -> float:
 
 DROPOUT = LidarQuantity(
     "dropout", "transmittance", "log2 of points per sweep", "window", measure, _start, _apply,
-    Axis(-4.0, 0.0, step=0.25, stride=1.0, plausible=1.0, enough=0.05, varies=False),
+    Axis(-4.0, 0.0, step=0.25, plausible=1.0, enough=0.05, varies=False),
     to_value=to_transmittance,
 )  # fmt: skip

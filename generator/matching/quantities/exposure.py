@@ -38,5 +38,5 @@ def _fields(value: Any) -> Mapping[str, Any]:
 EXPOSURE = CameraQuantity(
     "exposure", "EV", "mean log2 of luminance", "image_pipeline.exposure_compensation_ev",
     measure, _start, _apply, _fields,
-    Axis(-6.0, 6.0, step=0.25, stride=1.5, plausible=3.0, enough=0.1),
+    Axis(-6.0, 6.0, step=0.25, plausible=3.0, enough=0.1),
 )  # fmt: skip

@@ -26,7 +26,7 @@ from gen_data.generator.matching.recordings import Photo
 
 NAME, UNIT, PATH = "JPEG quality", "libjpeg", "image_pipeline.jpeg_quality"
 STATISTIC = "quantisation steps of the file, or of the coefficients of its blocks"
-AXIS = Axis(1.0, 100.0, step=1.0, stride=10.0, plausible=20.0, enough=2.0)
+AXIS = Axis(1.0, 100.0, step=1.0, plausible=20.0, enough=2.0)
 _STEPS = np.array([
     16, 11, 10, 16, 24, 40, 51, 61, 12, 12, 14, 19, 26, 58, 60, 55, 14, 13, 16, 24, 40, 57, 69, 56,
     14, 17, 22, 29, 51, 87, 80, 62, 18, 22, 37, 56, 68, 109, 103, 77, 24, 35, 55, 64, 81, 104, 113,

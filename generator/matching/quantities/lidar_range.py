@@ -45,6 +45,6 @@ def to_range_m(coordinate: float) -> float:
 RANGE = LidarQuantity(
     "range", "m", "log2 of the range of 99.9 % of the points", "model.range_m",
     measure, _start, _apply,
-    Axis(0.0, 10.0, step=0.1, stride=1.0, plausible=1.0, enough=0.05, varies=False),
+    Axis(0.0, 10.0, step=0.1, plausible=1.0, enough=0.05, varies=False),
     to_value=to_range_m,
 )  # fmt: skip

@@ -84,7 +84,7 @@ NOISE = CameraQuantity(
     "noise", "electrons", "log2 of linear variance over level in flat blocks",
     "image_pipeline.image_sensor.full_well_e",
     measure, _start, _apply, _fields,
-    Axis(math.log2(50.0), math.log2(1e6), step=1.0, stride=3.0, plausible=4.0, enough=0.25,
+    Axis(math.log2(50.0), math.log2(1e6), step=1.0, plausible=4.0, enough=0.25,
          varies=False),
     to_value=to_electrons,
 )  # fmt: skip

@@ -43,6 +43,6 @@ def to_intensity(coordinate: float) -> float:
 REFLECTANCE = LidarQuantity(
     "reflectance gain", "intensity of white", "log2 of mean intensity of the middle half",
     "model.white_intensity", measure, _start, _apply,
-    Axis(-7.0, 0.0, step=0.3, stride=1.5, plausible=1.5, enough=0.1, varies=False),
+    Axis(-7.0, 0.0, step=0.3, plausible=1.5, enough=0.1, varies=False),
     to_value=to_intensity,
 )  # fmt: skip

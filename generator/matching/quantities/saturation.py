@@ -47,5 +47,5 @@ def _fields(value: Any) -> Mapping[str, Any]:
 SATURATION = CameraQuantity(
     "saturation", "factor", "log2 of distance from grey", "image_pipeline.saturation",
     measure, _start, _apply, _fields,
-    Axis(0.1, 2.5, step=0.15, stride=0.5, plausible=0.5, enough=0.05),
+    Axis(0.1, 2.5, step=0.15, plausible=0.5, enough=0.05),
 )  # fmt: skip

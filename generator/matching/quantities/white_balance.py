@@ -41,5 +41,5 @@ def _fields(value: Any) -> Mapping[str, Any]:
 WHITE_BALANCE = CameraQuantity(
     "white balance", "EV", "log2 of mean red over mean blue", "image_pipeline.warmth_ev",
     measure, _start, _apply, _fields,
-    Axis(-2.5, 2.5, step=0.2, stride=0.8, plausible=1.0, enough=0.1),
+    Axis(-2.5, 2.5, step=0.2, plausible=1.0, enough=0.1),
 )  # fmt: skip
