@@ -61,7 +61,7 @@ def fit_lidar(illuminations: Sequence[Illumination], scans: Sequence[Scan], sens
 
 def _start(own: Array, real: Array) -> Array:
     """First parameters: a limit of range shows only if it is near the real scans' range."""
-    start = own.copy()
+    start: Array = own.copy()
     number = LIDAR.index(RANGE)
     start[number] = min(own[number], real[number] + 0.5 * RANGE.axis.step)
     return start

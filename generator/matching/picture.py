@@ -37,12 +37,12 @@ class Picture:
     @cached_property
     def linear(self) -> Float32:
         """Sparse linear colours, 1 saturates, float32 [n, 3]."""
-        return _LINEAR[self.rgb[::SPARSE, ::SPARSE].reshape(-1, 3)]
+        return np.asarray(_LINEAR[self.rgb[::SPARSE, ::SPARSE].reshape(-1, 3)])
 
     @cached_property
     def log_luminance(self) -> Float32:
         """Logarithm, base 2, of sparse linear luminance, float32 [n]."""
-        return np.log2(luminance(self.linear) + np.float32(FLOOR))
+        return np.asarray(np.log2(luminance(self.linear) + np.float32(FLOOR)))
 
     @cached_property
     def colors(self) -> Float32:

@@ -95,7 +95,8 @@ class _HitRecorder:
 
     def scan(self, *arguments: Any) -> LidarHits:
         """Trace rays."""
-        self.hits = hits = self.renderer.scan(*arguments)
+        hits: LidarHits = self.renderer.scan(*arguments)
+        self.hits = hits
         return hits
 
 

@@ -144,10 +144,11 @@ def map_numbers(value: Any, place: Coordinate, size: Coordinate) -> Any:
         if kind in ("uniform", "log_uniform"):
             return {kind: [round_digits(place(v)) for v in argument]}
         if kind == "normal":
-            kept = {"mean": round_digits(place(argument["mean"]))}
+            kept: dict[str, Any] = {"mean": round_digits(place(argument["mean"]))}
             kept["stddev"] = round_digits(size(argument["stddev"]))
             clip = argument.get("clip")
-            kept |= {} if clip is None else {"clip": [round_digits(place(v)) for v in clip]}
+            if clip is not None:
+                kept["clip"] = [round_digits(place(v)) for v in clip]
             return {kind: kept}
     raise NoParameter(f"{value} can be neither scaled nor shifted")
 
