@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from gen_data.generator.api.export import export
     from gen_data.generator.api.generate import generate
     from gen_data.generator.api.loader import Loader
+    from gen_data.generator.api.match import match
     from gen_data.generator.api.rerender import rerender
     from gen_data.generator.api.sample import Box2d, Box3d, CameraReading, Sample
     from gen_data.generator.api.write_sample import write_sample
@@ -61,6 +62,7 @@ _HOMES = {
     "export": "gen_data.generator.api.export",
     "generate": "gen_data.generator.api.generate",
     "write_sample": "gen_data.generator.api.write_sample",
+    "match": "gen_data.generator.api.match",
     "rerender": "gen_data.generator.api.rerender",
     "AssetError": "gen_data.generator.core.errors",
     "CertificationError": "gen_data.generator.core.errors",
@@ -105,6 +107,7 @@ __all__ = [
     "certify",
     "export",
     "generate",
+    "match",
     "open",
     "rerender",
     "write_sample",

@@ -41,8 +41,8 @@ from gen_data.generator.core.urls import is_url, needs_folder
 
 FOLDERS_ONLY = frozenset(
     (
-        "adapt", "certify", "contact-sheet", "diff", "export", "merge", "preview", "repair", "report",
-        "repro", "rerender", "sample", "study",
+        "adapt", "certify", "contact-sheet", "diff", "export", "match", "merge", "preview", "repair",
+        "report", "repro", "rerender", "sample", "study",
     )  # fmt: skip
 )
 """Commands that read no data set at a URL."""
@@ -64,6 +64,7 @@ class LazyCommands(click.Group):
         "report": "gen_data.generator.cli.report_command:report",
         "study": "gen_data.generator.cli.study_command:study",
         "adapt": "gen_data.generator.cli.adapt_command:adapt",
+        "match": "gen_data.generator.cli.match_command:match",
         "verify": "gen_data.generator.cli.verification_commands:verify",
         "certify": "gen_data.generator.cli.certify_command:certify",
         "merge": "gen_data.generator.cli.merge_command:merge",
@@ -89,6 +90,7 @@ class LazyCommands(click.Group):
         "report": "Statistics of a data set, and an HTML page with its samples.",
         "study": "Measure what a change of a configuration is worth on real pictures.",
         "adapt": "Draw more of what a detector missed: the next round of a curriculum.",
+        "match": "Fit exposure, colour, noise, blur and laser to real recordings.",
         "verify": "Check a data set: sizes, checksums, labels, reproducibility.",
         "certify": "Check a data set by independent means; write its certificate.",
         "merge": "Join parts that were generated with --shards.",

@@ -1,0 +1,1 @@
+"""Fitting of a configuration's sensors to unlabelled recordings of real ones."""

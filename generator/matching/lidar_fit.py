@@ -1,0 +1,105 @@
+"""Fit of a laser scanner to scans."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gen_data.generator.core.se3 import Array
+from gen_data.generator.matching.descriptions import SCANS
+from gen_data.generator.matching.indirect_inference import Estimate, fit, trimmed_mean
+from gen_data.generator.matching.quantities import LIDAR
+from gen_data.generator.matching.quantities.base import FieldChange, round_digits
+from gen_data.generator.matching.quantities.lidar_range import RANGE
+from gen_data.generator.matching.recordings import Scan
+from gen_data.generator.matching.results import (
+    ComparedStatistic,
+    FittedField,
+    FittedQuantity,
+    Part,
+    fitted_quantity,
+    not_fitted,
+)
+from gen_data.generator.matching.simulation import Illumination, measure_illuminations, rescan
+from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
+from gen_data.generator.sensors.lidar.scan_pattern import LidarModel
+
+
+def fit_lidar(illuminations: Sequence[Illumination], scans: Sequence[Scan], sensor: int) -> Part:
+    """Fit a laser scanner.
+
+    Args:
+        illuminations: Scenes of the configuration.
+        scans: Real scans.
+        sensor: Position of the scanner among the sensors.
+    """
+    if not illuminations or not scans:
+        return Part(not_fitted(LIDAR, "no laser scanner" if scans else "no scans"))
+    scanner = illuminations[0].sensor
+    if scanner.ideal:
+        return Part(not_fitted(LIDAR, "the scanner is ideal"))
+    real = np.array([[quantity.measure(scan) for quantity in LIDAR] for scan in scans])
+    axes = [quantity.axis for quantity in LIDAR]
+    own = np.array([quantity.start(scanner) for quantity in LIDAR])
+
+    def simulate(positions: Sequence[int], coordinates: Array, count: int) -> Array:
+        quantities = [LIDAR[k] for k in positions]
+        return measure_illuminations(illuminations, quantities, coordinates, count)
+
+    start = _start(own, trimmed_mean(real))
+    found = list(fit(real, simulate, axes, start, range(len(LIDAR))).values())
+    rows = tuple(
+        fitted_quantity(
+            quantity, one, float(before), round_digits(quantity.to_value(one.mean)), quantity.path
+        )
+        for quantity, one, before in zip(LIDAR, found, own, strict=True)
+    )
+    statistics = _compare(illuminations, scans, found)
+    return Part(rows, statistics, _fields(_with(scanner, found), rows, sensor))
+
+
+def _start(own: Array, real: Array) -> Array:
+    """First parameters: a limit of range shows only if it is near the real scans' range."""
+    start: Array = own.copy()
+    number = LIDAR.index(RANGE)
+    start[number] = min(own[number], real[number] + 0.5 * RANGE.axis.step)
+    return start
+
+
+def _with(sensor: LidarSensor, found: Sequence[Estimate]) -> LidarSensor:
+    """The scanner with all parameters that were determined."""
+    for quantity, one in zip(LIDAR, found, strict=True):
+        if one.determined:
+            sensor = quantity.apply(sensor, one.mean)
+    return sensor
+
+
+def _fields(
+    fitted: LidarSensor, rows: Sequence[FittedQuantity], sensor: int
+) -> tuple[FittedField, ...]:
+    """Changed fields; a data sheet is written whole, as its name stands for all of its values."""
+    made = []
+    for key in dict.fromkeys(quantity.key for quantity in LIDAR):
+        stated = tuple(row for row in rows if row.is_fitted and row.path.partition(".")[0] == key)
+        if stated:
+            value = getattr(fitted, key)
+            if isinstance(value, LidarModel):
+                value = value.model_dump(mode="json", exclude_defaults=True)
+            made.append(FittedField(FieldChange("sensors", sensor, key, value), stated))
+    return tuple(made)
+
+
+def _compare(
+    illuminations: Sequence[Illumination], scans: Sequence[Scan], found: Sequence[Estimate]
+) -> tuple[ComparedStatistic, ...]:
+    """Statistics of real scans, and of simulated ones before and after."""
+    before = [rescan(one, one.sensor) for one in illuminations]
+    after = [rescan(one, _with(one.sensor, found)) for one in illuminations]
+    measures = [*((q.statistic, q.measure) for q in LIDAR), *SCANS]
+    return tuple(
+        ComparedStatistic(
+            name, *(np.array([measure(scan) for scan in group]) for group in (scans, before, after))
+        )
+        for name, measure in measures
+    )

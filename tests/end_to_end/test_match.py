@@ -1,0 +1,113 @@
+"""``gen-data match``: from a folder of recordings to a configuration that generates."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import gen_data
+from gen_data.generator.assemble.config import load_config
+from tests.end_to_end.running import gen_data as run
+
+BASE = """\
+extends: tabletop.yaml
+without: {sensors: all, exporters: all, annotations: all, randomizers: [distractors, weights]}
+sensors:
+  - type: rgb_camera
+    name: color
+    size_px: [192, 144]
+    channels: [rgb]
+    image_pipeline: {preset: industrial, focus: null}
+exporters: [{type: coco}]
+"""
+REAL = """\
+extends: base.yaml
+seed: 99
+sensors:
+  - name: color
+    image_pipeline:
+      {exposure_compensation_ev: -1.5, image_sensor: {full_well_e: 2000}, jpeg_quality: 92}
+randomizers: [{name: orbit, distance_m: {uniform: [0.6, 1.0]}}]
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A configuration, recordings of another one, and the result of a fit."""
+    place = tmp_path_factory.mktemp("match")
+    (place / "configs").mkdir()
+    (place / "configs" / "base.yaml").write_text(BASE, encoding="utf-8")
+    (place / "configs" / "real.yaml").write_text(REAL, encoding="utf-8")
+    gen_data.generate(place / "configs" / "real.yaml", n=20, out=place / "real", workers=0)
+    done = run(
+        "match", "real", "configs/base.yaml", "--out", "fits/a.yaml", "--scenes", "10", cwd=place
+    )
+    assert done.returncode == 0, done.stderr
+    (place / "stdout.txt").write_text(done.stdout, encoding="utf-8")
+    return place
+
+
+def test_the_fitted_configuration_extends_the_given_one(folder: Path) -> None:
+    """Wherever it lies; it differs in the fitted fields only, each under its interval."""
+    text = (folder / "fits" / "a.yaml").read_text(encoding="utf-8")
+    fitted = load_config(str(folder / "fits" / "a.yaml"))
+
+    assert "extends: ../configs/base.yaml\n" in text
+    assert "# exposure: " in text
+    assert ", n = 20\n" in text
+    assert "jpeg_quality: 92\n" in text
+    (camera,) = fitted.sensors
+    assert camera.image_pipeline.preset == "industrial"
+    assert camera.size_px == (192, 144)
+
+
+def test_the_report_has_the_same_figures_in_all_forms(folder: Path) -> None:
+    """The terminal, JSON and the page; known values lie in the intervals, wide for ten scenes."""
+    figures = json.loads((folder / "fits" / "a.json").read_text(encoding="utf-8"))
+    rows = {row["name"]: row for row in figures["quantities"]}
+    page = (folder / "fits" / "a.html").read_text(encoding="utf-8")
+    shown = (folder / "stdout.txt").read_text(encoding="utf-8")
+
+    assert rows["exposure"]["low"] <= -1.5 <= rows["exposure"]["high"]
+    assert rows["noise"]["low"] <= 2000.0 <= rows["noise"]["high"]
+    assert rows["box sizes"]["low"] <= 1.5 <= rows["box sizes"]["high"]
+    assert rows["reflectance gain"]["note"] == "no scans"
+    assert figures["files"][0]["read"] == "20"
+    for name in rows:
+        assert name in page
+        assert name in shown
+    (level,) = (row for row in figures["statistics"] if row["name"] == "mean log2 of luminance")
+    assert level["apart_after"] < level["apart_before"]
+
+
+def test_a_fitted_configuration_can_be_planned(folder: Path) -> None:
+    """As any other."""
+    done = run("plan", "fits/a.yaml", "--n", "4", cwd=folder)
+
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("absent", "configs/base.yaml"), "absent: is no folder; expected one"),
+        (("real", "configs/base.yaml", "--camera", "colour"), "--camera: there is no such sensor"),
+        (("real", "configs/base.yaml", "--scenes", "1"), "scenes: 1 is too few; expected"),
+        (("real", "configs/base.yaml", "--out", "a.txt"), "a.txt; expected a name"),
+        (("real", "configs/base.yaml", "--out", "configs/base.yaml"), "configuration itself"),
+        (("real", "real"), "real: is a folder; expected a configuration to extend"),
+        (("s3://bucket/real", "configs/base.yaml"), "s3://bucket/real"),
+    ],
+)  # fmt: skip
+def test_wrong_arguments_are_one_line(
+    folder: Path, arguments: tuple[str, ...], message: str
+) -> None:
+    """And nothing is written."""
+    done = run("match", *arguments, cwd=folder)
+
+    assert done.returncode in (2, 4)
+    assert message in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert not (folder / "matched.yaml").exists()

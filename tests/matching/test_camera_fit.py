@@ -1,0 +1,172 @@
+"""Recovery of a camera's parameters from photographs that were made with known ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gen_data.generator.config.distributions import Constant
+from gen_data.generator.matching.camera_fit import fit_camera, measure_photo
+from gen_data.generator.matching.picture import Picture
+from gen_data.generator.matching.quantities import blur, exposure, jpeg_quality, noise
+from gen_data.generator.matching.recordings import Photo
+from gen_data.generator.matching.results import FittedQuantity, Part
+from gen_data.generator.matching.simulation import photograph
+from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline
+from tests.matching.scenes import exposures
+
+BASE = ImagePipeline.model_validate({"preset": "industrial", "focus": None})
+TRUTH = ImagePipeline.model_validate({
+    "preset": "industrial",
+    "focus": None,
+    "exposure_compensation_ev": {"normal": {"mean": -0.7, "stddev": 0.4, "clip": (-2.0, 1.0)}},
+    "contrast": 1.4,
+    "saturation": 0.75,
+    "warmth_ev": 0.3,
+    "blur_px": 1.0,
+    "image_sensor": {"full_well_e": 3000.0},
+    "jpeg_quality": {"choice": {"92": 3.0, "95": 1.0}},
+})  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def fitted() -> Part:
+    """A fit of 24 scenes to 30 photographs of other scenes."""
+    photos = [
+        measure_photo(Photo(f"{k}.png", photograph(one, TRUTH).rgb, (320, 240), None))
+        for k, one in enumerate(exposures(range(1000, 1030), TRUTH))
+    ]
+    return fit_camera(exposures(range(24), BASE), photos, 0)
+
+
+def row(part: Part, name: str) -> FittedQuantity:
+    """The row of a quantity."""
+    return next(one for one in part.quantities if one.name == name)
+
+
+@pytest.mark.parametrize(
+    ("name", "truth", "tolerance"),
+    [
+        ("exposure", -0.7, 0.2),
+        ("tone", 1.4, 0.15),
+        ("white balance", 0.3, 0.06),
+        ("saturation", 0.75, 0.1),
+        ("blur", 1.0, 0.06),
+        ("noise", 3000.0, 450.0),
+    ],
+)
+def test_known_parameters_are_recovered(
+    fitted: Part, name: str, truth: float, tolerance: float
+) -> None:
+    """Within a tolerance, and within the stated interval."""
+    found = row(fitted, name)
+
+    assert found.mean == pytest.approx(truth, abs=tolerance)
+    assert found.low is not None
+    assert found.high is not None
+    assert found.low <= truth <= found.high
+    assert found.is_fitted
+
+
+def test_a_spread_of_exposures_becomes_a_distribution(fitted: Part) -> None:
+    """Its deviation of 0.4 stops is told from that of scenes; blur, which has none, is a number."""
+    found = row(fitted, "exposure")
+
+    assert found.spread == pytest.approx(0.4, abs=0.12)
+    assert found.value["normal"]["stddev"] == pytest.approx(found.spread, rel=1e-3)
+    assert row(fitted, "blur").value == pytest.approx(1.0, abs=0.06)
+
+
+def test_qualities_of_jpeg_are_found_in_decoded_pixels(fitted: Part) -> None:
+    """Each of the two qualities, as often as it occurred."""
+    found = row(fitted, "JPEG quality").value["choice"]
+
+    assert set(found) == {"92", "95"}
+    assert sum(found.values()) == 30
+
+
+def test_simulated_pictures_come_nearer_to_the_real_ones(fitted: Part) -> None:
+    """Means of every fitted statistic, in units of the distance before."""
+    for one in fitted.statistics[:6]:
+        before, after = (abs(group.mean() - one.real.mean()) for group in (one.before, one.after))
+        assert after < 0.5 * before + 0.05 * one.real.std(), one.name
+
+
+def test_without_photographs_nothing_is_fitted() -> None:
+    """The reason is in every row."""
+    part = fit_camera(exposures([1], BASE), [], 0)
+
+    assert not part.fields
+    assert {one.note for one in part.quantities} == {"no photographs"}
+
+
+def test_a_camera_without_sensor_gets_none_for_pictures_without_noise() -> None:
+    """Nor a demosaicing, which would blur."""
+    ideal = ImagePipeline()
+    photos = [
+        measure_photo(Photo(f"{k}.png", photograph(one, ideal).rgb, (320, 240), None))
+        for k, one in enumerate(exposures(range(1000, 1008), ideal))
+    ]
+    part = fit_camera(exposures(range(8), ideal), photos, 0)
+
+    assert not row(part, "noise").is_fitted
+    assert "no noise" in row(part, "noise").note
+    assert not any("image_sensor" in one.change.field for one in part.fields)
+
+
+@pytest.mark.parametrize("quality", [97, 92, 85, 75, 60, 40, 25])
+def test_quality_is_read_from_pixels_exactly(quality: int) -> None:
+    """Quantised coefficients lie at multiples of the steps of one quality only."""
+    (one,) = exposures([5], BASE)
+    picture = photograph(one, BASE.model_copy(update={"jpeg_quality": Constant(float(quality))}))
+
+    assert jpeg_quality.pixel_quality(picture) == quality
+
+
+@pytest.mark.parametrize("electrons", [2000.0, 1e6])
+def test_pictures_without_compression_show_none(electrons: float) -> None:
+    """With noise and without."""
+    (one,) = exposures([5], BASE)
+    assert np.isnan(
+        jpeg_quality.pixel_quality(photograph(one, noise.NOISE.apply(BASE, np.log2(electrons))))
+    )
+
+
+@pytest.mark.parametrize("quality", [5, 30, 50, 75, 90, 99])
+def test_quality_is_read_from_the_tables_of_a_file(quality: int) -> None:
+    """As Pillow's libjpeg writes them."""
+    import io
+
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.fromarray(np.zeros((16, 16, 3), np.uint8)).save(stream, "JPEG", quality=quality)
+    with Image.open(io.BytesIO(stream.getvalue())) as image:
+        steps = np.array(image.quantization[0])  # type: ignore[attr-defined]
+
+    assert jpeg_quality.table_quality(steps) == quality
+
+
+def test_statistics_of_flat_pictures_are_defined_or_missing() -> None:
+    """A grey card has a level and neither edges nor colours; black and white have no noise."""
+    grey, black, white = (Picture(np.full((96, 128, 3), v, np.uint8)) for v in (118, 0, 255))
+
+    assert exposure.measure(grey) == pytest.approx(np.log2(0.1812 + 1.0 / 512.0), abs=0.01)
+    assert np.isnan(blur.measure(grey))
+    assert np.isnan(noise.measure(black))
+    assert np.isnan(noise.measure(white))
+
+
+@pytest.mark.parametrize("stddev_px", [0.7, 1.0, 1.5, 2.5])
+def test_blur_of_a_step_is_its_variance(stddev_px: float) -> None:
+    """A blurred edge between two greys; pixels add 1/12, differences of neighbours 1/3."""
+    import cv2
+
+    wide = np.zeros((128, 1280), np.float32) + 60.0
+    wide[:, 643:] = 180.0
+    step = cv2.resize(
+        cv2.GaussianBlur(wide, (0, 0), 10.0 * stddev_px), (128, 128), interpolation=cv2.INTER_AREA
+    )
+    picture = Picture(np.repeat(np.rint(step)[..., None], 3, axis=-1).astype(np.uint8))
+
+    assert blur.measure(picture) == pytest.approx(stddev_px**2 + 1.0 / 12.0 + 1.0 / 3.0, rel=0.1)

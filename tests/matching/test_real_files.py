@@ -1,0 +1,180 @@
+"""Folders of recordings: what is read, and what is skipped with which reason."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from gen_data.exporters.pointclouds import file_points, pcd_bytes, ply_bytes
+from gen_data.generator.core.capture import POINT
+from gen_data.generator.core.errors import StorageError
+from gen_data.generator.matching.inventory_table import inventory_rows
+from gen_data.generator.matching.point_files import read_point_file
+from gen_data.generator.matching.real_files import (
+    Inventory,
+    choose_evenly,
+    find_files,
+    read_labels,
+    read_photos,
+    read_scans,
+)
+
+
+def save(path: Path, width: int = 96, height: int = 80, mode: str = "RGB", **options: int) -> None:
+    """Write an image."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    Image.new(mode, (width, height), 100).save(path, **options)  # type: ignore[arg-type]
+
+
+def test_photographs_are_read_and_everything_else_is_counted_with_its_reason(
+    tmp_path: Path,
+) -> None:
+    """Damaged, tiny, grey and label images; depth folders and second links are no photographs."""
+    save(tmp_path / "a.png")
+    save(tmp_path / "deep" / "b.JPG", width=200, quality=80)
+    save(tmp_path / "tiny.png", width=20)
+    save(tmp_path / "grey.png", mode="L")
+    save(tmp_path / "labels.png", mode="I;16")
+    save(tmp_path / "cam" / "depth" / "c.png")
+    (tmp_path / "broken.jpg").write_bytes(b"\xff\xd8 no image")
+    (tmp_path / "linked.png").hardlink_to(tmp_path / "a.png")
+    inventory = Inventory()
+
+    photos = list(read_photos(find_files(tmp_path), 100, inventory))
+
+    assert [photo.name for photo in photos] == ["a.png", "deep/b.JPG"]
+    assert photos[0].quantisation is None
+    assert photos[1].quantisation is not None
+    assert photos[1].size_px == (200, 80)
+    assert inventory.used["photographs"] == 2
+    reasons = {why.split(" (")[0]: n for (_, why), n in inventory.skipped.items()}
+    assert reasons == {
+        "unreadable image": 1,
+        "smaller than 64 px": 1,
+        "without colours": 1,
+        "a label or depth image": 1,
+    }
+    table = inventory_rows(inventory)
+    assert table[0] == ("photographs", "6", "2", "4", "1 of 96 x 80 px, 1 of 200 x 80 px")
+
+
+def test_large_photographs_are_cropped_to_their_middle_on_the_grid_of_jpeg(tmp_path: Path) -> None:
+    """Four megapixels remain; the size of the whole is kept."""
+    save(tmp_path / "large.png", width=4000, height=3000)
+    (photo,) = read_photos(find_files(tmp_path), 1, Inventory())
+
+    assert photo.size_px == (4000, 3000)
+    assert 3.9e6 < photo.rgb.shape[0] * photo.rgb.shape[1] <= 4.0e6
+    assert photo.rgb.shape[0] % 8 == photo.rgb.shape[1] % 8 == 0
+
+
+def test_a_limit_chooses_files_evenly() -> None:
+    """From the first on, at equal distances."""
+    files = [Path(str(k)) for k in range(10)]
+
+    assert choose_evenly(files, 4) == [files[0], files[2], files[5], files[7]]
+    assert choose_evenly(files, 100) == files
+
+
+def test_folders_without_recordings_are_refused(tmp_path: Path) -> None:
+    """The message names what was expected."""
+    with pytest.raises(StorageError, match="is no folder"):
+        find_files(tmp_path / "absent")
+    (tmp_path / "notes.txt").write_text("nothing")
+    with pytest.raises(
+        StorageError, match=r"holds no photographs \(.*\.png.*\) and no laser scans"
+    ):
+        find_files(tmp_path)
+
+
+def points(n: int = 200) -> np.ndarray:
+    """Records of a scan."""
+    rng = np.random.default_rng(1)
+    made = np.zeros(n, POINT)
+    made["position_m"] = rng.normal(0.0, 10.0, (n, 3))
+    made["intensity"] = rng.random(n)
+    return made
+
+
+@pytest.mark.parametrize("name", ["scan.ply", "scan.pcd", "scan.bin", "scan.pcd.bin", "scan.npy"])
+def test_scans_of_every_format_have_the_same_points(tmp_path: Path, name: str) -> None:
+    """Ranges and intensities of our exporters' files, of KITTI's and of nuScenes' layout."""
+    made = points()
+    flat = np.column_stack([made["position_m"], made["intensity"]]).astype("<f4")
+    if name.endswith(".npy"):
+        np.save(tmp_path / name, made)
+    elif name.endswith("ply"):
+        (tmp_path / name).write_bytes(ply_bytes(file_points(made)))
+    elif name.endswith(".pcd"):
+        (tmp_path / name).write_bytes(pcd_bytes(file_points(made)))
+    else:
+        ring = np.zeros((len(flat), 1), "<f4")
+        five = np.hstack([flat, ring]) if name == "scan.pcd.bin" else flat
+        (tmp_path / name).write_bytes(five.astype("<f4").tobytes())
+
+    (scan,) = read_scans(find_files(tmp_path), 10, Inventory())
+
+    np.testing.assert_allclose(scan.range_m, np.linalg.norm(flat[:, :3], axis=1), rtol=1e-5)
+    np.testing.assert_allclose(scan.intensity, flat[:, 3], rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "reason"),
+    [
+        ("a.bin", b"\0" * 30, "30 bytes are not 4 float32 a point"),
+        ("a.ply", b"ply\nformat binary_big_endian 1.0\nelement vertex 1\nproperty float x\n"
+         b"end_header\n", "encoded as binary_big_endian"),
+        ("a.ply", b"solid", "no header of PLY"),
+        ("a.pcd", b"VERSION 0.7\n", "a PCD file without DATA"),
+        ("a.pcd", b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n",
+         "expected x, y, z and intensity"),
+        ("a.pcd", b"FIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nPOINTS 9\nDATA binary\n1",
+         "shorter than its 9 points"),
+    ],
+)  # fmt: skip
+def test_damaged_scans_state_the_fact(
+    tmp_path: Path, name: str, content: bytes, reason: str
+) -> None:
+    """One sentence for the table."""
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(ValueError, match=reason):
+        read_point_file(tmp_path / name)
+
+
+def test_bytes_of_intensity_become_shares(tmp_path: Path) -> None:
+    """Devices report 0 to 255, KITTI's files 0 to 1."""
+    flat = np.ones((200, 4), "<f4") * 51.0
+    flat.tofile(tmp_path / "a.bin")
+    inventory = Inventory()
+    (scan,) = read_scans(find_files(tmp_path), 10, inventory)
+
+    np.testing.assert_allclose(scan.intensity, 0.2)
+    assert inventory.notes["scans"] == "intensities of 1 divided by 255"
+
+
+def test_boxes_of_coco_and_kitti_are_the_same(tmp_path: Path) -> None:
+    """KITTI's corners are pixel centres; sizes come from photographs; DontCare is no object."""
+    coco, kitti = tmp_path / "one", tmp_path / "two"
+    for folder in (coco / "annotations", kitti / "label_2"):
+        folder.mkdir(parents=True)
+    content = {
+        "images": [{"id": 1, "width": 96, "height": 80}],
+        "categories": [{"id": 7, "name": "Car"}],
+        "annotations": [{"image_id": 1, "category_id": 7, "bbox": [10, 20, 31, 41]}],
+    }
+    (coco / "annotations" / "instances_val.json").write_text(json.dumps(content))
+    (coco / "annotations" / "broken.json").write_text("{")
+    save(coco / "a.png")
+    line = "Car 0 0 0 10 20 40 60 1 1 1 0 0 9 0\nDontCare -1 -1 -10 0 0 9 9 -1 -1 -1 -1 -1 -1 -1\n"
+    (kitti / "label_2" / "a.txt").write_text(line)
+    save(kitti / "a.png")
+
+    (one,) = read_labels(find_files(coco), {}, Inventory())
+    (two,) = read_labels(find_files(kitti), {"a.png": (96, 80)}, Inventory())
+
+    assert one == two
+    assert one.boxes == (("Car", 10.0, 20.0, 31.0, 41.0),)
