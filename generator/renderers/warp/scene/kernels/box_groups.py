@@ -40,8 +40,10 @@ _NEXT_IN_SHAFT = (
             enters = 0.0f;
             leaves = 1.0f;
             for (int k = 0; k < 3; ++k) {
-                const Floats low = (load(group + 16 * k, Floats()) - start[k] - grown) * inverse[k];
-                const Floats high = (load(group + 16 * k + 8, Floats()) - start[k] + grown) * inverse[k];
+                const Floats from = load(group + 16 * k, Floats()) - start[k];
+                const Floats to = load(group + 16 * k + 8, Floats()) - start[k];
+                const Floats low = (from - grown) * inverse[k];
+                const Floats high = (to + grown) * inverse[k];
                 enters = larger(enters, smaller(low, high));
                 leaves = smaller(leaves, larger(low, high));
             }
