@@ -40,8 +40,8 @@ from gen_data.generator.core.processes import SINGLE_THREADED
 from gen_data.generator.core.urls import is_url, needs_folder
 
 FOLDERS_ONLY = frozenset(
-    "adapt certify contact-sheet diff export match merge preview repair report repro rerender".split()  # noqa: SIM905
-) | {"sample", "study"}
+    "adapt certify contact-sheet diff export match merge preview repair report repro".split()  # noqa: SIM905
+) | {"rerender", "sample", "study"}
 """Commands that read no data set at a URL."""
 
 
