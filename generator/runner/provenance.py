@@ -64,7 +64,7 @@ def scene_line(sample: Sample, base: Sample | None) -> str:
 
 _RECURRING = ("bodies", "instances")
 """Fields most of whose items are the same objects at all steps of a sequence."""
-_texts: ObjectCache[str] = ObjectCache(4096)
+_texts: ObjectCache[str] = ObjectCache(2048)
 """Canonical JSON of the latest of these items, half a kilobyte each."""
 
 

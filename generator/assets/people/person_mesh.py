@@ -164,7 +164,8 @@ def _stance(person: Person) -> Stance:
 
 
 def _pose_piece(piece: _Piece, body: BodyTemplate, transforms: Array) -> Sheet:
-    bones, weights = (of.take(piece.used, axis=0) for of in (body.weight_bones, body.weights))
+    bones = body.weight_bones.take(piece.used, axis=0)
+    weights = body.weights.take(piece.used, axis=0)
     moved = skin_points(piece.vertices_m, bones, weights, transforms)
     normals = vertex_normals(moved, piece.faces)
     # Normals come from the whole surface: fields of the texture must not show in its shading.

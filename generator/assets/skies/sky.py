@@ -158,8 +158,10 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float, pale: float =
     luminance = relative("luminance")
     # Sum by sum: numpy is slow on products of three by three.
     red_blue = x / y, (1.0 - x - y) / y
-    rgb = np.stack([a * red_blue[0] + b + c * red_blue[1] for a, b, c in REC709_FROM_XYZ], axis=-1)
-    rgb = np.maximum(rgb, 0.02, out=rgb)
+    rgb: Array = np.stack(
+        [a * red_blue[0] + b + c * red_blue[1] for a, b, c in REC709_FROM_XYZ], axis=-1
+    )
+    np.maximum(rgb, 0.02, out=rgb)
     # Preetham's fit turns pink at the horizon of clear air, which in truth is pale.
     high = pale * _ramp(4.0, 20.0, math.degrees(sun_altitude_rad))
     rgb += np.exp(-rows_up / 0.22)[..., None] * high * (_HORIZON - rgb)

@@ -131,10 +131,9 @@ def _read_electrons(mean_e: Float32, read_noise_e: float, rng: Rng) -> Float32:
     """
     level = rng.standard_normal(mean_e.shape, dtype=np.float32)
     stddev_e = np.sqrt(mean_e + np.float32(read_noise_e * read_noise_e))
-    few = np.flatnonzero(mean_e < _NORMAL_FROM_E)
-    if len(few):
-        stddev_e.flat[few] = read_noise_e
-        mean_e.flat[few] = rng.poisson(mean_e.flat[few])
+    few = mean_e < _NORMAL_FROM_E
+    stddev_e[few] = read_noise_e
+    mean_e[few] = rng.poisson(mean_e[few])
     level *= stddev_e
     level += mean_e
     return level
