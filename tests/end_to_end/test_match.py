@@ -25,6 +25,7 @@ exporters: [{type: coco}]
 REAL = """\
 extends: base.yaml
 seed: 99
+views_per_scene: 1   # recordings are independent
 sensors:
   - name: color
     image_pipeline:
