@@ -50,4 +50,4 @@ class Picture:
         sparse = self.rgb[::SPARSE, ::SPARSE].reshape(-1, 3)
         red, green, blue = np.ascontiguousarray(sparse.T)
         top = np.maximum(np.maximum(red, green), blue)
-        return self.linear[(top > DARK) & (top < CLIPPED)]
+        return np.asarray(self.linear[(top > DARK) & (top < CLIPPED)])

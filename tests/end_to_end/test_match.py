@@ -25,6 +25,7 @@ exporters: [{type: coco}]
 REAL = """\
 extends: base.yaml
 seed: 99
+views_per_scene: 1   # recordings are independent
 sensors:
   - name: color
     image_pipeline:
@@ -41,9 +42,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (place / "configs" / "base.yaml").write_text(BASE, encoding="utf-8")
     (place / "configs" / "real.yaml").write_text(REAL, encoding="utf-8")
     gen_data.generate(place / "configs" / "real.yaml", n=20, out=place / "real", workers=0)
-    done = run(
-        "match", "real", "configs/base.yaml", "--out", "fits/a.yaml", "--scenes", "10", cwd=place
-    )
+    arguments = ("real", "configs/base.yaml", "--out", "fits/a.yaml", "--scenes", "10")
+    done = run("match", *arguments, cwd=place, COLUMNS="200")
     assert done.returncode == 0, done.stderr
     (place / "stdout.txt").write_text(done.stdout, encoding="utf-8")
     return place
