@@ -21,8 +21,10 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 PACKAGES = ("generator", "randomizers", "exporters", "scene_templates")
-LEFT_OUT = ("__main__", "rerun_recording")
-"""Ends of names of modules that run when imported, or whose libraries start threads."""
+LEFT_OUT = (
+    "__main__", "rerun_recording", "study.detector", "study.run_training", "study.training"
+)  # fmt: skip
+"""Ends of names of modules that run when imported, or whose libraries start threads, as torch."""
 
 
 def serve() -> None:
