@@ -14,7 +14,6 @@ EXTRAS = {
     "pxr": ("usd-core", "usd"),
     "pyarrow": ("pyarrow", "formats"),
     "rerun": ("rerun-sdk", "preview"),
-    "torch": ("torch", "study"),
 }
 """Package and extra by the module that the package installs."""
 

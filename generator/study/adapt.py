@@ -22,12 +22,12 @@ from gen_data.generator.api.config import load_config
 from gen_data.generator.api.dataset import SampleSequence, open_dataset
 from gen_data.generator.config.yaml_scalars import to_flow_yaml
 from gen_data.generator.core.errors import ConfigError, StorageError, VerificationError
-from gen_data.generator.core.optional_packages import missing_packages
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.report.drawn_parameters import replay_scenes
 from gen_data.generator.runner.durable_files import write_durably
 from gen_data.generator.runner.stored import StoredSamples
 from gen_data.generator.study.evaluation import check_results, evaluate, match_objects
+from gen_data.generator.study.experiment import require_torch
 from gen_data.generator.study.findings import Table
 from gen_data.generator.study.real_pictures import Box, RealObject, RealPicture, RealSet
 from gen_data.generator.study.reweighting import ALPHA, Dependence, Tally, find_dependences
@@ -168,8 +168,7 @@ def _read_checked(path: Path, data: Path, truth: RealSet) -> list[dict[str, Any]
 
 
 def _detect(path: Path, samples: SampleSequence, truth: RealSet) -> list[dict[str, Any]]:
-    if reason := missing_packages("torch"):
-        raise ConfigError(f"adapt {reason}")
+    require_torch("adapt")
     from gen_data.generator.study.detector import Detector
     from gen_data.generator.study.training import detect_in_images
 

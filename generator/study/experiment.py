@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -139,6 +140,15 @@ class Run:
         """Its detections in COCO's format of results."""
         rows: list[dict[str, Any]] = json.loads((self.folder / RESULTS).read_text("utf-8"))
         return rows
+
+
+def require_torch(command: str) -> None:
+    """Raise ConfigError with the remedy if torch, which the small detector needs, is missing.
+
+    The extra ``all`` leaves it out: it is larger than everything else together.
+    """
+    if find_spec("torch") is None:
+        raise ConfigError(f"{command} needs the package torch: pip install 'gen-data[study]'")
 
 
 def prepare(experiment: Experiment) -> Prepared:

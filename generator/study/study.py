@@ -8,10 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.core.errors import ConfigError, StorageError
-from gen_data.generator.core.optional_packages import missing_packages
+from gen_data.generator.core.errors import StorageError
 from gen_data.generator.study.evaluation import Evaluation, evaluate, read_results
-from gen_data.generator.study.experiment import Experiment, perform, prepare
+from gen_data.generator.study.experiment import Experiment, perform, prepare, require_torch
 from gen_data.generator.study.findings import Table, describe, format_page, tabulate
 from gen_data.generator.study.real_pictures import RealSet, read_real
 
@@ -40,8 +39,7 @@ def run_study(
         ConfigError: torch is not installed, or the input is wrong.
         StorageError: the folder holds another experiment, or cannot be written.
     """
-    if reason := missing_packages("torch"):
-        raise ConfigError(f"study {reason}")
+    require_torch("study")
     tell = report or _ignore
     prepared = prepare(experiment)
     for line in _summary(prepared.real):

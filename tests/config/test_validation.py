@@ -113,7 +113,7 @@ def test_a_valid_document_becomes_a_frozen_model() -> None:
     assert isinstance(config.share, float)
 
 
-NUMERIC = "constant, choice, sequence, uniform, log_uniform, normal, uniform_integer"
+NUMERIC = "constant, choice, sequence, uniform, log_uniform, normal, uniform_integer, mixture"
 FIELDS = ", ".join(Config.model_fields)
 
 MESSAGES = [
@@ -222,7 +222,7 @@ MESSAGES = [
      "(did you mean {uniform_integer: [1, 3]}?)"),
     ("count: {uniform: [1, 3]}",
      "1:9: count: distribution 'uniform' does not give a whole number; expected one of "
-     "constant, choice, sequence, uniform_integer (did you mean 'uniform_integer'?)"),
+     "constant, choice, sequence, uniform_integer, mixture (did you mean 'uniform_integer'?)"),
     ("count: {uniform_integer: [3, 1]}",
      "1:26: count: uniform_integer needs low <= high, got [3, 1]"),
     ("count: {uniform_integer: [-1, 1]}",

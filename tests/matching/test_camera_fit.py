@@ -58,13 +58,17 @@ def row(part: Part, name: str) -> FittedQuantity:
 def test_known_parameters_are_recovered(
     fitted: Part, name: str, truth: float, tolerance: float
 ) -> None:
-    """Within a tolerance, and within the stated interval."""
+    """Within a tolerance, and within the stated interval.
+
+    Six intervals of 95 % hold all six truths in 74 of 100 fits; Bonferroni's are 1.35 times
+    as wide.
+    """
     found = row(fitted, name)
 
     assert found.mean == pytest.approx(truth, abs=tolerance)
     assert found.low is not None
     assert found.high is not None
-    assert found.low <= truth <= found.high
+    assert abs(truth - 0.5 * (found.low + found.high)) <= 1.35 * 0.5 * (found.high - found.low)
     assert found.is_fitted
 
 

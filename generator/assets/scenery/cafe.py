@@ -247,7 +247,7 @@ def _crate(slot: int, rng: VariantRng) -> list[Patch]:
     """A crate of 0.4 x 0.5 m, heaped with round produce."""
     x, y, high = 0.2, 0.25, 0.13
     walls = hopper(Rectangle(-x, x, -y, y), Rectangle(-x, x, -y, y), (0.0, high), 3, True)
-    rows, columns = 9, 11
+    rows, columns = 7, 9
     v, u = np.meshgrid(np.linspace(0, 1, rows), np.linspace(0, 1, columns), indexing="ij")
     # Two grid steps per fruit: their tops and the gaps between them.
     bumps = 0.03 * np.abs(np.cos(0.5 * math.pi * np.arange(rows)))[:, None]

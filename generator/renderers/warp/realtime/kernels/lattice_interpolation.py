@@ -374,6 +374,16 @@ def shade_stretch(
     ...
 
 
+@wp.func
+def background(view: View, world: World, x: int, y: int):
+    """Radiance of a pixel without a surface."""
+    c = wp.vec3(0.0)
+    if world.sky.visible != 0:
+        d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
+        c = sky_image(world.sky, view.R_world_camera @ d)
+    return c
+
+
 @wp.kernel
 def gather_light(
     view: View,
@@ -400,8 +410,8 @@ def gather_light(
     y1 = wp.min(y0 + lattice.stride, view.height)
     step_y = step_at(lattice, y0, view.height)
     covered = world.ground.covered != 0
-    white = wp.vec3(SNOW_RED, SNOW_GREEN, SNOW_BLUE)
     for column in range(segment * run, wp.min((segment + 1) * run, lattice.width - 1)):
+        first = row * lattice.width + column
         x0 = column * lattice.stride
         x1 = wp.min(x0 + lattice.stride, view.width)
         step_x = step_at(lattice, x0, view.width)
@@ -418,7 +428,6 @@ def gather_light(
                         surface = surface_index(world, hit)
                         missed |= bit
                         if is_gatherable(world, surface):
-                            first = row * lattice.width + column
                             stretch, patch, sampler = stretch_at(
                                 view, world, images, lattice, lights, surface, first, x, y
                             )
@@ -429,7 +438,7 @@ def gather_light(
                                 lights,
                                 coats,
                                 covered,
-                                white,
+                                wp.vec3(SNOW_RED, SNOW_GREEN, SNOW_BLUE),
                                 stretch,
                                 patch,
                                 sampler,
@@ -443,11 +452,7 @@ def gather_light(
                             done |= bits & 65535
                             missed = (missed & ~bit) | (bits >> 16)
                     else:
-                        c = wp.vec3(0.0)
-                        if world.sky.visible != 0:
-                            d = pixel_direction(view, float(x) + 0.5, float(y) + 0.5)
-                            c = sky_image(world.sky, view.R_world_camera @ d)
-                        radiance[i] = c
+                        radiance[i] = background(view, world, x, y)
                 if (missed & bit) != 0:
                     # An atomic counter appends the pixel to the list.
                     pixels[wp.atomic_add(count, 0, 1)] = i
