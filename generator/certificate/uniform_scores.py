@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,8 +25,10 @@ from gen_data.generator.config.distributions import (
     Box,
     Cap,
     Choice,
+    Constant,
     Distribution,
     LogUniform,
+    Mixture,
     Normal,
     Probability,
     Shell,
@@ -106,6 +109,26 @@ def _uniform_integer(d: UniformInteger, value: int, rng: Rng) -> Scores:
     if not d.low <= value <= d.high:
         return (math.nan,)
     return ((value - d.low + rng.random()) / (d.high - d.low + 1),)
+
+
+def _mixture(d: Mixture[Any], value: float, rng: Rng) -> Scores:
+    """The weighted mean of the parts' scores, whose steps are spread by one number.
+
+    Empty if a part is of another kind than below, such as a choice.
+    """
+    spread = rng.random()
+    same: Any = SimpleNamespace(random=lambda: spread)
+    score, is_possible = 0.0, False
+    for part, weight in zip(d.parts, d.weights, strict=True):
+        if not isinstance(part, (Constant, LogUniform, Normal, Uniform, UniformInteger)):
+            return ()
+        low, high = part.support()
+        if weight > 0.0 and low <= value <= high:
+            is_possible = True
+            score += weight * (uniform_scores(part, value, same) or (spread,))[0]
+        elif value > high:
+            score += weight
+    return (score / sum(d.weights),) if is_possible else (math.nan,)
 
 
 def _choice(d: Choice[Any], value: Any, rng: Rng) -> Scores:
@@ -202,6 +225,7 @@ _TRANSFORMS: Mapping[type[Any], Callable[[Any, Any, Rng], Scores]] = {
     Cap: _cap,
     Choice: _choice,
     LogUniform: _log_uniform,
+    Mixture: _mixture,
     Normal: _normal,
     Probability: _probability,
     Shell: _shell,
