@@ -235,10 +235,12 @@ def test_trees_are_bare_where_snow_lies() -> None:
     """Every weather with snow on the ground draws winter, whose deciduous trees are bare."""
     snowy = [name for name, preset in PRESETS.items() if preset.condition.weather.snow_cover > 0.0]
     assert len(snowy) == 15
-    for weather in snowy:
-        config = load_config("street", overrides=[f"shared.weather={weather}"])
-        shared = config.shared(Streams(3, 0, index=0))
-        assert dict(shared)["season"] == "winter"
+    choice = f"shared.weather={{choice: [{', '.join(snowy)}]}}"
+    config = load_config("street", overrides=[choice])
+    drawn = [config.shared(Streams(3, scene, index=scene)) for scene in range(150)]
+    assert {dict(shared)["weather"] for shared in drawn} == set(snowy)
+    assert {dict(shared)["season"] for shared in drawn} == {"winter"}
+    shared = drawn[0]
     parts = config.scene_config(shared).elements
     trees = [part for part in parts if isinstance(part, LaneObjects) and "trees" in part.name]
     found = {a for part in trees for a in part.assets.resolve(library(), part.name)}

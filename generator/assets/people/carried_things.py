@@ -309,6 +309,8 @@ def _strap(carrier: Carrier, course: Sequence[tuple[float, float, float]], width
     along = np.gradient(places, axis=0)
     side = np.cross(up, along)
     side *= 0.5 * width_m / np.maximum(np.sqrt((side * side).sum(axis=1, keepdims=True)), 1e-9)
+    # A third of the cross-sections is enough once they are smooth.
+    places, side, up = places[::3], side[::3], up[::3]
     band = np.stack([places + x * side + z * up for x, z in _BAND], axis=1).reshape(-1, 3)
     faces = grid_faces(len(places), len(_BAND))
     material = carrier.person.outfit.bag_material
@@ -316,9 +318,9 @@ def _strap(carrier: Carrier, course: Sequence[tuple[float, float, float]], width
     return Sheet(band, vertex_normals(band, faces), faces, slots, (material,))
 
 
-_STRAP_ROWS, _TRUNK_M = 33, 0.185
+_STRAP_ROWS, _TRUNK_M = 31, 0.185
 """Cross-sections of a strap; half of the trunk's width in the template frame [m]."""
-_BAND = ((-1.0, -0.012), (-1.0, 0.004), (-0.8, 0.009), (0.8, 0.009), (1.0, 0.004), (1.0, -0.012))
+_BAND = ((-1.0, -0.012), (-0.9, 0.008), (0.9, 0.008), (1.0, -0.012))
 """Cross-section of a strap: shares of half of its width, and height above the clothes [m]."""
 
 
