@@ -9,6 +9,7 @@ They name the first stage that an accidental change of bytes altered (see
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -68,6 +69,8 @@ def main() -> None:
     """Renew the digests of the named configurations, or of all that have some."""
     from tests.contracts.test_every_config import CONFIGS, generate_reduced
 
+    # As tests do: no pack that is installed here.
+    os.environ["GEN_DATA_ASSETS"] = tempfile.mkdtemp(prefix="gen-data-no-packs-")
     stored = read_stored() if FILE.exists() else {"numerics": {}, "samples": {}}
     for name in sys.argv[1:] or list(stored["samples"]) or CONFIGS:
         with tempfile.TemporaryDirectory() as folder:
