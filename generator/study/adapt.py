@@ -26,7 +26,7 @@ from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.report.drawn_parameters import replay_scenes
 from gen_data.generator.runner.durable_files import write_durably
 from gen_data.generator.runner.stored import StoredSamples
-from gen_data.generator.study.evaluation import check_results, evaluate, match_objects
+from gen_data.generator.study.evaluation import check_results, evaluate
 from gen_data.generator.study.experiment import require_torch
 from gen_data.generator.study.findings import Table
 from gen_data.generator.study.real_pictures import Box, RealObject, RealPicture, RealSet
@@ -183,7 +183,7 @@ def _count(truth: RealSet, rows: Sequence[Mapping[str, Any]], cameras: int) -> d
     """Objects and misses by number of the sample."""
     evaluation = evaluate(truth, rows)
     counts = {(picture.image_id - 1) // cameras: [0, 0] for picture in truth.pictures}
-    for match in match_objects(evaluation)[0]:
+    for match in evaluation.matches:
         if match.thing is not None:
             number = (evaluation.pictures[match.picture].image_id - 1) // cameras
             counts[number][0] += 1

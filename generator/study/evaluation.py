@@ -11,6 +11,7 @@ import io
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -57,6 +58,11 @@ class Evaluation:
         precision = judged.eval["precision"][:, :, :, 0, -1]  # IoU, recall, class; all areas
         precision = np.where(precision > -1, precision, np.nan)
         return np.stack([precision.mean(axis=(0, 1)), precision[0].mean(axis=0)])
+
+    @cached_property
+    def matches(self) -> list[Match]:
+        """Objects that were found, missed, and false alarms; see ``match_objects``."""
+        return match_objects(self)[0]
 
     def summary(self, chosen: NDArray[np.int64] | None = None) -> NDArray[np.float64]:
         """AP and AP50 [2], the means over classes that occur."""

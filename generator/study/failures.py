@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.study.evaluation import Evaluation, Match, match_objects
+from gen_data.generator.study.evaluation import Evaluation, Match
 from gen_data.generator.study.real_pictures import Box, RealObject, RealPicture, read_image
 
 SMALL_PX2, LARGE_PX2 = 32**2, 96**2
@@ -40,8 +40,7 @@ def count_groups(runs: Sequence[Evaluation]) -> Groups:
     """Found and all objects of every group, summed over runs on the same pictures."""
     counts: dict[tuple[str, str], list[int]] = defaultdict(lambda: [0, 0])
     for run in runs:
-        matches, _ = match_objects(run)
-        for match in matches:
+        for match in run.matches:
             if match.thing is None:
                 continue
             for group in _groups(run.pictures[match.picture], match.thing):
@@ -54,7 +53,7 @@ def worst_pictures(runs: Sequence[Evaluation], most: int) -> list[tuple[int, int
     """Numbers of the pictures with most misses and false alarms per run, and their sums."""
     faults: dict[int, int] = defaultdict(int)
     for run in runs:
-        for match in match_objects(run)[0]:
+        for match in run.matches:
             faults[match.picture] += match.box is None or match.thing is None
     ranked = sorted(faults.items(), key=lambda item: (-item[1], item[0]))
     return [(number, count) for number, count in ranked[:most] if count]
@@ -65,7 +64,7 @@ def draw_faults(run: Evaluation, number: int) -> NDArray[np.uint8]:
     image = read_image(run.pictures[number].path)
     scale = min(1.0, SHOWN_PX / max(image.shape[:2]))
     shown = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
-    for match in match_objects(run)[0]:
+    for match in run.matches:
         if match.picture == number:
             box, color = _look(match)
             x0, y0, x1, y1 = (round(scale * side) for side in box)

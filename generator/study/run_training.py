@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 
 from gen_data.generator.api.dataset import open_dataset
@@ -70,7 +71,7 @@ def _generated(folder: Path, classes: list[str], longest_px: float) -> list[Targ
         for sample in samples:
             image, arrays = shrink(detection_target(sample), longest_px)
             labels = [label[int(k)] for k in arrays["labels"]]
-            targets.append((image, {**arrays, "labels": torch.tensor(labels).long().numpy()}))
+            targets.append((image, {**arrays, "labels": np.array(labels, np.int64)}))
     return targets
 
 
