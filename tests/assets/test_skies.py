@@ -15,6 +15,7 @@ from gen_data.generator.assets.skies.sky import (
     luminance_cd_m2,
     mean_luminance_cd_m2,
     overcast_sky,
+    preetham_sky,
     sky,
     sun_lux,
 )
@@ -81,7 +82,7 @@ def test_low_sun_is_redder() -> None:
 
 @pytest.mark.parametrize("azimuth_deg", [0.0, 70.0, 180.0])
 @pytest.mark.parametrize("elevation_deg", [10.0, 45.0, 80.0])
-def test_clear_sky_follows_perez_with_preethams_coefficients(
+def test_preethams_sky_follows_perez_with_his_coefficients(
     elevation_deg: float, azimuth_deg: float
 ) -> None:
     """Ratios to the zenith at turbidity 2: A..E = -1.1056, -0.2833, 5.2797, -2.3359, 0.2363."""
@@ -98,14 +99,14 @@ def test_clear_sky_follows_perez_with_preethams_coefficients(
     gamma = math.acos(float(place @ towards))
     expected = perez(elevation, gamma) / perez(math.pi / 2, math.pi / 2 - sun)
 
-    got = clear_sky(place[None, None], sun, 2.0)[0, 0] @ LUMINANCE
+    got = preetham_sky(place[None, None], sun, 2.0)[0, 0] @ LUMINANCE
 
     assert got == pytest.approx(expected, rel=1e-6)
 
 
-def cie_clear_sky(d: np.ndarray, sun: float) -> np.ndarray:
-    """Luminance over the zenith's: CIE S 011/E:2003, type 12, the standard clear sky."""
-    a, b, c, slope, e = -1.0, -0.32, 10.0, -3.0, 0.45
+def cie_clear_sky(d: np.ndarray, sun: float, *, polluted: bool = False) -> np.ndarray:
+    """Luminance over the zenith's: CIE S 011/E:2003, type 12 (standard clear), or 13 (polluted)."""
+    a, b, c, slope, e = (-1.0, -0.32, *((16.0, -3.0, 0.3) if polluted else (10.0, -3.0, 0.45)))
     angle = np.arccos(np.clip(d @ (math.cos(sun), 0.0, math.sin(sun)), -1.0, 1.0))
     at_zenith = 0.5 * math.pi - sun
 
@@ -117,21 +118,38 @@ def cie_clear_sky(d: np.ndarray, sun: float) -> np.ndarray:
     return gradation * scattering(angle) / scattering(at_zenith)
 
 
+def directions(to_deg: float) -> np.ndarray:
+    """Unit directions around the zenith, as far from it as given; [h, w, 3]."""
+    polar = np.radians(np.arange(1.0, to_deg, 3.0))[:, None]
+    turn = np.radians(np.arange(0.0, 360.0, 5.0))[None]
+    up = np.broadcast_to(np.cos(polar), (len(polar), turn.size))
+    return np.stack([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), up], axis=-1)
+
+
+@pytest.mark.parametrize("altitude_deg", [20.0, 40.0, 60.0])
+@pytest.mark.parametrize(("turbidity", "polluted"), [(2.0, False), (2.5, False), (7.0, True)])
+def test_measured_skies_are_the_standard_clear_sky_and_in_haze_the_polluted_one(
+    altitude_deg: float, turbidity: float, polluted: bool
+) -> None:
+    d, sun = directions(89.0), math.radians(altitude_deg)
+
+    got = clear_sky(d, sun, turbidity) @ LUMINANCE
+
+    np.testing.assert_allclose(got, cie_clear_sky(d, sun, polluted=polluted), rtol=1e-9)
+
+
 @pytest.mark.parametrize("altitude_deg", [20.0, 40.0, 60.0])
 def test_preethams_sky_is_shaped_as_the_standard_clear_sky(altitude_deg: float) -> None:
     """At turbidity 2.5: nine tenths of it, 10 degrees over the horizon and up, within 1.7 times.
 
     Preetham fitted another atmosphere; the median is within 20 %.
     """
-    polar = np.radians(np.arange(1.0, 80.0, 3.0))[:, None]
-    turn = np.radians(np.arange(0.0, 360.0, 5.0))[None]
-    up = np.broadcast_to(np.cos(polar), (len(polar), turn.size))
-    d = np.stack([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), up], axis=-1)
+    d = directions(80.0)
     sun = math.radians(altitude_deg)
 
-    ratio = (clear_sky(d, sun, 2.5, pale=0.0) @ LUMINANCE) / cie_clear_sky(d, sun)
+    ratio = (preetham_sky(d, sun, 2.5) @ LUMINANCE) / cie_clear_sky(d, sun)
 
-    weights = np.broadcast_to(np.sin(polar), up.shape).ravel()
+    weights = np.hypot(d[..., 0], d[..., 1]).ravel()
     order = np.argsort(ratio.ravel())
     grown = np.cumsum(weights[order]) / weights.sum()
     low, middle, high = (ratio.ravel()[order][np.searchsorted(grown, q)] for q in (0.05, 0.5, 0.95))

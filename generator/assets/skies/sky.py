@@ -4,13 +4,14 @@ The sun stands in the direction of +X and is not in the image: it is a Light. Lu
 of the real sky: the illuminance of level ground is ``daylight.sky_illuminance_lux``.
 
 Sources: Preetham, Shirley and Smits, "A practical analytic model for daylight", SIGGRAPH 1999
-(clear sky: Perez' formula for luminance and chromaticity); CIE S 011/E:2003 (overcast sky).
+(clear sky: Perez' formula for chromaticity, and luminance as published); CIE S 011/E:2003 (measured
+luminance of clear, hazy and overcast skies).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -35,6 +36,9 @@ _MEAN_ROWS = 64
 _STRIP_ROWS = 16
 # Less light than this share of the rest is not computed.
 _NEGLIGIBLE = 1e-3
+# CIE S 011/E:2003, types 12 (clear) and 13 (clear, polluted): a to e. The turbidities are assumed.
+_CLEAR, _POLLUTED = (-1.0, -0.32, 10.0, -3.0, 0.45), (-1.0, -0.32, 16.0, -3.0, 0.30)
+_CLEAR_TURBIDITY, _POLLUTED_TURBIDITY = 2.5, 6.0
 _TABLES = load_table(__package__, "preetham", tuple[tuple[float, ...], ...])
 # A cloud deck (about 6600 K), the clear horizon, a city's glow, clean night air, land from afar.
 _DECK = np.array((0.967, 1.0, 1.097))
@@ -56,7 +60,8 @@ class SkyModel:
         turbidity: 2 very clear, 3 usual, 6 hazy.
         cloudiness: 0 clear, 0.5 broken clouds, 1 overcast.
         ground_albedo: Of the land below the horizon.
-        model: ``measured``: the illuminance of IES RP-21, under any clouds, day and night.
+        model: ``measured``: the illuminance of IES RP-21, distributed as CIE S 011 tells, under any
+            clouds, day and night.
             ``preetham``: the luminances of Preetham's clear sky by day as published.
     """
 
@@ -115,7 +120,7 @@ def luminance_cd_m2(model: SkyModel, rows: int) -> Float32:
     above = pixel_directions(rows, rows // 2)
     if model.model == "preetham":
         zenith = daylight.preetham_zenith_cd_m2(model.sun_altitude_rad, model.turbidity)
-        half = clear_sky(above[:, :rows], model.sun_altitude_rad, model.turbidity, pale=0.0)
+        half = preetham_sky(above[:, :rows], model.sun_altitude_rad, model.turbidity)
         return _with_land(_mirror(zenith * half), model)
     night_lux = daylight.night_illuminance_lux(model.cloudiness)
     day_lux = daylight.sky_illuminance_lux(model.sun_altitude_rad, model.cloudiness) - night_lux
@@ -127,44 +132,111 @@ def luminance_cd_m2(model: SkyModel, rows: int) -> Float32:
     return _with_land(sum(parts[1:], start=parts[0]), model)
 
 
-def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float, pale: float = 1.0) -> Array:
+def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
+    """Relative luminance of the clear sky by day, linear RGB, zenith 1.
+
+    Luminances are those of CIE S 011; Preetham's fit leaves the sky opposite a sun in haze half as
+    bright. Colours are Preetham's, with a horizon as pale as in photographs.
+
+    Args:
+        d: Unit directions, shape [h, w, 3], each row level.
+        sun_altitude_rad: Over the horizon.
+        turbidity: Of the air.
+    """
+    way = _Way.of(d, sun_altitude_rad)
+    hazy = (turbidity - _CLEAR_TURBIDITY) / (_POLLUTED_TURBIDITY - _CLEAR_TURBIDITY)
+    hazy = min(max(hazy, 0.0), 1.0)
+    a, b, c, falloff, e = (
+        (1.0 - hazy) * clear + hazy * polluted
+        for clear, polluted in zip(_CLEAR, _POLLUTED, strict=True)
+    )
+    # The standard's indicatrix is Perez' less a constant, so that it is 1 at a right angle.
+    at_right_angle = 1.0 - c * math.exp(falloff * math.pi / 2.0)
+    luminance = way.relative((a, b, c, falloff, e), at_right_angle)
+    # Preetham's fit turns pink at the horizon of clear air, which in truth is pale.
+    high = _ramp(4.0, 20.0, math.degrees(sun_altitude_rad))
+    pale = np.exp(-way.up / 0.22)[..., None] * high
+    return _colored(way, turbidity, luminance, pale)
+
+
+def preetham_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
     """Relative luminance of the clear sky by day, linear RGB, zenith 1; Preetham 1999.
 
     Args:
         d: Unit directions, shape [h, w, 3], each row level.
         sun_altitude_rad: Over the horizon.
         turbidity: Of the air.
-        pale: How far the horizon's colour is taken from the fit's to that of photographs.
     """
-    zenith_distance = 0.5 * math.pi - sun_altitude_rad
-    up = np.maximum(d[..., 2], 0.012)
-    towards = d[..., 0] * math.cos(sun_altitude_rad) + d[..., 2] * math.sin(sun_altitude_rad)
-    angle = np.arccos(np.clip(towards, -1.0, 1.0))
+    way = _Way.of(d, sun_altitude_rad)
+    luminance = way.relative(_perez_factors("luminance", turbidity))
+    return _colored(way, turbidity, luminance, np.zeros(1))
 
-    # Gradation is constant along a row, and all three formulas share the same cosines.
-    rows_up, cosine_squared = up[:, :1], np.clip(towards, -1.0, 1.0) ** 2
 
-    def relative(table: str) -> Array:
-        c = [factor * turbidity + constant for factor, constant in _TABLES[table]]
-        zenith = np.full(1, zenith_distance)
-        at_zenith = _perez(np.ones(1), zenith, np.cos(zenith) ** 2, c)
-        return _perez(rows_up, angle, cosine_squared, c) / at_zenith
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """Where directions of the sky are; all formulas share these.
 
-    powers = np.array([zenith_distance**3, zenith_distance**2, zenith_distance, 1.0])
-    turbidities = np.array([turbidity**2, turbidity, 1.0])
-    terms = turbidities[:, None] * powers
-    x = float((np.array(_TABLES["zenith_x"]) * terms).sum()) * relative("x")
-    y = float((np.array(_TABLES["zenith_y"]) * terms).sum()) * relative("y")
-    luminance = relative("luminance")
+    Attributes:
+        up: Height of each row, its sine; at least 0.012, since they diverge at the horizon. [h, 1].
+        angle_rad, cosine_squared: Of the angle between each direction and the sun. [h, w].
+        sun_zenith_rad: Distance of the sun from the zenith.
+    """
+
+    up: Array
+    angle_rad: Array
+    cosine_squared: Array
+    sun_zenith_rad: float
+
+    @classmethod
+    def of(cls, d: Array, sun_altitude_rad: float) -> _Way:
+        """Of unit directions [h, w, 3], each row level."""
+        towards = d[..., 0] * math.cos(sun_altitude_rad) + d[..., 2] * math.sin(sun_altitude_rad)
+        towards = np.clip(towards, -1.0, 1.0)
+        up = np.maximum(d[:, :1, 2], 0.012)
+        return cls(up, np.arccos(towards), towards**2, 0.5 * math.pi - sun_altitude_rad)
+
+    def relative(self, factors: Sequence[float], constant: float = 1.0) -> Array:
+        """Perez' formula of five factors, relative to its value at the zenith."""
+        a, b, c, falloff, e = factors
+
+        def value(up: Array, angle: Array, cosine_squared: Array) -> Array:
+            gradation = 1.0 + a * np.exp(b / up)
+            indicatrix = constant + c * np.exp(falloff * angle) + e * cosine_squared
+            product: Array = gradation * indicatrix
+            return product
+
+        zenith = np.full(1, self.sun_zenith_rad)
+        at_zenith = value(np.ones(1), zenith, np.cos(zenith) ** 2)
+        return value(self.up, self.angle_rad, self.cosine_squared) / at_zenith
+
+
+def _perez_factors(table: str, turbidity: float) -> list[float]:
+    return [factor * turbidity + constant for factor, constant in _TABLES[table]]
+
+
+def _colored(way: _Way, turbidity: float, luminance: Array, pale: Array) -> Array:
+    """Luminances in Preetham's colours.
+
+    Args:
+        way: Directions.
+        turbidity: Of the air.
+        luminance: Of each direction [h, w].
+        pale: Share of the horizon's own colour in place of Preetham's, broadcast to [h, w, 1].
+    """
+    powers = np.array([way.sun_zenith_rad**3, way.sun_zenith_rad**2, way.sun_zenith_rad, 1.0])
+    terms = np.array([turbidity**2, turbidity, 1.0])[:, None] * powers
+    x, y = (
+        float((np.array(_TABLES[f"zenith_{axis}"]) * terms).sum())
+        * way.relative(_perez_factors(axis, turbidity))
+        for axis in ("x", "y")
+    )
     # Sum by sum: numpy is slow on products of three by three.
     red_blue = x / y, (1.0 - x - y) / y
     rgb: Array = np.stack(
         [a * red_blue[0] + b + c * red_blue[1] for a, b, c in REC709_FROM_XYZ], axis=-1
     )
     np.maximum(rgb, 0.02, out=rgb)
-    # Preetham's fit turns pink at the horizon of clear air, which in truth is pale.
-    high = pale * _ramp(4.0, 20.0, math.degrees(sun_altitude_rad))
-    rgb += np.exp(-rows_up / 0.22)[..., None] * high * (_HORIZON - rgb)
+    rgb += pale * (_HORIZON - rgb)
     red, green, blue = (rgb[..., k] * share for k, share in enumerate(REC709_LUMINANCE))
     rgb /= (red + green + blue)[..., None]
     rgb *= luminance[..., None]
@@ -175,12 +247,6 @@ def overcast_sky(d: Array) -> Array:
     """Relative luminance of the overcast sky, zenith 1: CIE standard overcast sky."""
     graded: Array = (1.0 + 2.0 * np.maximum(d[..., 2:], 0.0)) / 3.0 * _DECK
     return graded
-
-
-def _perez(up: Array, angle: Array, cosine_squared: Array, c: list[float]) -> Array:
-    gradation = 1.0 + c[0] * np.exp(c[1] / up)
-    luminance: Array = gradation * (1.0 + c[2] * np.exp(c[3] * angle) + c[4] * cosine_squared)
-    return luminance
 
 
 def _in_strips(compute: Callable[[Array], Array], d: Array) -> Array:
