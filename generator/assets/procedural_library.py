@@ -27,7 +27,7 @@ from gen_data.generator.core.bounded_cache import CountCache, Sized
 from gen_data.generator.core.errors import AssetError, ConfigError, did_you_mean
 from gen_data.generator.core.plugins import loaded, package_of, third_party
 
-VERSION = 3
+VERSION = 4
 """Increased whenever code shared by all families generates different geometry."""
 _KEYS = 8192
 """Content keys kept in memory, some hundred bytes each."""

@@ -31,7 +31,7 @@ def numerics_digests(renderer: Renderer, physics: PhysicsEngine | None) -> Mappi
     Without an engine there is no ``physics``.
     """
     scene = _canary_scene()
-    digests = {"draws": _digest(_draws()), "arrays": _digest(_arrays())}
+    digests = host_digests()
     if physics is not None:
         settled = physics.settle(scene)
         poses = [body.T_world_body.rounded() for body in settled.scene.bodies]
@@ -40,6 +40,11 @@ def numerics_digests(renderer: Renderer, physics: PhysicsEngine | None) -> Mappi
     images = (reading.channels[channel] for channel in sorted(CHANNELS, key=str))
     digests["render"] = _digest(*(np.ascontiguousarray(image).tobytes() for image in images))
     return digests
+
+
+def host_digests() -> dict[str, str]:
+    """SHA-256 of the kinds of computation that need no engine: ``draws`` and ``arrays``."""
+    return {"draws": _digest(_draws()), "arrays": _digest(_arrays())}
 
 
 def _canary_scene() -> Scene:

@@ -230,10 +230,15 @@ def market_stall(seed: int) -> Solid:
         Material(draw_linear(("#2f6f4a", "#22406f", "#5a5d60", "#7a2a24"), 0.1, rng), 0.85),
         crate,
         *_canvas(rng),
-        *(worn_paint((color,), 0.45, rng) for color in fruits[:3]),
+        *(_produce(color, rng) for color in fruits[:3]),
     )
     hull = hulls.box((-0.35, -half + 0.1, 0.0), (front, half - 0.1, table))
     return make_solid(parts, materials, [hull])
+
+
+def _produce(color: str, rng: VariantRng) -> Material:
+    texture_id = f"texture/produce?seed={rng.choose((0, 1, 2, 3))}"
+    return patterned_material(texture_id, 0.56, 0.45, draw_linear((color,), 0.1, rng))
 
 
 def _awning(half: float, deep: float, striped: bool) -> list[Patch]:
@@ -244,15 +249,10 @@ def _awning(half: float, deep: float, striped: bool) -> list[Patch]:
 
 
 def _crate(slot: int, rng: VariantRng) -> list[Patch]:
-    """A crate of 0.4 x 0.5 m, heaped with round produce."""
+    """A crate of 0.4 x 0.5 m, heaped with produce: its shape is a texture's."""
     x, y, high = 0.2, 0.25, 0.13
     walls = hopper(Rectangle(-x, x, -y, y), Rectangle(-x, x, -y, y), (0.0, high), 3, True)
-    rows, columns = 7, 9
-    v, u = np.meshgrid(np.linspace(0, 1, rows), np.linspace(0, 1, columns), indexing="ij")
-    # Two grid steps per fruit: their tops and the gaps between them.
-    bumps = 0.03 * np.abs(np.cos(0.5 * math.pi * np.arange(rows)))[:, None]
-    bumps = bumps + 0.03 * np.abs(np.cos(0.5 * math.pi * np.arange(columns)))[None, :]
-    heap = 0.1 * (1 - (2 * u - 1) ** 2) * (1 - (2 * v - 1) ** 2)
-    lift = heap + bumps * rng.between(0.8, 1.2) - 0.02
-    points = np.stack([(2 * u - 1) * x * 0.97, (2 * v - 1) * y * 0.97, high + lift], axis=2)
+    v, u = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 6), indexing="ij")
+    heap = rng.between(0.08, 0.13) * (1 - (2 * u - 1) ** 4) * (1 - (2 * v - 1) ** 4)
+    points = np.stack([(2 * u - 1) * x * 0.97, (2 * v - 1) * y * 0.97, high + heap - 0.01], axis=2)
     return [walls, grid(points, slot=slot)]

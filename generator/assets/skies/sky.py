@@ -40,8 +40,8 @@ _NEGLIGIBLE = 1e-3
 _CLEAR, _POLLUTED = (-1.0, -0.32, 10.0, -3.0, 0.45), (-1.0, -0.32, 16.0, -3.0, 0.30)
 _CLEAR_TURBIDITY, _POLLUTED_TURBIDITY = 2.5, 6.0
 _TABLES = load_table(__package__, "preetham", tuple[tuple[float, ...], ...])
-# A cloud deck (about 6600 K), the clear horizon (D75, assumed), a city's glow, clean night air, land
-# from afar.
+# A cloud deck (about 6600 K), the clear horizon (D75, assumed), a city's glow, clean night air,
+# land from afar.
 _DECK = np.array((0.967, 1.0, 1.097))
 _HORIZON = np.array((0.927, 1.007, 1.144))
 _CITY = np.array((1.22, 0.97, 0.65))

@@ -85,3 +85,22 @@ def foliage(seed: int) -> TextureData:
         height = height * (1 - leaf) + leaf * np.float32(4.0 * level)
     albedo = shade[..., None] * np.array([0.95, 1.0, 0.9])
     return texture(albedo.astype(np.float32), None, noise.blur_image(height))
+
+
+def produce(seed: int) -> TextureData:
+    """Round fruit or vegetables of one size beside each other in a heap; 0.56 m per repeat."""
+    rng = variant_rng("produce", seed)
+    across = (8, 10, 7, 12)[seed % 4]
+    points = noise.worley((across, across), rng, 0.45)
+    # A ball's height over the gap; each fruit hides a part of its neighbours.
+    height = np.sqrt(np.maximum(1.0 - (points.nearest / 0.72) ** 2, 0.0)).astype(np.float32)
+    tone = points.of_each(0.72 + 0.28 * noise.uniform(points.count, rng))
+    ripe = points.of_each(0.12 * (noise.uniform(points.count, rng) - 0.5))
+    shade = tone * (0.16 + 0.84 * noise.smoothstep(0.0, 0.75, height))
+    albedo = shade[..., None] * (1.0 + ripe[..., None] * np.array([0.4, 1.0, -0.6]))
+    pixels = 512.0 / across
+    return texture(
+        albedo.astype(np.float32),
+        None,
+        noise.blur_image((0.5 * pixels * height).astype(np.float32)),
+    )
