@@ -32,14 +32,15 @@ def read_stored() -> tuple[dict[str, str], dict[str, dict[str, str]]]:
 
 
 def digests_of(library: ProceduralLibrary) -> Mapping[str, dict[str, str]]:
-    """``{content key: digest of bytes}`` of two variants, by family.
+    """``{content key: digest of bytes}`` by family: of eight objects, or of one image.
 
     A content key changes with the family's version.
     """
     counts = Counter(name.split("?")[0] for name in library.names() if "?" in name)
     found: dict[str, dict[str, str]] = {}
     for name, count in sorted(counts.items()):
-        for seed in sorted({0, 2 * count // 3}):
+        chosen = 1 if name.startswith(("texture/", "environment/")) else min(count, 8)
+        for seed in (k * count // chosen for k in range(chosen)):
             asset = library.get(parse_asset_id(f"{name}?seed={seed}"))
             digest = _digest(_arrays(library, parse_asset_id(asset.asset_id), asset.kind))
             found.setdefault(name, {})[asset.sha256[:16]] = digest

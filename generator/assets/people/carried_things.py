@@ -90,9 +90,11 @@ def make_things(carrier: Carrier) -> list[Sheet]:
         made += _shoulder_bag(carrier)
     elif outfit.bag and not held:
         sides = "lr" if outfit.bag == "shopping_both" else "r"
-        paper = outfit.bag.startswith("shopping")
         for side in sides:
-            made += _hanging_bag(carrier, side, _PAPER if paper else outfit.bag_material)
+            if outfit.bag.startswith("shopping"):
+                made += _hanging_bag(carrier, side, _sack, _PAPER)
+            else:
+                made += _hanging_bag(carrier, side, _soft_case, outfit.bag_material)
     return made + (_HELD[held](carrier) if held else [])
 
 
@@ -109,23 +111,79 @@ def _cup(carrier: Carrier) -> list[Sheet]:
 
 
 def _carrier_bag(carrier: Carrier) -> list[Sheet]:
-    return _hanging_bag(carrier, "r", carrier.person.outfit.bag_material)
+    return _hanging_bag(carrier, "r", _sack, carrier.person.outfit.bag_material)
 
 
 def _carrier_bags(carrier: Carrier) -> list[Sheet]:
-    return [*_hanging_bag(carrier, "l", _PAPER), *_carrier_bag(carrier)]
+    return [*_hanging_bag(carrier, "l", _sack, _PAPER), *_carrier_bag(carrier)]
 
 
-def _hanging_bag(carrier: Carrier, side: str, material: Material) -> list[Sheet]:
-    """A bag that hangs from a hand and keeps upright."""
+def _hanging_bag(
+    carrier: Carrier, side: str, body: Callable[[Array, Array, Material], Sheet], material: Material
+) -> list[Sheet]:
+    """A bag that hangs from a hand by two cords and keeps upright.
+
+    Args:
+        carrier: Who holds it.
+        side: ``l`` or ``r``.
+        body: Makes the bag from its middle and size [m].
+        material: Of all of it.
+    """
     grip, scale = carrier.grip(side), carrier.scale
     room_m = float(grip[2]) - carrier.ground_m
     size = np.minimum(np.array([0.32, 0.12, 0.34]) * scale, (1.0, 1.0, 0.75 * room_m))
     drop = 0.1 * scale + 0.5 * float(size[2])
-    bag = pillow(grip - (0.0, 0.0, drop), size, np.eye(3), material)
-    handle_m = np.array([0.1, 0.02, 0.16]) * scale
-    handle = pillow(grip - (0.0, 0.0, 0.06 * scale), handle_m, np.eye(3), material, steps=2)
-    return [bag, handle]
+    middle = grip - (0.0, 0.0, drop)
+    bag = body(middle, size, material)
+    made = [bag]
+    for y in (-0.35, 0.35):
+        low = middle + size * (0.0, y, 0.46)
+        away = size * (0.22, 0.0, 0.0)
+        bend = 0.5 * (low + grip)
+        course = (low - away, bend - 0.7 * away, grip, bend + 0.7 * away, low + away)
+        made.append(_cord(np.stack(course), 0.009 * carrier.scale, material))
+    return made
+
+
+def _soft_case(middle: Array, size_m: Array, material: Material) -> Sheet:
+    return pillow(middle, size_m, np.eye(3), material)
+
+
+def _sack(middle: Array, size_m: Array, material: Material) -> Sheet:
+    """An open bag of paper or film whose mouth is pressed together."""
+    corners = np.array([(1, -1), (1, 0), (1, 1), (0.4, 1), (-0.4, 1), (-1, 1), (-1, 0), (-1, -1),
+                        (-0.4, -1), (0.4, -1), (1, -1)], dtype=float)  # fmt: skip
+    rows = []
+    for z, x, y, fold in _SACK:
+        ring = corners * (x, y)
+        # The narrow sides fold inwards.
+        ring[[1, 6], 0] *= 1.0 - fold
+        rows.append(np.column_stack([ring, np.full(len(ring), z)]))
+    places = 0.5 * np.concatenate(rows) * size_m + middle
+    faces = grid_faces(len(rows), len(corners))[:, ::-1]
+    normals = vertex_normals(places, faces)
+    return Sheet(places, normals, faces, np.zeros(len(faces), np.int64), (material,))
+
+
+_SACK = ((-0.98, 0.0, 0.0, 0.0), (-1.0, 0.95, 0.9, 0.0), (-0.9, 1.0, 1.0, 0.02),
+         (0.1, 0.99, 0.85, 0.16), (1.0, 1.0, 0.6, 0.3), (0.98, 0.97, 0.54, 0.32),
+         (0.3, 0.9, 0.7, 0.2))  # fmt: skip
+"""Rings of a sack from its floor over the mouth into its inside: height, half length, half width
+as shares of half of its size, and how far the narrow sides fold in."""
+
+
+def _cord(course: Array, width_m: float, material: Material) -> Sheet:
+    """A thin cord in a plane of constant Y, along points [n, 3]."""
+    along = np.gradient(course, axis=0)
+    along /= np.sqrt((along * along).sum(axis=1, keepdims=True))
+    side = np.array([0.0, 1.0, 0.0])
+    up = np.cross(along, side)
+    turn = 2.0 * math.pi * np.arange(4) / 3.0
+    ring = [np.cos(t) * side + np.sin(t) * up for t in turn.tolist()]
+    places = (course[:, None] + 0.5 * width_m * np.stack(ring, axis=1)).reshape(-1, 3)
+    faces = grid_faces(len(course), len(turn))
+    normals = vertex_normals(places, faces)
+    return Sheet(places, normals, faces, np.zeros(len(faces), np.int64), (material,))
 
 
 def _box(carrier: Carrier) -> list[Sheet]:
