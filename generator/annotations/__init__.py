@@ -28,6 +28,7 @@ TABLE = PluginTable[AnyAnnotator](
         "motion": "gen_data.generator.annotations.motion:Motion",
         "part_masks": "gen_data.generator.annotations.part_masks:PartMasks",
         "poses": "gen_data.generator.annotations.poses:Poses",
+        "relations": "gen_data.generator.annotations.relations:Relations",
         "semantic_masks": "gen_data.generator.annotations.semantic_masks:SemanticMasks",
         "visibility": "gen_data.generator.annotations.visibility:Visibility",
     },

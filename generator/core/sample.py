@@ -135,6 +135,41 @@ class BorderTruth:
     visible: tuple[bool, ...]
 
 
+Predicate = Literal[
+    "on",
+    "inside",
+    "supported_by",
+    "held_by",
+    "near",
+    "left_of",
+    "right_of",
+    "in_front_of",
+    "behind",
+]
+INVERSE: Mapping[Predicate, Predicate] = {
+    "near": "near",
+    "left_of": "right_of",
+    "right_of": "left_of",
+    "in_front_of": "behind",
+    "behind": "in_front_of",
+}
+"""Predicates of which annotations state one direction only; the other follows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Relation:
+    """An edge of a scene graph: ``subject predicate object``, such as "mug on table".
+
+    Attributes:
+        subject, object: Instance ids. Objects may be instances that are not annotated: furniture.
+        predicate: As defined by the annotation ``relations``.
+    """
+
+    subject: int
+    predicate: Predicate
+    object: int
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class ImageTruth:
     """The annotations of one camera image.
@@ -145,6 +180,7 @@ class ImageTruth:
         objects: In order of instance id.
         borders: Of lanes, in order of the scene's (lanes).
         free_space: Pixels that show ground on which one may drive and nothing stands (free_space).
+        relations: Among the instances that the image shows, in order (relations).
         extra: Results of third-party annotators, plain data by the annotator's type.
     """
 
@@ -152,6 +188,7 @@ class ImageTruth:
     objects: tuple[ObjectTruth, ...]
     borders: tuple[BorderTruth, ...] | None = None
     free_space: MaskPx | None = None
+    relations: tuple[Relation, ...] | None = None
     extra: Mapping[str, object] = field(default_factory=dict)
 
 
@@ -185,6 +222,7 @@ class EgoTruth:
             laser scanner at the instant of its own sweep (boxes3d).
         borders: Of lanes, world (lanes).
         birdseye: The ground from above (bev_map).
+        relations: Of annotated instances in space, whoever sees them, in order (relations).
         extra: Results of third-party annotators, plain data by the annotator's type.
     """
 
@@ -194,6 +232,7 @@ class EgoTruth:
     boxes3d: Mapping[str, Mapping[int, OrientedBox]] | None = None
     borders: tuple[LaneBorder, ...] | None = None
     birdseye: BirdseyeMap | None = None
+    relations: tuple[Relation, ...] | None = None
     extra: Mapping[str, object] = field(default_factory=dict)
 
 
