@@ -27,6 +27,7 @@ TABLE = PluginTable[Exporter](
         "kitti_stereo": "gen_data.exporters.kitti_stereo:KittiStereo",
         "kitti_tracking": "gen_data.exporters.kitti_tracking:KittiTracking",
         "label_studio": "gen_data.exporters.label_studio:LabelStudio",
+        "language": "gen_data.exporters.language:LanguageJsonl",
         "lerobot": "gen_data.exporters.lerobot:LeRobot",
         "mcap": "gen_data.exporters.mcap:Mcap",
         "motchallenge": "gen_data.exporters.motchallenge:MotChallenge",

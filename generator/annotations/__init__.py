@@ -25,6 +25,7 @@ TABLE = PluginTable[AnyAnnotator](
         "instance_masks": "gen_data.generator.annotations.instance_masks:InstanceMasks",
         "keypoints": "gen_data.generator.annotations.keypoints:Keypoints",
         "lanes": "gen_data.generator.annotations.lanes:Lanes",
+        "language": "gen_data.generator.annotations.language:Language",
         "motion": "gen_data.generator.annotations.motion:Motion",
         "part_masks": "gen_data.generator.annotations.part_masks:PartMasks",
         "poses": "gen_data.generator.annotations.poses:Poses",

@@ -52,8 +52,8 @@ class Relations(Strict):
     object's begins, along the horizontal direction away from the viewer.
 
     Attributes:
-        contact_m: Meshes at most this far apart touch; also deepest overlap. Resting objects are
-            within 1.5 mm, since physics collides convex parts.
+        contact_m: Meshes at most this far apart touch; also deepest overlap. Resting things
+            of shipped scenes were within 1.1 mm; physics collides convex parts.
         near: Largest distance of near things, as share of the longest side of the smaller one.
     """
 

@@ -170,6 +170,24 @@ class Relation:
     object: int
 
 
+@dataclass(frozen=True, slots=True)
+class Utterance:
+    """A sentence, expression or question about one image, in English.
+
+    Attributes:
+        kind: ``caption`` of the image; ``relation``, a sentence about two things; ``expression``
+            that refers to one thing and no other; the others are questions.
+        text: The sentence, expression or question.
+        answer: To a question; else empty.
+        instances: Ids of the things it is about: the mask of an answer is the union of theirs.
+    """
+
+    kind: Literal["caption", "relation", "expression", "counting", "existence", "spatial"]
+    text: str
+    answer: str = ""
+    instances: tuple[int, ...] = ()
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class ImageTruth:
     """The annotations of one camera image.
@@ -181,6 +199,7 @@ class ImageTruth:
         borders: Of lanes, in order of the scene's (lanes).
         free_space: Pixels that show ground on which one may drive and nothing stands (free_space).
         relations: Among the instances that the image shows, in order (relations).
+        utterances: Captions, expressions and questions (language).
         extra: Results of third-party annotators, plain data by the annotator's type.
     """
 
@@ -189,6 +208,7 @@ class ImageTruth:
     borders: tuple[BorderTruth, ...] | None = None
     free_space: MaskPx | None = None
     relations: tuple[Relation, ...] | None = None
+    utterances: tuple[Utterance, ...] | None = None
     extra: Mapping[str, object] = field(default_factory=dict)
 
 
