@@ -20,6 +20,7 @@ TABLE = PluginTable[Exporter](
         "control_clips": "gen_data.exporters.control_clips:ControlClips",
         "croissant": "gen_data.exporters.croissant:Croissant",
         "cvat": "gen_data.exporters.cvat:Cvat",
+        "dota": "gen_data.exporters.dota:Dota",
         "hdf5": "gen_data.exporters.hdf5:Hdf5",
         "huggingface": "gen_data.exporters.huggingface:HuggingFace",
         "kitti": "gen_data.exporters.kitti:Kitti",

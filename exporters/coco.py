@@ -31,6 +31,8 @@ the values of ``weather`` other than zero. Annotators that are enabled add these
     Camera frame: ``center_m``, full ``size_m``, ``quaternion_wxyz``.
 ``T_camera_object``
     Pose of the object's own frame, 4 x 4, row by row.
+``oriented_bbox``
+    Four corners ``[x, y]`` along the object's heading, from the front left one, clockwise.
 ``part_px``
     Visible pixels by part.
 ``motion``
@@ -253,6 +255,8 @@ def _optional_keys(thing: ObjectTruth) -> dict[str, Any]:
         keys["box3d"] = _box3d(thing.box3d_camera)
     if thing.T_camera_object is not None:
         keys["T_camera_object"] = _rows(thing.T_camera_object.matrix())
+    if thing.oriented_box is not None:
+        keys["oriented_bbox"] = [list(corner) for corner in thing.oriented_box]
     if thing.part_px is not None:
         keys["part_px"] = thing.part_px
     if thing.motion is not None:

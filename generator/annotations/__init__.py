@@ -27,6 +27,7 @@ TABLE = PluginTable[AnyAnnotator](
         "lanes": "gen_data.generator.annotations.lanes:Lanes",
         "language": "gen_data.generator.annotations.language:Language",
         "motion": "gen_data.generator.annotations.motion:Motion",
+        "oriented_boxes2d": "gen_data.generator.annotations.oriented_boxes2d:OrientedBoxes2d",
         "part_masks": "gen_data.generator.annotations.part_masks:PartMasks",
         "poses": "gen_data.generator.annotations.poses:Poses",
         "relations": "gen_data.generator.annotations.relations:Relations",

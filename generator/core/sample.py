@@ -70,6 +70,10 @@ class MotionTruth:
         return math.sqrt(x * x + y * y + z * z)
 
 
+PointPx = tuple[float, float]
+"""Image coordinates."""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class ObjectTruth:
     """All annotations of one instance in one image.
@@ -81,6 +85,9 @@ class ObjectTruth:
         box: Tight box of the visible pixels.
         amodal_box: Tight box of the whole silhouette, hidden parts and parts outside the image
             included (boxes2d).
+        oriented_box: Corners of the smallest rectangle around the visible pixels with sides along
+            the heading of the object as the image shows it: front left, front right, rear right,
+            rear left, clockwise seen from above; may leave the image (oriented_boxes2d).
         box3d_world, box3d_camera: The oriented box in both frames (boxes3d).
         T_camera_object: Pose of the instance frame in the camera frame (poses).
         mask: Visible pixels (instance_masks).
@@ -102,6 +109,7 @@ class ObjectTruth:
     visible_px: int
     box: BoxPx | None
     amodal_box: BoxPx | None = None
+    oriented_box: tuple[PointPx, PointPx, PointPx, PointPx] | None = None
     box3d_world: OrientedBox | None = None
     box3d_camera: OrientedBox | None = None
     T_camera_object: SE3 | None = None
