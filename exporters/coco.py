@@ -92,12 +92,12 @@ from gen_data.generator.core.lens import COEFFICIENTS, Lens
 from gen_data.generator.core.motion import Twist
 from gen_data.generator.core.sample import (
     ANNOTATION_STRIDE,
-    INVERSE,
     ImageTruth,
     KeypointTruth,
     MotionTruth,
     ObjectTruth,
     Sample,
+    both_ways,
 )
 from gen_data.generator.core.scene import Instance, Scene, Weather
 from gen_data.generator.core.se3 import Array
@@ -277,9 +277,7 @@ def motion_facts(motion: MotionTruth) -> dict[str, Any]:
 
 def scene_graph(scene: Scene, truth: ImageTruth) -> dict[str, Any]:
     """Relations of an image in both directions, and categories of unannotated instances in them."""
-    relations = truth.relations or ()
-    both = {(r.subject, r.predicate, r.object) for r in relations}
-    both |= {(o, INVERSE[p], s) for s, p, o in both if p in INVERSE}
+    both = both_ways(truth.relations or ())
     known = {thing.instance.instance_id for thing in truth.objects}
     others = sorted({number for s, _, o in both for number in (s, o)} - known)
     return {

@@ -23,7 +23,7 @@ from gen_data.generator.core.boxes import BoxPx
 from gen_data.generator.core.capture import Channel, SensorReading
 from gen_data.generator.core.english import article, count, join, plural
 from gen_data.generator.core.interfaces import AssetLibrary
-from gen_data.generator.core.sample import INVERSE, ImageTruth, ObjectTruth, Utterance
+from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Utterance, both_ways
 from gen_data.generator.core.scene import ObjectGroup, Scene
 
 CONTACTS = ("inside", "on", "held_by")
@@ -61,44 +61,30 @@ class Language(Strict):
         graph = truth
         if graph.relations is None:
             graph = Relations().annotate_image(scene, assets, reading, truth)
-        edges = {(r.subject, str(r.predicate), r.object) for r in graph.relations or ()}
-        edges |= {(o, str(INVERSE[p]), s) for s, p, o in edges if p in INVERSE}
-        listed = {t.instance.instance_id: t for t in truth.objects}
-        extents = find_extents(reading.channels[Channel.INSTANCE])
-        things = tuple(
-            Thing(
-                i.instance_id,
-                i.category.replace("_", " "),
-                extents[i.instance_id].box,
-                self._is_clear(
-                    scene,
-                    reading,
-                    listed.get(i.instance_id),
-                    i.annotated,
-                    extents[i.instance_id].visible_px,
-                ),
-                i.annotated,
-            )
-            for i in scene.instances
-            if i.instance_id in extents
-        )
-        present = {i.category.replace("_", " ") for i in scene.instances}
-        view = View(things, frozenset(edges), present, _placeable(scene.groups, assets))
+        things = tuple(self._things(scene, reading, truth))
+        present = {_in_words(i.category) for i in scene.instances}
+        edges = frozenset(both_ways(graph.relations or ()))
+        view = View(things, edges, present, _placeable(scene.groups, assets))
         return replace(truth, utterances=tuple(self._spread(view.utterances())))
 
-    def _is_clear(
-        self,
-        scene: Scene,
-        reading: SensorReading,
-        truth: ObjectTruth | None,
-        annotated: bool,
-        visible_px: int,
-    ) -> bool:
-        """Whether a thing is visible enough; annotated ones must also be listed."""
-        if visible_px < self.min_visible_px or (annotated and truth is None):
-            return False
-        if truth is None:
-            return True
+    def _things(self, scene: Scene, reading: SensorReading, truth: ImageTruth) -> Iterator[Thing]:
+        """Everything with a visible pixel; annotated things are clear only if they are listed."""
+        listed = {t.instance.instance_id: t for t in truth.objects}
+        extents = find_extents(reading.channels[Channel.INSTANCE])
+        for instance in scene.instances:
+            number = instance.instance_id
+            if number not in extents:
+                continue
+            clear = extents[number].visible_px >= self.min_visible_px
+            if instance.annotated:
+                clear = (
+                    clear and number in listed and self._is_whole(scene, reading, listed[number])
+                )
+            category, box = _in_words(instance.category), extents[number].box
+            yield Thing(number, category, box, clear, instance.annotated)
+
+    def _is_whole(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> bool:
+        """Whether enough of an object's silhouette is visible."""
         share = truth.visible_fraction
         if share is None:
             share = Visibility().annotate(scene, reading, truth).visible_fraction
@@ -308,6 +294,10 @@ def _is_across(one: Thing, side: str, landmark: Thing) -> bool:
     return 2 * one.box.x_max <= landmark.middle
 
 
+def _in_words(category: str) -> str:
+    return category.replace("_", " ")
+
+
 def _sentence(text: str) -> str:
     return f"{text[0].upper()}{text[1:]}"
 
@@ -323,7 +313,7 @@ def grammar() -> Mapping[str, Any]:
 def kin(category: str) -> frozenset[str]:
     """Categories, in words, that may be meant by the name of one: itself and its kin."""
     groups: Sequence[Sequence[str]] = grammar()["kin"]
-    named = ([name.replace("_", " ") for name in group] for group in groups)
+    named = ([_in_words(name) for name in group] for group in groups)
     return frozenset({category}.union(*(group for group in named if category in group)))
 
 
@@ -331,4 +321,4 @@ def kin(category: str) -> frozenset[str]:
 def _placeable(groups: tuple[ObjectGroup, ...], assets: AssetLibrary) -> tuple[str, ...]:
     """Categories of the annotated objects that a template may place, in words, sorted."""
     found = {assets.get(a).category for group in groups if group.annotated for a in group.assets}
-    return tuple(sorted({c.replace("_", " ") for c in found} - set(grammar()["unspoken"])))
+    return tuple(sorted({_in_words(c) for c in found} - set(grammar()["unspoken"])))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -176,6 +176,16 @@ class Relation:
     subject: int
     predicate: Predicate
     object: int
+
+
+def both_ways(relations: Iterable[Relation]) -> set[tuple[int, str, int]]:
+    """Relations and their inverses: subject, predicate, object."""
+    edges: set[tuple[int, str, int]] = set()
+    for relation in relations:
+        edges.add((relation.subject, relation.predicate, relation.object))
+        if relation.predicate in INVERSE:
+            edges.add((relation.object, INVERSE[relation.predicate], relation.subject))
+    return edges
 
 
 @dataclass(frozen=True, slots=True)
