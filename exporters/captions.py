@@ -11,17 +11,9 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
+from gen_data.generator.core.english import article, count, join
 from gen_data.generator.core.sample import ObjectTruth, Sample
 from gen_data.generator.core.scene import Camera, Scene, Weather
-
-NUMBERS = (
-    "no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven",
-    "twelve",
-)  # fmt: skip
-"""Words of small numbers; ``many`` above."""
-
-IRREGULAR = {"person": "people", "knife": "knives", "loaf": "loaves", "shelf": "shelves"}
-"""Plurals without a rule."""
 
 LIGHT_RAIN_MM_H, HEAVY_RAIN_MM_H = 2.5, 10.0
 """WMO's limits of light and heavy rain (Guide to Instruments and Methods of Observation, 2018)."""
@@ -45,7 +37,7 @@ def caption(sample: Sample, camera: str) -> str:
     scene = sample.scene_of(camera)
     place = scene.template.replace("_", " ") or "place"
     parts = [
-        f"{_article(place)} {place} with {list_objects(truth.objects)}",
+        f"{article(place)} {place} with {list_objects(truth.objects)}",
         describe_weather(scene.weather),
         describe_light(scene),
         describe_view(truth.camera),
@@ -58,10 +50,8 @@ def list_objects(objects: Sequence[ObjectTruth]) -> str:
     """Visible objects by category, the most frequent ones first."""
     seen = (t.instance.category for t in objects if t.box is not None and not t.ignored)
     counts = sorted(Counter(seen).items(), key=lambda item: (-item[1], item[0]))
-    names = [_count(name.replace("_", " "), count) for name, count in counts]
-    if not names:
-        return "no objects"
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    names = [count(name.replace("_", " "), number) for name, number in counts]
+    return join(names) or "no objects"
 
 
 def describe_weather(weather: Weather) -> str:
@@ -127,27 +117,3 @@ def describe_view(camera: Camera) -> str:
     if lens.lens.model != "pinhole" or field_rad > WIDE_RAD:
         return f"{view} through a wide-angle lens"
     return f"{view} through a long lens" if field_rad < NARROW_RAD else view
-
-
-def _count(name: str, count: int) -> str:
-    if count == 1:
-        return f"{_article(name)} {name}"
-    number = NUMBERS[count] if count < len(NUMBERS) else "many"
-    return f"{number} {_plural(name)}"
-
-
-def _plural(name: str) -> str:
-    head, _, last = name.rpartition(" ")
-    if last in IRREGULAR:
-        plural = IRREGULAR[last]
-    elif last.endswith(("s", "x", "ch", "sh")):
-        plural = f"{last}es"
-    elif last.endswith("y") and last[-2:-1] not in "aeiou":
-        plural = f"{last[:-1]}ies"
-    else:
-        plural = f"{last}s"
-    return f"{head} {plural}".strip()
-
-
-def _article(name: str) -> str:
-    return "an" if name[:1] in "aeiou" else "a"

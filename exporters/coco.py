@@ -31,6 +31,8 @@ the values of ``weather`` other than zero. Annotators that are enabled add these
     Camera frame: ``center_m``, full ``size_m``, ``quaternion_wxyz``.
 ``T_camera_object``
     Pose of the object's own frame, 4 x 4, row by row.
+``oriented_bbox``
+    Four corners ``[x, y]`` along the object's heading, from the front left one, clockwise.
 ``part_px``
     Visible pixels by part.
 ``motion``
@@ -55,7 +57,9 @@ after the image's instant. Masks, boxes and keypoints refer to the instants of t
 values to the instant of the image.
 
 If enabled, images have ``lane_borders``, lists of image points in the direction of travel with
-their visibility (0 = hidden), and ``free_space``, run-length encoded.
+their visibility (0 = hidden), ``free_space``, run-length encoded, and ``relationships``: triples
+of subject, predicate and object, both by ``instance_id``. An object may be a thing without
+annotation, such as a table; ``others`` has the categories of those, by ``instance_id``.
 
 Camera frames are X right, Y down, Z forward. ``K`` is for image coordinates in which pixel ``i``
 covers ``[i, i + 1)``, as COCO's boxes do; OpenCV's principal point is 0.5 px less.
@@ -93,8 +97,9 @@ from gen_data.generator.core.sample import (
     MotionTruth,
     ObjectTruth,
     Sample,
+    both_ways,
 )
-from gen_data.generator.core.scene import Instance, Weather
+from gen_data.generator.core.scene import Instance, Scene, Weather
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.core.shutter import Shutter
@@ -250,6 +255,8 @@ def _optional_keys(thing: ObjectTruth) -> dict[str, Any]:
         keys["box3d"] = _box3d(thing.box3d_camera)
     if thing.T_camera_object is not None:
         keys["T_camera_object"] = _rows(thing.T_camera_object.matrix())
+    if thing.oriented_box is not None:
+        keys["oriented_bbox"] = [list(corner) for corner in thing.oriented_box]
     if thing.part_px is not None:
         keys["part_px"] = thing.part_px
     if thing.motion is not None:
@@ -268,7 +275,18 @@ def motion_facts(motion: MotionTruth) -> dict[str, Any]:
     return {**facts, "speed_m_s": round(motion.speed_m_s, DECIMALS)}
 
 
-def _image_keys(truth: ImageTruth, camera: Intrinsics) -> dict[str, Any]:
+def scene_graph(scene: Scene, truth: ImageTruth) -> dict[str, Any]:
+    """Relations of an image in both directions, and categories of unannotated instances in them."""
+    both = both_ways(truth.relations or ())
+    known = {thing.instance.instance_id for thing in truth.objects}
+    others = sorted({number for s, _, o in both for number in (s, o)} - known)
+    return {
+        "relationships": [list(triple) for triple in sorted(both)],
+        "others": {str(number): scene.instance(number).category for number in others},
+    }
+
+
+def _image_keys(scene: Scene, truth: ImageTruth, camera: Intrinsics) -> dict[str, Any]:
     """Keys of the enabled annotations of the whole image."""
     keys: dict[str, Any] = {}
     if truth.borders is not None:
@@ -283,6 +301,8 @@ def _image_keys(truth: ImageTruth, camera: Intrinsics) -> dict[str, Any]:
         ]
     if truth.free_space is not None:
         keys["free_space"] = encode_rle(truth.free_space, camera.height_px, camera.width_px)
+    if truth.relations is not None:
+        keys |= scene_graph(scene, truth)
     return keys
 
 
@@ -311,7 +331,7 @@ def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
         "T_world_camera": _rows(camera.T_world_camera.matrix()),
         "attributes": dict(sample.scene.shared),
         "weather": _weather(sample.scene.weather),
-    } | _image_keys(sample.truth[sensor], camera.intrinsics)
+    } | _image_keys(sample.scene_of(sensor), sample.truth[sensor], camera.intrinsics)
     if info.steps_per_scene > 1:
         row["sequence_id"] = sequence_number(info, sample.index)
         row["frame_id"] = sample.index % info.steps_per_scene

@@ -235,7 +235,15 @@ class AppliedLabelMap:
 
     def map_image(self, truth: ImageTruth) -> ImageTruth:
         """The annotations of an image with mapped objects."""
-        return replace(truth, objects=tuple(self._map_objects(truth.objects)))
+        objects = tuple(self._map_objects(truth.objects))
+        kept = {thing.instance.instance_id for thing in objects}
+        dropped = {t.instance.instance_id for t in truth.objects} - kept
+        relations, utterances = truth.relations, truth.utterances
+        if relations is not None:
+            relations = tuple(r for r in relations if not {r.subject, r.object} & dropped)
+        if utterances is not None:
+            utterances = tuple(u for u in utterances if not dropped & set(u.instances))
+        return replace(truth, objects=objects, relations=relations, utterances=utterances)
 
     def _map_objects(self, objects: Iterable[ObjectTruth]) -> Iterator[ObjectTruth]:
         for thing in objects:

@@ -12,6 +12,7 @@ TABLE = PluginTable[Element](
         "backdrop": "gen_data.scene_templates.backdrop:Backdrop",
         "bin": "gen_data.scene_templates.bin:Bin",
         "crosswalk": "gen_data.scene_templates.crosswalk:Crosswalk",
+        "drone": "gen_data.scene_templates.drone:Drone",
         "ego": "gen_data.scene_templates.ego:Ego",
         "fields": "gen_data.scene_templates.fields:Fields",
         "ground": "gen_data.scene_templates.ground:GroundElement",

@@ -7,7 +7,7 @@ the finished sample: pixel values, ids, poses, frames, points and rows, whoever 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,14 @@ from gen_data.generator.core.capture import Channel, Measurements, PointCloud, S
 from gen_data.generator.core.errors import SampleError
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.motion import Twist
-from gen_data.generator.core.sample import EgoTruth, ImageTruth, MaskPx, ObjectTruth, Sample
+from gen_data.generator.core.sample import (
+    EgoTruth,
+    ImageTruth,
+    MaskPx,
+    ObjectTruth,
+    Relation,
+    Sample,
+)
 from gen_data.generator.core.scene import Instance, Scene
 from gen_data.generator.core.se3 import SE3
 
@@ -155,6 +162,7 @@ def _image_faults(
     ids = [item.instance.instance_id for item in truth.objects]
     if ids != sorted(set(ids)):
         yield "objects", f"are not in ascending order of unique instance ids: {ids[:20]}"
+    yield from _relation_faults(truth.relations, instances)
     for number, item in enumerate(truth.objects):
         field = f"objects[{number}] (instance {item.instance.instance_id} '{item.instance.name}')"
         known = instances.get(item.instance.instance_id)
@@ -167,6 +175,14 @@ def _image_faults(
             yield f"{field}.{part}", fact
         if item.lidar_points is not None and not item.lidar_points.keys() <= clouds.keys():
             yield f"{field}.lidar_points", f"names a scanner without a scan: {item.lidar_points}"
+
+
+def _relation_faults(relations: Iterable[Relation] | None, ids: Container[int]) -> Iterator[Fault]:
+    """Relations of instances that are not there."""
+    for relation in relations or ():
+        for number in (relation.subject, relation.object):
+            if number not in ids:
+                yield "relations", f"{relation} names instance {number}, which does not exist"
 
 
 def _identity_faults(
@@ -368,6 +384,10 @@ def _frame_faults(sample: Sample, frame: EgoTruth) -> Iterator[Fault]:
         yield "frame.T_world_ego", f"is not rigid: {frame.T_world_ego}"
     if not _is_finite(frame.twist):
         yield "frame.twist", f"is not finite: {frame.twist}"
+    for field, fact in _relation_faults(
+        frame.relations, {i.instance_id for i in sample.scene.instances}
+    ):
+        yield f"frame.{field}", fact
     for name, boxes in (frame.boxes3d or {}).items():
         scene = sample.scene_of(name)
         known = {i.instance_id for i in scene.instances if i.annotated}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -70,6 +70,10 @@ class MotionTruth:
         return math.sqrt(x * x + y * y + z * z)
 
 
+PointPx = tuple[float, float]
+"""Image coordinates."""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class ObjectTruth:
     """All annotations of one instance in one image.
@@ -81,6 +85,9 @@ class ObjectTruth:
         box: Tight box of the visible pixels.
         amodal_box: Tight box of the whole silhouette, hidden parts and parts outside the image
             included (boxes2d).
+        oriented_box: Corners of the smallest rectangle around the visible pixels with sides along
+            the heading of the object as the image shows it: front left, front right, rear right,
+            rear left, clockwise seen from above; may leave the image (oriented_boxes2d).
         box3d_world, box3d_camera: The oriented box in both frames (boxes3d).
         T_camera_object: Pose of the instance frame in the camera frame (poses).
         mask: Visible pixels (instance_masks).
@@ -102,6 +109,7 @@ class ObjectTruth:
     visible_px: int
     box: BoxPx | None
     amodal_box: BoxPx | None = None
+    oriented_box: tuple[PointPx, PointPx, PointPx, PointPx] | None = None
     box3d_world: OrientedBox | None = None
     box3d_camera: OrientedBox | None = None
     T_camera_object: SE3 | None = None
@@ -135,6 +143,69 @@ class BorderTruth:
     visible: tuple[bool, ...]
 
 
+Predicate = Literal[
+    "on",
+    "inside",
+    "supported_by",
+    "held_by",
+    "near",
+    "left_of",
+    "right_of",
+    "in_front_of",
+    "behind",
+]
+INVERSE: Mapping[Predicate, Predicate] = {
+    "near": "near",
+    "left_of": "right_of",
+    "right_of": "left_of",
+    "in_front_of": "behind",
+    "behind": "in_front_of",
+}
+"""Predicates of which annotations state one direction only; the other follows."""
+
+
+@dataclass(frozen=True, slots=True)
+class Relation:
+    """An edge of a scene graph: ``subject predicate object``, such as "mug on table".
+
+    Attributes:
+        subject, object: Instance ids. Objects may be instances that are not annotated: furniture.
+        predicate: As defined by the annotation ``relations``.
+    """
+
+    subject: int
+    predicate: Predicate
+    object: int
+
+
+def both_ways(relations: Iterable[Relation]) -> set[tuple[int, str, int]]:
+    """Relations and their inverses: subject, predicate, object."""
+    edges: set[tuple[int, str, int]] = set()
+    for relation in relations:
+        edges.add((relation.subject, relation.predicate, relation.object))
+        if relation.predicate in INVERSE:
+            edges.add((relation.object, INVERSE[relation.predicate], relation.subject))
+    return edges
+
+
+@dataclass(frozen=True, slots=True)
+class Utterance:
+    """A sentence, expression or question about one image, in English.
+
+    Attributes:
+        kind: ``caption`` of the image; ``relation``, a sentence about two things; ``expression``
+            that refers to one thing and no other; the others are questions.
+        text: The sentence, expression or question.
+        answer: To a question; else empty.
+        instances: Ids of the things it is about: the mask of an answer is the union of theirs.
+    """
+
+    kind: Literal["caption", "relation", "expression", "counting", "existence", "spatial"]
+    text: str
+    answer: str = ""
+    instances: tuple[int, ...] = ()
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class ImageTruth:
     """The annotations of one camera image.
@@ -145,6 +216,8 @@ class ImageTruth:
         objects: In order of instance id.
         borders: Of lanes, in order of the scene's (lanes).
         free_space: Pixels that show ground on which one may drive and nothing stands (free_space).
+        relations: Among the instances that the image shows, in order (relations).
+        utterances: Captions, expressions and questions (language).
         extra: Results of third-party annotators, plain data by the annotator's type.
     """
 
@@ -152,6 +225,8 @@ class ImageTruth:
     objects: tuple[ObjectTruth, ...]
     borders: tuple[BorderTruth, ...] | None = None
     free_space: MaskPx | None = None
+    relations: tuple[Relation, ...] | None = None
+    utterances: tuple[Utterance, ...] | None = None
     extra: Mapping[str, object] = field(default_factory=dict)
 
 
@@ -185,6 +260,7 @@ class EgoTruth:
             laser scanner at the instant of its own sweep (boxes3d).
         borders: Of lanes, world (lanes).
         birdseye: The ground from above (bev_map).
+        relations: Of annotated instances in space, whoever sees them, in order (relations).
         extra: Results of third-party annotators, plain data by the annotator's type.
     """
 
@@ -194,6 +270,7 @@ class EgoTruth:
     boxes3d: Mapping[str, Mapping[int, OrientedBox]] | None = None
     borders: tuple[LaneBorder, ...] | None = None
     birdseye: BirdseyeMap | None = None
+    relations: tuple[Relation, ...] | None = None
     extra: Mapping[str, object] = field(default_factory=dict)
 
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from gen_data.exporters.image_files import write_media
 from gen_data.generator import annotations
 from gen_data.generator.annotations.annotate import Thresholds, annotate_objects
+from gen_data.generator.annotations.language import Language
 from gen_data.generator.core.asset_types import (
     SURFACES,
     Asset,
@@ -236,12 +237,16 @@ def imu_rows(index: int) -> NDArray[Any]:
 def annotated(
     scene: Scene, readings: Mapping[str, SensorReading], thresholds: Thresholds
 ) -> dict[str, ImageTruth]:
-    """Every annotation of every reading."""
+    """Every annotation of every object, and what is said about the images, without relations."""
     annotators = [annotations.TABLE.load(name)() for name in annotations.TABLE]
-    return {
-        name: annotate_objects(scene, reading, annotators, thresholds)
-        for name, reading in readings.items()
-    }
+    language = Language(min_visible_px=thresholds.min_visible_px, min_visible_fraction=0.1)
+    truth = {}
+    for name, reading in readings.items():
+        objects = annotate_objects(scene, reading, annotators, thresholds)
+        unrelated = replace(objects, relations=())
+        said = language.annotate_image(scene, Props(), reading, unrelated).utterances
+        truth[name] = replace(objects, utterances=said)
+    return truth
 
 
 SPEED_M_S, TURN_RAD_S, STEP_S = 10.0, 0.2, 0.1

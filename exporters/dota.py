@@ -1,0 +1,104 @@
+"""DOTA's format of oriented boxes in aerial images.
+
+::
+
+    <split>/images/000000012_camera.png
+    <split>/labelTxt/000000012_camera.txt
+
+A label file begins with ``imagesource:`` and ``gsd:`` (null: a perspective image has no single
+ground sampling distance). Then a line per object: four corners ``x1 y1 ... x4 y4`` clockwise from
+the front left one, its category, and whether it is ``difficult``. Categories have hyphens for
+spaces, as DOTA's ``small-vehicle`` does. DOTA's corners are annotators' points of no defined pixel
+centre; here they are image coordinates in which pixel ``i`` covers ``[i, i + 1)``, and may leave
+the image.
+
+Reference: https://captain-whu.github.io/DOTA/dataset.html, and its development kit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+from pydantic import Field
+
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.coco import image_name
+from gen_data.exporters.fragments import fragment_rows, image_splits, write_image_rows
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.sensor_selection import check_channels
+from gen_data.exporters.sequences import write_text
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.sample import ObjectTruth, Sample
+
+HEADER = ("imagesource:gen-data", "gsd:null")
+
+
+class Dota(ExporterBase):
+    """DOTA labels of all cameras with the rgb channel.
+
+    Attributes:
+        difficult_below: Objects with a smaller visible fraction are ``difficult``; it needs the
+            annotation visibility where it is above 0. DOTA leaves it to annotators.
+    """
+
+    type: Literal["dota"] = "dota"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    difficult_below: float = Field(0.4, ge=0, le=1)
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Names of the annotators that it requires."""
+        return frozenset(
+            {"oriented_boxes2d", "visibility"} if self.difficult_below else {"oriented_boxes2d"}
+        )
+
+    def check(self, info: DatasetInfo) -> None:
+        """Reject a data set that this format cannot represent.
+
+        Raises:
+            ConfigError: no sensor writes the rgb channel.
+        """
+        check_channels(info, (), self.type)
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write a JSON line per image with the lines of its label file.
+
+        Raises:
+            ConfigError: see ``check``.
+        """
+        self.check(info)
+
+        def row_of(sample: Sample, sensor: str) -> dict[str, Any]:
+            suffix = info.encoding(sensor, Channel.RGB).suffix
+            things = sample.truth[sensor].objects
+            return {
+                "sensor": sensor,
+                "sample": sample.index,
+                "file_name": image_name(sample.index, sensor, suffix),
+                "lines": [self._line(t) for t in things if t.oriented_box and not t.ignored],
+            }
+
+        write_image_rows(info, samples, shard_dir / self.type, row_of)
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Write the label files and link the images."""
+        for split in image_splits([shard_dir / self.type for shard_dir in shard_dirs]):
+            folder = dataset_dir / split
+            for shard_dir, row in fragment_rows(shard_dirs, self.type, f"{split}.images"):
+                name = Path(row["file_name"])
+                text = "".join(f"{line}\n" for line in (*HEADER, *row["lines"]))
+                write_text(folder / f"labelTxt/{name.stem}.txt", text)
+                source = info.media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
+                link_or_copy(source, folder / "images" / name)
+
+    def _line(self, thing: ObjectTruth) -> str:
+        assert thing.oriented_box is not None, "filtered by the caller"
+        corners = " ".join(f"{u:.1f} {v:.1f}" for u, v in thing.oriented_box)
+        category = "-".join(thing.instance.category.split())
+        share = thing.visible_fraction
+        difficult = share is not None and share < self.difficult_below
+        return f"{corners} {category} {int(difficult)}"

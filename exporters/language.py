@@ -1,0 +1,154 @@
+"""Vision-language labels: scene graphs, captions, referring expressions, questions with answers.
+
+::
+
+    <split>.jsonl               a line per caption, relation, expression or question
+    <split>_images.jsonl        a line per image with its objects and their masks
+    <split>/000000012_color.png
+
+A line of ``<split>.jsonl`` has ``id`` (unique), ``image_id``, ``file_name``, ``kind``, ``text``,
+``answer`` (empty without a question) and ``object_ids``, what the line is about: the mask of an
+answer is the union of theirs, and an expression has one. Besides the lines of the annotation
+``language`` there is one of the kind ``scene_caption`` about place, weather, light and view, as
+``control_clips`` writes it.
+
+A line of ``<split>_images.jsonl`` has ``image_id``, ``file_name``, ``width``, ``height``,
+``objects`` and ``relationships``. Objects have ``object_id`` (the instance), ``annotation_id``
+(the same as in ``coco``), ``category``, ``bbox`` ``[left, top, width, height]`` and
+``segmentation`` (COCO's run lengths); furniture, which has no annotation, has ``object_id`` and
+``category`` only. Relationships are ``subject_id``, ``predicate`` and ``object_id``, the keys of
+Visual Genome (Krishna et al., 2017); they are there with the annotation ``relations``.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.captions import caption
+from gen_data.exporters.coco import box_xywh, image_name, scene_graph
+from gen_data.exporters.fragments import fragment_rows, image_splits, write_image_rows
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.rle import encode_rle
+from gen_data.exporters.sensor_selection import check_channels
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.sample import Sample, Utterance
+from gen_data.generator.core.serialization import canonical_json
+
+UTTERANCE_STRIDE = 1_000
+"""Ids of lines per image; more lines than this are left out."""
+
+
+class LanguageJsonl(ExporterBase):
+    """Text about every photograph as JSON lines, with masks of what it is about."""
+
+    type: Literal["language"] = "language"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Names of the annotators that it requires."""
+        return frozenset({"instance_masks", "language"})
+
+    def check(self, info: DatasetInfo) -> None:
+        """Reject a data set that this format cannot represent.
+
+        Raises:
+            ConfigError: no sensor writes the rgb channel.
+        """
+        check_channels(info, (), self.type)
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write a line per image, with its text.
+
+        Raises:
+            ConfigError: see ``check``.
+        """
+        self.check(info)
+
+        def row_of(sample: Sample, sensor: str) -> dict[str, Any]:
+            return {
+                "sensor": sensor,
+                "sample": sample.index,
+                "image": _image(info, sample, sensor),
+                "lines": [_line(u) for u in _utterances(sample, sensor)],
+            }
+
+        write_image_rows(info, samples, shard_dir / self.type, row_of)
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Join the lines of all shards and link the images."""
+        dataset_dir.mkdir(parents=True, exist_ok=True)
+        for split in image_splits([shard_dir / self.type for shard_dir in shard_dirs]):
+            with (
+                (dataset_dir / f"{split}.jsonl").open("w", encoding="utf-8", newline="\n") as text,
+                (dataset_dir / f"{split}_images.jsonl").open(
+                    "w", encoding="utf-8", newline="\n"
+                ) as images,
+            ):
+                for shard_dir, row in fragment_rows(shard_dirs, self.type, f"{split}.images"):
+                    image = row["image"]
+                    image["file_name"] = f"{split}/{image['file_name']}"
+                    images.write(canonical_json(image) + "\n")
+                    number = image["image_id"]
+                    head = {"image_id": number, "file_name": image["file_name"]}
+                    for k, line in enumerate(row["lines"][:UTTERANCE_STRIDE]):
+                        identity = {"id": number * UTTERANCE_STRIDE + k}
+                        text.write(json.dumps(identity | head | line, ensure_ascii=False) + "\n")
+                    source = info.media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
+                    link_or_copy(source, dataset_dir / image["file_name"])
+
+
+def _utterances(sample: Sample, sensor: str) -> list[tuple[str, Utterance]]:
+    """Text about an image, each with its kind."""
+    said = sample.truth[sensor].utterances
+    assert said is not None, "the annotation language is in `needs`"
+    scene = Utterance("caption", caption(sample, sensor))
+    return [("scene_caption", scene), *((u.kind, u) for u in said)]
+
+
+def _line(item: tuple[str, Utterance]) -> dict[str, Any]:
+    kind, said = item
+    return {"kind": kind, "text": said.text, "answer": said.answer, "object_ids": said.instances}
+
+
+def _image(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
+    truth = sample.truth[sensor]
+    camera = truth.camera.intrinsics
+    size = (camera.height_px, camera.width_px)
+    graph = scene_graph(sample.scene_of(sensor), truth)
+    objects: list[dict[str, Any]] = []
+    for thing in truth.objects:
+        if thing.box is None or thing.ignored:
+            continue
+        assert thing.mask is not None, "the annotation instance_masks is in `needs`"
+        objects.append(
+            {
+                "object_id": thing.instance.instance_id,
+                "annotation_id": sample.annotation_id(sensor, thing.instance.instance_id),
+                "category": thing.instance.category,
+                "bbox": box_xywh(thing.box),
+                "segmentation": encode_rle(thing.mask, *size),
+            }
+        )
+    listed = {thing["object_id"] for thing in objects}
+    named = {n for said in truth.utterances or () for n in said.instances} - listed
+    others = graph["others"] | {str(n): sample.scene_of(sensor).instance(n).category for n in named}
+    objects += [{"object_id": int(n), "category": others[n]} for n in sorted(others, key=int)]
+    row = {
+        "image_id": sample.image_id(sensor),
+        "file_name": image_name(sample.index, sensor, info.encoding(sensor, Channel.RGB).suffix),
+        "width": camera.width_px,
+        "height": camera.height_px,
+        "objects": objects,
+    }
+    if truth.relations is not None:
+        row["relationships"] = [
+            {"subject_id": s, "predicate": p, "object_id": o} for s, p, o in graph["relationships"]
+        ]
+    return row

@@ -1,0 +1,40 @@
+"""Drones, which carry a camera on a gimbal."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Rig, Scene
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.scene_templates.element import Element, add_background
+
+GIMBAL_BELOW_M = 0.09
+"""From the optical centre of the camera up to the airframe's centre (assumed)."""
+
+
+class Drone(Element):
+    """A quadrotor with two rigs, both X forward and Z up; never labelled.
+
+    The rig of its name is the airframe, which banks; ``<name>_gimbal`` is the optical centre of
+    the camera below it, which the gimbal holds level. Sensors name one of them as ``rig``; the
+    randomizer ``drone_flight`` moves both.
+
+    Attributes:
+        asset: Id of the airframe.
+        at_m: Position of the airframe before it flies, world.
+    """
+
+    type: Literal["drone"] = "drone"
+    asset: str = "drone?seed=0"
+    at_m: Vec3 = (0.0, 0.0, 50.0)
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """Add airframe and gimbal with their rigs."""
+        x, y, z = self.at_m
+        gimbal = f"{self.name}_gimbal"
+        scene = add_background(scene, assets, self.name, self.asset, SE3(self.at_m))
+        below = SE3((x, y, z - GIMBAL_BELOW_M))
+        scene = add_background(scene, assets, gimbal, "gimbal", below)
+        return replace(scene, rigs=(*scene.rigs, Rig(self.name, self.name), Rig(gimbal, gimbal)))

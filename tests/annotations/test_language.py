@@ -1,0 +1,235 @@
+"""Language about images, checked by a reader who has only the picture's boxes and the relations."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gen_data.generator.annotations.annotate import Thresholds, annotate_reading
+from gen_data.generator.annotations.instance_masks import InstanceMasks
+from gen_data.generator.annotations.language import Language, Thing, View, kin
+from gen_data.generator.annotations.relations import Relations
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import open_pipeline
+from gen_data.generator.core.boxes import BoxPx
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.sample import ImageTruth, Utterance
+from gen_data.generator.core.scene import Scene
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a reader sees: ids, their names and centres; and the relations in space."""
+
+    truth: ImageTruth
+    names: dict[int, str]
+    columns: dict[int, float]
+    pixels: dict[int, int]
+    related: set[tuple[int, str, int]]
+    scene: Scene
+
+    def said(self, kind: str) -> list[Utterance]:
+        """Utterances of a kind."""
+        return [u for u in self.truth.utterances or () if u.kind == kind]
+
+
+@cache
+def picture(config: str, index: int) -> Picture:
+    """A sample of a shipped configuration with its text."""
+    small = ("exporters=[]", "annotations=[]")
+    wanted = frozenset({Channel.INSTANCE, Channel.AMODAL})
+    with open_pipeline(load_config(config, overrides=small), wanted) as made:
+        sample = made.sample(index)
+        reading = next(iter(sample.capture.readings.values()))
+        annotators = [InstanceMasks(), Relations(), Language(most=1000)]
+        truth = annotate_reading(sample.scene, reading, annotators, Thresholds(), made.assets)
+    image = np.asarray(reading.channels[Channel.INSTANCE])
+    ids = [int(n) for n in np.unique(image) if n]
+    names = {n: sample.scene.instance(n).category.replace("_", " ") for n in ids}
+    columns = {n: float(np.nonzero((image == n).any(0))[0][[0, -1]].mean()) for n in ids}
+    pixels = {n: int((image == n).sum()) for n in ids}
+    related = {(r.subject, str(r.predicate), r.object) for r in truth.relations or ()}
+    return Picture(truth, names, columns, pixels, related, sample.scene)
+
+
+PICTURES = [("tabletop", 0), ("tabletop", 5), ("tabletop", 11), ("bin_picking", 0)]
+each = pytest.mark.parametrize(("config", "index"), PICTURES)
+
+
+def resolve(seen: Picture, text: str) -> set[int]:
+    """Things that an expression may mean, by its words alone."""
+    match = re.fullmatch(
+        r"the (?:(leftmost|rightmost) )?(.+?)"
+        r"(?: (on|in|held by|to the left of|to the right of) (the .+))?",
+        text,
+    )
+    assert match, text
+    superlative, name, words, landmark = match.groups()
+    found = {n for n, own in seen.names.items() if own == name}
+    if superlative:
+        pick = min if superlative == "leftmost" else max
+        found = {pick(found, key=lambda n: seen.columns[n])}
+    if landmark:
+        (at,) = resolve(seen, landmark)
+        spatial = {"on": "on", "in": "inside", "held by": "held_by"}
+        if words in spatial:
+            found = {n for n in found if (n, spatial[words], at) in seen.related}
+        elif words == "to the left of":
+            found = {n for n in found if seen.columns[n] < seen.columns[at]}
+        else:
+            found = {n for n in found if seen.columns[n] > seen.columns[at]}
+    return found
+
+
+@each
+def test_an_expression_refers_to_its_thing_and_no_other(config: str, index: int) -> None:
+    """A reader who knows all visible things, also barely visible ones, finds exactly that one."""
+    seen = picture(config, index)
+    assert seen.said("expression")
+    for said in seen.said("expression"):
+        assert resolve(seen, said.text) == set(said.instances), said.text
+
+
+@each
+def test_nothing_is_said_about_what_cannot_be_seen(config: str, index: int) -> None:
+    """Every thing that an utterance is about has at least the pixels of the threshold."""
+    seen = picture(config, index)
+    for said in seen.truth.utterances or ():
+        assert all(seen.pixels.get(n, 0) >= 256 for n in said.instances), said
+
+
+@each
+def test_numbers_are_those_in_the_picture(config: str, index: int) -> None:
+    """Counted in the image of instance ids, with everything of that name."""
+    seen = picture(config, index)
+    for said in seen.said("counting"):
+        assert said.instances
+        (name,) = {seen.names[n] for n in said.instances}
+        assert said.answer == str(sum(own == name for own in seen.names.values()))
+
+
+@each
+def test_existence_has_both_answers_and_they_are_true(config: str, index: int) -> None:
+    """An absent category is nowhere in the scene, not even hidden."""
+    seen = picture(config, index)
+    everywhere = {i.category.replace("_", " ") for i in seen.scene.instances}
+    for said in seen.said("existence"):
+        match = re.fullmatch(r"Is there an? (.+) in the image\?", said.text)
+        assert match, said.text
+        if said.answer == "yes":
+            assert {seen.names[n] for n in said.instances} == {match[1]}
+        else:
+            assert not said.instances
+            assert match[1] not in everywhere
+    if config == "tabletop":
+        assert {said.answer for said in seen.said("existence")} == {"yes", "no"}
+
+
+@each
+def test_answers_about_places_follow_from_relations(config: str, index: int) -> None:
+    """Names resolve to one thing each; sides agree with columns, places with contacts."""
+    seen = picture(config, index)
+    for said in seen.said("spatial"):
+        if match := re.fullmatch(r"Is (the .+) to the (left|right) of (the .+)\?", said.text):
+            (a,), (b,) = resolve(seen, match[1]), resolve(seen, match[3])
+            left = seen.columns[a] < seen.columns[b]
+            assert said.answer == ("yes" if left == (match[2] == "left") else "no")
+        elif match := re.fullmatch(r"Where is (the .+)\?", said.text):
+            (a,) = resolve(seen, match[1])
+            words, _, place = said.answer.partition(" ")
+            (b,) = resolve(seen, place)
+            assert (a, {"on": "on", "in": "inside"}[words], b) in seen.related
+        elif match := re.fullmatch(r"What can be seen (on|in) (the .+)\?", said.text):
+            (b,) = resolve(seen, match[2])
+            predicate = {"on": "on", "in": "inside"}[match[1]]
+            assert set(said.instances) == {
+                s for s, p, o in seen.related if (p, o) == (predicate, b)
+            }
+        else:
+            assert re.fullmatch(
+                r"Is (the .+) (closer to|farther from) the viewer than (the .+)\?", said.text
+            )
+
+
+def test_sentences_state_relations() -> None:
+    """Of a scene in which a hand holds a thing."""
+    seen = picture("tabletop", 5)
+    texts = {said.text for said in seen.said("relation")}
+    table = next(n for n, name in seen.names.items() if name == "table")
+
+    assert "The jar is on the table." in texts
+    jar = next(n for n, name in seen.names.items() if name == "jar")
+    assert (jar, "on", table) in seen.related
+
+
+def thing(number: int, category: str, x_min: int, x_max: int, **changes: Any) -> Thing:
+    """A clearly visible thing at some columns."""
+    facts = {"clear": True, "annotated": True} | changes
+    return Thing(number, category, BoxPx(x_min, 0, x_max, 10), **facts)
+
+
+def view(*things: Thing, edges: set[tuple[int, str, int]] | None = None) -> View:
+    """What an image shows."""
+    return View(things, frozenset(edges or ()), {t.category for t in things}, ("candle", "cup"))
+
+
+def texts(of: View, kind: str) -> list[str]:
+    """Texts of a kind."""
+    return [u.text for u in of.utterances() if u.kind == kind]
+
+
+def test_a_barely_visible_thing_takes_the_name_from_the_others() -> None:
+    """Neither "the mug" nor a number of mugs is beyond doubt."""
+    barely = view(thing(1, "mug", 0, 10), thing(2, "mug", 20, 30, clear=False))
+
+    assert texts(barely, "counting") == []
+    assert texts(barely, "expression") == ["the leftmost mug"]
+    assert texts(view(thing(1, "mug", 0, 10)), "expression") == ["the mug"]
+
+
+def test_kin_are_confused_and_are_not_asked_for() -> None:
+    """A cup beside a mug may be called a mug; where there is a mug, nobody asks for a cup."""
+    both = view(thing(1, "mug", 0, 10), thing(2, "cup", 20, 30))
+
+    assert "cup" in kin("mug")
+    assert texts(both, "expression") == []
+    assert texts(view(thing(1, "mug", 0, 10)), "existence") == [
+        "Is there a mug in the image?",
+        "Is there a candle in the image?",
+    ]
+
+
+def test_overlapping_boxes_have_no_leftmost_thing() -> None:
+    """One must be beside all others."""
+    assert texts(view(thing(1, "mug", 0, 10), thing(2, "mug", 9, 30)), "expression") == []
+    assert texts(view(thing(1, "mug", 0, 10), thing(2, "mug", 10, 30)), "expression") == [
+        "the leftmost mug",
+        "the rightmost mug",
+    ]
+
+
+def test_a_side_of_a_landmark_tells_things_apart_only_if_no_other_reaches_there() -> None:
+    """The second mug begins left of the bowl's centre: "to the left" might mean it."""
+    edges = {(1, "left_of", 3), (3, "right_of", 1)}
+    bowl = thing(3, "bowl", 40, 60)
+    doubtful = view(thing(1, "mug", 0, 10), thing(2, "mug", 49, 70), bowl, edges=edges)
+    certain = view(thing(1, "mug", 0, 10), thing(2, "mug", 50, 70), bowl, edges=edges)
+
+    assert "the mug to the left of the bowl" not in texts(doubtful, "expression")
+    assert "the mug to the left of the bowl" in texts(certain, "expression")
+
+
+def test_most_limits_each_kind() -> None:
+    """Spread evenly over what could be said."""
+    seen = picture("tabletop", 5)
+    kinds = {u.kind for u in seen.truth.utterances or ()}
+    limited = list(Language(most=2)._spread(seen.truth.utterances or ()))
+
+    assert {kind: sum(u.kind == kind for u in limited) for kind in kinds} == {
+        kind: min(2, len(seen.said(kind))) for kind in kinds
+    }

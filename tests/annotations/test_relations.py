@@ -1,0 +1,266 @@
+"""Relations between objects, held against Open3D's distances, rays and hulls."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from gen_data.generator.annotations.annotate import Thresholds, annotate_ego, annotate_reading
+from gen_data.generator.annotations.instance_masks import InstanceMasks
+from gen_data.generator.annotations.relations import Relations
+from gen_data.generator.annotations.surface_contacts import are_within, find_contacts, hits_by_rays
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import open_pipeline
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.sample import ImageTruth, Relation
+from gen_data.generator.core.scene import Scene
+
+SAMPLING_M = 0.001
+"""Points on surfaces are so dense that the true distance is at most this much smaller."""
+
+
+def box(size_m: tuple[float, float, float], at_m: tuple[float, float, float]) -> Any:
+    """Triangles of a box around a point."""
+    made = trimesh.creation.box(size_m).apply_translation(at_m)
+    return np.asarray(made.triangles, np.float64)
+
+
+@pytest.mark.parametrize(
+    ("lift_m", "touches"), [(0.0, True), (0.0019, True), (0.0021, False), (-0.0019, True)]
+)
+def test_contacts_reach_as_far_as_the_tolerance(lift_m: float, touches: bool) -> None:
+    """A cube over a table: the normals of its contacts point up into it."""
+    table, cube = box((2, 2, 0.1), (0, 0, -0.05)), box((0.1, 0.1, 0.1), (0.3, 0.1, 0.05 + lift_m))
+    contacts = find_contacts(cube, table, 0.002)
+
+    assert bool(len(contacts.gaps_m)) == touches
+    assert np.allclose(contacts.normals, [0, 0, 1])
+    assert np.allclose(contacts.gaps_m, lift_m)
+    assert np.allclose(np.abs(contacts.points_m - [0.3, 0.1, lift_m]).max(1), 0.05)
+
+
+def test_crossed_rods_touch_at_a_point() -> None:
+    """No corner is near: two edges meet, and the normal is across both."""
+    along = (
+        box((1, 0.02, 0.02), (0, 0, 0))
+        @ np.array(trimesh.transformations.rotation_matrix(np.pi / 4, [1, 0, 0]))[:3, :3].T
+    )
+    across = (
+        box((0.02, 1, 0.02), (0, 0, 0))
+        @ np.array(trimesh.transformations.rotation_matrix(np.pi / 4, [0, 1, 0]))[:3, :3].T
+    )
+    upper = across + np.array([0, 0, 0.02 * 2**0.5 + 0.001])
+    contacts = find_contacts(upper, along, 0.0015)
+
+    assert np.allclose(contacts.normals, [0, 0, 1])
+    assert np.allclose(contacts.gaps_m, 0.001)
+    assert np.allclose(contacts.points_m[:, :2], 0.0)
+
+
+def test_side_by_side_is_not_above() -> None:
+    """A taller box beside a lower one touches its side: no contact carries it."""
+    low, tall = box((0.1, 0.1, 0.1), (0, 0, 0.05)), box((0.1, 0.1, 0.102), (0.101, 0, 0.051))
+    contacts = find_contacts(tall, low, 0.002)
+
+    assert len(contacts.gaps_m)
+    assert np.allclose(contacts.normals, [1, 0, 0])
+
+
+@pytest.mark.parametrize(("gap_m", "near"), [(0.0, True), (0.299, True), (0.301, False)])
+def test_distances_between_faces_are_exact(gap_m: float, near: bool) -> None:
+    """Large triangles, whose corners are all farther apart."""
+    plate, tip = box((8, 8, 0.1), (0, 0, -0.05)), box((0.2, 0.2, 0.2), (1, 1, 0.1 + gap_m))
+
+    assert are_within(plate, tip, 0.3) == near
+    assert are_within(tip, plate, 0.3) == near
+
+
+def test_rays_hit_what_is_before_them() -> None:
+    """Not what is behind."""
+    wall = box((0.1, 4, 4), (2, 0, 0))
+
+    assert hits_by_rays(np.zeros(3), np.eye(3), wall).tolist() == [True, False, False]
+    assert not hits_by_rays(np.zeros(3), -np.eye(3), wall).any()
+
+
+@dataclass(frozen=True)
+class Settled:
+    """A scene after physics: its truth, and the mesh of each instance in the world."""
+
+    scene: Scene
+    image: ImageTruth
+    relations: tuple[Relation, ...]
+    meshes: dict[int, trimesh.Trimesh]
+
+    def pairs(self, predicate: str) -> set[tuple[int, int]]:
+        """Subject and object of all relations of a kind in space."""
+        return {(r.subject, r.object) for r in self.relations if r.predicate == predicate}
+
+
+@cache
+def settled(config: str, index: int) -> Settled:
+    """Sample of a shipped configuration, settled by physics."""
+    small = ("sensors[0].size_px=[320, 240]", "exporters=[]", "annotations=[]")
+    with open_pipeline(load_config(config, overrides=small), frozenset({Channel.INSTANCE})) as made:
+        sample = made.sample(index)
+        reading = next(iter(sample.capture.readings.values()))
+        annotators = [InstanceMasks(), Relations()]
+        image = annotate_reading(sample.scene, reading, annotators, Thresholds(), made.assets)
+        frame = annotate_ego({"": sample.scene}, [Relations()], made.assets)
+        assert frame is not None and frame.relations is not None
+        parts: dict[int, list[trimesh.Trimesh]] = {}
+        for body in sample.scene.bodies:
+            mesh = made.assets.mesh(body.asset)
+            corners = body.T_world_body.apply(mesh.vertices_m.astype(np.float64) * body.scale)
+            parts.setdefault(body.instance_id, []).append(trimesh.Trimesh(corners, mesh.faces))
+        meshes = {k: trimesh.util.concatenate(parts[k]) for k in parts if k}
+        return Settled(sample.scene, image, frame.relations, meshes)
+
+
+def raycaster(mesh: trimesh.Trimesh) -> Any:
+    """Open3D's scene of one mesh."""
+    o3d = pytest.importorskip("open3d")
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(mesh.vertices.astype(np.float32), mesh.faces.astype(np.uint32))
+    return scene
+
+
+def distance_m(one: trimesh.Trimesh, other: trimesh.Trimesh) -> float:
+    """Distance of two meshes, from points on each to the surface of the other."""
+    found = []
+    for a, b in ((one, other), (other, one)):
+        points = np.concatenate([a.sample(20_000, seed=0), a.vertices]).astype(np.float32)
+        found.append(float(raycaster(b).compute_distance(points).numpy().min()))
+    return min(found)
+
+
+WORLDS = [("tabletop", 0), ("tabletop", 10), ("bin_picking", 0)]
+each = pytest.mark.parametrize(("config", "index"), WORLDS)
+
+
+@each
+def test_supported_things_touch_what_supports_them_from_above(config: str, index: int) -> None:
+    """Rays straight down from points of the subject, and up from its support, find the other."""
+    world = settled(config, index)
+    assert world.pairs("supported_by")
+    for subject, support in world.pairs("supported_by"):
+        one, other = world.meshes[subject], world.meshes[support]
+        gaps = []
+        for source, target, down in ((one, other, -1.0), (other, one, 1.0)):
+            points = np.concatenate([source.sample(60_000, seed=0), source.vertices])
+            # From a little behind the surface: resting things overlap by rounding.
+            points[:, 2] -= down * 0.003
+            rays = np.column_stack([points, np.tile([0, 0, down], (len(points), 1))])
+            hits = raycaster(target).cast_rays(rays.astype(np.float32))["t_hit"].numpy()
+            gaps.append(hits.min() - 0.003)
+        assert min(gaps) < 0.002 / 0.5 + SAMPLING_M, (subject, support)
+
+
+@each
+def test_everything_at_rest_is_supported_down_to_the_furniture(config: str, index: int) -> None:
+    """Physics stability: nothing floats. Chains of supports end at what physics cannot move."""
+    world = settled(config, index)
+    below: dict[int, set[int]] = {}
+    for subject, support in world.pairs("supported_by") | world.pairs("held_by"):
+        below.setdefault(subject, set()).add(support)
+    loose = {b.instance_id for b in world.scene.bodies if b.motion == "dynamic"}
+    annotated = {i.instance_id for i in world.scene.instances if i.annotated}
+    for number in loose & annotated:
+        reached, frontier = set(), {number}
+        while frontier:
+            reached |= frontier
+            frontier = {s for f in frontier for s in below.get(f, ())} - reached
+        assert reached - loose, f"nothing carries {world.scene.instance(number).name}"
+
+
+@each
+def test_no_two_things_carry_each_other(config: str, index: int) -> None:
+    """Gravity has one direction."""
+    pairs = settled(config, index).pairs("supported_by")
+
+    assert not {(a, b) for a, b in pairs if (b, a) in pairs}
+
+
+@each
+def test_near_things_are_nearer_than_half_the_smaller_one(config: str, index: int) -> None:
+    """And all others are farther; things that touch, hold or contain each other are left out."""
+    world = settled(config, index)
+    annotated = sorted(i.instance_id for i in world.scene.instances if i.annotated)
+    related = {frozenset((r.subject, r.object)) for r in world.relations if r.predicate != "near"}
+    near = world.pairs("near")
+    sides = {
+        i.instance_id: max(np.subtract(i.box_max_m, i.box_min_m)) for i in world.scene.instances
+    }
+    for a, b in combinations(annotated, 2):
+        if frozenset((a, b)) in related:
+            continue
+        limit_m = 0.5 * min(sides[a], sides[b])
+        apart_m = distance_m(world.meshes[a], world.meshes[b])
+        if (a, b) in near:
+            assert apart_m <= limit_m + SAMPLING_M * 2
+        else:
+            assert apart_m > limit_m
+
+
+def test_parts_in_a_bin_are_inside_it_and_things_on_a_table_are_not() -> None:
+    """Open3D counts the points of their surfaces in the bin's convex hull."""
+    bin_world, table_world = settled("bin_picking", 0), settled("tabletop", 0)
+    (bin_id,) = (i.instance_id for i in bin_world.scene.instances if i.category == "bin")
+    hull = raycaster(bin_world.meshes[bin_id].convex_hull)
+    for instance in bin_world.scene.instances:
+        if not instance.annotated or instance.instance_id == bin_id:
+            continue
+        points = bin_world.meshes[instance.instance_id].sample(4000, seed=0).astype(np.float32)
+        inside = hull.compute_occupancy(points).numpy().mean()
+        assert ((instance.instance_id, bin_id) in bin_world.pairs("inside")) == (inside > 0.5)
+    assert not table_world.pairs("inside")
+    assert table_world.pairs("on") <= table_world.pairs("supported_by")
+
+
+def test_what_the_hand_holds_is_held_and_on_nothing() -> None:
+    """The arm's goal of this scene is to hold a thing; its pads touch it."""
+    world = settled("tabletop", 0)
+    (arm,) = world.scene.articulations
+    assert arm.goal is not None and arm.goal.kind == "hold"
+    held = world.scene.body(arm.goal.grasped_object).instance_id
+
+    assert world.pairs("held_by") == {(held, arm.instance_id)}
+    assert held not in {subject for subject, _ in world.pairs("on")}
+
+
+@each
+def test_views_follow_from_boxes_and_depths(config: str, index: int) -> None:
+    """Left and right by columns; before and behind, for things in the same columns, by distance."""
+    world = settled(config, index)
+    boxes = {t.instance.instance_id: t.box for t in world.image.objects if t.box}
+    stated = {(r.subject, r.predicate, r.object) for r in world.image.relations or ()}
+    pose = world.image.camera.T_world_camera
+    x, y, _ = pose.rotation()[:, 0]
+    away = np.array([-y, x, 0.0]) / np.hypot(x, y)
+    assert (pose.rotation()[:, 2] - pose.rotation()[:, 1]) @ away > 0.0
+    for a, b in combinations(boxes, 2):
+        for one, other in ((a, b), (b, a)):
+            left = boxes[one].x_max <= boxes[other].x_min
+            apart = left or boxes[other].x_max <= boxes[one].x_min
+            nearer = (world.meshes[one].vertices @ away).max() <= (
+                world.meshes[other].vertices @ away
+            ).min()
+            assert ((one, "left_of", other) in stated) == left
+            assert ((one, "in_front_of", other) in stated) == (nearer and not apart)
+
+
+def test_images_tell_only_of_what_they_show() -> None:
+    """A thing that no pixel shows is in the scene's graph and in no image's."""
+    world = settled("bin_picking", 0)
+    shown = {t.instance.instance_id for t in world.image.objects}
+    furniture = {i.instance_id for i in world.scene.instances if not i.annotated}
+    named = {n for r in world.image.relations or () for n in (r.subject, r.object)}
+
+    assert named <= shown | furniture
+    assert replace(world.image, relations=None).relations is None

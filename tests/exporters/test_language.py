@@ -1,0 +1,112 @@
+"""Vision-language labels as their readers see them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pycocotools import mask as coco_mask
+
+from gen_data.exporters.coco import Coco
+from gen_data.exporters.language import LanguageJsonl
+from gen_data.generator.core.sample import Relation, Sample
+from tests.exporters.test_birdseye import lines
+
+# pycocotools' decoder predates numpy 2's __array__(copy=...).
+pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
+
+
+@pytest.fixture
+def samples(world: Any) -> list[Sample]:
+    """The world's frames; in the first one the objects are related."""
+    first, *others = world.samples
+    a, b, *_ = (t.instance.instance_id for t in first.truth["color"].objects)
+    related = (Relation(a, "left_of", b), Relation(b, "near", a))
+    truth = {"color": replace(first.truth["color"], relations=related)}
+    return [replace(first, truth=truth), *others]
+
+
+def test_lines_refer_to_objects_of_their_image(
+    world: Any, samples: list[Sample], tmp_path: Path
+) -> None:
+    """Ids are unique, and every file is there."""
+    folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path)
+    rows = lines(folder / "train.jsonl")
+    images = {image["image_id"]: image for image in lines(folder / "train_images.jsonl")}
+
+    assert len({row["id"] for row in rows}) == len(rows)
+    assert {row["kind"] for row in rows} >= {"scene_caption", "caption", "counting", "existence"}
+    for row in rows:
+        image = images[row["image_id"]]
+        known = {thing["object_id"] for thing in image["objects"]}
+        assert set(row["object_ids"]) <= known
+        assert row["file_name"] == image["file_name"]
+        assert (folder / row["file_name"]).exists()
+
+
+def test_hugging_face_reads_the_lines(world: Any, samples: list[Sample], tmp_path: Path) -> None:
+    """As a table with a row per line, whose columns have one type each."""
+    datasets = pytest.importorskip("datasets")
+    folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path)
+    path = folder / "train.jsonl"
+    table = datasets.load_dataset(
+        "json", data_files=str(path), split="train", cache_dir=str(tmp_path / "cache")
+    )
+
+    assert list(table) == lines(path)
+
+
+def test_every_utterance_of_the_annotation_is_written_in_order(
+    world: Any, samples: list[Sample], tmp_path: Path
+) -> None:
+    """After a caption of the whole scene."""
+    folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path)
+    train = [s for s in samples if s.split == "train"]
+    said = [u for s in train for u in s.truth["color"].utterances or ()]
+    rows = [row for row in lines(folder / "train.jsonl") if row["kind"] != "scene_caption"]
+
+    assert [(r["kind"], r["text"], r["answer"], tuple(r["object_ids"])) for r in rows] == [
+        (u.kind, u.text, u.answer, u.instances) for u in said
+    ]
+    assert said
+
+
+def test_masks_and_ids_are_those_of_coco(world: Any, samples: list[Sample], tmp_path: Path) -> None:
+    """Decoded by pycocotools, every mask is the object's visible pixels."""
+    folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path / "language")
+    first = lines(folder / "train_images.jsonl")[0]
+    ids = samples[0].capture.readings["color"].channels
+    (instance_image,) = (image for channel, image in ids.items() if channel.value == "instance")
+
+    for thing in first["objects"]:
+        mask = coco_mask.decode(thing["segmentation"]).astype(bool)
+        assert (mask == (np.asarray(instance_image) == thing["object_id"])).all()
+        assert thing["annotation_id"] == samples[0].annotation_id("color", thing["object_id"])
+
+
+def test_relations_have_both_directions_here_and_in_coco(
+    world: Any, samples: list[Sample], tmp_path: Path
+) -> None:
+    """Left has right as its inverse, and near itself."""
+    folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path / "language")
+    coco = world.export(Coco(), world.info(7), samples, tmp_path / "coco")
+    first = lines(folder / "train_images.jsonl")[0]
+    image = next(
+        i
+        for i in json.loads((coco / "annotations/instances_train.json").read_text("utf-8"))[
+            "images"
+        ]
+        if i["sample"] == 0
+    )
+    a, b, *_ = (t.instance.instance_id for t in samples[0].truth["color"].objects)
+    expected = {(a, "left_of", b), (b, "right_of", a), (a, "near", b), (b, "near", a)}
+
+    assert {(r["subject_id"], r["predicate"], r["object_id"]) for r in first["relationships"]} == (
+        expected
+    )
+    assert {tuple(triple) for triple in image["relationships"]} == expected
+    assert "relationships" not in lines(folder / "train_images.jsonl")[1]
