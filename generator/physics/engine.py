@@ -9,7 +9,7 @@ from gen_data.generator.core.bounded_cache import CountCache
 from gen_data.generator.core.errors import Rejection
 from gen_data.generator.core.interfaces import AssetLibrary, DerivedArrays, Settled
 from gen_data.generator.core.kinematics import make_link_bodies
-from gen_data.generator.core.scene import Articulation, Body, Scene
+from gen_data.generator.core.scene import Articulation, Body, Episode, Scene
 from gen_data.generator.physics.collision_shapes import (
     CollisionShape,
     collision_shape,
@@ -18,6 +18,7 @@ from gen_data.generator.physics.collision_shapes import (
     unpack_shape,
 )
 from gen_data.generator.physics.manipulation.arm_goals import Arm, ArmState
+from gen_data.generator.physics.manipulation.demonstration import demonstrate
 from gen_data.generator.physics.manipulation.joint_trajectories import TrajectoryRecording
 from gen_data.generator.physics.manipulation.manipulation_planner import TaskPlanner
 from gen_data.generator.physics.physics_config import PhysicsConfig
@@ -151,23 +152,34 @@ class Engine:
         ]
         resting = {name: scene.body(name).T_world_body for name in (*fallen, *held)}
         recording = TrajectoryRecording(dict(resting))
+        episodes: dict[str, Episode] = {}
         for arm, state in arms:
             if not arm.articulation.task:
                 continue
             others = [name for other, _ in arms if other is not arm for name in other.bodies]
             obstacles = [*fixed, *others]
             planner = TaskPlanner(arm, state, self._world, obstacles, resting, scene.surfaces)
+            parts = [link for link in arm.robot.links if link in arm.robot.visuals]
+            if arm.articulation.assignment is not None:
+                shown = demonstrate(planner, arm, self._world, self._config.time_step_s)
+                if isinstance(shown, Rejection):
+                    return shown
+                episodes[arm.articulation.name] = shown.episode(recording.end_s)
+                recording.add(arm, shown.legs, parts, shown.poses)
+                resting = shown.poses[-1]
+                continue
             plan = planner.plan()
             if isinstance(plan, Rejection):
                 return plan
             resting = planner.resting
-            parts = [link for link in arm.robot.links if link in arm.robot.visuals]
             recording.add(arm, plan, parts)
         return replace(
             scene,
             tracks=(*scene.tracks, *recording.tracks()),
             articulations=tuple(
-                replace(a, joint_track=recording.joint_tracks.get(a.name))
+                replace(
+                    a, joint_track=recording.joint_tracks.get(a.name), episode=episodes.get(a.name)
+                )
                 for a in scene.articulations
             ),
         )
