@@ -191,7 +191,7 @@ class Failures(Strict):
 class ArmTask(RandomizerBase):
     """Draws the things of a task and gives an arm its program; physics demonstrates and judges it.
 
-    Its things are the members of a group of the randomizer's name.
+    Its things are the members of the object group of the randomizer's name.
 
     Attributes:
         task: Name of a task of the table ``arm_tasks.yaml``.
@@ -220,8 +220,14 @@ class ArmTask(RandomizerBase):
         return tuple(sorted(found))
 
     def check(self, scene: Scene, assets: AssetIndex) -> None:
-        """Check the names of tasks and of the arm, and that it has a gripper and a table."""
-        self.possible_assets(assets)
+        """Check the names of tasks, of the group and of the arm, and that it has a gripper."""
+        known = {assets.get(asset).category for asset in self._find_group(scene).assets}
+        for asset in self.possible_assets(assets):
+            if assets.get(asset).category not in known:
+                raise ConfigError(
+                    f"randomizers.{self.name}.task: the object group '{self.name}' lacks "
+                    f"'{asset.partition('?')[0]}'; expected it among its assets (ids)"
+                )
         arm = self._find_arm(scene)
         if assets.robot(arm.asset).gripper is None:
             raise ConfigError(
@@ -235,8 +241,7 @@ class ArmTask(RandomizerBase):
         check_known(name, tuple(tasks()), f"randomizers.{self.name}.task: unknown task")
         task, arm = tasks()[name], self._find_arm(scene)
         speed, failure = round(self.speed.draw(rng), 4), self._draw_failure(task, rng)
-        surfaces = tuple(s.name for s in scene.surfaces if not s.walled)
-        group = ObjectGroup(self.name, surfaces, (), len(task.things), "scatter")
+        group = self._find_group(scene)
         placed = self._place_things(task, arm, assets, rng)
         scene = remove_members(scene, self.name)
         members = [thing.member for thing in placed.values()]
@@ -259,7 +264,6 @@ class ArmTask(RandomizerBase):
         changed = replace(arm, task=goals, assignment=assignment)
         return replace(
             scene,
-            groups=(*(g for g in scene.groups if g.name != self.name), group),
             articulations=tuple(changed if a is arm else a for a in scene.articulations),
         )
 
@@ -268,6 +272,11 @@ class ArmTask(RandomizerBase):
         for name in names:
             check_known(name, tuple(tasks()), f"randomizers.{self.name}.task: unknown task")
         return names
+
+    def _find_group(self, scene: Scene) -> ObjectGroup:
+        known = {group.name: group for group in scene.groups}
+        check_known(self.name, tuple(known), f"randomizers.{self.name}: there is no object group")
+        return known[self.name]
 
     def _find_arm(self, scene: Scene) -> Articulation:
         for arm in scene.articulations:
@@ -439,7 +448,8 @@ def _motions(step: Step, frame: SE3, latest_m: Vec3) -> Iterator[SE3]:
         for k in range(1, count + 1):
             half = 0.5 * math.radians(step.turn_deg) * k / count
             x, y, z = (math.sin(half) * a for a in step.axis)
-            yield (moved @ pivot @ SE3(quaternion_wxyz=(math.cos(half), x, y, z)) @ pivot.inverse()).rounded()
+            turned = pivot @ SE3(quaternion_wxyz=(math.cos(half), x, y, z)) @ pivot.inverse()
+            yield (turned @ moved).rounded()
 
 
 def _yaw_of(frame: SE3) -> float:

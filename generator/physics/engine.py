@@ -9,7 +9,7 @@ from gen_data.generator.core.bounded_cache import CountCache
 from gen_data.generator.core.errors import Rejection
 from gen_data.generator.core.interfaces import AssetLibrary, DerivedArrays, Settled
 from gen_data.generator.core.kinematics import make_link_bodies
-from gen_data.generator.core.scene import Articulation, Body, Episode, Scene
+from gen_data.generator.core.scene import Articulation, Body, BodyJoint, Episode, Scene
 from gen_data.generator.physics.collision_shapes import (
     CollisionShape,
     collision_shape,
@@ -75,8 +75,17 @@ class Engine:
         if not falling and not scene.articulations:
             return Settled(scene)
         self._world.reset()
+        joints = {
+            joint.body: joint
+            for a in scene.articulations
+            if a.assignment is not None
+            for joint in a.assignment.joints
+        }
         for body in _solids(scene):
-            self._add(body, body in falling)
+            self._add(body, body in falling, joints.get(body.name))
+        for name in joints:
+            # What is fixed does not stop a part that moves: the limits of its joint do.
+            self._world.ignore(name, [other for other in fixed if other != name])
 
         arms = self._solve_goals(scene, fixed, _resting_bodies(scene, falling))
         if isinstance(arms, Rejection):
@@ -92,7 +101,7 @@ class Engine:
             return Settled(scene, planned)
         return Settled(planned)
 
-    def _add(self, body: Body, falls: bool) -> None:
+    def _add(self, body: Body, falls: bool, joint: BodyJoint | None = None) -> None:
         shape = self._shape(body.asset)
         guess_kg = _DENSITY_KG_M3 * 8.0 * float(shape.half_extents_m.prod()) * body.scale**3
         self._world.add(
@@ -100,9 +109,10 @@ class Engine:
             shape,
             body.T_world_body,
             scale=body.scale,
-            mass_kg=(body.mass_kg or guess_kg) if falls else 0.0,
+            mass_kg=(body.mass_kg or guess_kg) if falls or joint is not None else 0.0,
             friction=body.friction,
             restitution=body.restitution,
+            joint=joint,
         )
 
     def _shape(self, asset_id: str) -> CollisionShape:

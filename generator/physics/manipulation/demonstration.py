@@ -23,7 +23,7 @@ from gen_data.generator.physics.manipulation.joint_trajectories import (
     smooth_step,
 )
 from gen_data.generator.physics.manipulation.manipulation_planner import TaskPlanner
-from gen_data.generator.physics.world import World
+from gen_data.generator.physics.world import World, joint_position
 
 _TOUCH_M = 0.0005
 """Bodies nearer than this touch."""
@@ -31,8 +31,8 @@ _GAP_MAX_M = 0.1
 _STILL_M = 0.0002
 _STILL_RAD = 0.002
 """Smaller motions between knots are the simulator's noise."""
-_SLIP_KNOTS = 20
-"""A slip happens after a body has been held for a second."""
+_SLIP_KNOTS = 8
+"""A slip happens after a body has been held for 0.4 s."""
 _SETTLE_S = 0.6
 """After the last goal, so that what was let go comes to rest."""
 
@@ -62,8 +62,13 @@ def demonstrate(
         if not assignment.failure:
             planner.resting.update({n: p for n, p in shown.poses[-1].items() if n in planner.resting})
     shown.settle()
-    failed = [] if assignment.failure else shown.failed_conditions()
-    if failed:
+    failed = shown.failed_conditions()
+    if assignment.failure and not failed:
+        return Rejection(
+            f"task '{assignment.name}': it succeeds in spite of a {assignment.failure}",
+            "fewer failures, or another task",
+        )
+    if failed and not assignment.failure:
         first = failed[0]
         between = f" to '{first.other}'" if first.other else ""
         return Rejection(
@@ -101,8 +106,8 @@ class Demonstration:
         assert assignment is not None
         self._arm, self._world, self._assignment = arm, world, assignment
         self._steps = max(1, round(STEP_S / time_step_s))
-        self._joints = [joint.body for joint in assignment.joints]
-        self._start = dict(loose)
+        self._joints = {joint.body: joint for joint in assignment.joints}
+        self._start = {**loose, **{name: world.pose(name) for name in self._joints}}
         self._values: list[tuple[float, ...]] = []
         self._phases: list[str] = []
         self._held: list[str] = []
@@ -113,9 +118,8 @@ class Demonstration:
 
     def run(self, legs: Sequence[Leg], phase: str) -> None:
         """Carry out timed legs from where the latest ones ended."""
-        if self.poses:
-            for name, pose in self.poses[-1].items():
-                self._world.place(name, pose)
+        for name, pose in (self.poses[-1] if self.poses else self._start).items():
+            self._world.place(name, pose)
         for leg in legs:
             if not self.poses:
                 self._arm.show(leg.start)
@@ -138,8 +142,8 @@ class Demonstration:
 
     def settle(self) -> None:
         """Wait at the end until everything has come to rest."""
-        end = self.legs[-1].end
-        self.run([Leg(end, end, duration_s=_SETTLE_S)], "settle")
+        last = self.legs[-1]
+        self.run([Leg(last.end, last.end, _SETTLE_S, last.held)], "settle")
 
     def episode(self, start_s: float) -> Episode:
         """What happened, and whether it is a success, at times from ``start_s`` on."""
@@ -215,6 +219,8 @@ class Demonstration:
             up = np.array([0.0, 0.0, 1.0])
             cosine = float(world.pose(body).rotate(up) @ self._start[body].rotate(up))
             return math.acos(max(-1.0, min(1.0, cosine)))
+        if condition.measure == "travel":
+            return joint_position(self._joints[body], self._start[body], world.pose(body))
         if condition.measure == "height":
             return float(bounds(body)[0][2] - bounds(other)[1][2])
         middle = 0.5 * (sum(bounds(body)) - sum(bounds(other)))  # type: ignore[operator]
