@@ -257,9 +257,7 @@ class ArmTask(RandomizerBase):
         )
         goals = tuple(
             replace(goal, speed=round(speed * step.pace, 4))
-            for step, goal in zip(
-                task.program, _goals(task, placed, bodies, arm), strict=True
-            )
+            for step, goal in zip(task.program, _goals(task, placed, bodies, arm), strict=True)
         )
         changed = replace(arm, task=goals, assignment=assignment)
         return replace(

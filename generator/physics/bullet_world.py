@@ -103,29 +103,25 @@ class BulletWorld:
         mass_kg: float = 0.0,
         friction: float = 0.6,
         restitution: float = 0.05,
-        joint: BodyJoint | None = None,
     ) -> None:
-        """Add a body; a body with mass 0 is static, one with a joint moves along it."""
+        """Add a body; a body with mass 0 is static."""
         x, y, z = shape.center_of_mass_m
         T_body_center = SE3((x * scale, y * scale, z * scale))
         position, orientation = _bullet_pose(T_world_body @ T_body_center)
-        if joint is not None:
-            number = self._add_jointed(shape, scale, mass_kg, T_world_body, T_body_center, joint)
-        else:
-            number = pybullet.createMultiBody(
-                baseMass=mass_kg,
-                baseCollisionShapeIndex=self._collision_shape(shape, scale),
-                basePosition=position,
-                baseOrientation=orientation,
-                useMaximalCoordinates=1,
-                **self._here,
-            )
+        number = pybullet.createMultiBody(
+            baseMass=mass_kg,
+            baseCollisionShapeIndex=self._collision_shape(shape, scale),
+            basePosition=position,
+            baseOrientation=orientation,
+            useMaximalCoordinates=1,
+            **self._here,
+        )
         rolling = 0.0
         if mass_kg > 0.0:
             rolling = ROLLING_FRICTION_SHARE * float(shape.half_extents_m.min()) * scale
         pybullet.changeDynamics(
             number,
-            -1 if joint is None else 0,
+            -1,
             lateralFriction=friction,
             restitution=restitution,
             rollingFriction=rolling,
@@ -133,21 +129,25 @@ class BulletWorld:
             angularDamping=ANGULAR_DAMPING_PER_S,
             **self._here,
         )
-        self._solids[name] = _Solid(number, shape, scale, T_body_center, joint, T_world_body)
+        self._solids[name] = _Solid(number, shape, scale, T_body_center)
         self._names[number] = name
 
-    def _add_jointed(
+    def add_jointed(
         self,
+        name: str,
         shape: CollisionShape,
-        scale: float,
-        mass_kg: float,
         T_world_body: SE3,
-        T_body_center: SE3,
         joint: BodyJoint,
-    ) -> int:
-        """Add a body as the only link of a fixed base without a shape; the link is at the axis."""
-        anchor = T_world_body @ SE3(joint.anchor_m)
-        position, orientation = _bullet_pose(anchor)
+        *,
+        mass_kg: float,
+        friction: float = 0.6,
+    ) -> None:
+        """Add a body that moves along its joint only, at position 0 and at rest.
+
+        It is the only link of a fixed base without a shape; the link's frame is at the axis.
+        """
+        T_body_center = SE3(shape.center_of_mass_m)
+        position, orientation = _bullet_pose(T_world_body @ SE3(joint.anchor_m))
         center = (SE3(joint.anchor_m).inverse() @ T_body_center).translation_m
         prismatic = joint.kind == "prismatic"
         number = pybullet.createMultiBody(
@@ -155,7 +155,7 @@ class BulletWorld:
             basePosition=position,
             baseOrientation=orientation,
             linkMasses=[mass_kg],
-            linkCollisionShapeIndices=[self._collision_shape(shape, scale, center)],
+            linkCollisionShapeIndices=[self._collision_shape(shape, 1.0, center)],
             linkVisualShapeIndices=[-1],
             linkPositions=[(0.0, 0.0, 0.0)],
             linkOrientations=[(0.0, 0.0, 0.0, 1.0)],
@@ -167,12 +167,18 @@ class BulletWorld:
             **self._here,
         )
         pybullet.changeDynamics(
-            number, 0, jointLowerLimit=joint.lower, jointUpperLimit=joint.upper, **self._here
+            number,
+            0,
+            lateralFriction=friction,
+            jointLowerLimit=joint.lower,
+            jointUpperLimit=joint.upper,
+            **self._here,
         )
         pybullet.setJointMotorControl2(
             number, 0, pybullet.VELOCITY_CONTROL, force=joint.friction, **self._here
         )
-        return int(number)
+        self._solids[name] = _Solid(number, shape, 1.0, T_body_center, joint, T_world_body)
+        self._names[number] = name
 
     def remove(self, name: str) -> None:
         """Remove a body."""

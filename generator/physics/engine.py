@@ -104,15 +104,20 @@ class Engine:
     def _add(self, body: Body, falls: bool, joint: BodyJoint | None = None) -> None:
         shape = self._shape(body.asset)
         guess_kg = _DENSITY_KG_M3 * 8.0 * float(shape.half_extents_m.prod()) * body.scale**3
+        mass_kg = body.mass_kg or guess_kg
+        if joint is not None:
+            self._world.add_jointed(
+                body.name, shape, body.T_world_body, joint, mass_kg=mass_kg, friction=body.friction
+            )
+            return
         self._world.add(
             body.name,
             shape,
             body.T_world_body,
             scale=body.scale,
-            mass_kg=(body.mass_kg or guess_kg) if falls or joint is not None else 0.0,
+            mass_kg=mass_kg if falls else 0.0,
             friction=body.friction,
             restitution=body.restitution,
-            joint=joint,
         )
 
     def _shape(self, asset_id: str) -> CollisionShape:

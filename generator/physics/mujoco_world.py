@@ -116,15 +116,28 @@ class MujocoWorld:
         mass_kg: float = 0.0,
         friction: float = 0.6,
         restitution: float = 0.05,
-        joint: BodyJoint | None = None,
     ) -> None:
-        """Add a body at rest; a body with mass 0 is static, one with a joint moves along it."""
+        """Add a body at rest; a body with mass 0 is static."""
         del restitution
         self._suspend()
         solid = _Solid(shape, scale, mass_kg, friction, SE3())
-        solid.joint, solid.T_world_home = joint, T_world_body
         solid.T_world_center = T_world_body @ solid.T_body_center
         self._solids[name] = solid
+
+    def add_jointed(
+        self,
+        name: str,
+        shape: CollisionShape,
+        T_world_body: SE3,
+        joint: BodyJoint,
+        *,
+        mass_kg: float,
+        friction: float = 0.6,
+    ) -> None:
+        """Add a body that moves along its joint only, at position 0 and at rest."""
+        self.add(name, shape, T_world_body, mass_kg=mass_kg, friction=friction)
+        solid = self._solids[name]
+        solid.joint, solid.T_world_home = joint, T_world_body
 
     def remove(self, name: str) -> None:
         """Remove a body."""

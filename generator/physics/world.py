@@ -51,12 +51,23 @@ class World(Protocol):
         mass_kg: float = 0.0,
         friction: float = 0.6,
         restitution: float = 0.05,
-        joint: BodyJoint | None = None,
     ) -> None:
-        """Add a body at rest; a body with mass 0 is static.
+        """Add a body at rest; a body with mass 0 is static."""
+        ...
 
-        A body with a joint moves along it only, from position 0 at this pose; ``place`` takes it
-        to the position nearest to a pose.
+    def add_jointed(
+        self,
+        name: str,
+        shape: CollisionShape,
+        T_world_body: SE3,
+        joint: BodyJoint,
+        *,
+        mass_kg: float,
+        friction: float = 0.6,
+    ) -> None:
+        """Add a body that moves along its joint only, at position 0 and at rest.
+
+        ``place`` takes it to the position nearest to a pose.
         """
         ...
 

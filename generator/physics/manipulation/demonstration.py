@@ -13,13 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from gen_data.generator.core.errors import Rejection
+from gen_data.generator.core.kinematics import finger_links
 from gen_data.generator.core.scene import HAND, Condition, Episode, Span
 from gen_data.generator.core.se3 import SE3, Array
 from gen_data.generator.physics.manipulation.arm_goals import Arm
 from gen_data.generator.physics.manipulation.joint_trajectories import (
     STEP_S,
     Leg,
-    sample_positions,
     smooth_step,
 )
 from gen_data.generator.physics.manipulation.manipulation_planner import TaskPlanner
@@ -28,7 +28,7 @@ from gen_data.generator.physics.world import World, joint_position
 _TOUCH_M = 0.0005
 """Bodies nearer than this touch."""
 _GAP_MAX_M = 0.1
-_STILL_M = 0.0002
+_STILL_M = 0.0005
 _STILL_RAD = 0.002
 """Smaller motions between knots are the simulator's noise."""
 _SLIP_KNOTS = 8
@@ -60,7 +60,9 @@ def demonstrate(
             legs = _without_approach(legs)
         shown.run(legs, goal.phase or goal.kind)
         if not assignment.failure:
-            planner.resting.update({n: p for n, p in shown.poses[-1].items() if n in planner.resting})
+            planner.resting.update(
+                {n: p for n, p in shown.poses[-1].items() if n in planner.resting}
+            )
     shown.settle()
     failed = shown.failed_conditions()
     if assignment.failure and not failed:
@@ -112,6 +114,7 @@ class Demonstration:
         self._phases: list[str] = []
         self._held: list[str] = []
         self._contacts: list[frozenset[str]] = []
+        self._fingers = [arm.body(k) for k in finger_links(arm.robot) if k in arm.links]
         self._dropped = False
         self.legs: list[Leg] = []
         self.poses: list[dict[str, SE3]] = []
@@ -196,7 +199,12 @@ class Demonstration:
         moving = {n for n, pose in self.poses[-1].items() if pose != before[n]} | {held}
         moving |= {self._arm.body(link) for link in self._arm.moving}
         links = set(self._arm.bodies)
-        for one, other, gap_m in self._world.contacts():
+        # A grasp leaves some micrometres, which not every simulator counts as contact.
+        grasped = [
+            (link, held, self._world.gap_m(link, held, _TOUCH_M))
+            for link in (self._fingers if held else ())
+        ]
+        for one, other, gap_m in (*self._world.contacts(), *grasped):
             own = one in links and other in links
             if gap_m < _TOUCH_M and not own and (one in moving or other in moving):
                 yield " + ".join(sorted((one, other)))
