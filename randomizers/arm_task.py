@@ -94,9 +94,11 @@ class Step(Strict):
         at: Name of a thing.
         along: Thing that the X axis of the step's frame points to, horizontally; ``own`` = the X
             axis of ``at``; empty = away from the arm. Z is up.
+        carries: Whether ``reach`` takes the held thing there. It keeps its rotation or turns by
+            eighths; with ``yaws``, its X axis is that of the step's frame, or turned evenly.
         offset_m: Of the goal of ``reach``, in the step's frame.
         yaw_deg: Of the hand against that frame; at 0 the fingers open along its Y.
-        yaws: Number of evenly spaced rotations to try.
+        yaws: Number of evenly spaced rotations to try; 0 = two of the hand.
         by_m: Displacements of ``move``, each from its beginning, in the step's frame.
         turn_deg: Turn during ``move``, about ``axis`` through ``pivot_m``, after displacements.
         axis: Of the turn, in the step's frame.
@@ -113,7 +115,7 @@ class Step(Strict):
     along: str = ""
     offset_m: Vec3 = (0.0, 0.0, 0.0)
     yaw_deg: float = 0.0
-    yaws: int = Field(2, ge=1)
+    yaws: int = Field(0, ge=0)
     by_m: tuple[Vec3, ...] = ()
     turn_deg: float = 0.0
     axis: Vec3 = (0.0, 0.0, 1.0)
@@ -191,9 +193,10 @@ class Failures(Strict):
 class ArmTask(RandomizerBase):
     """Draws the things of a task and gives an arm its program; physics demonstrates and judges it.
 
-    Its things are the members of the object group of the randomizer's name.
+    Its things become the members of an object group.
 
     Attributes:
+        group: Name of the template's object group; empty = the randomizer's own name.
         task: Name of a task of the table ``arm_tasks.yaml``.
         arm: Name of the arm; empty = the first one.
         failures: Shares of demonstrations that fail on purpose, of tasks that grasp.
@@ -203,6 +206,7 @@ class ArmTask(RandomizerBase):
     type: Literal["arm_task"] = "arm_task"
     stage: Literal["scene"] = "scene"
     task: dist.Name = dist.Choice({"pick_and_place": 1.0})
+    group: str = ""
     arm: str = ""
     failures: Failures = Failures()
     speed: Annotated[dist.Scalar, dist.Bounds(0.01, 1.0)] = dist.Uniform(0.4, 0.7)
@@ -225,7 +229,7 @@ class ArmTask(RandomizerBase):
         for asset in self.possible_assets(assets):
             if assets.get(asset).category not in known:
                 raise ConfigError(
-                    f"randomizers.{self.name}.task: the object group '{self.name}' lacks "
+                    f"randomizers.{self.name}.task: the object group '{self.group or self.name}' lacks "
                     f"'{asset.partition('?')[0]}'; expected it among its assets (ids)"
                 )
         arm = self._find_arm(scene)
@@ -243,10 +247,10 @@ class ArmTask(RandomizerBase):
         speed, failure = round(self.speed.draw(rng), 4), self._draw_failure(task, rng)
         group = self._find_group(scene)
         placed = self._place_things(task, arm, assets, rng)
-        scene = remove_members(scene, self.name)
+        scene = remove_members(scene, group.name)
         members = [thing.member for thing in placed.values()]
         scene = add_members(scene, group, members, assets)
-        bodies = {thing: f"{self.name}/{k}" for k, thing in enumerate(placed)}
+        bodies = {thing: f"{group.name}/{k}" for k, thing in enumerate(placed)}
         words = {thing: found.words for thing, found in placed.items()}
         assignment = Assignment(
             name,
@@ -272,9 +276,10 @@ class ArmTask(RandomizerBase):
         return names
 
     def _find_group(self, scene: Scene) -> ObjectGroup:
-        known = {group.name: group for group in scene.groups}
-        check_known(self.name, tuple(known), f"randomizers.{self.name}: there is no object group")
-        return known[self.name]
+        name, known = self.group or self.name, {group.name: group for group in scene.groups}
+        fault = f"randomizers.{self.name}.group: the template has no object group"
+        check_known(name, tuple(known), fault)
+        return known[name]
 
     def _find_arm(self, scene: Scene) -> Articulation:
         for arm in scene.articulations:
@@ -388,9 +393,11 @@ def _goals(
 ) -> Iterator[ArmGoal]:
     """Goals of a program, in the world."""
     latest_m: Vec3 = (0.0, 0.0, 0.0)
+    held_yaw_rad = 0.0
     for step in task.program:
         touches = tuple(bodies[name] for name in step.touches)
         if step.verb == "grasp":
+            held_yaw_rad = placed[step.at].yaw_rad
             yield ArmGoal("grasp", objects=(bodies[step.at],), phase=step.phase)
             continue
         if step.verb == "grip":
@@ -403,10 +410,12 @@ def _goals(
             continue
         latest_m = (frame @ SE3(step.offset_m)).translation_m
         carried = step.carries or step.verb == "place"
-        first, count = math.radians(step.yaw_deg) + _yaw_of(frame), step.yaws
+        first, count = math.radians(step.yaw_deg) + _yaw_of(frame), step.yaws or 2
+        if carried:
+            first = first - held_yaw_rad if step.yaws else 0.0
+            count = step.yaws or _YAWS
         turns = [first + 2.0 * math.pi * k / count for k in range(count)]
         if carried:
-            turns = [2.0 * math.pi * k / _YAWS for k in range(_YAWS)]
             poses = tuple(SE3.about_z(turn, latest_m).rounded() for turn in turns)
         else:
             poses = tuple(hand_pose(latest_m, turn) for turn in turns)

@@ -61,7 +61,9 @@ def test_an_unknown_task_is_refused_by_its_field() -> None:
 
 def test_a_template_without_the_group_is_refused() -> None:
     """The group has the randomizer's name."""
-    with pytest.raises(ConfigError, match=r"randomizers\.toys: there is no object group 'toys'"):
+    with pytest.raises(
+        ConfigError, match=r"randomizers\.toys\.group: the template has no object group 'toys'"
+    ):
         ArmTask(name="toys", task=Constant("reach")).check(SCENE, FakeAssets())
 
 

@@ -139,6 +139,66 @@ def ring(
     return make_solid_in_place([body], (_paint("ring", color),), hull)
 
 
+def hook_stand(height_m: float = 0.14, reach_m: float = 0.09, color: str = "grey") -> Solid:
+    """A post on a foot, and an arm towards -X whose end points up. Slots: foot, metal.
+
+    Args:
+        height_m: Of the upper side of the arm; its end is 2.5 cm higher.
+        reach_m: Distance of the end from the post.
+        color: One of ``COLORS``, of the foot.
+    """
+    z, w = height_m, 0.006
+    foot = ((-0.04, -0.05, 0.0), (0.06, 0.05, 0.012))
+    bars = [
+        ((-w, -w, 0.012), (w, w, z)),
+        ((-reach_m - w, -w, z - 2 * w), (-w, w, z)),
+        ((-reach_m - w, -w, z), (-reach_m + w, w, z + 0.025)),
+    ]
+    return _boards([foot], (_paint("hook_stand", color), metal_material(*_STEEL)), bars)
+
+
+def plug(size_m: Vec3 = (0.04, 0.026, 0.045), color: str = "white") -> Solid:
+    """A plug that stands on its two pins. Slots: body, pins.
+
+    Args:
+        size_m: Length, width and height of its body.
+        color: One of ``COLORS``.
+    """
+    x, y, z = check_size("plug", size_m, 0.02)
+    body = ((-x / 2, -y / 2, _PIN_M[2]), (x / 2, y / 2, _PIN_M[2] + z))
+    return _boards([body], (_paint("plug", color), metal_material(*_STEEL)), _pins(0.0))
+
+
+def outlet(size_m: Vec3 = (0.1, 0.08, 0.03), color: str = "grey") -> Solid:
+    """A box with two slots from above for the pins of a plug, with 1.5 mm of play. Slot: body.
+
+    Args:
+        size_m: Length, width, height.
+        color: One of ``COLORS``.
+    """
+    x, y, z = check_size("outlet", size_m, 0.03)
+    (_, low, _), (_, high, _) = _pins(_PLAY_M)[0]
+    ends = sorted(v for (a, _, _), (b, _, _) in _pins(_PLAY_M) for v in (a, b))
+    edges = [-x / 2, *ends, x / 2]
+    strips = [(edges[k], edges[k + 1]) for k in (0, 2, 4)]
+    boards = [((a, low, 0.0), (b, high, z)) for a, b in strips]
+    boards += [((-x / 2, -y / 2, 0.0), (x / 2, low, z)), ((-x / 2, high, 0.0), (x / 2, y / 2, z))]
+    return _boards(boards, (_paint("outlet", color),))
+
+
+_PIN_M, _PIN_AT_M, _PLAY_M = (0.005, 0.014, 0.022), 0.01, 0.0015
+"""Size of the pins of plugs, distance from the middle, and play around them on each side."""
+
+
+def _pins(play_m: float) -> list[Box]:
+    x, y, z = _PIN_M
+    half = (0.5 * x + play_m, 0.5 * y + play_m)
+    return [
+        ((at - half[0], -half[1], 0.0), (at + half[0], half[1], z))
+        for at in (-_PIN_AT_M, _PIN_AT_M)
+    ]
+
+
 def _boards(
     boards: Sequence[Box], materials: tuple[Material, ...], handles: Sequence[Box] = ()
 ) -> Solid:
