@@ -38,6 +38,7 @@ TABLE = PluginTable[Exporter](
         "semantickitti": "gen_data.exporters.semantickitti:SemanticKitti",
         "solo": "gen_data.exporters.solo:Solo",
         "tables": "gen_data.exporters.measurement_tables:Tables",
+        "rlds": "gen_data.exporters.rlds:Rlds",
         "tfrecord": "gen_data.exporters.tfrecord:TfRecord",
         "usd": "gen_data.exporters.usd:Usd",
         "voc": "gen_data.exporters.voc:Voc",

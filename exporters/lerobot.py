@@ -10,7 +10,11 @@
 
 Features: ``observation.state``, the positions of all movable joints [rad or m];
 ``action``, their positions one step later, which a position controller would be given; and
-``observation.images.<camera>``. ``timestamp`` is the frame's number divided by the frame rate.
+``observation.images.<camera>``. Demonstrations of tasks (randomizer ``arm_task``) add
+``observation.ee_pose``, the grasp frame in the frame of the arm's base [m, quaternion w x y z];
+``observation.gripper`` and ``action.gripper``, its opening from 0 to 1; and texts
+``annotation.{phase,held,contacts,failure}`` with ``annotation.succeeded``. ``timestamp`` is the
+frame's number divided by the frame rate.
 Joints are named in ``info.json``, in the order of the robot's description.
 
 An episode is a sequence: all instants of one view. Robots of different models have different
@@ -50,6 +54,11 @@ from gen_data.exporters.parquet_tables import (
 from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import FRAMES, Frame, frame_facts, write_frames, write_text
 from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.demonstrations import (
+    DemonstrationStep,
+    demonstration_step,
+    joint_positions,
+)
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
 from gen_data.generator.core.sample import Sample
@@ -61,6 +70,19 @@ CHUNK_EPISODES = 1000
 STATISTICS_PX, WHOLE_PX = 150, 300
 """Longer side of the images in statistics, and the length below which all pixels count [px]."""
 DECIMALS = 9
+EE_POSE = "observation.ee_pose"
+POSE = ["x", "y", "z", "qw", "qx", "qy", "qz"]
+LABELS = {
+    EE_POSE: "float32",
+    "observation.gripper": "float32",
+    "action.gripper": "float32",
+    "annotation.phase": "string",
+    "annotation.held": "string",
+    "annotation.contacts": "string",
+    "annotation.succeeded": "bool",
+    "annotation.failure": "string",
+}
+"""Features of demonstrations and their types."""
 PHRASES = {
     "joints": "move to a posture",
     "reach": "reach a pose",
@@ -158,14 +180,16 @@ class LeRobot(ExporterBase):
         assert self._assets is not None, "call with_assets first"
         arm = self._find_arm(sample.scene)
         time_s = sample.scene.time_s
-        names = [joint.name for joint in self._assets.robot(arm.asset).movable]
         images = {
             camera: _image_sums(info.media_path(shard_dir, camera, Channel.RGB, sample.index))
             for camera in self._cameras(info)
         }
+        robot = self._assets.robot(arm.asset)
+        step = demonstration_step(arm, robot, time_s, info.step_s)
         return frame_facts(info, sample) | {
+            "labels": {} if step is None else _labels(step),
             "robot": arm.asset,
-            "joints": names,
+            "joints": [joint.name for joint in robot.movable],
             "state": joint_positions(arm, time_s),
             "action": joint_positions(arm, time_s + info.step_s),
             "task": task_sentence(sample.scene, arm),
@@ -185,15 +209,23 @@ class LeRobot(ExporterBase):
         )
 
 
-def joint_positions(arm: Articulation, time_s: float) -> tuple[float, ...]:
-    """Positions of all movable joints at an instant [rad or m]."""
-    if arm.joint_track is None:
-        return arm.joint_positions
-    return arm.joint_track.positions(round(time_s, 9))
+def _labels(step: DemonstrationStep) -> dict[str, Any]:
+    """Features of a demonstration at one instant."""
+    pose = (*step.T_base_grasp.translation_m, *step.T_base_grasp.quaternion_wxyz)
+    contacts = ", ".join(step.contacts)
+    values = (pose, step.opening, step.opening_action, step.phase, step.held, contacts,
+              step.succeeded, step.failure)  # fmt: skip
+    return dict(zip(LABELS, values, strict=True))
+
+
+def _column(dtype: str, length: int) -> dict[str, Any]:
+    return value_feature(dtype) if length == 1 else list_feature(value_feature(dtype), length)
 
 
 def task_sentence(scene: Scene, arm: Articulation) -> str:
     """Task of an arm in words, the same at all instants of a sequence."""
+    if arm.assignment is not None:
+        return arm.assignment.instruction
     goals = arm.task or ((arm.goal,) if arm.goal is not None else ())
     if not goals:
         return "Stay in place."
@@ -282,6 +314,7 @@ class _RobotFiles:
         return {
             "observation.state": row["state"],
             "action": row["action"],
+            **row["labels"],
             "timestamp": frame_index / self._rate_hz(),
             "frame_index": frame_index,
             "episode_index": self._episodes,
@@ -305,6 +338,10 @@ class _RobotFiles:
         return {
             "observation.state": positions,
             "action": positions,
+            **{
+                name: _column(LABELS[name], len(np.atleast_1d(value)))
+                for name, value in self.first["labels"].items()
+            },
             **{_image_key(camera): IMAGE for camera in self.first["images"]},
             "timestamp": value_feature("float32"),
             **dict.fromkeys(
@@ -341,6 +378,14 @@ class _RobotFiles:
             "features": {
                 "observation.state": positions,
                 "action": positions,
+                **{
+                    name: {
+                        "dtype": LABELS[name],
+                        "shape": [len(np.atleast_1d(value))],
+                        "names": POSE if name == EE_POSE else None,
+                    }
+                    for name, value in self.first["labels"].items()
+                },
                 **images,
                 "timestamp": {"dtype": "float32", **number},
                 "frame_index": {"dtype": "int64", **number},
@@ -374,6 +419,8 @@ def _number_stats(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Statistics of the numbers of an episode by feature, of the values as stored."""
     stats = {}
     for name in rows[0]:
+        if isinstance(rows[0][name], str):
+            continue
         stored = np.array([row[name] for row in rows])
         if stored.dtype.kind == "f":
             stored = stored.astype(np.float32).astype(np.float64)

@@ -31,7 +31,7 @@ from __future__ import annotations
 import json
 import struct
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -234,20 +234,31 @@ def encode_example(features: bytes) -> bytes:
     return _message(1, features)
 
 
-def encode_features(features: Mapping[str, Feature]) -> bytes:
-    """Wire format of entries of ``Features.feature``, sorted by key."""
+def encode_features(
+    features: Mapping[str, Feature],
+    floats: Collection[str] = FLOATS,
+    integers: Collection[str] = INTEGERS,
+) -> bytes:
+    """Wire format of entries of ``Features.feature``, sorted by key.
+
+    Args:
+        features: Values by key.
+        floats: Keys whose values are floats.
+        integers: Keys whose values are integers; those of all others are bytes.
+    """
     entries = (
-        _message(1, key.encode()) + _message(2, _encode_feature(key, features[key]))
+        _message(1, key.encode())
+        + _message(2, _encode_feature(features[key], key in floats, key in integers))
         for key in sorted(features)
     )
     return b"".join(_message(1, entry) for entry in entries)
 
 
-def _encode_feature(key: str, values: Feature) -> bytes:
+def _encode_feature(values: Feature, is_float: bool, is_integer: bool) -> bytes:
     """Wire format of a ``Feature``: a list of bytes (1), floats (2) or integers (3)."""
-    if key in FLOATS:
+    if is_float:
         return _message(2, _message(1, struct.pack(f"<{len(values)}f", *values)))
-    if key in INTEGERS:
+    if is_integer:
         return _message(3, _message(1, b"".join(_varint(int(value)) for value in values)))
     return _message(1, b"".join(_message(1, value) for value in values if isinstance(value, bytes)))
 

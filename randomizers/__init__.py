@@ -11,6 +11,7 @@ TABLE = PluginTable[Randomizer](
         "lane_objects": "gen_data.randomizers.lane_objects:LaneObjects",
         "arm_configuration": "gen_data.randomizers.arm_configuration:ArmConfiguration",
         "arm_motion": "gen_data.randomizers.arm_motion:ArmMotion",
+        "arm_task": "gen_data.randomizers.arm_task:ArmTask",
         "backdrop": "gen_data.randomizers.backdrop:Backdrop",
         "camera_intrinsics": "gen_data.randomizers.camera_intrinsics:CameraIntrinsics",
         "camera_on_lane": "gen_data.randomizers.camera_on_lane:CameraOnLane",

@@ -207,7 +207,8 @@ class ArmGoal:
         kind: ``joints``: candidates are joint positions. ``reach``: candidates are poses of the
             grasp frame in the world. ``hold``: like reach, with ``grasped_object`` between the
             fingers. In tasks only: ``grasp`` picks up one of ``objects``, ``place`` puts the held
-            object down.
+            object down, ``move`` passes ``waypoints`` in straight lines, ``grip`` opens or closes
+            the fingers and lets go of a held object.
         joint_candidates: One tuple per candidate [rad or m], arm joints in order.
         pose_candidates: ``T_world_grasp`` per candidate; for ``place``, a point on a surface and
             a rotation about Z of the object from its former pose at rest.
@@ -215,15 +216,130 @@ class ArmGoal:
         grasped_object: Name of the body to hold; empty = none.
         objects: Names of the bodies that may be grasped, the preferred one first.
         speed: Share of the joints' speed limits to use.
+        waypoints: Motions of a ``move`` in the world, passed in order; each leads from the pose of
+            the hand at the beginning of the move (``waypoint @ T_world_grasp``).
+        carries: Whether candidates of ``reach`` are, as for ``place``, points below the held
+            object and its rotation about Z, instead of poses of the hand.
+        touches: Names of the bodies that a ``move`` may touch and push.
+        phase: Name of this part of a demonstration in labels; empty = the kind.
     """
 
-    kind: Literal["joints", "reach", "hold", "grasp", "place"]
+    kind: Literal["joints", "reach", "hold", "grasp", "place", "move", "grip"]
     joint_candidates: tuple[tuple[float, ...], ...] = ()
     pose_candidates: tuple[SE3, ...] = ()
     gripper_opening: float = 1.0
     grasped_object: str = ""
     objects: tuple[str, ...] = ()
     speed: float = 0.5
+    waypoints: tuple[SE3, ...] = ()
+    carries: bool = False
+    touches: tuple[str, ...] = ()
+    phase: str = ""
+
+
+Measure = Literal["distance", "offset", "height", "gap", "tilt", "travel"]
+FailureKind = Literal["", "slip", "miss", "collision"]
+HAND = "hand"
+"""Stands for the origin of the grasp frame where conditions name a body."""
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """A measure of simulated bodies within bounds; a demonstration succeeds if all of its hold.
+
+    Attributes:
+        measure: ``distance``: between the middles of two boxes along the axes of the world [m].
+            ``offset``: its horizontal part [m]. ``height``: from the top of ``other`` up to the
+            bottom of ``body`` [m]. ``gap``: between surfaces, negative if they overlap, at most
+            0.1 [m]. ``tilt``: of the body from its rotation at time 0 [rad], the angle between
+            both directions of its Z axis. ``travel``: position of its joint [m or rad].
+        body, other: Names of bodies; ``hand`` = the grasp frame's origin.
+        at_least, at_most: Bounds, inclusive; None = unbounded.
+        ever: Whether it is enough that it holds at one instant; else it must hold at the end.
+    """
+
+    measure: Measure
+    body: str
+    other: str = ""
+    at_least: float | None = None
+    at_most: float | None = None
+    ever: bool = False
+
+    def holds(self, value: float) -> bool:
+        """Whether a measured value is within the bounds."""
+        above = self.at_least is None or value >= self.at_least
+        return above and (self.at_most is None or value <= self.at_most)
+
+
+@dataclass(frozen=True, slots=True)
+class Assignment:
+    """What an arm is asked to do: the goals of ``Articulation.task`` are its program.
+
+    Attributes:
+        name: Of the task.
+        instruction: The task as a sentence.
+        success: Conditions that physics must confirm.
+        failure: Failure that is to happen; empty = none.
+        joints: Joints of bodies of the task, such as drawers.
+    """
+
+    name: str
+    instruction: str
+    success: tuple[Condition, ...] = ()
+    failure: FailureKind = ""
+    joints: tuple[BodyJoint, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class BodyJoint:
+    """The joint that connects a body to the world: a drawer's slide, a door's hinge.
+
+    Attributes:
+        kind: ``prismatic`` along the axis or ``revolute`` about it.
+        axis: Unit vector in the frame of the body.
+        anchor_m: A point of the axis in the frame of the body.
+        lower, upper: Limits of the position [m or rad], which is 0 at time 0.
+        friction: Force or torque that moves it at least [N or N m].
+        stiffness: Of a spring that returns it to 0 [N/m or N m/rad].
+    """
+
+    body: str
+    kind: Literal["prismatic", "revolute"]
+    axis: Vec3
+    anchor_m: Vec3 = (0.0, 0.0, 0.0)
+    lower: float = 0.0
+    upper: float = 0.0
+    friction: float = 1.0
+    stiffness: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A time during which something holds, from ``start_s`` until before ``end_s``."""
+
+    label: str
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """A simulated demonstration of an Assignment.
+
+    Attributes:
+        succeeded: Whether all conditions held in physics.
+        failure: Why it failed; empty if it succeeded.
+        phases: Parts of the program, one after the other.
+        held: Times at which a body is in the hand; the label is its name.
+        contacts: Times at which two bodies touch, one of them in motion or of the arm; the label
+            has both names, sorted, with `` + `` between them.
+    """
+
+    succeeded: bool
+    failure: FailureKind = ""
+    phases: tuple[Span, ...] = ()
+    held: tuple[Span, ...] = ()
+    contacts: tuple[Span, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,9 +350,10 @@ class Articulation:
         joint_positions: One per movable joint, in the robot model's order [rad or m].
         goal: Its goal at time 0; None = its joint positions.
         workspace_m: Low and high corner [m] of the targets of its hand, world.
-        task: Its goals from time 0 on, one after the other: ``joints``, ``reach``, ``grasp``
-            and ``place``.
+        task: Its goals from time 0 on, one after the other: all kinds but ``hold``.
         joint_track: Trajectory of its joints; None = they do not move.
+        assignment: What the task is for; None = a motion that nothing judges.
+        episode: Its demonstration in physics; None = there is none.
     """
 
     name: str
@@ -248,6 +365,8 @@ class Articulation:
     workspace_m: tuple[Vec3, Vec3] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     task: tuple[ArmGoal, ...] = ()
     joint_track: JointTrajectory | None = None
+    assignment: Assignment | None = None
+    episode: Episode | None = None
 
 
 @dataclass(frozen=True, slots=True)

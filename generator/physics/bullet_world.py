@@ -13,13 +13,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gen_data.generator.core.processes import silence_stdio
-from gen_data.generator.core.se3 import SE3, Array, Vec3
+from gen_data.generator.core.scene import BodyJoint
+from gen_data.generator.core.se3 import IDENTITY, SE3, Array, Vec3
 from gen_data.generator.core.temporary_folders import TemporaryFolder
 from gen_data.generator.physics.collision_shapes import CollisionShape, scale_step
 from gen_data.generator.physics.world import (
     ANGULAR_DAMPING_PER_S,
     GRAVITY_M_S2,
     ROLLING_FRICTION_SHARE,
+    joint_position,
+    jointed_pose,
 )
 
 with silence_stdio():  # it prints its build time
@@ -35,6 +38,13 @@ class _Solid:
     shape: CollisionShape
     scale: float
     T_body_center: SE3
+    joint: BodyJoint | None = None
+    T_world_home: SE3 = IDENTITY
+
+    @property
+    def link(self) -> int:
+        """Number of the link that has the shape; -1 = the base."""
+        return -1 if self.joint is None else 0
 
 
 class BulletWorld:
@@ -122,6 +132,54 @@ class BulletWorld:
         self._solids[name] = _Solid(number, shape, scale, T_body_center)
         self._names[number] = name
 
+    def add_jointed(
+        self,
+        name: str,
+        shape: CollisionShape,
+        T_world_body: SE3,
+        joint: BodyJoint,
+        *,
+        mass_kg: float,
+        friction: float = 0.6,
+    ) -> None:
+        """Add a body that moves along its joint only, at position 0 and at rest.
+
+        It is the only link of a fixed base without a shape; the link's frame is at the axis.
+        """
+        T_body_center = SE3(shape.center_of_mass_m)
+        position, orientation = _bullet_pose(T_world_body @ SE3(joint.anchor_m))
+        center = (SE3(joint.anchor_m).inverse() @ T_body_center).translation_m
+        prismatic = joint.kind == "prismatic"
+        number = pybullet.createMultiBody(
+            baseMass=0.0,
+            basePosition=position,
+            baseOrientation=orientation,
+            linkMasses=[mass_kg],
+            linkCollisionShapeIndices=[self._collision_shape(shape, 1.0, center)],
+            linkVisualShapeIndices=[-1],
+            linkPositions=[(0.0, 0.0, 0.0)],
+            linkOrientations=[(0.0, 0.0, 0.0, 1.0)],
+            linkInertialFramePositions=[center],
+            linkInertialFrameOrientations=[(0.0, 0.0, 0.0, 1.0)],
+            linkParentIndices=[0],
+            linkJointTypes=[pybullet.JOINT_PRISMATIC if prismatic else pybullet.JOINT_REVOLUTE],
+            linkJointAxis=[joint.axis],
+            **self._here,
+        )
+        pybullet.changeDynamics(
+            number,
+            0,
+            lateralFriction=friction,
+            jointLowerLimit=joint.lower,
+            jointUpperLimit=joint.upper,
+            **self._here,
+        )
+        pybullet.setJointMotorControl2(
+            number, 0, pybullet.VELOCITY_CONTROL, force=joint.friction, **self._here
+        )
+        self._solids[name] = _Solid(number, shape, 1.0, T_body_center, joint, T_world_body)
+        self._names[number] = name
+
     def remove(self, name: str) -> None:
         """Remove a body."""
         solid = self._solids.pop(name)
@@ -131,18 +189,22 @@ class BulletWorld:
 
     def ignore(self, name: str, others: Iterable[str]) -> None:
         """Disable collisions of a body with others."""
-        number = self._solids[name].number
-        for other in others:
+        one = self._solids[name]
+        for other in (self._solids[other] for other in others):
             pybullet.setCollisionFilterPair(
-                number, self._solids[other].number, -1, -1, 0, **self._here
+                one.number, other.number, one.link, other.link, 0, **self._here
             )
 
     def place(self, name: str, T_world_body: SE3) -> None:
         """Move a body to a pose, at rest."""
         solid = self._solids[name]
+        self._bounds.pop(name, None)
+        if solid.joint is not None:
+            at = joint_position(solid.joint, solid.T_world_home, T_world_body)
+            pybullet.resetJointState(solid.number, 0, at, **self._here)
+            return
         position, orientation = _bullet_pose(T_world_body @ solid.T_body_center)
         pybullet.resetBasePositionAndOrientation(solid.number, position, orientation, **self._here)
-        self._bounds.pop(name, None)
 
     def pose(self, name: str) -> SE3:
         """``T_world_body``."""
@@ -168,8 +230,20 @@ class BulletWorld:
     def step(self, count: int) -> None:
         """Simulate ``count`` steps."""
         for _ in range(count):
+            self._pull_springs()
             pybullet.stepSimulation(**self._here)
         self._bounds = {}
+
+    def _pull_springs(self) -> None:
+        for solid in self._solids.values():
+            if solid.joint is not None and solid.joint.stiffness > 0.0:
+                force = -solid.joint.stiffness * self._position(solid)
+                pybullet.setJointMotorControl2(
+                    solid.number, 0, pybullet.TORQUE_CONTROL, force=force, **self._here
+                )
+
+    def _position(self, solid: _Solid) -> float:
+        return float(pybullet.getJointState(solid.number, 0, **self._here)[0])
 
     def speed(self, name: str) -> tuple[float, float]:
         """Linear [m/s] and angular speed [rad/s] of a body."""
@@ -183,16 +257,25 @@ class BulletWorld:
         return [(self._names[p[1]], self._names[p[2]], float(p[8])) for p in points]
 
     def _center(self, solid: _Solid) -> SE3:
+        if solid.joint is not None:
+            pose = jointed_pose(solid.joint, solid.T_world_home, self._position(solid))
+            return pose @ solid.T_body_center
         pose = pybullet.getBasePositionAndOrientation(solid.number, **self._here)
         (px, py, pz), (x, y, z, w) = pose
         return SE3((px, py, pz), (w, x, y, z))
 
-    def _collision_shape(self, shape: CollisionShape, scale: float) -> int:
+    def _collision_shape(
+        self, shape: CollisionShape, scale: float, center_m: Vec3 = (0.0, 0.0, 0.0)
+    ) -> int:
+        """The number of a shape, with its centre of mass at a point of the frame that has it."""
         if shape.boxes:
             number = pybullet.createCollisionShapeArray(
                 shapeTypes=[pybullet.GEOM_BOX] * len(shape.boxes),
                 halfExtents=[_scale(half, scale) for _, half in shape.boxes],
-                collisionFramePositions=[_scale(center, scale) for center, _ in shape.boxes],
+                collisionFramePositions=[
+                    (SE3(center_m) @ SE3(_scale(center, scale))).translation_m
+                    for center, _ in shape.boxes
+                ],
                 **self._here,
             )
             return int(number)
@@ -200,6 +283,7 @@ class BulletWorld:
             pybullet.GEOM_MESH,
             fileName=str(self._hull_file(shape, scale_step(scale))),
             meshScale=[scale, scale, scale],
+            collisionFramePosition=center_m,
             **self._here,
         )
         return int(number)

@@ -9,7 +9,7 @@ from gen_data.generator.core.bounded_cache import CountCache
 from gen_data.generator.core.errors import Rejection
 from gen_data.generator.core.interfaces import AssetLibrary, DerivedArrays, Settled
 from gen_data.generator.core.kinematics import make_link_bodies
-from gen_data.generator.core.scene import Articulation, Body, Scene
+from gen_data.generator.core.scene import Articulation, Body, BodyJoint, Episode, Scene
 from gen_data.generator.physics.collision_shapes import (
     CollisionShape,
     collision_shape,
@@ -18,6 +18,7 @@ from gen_data.generator.physics.collision_shapes import (
     unpack_shape,
 )
 from gen_data.generator.physics.manipulation.arm_goals import Arm, ArmState
+from gen_data.generator.physics.manipulation.demonstration import demonstrate
 from gen_data.generator.physics.manipulation.joint_trajectories import TrajectoryRecording
 from gen_data.generator.physics.manipulation.manipulation_planner import TaskPlanner
 from gen_data.generator.physics.physics_config import PhysicsConfig
@@ -74,8 +75,17 @@ class Engine:
         if not falling and not scene.articulations:
             return Settled(scene)
         self._world.reset()
+        joints = {
+            joint.body: joint
+            for a in scene.articulations
+            if a.assignment is not None
+            for joint in a.assignment.joints
+        }
         for body in _solids(scene):
-            self._add(body, body in falling)
+            self._add(body, body in falling, joints.get(body.name))
+        for name in joints:
+            # What is fixed does not stop a part that moves: the limits of its joint do.
+            self._world.ignore(name, [other for other in fixed if other != name])
 
         arms = self._solve_goals(scene, fixed, _resting_bodies(scene, falling))
         if isinstance(arms, Rejection):
@@ -91,15 +101,21 @@ class Engine:
             return Settled(scene, planned)
         return Settled(planned)
 
-    def _add(self, body: Body, falls: bool) -> None:
+    def _add(self, body: Body, falls: bool, joint: BodyJoint | None = None) -> None:
         shape = self._shape(body.asset)
         guess_kg = _DENSITY_KG_M3 * 8.0 * float(shape.half_extents_m.prod()) * body.scale**3
+        mass_kg = body.mass_kg or guess_kg
+        if joint is not None:
+            self._world.add_jointed(
+                body.name, shape, body.T_world_body, joint, mass_kg=mass_kg, friction=body.friction
+            )
+            return
         self._world.add(
             body.name,
             shape,
             body.T_world_body,
             scale=body.scale,
-            mass_kg=(body.mass_kg or guess_kg) if falls else 0.0,
+            mass_kg=mass_kg if falls else 0.0,
             friction=body.friction,
             restitution=body.restitution,
         )
@@ -151,23 +167,34 @@ class Engine:
         ]
         resting = {name: scene.body(name).T_world_body for name in (*fallen, *held)}
         recording = TrajectoryRecording(dict(resting))
+        episodes: dict[str, Episode] = {}
         for arm, state in arms:
             if not arm.articulation.task:
                 continue
             others = [name for other, _ in arms if other is not arm for name in other.bodies]
             obstacles = [*fixed, *others]
             planner = TaskPlanner(arm, state, self._world, obstacles, resting, scene.surfaces)
+            parts = [link for link in arm.robot.links if link in arm.robot.visuals]
+            if arm.articulation.assignment is not None:
+                shown = demonstrate(planner, arm, self._world, self._config.time_step_s)
+                if isinstance(shown, Rejection):
+                    return shown
+                episodes[arm.articulation.name] = shown.episode(recording.end_s)
+                recording.add(arm, shown.legs, parts, shown.poses)
+                resting = shown.poses[-1]
+                continue
             plan = planner.plan()
             if isinstance(plan, Rejection):
                 return plan
             resting = planner.resting
-            parts = [link for link in arm.robot.links if link in arm.robot.visuals]
             recording.add(arm, plan, parts)
         return replace(
             scene,
             tracks=(*scene.tracks, *recording.tracks()),
             articulations=tuple(
-                replace(a, joint_track=recording.joint_tracks.get(a.name))
+                replace(
+                    a, joint_track=recording.joint_tracks.get(a.name), episode=episodes.get(a.name)
+                )
                 for a in scene.articulations
             ),
         )

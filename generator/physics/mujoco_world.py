@@ -17,12 +17,16 @@ from dataclasses import dataclass, field
 import mujoco
 import numpy as np
 
+from gen_data.generator.core.scene import BodyJoint
 from gen_data.generator.core.se3 import SE3, Array
 from gen_data.generator.physics.collision_shapes import CollisionShape, Hull
 from gen_data.generator.physics.world import (
     ANGULAR_DAMPING_PER_S,
     GRAVITY_M_S2,
+    JOINT_DAMPING_S,
     ROLLING_FRICTION_SHARE,
+    joint_position,
+    jointed_pose,
 )
 
 _SOLIMP = (0.95, 0.99, 0.001, 0.5, 2.0)
@@ -35,7 +39,10 @@ _ROLLING_DIMENSIONS, _SLIDING_DIMENSIONS = 6, 3
 
 @dataclass(eq=False, slots=True)
 class _Solid:
-    """A body about its centre of mass; the last three fields refer to the compiled model."""
+    """A body about its centre of mass; ``position_at`` to ``geoms`` refer to the compiled model.
+
+    ``T_world_home`` is the pose of the body, not of its centre, at position 0 of its joint.
+    """
 
     shape: CollisionShape
     scale: float
@@ -46,6 +53,8 @@ class _Solid:
     position_at: int = -1
     velocity_at: int = -1
     geoms: tuple[int, ...] = ()
+    joint: BodyJoint | None = None
+    T_world_home: SE3 = field(default_factory=SE3)
 
     @property
     def T_body_center(self) -> SE3:  # noqa: N802
@@ -114,6 +123,21 @@ class MujocoWorld:
         solid = _Solid(shape, scale, mass_kg, friction, SE3())
         solid.T_world_center = T_world_body @ solid.T_body_center
         self._solids[name] = solid
+
+    def add_jointed(
+        self,
+        name: str,
+        shape: CollisionShape,
+        T_world_body: SE3,
+        joint: BodyJoint,
+        *,
+        mass_kg: float,
+        friction: float = 0.6,
+    ) -> None:
+        """Add a body that moves along its joint only, at position 0 and at rest."""
+        self.add(name, shape, T_world_body, mass_kg=mass_kg, friction=friction)
+        solid = self._solids[name]
+        solid.joint, solid.T_world_home = joint, T_world_body
 
     def remove(self, name: str) -> None:
         """Remove a body."""
@@ -227,7 +251,10 @@ def _compile(
         world.names[body.id] = name
         first = int(body.geomadr[0])
         solid.geoms = tuple(range(first, first + int(body.geomnum[0])))
-        if solid.mass_kg > 0.0:
+        if solid.joint is not None:
+            solid.position_at = int(model.jnt_qposadr[body.jntadr[0]])
+            solid.velocity_at = int(body.dofadr[0])
+        elif solid.mass_kg > 0.0:
             solid.position_at = int(model.jnt_qposadr[body.jntadr[0]])
             solid.velocity_at = int(body.dofadr[0])
             spin = slice(solid.velocity_at + 3, solid.velocity_at + 6)
@@ -247,6 +274,9 @@ def _add_body(
 ) -> None:
     falls = solid.mass_kg > 0.0
     body = spec.worldbody.add_body(name=name, mocap=not falls)
+    if solid.joint is not None:
+        home = solid.T_world_home @ solid.T_body_center
+        body.pos, body.quat = home.translation_m, home.quaternion_wxyz
     rolling_m = 0.0
     if falls:
         half_m = solid.shape.half_extents_m * solid.scale
@@ -255,7 +285,10 @@ def _add_body(
         squares = np.maximum(half_m, _FLAT_M) ** 2
         body.explicitinertial, body.mass = True, solid.mass_kg
         body.inertia = solid.mass_kg / 3.0 * (squares.sum() - squares)
-        body.add_freejoint()
+        if solid.joint is None:
+            body.add_freejoint()
+        else:
+            _add_joint(body, solid, solid.joint)
     surface = {
         "friction": (solid.friction**2, rolling_m, rolling_m),
         "condim": _ROLLING_DIMENSIONS if falls else _SLIDING_DIMENSIONS,
@@ -285,6 +318,22 @@ def _add_body(
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, **surface)
 
 
+def _add_joint(body: mujoco.MjsBody, solid: _Solid, joint: BodyJoint) -> None:
+    prismatic = joint.kind == "prismatic"
+    anchor = (solid.T_body_center.inverse() @ SE3(joint.anchor_m)).translation_m
+    body.add_joint(
+        type=mujoco.mjtJoint.mjJNT_SLIDE if prismatic else mujoco.mjtJoint.mjJNT_HINGE,
+        axis=joint.axis,
+        pos=anchor,
+        limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+        # Degrees are the unit of specifications.
+        range=[v if prismatic else math.degrees(v) for v in (joint.lower, joint.upper)],
+        frictionloss=joint.friction,
+        damping=JOINT_DAMPING_S * joint.friction,
+        stiffness=joint.stiffness,
+    )
+
+
 def _thick(hull: Hull, scale: float) -> Array:
     """Vertices [n, 3] at a scale; those of a flat part twice, on both sides of its plane."""
     points = hull.vertices_m * scale
@@ -298,7 +347,11 @@ def _thick(hull: Hull, scale: float) -> Array:
 def _load(world: _Compiled, solid: _Solid) -> None:
     """Give a body of the model its pose and velocity."""
     pose, at, data = solid.T_world_center, solid.position_at, world.data
-    if solid.mass_kg > 0.0:
+    if solid.joint is not None:
+        T_world_body = pose @ solid.T_body_center.inverse()
+        data.qpos[at] = joint_position(solid.joint, solid.T_world_home, T_world_body)
+        data.qvel[solid.velocity_at] = solid.velocity[0]
+    elif solid.mass_kg > 0.0:
         data.qpos[at : at + 7] = (*pose.translation_m, *pose.quaternion_wxyz)
         data.qvel[solid.velocity_at : solid.velocity_at + 6] = solid.velocity
     else:
@@ -309,8 +362,12 @@ def _load(world: _Compiled, solid: _Solid) -> None:
 
 def _store(world: _Compiled, solid: _Solid) -> None:
     """Take pose and velocity of a body that moves from the model."""
-    if solid.mass_kg > 0.0:
-        at, data = solid.position_at, world.data
+    at, data = solid.position_at, world.data
+    if solid.joint is not None:
+        pose = jointed_pose(solid.joint, solid.T_world_home, float(data.qpos[at]))
+        solid.T_world_center = pose @ solid.T_body_center
+        solid.velocity = (float(data.qvel[solid.velocity_at]), *(0.0,) * 5)
+    elif solid.mass_kg > 0.0:
         x, y, z, *turn = data.qpos[at : at + 7].tolist()
         qw, qx, qy, qz = turn
         solid.T_world_center = SE3((x, y, z), (qw, qx, qy, qz))

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Protocol
 
 from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.scene import BodyJoint
 from gen_data.generator.core.se3 import SE3, Array
 from gen_data.generator.physics.collision_shapes import CollisionShape
 from gen_data.generator.physics.physics_config import PhysicsConfig, missing_engine
 
 GRAVITY_M_S2 = 9.81
 ANGULAR_DAMPING_PER_S = 0.5
+JOINT_DAMPING_S = 0.2
+"""Damping of joints over their friction, per m/s or rad/s."""
 ROLLING_FRICTION_SHARE = 0.1
 """Rolling friction over an object's smallest half extent: balls and cans stop within a few turns,
 too little for anything to rest visibly out of balance."""
@@ -51,6 +55,22 @@ class World(Protocol):
         """Add a body at rest; a body with mass 0 is static."""
         ...
 
+    def add_jointed(
+        self,
+        name: str,
+        shape: CollisionShape,
+        T_world_body: SE3,
+        joint: BodyJoint,
+        *,
+        mass_kg: float,
+        friction: float = 0.6,
+    ) -> None:
+        """Add a body that moves along its joint only, at position 0 and at rest.
+
+        ``place`` takes it to the position nearest to a pose.
+        """
+        ...
+
     def remove(self, name: str) -> None:
         """Remove a body."""
         ...
@@ -86,6 +106,33 @@ class World(Protocol):
     def contacts(self) -> list[tuple[str, str, float]]:
         """All pairs of bodies in contact and their gap [m], negative if they overlap."""
         ...
+
+
+def jointed_pose(joint: BodyJoint, T_world_home: SE3, position: float) -> SE3:
+    """``T_world_body`` of a body at a position of its joint [m or rad].
+
+    Args:
+        joint: The joint.
+        T_world_home: Pose of the body at position 0.
+        position: The position.
+    """
+    x, y, z = joint.axis
+    if joint.kind == "prismatic":
+        return T_world_home @ SE3((position * x, position * y, position * z))
+    sine, anchor = math.sin(0.5 * position), SE3(joint.anchor_m)
+    turn = SE3(quaternion_wxyz=(math.cos(0.5 * position), sine * x, sine * y, sine * z))
+    return T_world_home @ anchor @ turn @ anchor.inverse()
+
+
+def joint_position(joint: BodyJoint, T_world_home: SE3, T_world_body: SE3) -> float:
+    """Position [m or rad] of the joint of a body at a pose: the inverse of ``jointed_pose``."""
+    moved = T_world_home.inverse() @ T_world_body
+    if joint.kind == "prismatic":
+        return sum(a * b for a, b in zip(joint.axis, moved.translation_m, strict=True))
+    w, *vector = moved.quaternion_wxyz
+    along = sum(a * b for a, b in zip(joint.axis, vector, strict=True))
+    angle = 2.0 * math.atan2(along, w)
+    return angle - 2.0 * math.pi * round(angle / (2.0 * math.pi))
 
 
 def open_world(config: PhysicsConfig) -> World:

@@ -38,6 +38,7 @@ from gen_data.scene_templates.surface import SurfaceElement
 from tests.randomizers.doubles import FakeAssets, rng_of
 
 GIVEN: dict[str, dict[str, Any]] = {
+    "arm_task": {"group": "objects", "task": "stack"},
     "ceiling_lights": {"visible": True},
     "companions": {"group": "lane_objects", "size": 4, "gap_m": {"uniform": [3, 5]}},
     "distractors": {"count": {"uniform_integer": [1, 4]}},
@@ -50,7 +51,7 @@ GIVEN: dict[str, dict[str, Any]] = {
 """Fields that a randomizer requires, or that ensure that it changes the scene."""
 
 PHYSICS_BOUND = (
-    "arm_configuration", "arm_motion", "companions", "distractors", "ego_on_lane", "lane_objects",
+    "arm_configuration", "arm_motion", "arm_task", "companions", "distractors", "ego_on_lane", "lane_objects",
     "objects", "physics_properties", "plate", "reaching_hand", "traffic_flow",
 )  # fmt: skip
 """Randomizers that must run before physics."""

@@ -1,6 +1,6 @@
-"""Joint trajectories: straight legs in joint space, each from rest to rest.
+"""Joint trajectories: legs in joint space, each from rest to rest.
 
-A leg follows ``start + s(t / T) * (end - start)`` with ``s = 10 x^3 - 15 x^4 + 6 x^5``.
+A straight leg follows ``start + s(t / T) * (end - start)`` with ``s = 10 x^3 - 15 x^4 + 6 x^5``.
 Speed and acceleration vanish at both ends; their peaks are 15/8 of the mean speed and 10/sqrt(3)
 of ``(end - start) / T^2`` (Biagiotti & Melchiorri, Trajectory Planning for Automatic Machines and
 Robots, 2008, section 2.1.7).
@@ -9,8 +9,9 @@ Robots, 2008, section 2.1.7).
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 from gen_data.generator.core.asset_types import Joint, RobotModel
 from gen_data.generator.core.kinematics import link_poses, round_positions
@@ -54,10 +55,11 @@ class Held:
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """A straight path in joint space, from rest to rest.
+    """A path of straight lines in joint space, from rest to rest.
 
     Attributes:
         start, end: One position per movable joint [rad or m].
+        via: Positions to pass between them; each line takes the same share of the path.
         duration_s: A multiple of ``STEP_S``; 0 = not yet timed.
         held: The body that moves with the hand; None = the hand is empty.
     """
@@ -66,12 +68,19 @@ class Leg:
     end: tuple[float, ...]
     duration_s: float = 0.0
     held: Held | None = None
+    via: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def lines(self) -> list[tuple[tuple[float, ...], tuple[float, ...]]]:
+        """Start and end of every straight line."""
+        return list(pairwise([self.start, *self.via, self.end]))
 
     def at(self, share: float) -> tuple[float, ...]:
         """Positions after a share of the path in [0, 1]."""
-        return round_positions(
-            [a + share * (b - a) for a, b in zip(self.start, self.end, strict=True)]
-        )
+        lines = self.lines
+        number = min(int(share * len(lines)), len(lines) - 1)
+        share = share * len(lines) - number
+        return round_positions([a + share * (b - a) for a, b in zip(*lines[number], strict=True)])
 
 
 def smooth_step(share: float) -> float:
@@ -94,8 +103,9 @@ def acceleration_max(joint: Joint) -> float:
 def time_leg(leg: Leg, robot: RobotModel, speed: float) -> Leg:
     """The leg with the shortest duration that stays within a share of all joints' limits."""
     longest_s = 0.0
-    for joint, a, b in zip(robot.movable, leg.start, leg.end, strict=True):
-        change = abs(b - a)
+    lines = leg.lines
+    for k, joint in enumerate(robot.movable):
+        change = len(lines) * max(abs(b[k] - a[k]) for a, b in lines)
         by_speed_s = _PEAK_SPEED * change / (speed * speed_max(joint))
         limit = speed * acceleration_max(joint)
         longest_s = max(longest_s, by_speed_s, math.sqrt(_PEAK_ACCELERATION * change / limit))
@@ -129,13 +139,26 @@ class TrajectoryRecording:
         self._starts: dict[str, int] = {}
         self.joint_tracks: dict[str, JointTrajectory] = {}
 
-    def add(self, arm: Arm, legs: Sequence[Leg], parts: Sequence[str]) -> None:
+    @property
+    def end_s(self) -> float:
+        """Time of the latest knot."""
+        return round(self._knot * STEP_S, 6)
+
+    def add(
+        self,
+        arm: Arm,
+        legs: Sequence[Leg],
+        parts: Sequence[str],
+        simulated: Sequence[Mapping[str, SE3]] = (),
+    ) -> None:
         """Record the legs of an arm after everything recorded so far.
 
         Args:
             arm: The robot.
             legs: Timed legs.
             parts: Links with a body in the scene.
+            simulated: ``{name: T_world_body}`` of all movable bodies at every knot, where physics
+                tells them; without it only held bodies move.
         """
         knots = sample_positions(legs)
         if not knots:
@@ -146,7 +169,10 @@ class TrajectoryRecording:
             poses = link_poses(arm.robot, arm.articulation.T_world_base, positions)
             for link in parts:
                 self._add_knot(f"{name}/{link}", number, poses[link])
-            if leg.held is not None:
+            if simulated:
+                for body, pose in simulated[number - start].items():
+                    self._add_knot(body, number, pose)
+            elif leg.held is not None:
                 pose = arm.grasp_pose(positions) @ leg.held.T_grasp_held
                 self._add_knot(leg.held.body, number, pose)
         self._knot = start + len(knots) - 1

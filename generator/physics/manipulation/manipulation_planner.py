@@ -6,7 +6,12 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from gen_data.generator.core.errors import Rejection
-from gen_data.generator.core.kinematics import all_positions, gripper_opening, is_within_limits
+from gen_data.generator.core.kinematics import (
+    all_positions,
+    gripper_opening,
+    is_within_limits,
+    round_positions,
+)
 from gen_data.generator.core.scene import ArmGoal, SupportSurface
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.physics.manipulation.arm_goals import Arm, ArmState
@@ -88,21 +93,46 @@ class TaskPlanner:
         """Timed legs to all goals, in order, or the reason why one cannot be accomplished."""
         legs: list[Leg] = []
         for number, goal in enumerate(self._arm.articulation.task, 1):
-            self._restore_world()
-            planned = self._plan_goal(goal, number)
+            planned = self.plan_goal(goal, number)
             if isinstance(planned, Rejection):
                 return planned
-            legs += [time_leg(leg, self._arm.robot, goal.speed) for leg in planned]
-            self.positions = legs[-1].end
+            legs += planned
         self._restore_world()
         return legs
 
-    def _plan_goal(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
-        """Untimed legs to one goal."""
+    def plan_goal(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
+        """Timed legs to the next goal, or the reason why it cannot be accomplished.
+
+        Args:
+            goal: The goal.
+            number: Its place in the task, from 1, for that reason.
+        """
+        self._restore_world()
+        planned = self._plan_untimed(goal, number)
+        if isinstance(planned, Rejection):
+            return planned
+        legs = [time_leg(leg, self._arm.robot, goal.speed) for leg in planned]
+        self.positions = legs[-1].end
+        return legs
+
+    def all_poses(self) -> dict[str, SE3]:
+        """``{name: T_world_body}`` of all movable bodies now, with the held one."""
+        if self._held is None:
+            return dict(self.resting)
+        pose = self._arm.grasp_pose(self.positions) @ self._held.T_grasp_held
+        return {**self.resting, self._held.body: pose.rounded()}
+
+    def _plan_untimed(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
         if goal.kind == "grasp":
             return self._plan_grasp(goal, number)
         if goal.kind == "place":
             return self._plan_place(goal, number)
+        if goal.kind == "grip":
+            return self._plan_grip(goal)
+        if goal.carries and self._held is None:
+            return self._reject([], NOTHING_HELD, number)
+        if goal.kind == "move":
+            return self._plan_move(goal, number)
         collisions: list[str] = []
         for end in self._goal_configurations(goal):
             path = self._plan_path(end)
@@ -119,8 +149,44 @@ class TaskPlanner:
             if is_within_limits(self._arm.robot, positions):
                 yield positions
         for pose in goal.pose_candidates:
-            found = self._motion.configurations(pose, self.positions, opening)
+            found = self._motion.configurations(
+                self._hand_pose(goal, pose), self.positions, opening
+            )
             yield from found[:_CONFIGURATIONS_MAX]
+
+    def _hand_pose(self, goal: ArmGoal, pose: SE3) -> SE3:
+        """``T_world_grasp`` for a pose of a goal, which may be that of the held object."""
+        if not goal.carries or self._held is None:
+            return pose
+        return pose @ self._held.T_surface_rest @ self._held.T_grasp_held.inverse()
+
+    def _plan_move(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
+        """One leg along straight lines of the hand, which may touch some bodies."""
+        start = self._arm.grasp_pose(self.positions)
+        way = self._motion.follow([motion @ start for motion in goal.waypoints], self.positions)
+        if way is None:
+            return self._reject([], CANNOT_REACH, number)
+        leg = Leg(self.positions, way[-1], held=self._held, via=tuple(way[:-1]))
+        obstacles = Obstacles(
+            [name for name in self._fixed if name not in goal.touches],
+            [name for name in self.resting if name not in goal.touches],
+            clearance_m=0.0,
+        )
+        self._restore_world()
+        for start, end in leg.lines:
+            collision = self._motion.first_collision(Leg(start, end, held=leg.held), obstacles)
+            if collision is not None:
+                return self._reject([collision], CANNOT_REACH, number)
+        return [leg]
+
+    def _plan_grip(self, goal: ArmGoal) -> list[Leg]:
+        """One leg of the fingers; what they hold rests from then on where it is."""
+        if self._held is not None:
+            pose = self._arm.grasp_pose(self.positions) @ self._held.T_grasp_held
+            self.resting[self._held.body] = pose.rounded()
+            self._held = None
+        end = self._motion.with_opening(self.positions, goal.gripper_opening)
+        return [Leg(self.positions, round_positions(end))]
 
     def _plan_path(self, end: Positions) -> list[Leg] | str:
         """Legs from the current configuration to another, clear of all resting bodies."""

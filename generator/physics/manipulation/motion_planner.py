@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from itertools import islice, pairwise
 
@@ -20,6 +21,12 @@ from gen_data.generator.physics.manipulation.joint_trajectories import Held, Leg
 from gen_data.generator.physics.world import World
 
 Positions = tuple[float, ...]
+
+_LINE_M, _LINE_RAD = 0.02, 0.15
+"""Farthest neighbours on straight lines of the hand: between them a joint path of an arm with links
+of half a metre leaves the line by a tenth of a millimetre."""
+_LINE_JOINT_RAD = 0.6
+"""Largest turn of a joint between such neighbours; more means another branch of solutions."""
 
 _SOLUTIONS_MAX = 4
 _GUIDE_STEPS = 5
@@ -74,6 +81,37 @@ class MotionPlanner:
                 next(remaining) if is_arm else position
                 for is_arm, position in zip(self._is_arm, positions, strict=True)
             ]
+        )
+
+    def follow(self, poses: Sequence[SE3], start: Positions) -> list[Positions] | None:
+        """Positions along straight lines of the hand from a start through poses; None if it cannot.
+
+        The hand turns evenly on the way. Positions are those of ``nearest_configuration``, close
+        enough to each other that straight lines in joint space stay near those of the hand.
+        """
+        positions, way = start, []
+        for pose in poses:
+            here = self._arm.grasp_pose(positions)
+            line = Trajectory("hand", 1.0, (here, pose))
+            cosine = sum(
+                a * b for a, b in zip(here.quaternion_wxyz, pose.quaternion_wxyz, strict=True)
+            )
+            angle_rad = 2.0 * math.acos(min(1.0, abs(cosine)))
+            length_m = math.dist(here.translation_m, pose.translation_m)
+            steps = max(1, math.ceil(max(length_m / _LINE_M, angle_rad / _LINE_RAD)))
+            for k in range(1, steps + 1):
+                found = self.nearest_configuration(line.pose(k / steps), positions)
+                if found is None or self._jumps(positions, found):
+                    return None
+                positions = found
+                way.append(found)
+        return way
+
+    def _jumps(self, one: Positions, other: Positions) -> bool:
+        """Whether a joint turns so far between neighbours on a line that the hand leaves it."""
+        return any(
+            abs(b - a) > _LINE_JOINT_RAD and is_arm
+            for a, b, is_arm in zip(one, other, self._is_arm, strict=True)
         )
 
     def effort_s(self, start: Positions, end: Positions) -> float:

@@ -1,0 +1,154 @@
+"""RLDS-style episodes of a robot arm: one ``tf.train.Example`` per episode in TFRecord files.
+
+::
+
+    <split>/<robot>/
+        episodes-00000-of-00002.tfrecord    one record per episode
+        features.json                       type and shape of every key
+
+Steps are lists of equal length under ``steps/``: ``observation/image/<camera>`` (PNG or JPEG),
+``observation/state`` and ``action`` (all movable joints [rad or m], now and one step later),
+``is_first``, ``is_last``, ``is_terminal``, ``reward`` (1 at the last step of a success),
+``discount``, ``language_instruction``. Demonstrations of tasks also have ``observation/ee_pose``
+(x, y, z, qw, qx, qy, qz of the grasp frame in the frame of the arm's base),
+``observation/gripper``, ``action_gripper``, ``phase``, ``held``, ``contacts`` (separated by
+commas), and of the whole episode ``episode_metadata/{succeeded,failure,sequence}``. Vectors of all
+steps follow one another.
+
+Reference: Ramos et al., RLDS: an ecosystem to generate, share and use datasets in reinforcement
+learning, 2021 (names and meaning of the keys of a step). Reading takes ``tf.io.parse_example``; the
+files of TensorFlow Datasets that describe a builder are not written.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from gen_data.exporters.base import check_installed
+from gen_data.exporters.fragments import fragment_rows, numbered_stem
+from gen_data.exporters.lerobot import LeRobot
+from gen_data.exporters.sequences import FRAMES, Frame, write_text
+from gen_data.exporters.tfrecord import Feature, encode_example, encode_features, frame_record
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.serialization import canonical_json
+
+FLOATS = {
+    "steps/observation/state": "state",
+    "steps/action": "action",
+    "steps/observation/ee_pose": "observation.ee_pose",
+    "steps/observation/gripper": "observation.gripper",
+    "steps/action_gripper": "action.gripper",
+}
+TEXTS = {
+    "steps/phase": "annotation.phase",
+    "steps/held": "annotation.held",
+    "steps/contacts": "annotation.contacts",
+}
+"""Keys of the record, and of the frame's line or its labels."""
+_REWARDS = ("steps/reward", "steps/discount")
+_INTEGERS = (
+    "steps/is_first",
+    "steps/is_last",
+    "steps/is_terminal",
+    "episode_metadata/succeeded",
+    "episode_metadata/sequence",
+)
+
+
+class Rlds(LeRobot):
+    """RLDS-style TFRecord files of the episodes of one arm.
+
+    Attributes:
+        episodes_per_file: Episodes in each file except the last one of a split.
+    """
+
+    type: Literal["rlds"] = "rlds"  # type: ignore[assignment]
+    episodes_per_file: int = Field(100, ge=1)
+
+    def check(self, info: DatasetInfo) -> None:
+        """Reject a data set that this format cannot represent; see ``LeRobot``.
+
+        Raises:
+            ConfigError: as there, or the CRC library is missing.
+        """
+        check_installed(self.type, "google_crc32c")
+        super().check(info)
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Write the episodes of all shards, and what their keys are."""
+        totals: Counter[tuple[str, str]] = Counter()
+        seen = -1
+        for _, row in fragment_rows(shard_dirs, self.type, FRAMES):
+            if row["sequence"] != seen:
+                totals[row["split"], row["robot"]] += 1
+                seen = row["sequence"]
+        frames = (Frame(d, row) for d, row in fragment_rows(shard_dirs, self.type, FRAMES))
+        written: Counter[tuple[str, str]] = Counter()
+        for _, group in groupby(frames, key=lambda frame: frame.row["sequence"]):
+            episode = list(group)
+            key = (episode[0].row["split"], episode[0].row["robot"])
+            folder = dataset_dir / key[0] / key[1].replace("/", "_")
+            folder.mkdir(parents=True, exist_ok=True)
+            features = _features(info, episode)
+            if key not in written:
+                facts = _describe(features, len(episode))
+                write_text(folder / "features.json", canonical_json(facts) + "\n")
+            number = (written[key], totals[key], self.episodes_per_file)
+            stem = numbered_stem("episodes", *number)
+            floats = {*FLOATS, *_REWARDS}
+            record = frame_record(encode_example(encode_features(features, floats, _INTEGERS)))
+            with (folder / f"{stem}.tfrecord").open("ab") as file:
+                file.write(record)
+            written[key] += 1
+
+
+def _features(info: DatasetInfo, frames: Sequence[Frame]) -> dict[str, Feature]:
+    """Lists of an episode by key."""
+    rows = [{**frame.row, **frame.row["labels"]} for frame in frames]
+    first, last = rows[0], len(rows) - 1
+    succeeded = bool(first.get("annotation.succeeded"))
+    features: dict[str, Feature] = {
+        "steps/is_first": [int(k == 0) for k in range(len(rows))],
+        "steps/is_last": [int(k == last) for k in range(len(rows))],
+        "steps/is_terminal": [int(k == last and succeeded) for k in range(len(rows))],
+        "steps/reward": [float(k == last and succeeded) for k in range(len(rows))],
+        "steps/discount": [1.0] * len(rows),
+        "steps/language_instruction": [row["task"].encode() for row in rows],
+        "episode_metadata/sequence": [first["sequence"]],
+        "episode_metadata/succeeded": [int(succeeded)],
+        "episode_metadata/failure": [first.get("annotation.failure", "").encode()],
+    }
+    for key, name in FLOATS.items():
+        if name in first:
+            features[key] = [value for row in rows for value in _as_list(row[name])]
+    for key, name in TEXTS.items():
+        if name in first:
+            features[key] = [row[name].encode() for row in rows]
+    for camera in first["images"]:
+        features[f"steps/observation/image/{camera}"] = [
+            info.media_path(f.shard_dir, camera, Channel.RGB, f.index).read_bytes() for f in frames
+        ]
+    return features
+
+
+def _describe(features: Mapping[str, Feature], steps: int) -> dict[str, Any]:
+    """Type of every key, and length of its value in a step or in the episode."""
+    kinds = dict.fromkeys((*FLOATS, *_REWARDS), "float32") | dict.fromkeys(_INTEGERS, "int64")
+    return {
+        key: {
+            "dtype": kinds.get(key, "bytes"),
+            "length": len(values) // (steps if key.startswith("steps/") else 1),
+        }
+        for key, values in features.items()
+    }
+
+
+def _as_list(value: float | Sequence[float]) -> Sequence[float]:
+    return value if isinstance(value, (list, tuple)) else [value]  # type: ignore[list-item]

@@ -1,0 +1,464 @@
+"""Tasks of robot arms: their things, program and conditions of success, from a table."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from gen_data.generator.config import distributions as dist
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.data_files import load_data
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.members import Member, add_members, remove_members
+from gen_data.generator.core.scene import (
+    HAND,
+    ArmGoal,
+    Articulation,
+    Assignment,
+    BodyJoint,
+    Condition,
+    FailureKind,
+    Measure,
+    ObjectGroup,
+    Scene,
+)
+from gen_data.generator.core.se3 import IDENTITY, SE3, Vec3
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.arm_configuration import hand_pose
+from gen_data.randomizers.base import RandomizerBase, check_known
+from gen_data.randomizers.placement import half_extents_m
+
+SEEDS = 16
+"""Variants to draw from where the table names a family."""
+_TRIES = 200
+_APART_M = 0.03
+"""Least gap between things that are drawn."""
+_YAWS = 8
+"""Rotations of a held object to try at its destination."""
+_LIFT_M = 0.0005
+
+Span = tuple[float, float]
+
+
+class Thing(Strict):
+    """A thing of a task.
+
+    Attributes:
+        assets: Its name in instructions, and the id of its asset; an id without parameters is a
+            family of variants. One of several is drawn.
+        x_m, y_m: Bounds of its middle: ahead of the arm's base and to its left; from ``near``, if
+            given, along its axes.
+        yaw_deg: Bounds of its rotation about Z.
+        near: Name of another thing that it is placed by, at ``z_m`` from that one's bottom.
+        z_m: Height of its bottom above the table, or above the bottom of ``near``.
+        mass_kg: 0 = fixed; None = the asset's own.
+        joint: Joint of a part that moves, in the frame of the part.
+    """
+
+    assets: dict[str, str] = Field(min_length=1)
+    x_m: Span = (0.35, 0.6)
+    y_m: Span = (-0.25, 0.25)
+    yaw_deg: Span = (-180.0, 180.0)
+    near: str = ""
+    z_m: float = 0.0
+    mass_kg: float | None = None
+    joint: Joint | None = None
+
+
+class Joint(Strict):
+    """A joint of a thing; see ``BodyJoint``."""
+
+    kind: Literal["prismatic", "revolute"]
+    axis: Vec3
+    anchor_m: Vec3 = (0.0, 0.0, 0.0)
+    limits: Span
+    friction: float = 1.0
+    stiffness: float = 0.0
+
+
+class Step(Strict):
+    """One step of a program: a verb and what it refers to.
+
+    Attributes:
+        verb: ``grasp`` lifts ``at``. ``place`` puts the held thing down on top of ``at``.
+            ``reach`` takes the hand, or with ``carries`` the held thing, to a point above the top
+            of ``at``, around all obstacles. ``move`` moves the hand along straight lines or an
+            arc, and may touch and push. ``grip`` opens or closes the fingers.
+        at: Name of a thing.
+        along: Thing that the X axis of the step's frame points to, horizontally; ``own`` = the X
+            axis of ``at``; empty = away from the arm. Z is up.
+        carries: Whether ``reach`` takes the held thing there. It keeps its rotation or turns by
+            eighths; with ``yaws``, its X axis is that of the step's frame, or turned evenly.
+        offset_m: Of the goal of ``reach``, in the step's frame.
+        yaw_deg: Of the hand against that frame; at 0 the fingers open along its Y.
+        yaws: Number of evenly spaced rotations to try; 0 = two of the hand.
+        by_m: Displacements of ``move``, each from its beginning, in the step's frame.
+        turn_deg: Turn during ``move``, about ``axis`` through ``pivot_m``, after displacements.
+        axis: Of the turn, in the step's frame.
+        pivot_m: Point of the axis, from the top of ``at``; None = the hand's goal of the latest
+            ``reach``.
+        opening: Of the gripper: 0 closed, 1 open.
+        touches: Names of the things that ``move`` may touch.
+        phase: Name of the step in labels.
+        pace: Factor on the arm's speed.
+    """
+
+    verb: Literal["reach", "move", "grasp", "place", "grip"]
+    at: str = ""
+    along: str = ""
+    offset_m: Vec3 = (0.0, 0.0, 0.0)
+    yaw_deg: float = 0.0
+    yaws: int = Field(0, ge=0)
+    by_m: tuple[Vec3, ...] = ()
+    turn_deg: float = 0.0
+    axis: Vec3 = (0.0, 0.0, 1.0)
+    pivot_m: Vec3 | None = None
+    opening: float = Field(1.0, ge=0, le=1)
+    carries: bool = False
+    touches: tuple[str, ...] = ()
+    phase: str = Field(min_length=1)
+    pace: float = Field(1.0, gt=0, le=1)
+
+
+class Success(Strict):
+    """A condition of success; see ``Condition``. Angles of ``tilt`` and ``travel`` in radians."""
+
+    measure: Measure
+    body: str
+    other: str = ""
+    at_least: float | None = None
+    at_most: float | None = None
+    ever: bool = False
+
+
+class Task(Strict):
+    """An entry of the table.
+
+    Attributes:
+        instruction: Sentence with names of things in braces.
+        things: By name, in the order in which they are placed.
+        program: Steps in order.
+        success: Conditions, all of which must hold.
+    """
+
+    instruction: str
+    things: dict[str, Thing]
+    program: tuple[Step, ...] = Field(min_length=1)
+    success: tuple[Success, ...] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _names_its_things(self) -> Task:
+        used = [step.at for step in self.program] + [t.near for t in self.things.values()]
+        used += [name for step in self.program for name in (*step.touches, step.along)]
+        used += [name for c in self.success for name in (c.body, c.other)]
+        unknown = sorted({*used} - {*self.things, "", "own", HAND})
+        if unknown:
+            raise ValueError(f"there is no thing '{unknown[0]}'")
+        return self
+
+
+@cache
+def tasks() -> Mapping[str, Task]:
+    """The table of tasks, by name."""
+    plain = load_data(__package__, "arm_tasks")
+    # Strict models take lists for tuples from JSON only.
+    return {name: Task.model_validate_json(json.dumps(entry)) for name, entry in plain.items()}
+
+
+class Failures(Strict):
+    """Shares of demonstrations that fail on purpose, by kind.
+
+    Attributes:
+        slip: The object slips out of the fingers on its way.
+        miss: The fingers close above the object.
+    """
+
+    slip: float = Field(0.0, ge=0, le=1)
+    miss: float = Field(0.0, ge=0, le=1)
+
+    @model_validator(mode="after")
+    def _is_a_share(self) -> Failures:
+        if self.slip + self.miss > 1.0:
+            raise ValueError("the shares of failures add up to more than 1")
+        return self
+
+
+class ArmTask(RandomizerBase):
+    """Draws the things of a task and gives an arm its program; physics demonstrates and judges it.
+
+    Its things become the members of an object group.
+
+    Attributes:
+        group: Name of the template's object group; empty = the randomizer's own name.
+        task: Name of a task of the table ``arm_tasks.yaml``.
+        arm: Name of the arm; empty = the first one.
+        failures: Shares of demonstrations that fail on purpose, of tasks that grasp.
+        speed: Fraction of the joints' speed and acceleration limits to use.
+    """
+
+    type: Literal["arm_task"] = "arm_task"
+    stage: Literal["scene"] = "scene"
+    task: dist.Name = dist.Choice({"pick_and_place": 1.0})
+    group: str = ""
+    arm: str = ""
+    failures: Failures = Failures()
+    speed: Annotated[dist.Scalar, dist.Bounds(0.01, 1.0)] = dist.Uniform(0.4, 0.7)
+
+    def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
+        """Ids of the assets of all tasks that it can draw."""
+        del assets
+        found = {
+            asset
+            for name in self._possible_tasks()
+            for thing in tasks()[name].things.values()
+            for chosen in thing.assets.values()
+            for asset in _variants(chosen)
+        }
+        return tuple(sorted(found))
+
+    def check(self, scene: Scene, assets: AssetIndex) -> None:
+        """Check the names of tasks, of the group and of the arm, and that it has a gripper."""
+        known = {assets.get(asset).category for asset in self._find_group(scene).assets}
+        for asset in self.possible_assets(assets):
+            if assets.get(asset).category not in known:
+                raise ConfigError(
+                    f"randomizers.{self.name}.task: the object group '{self.group or self.name}' lacks "
+                    f"'{asset.partition('?')[0]}'; expected it among its assets (ids)"
+                )
+        arm = self._find_arm(scene)
+        if assets.robot(arm.asset).gripper is None:
+            raise ConfigError(
+                f"randomizers.{self.name}: arm '{arm.name}' ({arm.asset}) has no gripper; expected "
+                "a robot with one, such as franka_panda, robots/ur5e or robots/sawyer"
+            )
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """Return the scene with the things of a task, and an arm that has it to do."""
+        name = self.task.draw(rng)
+        check_known(name, tuple(tasks()), f"randomizers.{self.name}.task: unknown task")
+        task, arm = tasks()[name], self._find_arm(scene)
+        speed, failure = round(self.speed.draw(rng), 4), self._draw_failure(task, rng)
+        group = self._find_group(scene)
+        placed = self._place_things(task, arm, assets, rng)
+        scene = remove_members(scene, group.name)
+        members = [thing.member for thing in placed.values()]
+        scene = add_members(scene, group, members, assets)
+        bodies = {thing: f"{group.name}/{k}" for k, thing in enumerate(placed)}
+        words = {thing: found.words for thing, found in placed.items()}
+        assignment = Assignment(
+            name,
+            task.instruction.format(**words),
+            tuple(_condition(condition, bodies) for condition in task.success),
+            failure,
+            tuple(_joints(task, bodies)),
+        )
+        goals = tuple(
+            replace(goal, speed=round(speed * step.pace, 4))
+            for step, goal in zip(task.program, _goals(task, placed, bodies, arm), strict=True)
+        )
+        changed = replace(arm, task=goals, assignment=assignment)
+        return replace(
+            scene,
+            articulations=tuple(changed if a is arm else a for a in scene.articulations),
+        )
+
+    def _possible_tasks(self) -> tuple[str, ...]:
+        names = tuple(str(name) for name in self.task.outcomes())
+        for name in names:
+            check_known(name, tuple(tasks()), f"randomizers.{self.name}.task: unknown task")
+        return names
+
+    def _find_group(self, scene: Scene) -> ObjectGroup:
+        name, known = self.group or self.name, {group.name: group for group in scene.groups}
+        fault = f"randomizers.{self.name}.group: the template has no object group"
+        check_known(name, tuple(known), fault)
+        return known[name]
+
+    def _find_arm(self, scene: Scene) -> Articulation:
+        for arm in scene.articulations:
+            if self.arm in ("", arm.name):
+                return arm
+        known = ", ".join(arm.name for arm in scene.articulations) or "none: add a robot"
+        raise ConfigError(f"randomizers.{self.name}.arm: there is no arm; expected {known}")
+
+    def _draw_failure(self, task: Task, rng: Rng) -> FailureKind:
+        draw = float(rng.uniform())
+        if not any(step.verb == "grasp" for step in task.program):
+            return ""
+        if draw < self.failures.slip:
+            return "slip"
+        return "miss" if draw < self.failures.slip + self.failures.miss else ""
+
+    def _place_things(
+        self, task: Task, arm: Articulation, assets: AssetIndex, rng: Rng
+    ) -> dict[str, _Placed]:
+        """Draw asset and pose of every thing, apart from those before it."""
+        placed: dict[str, _Placed] = {}
+        for name, thing in task.things.items():
+            words = sorted(thing.assets)
+            chosen = words[int(rng.integers(len(words)))]
+            variants = _variants(thing.assets[chosen])
+            asset = variants[int(rng.integers(len(variants)))]
+            for _ in range(_TRIES):
+                found = _draw_place(thing, chosen, asset, arm, placed, assets, rng)
+                if thing.near or all(found.is_apart(other) for other in placed.values()):
+                    placed[name] = found
+                    break
+            else:
+                raise self.reject(f"no free place for the {chosen}", "another draw, a larger table")
+        return placed
+
+
+@dataclass(frozen=True, slots=True)
+class _Placed:
+    """A thing in the scene; ``half_m`` are half extents along its own axes."""
+
+    words: str
+    member: Member
+    half_m: Vec3
+    middle_m: Vec3
+    yaw_rad: float
+
+    @property
+    def top_m(self) -> Vec3:
+        x, y, z = self.middle_m
+        return (x, y, z + self.half_m[2])
+
+    def is_apart(self, other: _Placed) -> bool:
+        one, two = math.hypot(*self.half_m[:2]), math.hypot(*other.half_m[:2])
+        return math.dist(self.middle_m[:2], other.middle_m[:2]) > one + two + _APART_M
+
+
+def _draw_place(
+    thing: Thing,
+    words: str,
+    asset: str,
+    arm: Articulation,
+    placed: Mapping[str, _Placed],
+    assets: AssetIndex,
+    rng: Rng,
+) -> _Placed:
+    x, y = float(rng.uniform(*thing.x_m)), float(rng.uniform(*thing.y_m))
+    yaw_rad = math.radians(float(rng.uniform(*thing.yaw_deg)))
+    if thing.near:
+        near = placed[thing.near]
+        foot = near.middle_m[2] - near.half_m[2]
+        base = SE3.about_z(near.yaw_rad, (near.middle_m[0], near.middle_m[1], foot))
+        yaw_rad += near.yaw_rad
+    else:
+        base = arm.T_world_base
+    low, high = assets.bounds_m(asset)
+    half = half_extents_m(low, high, 1.0)
+    fixed = thing.mass_kg == 0.0 or thing.joint is not None
+    lift = 0.0 if fixed else _LIFT_M
+    stand = (base @ SE3((x, y, thing.z_m + lift))).translation_m
+    center = tuple(0.5 * (a + b) for a, b in zip(low, high, strict=True))
+    turned = SE3.about_z(yaw_rad, stand) @ SE3((-center[0], -center[1], -low[2]))
+    mass_kg = assets.get(asset).mass_kg if thing.mass_kg is None else thing.mass_kg
+    member = Member(
+        asset, turned.rounded(), motion="static" if fixed else "dynamic", mass_kg=mass_kg
+    )
+    return _Placed(words, member, half, (stand[0], stand[1], stand[2] + half[2]), yaw_rad)
+
+
+def _variants(asset: str) -> tuple[str, ...]:
+    if "?" in asset or "/" in asset:
+        return (asset,)
+    return tuple(f"{asset}?seed={k}" for k in range(SEEDS))
+
+
+def _condition(condition: Success, bodies: Mapping[str, str]) -> Condition:
+    names = {**bodies, HAND: HAND, "": ""}
+    given = condition.model_dump()
+    return Condition(**{**given, "body": names[condition.body], "other": names[condition.other]})
+
+
+def _joints(task: Task, bodies: Mapping[str, str]) -> Iterator[BodyJoint]:
+    for name, thing in task.things.items():
+        if thing.joint is not None:
+            given = thing.joint.model_dump(exclude={"limits"})
+            low, high = thing.joint.limits
+            yield BodyJoint(body=bodies[name], lower=low, upper=high, **given)
+
+
+def _goals(
+    task: Task, placed: Mapping[str, _Placed], bodies: Mapping[str, str], arm: Articulation
+) -> Iterator[ArmGoal]:
+    """Goals of a program, in the world."""
+    latest_m: Vec3 = (0.0, 0.0, 0.0)
+    held_yaw_rad = 0.0
+    for step in task.program:
+        touches = tuple(bodies[name] for name in step.touches)
+        if step.verb == "grasp":
+            held_yaw_rad = placed[step.at].yaw_rad
+            yield ArmGoal("grasp", objects=(bodies[step.at],), phase=step.phase)
+            continue
+        if step.verb == "grip":
+            yield ArmGoal("grip", gripper_opening=step.opening, phase=step.phase)
+            continue
+        frame = _frame(step, placed, arm)
+        if step.verb == "move":
+            waypoints = tuple(_motions(step, frame, latest_m))
+            yield ArmGoal("move", waypoints=waypoints, touches=touches, phase=step.phase)
+            continue
+        latest_m = (frame @ SE3(step.offset_m)).translation_m
+        carried = step.carries or step.verb == "place"
+        first, count = math.radians(step.yaw_deg) + _yaw_of(frame), step.yaws or 2
+        if carried:
+            first = first - held_yaw_rad if step.yaws else 0.0
+            count = step.yaws or _YAWS
+        turns = [first + 2.0 * math.pi * k / count for k in range(count)]
+        if carried:
+            poses = tuple(SE3.about_z(turn, latest_m).rounded() for turn in turns)
+        else:
+            poses = tuple(hand_pose(latest_m, turn) for turn in turns)
+        yield ArmGoal(
+            "place" if step.verb == "place" else "reach",
+            pose_candidates=poses,
+            gripper_opening=step.opening,
+            carries=step.carries,
+            phase=step.phase,
+        )
+
+
+def _frame(step: Step, placed: Mapping[str, _Placed], arm: Articulation) -> SE3:
+    """Frame of a step at the top of its thing."""
+    if not step.at:
+        return IDENTITY
+    thing = placed[step.at]
+    if step.along == "own":
+        return SE3.about_z(thing.yaw_rad, thing.top_m)
+    start, end = arm.T_world_base.translation_m, thing.middle_m
+    if step.along:
+        start, end = thing.middle_m, placed[step.along].middle_m
+    return SE3.about_z(math.atan2(end[1] - start[1], end[0] - start[0]), thing.top_m)
+
+
+def _motions(step: Step, frame: SE3, latest_m: Vec3) -> Iterator[SE3]:
+    """Waypoints of a move, as motions in the world."""
+    turn = SE3(quaternion_wxyz=frame.quaternion_wxyz)
+    moved = IDENTITY
+    for by_m in step.by_m:
+        moved = SE3((turn @ SE3(by_m)).translation_m)
+        yield moved.rounded()
+    if step.turn_deg:
+        pivot_m = latest_m if step.pivot_m is None else (frame @ SE3(step.pivot_m)).translation_m
+        pivot = SE3(pivot_m, frame.quaternion_wxyz)
+        count = max(1, math.ceil(abs(step.turn_deg) / 5.0))
+        for k in range(1, count + 1):
+            half = 0.5 * math.radians(step.turn_deg) * k / count
+            x, y, z = (math.sin(half) * a for a in step.axis)
+            turned = pivot @ SE3(quaternion_wxyz=(math.cos(half), x, y, z)) @ pivot.inverse()
+            yield (turned @ moved).rounded()
+
+
+def _yaw_of(frame: SE3) -> float:
+    w, _, _, z = frame.quaternion_wxyz
+    return 2.0 * math.atan2(z, w)
