@@ -32,6 +32,7 @@ TABLE = PluginTable[Element](
         "robot": "gen_data.scene_templates.robot:Robot",
         "roundabout": "gen_data.scene_templates.roundabout:Roundabout",
         "room": "gen_data.scene_templates.room:Room",
+        "room_layout": "gen_data.scene_templates.room_layout:RoomLayout",
         "shelf": "gen_data.scene_templates.shelf:Shelf",
         "signals": "gen_data.scene_templates.signals:Signals",
         "square": "gen_data.scene_templates.square:Square",

@@ -229,7 +229,6 @@ def workbench(seed: int = 0) -> Solid:
     top: Box = ((-0.5 * d, -0.5 * w, z - 0.05), (0.5 * d, 0.5 * w, z))
     low: Box = ((-0.5 * d + 0.06, -0.5 * w + 0.06, 0.18), (0.5 * d - 0.08, 0.5 * w - 0.06, 0.21))
     patches = [board(*top, 0, 0.005), board(*low, 0), *four_legs(d, w, z - 0.05, 0.07, 1, 0.06)]
-    patches.append(board((-0.5 * d, -0.5 * w, z), (-0.5 * d + 0.02, 0.5 * w, z + 0.12), 0))
     legs = painted_material(rng.choose(("#2f5d7c", "#3b4046", "#6b7074", "#8a2f26")), 0.45)
     return solid(patches, [wood(rng, 0.6), legs if rng.chance(0.6) else wood(rng)], [top, low, *_legs_under(d, w, z)])
 

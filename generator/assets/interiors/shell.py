@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +19,7 @@ from gen_data.generator.assets.procedural.material_presets import (
     patterned_material,
 )
 from gen_data.generator.assets.procedural.patches import Patch
-from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.asset_types import Keypoint, Material
 from gen_data.generator.core.se3 import Vec3
 
 OPENINGS_MAX = 3
@@ -99,6 +100,8 @@ def wall(
 def door_frame(size_m: Vec3 = (0.9, 2.05, 0.12)) -> Solid:
     """The frame of a door, its opening along Y, its middle at the origin. Slot: frame.
 
+    Its leaf hangs at the keypoint ``hinge`` and opens towards +X.
+
     Args:
         size_m: Width and height of the opening, thickness of the wall.
 
@@ -112,7 +115,10 @@ def door_frame(size_m: Vec3 = (0.9, 2.05, 0.12)) -> Solid:
         ((-a, 0.5 * w - c, 0.0), (a, 0.5 * w + 0.05, h + 0.05)),
         ((-a, -0.5 * w + c, h - c), (a, 0.5 * w - c, h + 0.05)),
     ]
-    return solid([shapes.block(*b, 0.003) for b in boxes], [painted_material("#f0eee9", 0.4)], boxes)
+    made = solid(
+        [shapes.block(*b, 0.003) for b in boxes], [painted_material("#f0eee9", 0.4)], boxes
+    )
+    return replace(made, keypoints=(Keypoint("hinge", (0.5 * t - 0.022, -0.5 * w + 0.03, 0.0)),))
 
 
 def door_leaf(
