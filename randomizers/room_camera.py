@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field
 
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.scene import Body, Camera, Scene
 from gen_data.generator.core.se3 import Vec3, look_at
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
@@ -34,6 +36,8 @@ class RoomCamera(RandomizerBase):
         away_m: Smallest distance from that piece.
         clearance_m: Smallest distance to any body.
         near_m: Distance within which bodies may hide a fifth of the image at most.
+        min_pieces: Smallest number of pieces whose origins are in the image; half of
+            all pieces if that is fewer.
     """
 
     type: Literal["room_camera"] = "room_camera"
@@ -46,6 +50,7 @@ class RoomCamera(RandomizerBase):
     away_m: float = Field(1.3, ge=0)
     clearance_m: float = Field(0.25, ge=0)
     near_m: float = Field(0.7, ge=0)
+    min_pieces: int = Field(7, ge=0, le=100)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with its cameras moved. Raises LayoutRejected if no place is free."""
@@ -59,7 +64,10 @@ class RoomCamera(RandomizerBase):
                 if pose is None:
                     continue
                 moved = replace(camera, T_world_camera=look_at(*pose).rounded())
-                if hidden_share(moved, scene, assets, self.near_m) <= _HIDDEN_MAX:
+                if (
+                    _count_in_view(moved, pieces) >= min(self.min_pieces, len(pieces) // 2)
+                    and hidden_share(moved, scene, assets, self.near_m) <= _HIDDEN_MAX
+                ):
                     cameras[k] = moved
                     break
             else:
@@ -105,3 +113,15 @@ class RoomCamera(RandomizerBase):
         )  # fmt: skip
         return eye, target, roll
 
+
+
+def _count_in_view(camera: Camera, pieces: Sequence[Body]) -> int:
+    """Number of pieces whose origins are within the image."""
+    points = np.array([body.T_world_body.translation_m for body in pieces])
+    x, y, z = camera.T_world_camera.inverse().apply(points).T
+    k = camera.intrinsics
+    ahead = z > 0.3
+    deep = np.where(ahead, z, 1.0)
+    u, v = k.fx_px * x / deep + k.cx_px, k.fy_px * y / deep + k.cy_px
+    seen = ahead & (u > 0) & (u < k.width_px) & (v > 0) & (v < k.height_px)
+    return int(seen.sum())

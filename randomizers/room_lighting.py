@@ -56,7 +56,7 @@ class RoomLighting(RandomizerBase):
     type: Literal["room_lighting"] = "room_lighting"
     stage: Literal["scene", "view"] = "view"
     room: str = "room"
-    daylight_cd_m2: dist.Positive = dist.LogUniform(600.0, 5000.0)
+    daylight_cd_m2: dist.Positive = dist.LogUniform(400.0, 3000.0)
     night: dist.Flag = dist.Probability(0.2)
     is_on: dist.Flag = dist.Probability(0.6)
     luminous_flux_lm: dist.Positive = dist.LogUniform(500.0, 2500.0)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -393,10 +393,14 @@ def _at_windows(layout: Layout, rule: Rule, options: Options, wanted: int) -> in
         family, asset = _draw_asset(layout, rule, options)
         s = layout.shape(asset)
         low = max(0.015, min(opening.high_m + 0.14, layout.room.size_m[2] - 0.04) - s.high)
+        before = len(layout.pieces)
         for side in (-1, 1):
             along = opening.along_m + side * (0.5 * opening.width_m + s.half_y)
             at = layout.room.at_wall(opening.wall, along, s.half_x + 0.06)
-            placed += layout.put(rule, family, asset, at, opening.wall * 0.5 * math.pi, low)
+            layout.put(rule, family, asset, at, opening.wall * 0.5 * math.pi, low)
+        if len(layout.pieces) < before + 2:
+            del layout.pieces[before:]
+        placed += len(layout.pieces) - before
     return placed
 
 

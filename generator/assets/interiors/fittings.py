@@ -13,6 +13,7 @@ from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.furniture import rectangle
 from gen_data.generator.assets.procedural.material_presets import (
     ALUMINIUM,
+    PALETTES,
     PLASTICS,
     STAINLESS,
     draw_linear,
@@ -331,3 +332,40 @@ def whiteboard(seed: int = 0) -> Solid:
     tray: Box = ((0.0, -0.3 * w, -0.01), (0.06, 0.3 * w, 0.0))
     patches = [*_frame(w, h, 0.02, 0.022), shapes.block(*back, 0.0, 1), shapes.block(*tray, 0.003)]
     return solid(patches, [metal_material(ALUMINIUM, 0.4), painted_material("#f5f6f5", 0.15)], [back])
+
+
+def book_row(seed: int = 0) -> Solid:
+    """Books that stand side by side, spines towards +X. Slots: one per cloth, pages last."""
+    rng = variant_rng("book_row", seed)
+    covers = [Material(draw_linear(PALETTES["cloth"], 0.15, rng), rng.between(0.4, 0.8)) for _ in range(6)]
+    patches: list[Patch] = []
+    y, count = 0.0, int(rng.between(4, 15))
+    tallest = 0.0
+    for _ in range(count):
+        thick, h, d = rng.between(0.012, 0.045), rng.between(0.17, 0.27), rng.between(0.12, 0.19)
+        x1 = 0.09 - rng.between(0.0, 0.012)
+        slot = min(int(rng.random() * 6), 5)
+        book = [
+            shapes.block((x1 - d, y, 0.0), (x1, y + 0.002, h), 0.0, slot),
+            shapes.block((x1 - d, y + thick - 0.002, 0.0), (x1, y + thick, h), 0.0, slot),
+            shapes.block((x1 - 0.003, y, 0.0), (x1, y + thick, h), 0.001, slot),
+            shapes.block((x1 - d + 0.004, y + 0.002, 0.004), (x1 - 0.003, y + thick - 0.002, h - 0.004), 0.0, 6),
+        ]
+        patches += book
+        y, tallest = y + thick + 0.0008, max(tallest, h)
+    moved = [patch.moved(0.0, -0.5 * y, 0.0) for patch in patches]
+    looks = [*covers, painted_material("#e9e2d0", 0.9)]
+    return solid(moved, looks, [((-0.1, -0.5 * y, 0.0), (0.09, 0.5 * y, tallest))])
+
+
+def picture_frame(seed: int = 0) -> Solid:
+    """A framed photograph that stands, leaning back. Slots: frame, mount, print."""
+    rng = variant_rng("picture_frame", seed)
+    w, h, f = rng.between(0.1, 0.2), rng.between(0.13, 0.24), rng.between(0.008, 0.02)
+    image = rectangle((0.006, -0.5 * w + f, f), (0.0, w - 2 * f, 0.0), (0.0, 0.0, h - 2 * f)).painted(2)
+    patches = [*_frame(w, h, f, 0.014), shapes.block((0.0, -0.5 * w + 0.003, 0.003), (0.005, 0.5 * w - 0.003, h - 0.003), 0.0, 1), image]
+    leaning = [patch.rotated("y", -0.22) for patch in patches]
+    stand = board((-0.055, -0.015, 0.0), (-0.05, 0.015, 0.45 * h), 1)
+    look = printed_material(f"texture/book_cover?seed={seed}", 0.15)
+    boxes: list[Box] = [((-0.22 * h, -0.5 * w, 0.0), (0.014, 0.5 * w, h))]
+    return solid([*leaning, stand], [front(rng), painted_material("#4a4038", 0.8), look], boxes)
