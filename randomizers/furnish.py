@@ -29,7 +29,6 @@ from gen_data.randomizers.color_space import hsv_to_linear
 
 TRIES = 16
 """Layouts tried per room before the scene is rejected."""
-_INSIDE_M = 0.15
 _VIEWS = 12
 _DOOR_STYLES = 4
 
@@ -159,12 +158,11 @@ def _moving_parts(assets: AssetIndex) -> dict[str, tuple[str, str]]:
 
 
 def _interior(rooms: tuple[Room, ...]) -> tuple[Vec3, Vec3]:
-    """The box around all rooms, a little inside their walls."""
+    """The box around all rooms."""
     low, high = [math.inf, math.inf], [-math.inf, -math.inf]
     for room in rooms:
         for axis in (0, 1):
-            half = 0.5 * room.size_m[axis] - _INSIDE_M
+            half = 0.5 * room.size_m[axis]
             low[axis] = min(low[axis], room.center_m[axis] - half)
             high[axis] = max(high[axis], room.center_m[axis] + half)
-    top = min(room.size_m[2] for room in rooms) - _INSIDE_M
-    return (low[0], low[1], _INSIDE_M), (high[0], high[1], top)
+    return (low[0], low[1], 0.0), (high[0], high[1], rooms[0].size_m[2])

@@ -90,7 +90,7 @@ class RoomCamera(RandomizerBase):
         mx, my, _ = floor.T_world_body.translation_m
         x = mx + (2.0 * float(rng.random()) - 1.0) * max(0.5 * (x1 - x0) - _WALL_M, 0.0)
         y = my + (2.0 * float(rng.random()) - 1.0) * max(0.5 * (y1 - y0) - _WALL_M, 0.0)
-        eye = (x, y, min(self.height_m.draw(rng), scene.interior_m[1][2]))
+        eye = (x, y, min(self.height_m.draw(rng), scene.interior_m[1][2] - _WALL_M))
         here = [
             b for b in pieces
             if abs(b.T_world_body.translation_m[0] - mx) < 0.5 * (x1 - x0)

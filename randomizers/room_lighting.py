@@ -146,7 +146,7 @@ def _window_light(window: Body, assets: AssetIndex, luminance_cd_m2: float) -> L
     """A panel in the plane of a window's panes that shines into the room."""
     low, high = assets.bounds_m(window.asset)
     width, height = round(high[1] - low[1] - 0.2, 4), round(high[2] - 0.12, 4)
-    x, y, z = window.T_world_body.apply((0.06, 0.0, 0.5 * high[2]))
+    x, y, z = window.T_world_body.apply((0.055, 0.0, 0.5 * high[2]))
     w, _, _, qz = window.T_world_body.quaternion_wxyz
     c, s = round(1.0 - 2.0 * qz * qz, 6), round(2.0 * w * qz, 6)
     return Light(

@@ -6,15 +6,13 @@ from dataclasses import replace
 from typing import Literal
 
 from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import ObjectGroup, Region, Scene
+from gen_data.generator.core.scene import ObjectGroup, Scene
 from gen_data.generator.core.streams import Streams
 from gen_data.generator.rooms.bodies import Builder, Looks
 from gen_data.generator.rooms.floor_plan import Room, draw_plan
 from gen_data.generator.rooms.options import families_of, find_options
 from gen_data.generator.rooms.rules import APARTMENT, find_room_type
 from gen_data.scene_templates.element import Element
-
-_INSIDE_M = 0.15
 
 
 class RoomLayout(Element):
@@ -46,11 +44,9 @@ class RoomLayout(Element):
         ids = sorted({i for ids in find_options(assets, families).values() for i in ids})
         group = ObjectGroup(self.name, (), tuple(ids), 0, "scatter")
         x, y, z = rooms[0].size_m
-        low = (-x / 2 + _INSIDE_M, -y / 2 + _INSIDE_M, _INSIDE_M)
-        high = (x / 2 - _INSIDE_M, y / 2 - _INSIDE_M, z - _INSIDE_M)
-        return replace(
-            scene, groups=(*scene.groups, group), interior_m=(low, high), focus=Region((0.0, 0.0, 1.0))
-        )
+        (mx, my) = rooms[0].center_m
+        low, high = (mx - x / 2, my - y / 2, 0.0), (mx + x / 2, my + y / 2, z)
+        return replace(scene, groups=(*scene.groups, group), interior_m=(low, high))
 
 
 def _nominal_plan(kind: str, field: str) -> tuple[Room, ...]:

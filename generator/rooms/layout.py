@@ -477,7 +477,7 @@ def _put_thing(layout: Layout, rule: Rule, options: Options, k: int, height: flo
         reach = (s.half_x * tc + s.half_y * ts, s.half_x * ts + s.half_y * tc)
         edge = 0.03 if boards else 0.05
         free = a - edge - reach[0], b - edge - reach[1]
-        if min(free) < 0.0 and family != "pallet":
+        if min(free) < 0.0:
             continue
         dx, dy = layout.signed(max(free[0], 0.0)), layout.signed(max(free[1], 0.0))
         at = (x + c * dx - sn * dy, y + sn * dx + c * dy)

@@ -327,7 +327,7 @@ def board_levels_m(height_m: float) -> tuple[float, ...]:
 def pallet_rack(seed: int = 0) -> Solid:
     """A rack for pallets with three levels above the floor. Slots: uprights, beams, decks."""
     rng = variant_rng("pallet_rack", seed)
-    d, w = 1.1, rng.between(2.4, 2.8)
+    d, w = 1.3, rng.between(2.4, 2.8)
     z = 3 * PALLET_PITCH_M + rng.between(0.1, 0.3)
     uprights: list[Box] = []
     for sy in (-1, 1):
