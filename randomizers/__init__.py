@@ -26,6 +26,7 @@ TABLE = PluginTable[Randomizer](
         "lighting": "gen_data.randomizers.lighting:Lighting",
         "object_states": "gen_data.randomizers.object_states:ObjectStates",
         "room_camera": "gen_data.randomizers.room_camera:RoomCamera",
+        "room_path": "gen_data.randomizers.room_path:RoomPath",
         "room_lighting": "gen_data.randomizers.room_lighting:RoomLighting",
         "materials": "gen_data.randomizers.materials:Materials",
         "objects": "gen_data.randomizers.objects:Objects",

@@ -11,6 +11,7 @@ TABLE = PluginTable[Element](
         "lane_objects": "gen_data.scene_templates.lane_objects:LaneObjects",
         "backdrop": "gen_data.scene_templates.backdrop:Backdrop",
         "bin": "gen_data.scene_templates.bin:Bin",
+        "carrier": "gen_data.scene_templates.carrier:Carrier",
         "crosswalk": "gen_data.scene_templates.crosswalk:Crosswalk",
         "ego": "gen_data.scene_templates.ego:Ego",
         "fields": "gen_data.scene_templates.fields:Fields",

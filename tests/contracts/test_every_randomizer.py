@@ -65,9 +65,9 @@ IN_ROOMS = ("furnish", "object_states", "room_camera", "room_lighting")
 
 @cache
 def furnished_room() -> Scene:
-    """A bathroom with two cameras; ``furnish`` draws another one in its place."""
+    """A bedroom with two cameras; ``furnish`` draws another one in its place."""
     library = open_library(())
-    scene = build_scene("test", (RoomLayout(name="room", kind="bathroom"),), library)
+    scene = build_scene("test", (RoomLayout(name="room", kind="bedroom"),), library)
     lens = Intrinsics.from_hfov(64, 48, 1.0)
     cameras = tuple(Camera(name, SE3((0.0, 0.0, 1.5)), lens) for name in ("left", "right"))
     return made("furnish")(replace(scene, cameras=cameras), library, rng_of("room"))
