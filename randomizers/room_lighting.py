@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Literal
 
@@ -44,8 +44,9 @@ class RoomLighting(RandomizerBase):
     Attributes:
         room: Name of the template's ``room_layout`` element.
         daylight_cd_m2: Luminance of the brightest sky outside by day.
-        night: Whether it is night; the view outside is nearly black then, and a lamp is on.
-        is_on: Whether a lamp is on; drawn for each.
+        night: Whether it is night; the view outside is nearly black then, and the lamps of all
+            ceilings are on, as in rooms without windows.
+        is_on: Whether a lamp is on; drawn for each, and once for all on the ceiling of a room.
         luminous_flux_lm: Flux of each lamp.
         temperature_k: Colour temperature of all lamps.
         sun: Whether the sun shines in by day.
@@ -90,25 +91,22 @@ class RoomLighting(RandomizerBase):
         )
         scene = scene.with_bodies(replace(view, materials=glow))
         lights = (*sun, *panels, *lamps)
-        return replace(scene, lights=lights, environment=_reflected(scene, lights, windows, assets))
+        return replace(scene, lights=lights, environment=_reflected(scene, lights))
 
     def _switch_lamps(
         self, scene: Scene, own: Sequence[Body], assets: AssetIndex, rng: Rng, *, must: bool
     ) -> tuple[list[Light], Scene]:
         color = temperature_to_linear(self.temperature_k.draw(rng))
         found = [(b, at_m) for b in own if (at_m := keypoint_m(assets, b.asset, LAMP)) is not None]
-        ceiling = [self.is_on.draw(rng)] * len(found)
         lights, changed = [], []
         attributes: dict[int, list[tuple[str, str]]] = {}
-        shared = self.luminous_flux_lm.draw(rng)
+        shared_lm = self.luminous_flux_lm.draw(rng)
+        switches: dict[str, bool] = {}
         for number, (body, at_m) in enumerate(found):
-            hangs = at_m[2] < 0.0
-            # The lamps of a ceiling have one switch.
-            is_on = ceiling[0] if hangs else self.is_on.draw(rng)
-            flux_lm = shared if hangs else 0.5 * self.luminous_flux_lm.draw(rng)
-            is_on = is_on or (must and number == _first_hanging(found))
-            if must and hangs:
-                is_on = True
+            is_on, flux_lm = self.is_on.draw(rng), 0.5 * self.luminous_flux_lm.draw(rng)
+            if at_m[2] < 0.0:
+                # The lamps of a ceiling have one switch.
+                is_on, flux_lm = must or switches.setdefault(_room_of(body), is_on), shared_lm
             lit = flux_lm if is_on else 0.0
             # A lamp that is off shows its shade alone.
             glow = scale_emission(color, lit / (math.pi * _SHADE_M2))
@@ -133,8 +131,9 @@ class RoomLighting(RandomizerBase):
         return (Light("sun", "sun", direction=direction, color=(1.06, 0.99, 0.9), illuminance_lux=round(lux, 1)),)
 
 
-def _first_hanging(found: Sequence[tuple[Body, Vec3]]) -> int:
-    return next((k for k, (_, at_m) in enumerate(found) if at_m[2] < 0.0), 0)
+def _room_of(body: Body) -> str:
+    """Name of the room that a body is in: ``room/<name>/lamp_0``."""
+    return body.name.split("/")[1]
 
 
 def _lamp_light(name: str, body: Body, at_m: Vec3, flux_lm: float, color: Vec3) -> Light:
@@ -156,11 +155,8 @@ def _window_light(window: Body, assets: AssetIndex, luminance_cd_m2: float) -> L
     )  # fmt: skip
 
 
-def _reflected(
-    scene: Scene, lights: Sequence[Light], windows: Sequence[Body], assets: AssetIndex
-) -> Environment:
+def _reflected(scene: Scene, lights: Sequence[Light]) -> Environment:
     """Uniform light from all around: what the walls of the room send back."""
-    del windows, assets
     (x0, y0, z0), (x1, y1, z1) = scene.interior_m
     a, b, c = x1 - x0, y1 - y0, z1 - z0
     area = 2.0 * (a * b + b * c + c * a)

@@ -14,7 +14,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.assets.interiors.storage import PALLET_PITCH_M, board_levels_m
+from gen_data.generator.assets.interiors.storage import (
+    PALLET_PITCH_M,
+    VARIANTS_PER_LOOK,
+    board_levels_m,
+)
 from gen_data.generator.core.boxes import Rectangle, overlap_of
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.se3 import Vec3
@@ -92,12 +96,14 @@ class Layout:
     """A room being furnished.
 
     Attributes:
+        look: Decides on the look of matching pieces, in [0, 1).
         zones: Floor to keep free, with the index of the piece that needs it; -1 = a door.
     """
 
     room: Room
     assets: AssetIndex
     rng: Rng
+    look: float = 0.0
     pieces: list[Piece] = field(default_factory=list)
     zones: list[tuple[Rectangle, int]] = field(default_factory=list)
     refused: Counter[str] = field(default_factory=Counter)
@@ -214,7 +220,7 @@ def furnish(room: Room, rules: RoomType, options: Options, assets: AssetIndex, r
     Raises:
         Conflict: a required piece has no place, or something cannot be reached.
     """
-    layout = Layout(room, assets, rng)
+    layout = Layout(room, assets, rng, look=float(rng.random()))
     for opening in room.openings:
         if opening.kind == "door":
             x, y = room.at_wall(opening.wall, opening.along_m, 0.5 * DOOR_ZONE_M)
@@ -242,7 +248,12 @@ def furnish(room: Room, rules: RoomType, options: Options, assets: AssetIndex, r
 
 def _draw_asset(layout: Layout, rule: Rule, options: Options) -> tuple[str, str]:
     family = layout.pick(rule.assets)
-    return family, layout.pick(options[family])
+    found = options[family]
+    if rule.matching:
+        look = int(layout.look * (len(found) // VARIANTS_PER_LOOK))
+        seeds = range(VARIANTS_PER_LOOK * look, VARIANTS_PER_LOOK * (look + 1))
+        found = [f"{family}?seed={seed}" for seed in seeds]
+    return family, layout.pick(found)
 
 
 

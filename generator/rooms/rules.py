@@ -33,6 +33,7 @@ class Rule:
         clearance_m: Depth of free floor before its front [m].
         height_m: Height of its lowest point, for what hangs [m].
         at: Place on the top that carries it, from -1 to 1 along depth and width.
+        matching: Whether all matching pieces of a room have one look.
         things: Families of small things on it.
         how_many: Smallest and largest number of them per surface.
     """
@@ -46,6 +47,7 @@ class Rule:
     clearance_m: float = 0.0
     height_m: Range = (0.0, 0.0)
     at: tuple[float, float] = (0.0, 0.0)
+    matching: bool = False
     things: tuple[str, ...] = ()
     how_many: tuple[int, int] = (0, 0)
 

@@ -36,6 +36,8 @@ from gen_data.generator.core.se3 import Vec3
 
 _T = 0.018
 """Thickness of boards."""
+VARIANTS_PER_LOOK = 2
+"""Kitchen units of consecutive seeds that look alike."""
 PITCH_M = 0.36
 """Usual distance between the boards of bookcases; racks for pallets have four times as much."""
 
@@ -118,7 +120,7 @@ def _looks(family: str, rng: VariantRng, seed: int) -> list[Material]:
         return [shell, shell, steel]
     if family in ("kitchen_unit", "wall_unit"):
         # One kitchen has one look: variants of the same number match.
-        shared = variant_rng("kitchen", seed // 2)
+        shared = variant_rng("kitchen", seed // VARIANTS_PER_LOOK)
         facing = front(shared)
         worktop = patterned_material(
             f"texture/{shared.choose(('marble', 'wood_grain', 'terrazzo', 'concrete'))}?seed={int(shared.between(0, 16))}",
