@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from gen_data.generator.annotations.bev_raster import (
@@ -24,12 +25,19 @@ from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetLibrary
 from gen_data.generator.core.lane_geometry import lane_borders, left_normals
 from gen_data.generator.core.sample import BirdseyeMap, EgoTruth
-from gen_data.generator.core.scene import Instance, Scene
+from gen_data.generator.core.scene import Body, Instance, Scene
 from gen_data.generator.core.se3 import SE3, Array
 
 LINE_PX = 1.5
 """Width of borders: wide enough that rasterised lines have no gaps."""
 PEOPLE = frozenset({"pedestrian", "person"})
+
+
+Layers = dict[str, NDArray[np.bool_]]
+HEAD_M = 1.9
+"""Things that hang higher leave the floor below them free."""
+FLAT_M = 0.03
+"""Lower things, such as rugs, are walked on."""
 
 
 class BevMap(Strict):
@@ -40,6 +48,9 @@ class BevMap(Strict):
     the same and of opposite directions; ``vehicles``, ``people``: footprints of the boxes of
     annotated instances, by their assets' tags; ``free_space``: drivable and unoccupied. The layers
     follow nuScenes' maps.
+
+    In rooms the layers are ``floor``, ``wall``, ``door``, ``window``, ``occupied`` and
+    ``free_space``: a two-dimensional occupancy map.
 
     Attributes:
         px_m: Side of a pixel.
@@ -62,30 +73,69 @@ class BevMap(Strict):
         if not truth.rig:
             raise ConfigError(
                 "annotation 'bev_map': the scene has no rig to centre the map on; add an element"
-                " 'ego'"
+                " 'ego' or 'carrier'"
             )
         scene = scenes[""]
         T_world_map = level_pose(truth.T_world_ego)
         grid = Grid(T_world_map, self.px_m, 2 * math.ceil(self.reach_m / self.px_m))
-        drivable = covered_cells(grid, carriageways(scene, assets))
+        layers = _room_layers if any(i.category == "floor" for i in scene.instances) else _street_layers
         own = scene.body(scene.rig(truth.rig).body).instance_id
-        standing = [b for b in scene.bodies if b.instance_id not in (0, own)]
-        kinds = {i.instance_id: frozenset(assets.get(i.asset).tags) for i in scene.instances}
-        shown = [i for i in scene.instances if i.annotated]
-        vehicles = [i for i in shown if "vehicle" in kinds[i.instance_id]]
-        people = [i for i in shown if kinds[i.instance_id] & PEOPLE]
-        layers = {
-            "drivable": drivable,
-            "parking": covered_cells(grid, _lanes(scene, "parking")),
-            "crosswalk": covered_cells(grid, _lanes(scene, "crosswalk")),
-            "sidewalk": covered_cells(grid, _lanes(scene, "sidewalk")),
-            "lane_divider": covered_cells(grid, _borders(scene, "lane", LINE_PX * self.px_m)),
-            "road_divider": covered_cells(grid, _borders(scene, "road", LINE_PX * self.px_m)),
-            "vehicles": covered_cells(grid, _floors(vehicles)),
-            "people": covered_cells(grid, _floors(people)),
-            "free_space": drivable & ~covered_cells(grid, footprints(standing, assets)),
-        }
-        return replace(truth, birdseye=BirdseyeMap(T_world_map, self.px_m, layers))
+        return replace(truth, birdseye=BirdseyeMap(T_world_map, self.px_m, layers(grid, scene, assets, own)))
+
+
+def _street_layers(grid: Grid, scene: Scene, assets: AssetLibrary, own: int) -> Layers:
+    drivable = covered_cells(grid, carriageways(scene, assets))
+    standing = [b for b in scene.bodies if b.instance_id not in (0, own)]
+    kinds = {i.instance_id: frozenset(assets.get(i.asset).tags) for i in scene.instances}
+    shown = [i for i in scene.instances if i.annotated]
+    vehicles = [i for i in shown if "vehicle" in kinds[i.instance_id]]
+    people = [i for i in shown if kinds[i.instance_id] & PEOPLE]
+    return {
+        "drivable": drivable,
+        "parking": covered_cells(grid, _lanes(scene, "parking")),
+        "crosswalk": covered_cells(grid, _lanes(scene, "crosswalk")),
+        "sidewalk": covered_cells(grid, _lanes(scene, "sidewalk")),
+        "lane_divider": covered_cells(grid, _borders(scene, "lane", LINE_PX * self.px_m)),
+        "road_divider": covered_cells(grid, _borders(scene, "road", LINE_PX * self.px_m)),
+        "vehicles": covered_cells(grid, _floors(vehicles)),
+        "people": covered_cells(grid, _floors(people)),
+        "free_space": drivable & ~covered_cells(grid, footprints(standing, assets)),
+    }
+
+
+def _room_layers(grid: Grid, scene: Scene, assets: AssetLibrary, own: int) -> Layers:
+    """Layers of rooms: an occupancy map, and what walls hold.
+
+    ``occupied`` is covered by furniture and things whose lowest point is below ``HEAD_M``, rugs
+    left out, or by open doors; ``free_space`` is the rest of the floor, and of doorways.
+    """
+    def outlines(category: str) -> NDArray[np.bool_]:
+        ids = {i.instance_id for i in scene.instances if i.category == category}
+        bodies = (b for b in scene.bodies if b.instance_id in ids and b.part_id < 2)
+        return covered_cells(grid, footprints(bodies, assets))
+
+    shell = {i.instance_id for i in scene.instances if i.category in ("floor", "ceiling", "wall", "window")}
+    doors = {i.instance_id for i in scene.instances if i.category == "door"}
+    standing = [
+        b for b in scene.bodies
+        if b.instance_id not in (0, own) and b.instance_id not in shell
+        and not (b.instance_id in doors and b.part_id == 1)
+        and _height_m(b, assets, 0) < HEAD_M and _height_m(b, assets, 1) > FLAT_M
+    ]  # fmt: skip
+    floor, door, occupied = outlines("floor"), outlines("door"), covered_cells(grid, footprints(standing, assets))
+    return {
+        "floor": floor,
+        "wall": outlines("wall") & ~door,
+        "door": door,
+        "window": outlines("window"),
+        "occupied": occupied,
+        "free_space": (floor | door) & ~occupied,
+    }
+
+
+def _height_m(body: Body, assets: AssetLibrary, corner: int) -> float:
+    """Height of the lowest (0) or highest (1) point of an upright body."""
+    return body.T_world_body.translation_m[2] + body.scale * assets.bounds_m(body.asset)[corner][2]
 
 
 def level_pose(pose: SE3) -> SE3:

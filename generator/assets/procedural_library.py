@@ -41,6 +41,7 @@ TABLES = (
     "gen_data.generator.assets.scenery",
     "gen_data.generator.assets.vehicles",
     "gen_data.generator.assets.people",
+    "gen_data.generator.assets.interiors",
     "gen_data.generator.assets.skies",
 )
 """Packages with tables ``FAMILIES``, ``TEXTURES`` or ``ENVIRONMENTS``."""

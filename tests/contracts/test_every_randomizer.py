@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 import pickle
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import pytest
 from pydantic import ValidationError
 
+from gen_data.generator.assets.library import open_library
 from gen_data.generator.config.describe import describe
 from gen_data.generator.config.schema import json_schema
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.interfaces import Stage
+from gen_data.generator.core.interfaces import AssetIndex, Stage
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.plates import CATCHER
 from gen_data.generator.core.scene import (
@@ -34,6 +36,7 @@ from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.objects import AssetChoice, Objects
 from gen_data.scene_templates.robot import Robot
 from gen_data.scene_templates.room import Room
+from gen_data.scene_templates.room_layout import RoomLayout
 from gen_data.scene_templates.surface import SurfaceElement
 from tests.randomizers.doubles import FakeAssets, rng_of
 
@@ -51,10 +54,32 @@ GIVEN: dict[str, dict[str, Any]] = {
 """Fields that a randomizer requires, or that ensure that it changes the scene."""
 
 PHYSICS_BOUND = (
-    "arm_configuration", "arm_motion", "arm_task", "companions", "distractors", "ego_on_lane", "lane_objects",
-    "objects", "physics_properties", "plate", "reaching_hand", "traffic_flow",
+    "arm_configuration", "arm_motion", "arm_task", "companions", "distractors", "ego_on_lane",
+    "furnish", "lane_objects", "objects", "physics_properties", "plate", "reaching_hand",
+    "traffic_flow",
 )  # fmt: skip
 """Randomizers that must run before physics."""
+
+
+IN_ROOMS = ("furnish", "object_states", "room_camera", "room_lighting")
+"""Randomizers of furnished rooms, whose assets and rules are the real ones."""
+
+
+@cache
+def furnished_room() -> Scene:
+    """A bedroom with two cameras; ``furnish`` draws another one in its place."""
+    library = open_library(())
+    scene = build_scene("test", (RoomLayout(name="room", kind="bedroom"),), library)
+    lens = Intrinsics.from_hfov(64, 48, 1.0)
+    cameras = tuple(Camera(name, SE3((0.0, 0.0, 1.5)), lens) for name in ("left", "right"))
+    return made("furnish")(replace(scene, cameras=cameras), library, rng_of("room"))
+
+
+def world_of(kind: str) -> tuple[Scene, AssetIndex]:
+    """A scene that a randomizer can change, and its assets."""
+    if kind in IN_ROOMS:
+        return furnished_room(), open_library(())
+    return nominal_scene(), FakeAssets()
 
 
 def nominal_scene() -> Scene:
@@ -115,7 +140,7 @@ def made(kind: str) -> Any:
 
 def drawn(kind: str, stream: str = "stream", scene_index: int = 0) -> Scene:
     """The nominal scene after one draw."""
-    return made(kind)(nominal_scene(), FakeAssets(), rng_of(stream, scene_index))
+    return made(kind)(*world_of(kind), rng_of(stream, scene_index))
 
 
 each = pytest.mark.parametrize("kind", list(TABLE))
@@ -124,10 +149,10 @@ each = pytest.mark.parametrize("kind", list(TABLE))
 @each
 def test_scene_that_is_handed_in_stays_as_it_is(kind: str) -> None:
     """A randomizer returns a new scene."""
-    scene = nominal_scene()
+    scene, assets = world_of(kind)
     before = canonical_json(scene)
 
-    made(kind)(scene, FakeAssets(), rng_of())
+    made(kind)(scene, assets, rng_of())
 
     assert canonical_json(scene) == before
 
@@ -136,7 +161,7 @@ def test_scene_that_is_handed_in_stays_as_it_is(kind: str) -> None:
 def test_same_stream_draws_the_same_scene_in_any_process(kind: str) -> None:
     """Equal draws from a second call and from a copy in another process."""
     copy = pickle.loads(pickle.dumps(made(kind)))
-    by_copy = copy(nominal_scene(), FakeAssets(), rng_of("stream"))
+    by_copy = copy(*world_of(kind), rng_of("stream"))
 
     assert drawn(kind) == drawn(kind) == by_copy
 
@@ -144,7 +169,7 @@ def test_same_stream_draws_the_same_scene_in_any_process(kind: str) -> None:
 @each
 def test_other_streams_draw_other_scenes(kind: str) -> None:
     """Five streams give five different scenes, none of them the nominal one."""
-    scenes = [nominal_scene(), *(drawn(kind, f"stream {k}") for k in range(5))]
+    scenes = [world_of(kind)[0], *(drawn(kind, f"stream {k}") for k in range(5))]
 
     assert len({canonical_json(scene) for scene in scenes}) == 6
 
@@ -172,7 +197,8 @@ def test_names_and_ids_stay_in_order(kind: str) -> None:
         assert min(ids) == 1
         assert {body.instance_id for body in scene.bodies} <= {0, *ids}
         assert [camera.name for camera in scene.cameras] == ["left", "right"]
-        assert [arm.name for arm in scene.articulations] == ["arm"]
+        arms = [] if kind in IN_ROOMS else ["arm"]
+        assert [arm.name for arm in scene.articulations] == arms
 
 
 @each

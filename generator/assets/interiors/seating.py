@@ -1,0 +1,279 @@
+"""Seats, beds and tables; sizes as furniture is sold, after DIN EN 1729, 527 and 12520 in spirit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from gen_data.generator.assets.interiors.parts import (
+    Box,
+    board,
+    cloth,
+    cushion,
+    disc,
+    four_legs,
+    front,
+    lacquer,
+    rod,
+    solid,
+    upholstery,
+    wood,
+)
+from gen_data.generator.assets.procedural import surface_shapes as shapes
+from gen_data.generator.assets.procedural.family import Solid
+from gen_data.generator.assets.procedural.material_presets import (
+    ALUMINIUM,
+    STEEL,
+    metal_material,
+    painted_material,
+)
+from gen_data.generator.assets.procedural.patches import Patch
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
+
+
+def sofa(seed: int = 0) -> Solid:
+    """A sofa for two to four. Slots: cover, legs, pillows."""
+    rng = variant_rng("sofa", seed)
+    places = 2 + seed % 3
+    return _upholstered(rng, places, places * rng.between(0.58, 0.68))
+
+
+def armchair(seed: int = 0) -> Solid:
+    """An armchair. Slots: cover, legs, pillows."""
+    rng = variant_rng("armchair", seed)
+    return _upholstered(rng, 1, rng.between(0.52, 0.62))
+
+
+def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
+    arm, depth = rng.between(0.12, 0.22), rng.between(0.82, 0.98)
+    seat_z, back_z, leg = rng.between(0.4, 0.46), rng.between(0.72, 0.9), rng.between(0.05, 0.15)
+    arm_z, soft = rng.between(0.54, 0.64), rng.between(0.03, 0.07)
+    w, x0, x1 = seat_m + 2 * arm, -0.5 * depth, 0.5 * depth
+    y0, y1 = -0.5 * w, 0.5 * w
+    base: Box = ((x0 + 0.02, y0 + 0.02, leg), (x1 - 0.03, y1 - 0.02, seat_z - 0.14))
+    back: Box = ((x0, y0 + 0.01, leg), (x0 + 0.2, y1 - 0.01, back_z))
+    arms: list[Box] = [
+        ((x0 + 0.02, y0, leg), (x1, y0 + arm, arm_z)),
+        ((x0 + 0.02, y1 - arm, leg), (x1, y1, arm_z)),
+    ]
+    patches = [cushion(*b, 0, soft) for b in (base, back, *arms)]
+    each = seat_m / places
+    for k in range(places):
+        a = y0 + arm + k * each
+        patches.append(
+            cushion((x0 + 0.17, a + 0.004, seat_z - 0.16), (x1 + 0.01, a + each - 0.004, seat_z), 0, soft)
+        )
+        patches.append(
+            cushion((x0 + 0.13, a + 0.01, seat_z - 0.02), (x0 + 0.31, a + each - 0.01, back_z + 0.06), 0, 0.08)
+        )
+    for k in range(int(rng.between(0, places + 1))):
+        y = rng.between(y0 + arm + 0.2, y1 - arm - 0.2) if places > 1 else 0.0
+        pillow = cushion((-0.07, -0.21, -0.2), (0.07, 0.21, 0.2), 2, 0.068)
+        patches.append(pillow.rotated("y", -0.35).moved(x0 + 0.38, y, seat_z + 0.2))
+    patches += [
+        disc(sx * (0.5 * depth - 0.09), sy * (0.5 * w - 0.09), 0.0, leg + 0.02, 0.02, 1)
+        for sx in (-1, 1)
+        for sy in (-1, 1)
+    ]
+    seat: Box = ((x0 + 0.17, y0 + arm, leg), (x1, y1 - arm, seat_z))
+    return solid(patches, [upholstery(rng), wood(rng), cloth(rng)], [base, back, *arms, seat])
+
+
+def bed(seed: int = 0) -> Solid:
+    """A bed of 0.9 to 1.8 m, made; its head at -X. Slots: frame, mattress, duvet, pillows."""
+    rng = variant_rng("bed", seed)
+    w = (0.9, 1.4, 1.6, 1.8)[seed % 4]
+    length, top = 2.0, rng.between(0.42, 0.55)
+    x0, x1, y0, y1 = -0.5 * length - 0.06, 0.5 * length + 0.04, -0.5 * w - 0.04, 0.5 * w + 0.04
+    rail = rng.between(0.24, 0.34)
+    head: Box = ((x0, y0, 0.0), (x0 + 0.05, y1, rng.between(0.8, 1.15)))
+    sides: list[Box] = [
+        ((x0 + 0.05, y0, 0.12), (x1, y0 + 0.03, rail)),
+        ((x0 + 0.05, y1 - 0.03, 0.12), (x1, y1, rail)),
+        ((x1 - 0.03, y0 + 0.03, 0.12), (x1, y1 - 0.03, rail)),
+    ]
+    soft_head = rng.chance(0.4)
+    patches: list[Patch] = [cushion(*head, 2, 0.03) if soft_head else board(*head, 0, 0.006)]
+    patches += [board(*b) for b in sides]
+    patches += four_legs(x1 - x0, y1 - y0, 0.2, 0.06, 0)
+    mattress: Box = ((-0.5 * length, -0.5 * w, 0.14), (0.5 * length, 0.5 * w, top))
+    patches.append(cushion(*mattress, 1, 0.05))
+    # The duvet hangs over the sides and is folded back at the head.
+    fold = rng.between(0.45, 0.75)
+    patches.append(
+        cushion((-0.5 * length + fold, -0.5 * w - 0.055, top - 0.17), (0.5 * length + 0.03, 0.5 * w + 0.055, top + 0.06), 2, 0.055)
+    )
+    patches.append(
+        cushion((-0.5 * length + fold - 0.04, -0.5 * w - 0.05, top - 0.05), (-0.5 * length + fold + 0.22, 0.5 * w + 0.05, top + 0.085), 1, 0.04)
+    )
+    for y in (0.0,) if w < 1.2 else (-0.25 * w, 0.25 * w):
+        pillow = cushion((-0.2, -0.34, -0.075), (0.2, 0.34, 0.075), 3, 0.07)
+        turned = pillow.rotated("y", rng.between(-0.35, -0.12)).rotated("z", rng.between(-0.08, 0.08))
+        patches.append(turned.moved(-0.5 * length + 0.25, y, top + 0.1))
+    linen = painted_material(rng.choose(("#f3f1ec", "#e8ebee", "#efe6da")), 0.95)
+    return solid(patches, [front(rng), linen, cloth(rng), linen], [head, mattress])
+
+
+def chair(seed: int = 0) -> Solid:
+    """A chair for tables, wooden, upholstered or a shell on steel. Slots: seat, legs."""
+    rng = variant_rng("chair", seed)
+    w, d, z = rng.between(0.4, 0.48), rng.between(0.42, 0.48), rng.between(0.44, 0.47)
+    back_z = rng.between(0.8, 0.98)
+    soft = seed % 3 == 1
+    seat: Box = ((-0.5 * d, -0.5 * w, z - (0.06 if soft else 0.025)), (0.5 * d, 0.5 * w, z))
+    patches = [cushion(*seat, 0, 0.025) if soft else board(*seat, 0, 0.008)]
+    x = -0.5 * d + 0.02
+    legs = 1 if seed % 3 else 0
+    for sy in (-1, 1):
+        y = sy * (0.5 * w - 0.03)
+        patches.append(rod((0.5 * d - 0.03, y, z - 0.02), (0.5 * d, 1.03 * y, 0.0), 0.014, legs))
+        patches.append(rod((x, y, z - 0.02), (x - 0.04, 1.03 * y, 0.0), 0.014, legs))
+        patches.append(rod((x, y, z - 0.03), (x - 0.07, y, back_z), 0.012, legs))
+    if soft or seed % 3 == 2:
+        rest: Box = ((-0.02, -0.5 * w, -0.5 * (back_z - z) + 0.1), (0.02, 0.5 * w, 0.5 * (back_z - z)))
+        patches.append(
+            cushion(*rest, 0, 0.02).rotated("y", -0.14).moved(x - 0.045, 0.0, 0.5 * (z + back_z) + 0.02)
+        )
+    else:
+        for k in range(2 + seed % 2):
+            h = back_z - 0.05 - 0.13 * k
+            lean = x - 0.07 * (h - z) / (back_z - z)
+            patches.append(board((lean - 0.009, -0.5 * w + 0.02, h - 0.035), (lean + 0.009, 0.5 * w - 0.02, h + 0.035), 0, 0.006))
+    steel = metal_material(STEEL, 0.35) if rng.chance(0.5) else painted_material("#26282b", 0.4)
+    body = upholstery(rng) if soft else (wood(rng) if rng.chance(0.65) else lacquer(rng))
+    boxes: list[Box] = [seat, ((x - 0.08, -0.5 * w, z), (x + 0.01, 0.5 * w, back_z))]
+    boxes += _legs_under(d, w, z)
+    return solid(patches, [body, wood(rng) if legs and soft else steel if legs else body], boxes)
+
+
+def stool(seed: int = 0) -> Solid:
+    """A stool, low or at bar height. Slots: seat, legs."""
+    rng = variant_rng("stool", seed)
+    z, r = (0.45, 0.65)[seed % 2] + rng.between(-0.02, 0.02), rng.between(0.15, 0.19)
+    patches = [disc(0, 0, z - 0.035, z, r, 0, 32)]
+    for k in range(4):
+        a = 0.25 * math.pi * (2 * k + 1)
+        c, s = math.cos(a), math.sin(a)
+        patches.append(rod((0.7 * r * c, 0.7 * r * s, z - 0.03), (1.05 * r * c, 1.05 * r * s, 0.0), 0.014, 1))
+    return solid(patches, [front(rng), wood(rng)], [((-0.7 * r, -0.7 * r, 0.0), (0.7 * r, 0.7 * r, z))])
+
+
+def office_chair(seed: int = 0) -> Solid:
+    """A swivel chair on five castors. Slots: cover, base."""
+    rng = variant_rng("office_chair", seed)
+    w, z = rng.between(0.46, 0.52), rng.between(0.44, 0.52)
+    top = z + rng.between(0.48, 0.7)
+    patches = [
+        cushion((-0.22, -0.5 * w, z - 0.08), (0.26, 0.5 * w, z), 0, 0.035),
+        cushion((-0.035, -0.46 * w, 0.0), (0.035, 0.46 * w, top - z - 0.08), 0, 0.033)
+        .rotated("y", -0.12).moved(-0.24, 0.0, z + 0.08),
+        rod((0.0, 0.0, 0.1), (0.0, 0.0, z - 0.07), 0.026, 1),
+        rod((-0.1, 0.0, z - 0.09), (-0.27, 0.0, z + 0.25), 0.02, 1),
+    ]  # fmt: skip
+    for k in range(5):
+        a = 2.0 * math.pi * k / 5 + 0.3
+        c, s = 0.29 * math.cos(a), 0.29 * math.sin(a)
+        patches.append(rod((0.0, 0.0, 0.11), (c, s, 0.075), 0.018, 1))
+        patches.append(rod((c, s - 0.022, 0.03), (c, s + 0.022, 0.03), 0.03, 1, 14))
+    if rng.chance(0.7):
+        for sy in (-1, 1):
+            y = sy * (0.5 * w + 0.03)
+            patches.append(cushion((-0.12, y - 0.03, z + 0.18), (0.14, y + 0.03, z + 0.215), 1, 0.015))
+            patches.append(rod((0.0, y, z + 0.19), (0.0, y, z - 0.06), 0.014, 1))
+            patches.append(rod((0.0, y, z - 0.06), (0.0, 0.3 * y, z - 0.07), 0.014, 1))
+    dark = painted_material("#1d1e20", 0.5) if rng.chance(0.7) else metal_material(ALUMINIUM, 0.3)
+    boxes: list[Box] = [((-0.28, -0.28, 0.0), (0.28, 0.28, z)), ((-0.32, -0.23, z), (-0.2, 0.23, top))]
+    return solid(patches, [upholstery(rng), dark], boxes)
+
+
+def dining_table(seed: int = 0) -> Solid:
+    """A table for meals, rectangular or round. Slots: top, legs."""
+    rng = variant_rng("dining_table", seed)
+    if seed % 4 == 3:
+        return _round_table(rng, rng.between(0.45, 0.6), rng.between(0.73, 0.76))
+    return _rectangular_table(rng, rng.between(0.75, 0.95), rng.between(1.2, 1.9), rng.between(0.73, 0.76))
+
+
+def coffee_table(seed: int = 0) -> Solid:
+    """A low table. Slots: top, legs."""
+    rng = variant_rng("coffee_table", seed)
+    if seed % 3 == 2:
+        return _round_table(rng, rng.between(0.34, 0.45), rng.between(0.38, 0.46))
+    return _rectangular_table(rng, rng.between(0.5, 0.65), rng.between(0.8, 1.2), rng.between(0.36, 0.46))
+
+
+def side_table(seed: int = 0) -> Solid:
+    """A small table beside a seat. Slots: top, legs."""
+    rng = variant_rng("side_table", seed)
+    return _round_table(rng, rng.between(0.2, 0.26), rng.between(0.45, 0.6))
+
+
+def desk(seed: int = 0) -> Solid:
+    """A desk, some with drawers at one side. Slots: top, legs."""
+    rng = variant_rng("desk", seed)
+    return _rectangular_table(
+        rng, rng.between(0.6, 0.8), rng.between(1.2, 1.8), rng.between(0.72, 0.76), drawers=seed % 2 == 1
+    )
+
+
+def meeting_table(seed: int = 0) -> Solid:
+    """A long table for meetings. Slots: top, legs."""
+    rng = variant_rng("meeting_table", seed)
+    return _rectangular_table(rng, rng.between(0.9, 1.2), rng.between(1.8, 2.6), 0.74)
+
+
+def workbench(seed: int = 0) -> Solid:
+    """A workbench with a thick top and a lower board. Slots: top, legs."""
+    rng = variant_rng("workbench", seed)
+    d, w, z = rng.between(0.6, 0.75), rng.between(1.4, 2.0), rng.between(0.82, 0.92)
+    top: Box = ((-0.5 * d, -0.5 * w, z - 0.05), (0.5 * d, 0.5 * w, z))
+    low: Box = ((-0.5 * d + 0.06, -0.5 * w + 0.06, 0.18), (0.5 * d - 0.08, 0.5 * w - 0.06, 0.21))
+    patches = [board(*top, 0, 0.005), board(*low, 0), *four_legs(d, w, z - 0.05, 0.07, 1, 0.06)]
+    legs = painted_material(rng.choose(("#2f5d7c", "#3b4046", "#6b7074", "#8a2f26")), 0.45)
+    return solid(patches, [wood(rng, 0.6), legs if rng.chance(0.6) else wood(rng)], [top, low, *_legs_under(d, w, z)])
+
+
+def _rectangular_table(
+    rng: VariantRng, depth_m: float, width_m: float, height_m: float, *, drawers: bool = False
+) -> Solid:
+    d, w, z = depth_m, width_m, height_m
+    thick = rng.between(0.02, 0.04)
+    top: Box = ((-0.5 * d, -0.5 * w, z - thick), (0.5 * d, 0.5 * w, z))
+    patches = [board(*top, 0, 0.004), *four_legs(d, w, z - thick, rng.between(0.04, 0.07), 1, 0.05)]
+    apron = 0.02
+    for sx in (-1, 1):
+        x = sx * (0.5 * d - 0.05)
+        patches.append(board((x - apron / 2, -0.5 * w + 0.06, z - thick - 0.08), (x + apron / 2, 0.5 * w - 0.06, z - thick), 1))
+    boxes: list[Box] = [top, *_legs_under(d, w, z)]
+    if drawers:
+        chest: Box = ((-0.5 * d + 0.06, 0.5 * w - 0.5, 0.1), (0.5 * d - 0.03, 0.5 * w - 0.08, z - thick))
+        patches.append(board(*chest, 1))
+        for k in range(3):
+            h = (z - thick - 0.1) / 3
+            a = 0.1 + k * h
+            patches.append(board((0.5 * d - 0.03, 0.5 * w - 0.495, a + 0.004), (0.5 * d - 0.012, 0.5 * w - 0.085, a + h - 0.004), 0))
+        boxes.append(chest)
+    legs = painted_material(rng.choose(("#26282b", "#d9d8d4")), 0.4) if rng.chance(0.4) else wood(rng)
+    return solid(patches, [front(rng), legs], boxes)
+
+
+def _round_table(rng: VariantRng, radius_m: float, height_m: float) -> Solid:
+    r, z = radius_m, height_m
+    patches = [
+        disc(0.0, 0.0, z - 0.025, z, r, 0, 40),
+        shapes.lathe([(0.0, 0.0), (0.6 * r, 0.0), (0.6 * r, 0.012), (0.05, 0.04), (0.03, 0.1),
+                      (0.03, z - 0.05), (0.1, z - 0.025), (0.0, z - 0.025)], 28, 1),
+    ]  # fmt: skip
+    legs = painted_material("#26282b", 0.4) if rng.chance(0.6) else wood(rng)
+    q = 0.7071 * r
+    boxes: list[Box] = [((-q, -q, z - 0.025), (q, q, z)), ((-0.4 * r, -0.4 * r, 0.0), (0.4 * r, 0.4 * r, z))]
+    return solid(patches, [front(rng), legs], boxes)
+
+
+def _legs_under(depth_m: float, width_m: float, height_m: float) -> Sequence[Box]:
+    x, y = 0.5 * depth_m - 0.05, 0.5 * width_m - 0.05
+    return [
+        ((sx * x - 0.03, sy * y - 0.03, 0.0), (sx * x + 0.03, sy * y + 0.03, height_m - 0.03))
+        for sx in (-1, 1)
+        for sy in (-1, 1)
+    ]

@@ -1,0 +1,210 @@
+"""Bodies of rooms in a scene: shells, pieces and their moving parts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from gen_data.generator.assets.asset_ids import AssetId, ParameterValue
+from gen_data.generator.assets.interiors.shell import NO_OPENINGS
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.members import free_instance_ids
+from gen_data.generator.core.scene import Body, Instance, Scene
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.generator.rooms.floor_plan import WALL_M, Opening, Room, outer_radius_m, walls_of
+from gen_data.generator.rooms.layout import Piece
+
+OUTSIDE = "outside"
+_VIEW_AWAY_M = 5.0
+_VIEW_HEIGHTS_M = (-2.5, 5.2)
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """How a part moves on its piece.
+
+    Attributes:
+        keypoint: Where it hangs on the piece when it is closed.
+        axis: Axis of the piece's frame about which it turns, or along which it slides.
+        limit: Largest opening [rad or m]; turns are negative rotations about the axis.
+    """
+
+    keypoint: str
+    kind: Literal["hinge", "slide"]
+    axis: Literal["x", "y", "z"]
+    limit: float
+
+
+JOINTS: Mapping[str, Joint] = {
+    "door": Joint("hinge", "hinge", "z", 1.7),
+    "leaf": Joint("hinge", "hinge", "z", 1.57),
+    "drawer": Joint("slide", "slide", "x", 0.28),
+    "lid": Joint("lid", "hinge", "y", 1.95),
+}
+"""Joints by the last part of the names of bodies."""
+
+
+@dataclass(frozen=True, slots=True)
+class Looks:
+    """Materials of a shell."""
+
+    floor: Material
+    walls: Material
+    ceiling: Material
+    door_style: int = 0
+    view_seed: int = 0
+
+
+def part_pose(T_world_piece: SE3, at_m: Vec3, joint: Joint, opening: float) -> SE3:
+    """``T_world_part`` of a part that is open by so much [rad or m]."""
+    if joint.kind == "slide":
+        return (T_world_piece @ SE3((at_m[0] + opening, at_m[1], at_m[2]))).rounded()
+    half = -0.5 * opening
+    c, s = math.cos(half), math.sin(half)
+    turn = (c, 0.0, s, 0.0) if joint.axis == "y" else (c, 0.0, 0.0, s)
+    return (T_world_piece @ SE3(at_m, turn)).rounded()
+
+
+def keypoint_m(assets: AssetIndex, asset: str, name: str) -> Vec3 | None:
+    """A keypoint of an asset; None if it has none of that name."""
+    return next((k.position_m for k in assets.keypoints(asset) if k.name == name), None)
+
+
+def remove_room(scene: Scene, name: str) -> Scene:
+    """The scene without the bodies and instances of a room element."""
+    removed = {b.name for b in scene.bodies if b.name.partition("/")[0] == name}
+    ids = {b.instance_id for b in scene.bodies if b.name in removed}
+    return replace(
+        scene,
+        bodies=tuple(b for b in scene.bodies if b.name not in removed),
+        instances=tuple(i for i in scene.instances if i.instance_id not in ids),
+    )
+
+
+class Builder:
+    """Collects the bodies and instances of one room element."""
+
+    def __init__(self, scene: Scene, assets: AssetIndex, name: str, *, annotated: bool) -> None:
+        self._scene, self._assets, self._name, self._annotated = scene, assets, name, annotated
+        self._bodies: list[Body] = []
+        self._instances: list[Instance] = []
+        self._ids = iter(free_instance_ids(scene, 4096))
+
+    def scene(self) -> Scene:
+        """The scene with everything that was added."""
+        bodies, instances = tuple(self._bodies), tuple(self._instances)
+        return replace(
+            self._scene,
+            bodies=(*self._scene.bodies, *bodies),
+            instances=(*self._scene.instances, *instances),
+        )
+
+    def add(
+        self, name: str, asset: str, pose: SE3, room: str, *, annotated: bool,
+        materials: tuple[Material, ...] = (), part: str = "", part_asset: str = "", group: str = "",
+        part_materials: tuple[Material, ...] = (),
+    ) -> None:  # fmt: skip
+        """Add a body and its instance; with a part, two bodies of one instance."""
+        number, pose = next(self._ids), pose.rounded()
+        full = f"{self._name}/{name}"
+        body = Body(full, asset, pose, instance_id=number, group=group, materials=materials)
+        attributes: list[tuple[str, str]] = [("room", room)]
+        if part:
+            joint = JOINTS[part]
+            at_m = keypoint_m(self._assets, asset, joint.keypoint)
+            assert at_m is not None, f"{asset} has no keypoint {joint.keypoint}"
+            closed = part_pose(pose, at_m, joint, 0.0)
+            moving = Body(f"{full}/{part}", part_asset, closed, instance_id=number, part_id=2, group=group, materials=part_materials)
+            self._bodies += [replace(body, part_id=1), moving]
+            attributes.append(("open", "0"))
+        else:
+            self._bodies.append(body)
+        self._instances.append(
+            Instance(
+                number, full, self._assets.get(asset).category, 0, asset, annotated=annotated,
+                parts=("body", part) if part else (), attributes=tuple(sorted(attributes)),
+            )
+        )  # fmt: skip
+
+    def add_shells(self, rooms: Sequence[Room], looks: Mapping[str, Looks]) -> None:
+        """Add floors, ceilings, walls, doors and windows, and the view outside."""
+        for room in rooms:
+            self._add_shell(room, looks[room.name])
+        first = looks[rooms[0].name]
+        radius_m = round(outer_radius_m(tuple(rooms)) + _VIEW_AWAY_M, 3)
+        view = _id(OUTSIDE, radius_m=radius_m, size_m=_VIEW_HEIGHTS_M, seed=first.view_seed)
+        self._bodies.append(Body(f"{self._name}/{OUTSIDE}", view, SE3(), collides=False))
+
+    def _add_shell(self, room: Room, looks: Looks) -> None:
+        x, y, z = room.size_m
+        at, kind = room.center_m, room.kind
+        own = {"annotated": self._annotated}
+        base = room.name
+        floor_at, top_at = SE3((*at, 0.0)), SE3((*at, z))
+        self.add(f"{base}/floor", _id("floor", size_m=(x, y)), floor_at, kind, materials=(looks.floor,), **own)
+        self.add(f"{base}/ceiling", _id("ceiling", size_m=(x, y)), top_at, kind, materials=(looks.ceiling,), **own)
+        for wall, openings in walls_of(room):
+            self._add_wall(room, wall, openings, looks)
+        for k, opening in enumerate(room.openings):
+            if opening.framed:
+                self._add_opening(room, k, opening, looks)
+
+    def _add_wall(self, room: Room, wall: int, openings: tuple[Opening, ...], looks: Looks) -> None:
+        # A wall's own X axis runs to the right of what faces into the room.
+        holes = [v for o in openings for v in (-o.along_m, o.width_m, o.low_m, o.high_m)]
+        length = round(room.wall_length_m(wall) + 2 * WALL_M * (wall % 2), 4)
+        parameters: dict[str, ParameterValue] = {"size_m": (length, room.size_m[2], WALL_M)}
+        if holes:
+            parameters["openings"] = (*holes, *NO_OPENINGS[len(holes) :])
+        pose = SE3.about_z(0.5 * math.pi * (wall - 1), (*room.at_wall(wall, 0.0, 0.0), 0.0))
+        asset = _id("wall", **parameters)
+        skirting = self._assets.materials(asset)[1]
+        if room.kind in ("bathroom", "warehouse", "workshop"):
+            skirting = looks.walls
+        self.add(f"{room.name}/wall_{wall}", asset, pose, room.kind, annotated=self._annotated, materials=(looks.walls, skirting))
+
+    def _add_opening(self, room: Room, k: int, opening: Opening, looks: Looks) -> None:
+        yaw = 0.5 * math.pi * opening.wall
+        shared = room.name in ("kitchen", "bathroom", "bedroom") and opening.kind == "door"
+        depth = 2 * WALL_M if shared else WALL_M
+        at = room.at_wall(opening.wall, opening.along_m, -0.5 * depth)
+        pose = SE3.about_z(yaw, (*at, opening.low_m))
+        width, height = opening.width_m, round(opening.high_m - opening.low_m, 4)
+        name = f"{room.name}/{opening.kind}_{k}"
+        if opening.kind == "window":
+            panes = max(1, round(width / 0.75))
+            asset = _id("window", size_m=(width, height, depth), panes=panes)
+            self.add(name, asset, pose, room.kind, annotated=self._annotated)
+            return
+        frame = _id("door_frame", size_m=(width, height, depth))
+        leaf = _id("door_leaf", size_m=(round(width - 0.06, 4), round(height - 0.03, 4)), style=looks.door_style)
+        self.add(name, frame, pose, room.kind, annotated=self._annotated, part="leaf", part_asset=leaf)
+
+    def add_pieces(self, room: Room, pieces: Sequence[Piece], parts: Mapping[str, tuple[str, str]]) -> None:
+        """Add furniture and things.
+
+        Args:
+            room: The room that they are in.
+            pieces: Where they are.
+            parts: Name of the part and its family, by the family of the piece.
+        """
+        counts: dict[str, int] = {}
+        for piece in pieces:
+            number = counts[piece.family] = counts.get(piece.family, -1) + 1
+            pose = SE3.about_z(piece.yaw_rad, piece.position_m)
+            word = piece.family.replace("/", "_")
+            part, part_asset = "", ""
+            if piece.family in parts:
+                part, family = parts[piece.family]
+                part_asset = f"{family}?{piece.asset.partition('?')[2]}"
+            self.add(
+                f"{room.name}/{word}_{number}", piece.asset, pose, room.kind, annotated=True, part=part,
+                part_asset=part_asset, group=self._name,
+            )  # fmt: skip
+
+
+def _id(family: str, **parameters: ParameterValue) -> str:
+    return str(AssetId(family, parameters))

@@ -1,0 +1,563 @@
+"""Layouts of rooms: pieces placed one after the other, by rejection from their rules.
+
+A candidate is refused with a reason; ``Conflict`` names the most frequent one of the rule that
+could not be satisfied.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gen_data.generator.assets.interiors.storage import (
+    PALLET_PITCH_M,
+    VARIANTS_PER_LOOK,
+    board_levels_m,
+)
+from gen_data.generator.core.boxes import Rectangle, overlap_of
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.streams import Rng
+from gen_data.generator.rooms.floor_plan import Opening, Room, between, direction, draw_count
+from gen_data.generator.rooms.rules import RoomType, Rule
+
+Options = Mapping[str, Sequence[str]]
+"""Ids of assets by family."""
+WALL_GAP_M = 0.012
+"""Gap behind pieces with their back to a wall: the thickness of a skirting board."""
+DOOR_ZONE_M = 0.95
+"""Depth of the floor before doors that stays free: the swing of a leaf."""
+PERSON_M = 0.22
+"""Half of the width that a person needs to pass; 0.45 m at the shoulders (DIN 33402-2)."""
+CELL_M = 0.05
+_TRIES = 36
+_HEAD_M = 1.9
+_CROWDED = 0.25
+"""Distance within which a piece before a window hides it."""
+_FLAT = frozenset({"rug"})
+_BOARDS = frozenset({"bookcase", "steel_rack"})
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A placed piece.
+
+    Attributes:
+        role: Its name in the rules; ``thing`` for small things.
+        position_m, yaw_rad: Pose of its frame, world, Z up.
+        footprint: Rectangle that it covers, world.
+        low_m, high_m: Heights between which it extends.
+        on: Index of the piece that carries it; -1 = none.
+    """
+
+    role: str
+    family: str
+    asset: str
+    position_m: Vec3
+    yaw_rad: float
+    footprint: Rectangle
+    low_m: float
+    high_m: float
+    on: int = -1
+
+
+class Conflict(Exception):
+    """A layout that breaks a rule.
+
+    Attributes:
+        piece: Piece that has no place.
+        reason: The most frequent reason.
+    """
+
+    def __init__(self, piece: str, reason: str) -> None:
+        self.piece, self.reason = piece, reason
+        super().__init__(f"{piece}: {reason}")
+
+
+@dataclass(frozen=True, slots=True)
+class _Shape:
+    """Bounds of an asset: middle of its footprint, half extents, lowest and highest point [m]."""
+
+    x: float
+    y: float
+    half_x: float
+    half_y: float
+    low: float
+    high: float
+
+
+@dataclass
+class Layout:
+    """A room being furnished.
+
+    Attributes:
+        look: Decides on the look of matching pieces, in [0, 1).
+        zones: Floor to keep free, with the index of the piece that needs it; -1 = a door.
+    """
+
+    room: Room
+    assets: AssetIndex
+    rng: Rng
+    look: float = 0.0
+    pieces: list[Piece] = field(default_factory=list)
+    zones: list[tuple[Rectangle, int]] = field(default_factory=list)
+    refused: Counter[str] = field(default_factory=Counter)
+
+    def shape(self, asset: str) -> _Shape:
+        """Extents of an asset."""
+        (x0, y0, z0), (x1, y1, z1) = self.assets.bounds_m(asset)
+        return _Shape(0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (x1 - x0), 0.5 * (y1 - y0), z0, z1)
+
+    def pick(self, options: Sequence[str]) -> str:
+        """Draw one of several."""
+        return options[min(int(self.rng.random() * len(options)), len(options) - 1)]
+
+    def signed(self, reach: float) -> float:
+        """Draw uniformly from -reach to reach."""
+        return (2.0 * float(self.rng.random()) - 1.0) * reach
+
+    def put(
+        self, rule: Rule, family: str, asset: str, at: tuple[float, float], yaw_rad: float, low_m: float,
+        ignore: int = -2, on: int = -1,
+    ) -> bool:  # fmt: skip
+        """Place the middle of an asset's footprint at a point, unless something is in the way."""
+        s = self.shape(asset)
+        c, sn = _cos_sin(yaw_rad)
+        footprint: Rectangle = (at[0], at[1], c, sn, s.half_x, s.half_y)
+        high_m = low_m + s.high - s.low
+        zone = _before(footprint, rule.clearance_m) if rule.clearance_m > 0.0 else None
+        reason = self.refuse(footprint, low_m, high_m, zone, ignore, flat=family in _FLAT)
+        if reason:
+            self.refused[reason] += 1
+            return False
+        x, y = at[0] - c * s.x + sn * s.y, at[1] - sn * s.x - c * s.y
+        position = (round(x, 5), round(y, 5), round(low_m - s.low, 5))
+        self.pieces.append(Piece(rule.piece, family, asset, position, yaw_rad, footprint, low_m, high_m, on))
+        if zone is not None:
+            self.zones.append((zone, len(self.pieces) - 1))
+        return True
+
+    def refuse(
+        self, footprint: Rectangle, low_m: float, high_m: float, zone: Rectangle | None, ignore: int,
+        *, flat: bool,
+    ) -> str:  # fmt: skip
+        """Why something cannot be there; empty = it can."""
+        if not self.holds(footprint):
+            return "no room between the walls"
+        if high_m > self.room.size_m[2] + 1e-6:
+            return "higher than the room"
+        for other in self.pieces:
+            if flat != (other.family in _FLAT):
+                continue
+            if low_m < other.high_m - 1e-6 and other.low_m < high_m - 1e-6 and overlap_of(footprint, other.footprint):
+                return f"overlaps {other.role}"
+        if not flat and low_m < _HEAD_M:
+            for free, owner in self.zones:
+                if owner != ignore and overlap_of(footprint, free):
+                    return "blocks a door" if owner < 0 else f"blocks the front of {self.pieces[owner].role}"
+        if self.covers_window(footprint, low_m, high_m):
+            return "covers a window"
+        if zone is not None:
+            if not self.holds(zone):
+                return "no free floor before it"
+            for other in self.pieces:
+                if other.low_m < _HEAD_M and other.family not in _FLAT and overlap_of(zone, other.footprint):
+                    return f"no free floor before it: {other.role}"
+        return ""
+
+    def holds(self, rectangle: Rectangle) -> bool:
+        """Whether a rectangle is inside the walls."""
+        x, y, c, s, a, b = rectangle
+        reach_x, reach_y = abs(c) * a + abs(s) * b, abs(s) * a + abs(c) * b
+        (mx, my), (sx, sy, _) = self.room.center_m, self.room.size_m
+        return bool(abs(x - mx) + reach_x <= 0.5 * sx + 1e-6 and abs(y - my) + reach_y <= 0.5 * sy + 1e-6)
+
+    def covers_window(self, footprint: Rectangle, low_m: float, high_m: float) -> bool:
+        """Whether something stands before a window, or hangs before a door."""
+        return any(
+            low_m < opening.high_m and high_m > opening.low_m + 0.03
+            and overlap_of(footprint, self.before_opening(opening))
+            for opening in self.room.openings
+        )  # fmt: skip
+
+    def before_opening(self, opening: Opening) -> Rectangle:
+        """The floor just before an opening."""
+        x, y = self.room.at_wall(opening.wall, opening.along_m, 0.5 * _CROWDED)
+        c, s = direction(opening.wall)
+        return (x, y, c, s, 0.5 * _CROWDED, 0.5 * opening.width_m)
+
+
+def _cos_sin(yaw_rad: float) -> tuple[float, float]:
+    quarter = yaw_rad / (0.5 * math.pi)
+    if abs(quarter - round(quarter)) < 1e-9:
+        return direction(round(quarter))
+    return math.cos(yaw_rad), math.sin(yaw_rad)
+
+
+def _before(footprint: Rectangle, depth_m: float) -> Rectangle:
+    """The rectangle before the front of a footprint."""
+    x, y, c, s, a, b = footprint
+    ahead = a + 0.5 * depth_m
+    return (x + c * ahead, y + s * ahead, c, s, 0.5 * depth_m, b)
+
+
+def furnish(room: Room, rules: RoomType, options: Options, assets: AssetIndex, rng: Rng, clutter: float) -> list[Piece]:
+    """Draw the pieces of a room.
+
+    Args:
+        room: The room with its openings.
+        rules: Rules of its type.
+        options: Ids of assets by family.
+        assets: Their extents.
+        rng: Random stream.
+        clutter: Factor on the numbers of small things.
+
+    Raises:
+        Conflict: a required piece has no place, or something cannot be reached.
+    """
+    layout = Layout(room, assets, rng, look=float(rng.random()))
+    for opening in room.openings:
+        if opening.kind == "door":
+            x, y = room.at_wall(opening.wall, opening.along_m, 0.5 * DOOR_ZONE_M)
+            c, s = direction(opening.wall)
+            layout.zones.append(((x, y, c, s, 0.5 * DOOR_ZONE_M, 0.5 * opening.width_m + 0.05), -1))
+    for rule in rules.pieces:
+        layout.refused = Counter()
+        low, high = rule.count
+        wanted = draw_count(rng, (low, high))
+        if rule.piece == "floor_things":
+            wanted = round(wanted * clutter)
+        placed = _PLACES[rule.place](layout, rule, options, wanted)
+        related = not rule.of or any(p.role in rule.of for p in layout.pieces)
+        if placed < low and related and rule.place not in ("on", "around", "front"):
+            reason = layout.refused.most_common(1)
+            raise Conflict(rule.piece, reason[0][0] if reason else "no place")
+    unreachable = find_unreachable(layout)
+    if unreachable:
+        raise Conflict(unreachable, "cannot be reached from a door")
+    for rule in rules.pieces:
+        if rule.things and rule.how_many[1]:
+            _put_things(layout, rule, options, clutter)
+    return layout.pieces
+
+
+def _draw_asset(layout: Layout, rule: Rule, options: Options) -> tuple[str, str]:
+    family = layout.pick(rule.assets)
+    found = options[family]
+    if rule.matching:
+        look = int(layout.look * (len(found) // VARIANTS_PER_LOOK))
+        seeds = range(VARIANTS_PER_LOOK * look, VARIANTS_PER_LOOK * (look + 1))
+        found = [f"{family}?seed={seed}" for seed in seeds]
+    return family, layout.pick(found)
+
+
+
+
+def _at_wall(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
+    """Back to a wall, in corners or anywhere along it; hanging ones at their height."""
+    placed = 0
+    for _ in range(wanted):
+        for _ in range(_TRIES):
+            family, asset = _draw_asset(layout, rule, options)
+            s = layout.shape(asset)
+            lengths = [layout.room.wall_length_m(k) for k in range(4)]
+            wall = _weighted(lengths, float(layout.rng.random()))
+            free = 0.5 * lengths[wall] - s.half_y - 0.015
+            corner = free if layout.rng.random() < 0.5 else -free
+            along = corner if rule.place == "corner" else layout.signed(max(free, 0.0))
+            gap = 0.0005 if rule.place == "hang" else WALL_GAP_M
+            at = layout.room.at_wall(wall, along, s.half_x + gap)
+            low = between(layout.rng, rule.height_m) if rule.place == "hang" else 0.0
+            if layout.put(rule, family, asset, at, wall * 0.5 * math.pi, low):
+                placed += 1
+                break
+    return placed
+
+
+def _weighted(weights: Sequence[float], draw: float) -> int:
+    left = draw * sum(weights)
+    for k, weight in enumerate(weights):
+        left -= weight
+        if left < 0.0:
+            return k
+    return len(weights) - 1
+
+
+def _free(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
+    """Anywhere on the floor: furniture square to the walls, small things at any angle."""
+    placed = 0
+    (mx, my), (sx, sy, _) = layout.room.center_m, layout.room.size_m
+    for _ in range(wanted):
+        for _ in range(_TRIES):
+            family, asset = _draw_asset(layout, rule, options)
+            s = layout.shape(asset)
+            small = max(s.half_x, s.half_y) < 0.65
+            yaw = layout.signed(math.pi) if small else draw_count(layout.rng, (0, 3)) * 0.5 * math.pi
+            at = (mx + layout.signed(0.5 * sx - 0.1), my + layout.signed(0.5 * sy - 0.1))
+            if layout.put(rule, family, asset, at, yaw, 0.0):
+                placed += 1
+                break
+    return placed
+
+
+def _relatives(layout: Layout, rule: Rule) -> list[int]:
+    return [k for k, p in enumerate(layout.pieces) if p.role in rule.of]
+
+
+def _relative(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
+    """Before, beside, around, above or under another piece, or against the wall that it faces."""
+    found = _relatives(layout, rule)
+    placed = 0
+    used: set[tuple[int, int]] = set()
+    if not found:
+        return 0
+    for number in range(wanted):
+        for attempt in range(_TRIES):
+            k = found[number % len(found)] if attempt < _TRIES // 2 and rule.place != "around" else found[
+                min(int(layout.rng.random() * len(found)), len(found) - 1)
+            ]
+            family, asset = _draw_asset(layout, rule, options)
+            if rule.place in ("front", "above", "under", "across") and (k, 0) in used:
+                layout.refused["another one is there"] += 1
+                continue
+            if _put_relative(layout, rule, family, asset, k):
+                used.add((k, 0))
+                placed += 1
+                break
+    return placed
+
+
+def _put_relative(layout: Layout, rule: Rule, family: str, asset: str, k: int) -> bool:
+    ref = layout.pieces[k]
+    x, y, c, sn, a, b = ref.footprint
+    s = layout.shape(asset)
+    gap = between(layout.rng, rule.gap_m)
+    dx, dy, yaw, low = 0.0, 0.0, ref.yaw_rad, 0.0
+    match rule.place:
+        case "front":
+            dx, dy = a + gap + s.half_x, layout.signed(0.25 * b)
+            yaw += math.pi + (layout.signed(0.35) if gap != 0.0 and s.half_y < 0.4 else 0.0)
+        case "beside":
+            dx = s.half_x - a
+            dy = (b + gap + s.half_y) * (1 if layout.rng.random() < 0.5 else -1)
+            if ref.role == rule.piece or gap == 0.0:
+                dx = s.half_x - a
+        case "around":
+            side = draw_count(layout.rng, (0, 3))
+            sc, ss = direction(side)
+            reach, free = (a, b) if side % 2 == 0 else (b, a)
+            away = reach + gap + s.half_x
+            aside = layout.signed(max(free - s.half_y, 0.0))
+            dx, dy = sc * away - ss * aside, ss * away + sc * aside
+            yaw += side * 0.5 * math.pi + math.pi + layout.signed(0.15)
+        case "above":
+            dx, low = s.half_x - a - WALL_GAP_M + 0.0005, min(ref.high_m, 0.91) + gap
+        case "under":
+            dx = layout.signed(0.1) + (0.35 * a if ref.family == "bed" else 0.6 * a if ref.family == "wash_basin" else 0.0)
+            yaw += 0.0
+        case _:
+            return _put_across(layout, rule, family, asset, k)
+    at = (x + c * dx - sn * dy, y + sn * dx + c * dy)
+    return layout.put(rule, family, asset, at, yaw, low, ignore=k)
+
+
+def _put_across(layout: Layout, rule: Rule, family: str, asset: str, k: int) -> bool:
+    ref, room = layout.pieces[k], layout.room
+    wall = round(ref.yaw_rad / (0.5 * math.pi) + 2) % 4
+    s = layout.shape(asset)
+    c, sn = direction(wall)
+    x, y = ref.footprint[0] - room.center_m[0], ref.footprint[1] - room.center_m[1]
+    along = -x * sn + y * c + layout.signed(0.4)
+    at = room.at_wall(wall, along, s.half_x + WALL_GAP_M)
+    return layout.put(rule, family, asset, at, wall * 0.5 * math.pi, 0.0)
+
+
+def _on(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
+    """On the tops of other pieces; at most ``wanted`` on each."""
+    placed = 0
+    for k in _relatives(layout, rule) if wanted else []:
+        ref = layout.pieces[k]
+        x, y, c, sn, a, b = ref.footprint
+        family, asset = _draw_asset(layout, rule, options)
+        s = layout.shape(asset)
+        dx = rule.at[0] * max(a - s.half_x, 0.0)
+        dy = rule.at[1] * max(b - s.half_y, 0.0) * (1 if layout.rng.random() < 0.5 else -1)
+        at = (x + c * dx - sn * dy, y + sn * dx + c * dy)
+        if s.half_x <= a + 0.03 and s.half_y <= b + 0.03:
+            placed += layout.put(rule, family, asset, at, ref.yaw_rad, ref.high_m, ignore=k, on=k)
+    return placed
+
+
+def _windows(layout: Layout) -> list[Opening]:
+    return [o for o in layout.room.openings if o.kind == "window"]
+
+
+def _at_windows(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
+    """Curtains at both sides of windows, in pairs."""
+    placed = 0
+    for opening in _windows(layout)[: (wanted + 1) // 2]:
+        family, asset = _draw_asset(layout, rule, options)
+        s = layout.shape(asset)
+        low = max(0.015, min(opening.high_m + 0.14, layout.room.size_m[2] - 0.04) - s.high)
+        before = len(layout.pieces)
+        for side in (-1, 1):
+            along = opening.along_m + side * (0.5 * opening.width_m + s.half_y)
+            at = layout.room.at_wall(opening.wall, along, s.half_x + 0.06)
+            layout.put(rule, family, asset, at, opening.wall * 0.5 * math.pi, low)
+        if len(layout.pieces) < before + 2:
+            del layout.pieces[before:]
+        placed += len(layout.pieces) - before
+    return placed
+
+
+def _below_windows(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
+    """Under the middle of windows."""
+    placed = 0
+    for opening in _windows(layout)[:wanted]:
+        family, asset = _draw_asset(layout, rule, options)
+        s = layout.shape(asset)
+        low = between(layout.rng, rule.height_m)
+        at = layout.room.at_wall(opening.wall, opening.along_m, s.half_x + 0.0005)
+        placed += layout.put(rule, family, asset, at, opening.wall * 0.5 * math.pi, low)
+    return placed
+
+
+def _at_ceiling(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
+    """In a row, or in two rows from four on, under the ceiling; all of one kind."""
+    (mx, my), (sx, sy, height) = layout.room.center_m, layout.room.size_m
+    family, asset = _draw_asset(layout, rule, options)
+    s = layout.shape(asset)
+    rows = 2 if wanted >= 4 else 1
+    columns = math.ceil(wanted / rows)
+    placed = 0
+    for k in range(wanted):
+        u, v = (k % columns + 0.5) / columns - 0.5, (k // columns + 0.5) / rows - 0.5
+        across = (u, v) if sx >= sy else (v, u)
+        at = (mx + across[0] * sx, my + across[1] * sy)
+        placed += layout.put(rule, family, asset, at, 0.5 * math.pi * (sx >= sy), height - (s.high - s.low))
+    return placed
+
+
+_PLACES = {
+    "wall": _at_wall, "corner": _at_wall, "hang": _at_wall, "free": _free, "front": _relative,
+    "beside": _relative, "around": _relative, "above": _relative, "under": _relative,
+    "across": _relative, "on": _on, "window": _at_windows, "below": _below_windows,
+    "ceiling": _at_ceiling,
+}  # fmt: skip
+
+
+def supports(piece: Piece) -> list[tuple[float, float]]:
+    """Height of each level surface of a piece that carries things, and the free height above."""
+    height = piece.high_m - piece.low_m
+    if piece.family in _BOARDS:
+        levels = board_levels_m(round(height, 6))
+        return [(piece.low_m + z, height / len(levels) - 0.05) for z in levels]
+    if piece.family == "pallet_rack":
+        return [(0.0, PALLET_PITCH_M - 0.16), (PALLET_PITCH_M, PALLET_PITCH_M - 0.16), (2 * PALLET_PITCH_M, 1.2)]
+    return [(piece.high_m, 0.6)]
+
+
+def _put_things(layout: Layout, rule: Rule, options: Options, clutter: float) -> None:
+    """Small things on the surfaces of all pieces of a rule, apart from one another."""
+    for k, piece in enumerate(list(layout.pieces)):
+        if piece.role != rule.piece or piece.on >= 0 or piece.family not in rule.assets:
+            continue
+        for height, clearance in supports(piece):
+            for _ in range(round(draw_count(layout.rng, rule.how_many) * clutter)):
+                _put_thing(layout, rule, options, k, height, clearance)
+
+
+def _put_thing(layout: Layout, rule: Rule, options: Options, k: int, height: float, clearance: float) -> None:
+    x, y, c, sn, a, b = layout.pieces[k].footprint
+    family = layout.pick(rule.things)
+    asset = layout.pick(options[family])
+    s = layout.shape(asset)
+    boards = layout.pieces[k].family in (*_BOARDS, "pallet_rack")
+    if s.high - s.low > clearance:
+        return
+    for _ in range(8):
+        turn = layout.signed(0.25 if boards else math.pi)
+        if family == "pallet":
+            turn = 0.0
+        tc, ts = abs(math.cos(turn)), abs(math.sin(turn))
+        reach = (s.half_x * tc + s.half_y * ts, s.half_x * ts + s.half_y * tc)
+        edge = 0.03 if boards else 0.05
+        free = a - edge - reach[0], b - edge - reach[1]
+        if min(free) < 0.0:
+            continue
+        dx, dy = layout.signed(max(free[0], 0.0)), layout.signed(max(free[1], 0.0))
+        at = (x + c * dx - sn * dy, y + sn * dx + c * dy)
+        yaw = layout.pieces[k].yaw_rad + turn
+        c2, s2 = _cos_sin(yaw)
+        footprint: Rectangle = (at[0], at[1], c2, s2, s.half_x, s.half_y)
+        top = height + s.high - s.low
+        taken = any(
+            n != k and p.low_m < top and height < p.high_m - 1e-6 and overlap_of(footprint, p.footprint)
+            for n, p in enumerate(layout.pieces)
+        )
+        if taken:
+            continue
+        px, py = at[0] - c2 * s.x + s2 * s.y, at[1] - s2 * s.x - c2 * s.y
+        position = (round(px, 5), round(py, 5), round(height - s.low, 5))
+        layout.pieces.append(Piece("thing", family, asset, position, yaw, footprint, height, top, k))
+        return
+
+
+def free_floor(room: Room, pieces: Sequence[Piece], margin_m: float) -> tuple[NDArray[np.bool_], float, float]:
+    """Cells of ``CELL_M`` whose middle a disc of radius ``margin_m`` can stand on; [rows y, columns x].
+
+    Also the world coordinates of the corner of the first cell.
+    """
+    (mx, my), (sx, sy, _) = room.center_m, room.size_m
+    columns, rows = math.ceil(sx / CELL_M), math.ceil(sy / CELL_M)
+    x0, y0 = mx - 0.5 * sx, my - 0.5 * sy
+    x = x0 + (np.arange(columns) + 0.5) * CELL_M
+    y = (y0 + (np.arange(rows) + 0.5) * CELL_M)[:, None]
+    inside = (np.abs(x - mx) < 0.5 * sx - margin_m) & (np.abs(y - my) < 0.5 * sy - margin_m)
+    free: NDArray[np.bool_] = np.broadcast_to(inside, (rows, columns)).copy()
+    for piece in pieces:
+        if piece.low_m >= _HEAD_M or piece.family in _FLAT:
+            continue
+        px, py, c, s, a, b = piece.footprint
+        along, across = c * (x - px) + s * (y - py), c * (y - py) - s * (x - px)
+        free &= (np.abs(along) > a + margin_m) | (np.abs(across) > b + margin_m)
+    return free, x0, y0
+
+
+def find_unreachable(layout: Layout) -> str:
+    """A door, or a piece with free floor before its front, that nobody can walk to; empty = none.
+
+    Walking starts at the first door.
+    """
+    from scipy import ndimage
+
+    fixed = [p for p in layout.pieces if p.role not in ("chair", "stool", "office_chair", "floor_things")]
+    free, x0, y0 = free_floor(layout.room, fixed, PERSON_M)
+    regions, _ = ndimage.label(free)
+
+    def region_at(zone: Rectangle) -> set[int]:
+        x, y, c, s, a, b = zone
+        found = set()
+        for u in np.linspace(-0.9, 0.9, 9):
+            for v in np.linspace(-0.9, 0.9, 9):
+                px, py = x + c * u * a - s * v * b, y + s * u * a + c * v * b
+                i, j = int((py - y0) / CELL_M), int((px - x0) / CELL_M)
+                if 0 <= i < free.shape[0] and 0 <= j < free.shape[1]:
+                    found.add(int(regions[i, j]))
+        return found - {0}
+
+    home: set[int] = set()
+    for zone, owner in layout.zones:
+        here = region_at(zone)
+        if owner < 0 and not home:
+            home = here
+            if not home:
+                return "door"
+        elif not here & home:
+            return "door" if owner < 0 else layout.pieces[owner].role
+    return ""

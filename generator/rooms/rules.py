@@ -1,0 +1,99 @@
+"""Rules of rooms: what belongs into a room of a type, where, and how much space it needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal
+
+from gen_data.generator.config.data_files import load_data
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.core.serialization import from_plain
+
+Range = tuple[float, float]
+Place = Literal[
+    "wall", "corner", "free", "front", "beside", "around", "on", "above", "under", "across", "hang",
+    "window", "below", "ceiling",
+]  # fmt: skip
+APARTMENT = "apartment"
+"""Type of several joined rooms."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One kind of piece; ``room_types.yaml`` explains the fields.
+
+    Attributes:
+        piece: Name by which other rules refer to it.
+        assets: Families to draw from, each as likely as it is listed.
+        count: Smallest and largest number; per piece of ``of`` for ``on``.
+        place: Where it goes.
+        of: Pieces that it refers to.
+        gap_m: Distance from that piece [m].
+        clearance_m: Depth of free floor before its front [m].
+        height_m: Height of its lowest point, for what hangs [m].
+        at: Place on the top that carries it, from -1 to 1 along depth and width.
+        matching: Whether all matching pieces of a room have one look.
+        things: Families of small things on it.
+        how_many: Smallest and largest number of them per surface.
+    """
+
+    piece: str
+    assets: tuple[str, ...]
+    count: tuple[int, int]
+    place: Place
+    of: tuple[str, ...] = ()
+    gap_m: Range = (0.0, 0.0)
+    clearance_m: float = 0.0
+    height_m: Range = (0.0, 0.0)
+    at: tuple[float, float] = (0.0, 0.0)
+    matching: bool = False
+    things: tuple[str, ...] = ()
+    how_many: tuple[int, int] = (0, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class RoomType:
+    """Rules of one type of room.
+
+    Attributes:
+        size_m: Ranges of length, width and height [m].
+        windows: Smallest and largest number of windows.
+        floor, walls: Families of textures; ``paint`` is a plain colour.
+        pieces: Rules in the order of placing.
+    """
+
+    size_m: tuple[Range, Range, Range]
+    windows: tuple[int, int]
+    floor: tuple[str, ...]
+    walls: tuple[str, ...]
+    pieces: tuple[Rule, ...]
+
+    @property
+    def families(self) -> frozenset[str]:
+        """Families of everything that may be in such a room."""
+        return frozenset(
+            name for rule in self.pieces for name in (*rule.assets, *rule.things)
+        )
+
+
+@cache
+def room_types() -> dict[str, RoomType]:
+    """The shipped types by name."""
+    rows = load_data(__package__, "room_types")
+    return {name: from_plain(RoomType, row) for name, row in rows.items()}
+
+
+def find_room_type(name: str, field: str) -> RoomType:
+    """The type of that name.
+
+    Raises:
+        ConfigError: there is none; the text begins with ``field``.
+    """
+    known = room_types()
+    if name not in known:
+        raise ConfigError(
+            f"{field}: there is no room type '{name}'; expected one of "
+            f"{', '.join((*known, APARTMENT))}{did_you_mean(name, known)}"
+        )
+    return known[name]

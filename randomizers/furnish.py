@@ -1,0 +1,168 @@
+"""Furnished rooms: sizes, openings, surfaces and furniture by the rules of their type."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import replace
+from typing import Annotated, Literal
+
+from gen_data.generator.config import distributions as dist
+from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Region, Scene
+from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.streams import Rng
+from gen_data.generator.rooms.bodies import JOINTS, Builder, Looks, remove_room
+from gen_data.generator.rooms.floor_plan import Room, draw_plan
+from gen_data.generator.rooms.layout import Conflict, Piece, furnish
+from gen_data.generator.rooms.options import families_of, find_options
+from gen_data.generator.rooms.rules import APARTMENT, Range, find_room_type
+from gen_data.randomizers.base import (
+    RandomizerBase,
+    choose,
+    find_texture_files,
+    find_textures,
+)
+from gen_data.randomizers.color_space import hsv_to_linear
+
+TRIES = 16
+"""Layouts tried per room before the scene is rejected."""
+_VIEWS = 12
+_DOOR_STYLES = 4
+
+
+class Furnish(RandomizerBase):
+    """Draws a room: size, openings, surfaces, and furniture by the rules of its type.
+
+    Layouts keep these constraints: nothing overlaps; pieces that need a wall touch it; the floor
+    before doors and before fronts that open is free; windows are not hidden; every door and every
+    such front can be reached by a person.
+
+    Attributes:
+        room: Name of the template's ``room_layout`` element.
+        length_m, width_m, height_m: Inner size along X, Y and Z; by default that of the type.
+        clutter: Factor on the numbers of small things.
+    """
+
+    type: Literal["furnish"] = "furnish"
+    stage: Literal["scene"] = "scene"
+    room: str = "room"
+    length_m: dist.Positive | None = None
+    width_m: dist.Positive | None = None
+    height_m: Annotated[dist.Scalar, dist.Bounds(2.0, 12.0)] | None = None
+    clutter: dist.NonNegative = dist.Uniform(0.4, 1.4)
+
+    def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
+        """Ids of the texture files of floors and walls; the element's group lists the furniture."""
+        floors = find_textures(assets, ("floor",), f"randomizers.{self.name}")
+        return find_texture_files(assets, floors)
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """Return the scene with the room redrawn.
+
+        Raises:
+            ConfigError: there is no such element.
+            LayoutRejected: no layout keeps the rules.
+        """
+        kind, annotated = self._find_element(scene)
+        field = f"randomizers.{self.name}.room"
+        options = find_options(assets, families_of(kind, field))
+        rooms, pieces = self._draw_layout(kind, options, assets, rng)
+        scene = remove_room(scene, self.room)
+        builder = Builder(scene, assets, self.room, annotated=annotated)
+        builder.add_shells(rooms, {room.name: self._draw_looks(room, assets, rng) for room in rooms})
+        parts = _moving_parts(assets)
+        for room, placed in zip(rooms, pieces, strict=True):
+            builder.add_pieces(room, placed, parts)
+        low, high = _interior(rooms)
+        middle = tuple(0.5 * (a + b) for a, b in zip(low, high, strict=True))
+        focus = Region((middle[0], middle[1], 0.9), (high[0] - low[0], high[1] - low[1], 1.4))
+        return replace(builder.scene(), interior_m=(low, high), focus=focus)
+
+    def _find_element(self, scene: Scene) -> tuple[str, bool]:
+        """Type of the element's room, and whether its shell is annotated."""
+        floors = [i for i in scene.instances if i.category == "floor" and i.name.startswith(f"{self.room}/")]
+        if not floors:
+            raise ConfigError(
+                f"randomizers.{self.name}.room: the template has no element '{self.room}' of type "
+                "room_layout"
+            )
+        kinds = [dict(floor.attributes)["room"] for floor in floors]
+        return kinds[0] if len(kinds) == 1 else APARTMENT, floors[0].annotated
+
+    def _draw_layout(
+        self, kind: str, options: dict[str, tuple[str, ...]], assets: AssetIndex, rng: Rng
+    ) -> tuple[tuple[Room, ...], list[list[Piece]]]:
+        conflicts: Counter[tuple[str, str]] = Counter()
+        clutter = self.clutter.draw(rng)
+        for _ in range(TRIES):
+            rooms = draw_plan(kind, self._draw_size(kind, rng), rng, f"randomizers.{self.name}.room")
+            made = []
+            for room in rooms:
+                rules = find_room_type(room.kind, "")
+                try:
+                    made.append(furnish(room, rules, options, assets, rng, clutter))
+                except Conflict as conflict:
+                    conflicts[f"{room.kind}: {conflict.piece}", conflict.reason] += 1
+                    break
+            if len(made) == len(rooms):
+                return rooms, made
+        (piece, reason), count = conflicts.most_common(1)[0]
+        raise self.reject(
+            f"no layout keeps the rules; most often ({count} of {TRIES}) {piece}: {reason}",
+            "a larger length_m or width_m",
+        )
+
+    def _draw_size(self, kind: str, rng: Rng) -> tuple[Range, Range, Range] | None:
+        given = (self.length_m, self.width_m, self.height_m)
+        if all(one is None for one in given):
+            return None
+        usual = (
+            ((8.6, 10.5), (7.2, 8.6), (2.45, 2.8)) if kind == APARTMENT else find_room_type(kind, "").size_m
+        )
+        drawn = [
+            limits if one is None else (round(one.draw(rng), 3),) * 2
+            for one, limits in zip(given, usual, strict=True)
+        ]
+        return (drawn[0], drawn[1], drawn[2])
+
+    def _draw_looks(self, room: Room, assets: AssetIndex, rng: Rng) -> Looks:
+        rules = find_room_type(room.kind, "")
+        field = f"randomizers.{self.name}"
+        floor = choose(find_textures(assets, (choose(rules.floor, rng),), field), rng)
+        wall = choose(rules.walls, rng)
+        tint = hsv_to_linear(float(rng.random()), 0.25 * float(rng.random()) ** 1.5, 0.82 + 0.13 * float(rng.random()))
+        if wall == "paint":
+            walls = Material(tint, 0.9)
+        else:
+            scale = {"tiles": 0.8, "brick": 0.9}.get(wall, 1.4)
+            walls = Material((1.0, 1.0, 1.0), 1.0, texture=choose(find_textures(assets, (wall,), field), rng), texture_scale_m=scale)
+        scale = round(0.9 + 0.9 * float(rng.random()), 3)
+        ground = Material((1.0, 1.0, 1.0), 1.0, texture=floor, texture_scale_m=scale)
+        white = 0.78 + 0.1 * float(rng.random())
+        styles, views = int(rng.random() * _DOOR_STYLES), int(rng.random() * _VIEWS)
+        return Looks(ground, walls, Material((white, white, white), 0.95), styles, views)
+
+
+def _moving_parts(assets: AssetIndex) -> dict[str, tuple[str, str]]:
+    """Name of the part and its family, by the family of its piece."""
+    found = {}
+    for asset in assets.find(("part_of",)):
+        family = asset.asset_id.partition("?")[0]
+        piece, _, part = family.rpartition("/")
+        if part in JOINTS:
+            found[piece] = (part, family)
+    return found
+
+
+def _interior(rooms: tuple[Room, ...]) -> tuple[Vec3, Vec3]:
+    """The box around all rooms."""
+    low, high = [math.inf, math.inf], [-math.inf, -math.inf]
+    for room in rooms:
+        for axis in (0, 1):
+            half = 0.5 * room.size_m[axis]
+            low[axis] = min(low[axis], room.center_m[axis] - half)
+            high[axis] = max(high[axis], room.center_m[axis] + half)
+    return (low[0], low[1], 0.0), (high[0], high[1], rooms[0].size_m[2])

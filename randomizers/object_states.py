@@ -1,0 +1,120 @@
+"""States of things: doors, drawers and lids that are open, screens that are on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Literal
+
+from gen_data.generator.config import distributions as dist
+from gen_data.generator.core.boxes import overlap_of
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.se3 import SE3, Vec3
+from gen_data.generator.core.streams import Rng
+from gen_data.generator.rooms.bodies import JOINTS, Joint, keypoint_m, part_pose
+from gen_data.randomizers.base import RandomizerBase, add_attributes, body_materials
+from gen_data.randomizers.free_space import Footprint
+
+SCREEN = "screen"
+"""Role of slots that show images."""
+_PICTURES = 12
+_STEPS = (1.0, 0.6, 0.3)
+"""Shares of the drawn opening that are tried where something is in the way."""
+
+
+class ObjectStates(RandomizerBase):
+    """Opens doors, drawers and lids as far as nothing is in their way, and switches screens on.
+
+    Labels carry ``open``, from 0 to 1, ``joint``: the turn [rad] or way [m] of the part, and
+    ``state``: on or off.
+
+    Attributes:
+        is_open: Whether a part is open at all.
+        opening: Share of the joint's range, if it is.
+        is_on: Whether a screen is on.
+        luminance_cd_m2: Of screens that are on.
+    """
+
+    type: Literal["object_states"] = "object_states"
+    is_open: dist.Flag = dist.Probability(0.35)
+    opening: dist.UnitInterval = dist.Uniform(0.1, 1.0)
+    is_on: dist.Flag = dist.Probability(0.6)
+    luminance_cd_m2: dist.NonNegative = dist.LogUniform(80.0, 300.0)
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """Return the scene with states drawn and stated by the instances' attributes."""
+        attributes: dict[int, list[tuple[str, str]]] = {}
+        for part, piece, joint in _find_parts(scene):
+            is_open, opening = self.is_open.draw(rng), self.opening.draw(rng)
+            moved, share = _open(scene, assets, part, piece, joint, opening if is_open else 0.0)
+            scene = scene.with_bodies(moved)
+            way = f"{share * joint.limit:.4g}"
+            attributes.setdefault(part.instance_id, []).extend([("joint", way), ("open", f"{share:.3g}")])
+        changed = []
+        for body in scene.bodies:
+            slots = body_materials(body, assets)
+            if not any(m.role == SCREEN for m in slots):
+                continue
+            is_on, luminance = self.is_on.draw(rng), self.luminance_cd_m2.draw(rng)
+            picture = f"texture/outdoor_view?seed={int(rng.random() * _PICTURES)}"
+            glow = round(luminance, 2)
+            if is_on:
+                lit = tuple(
+                    replace(m, emission_cd_m2=(glow, glow, glow), texture=picture) if m.role == SCREEN else m
+                    for m in slots
+                )
+                changed.append(replace(body, materials=lit))
+            state = ("state", "on" if is_on else "off")
+            attributes.setdefault(body.instance_id, []).append(state)
+        return add_attributes(scene.with_bodies(*changed), attributes)
+
+
+def _find_parts(scene: Scene) -> Iterator[tuple[Body, Body, Joint]]:
+    """Yield every moving part, its piece and its joint."""
+    bodies = {body.name: body for body in scene.bodies}
+    for body in scene.bodies:
+        piece, _, part = body.name.rpartition("/")
+        if part in JOINTS and piece in bodies and bodies[piece].instance_id == body.instance_id:
+            yield body, bodies[piece], JOINTS[part]
+
+
+def _open(
+    scene: Scene, assets: AssetIndex, part: Body, piece: Body, joint: Joint, share: float
+) -> tuple[Body, float]:
+    """The part at the largest opening tried that is free; its share of the joint's range."""
+    at_m = keypoint_m(assets, piece.asset, joint.keypoint)
+    assert at_m is not None, f"{piece.asset} has no keypoint {joint.keypoint}"
+    for step in _STEPS:
+        opening = round(share * step, 3)
+        pose = part_pose(piece.T_world_body, at_m, joint, opening * joint.limit)
+        if opening == 0.0 or joint.axis == "y" or _is_free(scene, assets, part, pose):
+            return replace(part, T_world_body=pose), opening
+    closed = part_pose(piece.T_world_body, at_m, joint, 0.0)
+    return replace(part, T_world_body=closed), 0.0
+
+
+def _is_free(scene: Scene, assets: AssetIndex, part: Body, pose: SE3) -> bool:
+    """Whether a part there overlaps nothing but its own piece and the floor."""
+    own = Footprint.of(pose, assets.bounds_m(part.asset)).rectangle
+    low, high = _heights_m(pose, assets.bounds_m(part.asset))
+    x, y, _ = pose.translation_m
+    for body in scene.bodies:
+        if body.instance_id in (0, part.instance_id):
+            continue
+        bx, by, _ = body.T_world_body.translation_m
+        if math.hypot(bx - x, by - y) > 6.0:
+            continue
+        bounds = assets.bounds_m(body.asset)
+        other_low, other_high = _heights_m(body.T_world_body, bounds)
+        if other_low > high - 0.002 or other_high < low + 0.025:
+            continue
+        if overlap_of(own, Footprint.of(body.T_world_body, bounds, body.scale).rectangle):
+            return False
+    return True
+
+
+def _heights_m(pose: SE3, bounds_m: tuple[Vec3, Vec3]) -> tuple[float, float]:
+    z = pose.translation_m[2]
+    return z + bounds_m[0][2], z + bounds_m[1][2]

@@ -1,0 +1,127 @@
+"""Cameras in rooms: where a person or a robot can stand, looking at what is there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from gen_data.generator.config import distributions as dist
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Body, Camera, Scene
+from gen_data.generator.core.se3 import Vec3, look_at
+from gen_data.generator.core.streams import Rng
+from gen_data.randomizers.base import RandomizerBase
+from gen_data.randomizers.free_space import hidden_share, is_clear
+
+TRIES = 96
+_WALL_M = 0.3
+"""Smallest distance of a camera from walls."""
+_HIDDEN_MAX = 0.2
+
+
+class RoomCamera(RandomizerBase):
+    """Places every camera without a rig on free floor of a room, looking at a piece in it.
+
+    Attributes:
+        room: Name of the template's ``room_layout`` element.
+        height_m: Height of the camera: 1.2 to 1.7 by hand, 0.2 to 1.2 on a robot.
+        pitch_deg: Upward tilt.
+        yaw_deg: Rotation away from the piece that it looks at.
+        roll_deg: Clockwise rotation about the viewing direction.
+        away_m: Smallest distance from that piece.
+        clearance_m: Smallest distance to any body.
+        near_m: Distance within which bodies may hide a fifth of the image at most.
+        min_pieces: Smallest number of pieces whose origins are in the image; half of
+            all pieces if that is fewer.
+    """
+
+    type: Literal["room_camera"] = "room_camera"
+    stage: Literal["scene", "view"] = "view"
+    room: str = "room"
+    height_m: dist.Positive = dist.Uniform(1.0, 1.75)
+    pitch_deg: Annotated[dist.Scalar, dist.Bounds(-89, 89)] = dist.Normal(-10.0, 7.0, clip=(-35.0, 12.0))
+    yaw_deg: dist.Scalar = dist.Normal(0.0, 12.0, clip=(-30.0, 30.0))
+    roll_deg: dist.Scalar = dist.Normal(0.0, 1.5, clip=(-6.0, 6.0))
+    away_m: float = Field(1.3, ge=0)
+    clearance_m: float = Field(0.25, ge=0)
+    near_m: float = Field(0.7, ge=0)
+    min_pieces: int = Field(7, ge=0, le=100)
+
+    def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
+        """Return the scene with its cameras moved. Raises LayoutRejected if no place is free."""
+        floors, pieces = self._find(scene)
+        cameras = list(scene.cameras)
+        for k, camera in enumerate(cameras):
+            if camera.rig:
+                continue
+            for _ in range(TRIES):
+                pose = self._draw_pose(scene, floors, pieces, assets, rng)
+                if pose is None:
+                    continue
+                moved = replace(camera, T_world_camera=look_at(*pose).rounded())
+                if (
+                    _count_in_view(moved, pieces) >= min(self.min_pieces, len(pieces) // 2)
+                    and hidden_share(moved, scene, assets, self.near_m) <= _HIDDEN_MAX
+                ):
+                    cameras[k] = moved
+                    break
+            else:
+                remedy = "a smaller away_m, clearance_m or near_m, or another height_m"
+                raise self.reject("no free place for a camera in the room", remedy)
+        return replace(scene, cameras=tuple(cameras))
+
+    def _find(self, scene: Scene) -> tuple[list[Body], list[Body]]:
+        """Floors of the rooms, and pieces to look at."""
+        own = [b for b in scene.bodies if b.name.partition("/")[0] == self.room]
+        floors = [b for b in own if b.name.endswith("/floor")]
+        return floors, [b for b in own if b.group == self.room and b.part_id < 2]
+
+    def _draw_pose(
+        self, scene: Scene, floors: list[Body], pieces: list[Body], assets: AssetIndex, rng: Rng
+    ) -> tuple[Vec3, Vec3, float] | None:
+        """Draw eye, target and roll; None if the place is taken or too near."""
+        floor = floors[min(int(rng.random() * len(floors)), len(floors) - 1)]
+        (x0, y0, _), (x1, y1, _) = assets.bounds_m(floor.asset)
+        mx, my, _ = floor.T_world_body.translation_m
+        x = mx + (2.0 * float(rng.random()) - 1.0) * max(0.5 * (x1 - x0) - _WALL_M, 0.0)
+        y = my + (2.0 * float(rng.random()) - 1.0) * max(0.5 * (y1 - y0) - _WALL_M, 0.0)
+        eye = (x, y, min(self.height_m.draw(rng), scene.interior_m[1][2] - _WALL_M))
+        here = [
+            b for b in pieces
+            if abs(b.T_world_body.translation_m[0] - mx) < 0.5 * (x1 - x0)
+            and abs(b.T_world_body.translation_m[1] - my) < 0.5 * (y1 - y0)
+        ]  # fmt: skip
+        if not here:
+            return None
+        tx, ty, _ = here[min(int(rng.random() * len(here)), len(here) - 1)].T_world_body.translation_m
+        yaw = math.atan2(ty - y, tx - x) + math.radians(self.yaw_deg.draw(rng))
+        pitch, roll = math.radians(self.pitch_deg.draw(rng)), math.radians(self.roll_deg.draw(rng))
+        # The room's middle lies ahead, not behind the camera: views into corners show little.
+        ahead = (mx - x) * math.cos(yaw) + (my - y) * math.sin(yaw)
+        if math.hypot(tx - x, ty - y) < self.away_m or ahead < 0.0:
+            return None
+        if not is_clear(eye, scene, assets, self.clearance_m):
+            return None
+        target = (
+            x + math.cos(pitch) * math.cos(yaw), y + math.cos(pitch) * math.sin(yaw),
+            eye[2] + math.sin(pitch),
+        )  # fmt: skip
+        return eye, target, roll
+
+
+
+def _count_in_view(camera: Camera, pieces: Sequence[Body]) -> int:
+    """Number of pieces whose origins are within the image."""
+    points = np.array([body.T_world_body.translation_m for body in pieces])
+    x, y, z = camera.T_world_camera.inverse().apply(points).T
+    k = camera.intrinsics
+    ahead = z > 0.3
+    deep = np.where(ahead, z, 1.0)
+    u, v = k.fx_px * x / deep + k.cx_px, k.fy_px * y / deep + k.cy_px
+    seen = ahead & (u > 0) & (u < k.width_px) & (v > 0) & (v < k.height_px)
+    return int(seen.sum())

@@ -1,0 +1,59 @@
+"""Rooms by rules: shells, which the randomizer ``furnish`` redraws and fills."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import ObjectGroup, Scene
+from gen_data.generator.core.streams import Streams
+from gen_data.generator.rooms.bodies import Builder, Looks
+from gen_data.generator.rooms.floor_plan import Room, draw_plan
+from gen_data.generator.rooms.options import families_of, find_options
+from gen_data.generator.rooms.rules import APARTMENT, find_room_type
+from gen_data.scene_templates.element import Element
+
+
+class RoomLayout(Element):
+    """An empty room of a type, with floor, ceiling, walls, a door and windows.
+
+    The randomizer ``furnish`` of the same ``room`` draws its size, openings and furniture.
+
+    Attributes:
+        kind: living_room, kitchen, bedroom, office, bathroom, workshop, warehouse, or apartment:
+            living room, kitchen, bedroom and bathroom with doors between them.
+        annotate: Whether to write labels for floor, ceiling, walls, doors and windows too.
+    """
+
+    type: Literal["room_layout"] = "room_layout"
+    kind: str = "living_room"
+    annotate: bool = True
+
+    def add(self, scene: Scene, assets: AssetIndex) -> Scene:
+        """Add the shell, and the group of everything that may furnish it."""
+        field = f"elements.{self.name}.kind"
+        families = families_of(self.kind, field)
+        rooms = _nominal_plan(self.kind, field)
+        builder = Builder(scene, assets, self.name, annotated=self.annotate)
+        looks = Looks(
+            assets.materials("floor")[0], assets.materials("wall")[0], assets.materials("ceiling")[0]
+        )
+        builder.add_shells(rooms, {room.name: looks for room in rooms})
+        scene = builder.scene()
+        ids = sorted({i for ids in find_options(assets, families).values() for i in ids})
+        group = ObjectGroup(self.name, (), tuple(ids), 0, "scatter")
+        x, y, z = rooms[0].size_m
+        (mx, my) = rooms[0].center_m
+        low, high = (mx - x / 2, my - y / 2, 0.0), (mx + x / 2, my + y / 2, z)
+        return replace(scene, groups=(*scene.groups, group), interior_m=(low, high))
+
+
+def _nominal_plan(kind: str, field: str) -> tuple[Room, ...]:
+    """Rooms of the middle of their ranges, the same at every call."""
+    if kind == APARTMENT:
+        rng = Streams(seed=0, scene=0).rng("room_layout")
+        return draw_plan(kind, ((9.4, 9.4), (7.8, 7.8), (2.6, 2.6)), rng, field)
+    middle = [round(0.5 * (low + high), 2) for low, high in find_room_type(kind, field).size_m]
+    fixed = (middle[0], middle[0]), (middle[1], middle[1]), (middle[2], middle[2])
+    return draw_plan(kind, fixed, Streams(seed=0, scene=0).rng("room_layout"), field)

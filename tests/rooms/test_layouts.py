@@ -1,0 +1,291 @@
+"""Layouts of rooms keep their rules, whatever is drawn.
+
+Bodies are measured by their boxes in the scene; rules and placed rectangles of the layout itself are
+not asked.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from functools import cache
+from itertools import combinations
+
+import cv2
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.config import distributions as dist
+from gen_data.generator.core.errors import ConfigError, LayoutRejected
+from gen_data.generator.core.scene import Body, Scene
+from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.core.streams import Streams
+from gen_data.randomizers.furnish import Furnish
+from gen_data.scene_templates.builder import build_scene
+from gen_data.scene_templates.room_layout import RoomLayout
+
+KINDS = (
+    "living_room", "kitchen", "bedroom", "office", "bathroom", "workshop", "warehouse", "apartment",
+)  # fmt: skip
+SEEDS = 6
+AGAINST_WALLS = (
+    "bed", "bookcase", "cooker", "dresser", "filing_cabinet", "kitchen_sink", "pallet_rack", "refrigerator",
+    "sofa", "steel_rack", "toilet", "tool_cabinet", "tv_stand", "wardrobe", "wash_basin", "washing_machine",
+)  # fmt: skip
+MAY_STAND_FREE = {"warehouse": {"pallet_rack"}}
+MOVABLE = {"armchair", "chair", "office_chair", "stool"}
+STRUCTURE = {"floor", "ceiling", "wall", "door", "window"}
+SHOULDERS_M = 0.4
+CELL_M = 0.1
+
+
+@cache
+def library() -> Library:
+    """The assets that come with the package."""
+    return open_library(())
+
+
+@cache
+def nominal(kind: str) -> Scene:
+    """An empty room of a type."""
+    return build_scene("test", (RoomLayout(name="room", kind=kind),), library())
+
+
+@cache
+def furnished(kind: str, seed: int) -> Scene:
+    """A furnished room."""
+    for attempt in range(4):
+        try:
+            return Furnish(name="furniture")(
+                nominal(kind), library(), Streams(3, seed, attempt=attempt).rng("furniture")
+            )
+        except LayoutRejected:
+            continue
+    raise AssertionError(f"{kind} {seed}: four attempts were rejected")
+
+
+def family(body: Body) -> str:
+    """Family of a body's asset."""
+    return body.asset.partition("?")[0]
+
+
+def outline(body: Body) -> NDArray[np.float32]:
+    """Corners of the rectangle that a body covers on the floor, [4, 2]."""
+    (x0, y0, _), (x1, y1, _) = library().bounds_m(body.asset)
+    corners = body.T_world_body.apply(
+        np.array([(x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0)])
+    )
+    return corners[:, :2].astype(np.float32)
+
+
+def common_m2(a: Body, b: Body) -> float:
+    """Area that the outlines of two bodies have in common, by OpenCV."""
+    return float(cv2.intersectConvexConvex(outline(a), outline(b))[0])
+
+
+def distance_m(body: Body, x: float, y: float) -> float:
+    """Distance of a point from a body's outline, negative inside, by OpenCV."""
+    return -float(cv2.pointPolygonTest(outline(body), (x, y), measureDist=True))
+
+
+def heights_m(body: Body) -> tuple[float, float]:
+    """Lowest and highest point of a body."""
+    low, high = library().bounds_m(body.asset)
+    z = body.T_world_body.translation_m[2]
+    return z + low[2], z + high[2]
+
+
+def pieces(scene: Scene) -> list[Body]:
+    """Furniture and things, without parts that open."""
+    return [b for b in scene.bodies if b.group == "room" and b.part_id < 2]
+
+
+def floors(scene: Scene) -> list[tuple[float, float, float, float]]:
+    """Extents of every room: smallest and largest x, smallest and largest y."""
+    made = []
+    for body in scene.bodies:
+        if body.name.endswith("/floor"):
+            (x0, y0, _), (x1, y1, _) = library().bounds_m(body.asset)
+            x, y, _ = body.T_world_body.translation_m
+            made.append((x + x0, x + x1, y + y0, y + y1))
+    return made
+
+
+each = pytest.mark.parametrize("kind", KINDS)
+
+
+@each
+def test_no_two_pieces_overlap(kind: str) -> None:
+    """Where heights overlap, outlines do not; a rug lies under others."""
+    for seed in range(SEEDS):
+        placed = [b for b in pieces(furnished(kind, seed)) if family(b) != "rug"]
+        for a, b in combinations(placed, 2):
+            (low_a, high_a), (low_b, high_b) = heights_m(a), heights_m(b)
+            if low_a < high_b - 1e-3 and low_b < high_a - 1e-3 and not _is_inside_shelf(a, b):
+                assert common_m2(a, b) < 1e-3, (seed, a.name, b.name)
+
+
+def _is_inside_shelf(a: Body, b: Body) -> bool:
+    """Whether one of two is a shelf, whose box holds what stands on its boards."""
+    return bool({family(a), family(b)} & {"bookcase", "steel_rack", "pallet_rack"})
+
+
+@each
+def test_everything_is_inside_the_walls(kind: str) -> None:
+    """Outlines lie within the floor of a room, tops below its ceiling."""
+    for seed in range(SEEDS):
+        scene = furnished(kind, seed)
+        for body in pieces(scene):
+            (x0, y0), (x1, y1) = outline(body).min(axis=0), outline(body).max(axis=0)
+            inside = [
+                a - 2e-3 <= x0 and x1 <= b + 2e-3 and c - 2e-3 <= y0 and y1 <= d + 2e-3
+                for a, b, c, d in floors(scene)
+            ]
+            assert any(inside), (seed, body.name)
+            assert -1e-4 <= heights_m(body)[0] and heights_m(body)[1] <= scene.interior_m[1][2] + 1e-3
+
+
+@each
+def test_pieces_that_need_a_wall_touch_one(kind: str) -> None:
+    """The middle of the back is within 2 cm of a wall."""
+    for seed in range(SEEDS):
+        scene = furnished(kind, seed)
+        for body in pieces(scene):
+            if family(body) in AGAINST_WALLS and family(body) not in MAY_STAND_FREE.get(kind, ()):
+                back = library().bounds_m(body.asset)[0][0]
+                x, y, _ = body.T_world_body.apply(np.array((back, 0.0, 0.0)))
+                gap = min(min(abs(x - a), abs(x - b), abs(y - c), abs(y - d)) for a, b, c, d in floors(scene))
+
+                assert gap < 0.02, (seed, body.name)
+
+
+@each
+def test_small_things_stand_on_something(kind: str) -> None:
+    """Under the middle of what is not on the floor, a wall or the ceiling, there is a surface."""
+    hung = {"picture", "mirror", "radiator", "towel", "wall_clock", "whiteboard", "curtain", "wall_unit",
+            "range_hood", "ceiling_lamp", "tube_lamp", "wash_basin"}  # fmt: skip
+    for seed in range(SEEDS):
+        placed = pieces(furnished(kind, seed))
+        for body in placed:
+            low = heights_m(body)[0]
+            if low < 0.015 or family(body) in hung:
+                continue
+            x, y = (float(v) for v in outline(body).mean(axis=0))
+            below = [b for b in placed if b is not body and distance_m(b, x, y) < 0.0]
+            tops = [z for b in below for z in _level_heights(b)]
+
+            assert any(abs(low - z) < 2e-3 for z in tops), (seed, body.name, low, tops)
+
+
+def _level_heights(body: Body) -> list[float]:
+    """Heights of the horizontal faces that look up, from the mesh."""
+    mesh = library().mesh(body.asset)
+    corners = mesh.vertices_m[mesh.faces].astype(np.float64)
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = 0.5 * np.linalg.norm(cross, axis=1)
+    up = cross[:, 2] > 1.99 * area * 0.999
+    z = np.round(corners[up, :, 2].mean(axis=1), 3)
+    return [float(v) + body.T_world_body.translation_m[2] for v in np.unique(z)]
+
+
+@each
+def test_every_door_is_reached_from_every_other_and_every_bed_and_cupboard_too(kind: str) -> None:
+    """A person 0.4 m wide walks there, by a flood fill over cells of 0.1 m."""
+    goals = {"bed", "wardrobe", "refrigerator", "toilet", "wash_basin", "workbench", "desk", "sofa"}
+    for seed in range(SEEDS):
+        scene = furnished(kind, seed)
+        blocked = [
+            b for b in pieces(scene)
+            if heights_m(b)[0] < 1.9 and family(b) != "rug" and family(b) not in MOVABLE
+            and "floor_things" not in b.name and max(_size(b)) > 0.35
+        ]  # fmt: skip
+        reached = _walk(scene, blocked)
+        for body in pieces(scene):
+            if family(body) in goals and heights_m(body)[0] < 0.3:
+                assert min(distance_m(body, *p) for p in reached) < 0.75, (seed, body.name)
+        for body in scene.bodies:
+            if family(body) == "door_frame":
+                assert min(distance_m(body, *p) for p in reached) < 0.6, (seed, body.name)
+
+
+def _size(body: Body) -> tuple[float, float]:
+    low, high = library().bounds_m(body.asset)
+    return high[0] - low[0], high[1] - low[1]
+
+
+def _walk(scene: Scene, blocked: list[Body]) -> list[tuple[float, float]]:
+    """Middles of the cells reached from the first door, through doors [m]."""
+    rooms = floors(scene)
+    doors = [b for b in scene.bodies if family(b) == "door_frame"]
+    half = 0.5 * SHOULDERS_M
+    corners = [(outline(b), b) for b in blocked]
+
+    def is_free(i: int, j: int) -> bool:
+        x, y = i * CELL_M, j * CELL_M
+        inside = any(a + half <= x <= b - half and c + half <= y <= d - half for a, b, c, d in rooms)
+        passage = any(math.dist((x, y), d.T_world_body.translation_m[:2]) < 0.35 for d in doors)
+        clear = all(cv2.pointPolygonTest(box, (x, y), measureDist=True) < -half for box, _ in corners)
+        return passage or (inside and clear)
+
+    first = doors[0].T_world_body.translation_m
+    start = (round(first[0] / CELL_M), round(first[1] / CELL_M))
+    seen, queue = {start}, deque([start])
+    while queue:
+        i, j = queue.popleft()
+        for step in ((i + 1, j), (i - 1, j), (i, j + 1), (i, j - 1)):
+            if step not in seen and is_free(*step):
+                seen.add(step)
+                queue.append(step)
+    return [(i * CELL_M, j * CELL_M) for i, j in seen]
+
+
+@each
+def test_same_stream_makes_the_same_bytes(kind: str) -> None:
+    """From two libraries."""
+    rng = [Streams(3, 1).rng("furniture") for _ in range(2)]
+    try:
+        made = [Furnish(name="f")(nominal(kind), assets, r) for assets, r in zip((library(), open_library(())), rng, strict=True)]
+    except LayoutRejected:
+        pytest.skip("this attempt is rejected")
+
+    assert canonical_json(made[0]) == canonical_json(made[1])
+
+
+def test_an_impossible_room_says_what_has_no_place_and_what_to_change() -> None:
+    """A bed of two metres does not fit a room of 1.5 m."""
+    small = Furnish(name="furniture", length_m=dist.Constant(1.5), width_m=dist.Constant(1.5))
+    with pytest.raises(LayoutRejected) as caught:
+        small(nominal("bedroom"), library(), Streams(3, 1).rng("furniture"))
+
+    assert "bedroom: bed: " in caught.value.rejection.reason
+    assert caught.value.rejection.remedy == "a larger length_m or width_m (randomizers.furniture)"
+
+
+def test_an_unknown_type_of_room_is_refused_with_the_nearest() -> None:
+    """The text names the field."""
+    with pytest.raises(ConfigError, match=r"elements.room.kind: .*'kichen'.*kitchen"):
+        build_scene("test", (RoomLayout(name="room", kind="kichen"),), library())
+
+
+def test_furnish_needs_a_room_layout() -> None:
+    """A scene without one is refused."""
+    with pytest.raises(ConfigError, match="randomizers.furniture.room: .*room_layout"):
+        Furnish(name="furniture")(Scene("empty"), library(), Streams(3, 1).rng("furniture"))
+
+
+@pytest.mark.slow
+def test_no_two_of_two_hundred_rooms_are_nearly_alike_and_many_categories_occur() -> None:
+    """Of equal types, the multisets of (family, place to 0.25 m) differ in more than half."""
+    kinds = [k for k in KINDS if k != "apartment"]
+    scenes = [(kinds[k % len(kinds)], furnished(kinds[k % len(kinds)], k)) for k in range(200)]
+    cells = [
+        (kind, {(family(b), *(round(4 * v) for v in b.T_world_body.translation_m[:2])) for b in pieces(scene)})
+        for kind, scene in scenes
+    ]
+    alike = [len(a & b) / len(a | b) for (k, a), (m, b) in combinations(cells, 2) if k == m]
+    categories = {i.category for _, scene in scenes for i in scene.instances} - STRUCTURE
+
+    assert max(alike) < 0.5
+    assert len(categories) >= 80

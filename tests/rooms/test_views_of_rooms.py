@@ -1,0 +1,215 @@
+"""Light, states, cameras and walks in furnished rooms."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from gen_data.generator.annotations.bev_map import BevMap
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.config import distributions as dist
+from gen_data.generator.core.errors import ConfigError, LayoutRejected
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.sample import EgoTruth
+from gen_data.generator.core.scene import Camera, Scene
+from gen_data.generator.core.scene_time import scene_at
+from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.streams import Streams
+from gen_data.randomizers.furnish import Furnish
+from gen_data.randomizers.object_states import ObjectStates
+from gen_data.randomizers.room_camera import RoomCamera
+from gen_data.randomizers.room_lighting import RoomLighting
+from gen_data.randomizers.room_path import RoomPath
+from gen_data.scene_templates.builder import build_scene
+from gen_data.scene_templates.carrier import Carrier
+from gen_data.scene_templates.room_layout import RoomLayout
+from tests.rooms.test_layouts import distance_m, heights_m, library
+
+ON, OFF = dist.Constant(True), dist.Constant(False)
+
+
+@cache
+def flat(seed: int = 1) -> Scene:
+    """A furnished apartment with a camera and a carrier."""
+    elements = (RoomLayout(name="room", kind="apartment"), Carrier(name="carrier"))
+    camera = Camera("color", SE3((0.0, 0.0, 1.5)), Intrinsics.from_hfov(64, 48, 1.2))
+    scene = replace(build_scene("test", elements, library()), cameras=(camera,))
+    for attempt in range(4):
+        try:
+            return Furnish(name="f")(scene, library(), Streams(5, seed, attempt=attempt).rng("f"))
+        except LayoutRejected:
+            continue
+    raise AssertionError("no apartment in four attempts")
+
+
+def states(scene: Scene, **fields: dist.Numeric[bool]) -> Scene:
+    """The apartment with states drawn."""
+    return ObjectStates(name="s", **fields)(scene, library(), Streams(5, 1).rng("s"))
+
+
+def test_closed_parts_are_where_their_pieces_are_and_say_so() -> None:
+    """With no opening, parts stay as they were, and every label says 0."""
+    closed = states(flat(), is_open=OFF)
+    parts = [b for b in closed.bodies if b.part_id == 2]
+    attributes = [dict(closed.instance(b.instance_id).attributes) for b in parts]
+
+    assert len(parts) >= 8
+    assert parts == [b for b in flat().bodies if b.part_id == 2]
+    assert {a["open"] for a in attributes} == {"0"}
+
+
+def test_the_joint_of_a_label_is_the_turn_of_the_part() -> None:
+    """The angle between a door's leaf and its frame, from their poses."""
+    opened = states(flat(), is_open=ON)
+    angles = {}
+    for body in opened.bodies:
+        piece, _, part = body.name.rpartition("/")
+        if part in ("leaf", "door"):
+            turn = opened.body(piece).T_world_body.inverse() @ body.T_world_body
+            stated = float(dict(opened.instance(body.instance_id).attributes)["joint"])
+            angles[stated] = 2.0 * math.acos(min(1.0, abs(turn.quaternion_wxyz[0])))
+
+    assert max(angles) > 0.2
+    assert list(angles) == pytest.approx(list(angles.values()), abs=2e-3)
+
+
+def test_screens_that_are_on_shine_and_say_so() -> None:
+    """Every screen is lit with is_on, none without."""
+    for is_on, word in ((ON, "on"), (OFF, "off")):
+        scene = states(flat(), is_on=is_on)
+        screens = [b for b in scene.bodies if any(m.role == "screen" for m in b.materials or library().materials(b.asset))]
+
+        assert screens
+        for body in screens:
+            lit = any(sum(m.emission_cd_m2) > 0 for m in body.materials)
+            assert lit == (word == "on")
+            assert dict(scene.instance(body.instance_id).attributes)["state"] == word
+
+
+def test_every_lit_lamp_has_a_light_near_it_and_no_other_has() -> None:
+    """Labels, emission and lights agree, by day."""
+    scene = RoomLighting(name="l", night=OFF, is_on=dist.Probability(0.5))(flat(), library(), Streams(5, 2).rng("l"))
+    spheres = [np.array(light.position_m) for light in scene.lights if light.kind == "sphere"]
+    lamps = [i for i in scene.instances if i.category == "lamp"]
+    for lamp in lamps:
+        (body,) = (b for b in scene.bodies if b.instance_id == lamp.instance_id)
+        near = [p for p in spheres if np.linalg.norm(p[:2] - np.array(body.T_world_body.translation_m[:2])) < 1e-3]
+        is_on = dict(lamp.attributes)["state"] == "on"
+
+        assert bool(near) == is_on
+        assert any(sum(m.emission_cd_m2) > 0 for m in body.materials) == is_on
+    assert {dict(i.attributes)["state"] for i in lamps} == {"on", "off"}
+
+
+def test_at_night_a_lamp_is_on_and_no_light_comes_through_windows() -> None:
+    """Neither sun nor panels, and the view is nearly black."""
+    scene = RoomLighting(name="l", night=ON, is_on=OFF)(flat(), library(), Streams(5, 2).rng("l"))
+
+    assert {light.kind for light in scene.lights} == {"sphere"}
+    assert max(scene.body("room/outside").materials[0].emission_cd_m2) < 1.0
+
+
+def test_the_sun_shines_into_a_window() -> None:
+    """It travels inwards through one of them: against its outward normal."""
+    fields = {"night": OFF, "sun": ON}
+    scene = RoomLighting(name="l", **fields)(flat(), library(), Streams(5, 3).rng("l"))
+    (sun,) = (light for light in scene.lights if light.kind == "sun")
+    inward = [b.T_world_body.rotate(np.array((1.0, 0.0, 0.0))) for b in scene.bodies if "/window_" in b.name]
+
+    assert sun.direction[2] < -0.5
+    assert max(float(np.dot(n, sun.direction)) for n in inward) > 0.25
+
+
+def test_cameras_stand_on_free_floor_at_the_drawn_height() -> None:
+    """Nothing is nearer than the clearance, by OpenCV's distance to outlines."""
+    camera = RoomCamera(name="c", height_m=dist.Constant(1.4))
+    for view in range(10):
+        scene = camera(flat(), library(), Streams(5, 1, view=view).rng("c"))
+        x, y, z = scene.camera("color").T_world_camera.translation_m
+        near = [
+            b.name for b in scene.bodies
+            if b.group == "room" and heights_m(b)[0] - 0.2 < z < heights_m(b)[1] + 0.2 and distance_m(b, x, y) < 0.2
+        ]  # fmt: skip
+
+        assert z == pytest.approx(1.4)
+        assert not near
+
+
+def walk(**fields: object) -> Scene:
+    """The apartment with a walk through it."""
+    return RoomPath(name="p", **fields)(flat(), library(), Streams(5, 4).rng("p"))
+
+
+def test_a_walk_has_its_speed_and_touches_nothing() -> None:
+    """Every 0.1 s, by OpenCV's distance to outlines; shortened by corners only."""
+    scene = walk(speed_m_s=dist.Constant(0.8), radius_m=0.2, duration_s=6.0)
+    places = [scene_at(scene, 0.1 * k).body("carrier").T_world_body.translation_m[:2] for k in range(61)]
+    steps = [math.dist(a, b) for a, b in zip(places, places[1:], strict=False)]
+    low = [b for b in scene.bodies if b.group == "room" and heights_m(b)[0] < 2.0 and heights_m(b)[1] > 0.03]
+
+    assert np.median(steps) == pytest.approx(0.08, rel=0.03)
+    assert max(steps) <= 0.0805
+    assert min(distance_m(b, *place) for b in low for place in places) > 0.1
+
+
+def test_a_walk_looks_where_it_goes() -> None:
+    """Its X axis is within 60 degrees of its velocity, nearly always."""
+    scene = walk(speed_m_s=dist.Constant(0.6), duration_s=6.0)
+    ahead = []
+    for k in range(1, 59):
+        moved = scene_at(scene, 0.1 * k)
+        pose, later = (s.body("carrier").T_world_body for s in (moved, scene_at(scene, 0.1 * k + 0.05)))
+        velocity = np.array(later.translation_m) - np.array(pose.translation_m)
+        ahead.append(float(np.dot(pose.rotate(np.array((1.0, 0.0, 0.0))), velocity)) / np.linalg.norm(velocity))
+
+    assert np.mean(np.array(ahead) > 0.5) > 0.9
+
+
+def test_a_walk_without_carrier_is_refused() -> None:
+    """The text names the field and the element."""
+    with pytest.raises(ConfigError, match=r"randomizers.p.carrier: .*'hand' of type carrier"):
+        walk(carrier="hand")
+
+
+def test_a_carrier_too_wide_for_the_doors_and_furniture_is_rejected_with_a_remedy() -> None:
+    """One metre of radius."""
+    with pytest.raises(LayoutRejected) as caught:
+        walk(radius_m=1.0, duration_s=60.0, speed_m_s=dist.Constant(1.0))
+
+    assert "radius_m" in caught.value.rejection.remedy
+
+
+def test_the_map_of_a_room_agrees_with_outlines() -> None:
+    """Cells of 5 cm: free ones are farther than a cell from all that stands; occupied ones nearer."""
+    scene = states(flat(), is_open=OFF)
+    pose = SE3((0.0, 0.0, 0.0))
+    truth = EgoTruth(rig="carrier", T_world_ego=pose)
+    made = BevMap(px_m=0.05, reach_m=6.0).annotate_frame({"": scene}, open_library(()), truth).birdseye
+    assert made is not None
+    free, occupied = made.layers["free_space"], made.layers["occupied"]
+    n = len(free)
+    standing = [b for b in scene.bodies if b.group == "room" and heights_m(b)[0] < 1.9 and heights_m(b)[1] > 0.03]
+
+    assert not (free & occupied).any()
+    assert free.sum() * 0.05**2 == pytest.approx(_area_m2(scene) - occupied.sum() * 0.05**2, rel=0.05)
+    for row, column in np.argwhere(free)[::97]:
+        x, y = (0.5 * n - row - 0.5) * 0.05, (0.5 * n - column - 0.5) * 0.05
+        assert all(distance_m(b, x, y) > -0.3 for b in standing)
+    for row, column in np.argwhere(occupied)[::97]:
+        x, y = (0.5 * n - row - 0.5) * 0.05, (0.5 * n - column - 0.5) * 0.05
+        leaves = [b for b in scene.bodies if b.name.endswith("/leaf")]
+        assert min(distance_m(b, x, y) for b in (*standing, *leaves)) < 0.05
+
+
+def _area_m2(scene: Scene) -> float:
+    """Area of all floors and doorways."""
+    area = 0.0
+    for body in scene.bodies:
+        if body.name.endswith("/floor") or body.asset.startswith("door_frame"):
+            (x0, y0, _), (x1, y1, _) = library().bounds_m(body.asset)
+            area += (x1 - x0) * (y1 - y0)
+    return area
