@@ -12,8 +12,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.generator.matching.label_files import Box, RealObject
 from gen_data.generator.study.evaluation import Evaluation, Match
-from gen_data.generator.study.real_pictures import Box, RealObject, RealPicture, read_image
+from gen_data.generator.study.real_pictures import RealPicture, read_image
 
 SMALL_PX2, LARGE_PX2 = 32**2, 96**2
 """Bounds of COCO's areas."""
