@@ -7,7 +7,7 @@ from html import escape
 
 from gen_data.generator.certificate.certificate import Certificate, CheckedClaim
 from gen_data.generator.certificate.finding import Finding, Status
-from gen_data.generator.report.html_page import format_document
+from gen_data.generator.report.html_page import format_check, format_document, format_tiles
 
 CLASSES = {Status.PASSED: "good", Status.FAILED: "bad", Status.NOT_CHECKED: "quiet"}
 """Classes of the style sheet."""
@@ -40,13 +40,8 @@ def format_page(certificate: Certificate) -> str:
     body = "".join(
         (
             f"<main><h1>Certificate of {escape(dataset.name)}</h1>",
-            '<div class="tiles">',
-            *(
-                f'<div class="tile"><b class="{kind}">{escape(value)}</b>'
-                f"<span>{escape(name)}</span></div>"
-                for name, value, kind in tiles
-            ),
-            '</div><div class="card">',
+            format_tiles(tiles),
+            '<div class="card">',
             *(f"<p>{escape(name)}: {escape(value)}</p>" for name, value in facts.items()),
             "</div>",
             *(part for claim in certificate.claims for part in _claim(claim)),
@@ -61,7 +56,8 @@ def _claim(claim: CheckedClaim) -> Iterator[str]:
     yield f"<h2>{escape(claim.name.capitalize())}</h2><p>{escape(claim.statement)}</p>"
     yield '<div class="card">'
     for finding in claim.findings:
-        yield _row(finding.subject or "data set", finding.status.value, CLASSES[finding.status])
+        subject = finding.subject or "data set"
+        yield format_check(subject, finding.status.value, CLASSES[finding.status])
         yield from (f"<p>{escape(text)}</p>" for text in _facts(finding))
     yield "</div>"
 
@@ -73,10 +69,3 @@ def _facts(finding: Finding) -> Iterator[str]:
     if finding.figures:
         yield "; ".join(f"{name}: {value}" for name, value in finding.figures.items())
     yield from finding.evidence
-
-
-def _row(name: str, value: str, kind: str) -> str:
-    return (
-        f'<div class="check"><span>{escape(name)}</span>'
-        f'<span class="{kind}">{escape(value)}</span></div>'
-    )

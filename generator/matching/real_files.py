@@ -6,7 +6,6 @@ of a camera (``depth``, ``instance``), are left out, and so are further links to
 
 from __future__ import annotations
 
-import json
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -22,6 +21,7 @@ from gen_data.generator.assets.sandbox import run_sandboxed
 from gen_data.generator.core.asset_types import UInt8
 from gen_data.generator.core.capture import POINT, Channel
 from gen_data.generator.core.errors import AssetError, StorageError
+from gen_data.generator.matching.label_files import RealObject, read_coco, read_kitti
 from gen_data.generator.matching.point_files import read_point_file
 from gen_data.generator.matching.recordings import ImageLabels, Photo, Scan
 
@@ -172,6 +172,22 @@ def decode_photo(root: Path, files: Mapping[str, str]) -> dict[str, NDArray[Any]
     return {"rgb": _middle(rgb), "size_px": size_px, "quantisation": steps}
 
 
+def read_rgb(path: Path) -> UInt8:
+    """A whole image as RGB [h, w, 3]. Raises AssetError if it cannot be decoded."""
+    return run_sandboxed(_decode_rgb, path.parent, {path.name: ""})["rgb"]
+
+
+def _decode_rgb(root: Path, files: Mapping[str, str]) -> dict[str, NDArray[Any]]:
+    """Decode an image; runs in the sandbox."""
+    (name,) = files
+    path = root / name
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise AssetError(f"{path}: {error.strerror}") from None
+    return {"rgb": decode_image(data, str(path))}
+
+
 def _middle(rgb: UInt8) -> UInt8:
     """The middle of a large image, from a corner of JPEG's grid."""
     height, width = rgb.shape[:2]
@@ -242,25 +258,15 @@ def _read_coco(paths: Iterable[Path], inventory: Inventory) -> Iterator[ImageLab
     for path in paths:
         inventory.found["label files"] += 1
         try:
-            content = json.loads(path.read_bytes())
-            names = {row["id"]: str(row["name"]) for row in content["categories"]}
-            boxes: dict[Any, list[tuple[str, float, float, float, float]]] = {}
-            for row in content["annotations"]:
-                if not row.get("iscrowd"):
-                    box = tuple(float(v) for v in row["bbox"])
-                    x, y, width, height = box
-                    named = (names[row["category_id"]], x, y, width, height)
-                    boxes.setdefault(row["image_id"], []).append(named)
-            images = [
-                ImageLabels(int(r["width"]), int(r["height"]), tuple(boxes.get(r["id"], ())))
-                for r in content["images"]
-            ]
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            reason = f"not COCO's layout ({type(error).__name__}: {error})"
-            inventory.skip("label files", reason, path.name)
+            images = read_coco(path).images
+        except StorageError as error:
+            inventory.skip("label files", str(error).removeprefix(f"{path}: "), path.name)
+            continue
+        if not all(min(image.size_px) > 0 for image in images):
+            inventory.skip("label files", "an image without width and height", path.name)
             continue
         inventory.used["label files"] += 1
-        yield from images
+        yield from (_labels_of(image.size_px, image.objects) for image in images)
 
 
 def _read_kitti(
@@ -275,14 +281,20 @@ def _read_kitti(
             inventory.skip("label files", "no photograph states the size of its image", path.name)
             continue
         try:
-            boxes = []
-            for line in path.read_text(encoding="utf-8").splitlines():
-                kind, *texts = line.split()
-                left, top, right, bottom = (float(text) for text in texts[3:7])
-                if kind != "DontCare":
-                    boxes.append((kind, left, top, right - left + 1.0, bottom - top + 1.0))
-        except (OSError, ValueError) as error:
-            inventory.skip("label files", f"not KITTI's columns ({error})", path.name)
+            objects = read_kitti(path)
+        except StorageError as error:
+            inventory.skip("label files", "not labels in KITTI's format", error)
             continue
         inventory.used["label files"] += 1
-        yield ImageLabels(*size, tuple(boxes))
+        yield _labels_of(size, objects)
+
+
+def _labels_of(size_px: tuple[int, int], objects: Iterable[RealObject]) -> ImageLabels:
+    """Boxes as position and size, without regions of many objects."""
+    boxes = tuple(
+        (thing.name, x0, y0, x1 - x0, y1 - y0)
+        for thing in objects
+        for x0, y0, x1, y1 in [thing.box]
+        if not thing.is_ignored
+    )
+    return ImageLabels(*size_px, boxes)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -54,6 +54,39 @@ def format_document(title: str, body: str, script_digest: str = "") -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(title)}</title>\n<style>{STYLE}</style></head>\n"
         f"<body>{body}</body></html>\n"
+    )
+
+
+def format_table(
+    title: str, header: Sequence[str], rows: Sequence[Sequence[str]], note: str
+) -> str:
+    """A table of plain texts under a heading, with a note below; the first column is left."""
+
+    def line(cells: Sequence[str], tag: str) -> str:
+        return "<tr>" + "".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+
+    body = "".join(line(row, "td") for row in rows)
+    return (
+        f'<h2>{escape(title.capitalize())}</h2><div class="card scroll"><table><thead>'
+        f"{line(header, 'th')}</thead><tbody>{body}</tbody></table></div>"
+        f'<p class="quiet">{escape(note)}</p>'
+    )
+
+
+def format_tiles(tiles: Iterable[tuple[str, str, str]]) -> str:
+    """A row of figures, each a name, a value and a class of the style sheet."""
+    shown = (
+        f'<div class="tile"><b class="{kind}">{escape(value)}</b><span>{escape(name)}</span></div>'
+        for name, value, kind in tiles
+    )
+    return f'<div class="tiles">{"".join(shown)}</div>'
+
+
+def format_check(name: str, verdict: str, kind: str) -> str:
+    """A line with a name and a verdict of a class of the style sheet."""
+    return (
+        f'<div class="check"><span>{escape(name)}</span>'
+        f'<span class="{kind}">{escape(verdict)}</span></div>'
     )
 
 

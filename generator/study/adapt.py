@@ -23,13 +23,14 @@ from gen_data.generator.api.dataset import SampleSequence, open_dataset
 from gen_data.generator.config.yaml_scalars import to_flow_yaml
 from gen_data.generator.core.errors import ConfigError, StorageError, VerificationError
 from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.matching.label_files import Box, RealObject
 from gen_data.generator.report.drawn_parameters import replay_scenes
 from gen_data.generator.runner.durable_files import write_durably
 from gen_data.generator.runner.stored import StoredSamples
 from gen_data.generator.study.evaluation import check_results, evaluate
 from gen_data.generator.study.experiment import require_torch
 from gen_data.generator.study.findings import Table
-from gen_data.generator.study.real_pictures import Box, RealObject, RealPicture, RealSet
+from gen_data.generator.study.real_pictures import RealPicture, RealSet
 from gen_data.generator.study.reweighting import ALPHA, Dependence, Tally, find_dependences
 from gen_data.targets import detection_target
 

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.study.real_pictures import Box, RealObject, RealPicture, RealSet
+from gen_data.generator.matching.label_files import Box, RealObject
+from gen_data.generator.study.real_pictures import RealPicture, RealSet
 
 MATCH_IOU = 0.5
 """Intersection over union from which a detection finds an object, in counts of misses."""

@@ -12,16 +12,18 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.generator.matching.label_files import Box, RealObject
 from gen_data.generator.study.evaluation import Evaluation, Match
-from gen_data.generator.study.real_pictures import Box, RealObject, RealPicture, read_image
+from gen_data.generator.study.real_pictures import RealPicture, read_image
 
 SMALL_PX2, LARGE_PX2 = 32**2, 96**2
 """Bounds of COCO's areas."""
 DARK, BRIGHT = 64.0, 160.0
 """Bounds of the mean 8-bit luma of a box: below is dark, above is bright."""
 SHOWN_PX = 480
+"""Longest side of a picture in the page."""
 FOUND, MISSED, ALARM = (60, 190, 60), (235, 40, 40), (250, 170, 20)
-"""Colours (RGB) of objects that were found and missed, and of false alarms."""
+"""Colours (RGB) of objects that were found and missed, and of false alarms; see html_page.css."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +64,10 @@ def worst_pictures(runs: Sequence[Evaluation], most: int) -> list[tuple[int, int
 def draw_faults(run: Evaluation, number: int) -> NDArray[np.uint8]:
     """A picture with the objects that were found and missed, and the false alarms; RGB."""
     image = read_image(run.pictures[number].path)
-    scale = min(1.0, SHOWN_PX / max(image.shape[:2]))
-    shown = cv2.resize(image, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    # Small pictures are enlarged: lines must not hide what they mark.
+    scale = SHOWN_PX / max(image.shape[:2])
+    filter_ = cv2.INTER_AREA if scale < 1.0 else cv2.INTER_LINEAR
+    shown = cv2.resize(image, None, fx=scale, fy=scale, interpolation=filter_)
     for match in run.matches:
         if match.picture == number:
             box, color = _look(match)

@@ -1,22 +1,16 @@
-"""Findings of a study: average precision and what is missed, as data, tables and a page."""
+"""Findings of a study: average precision and what is missed, as data and tables."""
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping, Sequence
-from html import escape
 from typing import Any
-
-import cv2
 
 from gen_data.generator.study.comparison import Interval, adjust, interval, score
 from gen_data.generator.study.evaluation import Evaluation
-from gen_data.generator.study.failures import count_groups, draw_faults, worst_pictures
+from gen_data.generator.study.failures import count_groups
 
 ALPHA = 0.05
 """False alarm rate of all verdicts of a study together."""
-PICTURES_MAX = 12
-"""Pictures of faults per variant."""
 
 Table = dict[str, Any]
 """``title``, ``header``, ``rows`` of texts, ``note``."""
@@ -116,37 +110,6 @@ def tabulate(findings: Mapping[str, Any]) -> list[Table]:
     return tables
 
 
-def format_page(
-    title: str, tables: Sequence[Table], runs: Mapping[str, Sequence[Evaluation]]
-) -> str:
-    """One HTML page with the tables and the pictures with most faults, which requests nothing."""
-    sections = [_format_table(table) for table in tables]
-    for name, evaluations in runs.items():
-        figures = [
-            f'<figure><img alt="" src="{_data_url(evaluations[0], number)}"><figcaption>'
-            f"{escape(evaluations[0].pictures[number].path.name)}: {count} faults in "
-            f"{len(evaluations)} runs</figcaption></figure>"
-            for number, count in worst_pictures(evaluations, PICTURES_MAX)
-        ]
-        sections.append(f"<h2>{escape(name)}: pictures with most faults</h2>{''.join(figures)}")
-    legend = "green: found; red: missed; orange: false alarm (of the first seed)"
-    return (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
-        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
-        "style-src 'unsafe-inline'\">\n"
-        f"<title>{escape(title)}</title>\n<style>{_STYLE}</style></head>\n"
-        f"<body><h1>{escape(title)}</h1><p>{legend}</p>{''.join(sections)}</body></html>\n"
-    )
-
-
-_STYLE = (
-    "body{font:15px/1.4 sans-serif;margin:2em;max-width:80em}table{border-collapse:collapse}"
-    "td,th{padding:.2em .8em;text-align:right;border-bottom:1px solid #ccc}"
-    "td:first-child,th:first-child{text-align:left}figure{display:inline-block;margin:.5em}"
-    "figcaption{font-size:12px}caption{caption-side:bottom;text-align:left;color:#555}"
-)
-
-
 def _plain(value: Interval) -> dict[str, float]:
     return {"mean": value.mean, "low": value.low, "high": value.high, "p": value.p}
 
@@ -164,19 +127,3 @@ def _with_interval(value: Mapping[str, float], sign: str = "") -> str:
 
 def _percent(group: Mapping[str, Any] | None) -> str:
     return "" if group is None else f"{100.0 * group['found'] / group['objects']:.0f} %"
-
-
-def _format_table(table: Table) -> str:
-    def line(cells: Sequence[str], tag: str) -> str:
-        return "<tr>" + "".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells) + "</tr>"
-
-    rows = "".join(line(row, "td") for row in table["rows"])
-    return (
-        f"<h2>{escape(table['title'])}</h2><table><caption>{escape(table['note'])}</caption>"
-        f"{line(table['header'], 'th')}{rows}</table>"
-    )
-
-
-def _data_url(run: Evaluation, number: int) -> str:
-    encoded = cv2.imencode(".jpg", draw_faults(run, number)[..., ::-1])[1]
-    return "data:image/jpeg;base64," + base64.b64encode(encoded.tobytes()).decode()

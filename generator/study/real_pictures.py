@@ -2,41 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
-import numpy as np
-from numpy.typing import NDArray
+from gen_data.generator.core.asset_types import UInt8
+from gen_data.generator.core.errors import AssetError, ConfigError, StorageError
+from gen_data.generator.matching.label_files import RealObject, read_coco, read_kitti
+from gen_data.generator.matching.real_files import read_rgb
 
-from gen_data.generator.core.errors import ConfigError, StorageError
-
-OCCLUSION_LEVELS = ("visible", "partly occluded", "largely occluded")
-"""KITTI's levels 0, 1 and 2; its level 3 is "unknown"."""
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
-
-Box = tuple[float, float, float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class RealObject:
-    """A labelled object.
-
-    Attributes:
-        name: Its class; empty = a region of objects of any class, which is always ignored.
-        box: ``x_min, y_min, x_max, y_max`` [px], half-open.
-        is_ignored: It counts neither as an object nor as background.
-        occlusion: One of ``OCCLUSION_LEVELS``; empty = not annotated.
-    """
-
-    name: str
-    box: Box
-    is_ignored: bool = False
-    occlusion: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,21 +146,12 @@ def read_real(folder: Path, split: str = "") -> RealSet:
     )
 
 
-def read_image(path: Path) -> NDArray[np.uint8]:
+def read_image(path: Path) -> UInt8:
     """RGB image [h, w, 3]. Raises StorageError if it cannot be read."""
-    image = _decode(path)
-    if image is None:
-        raise StorageError(f"{path}: cannot be read as an image")
-    return image
-
-
-def _decode(path: Path) -> NDArray[np.uint8] | None:
     try:
-        encoded = np.fromfile(path, np.uint8)
-    except OSError:
-        return None
-    image = cv2.imdecode(encoded, cv2.IMREAD_COLOR) if encoded.size else None
-    return None if image is None else np.ascontiguousarray(image[..., ::-1])
+        return read_rgb(path)
+    except AssetError as error:
+        raise StorageError(str(error)) from error
 
 
 def _is_instances(path: Path) -> bool:
@@ -209,46 +177,19 @@ def _choose(root: Path, files: Sequence[Path], split: str) -> Path:
 
 
 def _read_coco(root: Path, path: Path) -> RealSet:
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        names = {row["id"]: row["name"] for row in content["categories"]}
-        objects: dict[int, list[RealObject]] = {row["id"]: [] for row in content["images"]}
-        skipped: Counter[str] = Counter()
-        for row in content["annotations"]:
-            x, y, width, height = row["bbox"]
-            if not (width > 0 and height > 0):
-                skipped["object with an empty box"] += 1
-                continue
-            objects[row["image_id"]].append(
-                RealObject(
-                    names[row["category_id"]],
-                    (x, y, x + width, y + height),
-                    bool(row.get("iscrowd", 0)),
-                    _occlusion(row.get("occlusion")),
-                )
-            )
-        files = _find_images(root, path, [row["file_name"] for row in content["images"]])
-        numbers = [row["id"] for row in content["images"]]
-    except (ValueError, KeyError, TypeError) as error:
-        raise StorageError(f"{path}: not annotations in COCO's format: {error!r}") from error
-    pictures = list(_readable(zip(numbers, files, objects.values(), strict=True), skipped))
-    ids = {name: number for number, name in names.items()}
-    return _checked(RealSet(path, tuple(sorted(pictures, key=_by_id)), ids, skipped))
+    labels = read_coco(path)
+    skipped = Counter({"object with an empty box": labels.empty} if labels.empty else {})
+    files = _find_images(root, path, [image.file_name for image in labels.images])
+    frames = [
+        (image.image_id, file, image.objects)
+        for image, file in zip(labels.images, files, strict=True)
+    ]
+    pictures = sorted(_readable(frames, skipped), key=_by_id)
+    return _checked(RealSet(path, tuple(pictures), labels.category_ids, skipped))
 
 
 def _by_id(picture: RealPicture) -> int:
     return picture.image_id
-
-
-def _occlusion(value: Any) -> str:
-    """The level of a hidden fraction, by the bounds of ``gen_data.exporters.kitti``."""
-    if isinstance(value, str):
-        return value if value in OCCLUSION_LEVELS else ""
-    if not isinstance(value, (int, float)):
-        return ""
-    from gen_data.exporters.kitti import occlusion_level
-
-    return OCCLUSION_LEVELS[occlusion_level(float(value))]
 
 
 def _find_images(root: Path, annotations: Path, names: Sequence[str]) -> list[Path]:
@@ -277,10 +218,7 @@ def _read_kitti(root: Path) -> RealSet:
     frames, skipped = [], Counter[str]()
     names: set[str] = set()
     for number, path in enumerate(sorted((root / "label_2").glob("*.txt")), 1):
-        objects = [
-            _kitti_object(f"{path}:{line}", text)
-            for line, text in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
-        ]
+        objects = read_kitti(path)
         names |= {thing.name for thing in objects if thing.name}
         frames.append((number, images.get(path.stem, root / f"image_2/{path.stem}.png"), objects))
     ids = {name: number for number, name in enumerate(sorted(names), 1)}
@@ -291,30 +229,20 @@ def _is_image(path: Path) -> bool:
     return path.suffix.lower() in _SUFFIXES
 
 
-def _kitti_object(place: str, line: str) -> RealObject:
-    try:
-        kind, _, level, _, *sides = line.split()[:8]
-        x0, y0, x1, y1 = map(float, sides)
-        occluded = int(float(level))
-    except ValueError as error:
-        raise StorageError(f"{place}: not a label in KITTI's format: {error}") from error
-    # KITTI's sides are inclusive pixel numbers.
-    box = (x0, y0, x1 + 1.0, y1 + 1.0)
-    if kind == "DontCare":
-        return RealObject("", box, True)
-    known = 0 <= occluded < len(OCCLUSION_LEVELS)
-    return RealObject(kind, box, False, OCCLUSION_LEVELS[occluded] if known else "")
-
-
-def _readable(frames: Any, skipped: Counter[str]) -> Iterator[RealPicture]:
+def _readable(
+    frames: Iterable[tuple[int, Path, tuple[RealObject, ...]]], skipped: Counter[str]
+) -> Iterator[RealPicture]:
     """Pictures of (id, path, objects) whose images exist and can be decoded."""
     for number, path, objects in frames:
-        image = _decode(path)
-        if image is None:
-            skipped["image that cannot be read" if path.exists() else "image that is missing"] += 1
+        if not path.is_file():
+            skipped["image that is missing"] += 1
             continue
-        height, width = image.shape[:2]
-        yield RealPicture(number, path, (width, height), tuple(objects))
+        try:
+            height, width = read_image(path).shape[:2]
+        except StorageError:
+            skipped["image that cannot be read"] += 1
+            continue
+        yield RealPicture(number, path, (width, height), objects)
 
 
 def _checked(real: RealSet) -> RealSet:

@@ -11,7 +11,8 @@ from typing import Any
 from gen_data.generator.core.errors import StorageError
 from gen_data.generator.study.evaluation import Evaluation, evaluate, read_results
 from gen_data.generator.study.experiment import Experiment, perform, prepare, require_torch
-from gen_data.generator.study.findings import Table, describe, format_page, tabulate
+from gen_data.generator.study.findings import Table, describe, tabulate
+from gen_data.generator.study.page import format_page
 from gen_data.generator.study.real_pictures import RealSet, read_real
 
 PAGE, FINDINGS = "study.html", "findings.json"
