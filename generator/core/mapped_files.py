@@ -79,6 +79,21 @@ def limit_mapped_pages(kept_bytes: int) -> None:
         release_mapped_pages()
 
 
+class PageLimiter:
+    """Drops the pages of all maps whenever many have been read.
+
+    Pages of libraries stay: without them in the sum, maps keep what a scene's views share.
+    """
+
+    def __init__(self) -> None:
+        self._remained_bytes = read_statm(2)
+
+    def limit_growth(self, growth_bytes: int) -> None:
+        """Drop the pages if so many bytes of files were read since they were last dropped."""
+        self._remained_bytes = min(self._remained_bytes, read_statm(2))
+        limit_mapped_pages(self._remained_bytes + growth_bytes)
+
+
 def read_statm(column: int) -> int:
     """A column of procfs's ``statm`` of this process [bytes]; 0 without procfs.
 

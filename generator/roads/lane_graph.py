@@ -126,7 +126,7 @@ def path(
 def world_points(points: Array, T_world_road: SE3) -> tuple[Vec3, ...]:
     """Transform points [n, 3] of a road's frame to the world, rounded to a micrometre."""
     placed = np.round(T_world_road.apply(points), 6) + 0.0
-    return tuple((float(x), float(y), float(z)) for x, y, z in placed)
+    return tuple(map(tuple, placed.tolist()))
 
 
 def stations(start_m: float, end_m: float, step_m: float) -> Array:

@@ -13,6 +13,7 @@ import pytest
 
 from gen_data.generator.assets.asset_cache import Arrays, DiskCache
 from gen_data.generator.core.mapped_files import (
+    PageLimiter,
     limit_mapped_pages,
     map_file,
     owned_bytes,
@@ -85,6 +86,21 @@ def test_pages_are_dropped_and_come_back(tmp_path: Path) -> None:
 
     assert read_statm(2) < resident - (7 << 20)
     assert view.tobytes() == content
+
+
+def test_pages_are_dropped_once_enough_were_read(tmp_path: Path) -> None:
+    """Pages that were resident before do not count."""
+    write(tmp_path / "file", 8 << 20)
+    view = np.frombuffer(mapped(tmp_path / "file"), np.uint8)
+    limiter = PageLimiter()
+    view.sum()
+    resident = read_statm(2)
+
+    limiter.limit_growth(16 << 20)
+    assert read_statm(2) > resident - (1 << 20)
+    limiter.limit_growth(4 << 20)
+
+    assert read_statm(2) < resident - (7 << 20)
 
 
 def test_a_file_is_unmapped_with_its_last_view(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.bounded_cache import ByteCache, ObjectCache
 from gen_data.generator.core.interfaces import AssetLibrary, DerivedArrays
 from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.mapped_files import PageLimiter
 from gen_data.generator.renderers.warp.scene.brdf_albedo_lut import lobe_albedo
 from gen_data.generator.renderers.warp.scene.device_assets import (
     Arrays,
@@ -63,6 +64,7 @@ class DeviceCache:
         bodies: The latest packed bodies, which all views of a scene share.
         scenes: The latest packed scene, which all cameras and scanners of a sample share.
         material_records, infrared: Records of a body's materials, by their tuple.
+        pages: Returns pages of files to the system.
     """
 
     def __init__(self, assets: AssetLibrary, device: wp.Device) -> None:
@@ -70,6 +72,7 @@ class DeviceCache:
         # Asked once: it takes as long as loading a small mesh.
         self._store = assets if isinstance(assets, DerivedArrays) else None
         self.device = device
+        self.pages = PageLimiter()
         self.lobes = wp.array(lobe_albedo(), dtype=wp.vec2, device=device)
         self.bodies: ObjectCache[Any] = ObjectCache(1)
         self.scenes: ObjectCache[Any] = ObjectCache(1)

@@ -11,7 +11,6 @@ import warp as wp
 from numpy.typing import NDArray
 
 from gen_data.generator.core.lens import LensModel
-from gen_data.generator.core.mapped_files import limit_mapped_pages
 from gen_data.generator.core.scene import (
     LIGHT_KINDS,
     PANEL_KINDS,
@@ -112,12 +111,12 @@ class _PackedScene:
 
 
 _FILE_BYTES = 128 << 20
-"""Pages of files that stay in memory from frame to frame; large frames read somewhat more."""
+"""Pages of files that frames may read until all are dropped: about what a street's views share."""
 
 
 def pack_world(scene: Scene, camera: Camera, cache: DeviceCache) -> PackedWorld:
     """Pack a scene for one camera. Cheap enough for every frame."""
-    limit_mapped_pages(_FILE_BYTES)
+    cache.pages.limit_growth(_FILE_BYTES)
     packed: _PackedScene = cache.scenes.get(scene, lambda: _pack_scene(scene, cache))
     return _pack_for_camera(camera, packed, scene.weather, cache)
 

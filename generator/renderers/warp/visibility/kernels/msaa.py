@@ -135,16 +135,20 @@ def number_pixels(
     scan(reach, matter, [&](int x, int y, unsigned reached, auto at) {
         const float row_centre = plane.c + (float)y * dy;
         const Floats centres = row_centre + (lane + (float)x) * dx;
-        unsigned left = reached & bits(limits(x, y) <= centres + slack);
+        // No sample is nearer than this.
+        const Floats bound = larger(centres + slack, plane.low);
+        unsigned left = reached & bits(limits(x, y) <= bound);
         for (; left; left &= left - 1) {
             const int pixel = first_bit(left);
+            const int first = numbers.data[y * stride + x + pixel] * samples;
+            unsigned changed = 0;
             const Values values = at(pixel);
             const float centre = row_centre + (float)(x + pixel) * dx;
             for (int s = 0; s < samples; s += QUAD) {
                 const auto& change = changes[s / QUAD];
                 const DoubleQuad inside = least(
                     change.a + values.a, least(change.b + values.b, change.c + values.c));
-                const int row = numbers.data[y * stride + x + pixel] * samples + s;
+                const int row = first + s;
                 const FloatQuad w = clamped(
                     centre + (change.right * dx + change.down * dy), low, high);
                 // One branch for both tests: it cannot be predicted.
@@ -156,7 +160,16 @@ def number_pixels(
                 if (drawn) {
                     put(nearness.data + row, drawn, w);
                     put(hits.data + row, drawn, LongQuad(hit));
+                    changed = drawn;
                 }
+            }
+            // What lies behind all samples of a pixel need not be looked at again.
+            if (changed) {
+                float farthest = nearness.data[first];
+                for (int s = 1; s < samples; ++s)
+                    farthest = least(farthest, nearness.data[first + s]);
+                float& floor = floors.data[y * stride + x + pixel];
+                floor = floor < farthest ? farthest : floor;
             }
         }
     });
@@ -203,7 +216,7 @@ def draw_samples(
     Args:
         numbers: Row of each pixel in the outputs.
         floors: Nearness below which a pixel takes nothing; UNLISTED for unlisted pixels. It is
-            LANES longer than the image.
+            LANES longer than the image. Raised where all samples of a pixel are nearer.
         offsets: x and y of sample positions, from the middle of a pixel [1/256 px], [2, samples];
             a multiple of four, at most eight.
         nearness: 1/z [1/m]; must be 0 on entry.
