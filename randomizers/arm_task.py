@@ -225,11 +225,12 @@ class ArmTask(RandomizerBase):
 
     def check(self, scene: Scene, assets: AssetIndex) -> None:
         """Check the names of tasks, of the group and of the arm, and that it has a gripper."""
-        known = {assets.get(asset).category for asset in self._find_group(scene).assets}
+        group = self._find_group(scene)
+        known = {assets.get(asset).category for asset in group.assets}
         for asset in self.possible_assets(assets):
             if assets.get(asset).category not in known:
                 raise ConfigError(
-                    f"randomizers.{self.name}.task: the object group '{self.group or self.name}' lacks "
+                    f"randomizers.{self.name}.task: the object group '{group.name}' lacks "
                     f"'{asset.partition('?')[0]}'; expected it among its assets (ids)"
                 )
         arm = self._find_arm(scene)

@@ -51,8 +51,8 @@ GIVEN: dict[str, dict[str, Any]] = {
 """Fields that a randomizer requires, or that ensure that it changes the scene."""
 
 PHYSICS_BOUND = (
-    "arm_configuration", "arm_motion", "arm_task", "companions", "distractors", "ego_on_lane", "lane_objects",
-    "objects", "physics_properties", "plate", "reaching_hand", "traffic_flow",
+    "arm_configuration", "arm_motion", "arm_task", "companions", "distractors", "ego_on_lane",
+    "lane_objects", "objects", "physics_properties", "plate", "reaching_hand", "traffic_flow",
 )  # fmt: skip
 """Randomizers that must run before physics."""
 

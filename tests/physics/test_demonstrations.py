@@ -82,7 +82,7 @@ def test_a_success_is_where_physics_left_it(engine_name: EngineName) -> None:
 def test_phases_follow_one_another_and_the_thing_is_held_between_them(
     engine_name: EngineName,
 ) -> None:
-    """Without gaps from 0 to the end of the joints' track; held once, while the fingers touch it."""
+    """No gaps from 0 to the end of the joints' track; held once, while the fingers touch it."""
     arm = shown(engine_name).articulations[0]
     episode, track = arm.episode, arm.joint_track
     assert episode is not None
@@ -151,7 +151,7 @@ def test_a_goal_out_of_reach_is_refused_before_any_picture(engine_name: EngineNa
 
 
 def test_a_pushed_thing_slides_ahead_of_the_hand(engine_name: EngineName) -> None:
-    """The hand moves 15 cm from 5 cm before the cube's face: the cube ends about 10 cm on, upright."""
+    """From 5 cm before its face the hand moves 15 cm: the cube ends about 10 cm on, upright."""
     scene = table_scene(thing("it", "box 0.06 0.06 0.06", x=0.1, y=0.0, above_m=0.031))
     push = (
         ArmGoal("reach", pose_candidates=(above_table(0.02, 0.0, 0.1),), gripper_opening=0.0),
