@@ -178,14 +178,16 @@ class Failures(Strict):
     Attributes:
         slip: The object slips out of the fingers on its way.
         miss: The fingers close above the object.
+        collision: The hand knocks the object away before it reaches for it.
     """
 
     slip: float = Field(0.0, ge=0, le=1)
     miss: float = Field(0.0, ge=0, le=1)
+    collision: float = Field(0.0, ge=0, le=1)
 
     @model_validator(mode="after")
     def _is_a_share(self) -> Failures:
-        if self.slip + self.miss > 1.0:
+        if self.slip + self.miss + self.collision > 1.0:
             raise ValueError("the shares of failures add up to more than 1")
         return self
 
@@ -293,9 +295,12 @@ class ArmTask(RandomizerBase):
         draw = float(rng.uniform())
         if not any(step.verb == "grasp" for step in task.program):
             return ""
-        if draw < self.failures.slip:
-            return "slip"
-        return "miss" if draw < self.failures.slip + self.failures.miss else ""
+        kinds: tuple[FailureKind, ...] = ("slip", "miss", "collision")
+        for kind in kinds:
+            draw -= getattr(self.failures, kind)
+            if draw < 0.0:
+                return kind
+        return ""
 
     def _place_things(
         self, task: Task, arm: Articulation, assets: AssetIndex, rng: Rng

@@ -115,7 +115,7 @@ def test_a_held_thing_does_not_move_in_the_hand(engine_name: EngineName) -> None
         assert other == pytest.approx(relative[0], abs=2e-3)
 
 
-@pytest.mark.parametrize("failure", ["slip", "miss"])
+@pytest.mark.parametrize("failure", ["slip", "miss", "collision"])
 def test_failures_that_are_asked_for_happen_and_are_labelled(
     engine_name: EngineName, failure: FailureKind
 ) -> None:
@@ -128,6 +128,10 @@ def test_failures_that_are_asked_for_happen_and_are_labelled(
     assert math.dist((x, y), TARGET) > 0.02
     assert z < TABLE_TOP_Z_M + 0.05
     assert len(episode.held) == (1 if failure == "slip" else 0)
+    knocked = [s for s in episode.contacts if s.label.endswith("finger + it")]
+    if failure == "collision":
+        assert knocked[0].start_s < next(s.end_s for s in episode.phases if s.label == "approach")
+        assert math.dist((x, y), (0.1, 0.1)) > 0.02
     if failure == "miss":
         assert scene.track("it") is None
 

@@ -31,8 +31,8 @@ _GAP_MAX_M = 0.1
 _STILL_M = 0.0005
 _STILL_RAD = 0.002
 """Smaller motions between knots are the simulator's noise."""
-_SLIP_KNOTS = 8
-"""A slip happens after a body has been held for 0.4 s."""
+_SLIP_KNOTS = 12
+"""A slip happens after a body has been held for 0.6 s."""
 _SETTLE_S = 0.6
 """After the last goal, so that what was let go comes to rest."""
 
@@ -52,7 +52,14 @@ def demonstrate(
     assignment = articulation.assignment
     assert assignment is not None
     shown = Demonstration(arm, world, planner.all_poses(), time_step_s)
+    struck = False
     for number, goal in enumerate(articulation.task, 1):
+        if assignment.failure == "collision" and goal.kind == "grasp" and not struck:
+            blow = planner.plan_blow(goal, number)
+            if isinstance(blow, Rejection):
+                return blow
+            shown.run(blow, "approach")
+            struck = True
         legs = planner.plan_goal(goal, number)
         if isinstance(legs, Rejection):
             return legs
@@ -176,7 +183,7 @@ class Demonstration:
 
     def _held_body(self, leg: Leg) -> str:
         """Name of the body that is in the hand on a leg; empty where it fails to hold it."""
-        if leg.held is None or self._assignment.failure == "miss":
+        if leg.held is None or self._assignment.failure in ("miss", "collision"):
             return ""
         if self._assignment.failure == "slip" and sum(map(bool, self._held)) >= _SLIP_KNOTS:
             self._dropped = True
@@ -231,9 +238,10 @@ class Demonstration:
             return joint_position(self._joints[body], self._start[body], world.pose(body))
         if condition.measure == "height":
             return float(bounds(body)[0][2] - bounds(other)[1][2])
-        middle = 0.5 * (sum(bounds(body)) - sum(bounds(other)))  # type: ignore[operator]
+        (low, high), (other_low, other_high) = bounds(body), bounds(other)
         size = 2 if condition.measure == "offset" else 3
-        return math.sqrt(float(middle[:size] @ middle[:size]))
+        apart = 0.5 * (low + high - other_low - other_high)[:size]
+        return math.sqrt(float(apart @ apart))
 
 
 def _moved(one: SE3, other: SE3) -> bool:
