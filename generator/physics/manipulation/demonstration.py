@@ -42,7 +42,8 @@ def demonstrate(
 ) -> Demonstration | Rejection:
     """Plan and carry out the task of an arm goal by goal; each plan starts from what physics left.
 
-    A failure that was asked for is no reason to stop: the arm goes on as if nothing had happened.
+    A failure that was asked for befalls the first grasp. It is no reason to stop: the arm goes on as
+    if nothing had happened.
 
     Returns:
         The demonstration; or why a goal cannot be accomplished, or which condition of success does
@@ -52,18 +53,18 @@ def demonstrate(
     assignment = articulation.assignment
     assert assignment is not None
     shown = Demonstration(arm, world, planner.all_poses(), time_step_s)
-    struck = False
+    first_grasp = next((g for g in articulation.task if g.kind == "grasp"), None)
     for number, goal in enumerate(articulation.task, 1):
-        if assignment.failure == "collision" and goal.kind == "grasp" and not struck:
+        fails = goal is first_grasp
+        if assignment.failure == "collision" and fails:
             blow = planner.plan_blow(goal, number)
             if isinstance(blow, Rejection):
                 return blow
             shown.run(blow, "approach")
-            struck = True
         legs = planner.plan_goal(goal, number)
         if isinstance(legs, Rejection):
             return legs
-        if assignment.failure == "miss" and goal.kind == "grasp":
+        if assignment.failure == "miss" and fails:
             legs = _without_approach(legs)
         shown.run(legs, goal.phase or goal.kind)
         if not assignment.failure:
@@ -122,7 +123,7 @@ class Demonstration:
         self._held: list[str] = []
         self._contacts: list[frozenset[str]] = []
         self._fingers = [arm.body(k) for k in finger_links(arm.robot) if k in arm.links]
-        self._dropped = False
+        self._first_held = ""
         self.legs: list[Leg] = []
         self.poses: list[dict[str, SE3]] = []
 
@@ -183,11 +184,14 @@ class Demonstration:
 
     def _held_body(self, leg: Leg) -> str:
         """Name of the body that is in the hand on a leg; empty where it fails to hold it."""
-        if leg.held is None or self._assignment.failure in ("miss", "collision"):
+        if leg.held is None:
             return ""
-        if self._assignment.failure == "slip" and sum(map(bool, self._held)) >= _SLIP_KNOTS:
-            self._dropped = True
-        return "" if self._dropped else leg.held.body
+        body, failure = leg.held.body, self._assignment.failure
+        self._first_held = self._first_held or body
+        if not failure or body != self._first_held:
+            return body
+        slips_later = failure == "slip" and self._held.count(body) < _SLIP_KNOTS
+        return body if slips_later else ""
 
     def _record(self, phase: str, held: str, positions: Sequence[float]) -> None:
         before = self.poses[-1] if self.poses else self._start
