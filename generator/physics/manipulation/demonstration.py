@@ -42,8 +42,8 @@ def demonstrate(
 ) -> Demonstration | Rejection:
     """Plan and carry out the task of an arm goal by goal; each plan starts from what physics left.
 
-    A failure that was asked for befalls the first grasp. It is no reason to stop: the arm goes on as
-    if nothing had happened.
+    A failure that was asked for befalls the first grasp. It is no reason to stop: the arm goes on
+    as if nothing had happened.
 
     Returns:
         The demonstration; or why a goal cannot be accomplished, or which condition of success does
