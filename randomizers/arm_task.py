@@ -178,14 +178,16 @@ class Failures(Strict):
     Attributes:
         slip: The object slips out of the fingers on its way.
         miss: The fingers close above the object.
+        collision: The hand knocks the object away before it reaches for it.
     """
 
     slip: float = Field(0.0, ge=0, le=1)
     miss: float = Field(0.0, ge=0, le=1)
+    collision: float = Field(0.0, ge=0, le=1)
 
     @model_validator(mode="after")
     def _is_a_share(self) -> Failures:
-        if self.slip + self.miss > 1.0:
+        if self.slip + self.miss + self.collision > 1.0:
             raise ValueError("the shares of failures add up to more than 1")
         return self
 
@@ -225,11 +227,12 @@ class ArmTask(RandomizerBase):
 
     def check(self, scene: Scene, assets: AssetIndex) -> None:
         """Check the names of tasks, of the group and of the arm, and that it has a gripper."""
-        known = {assets.get(asset).category for asset in self._find_group(scene).assets}
+        group = self._find_group(scene)
+        known = {assets.get(asset).category for asset in group.assets}
         for asset in self.possible_assets(assets):
             if assets.get(asset).category not in known:
                 raise ConfigError(
-                    f"randomizers.{self.name}.task: the object group '{self.group or self.name}' lacks "
+                    f"randomizers.{self.name}.task: the object group '{group.name}' lacks "
                     f"'{asset.partition('?')[0]}'; expected it among its assets (ids)"
                 )
         arm = self._find_arm(scene)
@@ -292,9 +295,12 @@ class ArmTask(RandomizerBase):
         draw = float(rng.uniform())
         if not any(step.verb == "grasp" for step in task.program):
             return ""
-        if draw < self.failures.slip:
-            return "slip"
-        return "miss" if draw < self.failures.slip + self.failures.miss else ""
+        kinds: tuple[FailureKind, ...] = ("slip", "miss", "collision")
+        for kind in kinds:
+            draw -= getattr(self.failures, kind)
+            if draw < 0.0:
+                return kind
+        return ""
 
     def _place_things(
         self, task: Task, arm: Articulation, assets: AssetIndex, rng: Rng

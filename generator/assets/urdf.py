@@ -235,8 +235,14 @@ def _sort_links(links: dict[str, Link], joints: list[Joint]) -> Urdf:
             raise ValueError(f"joint '{joint.name[:40]}' refers to a missing link")
         by_parent.setdefault(joint.parent, []).append(joint)
     children = [joint.child for joint in joints]
+    for k, joint in enumerate(joints):
+        if joint.child in children[:k]:
+            raise ValueError(
+                f"joint '{joint.name[:40]}' closes a loop: link '{joint.child[:40]}' has another "
+                "parent already"
+            )
     roots = [name for name in links if name not in set(children)]
-    if len(roots) != 1 or len(children) != len(set(children)):
+    if len(roots) != 1:
         raise ValueError(f"its links form no tree: {len(roots)} of them have no parent")
     order, ordered_joints, pending = [roots[0]], [], list(reversed(by_parent.get(roots[0], [])))
     while pending:
@@ -245,7 +251,8 @@ def _sort_links(links: dict[str, Link], joints: list[Joint]) -> Urdf:
         order.append(joint.child)
         pending += reversed(by_parent.get(joint.child, []))
     if len(order) != len(links):
-        raise ValueError("its joints form a loop")
+        loop = next(joint for joint in joints if joint.child not in order)
+        raise ValueError(f"joint '{loop.name[:40]}' is part of a loop")
     return Urdf({name: links[name] for name in order}, tuple(ordered_joints))
 
 

@@ -21,6 +21,7 @@ from gen_data.generator.assets.folder_index import FolderIndex, MeshEntry, list_
 from gen_data.generator.assets.library import open_library
 from gen_data.generator.assets.readers import read_mesh
 from gen_data.generator.assets.triangle_soup import TriangleSoup
+from gen_data.generator.assets.urdf import read_urdf
 from gen_data.generator.core.errors import AssetError
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
@@ -299,6 +300,24 @@ def test_hostile_urdfs_are_refused(tmp_path: Path, name: str) -> None:
     )
     (tmp_path / "assets/assets.yaml").write_text("assets: [{id: a, file: a.urdf, category: x}]\n")
     refused(tmp_path, "a.urdf", lambda library: library.mesh("user/a"))
+
+
+@pytest.mark.hostile
+@pytest.mark.parametrize(
+    ("name", "cause"),
+    [
+        ("loop", "joint 'j1' is part of a loop"),
+        ("two parents", "joint 'j2' closes a loop: link 'c' has another parent already"),
+        ("no limits", "joint 'j' has no limits"),
+    ],
+)
+def test_urdfs_with_faulty_joints_are_refused_by_their_names(
+    tmp_path: Path, name: str, cause: str
+) -> None:
+    """A robot's author finds the joint without counting."""
+    (tmp_path / "a.urdf").write_text(URDFS[name])
+    with pytest.raises(AssetError, match=cause):
+        read_urdf(Folder(tmp_path), "a.urdf")
 
 
 def png_claiming(width: int, height: int) -> bytes:

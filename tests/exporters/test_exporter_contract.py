@@ -11,7 +11,7 @@ from gen_data.exporters import TABLE
 from gen_data.generator import annotations
 from tests.exporters.drives import drive_info
 
-PACKED = {"huggingface", "tfrecord", "webdataset", "rerun"}
+PACKED = {"huggingface", "rlds", "tfrecord", "webdataset", "rerun"}
 """Formats with several samples in a file."""
 
 
@@ -25,7 +25,7 @@ def given(exporter: Any, world: Any) -> tuple[Any, Any]:
     """The seven frames; a drive with two cameras or an arm, or bodies, for formats of these."""
     if exporter.type == "kitti_stereo":
         return world.pairs()
-    if exporter.type == "lerobot":
+    if exporter.type in ("lerobot", "rlds"):
         return drive_info(world), world.reach()
     if exporter.type == "bop":
         return world.info(7), world.with_bodies(world.samples)

@@ -82,7 +82,7 @@ def test_a_success_is_where_physics_left_it(engine_name: EngineName) -> None:
 def test_phases_follow_one_another_and_the_thing_is_held_between_them(
     engine_name: EngineName,
 ) -> None:
-    """Without gaps from 0 to the end of the joints' track; held once, while the fingers touch it."""
+    """No gaps from 0 to the end of the joints' track; held once, while the fingers touch it."""
     arm = shown(engine_name).articulations[0]
     episode, track = arm.episode, arm.joint_track
     assert episode is not None
@@ -115,7 +115,7 @@ def test_a_held_thing_does_not_move_in_the_hand(engine_name: EngineName) -> None
         assert other == pytest.approx(relative[0], abs=2e-3)
 
 
-@pytest.mark.parametrize("failure", ["slip", "miss"])
+@pytest.mark.parametrize("failure", ["slip", "miss", "collision"])
 def test_failures_that_are_asked_for_happen_and_are_labelled(
     engine_name: EngineName, failure: FailureKind
 ) -> None:
@@ -128,6 +128,10 @@ def test_failures_that_are_asked_for_happen_and_are_labelled(
     assert math.dist((x, y), TARGET) > 0.02
     assert z < TABLE_TOP_Z_M + 0.05
     assert len(episode.held) == (1 if failure == "slip" else 0)
+    knocked = [s for s in episode.contacts if s.label.endswith("finger + it")]
+    if failure == "collision":
+        assert knocked[0].start_s < next(s.end_s for s in episode.phases if s.label == "approach")
+        assert math.dist((x, y), (0.1, 0.1)) > 0.02
     if failure == "miss":
         assert scene.track("it") is None
 
@@ -151,7 +155,7 @@ def test_a_goal_out_of_reach_is_refused_before_any_picture(engine_name: EngineNa
 
 
 def test_a_pushed_thing_slides_ahead_of_the_hand(engine_name: EngineName) -> None:
-    """The hand moves 15 cm from 5 cm before the cube's face: the cube ends about 10 cm on, upright."""
+    """From 5 cm before its face the hand moves 15 cm: the cube ends about 10 cm on, upright."""
     scene = table_scene(thing("it", "box 0.06 0.06 0.06", x=0.1, y=0.0, above_m=0.031))
     push = (
         ArmGoal("reach", pose_candidates=(above_table(0.02, 0.0, 0.1),), gripper_opening=0.0),

@@ -10,13 +10,14 @@ from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.scene import HAND, Articulation, ObjectGroup, Scene, SupportSurface
 from gen_data.generator.core.se3 import SE3
 from gen_data.randomizers.arm_task import ArmTask, Failures, Task, tasks
-from tests.randomizers.doubles import FakeAssets, rng_of, two_link_arm
+from tests.randomizers.doubles import FakeAssets, two_link_arm
 
 ARM = Articulation("arm", "two_link", 1, SE3((-0.5, 0.0, 0.74)), two_link_arm().home)
 TABLE = SupportSurface("table", "table", SE3((0.0, 0.0, 0.74)), (1.2, 0.8), 1.0)
 GROUP = ObjectGroup("things", ("table",), (), 0, "scatter")
 SCENE = Scene("test", surfaces=(TABLE,), groups=(GROUP,), articulations=(ARM,))
-MINIMAL = """{"instruction": "Move over the {it}.", "things": {"it": {"assets": {"cup": "cup?seed=0"}}},
+MINIMAL = """{"instruction": "Move over the {it}.",
+ "things": {"it": {"assets": {"cup": "cup?seed=0"}}},
  "program": [{"verb": "reach", "at": "%s", "phase": "reach"}],
  "success": [{"measure": "offset", "body": "hand", "other": "it", "at_most": 0.01}]}"""
 

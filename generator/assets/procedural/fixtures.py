@@ -86,7 +86,7 @@ def door_panel(size_m: Vec3 = (0.012, 0.22, 0.2), color: str = "brown") -> Solid
 
 
 def knob(size_m: Vec3 = (0.07, 0.014, 0.035), color: str = "black") -> Solid:
-    """A bar handle on a round foot, turned about Z. Slots: body, handle.
+    """A bar handle on a round foot, turned about Z. Slots: foot, handle.
 
     Args:
         size_m: Length, width and height of the bar.

@@ -31,8 +31,8 @@ _GAP_MAX_M = 0.1
 _STILL_M = 0.0005
 _STILL_RAD = 0.002
 """Smaller motions between knots are the simulator's noise."""
-_SLIP_KNOTS = 8
-"""A slip happens after a body has been held for 0.4 s."""
+_SLIP_KNOTS = 12
+"""A slip happens after a body has been held for 0.6 s."""
 _SETTLE_S = 0.6
 """After the last goal, so that what was let go comes to rest."""
 
@@ -42,7 +42,8 @@ def demonstrate(
 ) -> Demonstration | Rejection:
     """Plan and carry out the task of an arm goal by goal; each plan starts from what physics left.
 
-    A failure that was asked for is no reason to stop: the arm goes on as if nothing had happened.
+    A failure that was asked for befalls the first grasp. It is no reason to stop: the arm goes on
+    as if nothing had happened.
 
     Returns:
         The demonstration; or why a goal cannot be accomplished, or which condition of success does
@@ -52,11 +53,18 @@ def demonstrate(
     assignment = articulation.assignment
     assert assignment is not None
     shown = Demonstration(arm, world, planner.all_poses(), time_step_s)
+    first_grasp = next((g for g in articulation.task if g.kind == "grasp"), None)
     for number, goal in enumerate(articulation.task, 1):
+        fails = goal is first_grasp
+        if assignment.failure == "collision" and fails:
+            blow = planner.plan_blow(goal, number)
+            if isinstance(blow, Rejection):
+                return blow
+            shown.run(blow, "approach")
         legs = planner.plan_goal(goal, number)
         if isinstance(legs, Rejection):
             return legs
-        if assignment.failure == "miss" and goal.kind == "grasp":
+        if assignment.failure == "miss" and fails:
             legs = _without_approach(legs)
         shown.run(legs, goal.phase or goal.kind)
         if not assignment.failure:
@@ -115,7 +123,7 @@ class Demonstration:
         self._held: list[str] = []
         self._contacts: list[frozenset[str]] = []
         self._fingers = [arm.body(k) for k in finger_links(arm.robot) if k in arm.links]
-        self._dropped = False
+        self._first_held = ""
         self.legs: list[Leg] = []
         self.poses: list[dict[str, SE3]] = []
 
@@ -176,11 +184,14 @@ class Demonstration:
 
     def _held_body(self, leg: Leg) -> str:
         """Name of the body that is in the hand on a leg; empty where it fails to hold it."""
-        if leg.held is None or self._assignment.failure == "miss":
+        if leg.held is None:
             return ""
-        if self._assignment.failure == "slip" and sum(map(bool, self._held)) >= _SLIP_KNOTS:
-            self._dropped = True
-        return "" if self._dropped else leg.held.body
+        body, failure = leg.held.body, self._assignment.failure
+        self._first_held = self._first_held or body
+        if not failure or body != self._first_held:
+            return body
+        slips_later = failure == "slip" and self._held.count(body) < _SLIP_KNOTS
+        return body if slips_later else ""
 
     def _record(self, phase: str, held: str, positions: Sequence[float]) -> None:
         before = self.poses[-1] if self.poses else self._start
@@ -231,9 +242,10 @@ class Demonstration:
             return joint_position(self._joints[body], self._start[body], world.pose(body))
         if condition.measure == "height":
             return float(bounds(body)[0][2] - bounds(other)[1][2])
-        middle = 0.5 * (sum(bounds(body)) - sum(bounds(other)))  # type: ignore[operator]
+        (low, high), (other_low, other_high) = bounds(body), bounds(other)
         size = 2 if condition.measure == "offset" else 3
-        return math.sqrt(float(middle[:size] @ middle[:size]))
+        apart = 0.5 * (low + high - other_low - other_high)[:size]
+        return math.sqrt(float(apart @ apart))
 
 
 def _moved(one: SE3, other: SE3) -> bool:

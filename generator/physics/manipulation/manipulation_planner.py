@@ -45,6 +45,9 @@ _SUPPORT_GAP_M = 0.002
 _STABLE_STEPS = 60
 _STABLE_M = 0.002
 """A stable object moves no farther than this in so many simulated steps."""
+_BLOWS_MAX = 8
+_BLOW_M = 0.08
+"""Distance from a body at which a hand comes down to knock it away; it goes half as far beyond."""
 _HALF_TURN = SE3(quaternion_wxyz=(0.0, 0.0, 0.0, 1.0))
 """The same grasp with the fingers exchanged."""
 _FLIP = SE3(quaternion_wxyz=(0.0, 1.0, 0.0, 0.0))
@@ -115,6 +118,46 @@ class TaskPlanner:
         self.positions = legs[-1].end
         return legs
 
+    def plan_blow(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
+        """Timed legs of a closed hand that knock away the first object of a grasp.
+
+        They come down beside it, pass through its place and rise; of several directions the first
+        possible one is taken. The object keeps its place in ``resting``.
+        """
+        start, refused = self.positions, self._reject([], CANNOT_REACH, number)
+        for k in range(_BLOWS_MAX):
+            self.positions = start
+            legs: list[Leg] = []
+            for blow in self._blow_goals(goal, 2.0 * math.pi * k / _BLOWS_MAX):
+                planned = self.plan_goal(blow, number)
+                if isinstance(planned, Rejection):
+                    refused = planned
+                    break
+                legs += planned
+            else:
+                return legs
+        self.positions = start
+        return refused
+
+    def _blow_goals(self, goal: ArmGoal, yaw_rad: float) -> list[ArmGoal]:
+        body = goal.objects[0]
+        self._restore_world()
+        low, high = self._world.bounds_m(body)
+        x, y, z = (float(v) for v in 0.5 * (low + high))
+        tip_m = self._hand.tip_depth_m() if self._hand else 0.0
+        z = max(z, float(low[2]) + tip_m + 2.0 * _FLOOR_GAP_M)
+        way_m = 0.5 * math.hypot(*(float(v) for v in (high - low)[:2])) + _BLOW_M
+        turn = SE3.about_z(yaw_rad)
+        place = SE3((x, y, z)) @ turn @ SE3((-way_m, 0.0, _APPROACH_M)) @ _FLIP
+        rise = SE3((0.0, 0.0, 1.5 * _APPROACH_M))
+        ahead = (turn @ SE3((way_m + 0.5 * _BLOW_M, 0.0, 0.0))).translation_m
+        return [
+            ArmGoal("reach", pose_candidates=(place,), gripper_opening=0.0, speed=goal.speed),
+            ArmGoal("move", waypoints=(SE3((0.0, 0.0, -_APPROACH_M)),), speed=goal.speed),
+            ArmGoal("move", waypoints=(SE3(ahead),), touches=(body,), speed=goal.speed),
+            ArmGoal("move", waypoints=(rise,), touches=(body,), speed=goal.speed),
+        ]
+
     def all_poses(self) -> dict[str, SE3]:
         """``{name: T_world_body}`` of all movable bodies now, with the held one."""
         if self._held is None:
@@ -162,8 +205,8 @@ class TaskPlanner:
 
     def _plan_move(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
         """One leg along straight lines of the hand, which may touch some bodies."""
-        start = self._arm.grasp_pose(self.positions)
-        way = self._motion.follow([motion @ start for motion in goal.waypoints], self.positions)
+        hand = self._arm.grasp_pose(self.positions)
+        way = self._motion.follow([motion @ hand for motion in goal.waypoints], self.positions)
         if way is None:
             return self._reject([], CANNOT_REACH, number)
         leg = Leg(self.positions, way[-1], held=self._held, via=tuple(way[:-1]))

@@ -1,0 +1,141 @@
+"""Labels of demonstrations in episodes, read by pyarrow and protobuf."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet
+import pytest
+from PIL import Image
+from tfrecord import example_pb2
+from tfrecord.reader import tfrecord_iterator
+
+from gen_data.exporters.lerobot import LeRobot
+from gen_data.exporters.rlds import Rlds
+from gen_data.generator.core.demonstrations import demonstration_step
+from gen_data.generator.core.scene import Assignment, Episode, Span
+from gen_data.generator.core.se3 import SE3
+from tests.exporters.drives import drive_info
+from tests.randomizers.doubles import two_link_arm
+
+INSTRUCTION = "Put the crate on the mat."
+EPISODE = Episode(
+    False,
+    "slip",
+    (Span("pick", 0.0, 0.2), Span("place", 0.2, 0.4)),
+    (Span("crate/0", 0.1, 0.3),),
+    (Span("arm/finger + crate/0", 0.1, 0.3), Span("crate/0 + table", 0.2, 0.3)),
+)
+
+
+@pytest.fixture(scope="module")
+def samples(world: Any) -> Any:
+    """Two sequences of four steps of 0.1 s, in which a crate slips."""
+
+    def demonstrated(sample: Any) -> Any:
+        (arm,) = sample.scene.articulations
+        arm = replace(arm, assignment=Assignment("put", INSTRUCTION), episode=EPISODE)
+        return replace(sample, scene=replace(sample.scene, articulations=(arm,)))
+
+    return [demonstrated(sample) for sample in world.reach()]
+
+
+def values(example: Any, key: str) -> list[Any]:
+    """Values of a key of an example."""
+    feature = example.features.feature[key]
+    return list(getattr(feature, feature.WhichOneof("kind")).value)
+
+
+def test_lerobot_has_what_the_arm_does_at_every_step(
+    world: Any, samples: Any, tmp_path: Path
+) -> None:
+    """At 0, 0.1, 0.2 and 0.3 s; the hand's pose is that of the step's joints."""
+    folder = world.export(LeRobot(), drive_info(world), samples, tmp_path) / "train/toys_arm"
+    rows = pyarrow.parquet.read_table(folder / "data/chunk-000/episode_000000.parquet").to_pylist()
+    info = json.loads((folder / "meta/info.json").read_text())
+    (task,) = [json.loads(t) for t in (folder / "meta/tasks.jsonl").read_text().splitlines()]
+
+    assert task["task"] == INSTRUCTION
+    assert [row["annotation.phase"] for row in rows] == ["pick", "pick", "place", "place"]
+    assert [row["annotation.held"] for row in rows] == ["", "crate/0", "crate/0", ""]
+    assert [row["annotation.contacts"] for row in rows] == [
+        "", "arm/finger + crate/0", "arm/finger + crate/0, crate/0 + table", ""]  # fmt: skip
+    assert {(row["annotation.succeeded"], row["annotation.failure"]) for row in rows} == {
+        (False, "slip")
+    }
+    assert info["features"]["observation.ee_pose"]["shape"] == [7]
+    for row in rows:
+        assert np.linalg.norm(row["observation.ee_pose"][3:]) == pytest.approx(1.0, abs=1e-6)
+
+
+def test_rlds_has_an_episode_per_record_with_steps_of_equal_length(
+    world: Any, samples: Any, tmp_path: Path
+) -> None:
+    """Lists of four steps; vectors of the steps follow one another; a failure has no reward."""
+    folder = world.export(Rlds(), drive_info(world), samples, tmp_path) / "train/toys_arm"
+    described = json.loads((folder / "features.json").read_text())
+    (record,) = tfrecord_iterator(str(folder / "episodes-00000-of-00001.tfrecord"))
+    example = example_pb2.Example()
+    example.ParseFromString(bytes(record))
+
+    assert set(example.features.feature) == set(described)
+    for key, fact in described.items():
+        count = 4 if key.startswith("steps/") else 1
+        assert len(values(example, key)) == count * fact["length"], key
+    assert values(example, "steps/is_first") == [1, 0, 0, 0]
+    assert values(example, "steps/is_last") == [0, 0, 0, 1]
+    assert values(example, "steps/reward") == [0.0] * 4
+    assert values(example, "steps/language_instruction") == [INSTRUCTION.encode()] * 4
+    assert values(example, "steps/phase") == [b"pick", b"pick", b"place", b"place"]
+    assert values(example, "episode_metadata/failure") == [b"slip"]
+    (arm,) = samples[0].scene.articulations
+    track = arm.joint_track
+    states = [track.positions(0.1 * k) for k in range(4)]
+    assert values(example, "steps/observation/state") == pytest.approx(np.ravel(states), abs=1e-6)
+    camera = next(iter(samples[0].truth))
+    picture = values(example, f"steps/observation/image/{camera}")[2]
+    (expected,) = (
+        a for c, a in samples[2].capture.readings[camera].channels.items() if c.value == "rgb"
+    )
+    assert np.array_equal(np.asarray(Image.open(io.BytesIO(picture))), expected)
+
+
+def test_rlds_rewards_the_last_step_of_a_success(world: Any, samples: Any, tmp_path: Path) -> None:
+    """One, and a terminal state."""
+    done = [
+        replace(s, scene=replace(s.scene, articulations=(
+            replace(s.scene.articulations[0], episode=replace(EPISODE, succeeded=True, failure="")),
+        )))
+        for s in samples
+    ]  # fmt: skip
+    folder = world.export(Rlds(), drive_info(world), done, tmp_path) / "train/toys_arm"
+    (record,) = tfrecord_iterator(str(folder / "episodes-00000-of-00001.tfrecord"))
+    example = example_pb2.Example()
+    example.ParseFromString(bytes(record))
+
+    assert values(example, "steps/reward") == [0.0, 0.0, 0.0, 1.0]
+    assert values(example, "steps/is_terminal") == [0, 0, 0, 1]
+
+
+def test_the_hand_of_a_step_is_that_of_its_joints(samples: Any) -> None:
+    """Shoulder and elbow at 0: the hand stands upright over the base, 0.3 + 0.3 + 0.35 m up."""
+    arm = replace(samples[0].scene.articulations[0], joint_track=None)
+    arm = replace(arm, joint_positions=(0.0, 0.0, 0.02, 0.02))
+
+    step = demonstration_step(arm, two_link_arm(), 5.0, 0.1)
+
+    assert step is not None
+    assert step.T_base_grasp == SE3((0.0, 0.0, 0.95))
+    assert (step.opening, step.opening_action) == (0.5, 0.5)
+    assert step.phase == "place"
+
+
+def test_an_arm_that_demonstrates_nothing_has_no_step(world: Any) -> None:
+    """Its motion is not judged."""
+    (arm,) = world.reach()[0].scene.articulations
+    assert demonstration_step(arm, two_link_arm(), 0.0, 0.1) is None
