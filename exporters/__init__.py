@@ -21,6 +21,7 @@ TABLE = PluginTable[Exporter](
         "croissant": "gen_data.exporters.croissant:Croissant",
         "cvat": "gen_data.exporters.cvat:Cvat",
         "dota": "gen_data.exporters.dota:Dota",
+        "graspnet": "gen_data.exporters.graspnet:GraspNet",
         "hdf5": "gen_data.exporters.hdf5:Hdf5",
         "huggingface": "gen_data.exporters.huggingface:HuggingFace",
         "kitti": "gen_data.exporters.kitti:Kitti",

@@ -22,6 +22,7 @@ TABLE = PluginTable[AnyAnnotator](
         "boxes2d": "gen_data.generator.annotations.boxes2d:Boxes2d",
         "boxes3d": "gen_data.generator.annotations.boxes3d:Boxes3d",
         "free_space": "gen_data.generator.annotations.free_space:FreeSpace",
+        "grasps": "gen_data.generator.annotations.grasps:Grasps",
         "instance_masks": "gen_data.generator.annotations.instance_masks:InstanceMasks",
         "keypoints": "gen_data.generator.annotations.keypoints:Keypoints",
         "lanes": "gen_data.generator.annotations.lanes:Lanes",

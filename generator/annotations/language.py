@@ -309,7 +309,7 @@ def grammar() -> Mapping[str, Any]:
     return found
 
 
-@cache
+@lru_cache(maxsize=256)
 def kin(category: str) -> frozenset[str]:
     """Categories, in words, that may be meant by the name of one: itself and its kin."""
     groups: Sequence[Sequence[str]] = grammar()["kin"]

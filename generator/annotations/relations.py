@@ -151,7 +151,8 @@ class Shape:
         contained = (triangles.mean(1) @ self.hull[:, :3].T + self.hull[:, 3] <= 0.0).all(1)
         if area[contained].sum() < 0.5 * area.sum():
             return False
-        return bool(hits_by_rays(center, COMPASS, self.triangles_m).all())
+        hits = hits_by_rays(np.tile(center, (len(COMPASS), 1)), COMPASS, self.triangles_m)
+        return bool(np.isfinite(hits).any(axis=1).all())
 
 
 Geometry = tuple[Thing, ...]

@@ -49,7 +49,7 @@ def find_contacts(a: Array, b: Array, tolerance_m: float) -> Contacts:
     found: list[tuple[Array, Array, Array]] = []
     for i, j in _near_pairs(a, b, tolerance_m):
         one, other = a[i], b[j]
-        n_a, n_b = _normals(one), _normals(other)
+        n_a, n_b = triangle_normals(one), triangle_normals(other)
         facing = (n_a * n_b).sum(1) < OPPOSED
         one, other, n_a, n_b = one[facing], other[facing], n_a[facing], n_b[facing]
         for k in range(3):
@@ -90,13 +90,17 @@ def are_within(a: Array, b: Array, limit_m: float) -> bool:
     return any((_distances(a[i], b[j]) <= limit_m).any() for i, j in _near_pairs(a, b, limit_m))
 
 
-def hits_by_rays(origin_m: Array, directions: Array, triangles: Array) -> NDArray[np.bool_]:
-    """Whether rays [n, 3] from one point hit a mesh (Moeller and Trumbore, 1997), bool [n]."""
+def hits_by_rays(origins_m: Array, directions: Array, triangles: Array) -> Array:
+    """Distances at which rays hit triangles (Moeller and Trumbore, 1997), [rays, triangles].
+
+    In units of the directions' lengths; inf where a ray misses, or the triangle is behind it.
+    Origins and directions are [n, 3].
+    """
     base = triangles[:, 0]
     u_axis, v_axis = triangles[:, 1] - base, triangles[:, 2] - base
-    to_origin = origin_m - base
-    hits = np.zeros(len(directions), dtype=bool)
-    for k, direction in enumerate(directions):
+    distances = np.full((len(directions), len(triangles)), np.inf)
+    for k, (origin, direction) in enumerate(zip(origins_m, directions, strict=True)):
+        to_origin = origin - base
         p = np.cross(direction, v_axis)
         area = (u_axis * p).sum(1)
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -104,8 +108,9 @@ def hits_by_rays(origin_m: Array, directions: Array, triangles: Array) -> NDArra
             q = np.cross(to_origin, u_axis)
             v = (q @ direction) / area
             t = (v_axis * q).sum(1) / area
-            hits[k] = bool(((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)).any())
-    return hits
+            hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
+        distances[k, hit] = t[hit]
+    return distances
 
 
 def _reaching(triangles: Array, others: Array, limit_m: float) -> NDArray[np.bool_]:
@@ -139,7 +144,7 @@ def _overlap(
 
 def _distances(a: Array, b: Array) -> Array:
     """Distance of each pair of triangles [m], [n]; of crossing ones, that of their features."""
-    n_a, n_b = _normals(a), _normals(b)
+    n_a, n_b = triangle_normals(a), triangle_normals(b)
     best = np.full(len(a), np.inf)
     for k in range(3):
         for height, inside in (_over_face(a[:, k], b, n_b), _over_face(b[:, k], a, n_a)):
@@ -151,7 +156,7 @@ def _distances(a: Array, b: Array) -> Array:
     return best
 
 
-def _normals(triangles: Array) -> Array:
+def triangle_normals(triangles: Array) -> Array:
     """Unit normals [n, 3]; zero for triangles without area."""
     across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     return np.asarray(across / np.maximum(np.sqrt((across * across).sum(1)), 1e-30)[:, None])

@@ -246,6 +246,39 @@ class BirdseyeMap:
     layers: Mapping[str, NDArray[np.bool_]]
 
 
+@dataclass(frozen=True, slots=True)
+class Grasp:
+    """A pose at which a parallel gripper can hold an instance.
+
+    Attributes:
+        T_world_grasp: Origin midway between the contacts, X = direction of approach, Y = direction
+            in which the fingers open: the frame of GraspNet-1Billion (Fang et al., CVPR 2020).
+        width_m: Distance between the contacts.
+        score: 1.1 minus the least coefficient of friction that holds, at most 1, as there.
+    """
+
+    instance_id: int
+    T_world_grasp: SE3
+    width_m: float
+    score: float
+
+
+@dataclass(frozen=True, slots=True)
+class Suction:
+    """A point at which a suction cup can hold an instance.
+
+    Attributes:
+        point_m: Centre of the cup, world.
+        normal: Unit vector out of the surface, world.
+        score: In [0, 1]: flatness under the rim, times nearness to the centre.
+    """
+
+    instance_id: int
+    point_m: Vec3
+    normal: Vec3
+    score: float
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class EgoTruth:
     """Annotations of a sample as a whole.
@@ -261,6 +294,8 @@ class EgoTruth:
         borders: Of lanes, world (lanes).
         birdseye: The ground from above (bev_map).
         relations: Of annotated instances in space, whoever sees them, in order (relations).
+        grasps: Of annotated loose instances, by instance and falling score (grasps).
+        suctions: The same for suction cups (grasps).
         extra: Results of third-party annotators, plain data by the annotator's type.
     """
 
@@ -271,6 +306,8 @@ class EgoTruth:
     borders: tuple[LaneBorder, ...] | None = None
     birdseye: BirdseyeMap | None = None
     relations: tuple[Relation, ...] | None = None
+    grasps: tuple[Grasp, ...] | None = None
+    suctions: tuple[Suction, ...] | None = None
     extra: Mapping[str, object] = field(default_factory=dict)
 
 

@@ -85,8 +85,11 @@ def test_rays_hit_what_is_before_them() -> None:
     """Not what is behind."""
     wall = box((0.1, 4, 4), (2, 0, 0))
 
-    assert hits_by_rays(np.zeros(3), np.eye(3), wall).tolist() == [True, False, False]
-    assert not hits_by_rays(np.zeros(3), -np.eye(3), wall).any()
+    hits = hits_by_rays(np.zeros((3, 3)), np.eye(3), wall)
+
+    assert hits.min(axis=1).tolist() == pytest.approx([1.95, np.inf, np.inf])
+    assert np.isfinite(hits[0]).sum() >= 2  # the near and the far side
+    assert np.isinf(hits_by_rays(np.zeros((3, 3)), -np.eye(3), wall)).all()
 
 
 @dataclass(frozen=True)

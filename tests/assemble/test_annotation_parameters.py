@@ -56,7 +56,7 @@ def test_editors_know_both_spellings() -> None:
 
     assert names == {"enum": list(TABLE)}
     assert {m["$ref"].rpartition(".")[2] for m in mappings} == {
-        "bev_map", "free_space", "lanes", "language", "relations",
+        "bev_map", "free_space", "grasps", "lanes", "language", "relations",
     }  # fmt: skip
 
 

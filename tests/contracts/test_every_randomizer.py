@@ -46,6 +46,7 @@ GIVEN: dict[str, dict[str, Any]] = {
     "companions": {"group": "lane_objects", "size": 4, "gap_m": {"uniform": [3, 5]}},
     "distractors": {"count": {"uniform_integer": [1, 4]}},
     "colors": {"probability": True},
+    "drone_flight": {"from_end_m": 10},
     "materials": {"probability": True},
     "reaching_hand": {"group": "objects", "things": "objects", "probability": True},
     "street_lights": {"when": "always"},
@@ -85,7 +86,7 @@ def world_of(kind: str) -> tuple[Scene, AssetIndex]:
 def nominal_scene() -> Scene:
     """A room with a table, an arm, objects, lamps, cars, one of them the ego, and two cameras.
 
-    Outside, people walk in rain.
+    Outside, people walk in rain, and a drone hovers.
     """
     household, shapes = AssetChoice(tags=("household",)), AssetChoice(tags=("random_shape",))
     elements = (
@@ -111,14 +112,17 @@ def nominal_scene() -> Scene:
     lamp = Body("street_lamp", "street_lamp", SE3((1.0, 1.0, 0.0)))
     signal = Body("signal", "signal", SE3((3.0, 3.0, 0.0)))
     plate = Body("plate", "plane", materials=(Material(role=CATCHER),))
+    drone = Body("drone", "plane", SE3((0.0, 0.0, 50.1)))
+    gimbal = Body("drone_gimbal", "plane", SE3((0.0, 0.0, 50.0)))
+    flying = (Rig("drone", "drone"), Rig("drone_gimbal", "drone_gimbal"))
     walkers = [_walker(k) for k in range(12)]
     persons = [Instance(w.instance_id, w.name, "person", 0, w.asset) for w in walkers]
     crowd = ObjectGroup("people", (), ("walker?seed=0",), 12, "along", lanes=("sidewalk",))
     return replace(
         scene,
-        bodies=(*scene.bodies, lamp, signal, plate, wagon, ego, *walkers),
+        bodies=(*scene.bodies, lamp, signal, plate, wagon, ego, drone, gimbal, *walkers),
         instances=(*scene.instances, labelled, carrier, *persons),
-        rigs=(*scene.rigs, Rig("ego", "ego"), Rig("car", "lane_objects/0")),
+        rigs=(*scene.rigs, Rig("ego", "ego"), Rig("car", "lane_objects/0"), *flying),
         cameras=cameras,
         lidars=(Lidar("roof", "", SE3((0.0, 0.0, 1.9)), rig="car"),),
         lanes=lanes,

@@ -1,0 +1,121 @@
+"""Grasps in the arrays of GraspNet-1Billion and SuctionNet-1Billion.
+
+::
+
+    <split>/000000012_color.png
+    <split>/000000012_color_grasps.npy     float32 [n, 17]
+    <split>/000000012_color_suctions.npy   float32 [n, 8]
+
+Rows of grasps are score, width, height, depth, rotation (3 x 3, row by row; X = approach, Y =
+opening), translation, object id; ``GraspGroup().from_npy`` of graspnetAPI reads them. Rows of
+suctions are score, direction (out of the surface), translation, object id, as ``SuctionGroup`` of
+suctionnetAPI has them. All are in the camera frame [m], of the objects that are annotated in the
+image; object ids are instance ids. Height and depth are those of the fingers: ``finger_m`` and
+``reach_m`` of the annotation ``grasps``.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.coco import image_name
+from gen_data.exporters.fragments import fragment_rows, image_splits, write_image_rows
+from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.sensor_selection import check_channels
+from gen_data.exporters.sequences import write_bytes
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.sample import Sample
+
+
+class GraspNet(ExporterBase):
+    """Grasps and suctions of the objects in every photograph.
+
+    Attributes:
+        height_m: Height of the fingers, as the annotation has it.
+        depth_m: Reach of the fingers beyond the contacts, as the annotation has it.
+    """
+
+    type: Literal["graspnet"] = "graspnet"
+
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+    height_m: float = Field(0.02, gt=0)
+    depth_m: float = Field(0.015, ge=0)
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Names of the annotators that it requires."""
+        return frozenset({"grasps"})
+
+    def check(self, info: DatasetInfo) -> None:
+        """Reject a data set that this format cannot represent.
+
+        Raises:
+            ConfigError: no sensor writes the rgb channel.
+        """
+        check_channels(info, (), self.type)
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write a JSON line per image with the rows of its arrays.
+
+        Raises:
+            ConfigError: see ``check``.
+        """
+        self.check(info)
+
+        def row_of(sample: Sample, sensor: str) -> dict[str, Any]:
+            suffix = info.encoding(sensor, Channel.RGB).suffix
+            return {
+                "sensor": sensor,
+                "sample": sample.index,
+                "file_name": image_name(sample.index, sensor, suffix),
+                "grasps": self._grasps(sample, sensor),
+                "suctions": _suctions(sample, sensor),
+            }
+
+        write_image_rows(info, samples, shard_dir / self.type, row_of)
+
+    def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
+        """Write the arrays and link the images."""
+        for split in image_splits([shard_dir / self.type for shard_dir in shard_dirs]):
+            for shard_dir, row in fragment_rows(shard_dirs, self.type, f"{split}.images"):
+                image = dataset_dir / split / row["file_name"]
+                for name, columns in (("grasps", 17), ("suctions", 8)):
+                    file = io.BytesIO()
+                    np.save(file, np.array(row[name], np.float32).reshape(-1, columns))
+                    write_bytes(image.with_name(f"{image.stem}_{name}.npy"), file.getvalue())
+                source = info.media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
+                link_or_copy(source, image)
+
+    def _grasps(self, sample: Sample, sensor: str) -> list[list[float]]:
+        frame, truth = sample.frame, sample.truth[sensor]
+        shown = {t.instance.instance_id for t in truth.objects if t.box is not None}
+        T_camera_world = truth.camera.T_world_camera.inverse()
+        rows = []
+        for grasp in (frame.grasps if frame else None) or ():
+            if grasp.instance_id in shown:
+                pose = T_camera_world @ grasp.T_world_grasp
+                size = [grasp.score, grasp.width_m, self.height_m, self.depth_m]
+                place = [*pose.rotation().ravel().tolist(), *pose.translation_m]
+                rows.append([*size, *place, grasp.instance_id])
+        return rows
+
+
+def _suctions(sample: Sample, sensor: str) -> list[list[float]]:
+    frame, truth = sample.frame, sample.truth[sensor]
+    shown = {t.instance.instance_id for t in truth.objects if t.box is not None}
+    T_camera_world = truth.camera.T_world_camera.inverse()
+    rows = []
+    for suction in (frame.suctions if frame else None) or ():
+        if suction.instance_id in shown:
+            direction = T_camera_world.rotate(np.array(suction.normal)).tolist()
+            place = T_camera_world.apply(np.array(suction.point_m)).tolist()
+            rows.append([suction.score, *direction, *place, suction.instance_id])
+    return rows

@@ -1,0 +1,236 @@
+"""Grasps of loose objects, by parallel grippers and suction cups, from meshes and final poses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from gen_data.generator.annotations.surface_contacts import hits_by_rays, triangle_normals
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.sample import EgoTruth, Grasp, Suction
+from gen_data.generator.core.scene import Instance, Scene
+from gen_data.generator.core.se3 import SE3, Array
+
+PLASTIC = 1.32471795724474602596
+"""Additive steps 1/p and 1/p^2 fill a square evenly (Roberts, "The unreasonable effectiveness of
+quasirandom sequences", 2018)."""
+SPACING_M = 0.004
+"""Distance of the points on surfaces that grippers must not contain."""
+AROUND = 12
+"""Directions of approach per pair of contacts."""
+LEAST_WIDTH_M = 0.001
+"""Thinner things cannot be told from the rounding of a surface."""
+PALM_M = (0.05, 0.03)
+"""Length and half height of the part of a gripper that carries the fingers (assumed)."""
+
+
+class Grasps(Strict):
+    """Antipodal grasps and suction points that the scene leaves room for.
+
+    Points spread evenly over an object's surface are first contacts; the second one is where the
+    line along the inward normal leaves the object. The pair holds if the line is within both
+    friction cones (Nguyen, "Constructing force-closure grasps", 1988): ``score`` is 1.1 minus the
+    least coefficient of friction. Of the directions of approach around the line, the most
+    downward one is taken whose open gripper, two fingers and a palm, contains no point of any
+    surface.
+
+    A suction cup needs a flat rim, room above it, and a surface that faces up.
+
+    Nothing is drawn at random.
+
+    Attributes:
+        opening_m: Largest distance between the fingers.
+        friction: Largest coefficient of friction to rely on.
+        finger_m: Thickness, height and length of a finger.
+        reach_m: How far fingers reach beyond the contacts.
+        clearance_m: Distance between fingers and contacts before they close.
+        cup_m: Radius of the suction cup.
+        seal_m: Largest deviation of the rim from a plane.
+        lever_m: Horizontal distance from the object's centre at which a suction scores 0 (assumed).
+        tried: Number of first contacts per object.
+        most: Largest number of grasps, and of suctions, per object.
+    """
+
+    channels: ClassVar[frozenset[Channel]] = frozenset()
+    type: Literal["grasps"] = "grasps"
+    opening_m: float = Field(0.08, gt=0)
+    friction: float = Field(0.6, gt=0, le=1)
+    finger_m: tuple[float, float, float] = (0.01, 0.02, 0.04)
+    reach_m: float = Field(0.015, ge=0)
+    clearance_m: float = Field(0.003, gt=0)
+    cup_m: float = Field(0.01, gt=0)
+    seal_m: float = Field(0.0015, gt=0)
+    lever_m: float = Field(0.05, gt=0)
+    tried: int = Field(96, ge=1)
+    most: int = Field(12, ge=1)
+
+    def annotate_frame(
+        self, scenes: Mapping[str, Scene], assets: AssetLibrary, truth: EgoTruth
+    ) -> EgoTruth:
+        """Fill in ``grasps`` and ``suctions``."""
+        scene = scenes[""]
+        meshes = world_meshes(scene, assets)
+        loose = {b.instance_id for b in scene.bodies if b.motion == "dynamic"}
+        grasps: list[Grasp] = []
+        suctions: list[Suction] = []
+        for instance in sorted(scene.instances, key=lambda i: i.instance_id):
+            number = instance.instance_id
+            if not instance.annotated or number not in loose:
+                continue
+            mesh = np.concatenate([t for owner, t in meshes if owner == number])
+            margin_m = self.opening_m + self.finger_m[2] + PALM_M[0]
+            around = points_near([t for _, t in meshes], mesh, margin_m)
+            points, normals = spread_points(mesh, self.tried)
+            grasps += self._grasps(instance, mesh, points, normals, around)
+            suctions += self._suctions(instance, mesh, points, normals, around)
+        return replace(truth, grasps=tuple(grasps), suctions=tuple(suctions))
+
+    def _grasps(
+        self, instance: Instance, mesh: Array, points: Array, normals: Array, around: Array
+    ) -> list[Grasp]:
+        """Grasps of one object, the best ones first."""
+        hits = hits_by_rays(points, -normals, mesh)
+        # Fingers come from outside: the last point within the opening is the second contact.
+        widest_m = self.opening_m - 2.0 * self.clearance_m
+        within = np.where((hits < LEAST_WIDTH_M) | (hits > widest_m), 0.0, hits)
+        widths, faces = within.max(axis=1), within.argmax(axis=1)
+        # Nothing of the object lies between a contact and its finger.
+        apart_m = self.clearance_m + self.finger_m[0]
+        beyond = ((hits > widths[:, None] + 1e-6) & (hits < widths[:, None] + apart_m)).any(axis=1)
+        before = (hits_by_rays(points + 1e-6 * normals, normals, mesh) < apart_m).any(axis=1)
+        cosines = -(normals * triangle_normals(mesh[faces])).sum(axis=1)
+        needs = np.sqrt(np.maximum(1.0 - cosines**2, 0.0)) / np.maximum(cosines, 1e-9)
+        holding = (widths > 0.0) & (needs <= self.friction) & ~beyond & ~before
+        found: list[Grasp] = []
+        for k in sorted(np.flatnonzero(holding).tolist(), key=lambda k: needs[k]):
+            pose = self._approach(points[k], points[k] - widths[k] * normals[k], around)
+            if pose is not None:
+                width_m, score = float(widths[k]), min(1.0, 1.1 - float(needs[k]))
+                number = instance.instance_id
+                found.append(Grasp(number, pose.rounded(), round(width_m, 6), round(score, 6)))
+            if len(found) == self.most:
+                break
+        return found
+
+    def _approach(self, one: Array, other: Array, around: Array) -> SE3 | None:
+        """Pose of the first free gripper, from above on; None if there is none."""
+        line = (other - one) / math.dist(one, other)
+        down = np.array([0.0, 0.0, -1.0]) - line * -line[2]
+        if float(down @ down) < 1e-6:
+            down = np.array([1.0, 0.0, 0.0]) - line * line[0]
+        down /= math.sqrt(float(down @ down))
+        side = np.cross(line, down)
+        middle = 0.5 * (one + other)
+        reach_m = math.hypot(self.finger_m[2] + PALM_M[0], self.opening_m)
+        offsets = around - middle
+        offsets = offsets[(offsets * offsets).sum(axis=1) < reach_m**2]
+        turns = sorted(range(AROUND), key=lambda k: (min(k, AROUND - k), k))
+        for angle in (2.0 * math.pi * k / AROUND for k in turns):
+            forward = math.cos(angle) * down + math.sin(angle) * side
+            rotation = np.stack([forward, line, np.cross(forward, line)], axis=1)
+            if not self._is_blocked(offsets @ rotation, math.dist(one, other)):
+                matrix = np.eye(4)
+                matrix[:3, :3], matrix[:3, 3] = rotation, middle
+                return SE3.from_matrix(matrix)
+        return None
+
+    def _is_blocked(self, points: Array, width_m: float) -> bool:
+        """Whether an open gripper contains any of the points, given in its frame."""
+        x, y, z = points[:, 0], np.abs(points[:, 1]), np.abs(points[:, 2])
+        thick_m, height_m, length_m = self.finger_m
+        inner = 0.5 * width_m + self.clearance_m
+        in_finger = (x > -length_m) & (x < self.reach_m) & (z < 0.5 * height_m)
+        in_finger &= (y > inner) & (y < inner + thick_m)
+        in_palm = (x <= -length_m) & (x > -length_m - PALM_M[0]) & (z < PALM_M[1])
+        in_palm &= y < 0.5 * self.opening_m + thick_m
+        return bool((in_finger | in_palm).any())
+
+    def _suctions(
+        self, instance: Instance, mesh: Array, points: Array, normals: Array, around: Array
+    ) -> list[Suction]:
+        """Suction points of one object, the best ones first."""
+        found = []
+        center = np.array(instance.box3d.T_frame_box.translation_m)
+        for point, normal in zip(points, normals, strict=True):
+            if normal[2] <= 0.0:
+                continue
+            rim = rim_points(point, normal, self.cup_m) + 2.0 * self.seal_m * normal
+            depths = hits_by_rays(rim, np.tile(-normal, (len(rim), 1)), mesh).min(axis=1)
+            deviation_m = float(np.abs(depths - 2.0 * self.seal_m).max())
+            lever_m = math.dist(point[:2], center[:2])
+            score = (1.0 - deviation_m / self.seal_m) * (1.0 - lever_m / self.lever_m)
+            if deviation_m >= self.seal_m or lever_m >= self.lever_m:
+                continue
+            height = (around - point) @ normal
+            apart = around - point - height[:, None] * normal
+            inside = (apart * apart).sum(1) < self.cup_m**2
+            room_m = self.finger_m[2] + PALM_M[0]
+            if not (inside & (height > 2.0 * self.seal_m) & (height < room_m)).any():
+                x, y, z = (round(float(v), 6) for v in point)
+                nx, ny, nz = (round(float(v), 6) for v in normal)
+                found.append(
+                    Suction(instance.instance_id, (x, y, z), (nx, ny, nz), round(score, 6))
+                )
+        return sorted(found, key=lambda s: -s.score)[: self.most]
+
+
+def world_meshes(scene: Scene, assets: AssetLibrary) -> list[tuple[int, Array]]:
+    """Instance id and triangles [n, 3, 3] of all bodies, world."""
+    found = []
+    for body in scene.bodies:
+        mesh = assets.mesh(body.asset)
+        corners = body.T_world_body.apply(mesh.vertices_m.astype(np.float64) * body.scale)
+        found.append((body.instance_id, corners[mesh.faces]))
+    return found
+
+
+def spread_points(mesh: Array, count: int) -> tuple[Array, Array]:
+    """Points spread evenly over a mesh, [count, 3], and their normals."""
+    sides = np.cross(mesh[:, 1] - mesh[:, 0], mesh[:, 2] - mesh[:, 0])
+    total = np.cumsum(np.sqrt((sides * sides).sum(1)))
+    k = np.arange(count)
+    faces = np.searchsorted(total, (k + 0.5) / count * total[-1])
+    u, v = (0.5 + (k + 1) / PLASTIC) % 1.0, (0.5 + (k + 1) / PLASTIC**2) % 1.0
+    u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
+    a, b, c = (mesh[faces, i] for i in range(3))
+    points = a + u[:, None] * (b - a) + v[:, None] * (c - a)
+    return points, triangle_normals(mesh[faces])
+
+
+def points_near(meshes: Sequence[Array], mesh: Array, margin_m: float) -> Array:
+    """Points on all meshes at most ``SPACING_M`` apart, in the bounds of one and a margin."""
+    low, high = mesh.min((0, 1)) - margin_m, mesh.max((0, 1)) + margin_m
+    found = [np.zeros((0, 3))]
+    for triangles in meshes:
+        near = (triangles.max(1) >= low).all(1) & (triangles.min(1) <= high).all(1)
+        chosen = triangles[near]
+        edges = np.sqrt(((np.roll(chosen, -1, axis=1) - chosen) ** 2).sum(2)).max(1)
+        counts = np.minimum(np.ceil(edges / SPACING_M).astype(int), 1024)
+        for n in np.unique(counts):
+            i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
+            u, v = ((w[i + j <= n] / max(n, 1))[None, :, None] for w in (i, j))
+            a, b, c = (chosen[counts == n][:, None, k] for k in range(3))
+            points = (a + u * (b - a) + v * (c - a)).reshape(-1, 3)
+            found.append(points[((points >= low) & (points <= high)).all(1)])
+    points = np.concatenate(found)
+    # Fine meshes have many points per cell: one is enough.
+    cells = np.floor((points - low) / (0.5 * SPACING_M)).astype(np.int64)
+    keys = (cells[:, 0] << 40) + (cells[:, 1] << 20) + cells[:, 2]
+    return points[np.unique(keys, return_index=True)[1]]
+
+
+def rim_points(point: Array, normal: Array, radius_m: float) -> Array:
+    """Eight points on a circle around a point, across its normal, [8, 3]."""
+    helper = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    u = np.cross(normal, helper)
+    u /= math.sqrt(float(u @ u))
+    angles = np.arange(8) * math.pi / 4
+    around = np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * np.cross(normal, u)
+    return np.asarray(point + radius_m * around)
