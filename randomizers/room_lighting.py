@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Literal
 
+import numpy as np
+
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
@@ -153,7 +155,7 @@ def _room_of(body: Body) -> str:
 
 
 def _lamp_light(name: str, body: Body, at_m: Vec3, flux_lm: float, color: Vec3) -> Light:
-    x, y, z = (round(float(v), 5) for v in body.T_world_body.apply(at_m))
+    x, y, z = (round(float(v), 5) for v in body.T_world_body.apply(np.array(at_m)))
     return scale_to_flux(Light(name, "sphere", (x, y, z), color=color, radius_m=_BULB_M), flux_lm)
 
 
@@ -161,7 +163,7 @@ def _window_light(window: Body, assets: AssetIndex, luminance_cd_m2: float) -> L
     """A panel in the plane of a window's panes that shines into the room."""
     low, high = assets.bounds_m(window.asset)
     width, height = round(high[1] - low[1] - 0.2, 4), round(high[2] - 0.12, 4)
-    x, y, z = window.T_world_body.apply((0.055, 0.0, 0.5 * high[2]))
+    x, y, z = window.T_world_body.apply(np.array((0.055, 0.0, 0.5 * high[2])))
     w, _, _, qz = window.T_world_body.quaternion_wxyz
     c, s = round(1.0 - 2.0 * qz * qz, 6), round(2.0 * w * qz, 6)
     return Light(

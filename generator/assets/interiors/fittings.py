@@ -32,13 +32,18 @@ from gen_data.generator.assets.procedural.material_presets import (
     patterned_material,
     printed_material,
 )
-from gen_data.generator.assets.procedural.patches import Patch
+from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Keypoint, Material
 from gen_data.generator.core.se3 import Vec3
 
 LAMP = "lamp"
 """Role of slots that shine, and keypoint in the middle of the light."""
+
+
+def _scaled(color: Vec3, factor: float) -> Vec3:
+    r, g, b = color
+    return (factor * r, factor * g, factor * b)
 
 
 def _with_lamp(made: Solid, at_m: Vec3) -> Solid:
@@ -157,7 +162,7 @@ def curtain(seed: int = 0) -> Solid:
         rod((0.0, -0.5 * w - 0.04, h + 0.015), (0.0, 0.5 * w + 0.04, h + 0.015), 0.012, 1),
     ]
     light = cloth(rng)
-    made = replace(light, diffuse_transmission=tuple(0.3 * c for c in light.base_color))
+    made = replace(light, diffuse_transmission=_scaled(light.base_color, 0.3))
     return solid(
         patches,
         [made, metal_material(STAINLESS, 0.35)],
@@ -373,8 +378,12 @@ def house_plant(seed: int = 0) -> Solid:
             .rotated("z", rng.between(0.0, 2 * math.pi))
             .moved(0.0, 0.0, 0.86 * h)
         )
-    green = tuple(c * rng.between(0.7, 1.2) for c in (0.06, 0.16, 0.04))
-    leaf = Material(green, 0.45, diffuse_transmission=tuple(0.8 * g for g in green), role="leaf")
+    green = (
+        0.06 * rng.between(0.7, 1.2),
+        0.16 * rng.between(0.7, 1.2),
+        0.04 * rng.between(0.7, 1.2),
+    )
+    leaf = Material(green, 0.45, diffuse_transmission=_scaled(green, 0.8), role="leaf")
     clay = Material(
         draw_linear(("#b5643c", "#f0ede6", "#3a3d40", "#8a9a8d", "#d8c7ab"), 0.1, rng), 0.6
     )
@@ -403,7 +412,7 @@ def _leaf(rng: VariantRng, length: float) -> Patch:
         axis=2,
     )
     sheet = shapes.grid(points, slot=2)
-    return shapes.join_patches([sheet, sheet.flipped()])
+    return join_patches([sheet, sheet.flipped()])
 
 
 def waste_basket(seed: int = 0) -> Solid:
