@@ -325,7 +325,7 @@ def test_furnish_needs_a_room_layout() -> None:
 
 @pytest.mark.slow
 def test_no_two_of_two_hundred_rooms_are_nearly_alike_and_many_categories_occur() -> None:
-    """Of equal types, the multisets of (family, place to 0.25 m) differ in more than half."""
+    """Sets of (family, place to 0.25 m) share less than a quarter; 140 categories occur."""
     kinds = [k for k in KINDS if k != "apartment"]
     scenes = [(kinds[k % len(kinds)], furnished(kinds[k % len(kinds)], k)) for k in range(200)]
     cells = [
@@ -341,5 +341,5 @@ def test_no_two_of_two_hundred_rooms_are_nearly_alike_and_many_categories_occur(
     alike = [len(a & b) / len(a | b) for (k, a), (m, b) in combinations(cells, 2) if k == m]
     categories = {i.category for _, scene in scenes for i in scene.instances} - STRUCTURE
 
-    assert max(alike) < 0.5
-    assert len(categories) >= 80
+    assert max(alike) < 0.25
+    assert len(categories) >= 140
