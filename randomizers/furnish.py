@@ -72,7 +72,9 @@ class Furnish(RandomizerBase):
         rooms, pieces = self._draw_layout(kind, options, assets, rng)
         scene = remove_room(scene, self.room)
         builder = Builder(scene, assets, self.room, annotated=annotated)
-        builder.add_shells(rooms, {room.name: self._draw_looks(room, assets, rng) for room in rooms})
+        builder.add_shells(
+            rooms, {room.name: self._draw_looks(room, assets, rng) for room in rooms}
+        )
         parts = _moving_parts(assets)
         for room, placed in zip(rooms, pieces, strict=True):
             builder.add_pieces(room, placed, parts)
@@ -83,7 +85,11 @@ class Furnish(RandomizerBase):
 
     def _find_element(self, scene: Scene) -> tuple[str, bool]:
         """Type of the element's room, and whether its shell is annotated."""
-        floors = [i for i in scene.instances if i.category == "floor" and i.name.startswith(f"{self.room}/")]
+        floors = [
+            i
+            for i in scene.instances
+            if i.category == "floor" and i.name.startswith(f"{self.room}/")
+        ]
         if not floors:
             raise ConfigError(
                 f"randomizers.{self.name}.room: the template has no element '{self.room}' of type "
@@ -98,7 +104,9 @@ class Furnish(RandomizerBase):
         conflicts: Counter[tuple[str, str]] = Counter()
         clutter = self.clutter.draw(rng)
         for _ in range(TRIES):
-            rooms = draw_plan(kind, self._draw_size(kind, rng), rng, f"randomizers.{self.name}.room")
+            rooms = draw_plan(
+                kind, self._draw_size(kind, rng), rng, f"randomizers.{self.name}.room"
+            )
             made = []
             for room in rooms:
                 rules = find_room_type(room.kind, "")
@@ -120,7 +128,9 @@ class Furnish(RandomizerBase):
         if all(one is None for one in given):
             return None
         usual = (
-            ((8.6, 10.5), (7.2, 8.6), (2.45, 2.8)) if kind == APARTMENT else find_room_type(kind, "").size_m
+            ((8.6, 10.5), (7.2, 8.6), (2.45, 2.8))
+            if kind == APARTMENT
+            else find_room_type(kind, "").size_m
         )
         drawn = [
             limits if one is None else (round(one.draw(rng), 3),) * 2
@@ -133,12 +143,21 @@ class Furnish(RandomizerBase):
         field = f"randomizers.{self.name}"
         floor = choose(find_textures(assets, (choose(rules.floor, rng),), field), rng)
         wall = choose(rules.walls, rng)
-        tint = hsv_to_linear(float(rng.random()), 0.25 * float(rng.random()) ** 1.5, 0.82 + 0.13 * float(rng.random()))
+        tint = hsv_to_linear(
+            float(rng.random()),
+            0.25 * float(rng.random()) ** 1.5,
+            0.82 + 0.13 * float(rng.random()),
+        )
         if wall == "paint":
             walls = Material(tint, 0.9)
         else:
             scale = {"tiles": 0.8, "brick": 0.9}.get(wall, 1.4)
-            walls = Material((1.0, 1.0, 1.0), 1.0, texture=choose(find_textures(assets, (wall,), field), rng), texture_scale_m=scale)
+            walls = Material(
+                (1.0, 1.0, 1.0),
+                1.0,
+                texture=choose(find_textures(assets, (wall,), field), rng),
+                texture_scale_m=scale,
+            )
         scale = round(0.9 + 0.9 * float(rng.random()), 3)
         ground = Material((1.0, 1.0, 1.0), 1.0, texture=floor, texture_scale_m=scale)
         white = 0.78 + 0.1 * float(rng.random())

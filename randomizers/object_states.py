@@ -51,7 +51,9 @@ class ObjectStates(RandomizerBase):
             moved, share = _open(scene, assets, part, piece, joint, opening if is_open else 0.0)
             scene = scene.with_bodies(moved)
             way = f"{share * joint.limit:.4g}"
-            attributes.setdefault(part.instance_id, []).extend([("joint", way), ("open", f"{share:.3g}")])
+            attributes.setdefault(part.instance_id, []).extend(
+                [("joint", way), ("open", f"{share:.3g}")]
+            )
         changed = []
         for body in scene.bodies:
             slots = body_materials(body, assets)
@@ -62,7 +64,9 @@ class ObjectStates(RandomizerBase):
             glow = round(luminance, 2)
             if is_on:
                 lit = tuple(
-                    replace(m, emission_cd_m2=(glow, glow, glow), texture=picture) if m.role == SCREEN else m
+                    replace(m, emission_cd_m2=(glow, glow, glow), texture=picture)
+                    if m.role == SCREEN
+                    else m
                     for m in slots
                 )
                 changed.append(replace(body, materials=lit))

@@ -44,7 +44,9 @@ class RoomCamera(RandomizerBase):
     stage: Literal["scene", "view"] = "view"
     room: str = "room"
     height_m: dist.Positive = dist.Uniform(1.0, 1.75)
-    pitch_deg: Annotated[dist.Scalar, dist.Bounds(-89, 89)] = dist.Normal(-10.0, 7.0, clip=(-35.0, 12.0))
+    pitch_deg: Annotated[dist.Scalar, dist.Bounds(-89, 89)] = dist.Normal(
+        -10.0, 7.0, clip=(-35.0, 12.0)
+    )
     yaw_deg: dist.Scalar = dist.Normal(0.0, 12.0, clip=(-30.0, 30.0))
     roll_deg: dist.Scalar = dist.Normal(0.0, 1.5, clip=(-6.0, 6.0))
     away_m: float = Field(1.3, ge=0)
@@ -92,13 +94,16 @@ class RoomCamera(RandomizerBase):
         y = my + (2.0 * float(rng.random()) - 1.0) * max(0.5 * (y1 - y0) - _WALL_M, 0.0)
         eye = (x, y, min(self.height_m.draw(rng), scene.interior_m[1][2] - _WALL_M))
         here = [
-            b for b in pieces
+            b
+            for b in pieces
             if abs(b.T_world_body.translation_m[0] - mx) < 0.5 * (x1 - x0)
             and abs(b.T_world_body.translation_m[1] - my) < 0.5 * (y1 - y0)
-        ]  # fmt: skip
+        ]
         if not here:
             return None
-        tx, ty, _ = here[min(int(rng.random() * len(here)), len(here) - 1)].T_world_body.translation_m
+        tx, ty, _ = here[
+            min(int(rng.random() * len(here)), len(here) - 1)
+        ].T_world_body.translation_m
         yaw = math.atan2(ty - y, tx - x) + math.radians(self.yaw_deg.draw(rng))
         pitch, roll = math.radians(self.pitch_deg.draw(rng)), math.radians(self.roll_deg.draw(rng))
         # The room's middle lies ahead, not behind the camera: views into corners show little.
@@ -108,11 +113,11 @@ class RoomCamera(RandomizerBase):
         if not is_clear(eye, scene, assets, self.clearance_m):
             return None
         target = (
-            x + math.cos(pitch) * math.cos(yaw), y + math.cos(pitch) * math.sin(yaw),
+            x + math.cos(pitch) * math.cos(yaw),
+            y + math.cos(pitch) * math.sin(yaw),
             eye[2] + math.sin(pitch),
-        )  # fmt: skip
+        )
         return eye, target, roll
-
 
 
 def _count_in_view(camera: Camera, pieces: Sequence[Body]) -> int:

@@ -1,4 +1,4 @@
-"""Light in rooms: lamps that are on or off, daylight and sun through windows, light from all walls."""
+"""Light in rooms: lamps that are on or off, daylight and sun through windows."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Literal
+
+import numpy as np
 
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.errors import ConfigError
@@ -83,11 +85,14 @@ class RoomLighting(RandomizerBase):
         outside = 0.3 if night else round(bright, 1)
         scene = remove_lights(scene)
         lamps, scene = self._switch_lamps(scene, own, assets, rng, must=night or not windows)
-        panels = [_window_light(w, assets, _VIEW_MEAN * outside) for w in windows] if not night else []
+        panels = (
+            [_window_light(w, assets, _VIEW_MEAN * outside) for w in windows] if not night else []
+        )
         sun = self._draw_sun(windows, rng, shines=not night)
         view = scene.body(f"{self.room}/{OUTSIDE}")
         glow = tuple(
-            replace(m, emission_cd_m2=(outside, outside, outside)) for m in body_materials(view, assets)
+            replace(m, emission_cd_m2=(outside, outside, outside))
+            for m in body_materials(view, assets)
         )
         scene = scene.with_bodies(replace(view, materials=glow))
         lights = (*sun, *panels, *lamps)
@@ -118,17 +123,30 @@ class RoomLighting(RandomizerBase):
 
     def _draw_sun(self, windows: Sequence[Body], rng: Rng, *, shines: bool) -> tuple[Light, ...]:
         """The sun, from a direction in which it shines through one of the windows."""
-        wanted, lux, altitude = self.sun.draw(rng), self.sun_lux.draw(rng), self.sun_altitude_deg.draw(rng)
+        wanted, lux, altitude = (
+            self.sun.draw(rng),
+            self.sun_lux.draw(rng),
+            self.sun_altitude_deg.draw(rng),
+        )
         number, aside = int(rng.random() * max(1, len(windows))), 2.0 * float(rng.random()) - 1.0
         if not (shines and wanted and windows):
             return ()
         w, _, _, z = windows[number].T_world_body.quaternion_wxyz
         azimuth, up = 2.0 * math.atan2(z, w) + math.radians(50.0 * aside), math.radians(altitude)
         direction = (
-            round(math.cos(up) * math.cos(azimuth), 6), round(math.cos(up) * math.sin(azimuth), 6),
+            round(math.cos(up) * math.cos(azimuth), 6),
+            round(math.cos(up) * math.sin(azimuth), 6),
             round(-math.sin(up), 6),
-        )  # fmt: skip
-        return (Light("sun", "sun", direction=direction, color=(1.06, 0.99, 0.9), illuminance_lux=round(lux, 1)),)
+        )
+        return (
+            Light(
+                "sun",
+                "sun",
+                direction=direction,
+                color=(1.06, 0.99, 0.9),
+                illuminance_lux=round(lux, 1),
+            ),
+        )
 
 
 def _room_of(body: Body) -> str:
@@ -137,7 +155,7 @@ def _room_of(body: Body) -> str:
 
 
 def _lamp_light(name: str, body: Body, at_m: Vec3, flux_lm: float, color: Vec3) -> Light:
-    x, y, z = (round(float(v), 5) for v in body.T_world_body.apply(at_m))
+    x, y, z = (round(float(v), 5) for v in body.T_world_body.apply(np.array(at_m)))
     return scale_to_flux(Light(name, "sphere", (x, y, z), color=color, radius_m=_BULB_M), flux_lm)
 
 
@@ -145,14 +163,19 @@ def _window_light(window: Body, assets: AssetIndex, luminance_cd_m2: float) -> L
     """A panel in the plane of a window's panes that shines into the room."""
     low, high = assets.bounds_m(window.asset)
     width, height = round(high[1] - low[1] - 0.2, 4), round(high[2] - 0.12, 4)
-    x, y, z = window.T_world_body.apply((0.055, 0.0, 0.5 * high[2]))
+    x, y, z = window.T_world_body.apply(np.array((0.055, 0.0, 0.5 * high[2])))
     w, _, _, qz = window.T_world_body.quaternion_wxyz
     c, s = round(1.0 - 2.0 * qz * qz, 6), round(2.0 * w * qz, 6)
     return Light(
-        f"daylight/{window.name}", "rectangle", (round(float(x), 5), round(float(y), 5), round(float(z), 5)),
-        (c, s, 0.0), (0.95, 1.0, 1.07), size_m=(width, height), side=(-s, c, 0.0),
+        f"daylight/{window.name}",
+        "rectangle",
+        (round(float(x), 5), round(float(y), 5), round(float(z), 5)),
+        (c, s, 0.0),
+        (0.95, 1.0, 1.07),
+        size_m=(width, height),
+        side=(-s, c, 0.0),
         intensity_cd=round(luminance_cd_m2 * width * height, 3),
-    )  # fmt: skip
+    )
 
 
 def _reflected(scene: Scene, lights: Sequence[Light]) -> Environment:
@@ -171,5 +194,3 @@ def _reflected(scene: Scene, lights: Sequence[Light]) -> Environment:
             flux += light.illuminance_lux * abs(light.direction[2])
     luminance = flux * _REFLECTANCE / (math.pi * area * (1.0 - _REFLECTANCE))
     return Environment("environment/neutral?seed=0", max(round(luminance, 3), 0.05), visible=False)
-
-

@@ -74,9 +74,10 @@ class RoomPath(RandomizerBase):
         body, floors = self._find(scene)
         obstacles = _obstacles(scene, assets, self.room)
         doors = [
-            b for b in scene.bodies
+            b
+            for b in scene.bodies
             if b.asset.startswith("door_frame") and b.name.startswith(f"{self.room}/")
-        ]  # fmt: skip
+        ]
         grid = _Grid(floors, doors, obstacles, assets, self.radius_m)
         speed, sway_m = self.speed_m_s.draw(rng), self.sway_m.draw(rng)
         wanted_m = speed * self.duration_s
@@ -89,16 +90,28 @@ class RoomPath(RandomizerBase):
                 poses = _poses(points, body.T_world_body.translation_m[2], sway_m)
                 track = Trajectory(body.name, KNOT_S, poses)
                 tracks = (*(t for t in scene.tracks if t.body != body.name), track)
-                return replace(scene.with_bodies(replace(body, T_world_body=poses[0])), tracks=tracks)
-        raise self.reject("no free path through the room", "a smaller radius_m, speed_m_s or duration_s")
+                return replace(
+                    scene.with_bodies(replace(body, T_world_body=poses[0])), tracks=tracks
+                )
+        raise self.reject(
+            "no free path through the room", "a smaller radius_m, speed_m_s or duration_s"
+        )
 
     def _find(self, scene: Scene) -> tuple[Body, list[Body]]:
         field = f"randomizers.{self.name}"
-        floors = [b for b in scene.bodies if b.name.startswith(f"{self.room}/") and b.name.endswith("/floor")]
+        floors = [
+            b
+            for b in scene.bodies
+            if b.name.startswith(f"{self.room}/") and b.name.endswith("/floor")
+        ]
         if not floors:
-            raise ConfigError(f"{field}.room: the template has no element '{self.room}' of type room_layout")
+            raise ConfigError(
+                f"{field}.room: the template has no element '{self.room}' of type room_layout"
+            )
         if self.carrier not in [rig.name for rig in scene.rigs]:
-            raise ConfigError(f"{field}.carrier: the template has no element '{self.carrier}' of type carrier")
+            raise ConfigError(
+                f"{field}.carrier: the template has no element '{self.carrier}' of type carrier"
+            )
         return scene.body(scene.rig(self.carrier).body), floors
 
 
@@ -119,9 +132,13 @@ class _Grid:
     """Places where a walker fits, as cells over all rooms; row = y, column = x."""
 
     def __init__(
-        self, floors: Sequence[Body], doors: Sequence[Body], obstacles: Sequence[Rectangle],
-        assets: AssetIndex, radius_m: float,
-    ) -> None:  # fmt: skip
+        self,
+        floors: Sequence[Body],
+        doors: Sequence[Body],
+        obstacles: Sequence[Rectangle],
+        assets: AssetIndex,
+        radius_m: float,
+    ) -> None:
         rooms = [_extent(b, assets) for b in floors]
         x0, y0 = min(r[0] for r in rooms), min(r[1] for r in rooms)
         columns = math.ceil((max(r[2] for r in rooms) - x0) / CELL_M)
@@ -139,7 +156,9 @@ class _Grid:
             place = Footprint.of(door.T_world_body, ((lx, ly, 0.0), (hx, hy, 0.0)))
             px, py, c, s, _, _ = place.rectangle
             along, across = c * (x - px) + s * (y - py), c * (y - py) - s * (x - px)
-            free |= (np.abs(along) < 0.5 * (hx - lx) + radius_m + CELL_M) & (np.abs(across) < max(half_across, 0.06))
+            free |= (np.abs(along) < 0.5 * (hx - lx) + radius_m + CELL_M) & (
+                np.abs(across) < max(half_across, 0.06)
+            )
         for px, py, c, s, a, b in obstacles:
             along, across = np.abs(c * (x - px) + s * (y - py)), np.abs(c * (y - py) - s * (x - px))
             beyond = np.maximum(along - a, 0.0) ** 2 + np.maximum(across - b, 0.0) ** 2
@@ -170,7 +189,9 @@ class _Grid:
                 return smooth
         return None
 
-    def _shortest(self, start: tuple[int, ...], goal: tuple[int, ...]) -> list[tuple[int, ...]] | None:
+    def _shortest(
+        self, start: tuple[int, ...], goal: tuple[int, ...]
+    ) -> list[tuple[int, ...]] | None:
         rows, columns = self._free.shape
         best, came = {start: 0.0}, {start: start}
         queue = [(0.0, start)]
@@ -186,7 +207,11 @@ class _Grid:
             for di in (-1, 0, 1):
                 for dj in (-1, 0, 1):
                     i, j = cell[0] + di, cell[1] + dj
-                    if not (di or dj) or not (0 <= i < rows and 0 <= j < columns) or not self._free[i, j]:
+                    if (
+                        not (di or dj)
+                        or not (0 <= i < rows and 0 <= j < columns)
+                        or not self._free[i, j]
+                    ):
                         continue
                     reached = cost + (1.4142 if di and dj else 1.0)
                     if reached < best.get((i, j), math.inf):

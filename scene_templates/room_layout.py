@@ -37,7 +37,9 @@ class RoomLayout(Element):
         rooms = _nominal_plan(self.kind, field)
         builder = Builder(scene, assets, self.name, annotated=self.annotate)
         looks = Looks(
-            assets.materials("floor")[0], assets.materials("wall")[0], assets.materials("ceiling")[0]
+            assets.materials("floor")[0],
+            assets.materials("wall")[0],
+            assets.materials("ceiling")[0],
         )
         builder.add_shells(rooms, {room.name: looks for room in rooms})
         scene = builder.scene()

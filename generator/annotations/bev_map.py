@@ -78,9 +78,13 @@ class BevMap(Strict):
         scene = scenes[""]
         T_world_map = level_pose(truth.T_world_ego)
         grid = Grid(T_world_map, self.px_m, 2 * math.ceil(self.reach_m / self.px_m))
-        layers = _room_layers if any(i.category == "floor" for i in scene.instances) else _street_layers
+        layers = (
+            _room_layers if any(i.category == "floor" for i in scene.instances) else _street_layers
+        )
         own = scene.body(scene.rig(truth.rig).body).instance_id
-        return replace(truth, birdseye=BirdseyeMap(T_world_map, self.px_m, layers(grid, scene, assets, own)))
+        return replace(
+            truth, birdseye=BirdseyeMap(T_world_map, self.px_m, layers(grid, scene, assets, own))
+        )
 
 
 def _street_layers(grid: Grid, scene: Scene, assets: AssetLibrary, own: int) -> Layers:
@@ -95,8 +99,8 @@ def _street_layers(grid: Grid, scene: Scene, assets: AssetLibrary, own: int) -> 
         "parking": covered_cells(grid, _lanes(scene, "parking")),
         "crosswalk": covered_cells(grid, _lanes(scene, "crosswalk")),
         "sidewalk": covered_cells(grid, _lanes(scene, "sidewalk")),
-        "lane_divider": covered_cells(grid, _borders(scene, "lane", LINE_PX * self.px_m)),
-        "road_divider": covered_cells(grid, _borders(scene, "road", LINE_PX * self.px_m)),
+        "lane_divider": covered_cells(grid, _borders(scene, "lane", LINE_PX * grid.cell_m)),
+        "road_divider": covered_cells(grid, _borders(scene, "road", LINE_PX * grid.cell_m)),
         "vehicles": covered_cells(grid, _floors(vehicles)),
         "people": covered_cells(grid, _floors(people)),
         "free_space": drivable & ~covered_cells(grid, footprints(standing, assets)),
@@ -109,12 +113,17 @@ def _room_layers(grid: Grid, scene: Scene, assets: AssetLibrary, own: int) -> La
     ``occupied`` is covered by furniture and things whose lowest point is below ``HEAD_M``, rugs
     left out, or by open doors; ``free_space`` is the rest of the floor, and of doorways.
     """
+
     def outlines(category: str) -> NDArray[np.bool_]:
         ids = {i.instance_id for i in scene.instances if i.category == category}
         bodies = (b for b in scene.bodies if b.instance_id in ids and b.part_id < 2)
         return covered_cells(grid, footprints(bodies, assets))
 
-    shell = {i.instance_id for i in scene.instances if i.category in ("floor", "ceiling", "wall", "window")}
+    shell = {
+        i.instance_id
+        for i in scene.instances
+        if i.category in ("floor", "ceiling", "wall", "window")
+    }
     doors = {i.instance_id for i in scene.instances if i.category == "door"}
     standing = [
         b for b in scene.bodies
@@ -122,7 +131,11 @@ def _room_layers(grid: Grid, scene: Scene, assets: AssetLibrary, own: int) -> La
         and not (b.instance_id in doors and b.part_id == 1)
         and _height_m(b, assets, 0) < HEAD_M and _height_m(b, assets, 1) > FLAT_M
     ]  # fmt: skip
-    floor, door, occupied = outlines("floor"), outlines("door"), covered_cells(grid, footprints(standing, assets))
+    floor, door, occupied = (
+        outlines("floor"),
+        outlines("door"),
+        covered_cells(grid, footprints(standing, assets)),
+    )
     return {
         "floor": floor,
         "wall": outlines("wall") & ~door,

@@ -84,6 +84,14 @@ def remove_room(scene: Scene, name: str) -> Scene:
     )
 
 
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part that moves on its piece: its name in ``JOINTS``, and its asset."""
+
+    name: str
+    asset: str
+
+
 class Builder:
     """Collects the bodies and instances of one room element."""
 
@@ -103,31 +111,46 @@ class Builder:
         )
 
     def add(
-        self, name: str, asset: str, pose: SE3, room: str, *, annotated: bool,
-        materials: tuple[Material, ...] = (), part: str = "", part_asset: str = "", group: str = "",
-        part_materials: tuple[Material, ...] = (),
-    ) -> None:  # fmt: skip
+        self,
+        name: str,
+        asset: str,
+        pose: SE3,
+        room: str,
+        materials: tuple[Material, ...] = (),
+        part: Part | None = None,
+        *,
+        group: str = "",
+    ) -> None:
         """Add a body and its instance; with a part, two bodies of one instance."""
         number, pose = next(self._ids), pose.rounded()
         full = f"{self._name}/{name}"
         body = Body(full, asset, pose, instance_id=number, group=group, materials=materials)
         attributes: list[tuple[str, str]] = [("room", room)]
-        if part:
-            joint = JOINTS[part]
+        if part is None:
+            self._bodies.append(body)
+        else:
+            joint = JOINTS[part.name]
             at_m = keypoint_m(self._assets, asset, joint.keypoint)
             assert at_m is not None, f"{asset} has no keypoint {joint.keypoint}"
             closed = part_pose(pose, at_m, joint, 0.0)
-            moving = Body(f"{full}/{part}", part_asset, closed, instance_id=number, part_id=2, group=group, materials=part_materials)
+            moving = replace(
+                Body(f"{full}/{part.name}", part.asset, closed, instance_id=number, group=group),
+                part_id=2,
+            )
             self._bodies += [replace(body, part_id=1), moving]
             attributes.append(("open", "0"))
-        else:
-            self._bodies.append(body)
         self._instances.append(
             Instance(
-                number, full, self._assets.get(asset).category, 0, asset, annotated=annotated,
-                parts=("body", part) if part else (), attributes=tuple(sorted(attributes)),
+                number,
+                full,
+                self._assets.get(asset).category,
+                0,
+                asset,
+                annotated=self._annotated or bool(group),
+                parts=("body", part.name) if part else (),
+                attributes=tuple(sorted(attributes)),
             )
-        )  # fmt: skip
+        )
 
     def add_shells(self, rooms: Sequence[Room], looks: Mapping[str, Looks]) -> None:
         """Add floors, ceilings, walls, doors and windows, and the view outside."""
@@ -141,11 +164,22 @@ class Builder:
     def _add_shell(self, room: Room, looks: Looks) -> None:
         x, y, z = room.size_m
         at, kind = room.center_m, room.kind
-        own = {"annotated": self._annotated}
         base = room.name
         floor_at, top_at = SE3((*at, 0.0)), SE3((*at, z))
-        self.add(f"{base}/floor", _id("floor", size_m=(x, y)), floor_at, kind, materials=(looks.floor,), **own)
-        self.add(f"{base}/ceiling", _id("ceiling", size_m=(x, y)), top_at, kind, materials=(looks.ceiling,), **own)
+        self.add(
+            f"{base}/floor",
+            _id("floor", size_m=(x, y)),
+            floor_at,
+            kind,
+            materials=(looks.floor,),
+        )
+        self.add(
+            f"{base}/ceiling",
+            _id("ceiling", size_m=(x, y)),
+            top_at,
+            kind,
+            materials=(looks.ceiling,),
+        )
         for wall, openings in walls_of(room):
             self._add_wall(room, wall, openings, looks)
         for k, opening in enumerate(room.openings):
@@ -164,7 +198,13 @@ class Builder:
         skirting = self._assets.materials(asset)[1]
         if room.kind in ("bathroom", "warehouse", "workshop"):
             skirting = looks.walls
-        self.add(f"{room.name}/wall_{wall}", asset, pose, room.kind, annotated=self._annotated, materials=(looks.walls, skirting))
+        self.add(
+            f"{room.name}/wall_{wall}",
+            asset,
+            pose,
+            room.kind,
+            materials=(looks.walls, skirting),
+        )
 
     def _add_opening(self, room: Room, k: int, opening: Opening, looks: Looks) -> None:
         yaw = 0.5 * math.pi * opening.wall
@@ -177,13 +217,19 @@ class Builder:
         if opening.kind == "window":
             panes = max(1, round(width / 0.75))
             asset = _id("window", size_m=(width, height, depth), panes=panes)
-            self.add(name, asset, pose, room.kind, annotated=self._annotated)
+            self.add(name, asset, pose, room.kind)
             return
         frame = _id("door_frame", size_m=(width, height, depth))
-        leaf = _id("door_leaf", size_m=(round(width - 0.06, 4), round(height - 0.03, 4)), style=looks.door_style)
-        self.add(name, frame, pose, room.kind, annotated=self._annotated, part="leaf", part_asset=leaf)
+        leaf = _id(
+            "door_leaf",
+            size_m=(round(width - 0.06, 4), round(height - 0.03, 4)),
+            style=looks.door_style,
+        )
+        self.add(name, frame, pose, room.kind, part=Part("leaf", leaf))
 
-    def add_pieces(self, room: Room, pieces: Sequence[Piece], parts: Mapping[str, tuple[str, str]]) -> None:
+    def add_pieces(
+        self, room: Room, pieces: Sequence[Piece], parts: Mapping[str, tuple[str, str]]
+    ) -> None:
         """Add furniture and things.
 
         Args:
@@ -196,14 +242,18 @@ class Builder:
             number = counts[piece.family] = counts.get(piece.family, -1) + 1
             pose = SE3.about_z(piece.yaw_rad, piece.position_m)
             word = piece.family.replace("/", "_")
-            part, part_asset = "", ""
+            part = None
             if piece.family in parts:
-                part, family = parts[piece.family]
-                part_asset = f"{family}?{piece.asset.partition('?')[2]}"
+                kind, family = parts[piece.family]
+                part = Part(kind, f"{family}?{piece.asset.partition('?')[2]}")
             self.add(
-                f"{room.name}/{word}_{number}", piece.asset, pose, room.kind, annotated=True, part=part,
-                part_asset=part_asset, group=self._name,
-            )  # fmt: skip
+                f"{room.name}/{word}_{number}",
+                piece.asset,
+                pose,
+                room.kind,
+                part=part,
+                group=self._name,
+            )
 
 
 def _id(family: str, **parameters: ParameterValue) -> str:

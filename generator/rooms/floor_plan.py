@@ -1,8 +1,8 @@
 """Floor plans: rooms as rectangles, their walls and the openings in them.
 
-Wall ``k`` of a room is the one on the side of direction ``180 + 90 k`` degrees; what stands with its
-back to it faces ``90 k`` degrees. Places along a wall count from its middle, to the left of what
-faces into the room.
+Wall ``k`` of a room is the one on the side of direction ``180 + 90 k`` degrees; what stands with
+its back to it faces ``90 k`` degrees. Places along a wall count from its middle, to the left of
+what faces into the room.
 """
 
 from __future__ import annotations
@@ -90,7 +90,9 @@ def draw_count(rng: Rng, limits: tuple[int, int]) -> int:
     return limits[0] + min(int(rng.random() * (limits[1] - limits[0] + 1)), limits[1] - limits[0])
 
 
-def draw_plan(kind: str, size_m: tuple[Range, Range, Range] | None, rng: Rng, field: str) -> tuple[Room, ...]:
+def draw_plan(
+    kind: str, size_m: tuple[Range, Range, Range] | None, rng: Rng, field: str
+) -> tuple[Room, ...]:
     """Draw the rooms of a type, with doors and windows.
 
     Args:
@@ -111,7 +113,9 @@ def draw_plan(kind: str, size_m: tuple[Range, Range, Range] | None, rng: Rng, fi
 
 def _draw_apartment(size_m: tuple[Range, Range, Range] | None, rng: Rng) -> tuple[Room, ...]:
     """A living room along one side, a kitchen, a bathroom and a bedroom along the other."""
-    length, width, height = (between(rng, r) for r in size_m or ((8.6, 10.5), (7.2, 8.6), (2.45, 2.8)))
+    length, width, height = (
+        between(rng, r) for r in size_m or ((8.6, 10.5), (7.2, 8.6), (2.45, 2.8))
+    )
     front = round(width * between(rng, (0.5, 0.56)), 3)
     back = round(width - front - 2 * WALL_M, 3)
     names = ["kitchen", "bathroom", "bedroom"]
@@ -130,11 +134,19 @@ def _draw_apartment(size_m: tuple[Range, Range, Range] | None, rng: Rng) -> tupl
         middle = round(x + 0.5 * wide, 3)
         along = round(between(rng, (-0.5, 0.5)) * (wide - DOOR_M[0] - 0.5), 3)
         room = Room(name, name, (middle, back_y), (wide, back, height))
-        # Wall 1 of the back rooms is wall 3 of the living room; both count along it in opposite senses.
+        # Wall 1 of the back rooms is wall 3 of the living room; they count in opposite senses.
         door = Opening("door", 1, along, DOOR_M[0], 0.0, DOOR_M[1])
         room = Room(*_head(room), (door,))
         world_x = room.at_wall(1, along, 0.0)[0]
-        other = Opening("door", 3, round(world_x - living.center_m[0], 3), DOOR_M[0], 0.0, DOOR_M[1], framed=False)
+        other = Opening(
+            "door",
+            3,
+            round(world_x - living.center_m[0], 3),
+            DOOR_M[0],
+            0.0,
+            DOOR_M[1],
+            framed=False,
+        )
         living = Room(*_head(living), (*living.openings, other))
         outer = [3, *([0] if name == names[0] else []), *([2] if name == names[-1] else [])]
         rooms.append(_open(room, find_room_type(name, ""), outer, 0, rng))
@@ -146,11 +158,15 @@ def _head(room: Room) -> tuple[str, str, tuple[float, float], tuple[float, float
     return room.name, room.kind, room.center_m, room.size_m
 
 
-def _open(room: Room, rules: RoomType, walls: range | tuple[int, ...] | list[int], doors: int, rng: Rng) -> Room:
+def _open(
+    room: Room, rules: RoomType, walls: range | tuple[int, ...] | list[int], doors: int, rng: Rng
+) -> Room:
     """The room with doors, then windows, in some of its walls, where they fit."""
     size = GATE_M if room.kind == "warehouse" else DOOR_M
     for _ in range(doors):
-        room = _add(room, "door", (size[0], 0.0, min(size[1], room.size_m[2] - 0.2)), list(walls), rng)
+        room = _add(
+            room, "door", (size[0], 0.0, min(size[1], room.size_m[2] - 0.2)), list(walls), rng
+        )
     for _ in range(draw_count(rng, rules.windows)):
         low = between(rng, (0.8, 0.95)) if room.kind != "bathroom" else between(rng, (1.2, 1.35))
         if room.kind in ("warehouse", "workshop"):
@@ -163,14 +179,18 @@ def _open(room: Room, rules: RoomType, walls: range | tuple[int, ...] | list[int
     return room
 
 
-def _add(room: Room, kind: Opening_Kind, shape: tuple[float, float, float], walls: list[int], rng: Rng) -> Room:
+def _add(
+    room: Room, kind: Opening_Kind, shape: tuple[float, float, float], walls: list[int], rng: Rng
+) -> Room:
     width, low, high = shape
     for _ in range(_TRIES):
         wall = walls[min(int(rng.random() * len(walls)), len(walls) - 1)]
         free = room.wall_length_m(wall) - width - 2 * _ASIDE_M
         along = round((float(rng.random()) - 0.5) * free, 3)
         others = [o for o in room.openings if o.wall == wall]
-        clear = all(abs(o.along_m - along) > 0.5 * (o.width_m + width) + 2 * _ASIDE_M for o in others)
+        clear = all(
+            abs(o.along_m - along) > 0.5 * (o.width_m + width) + 2 * _ASIDE_M for o in others
+        )
         if free > 0.0 and clear and len(others) < 3:
             opening = Opening(kind, wall, along, width, round(low, 3), round(high, 3))
             return Room(*_head(room), (*room.openings, opening))

@@ -122,9 +122,15 @@ class Layout:
         return (2.0 * float(self.rng.random()) - 1.0) * reach
 
     def put(
-        self, rule: Rule, family: str, asset: str, at: tuple[float, float], yaw_rad: float, low_m: float,
-        ignore: int = -2, on: int = -1,
-    ) -> bool:  # fmt: skip
+        self,
+        rule: Rule,
+        family: str,
+        asset: str,
+        at: tuple[float, float],
+        yaw_rad: float,
+        low_m: float,
+        ignore: int = -2,
+    ) -> bool:
         """Place the middle of an asset's footprint at a point, unless something is in the way."""
         s = self.shape(asset)
         c, sn = _cos_sin(yaw_rad)
@@ -137,15 +143,24 @@ class Layout:
             return False
         x, y = at[0] - c * s.x + sn * s.y, at[1] - sn * s.x - c * s.y
         position = (round(x, 5), round(y, 5), round(low_m - s.low, 5))
-        self.pieces.append(Piece(rule.piece, family, asset, position, yaw_rad, footprint, low_m, high_m, on))
+        on = ignore if rule.place == "on" else -1
+        self.pieces.append(
+            Piece(rule.piece, family, asset, position, yaw_rad, footprint, low_m, high_m, on)
+        )
         if zone is not None:
             self.zones.append((zone, len(self.pieces) - 1))
         return True
 
     def refuse(
-        self, footprint: Rectangle, low_m: float, high_m: float, zone: Rectangle | None, ignore: int,
-        *, flat: bool,
-    ) -> str:  # fmt: skip
+        self,
+        footprint: Rectangle,
+        low_m: float,
+        high_m: float,
+        zone: Rectangle | None,
+        ignore: int,
+        *,
+        flat: bool,
+    ) -> str:
         """Why something cannot be there; empty = it can."""
         if not self.holds(footprint):
             return "no room between the walls"
@@ -154,20 +169,32 @@ class Layout:
         for other in self.pieces:
             if flat != (other.family in _FLAT):
                 continue
-            if low_m < other.high_m - 1e-6 and other.low_m < high_m - 1e-6 and overlap_of(footprint, other.footprint):
+            if (
+                low_m < other.high_m - 1e-6
+                and other.low_m < high_m - 1e-6
+                and overlap_of(footprint, other.footprint)
+            ):
                 return f"overlaps {other.role}"
         if not flat and low_m < _HEAD_M:
             for free, owner in self.zones:
                 if owner != ignore and overlap_of(footprint, free):
-                    return "blocks a door" if owner < 0 else f"blocks the front of {self.pieces[owner].role}"
+                    return (
+                        "blocks a door"
+                        if owner < 0
+                        else f"blocks the front of {self.pieces[owner].role}"
+                    )
         if self.covers_window(footprint, low_m, high_m):
             return "covers a window"
-        if zone is not None:
-            if not self.holds(zone):
-                return "no free floor before it"
-            for other in self.pieces:
-                if other.low_m < _HEAD_M and other.family not in _FLAT and overlap_of(zone, other.footprint):
-                    return f"no free floor before it: {other.role}"
+        return "" if zone is None else self.refuse_zone(zone)
+
+    def refuse_zone(self, zone: Rectangle) -> str:
+        """Why floor cannot be kept free; empty = it can."""
+        if not self.holds(zone):
+            return "no free floor before it"
+        for other in self.pieces:
+            stands = other.low_m < _HEAD_M and other.family not in _FLAT
+            if stands and overlap_of(zone, other.footprint):
+                return f"no free floor before it: {other.role}"
         return ""
 
     def holds(self, rectangle: Rectangle) -> bool:
@@ -175,15 +202,18 @@ class Layout:
         x, y, c, s, a, b = rectangle
         reach_x, reach_y = abs(c) * a + abs(s) * b, abs(s) * a + abs(c) * b
         (mx, my), (sx, sy, _) = self.room.center_m, self.room.size_m
-        return bool(abs(x - mx) + reach_x <= 0.5 * sx + 1e-6 and abs(y - my) + reach_y <= 0.5 * sy + 1e-6)
+        return bool(
+            abs(x - mx) + reach_x <= 0.5 * sx + 1e-6 and abs(y - my) + reach_y <= 0.5 * sy + 1e-6
+        )
 
     def covers_window(self, footprint: Rectangle, low_m: float, high_m: float) -> bool:
         """Whether something stands before a window, or hangs before a door."""
         return any(
-            low_m < opening.high_m and high_m > opening.low_m + 0.03
+            low_m < opening.high_m
+            and high_m > opening.low_m + 0.03
             and overlap_of(footprint, self.before_opening(opening))
             for opening in self.room.openings
-        )  # fmt: skip
+        )
 
     def before_opening(self, opening: Opening) -> Rectangle:
         """The floor just before an opening."""
@@ -206,7 +236,9 @@ def _before(footprint: Rectangle, depth_m: float) -> Rectangle:
     return (x + c * ahead, y + s * ahead, c, s, 0.5 * depth_m, b)
 
 
-def furnish(room: Room, rules: RoomType, options: Options, assets: AssetIndex, rng: Rng, clutter: float) -> list[Piece]:
+def furnish(
+    room: Room, rules: RoomType, options: Options, assets: AssetIndex, rng: Rng, clutter: float
+) -> list[Piece]:
     """Draw the pieces of a room.
 
     Args:
@@ -256,8 +288,6 @@ def _draw_asset(layout: Layout, rule: Rule, options: Options) -> tuple[str, str]
     return family, layout.pick(found)
 
 
-
-
 def _at_wall(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
     """Back to a wall, in corners or anywhere along it; hanging ones at their height."""
     placed = 0
@@ -297,7 +327,9 @@ def _free(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
             family, asset = _draw_asset(layout, rule, options)
             s = layout.shape(asset)
             small = max(s.half_x, s.half_y) < 0.65
-            yaw = layout.signed(math.pi) if small else draw_count(layout.rng, (0, 3)) * 0.5 * math.pi
+            yaw = (
+                layout.signed(math.pi) if small else draw_count(layout.rng, (0, 3)) * 0.5 * math.pi
+            )
             at = (mx + layout.signed(0.5 * sx - 0.1), my + layout.signed(0.5 * sy - 0.1))
             if layout.put(rule, family, asset, at, yaw, 0.0):
                 placed += 1
@@ -318,9 +350,11 @@ def _relative(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
         return 0
     for number in range(wanted):
         for attempt in range(_TRIES):
-            k = found[number % len(found)] if attempt < _TRIES // 2 and rule.place != "around" else found[
-                min(int(layout.rng.random() * len(found)), len(found) - 1)
-            ]
+            k = (
+                found[number % len(found)]
+                if attempt < _TRIES // 2 and rule.place != "around"
+                else found[min(int(layout.rng.random() * len(found)), len(found) - 1)]
+            )
             family, asset = _draw_asset(layout, rule, options)
             if rule.place in ("front", "above", "under", "across") and (k, 0) in used:
                 layout.refused["another one is there"] += 1
@@ -358,7 +392,9 @@ def _put_relative(layout: Layout, rule: Rule, family: str, asset: str, k: int) -
         case "above":
             dx, low = s.half_x - a - WALL_GAP_M + 0.0005, min(ref.high_m, 0.91) + gap
         case "under":
-            dx = layout.signed(0.1) + (0.35 * a if ref.family == "bed" else 0.6 * a if ref.family == "wash_basin" else 0.0)
+            dx = layout.signed(0.1) + (
+                0.35 * a if ref.family == "bed" else 0.6 * a if ref.family == "wash_basin" else 0.0
+            )
             yaw += 0.0
         case _:
             return _put_across(layout, rule, family, asset, k)
@@ -389,7 +425,7 @@ def _on(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
         dy = rule.at[1] * max(b - s.half_y, 0.0) * (1 if layout.rng.random() < 0.5 else -1)
         at = (x + c * dx - sn * dy, y + sn * dx + c * dy)
         if s.half_x <= a + 0.03 and s.half_y <= b + 0.03:
-            placed += layout.put(rule, family, asset, at, ref.yaw_rad, ref.high_m, ignore=k, on=k)
+            placed += layout.put(rule, family, asset, at, ref.yaw_rad, ref.high_m, ignore=k)
     return placed
 
 
@@ -439,16 +475,28 @@ def _at_ceiling(layout: Layout, rule: Rule, options: Options, wanted: int) -> in
         u, v = (k % columns + 0.5) / columns - 0.5, (k // columns + 0.5) / rows - 0.5
         across = (u, v) if sx >= sy else (v, u)
         at = (mx + across[0] * sx, my + across[1] * sy)
-        placed += layout.put(rule, family, asset, at, 0.5 * math.pi * (sx >= sy), height - (s.high - s.low))
+        placed += layout.put(
+            rule, family, asset, at, 0.5 * math.pi * (sx >= sy), height - (s.high - s.low)
+        )
     return placed
 
 
 _PLACES = {
-    "wall": _at_wall, "corner": _at_wall, "hang": _at_wall, "free": _free, "front": _relative,
-    "beside": _relative, "around": _relative, "above": _relative, "under": _relative,
-    "across": _relative, "on": _on, "window": _at_windows, "below": _below_windows,
+    "wall": _at_wall,
+    "corner": _at_wall,
+    "hang": _at_wall,
+    "free": _free,
+    "front": _relative,
+    "beside": _relative,
+    "around": _relative,
+    "above": _relative,
+    "under": _relative,
+    "across": _relative,
+    "on": _on,
+    "window": _at_windows,
+    "below": _below_windows,
     "ceiling": _at_ceiling,
-}  # fmt: skip
+}
 
 
 def supports(piece: Piece) -> list[tuple[float, float]]:
@@ -458,7 +506,11 @@ def supports(piece: Piece) -> list[tuple[float, float]]:
         levels = board_levels_m(round(height, 6))
         return [(piece.low_m + z, height / len(levels) - 0.05) for z in levels]
     if piece.family == "pallet_rack":
-        return [(0.0, PALLET_PITCH_M - 0.16), (PALLET_PITCH_M, PALLET_PITCH_M - 0.16), (2 * PALLET_PITCH_M, 1.2)]
+        return [
+            (0.0, PALLET_PITCH_M - 0.16),
+            (PALLET_PITCH_M, PALLET_PITCH_M - 0.16),
+            (2 * PALLET_PITCH_M, 1.2),
+        ]
     return [(piece.high_m, 0.6)]
 
 
@@ -472,7 +524,9 @@ def _put_things(layout: Layout, rule: Rule, options: Options, clutter: float) ->
                 _put_thing(layout, rule, options, k, height, clearance)
 
 
-def _put_thing(layout: Layout, rule: Rule, options: Options, k: int, height: float, clearance: float) -> None:
+def _put_thing(
+    layout: Layout, rule: Rule, options: Options, k: int, height: float, clearance: float
+) -> None:
     x, y, c, sn, a, b = layout.pieces[k].footprint
     family = layout.pick(rule.things)
     asset = layout.pick(options[family])
@@ -497,19 +551,26 @@ def _put_thing(layout: Layout, rule: Rule, options: Options, k: int, height: flo
         footprint: Rectangle = (at[0], at[1], c2, s2, s.half_x, s.half_y)
         top = height + s.high - s.low
         taken = any(
-            n != k and p.low_m < top and height < p.high_m - 1e-6 and overlap_of(footprint, p.footprint)
+            n != k
+            and p.low_m < top
+            and height < p.high_m - 1e-6
+            and overlap_of(footprint, p.footprint)
             for n, p in enumerate(layout.pieces)
         )
         if taken:
             continue
         px, py = at[0] - c2 * s.x + s2 * s.y, at[1] - s2 * s.x - c2 * s.y
         position = (round(px, 5), round(py, 5), round(height - s.low, 5))
-        layout.pieces.append(Piece("thing", family, asset, position, yaw, footprint, height, top, k))
+        layout.pieces.append(
+            Piece("thing", family, asset, position, yaw, footprint, height, top, k)
+        )
         return
 
 
-def free_floor(room: Room, pieces: Sequence[Piece], margin_m: float) -> tuple[NDArray[np.bool_], float, float]:
-    """Cells of ``CELL_M`` whose middle a disc of radius ``margin_m`` can stand on; [rows y, columns x].
+def free_floor(
+    room: Room, pieces: Sequence[Piece], margin_m: float
+) -> tuple[NDArray[np.bool_], float, float]:
+    """Cells of ``CELL_M`` on which a disc of radius ``margin_m`` can stand; [rows y, columns x].
 
     Also the world coordinates of the corner of the first cell.
     """
@@ -536,7 +597,9 @@ def find_unreachable(layout: Layout) -> str:
     """
     from scipy import ndimage
 
-    fixed = [p for p in layout.pieces if p.role not in ("chair", "stool", "office_chair", "floor_things")]
+    fixed = [
+        p for p in layout.pieces if p.role not in ("chair", "stool", "office_chair", "floor_things")
+    ]
     free, x0, y0 = free_floor(layout.room, fixed, PERSON_M)
     regions, _ = ndimage.label(free)
 

@@ -11,7 +11,17 @@ from gen_data.generator.rooms.rules import APARTMENT, find_room_type
 
 IN_APARTMENTS = ("bathroom", "bedroom", "kitchen", "living_room")
 _ALSO_FROM_PACKS = frozenset(
-    {"armchair", "bed", "chair", "coffee_table", "desk", "house_plant", "office_chair", "sofa", "stool"}
+    {
+        "armchair",
+        "bed",
+        "chair",
+        "coffee_table",
+        "desk",
+        "house_plant",
+        "office_chair",
+        "sofa",
+        "stool",
+    }
 )
 """Families whose rules fit any model of their category: no boards, doors or drawers."""
 _by_family: ObjectCache[Mapping[str, tuple[str, ...]]] = ObjectCache(2)
@@ -46,6 +56,10 @@ def _group(everything: tuple[Asset, ...]) -> Mapping[str, tuple[str, ...]]:
         elif "furniture" in asset.tags:
             packed.setdefault(asset.category, []).append(asset.asset_id)
     return {
-        family: tuple(sorted((*ids, *(packed.get(category[family], ()) if family in _ALSO_FROM_PACKS else ()))))
+        family: tuple(
+            sorted(
+                (*ids, *(packed.get(category[family], ()) if family in _ALSO_FROM_PACKS else ()))
+            )
+        )
         for family, ids in own.items()
     }

@@ -12,9 +12,21 @@ from gen_data.generator.core.serialization import from_plain
 
 Range = tuple[float, float]
 Place = Literal[
-    "wall", "corner", "free", "front", "beside", "around", "on", "above", "under", "across", "hang",
-    "window", "below", "ceiling",
-]  # fmt: skip
+    "wall",
+    "corner",
+    "free",
+    "front",
+    "beside",
+    "around",
+    "on",
+    "above",
+    "under",
+    "across",
+    "hang",
+    "window",
+    "below",
+    "ceiling",
+]
 APARTMENT = "apartment"
 """Type of several joined rooms."""
 
@@ -72,9 +84,7 @@ class RoomType:
     @property
     def families(self) -> frozenset[str]:
         """Families of everything that may be in such a room."""
-        return frozenset(
-            name for rule in self.pieces for name in (*rule.assets, *rule.things)
-        )
+        return frozenset(name for rule in self.pieces for name in (*rule.assets, *rule.things))
 
 
 @cache

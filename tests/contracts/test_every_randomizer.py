@@ -33,6 +33,7 @@ from gen_data.generator.core.se3 import SE3, look_at
 from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
 from gen_data.randomizers import TABLE
 from gen_data.scene_templates.builder import build_scene
+from gen_data.scene_templates.carrier import Carrier
 from gen_data.scene_templates.objects import AssetChoice, Objects
 from gen_data.scene_templates.robot import Robot
 from gen_data.scene_templates.room import Room
@@ -62,7 +63,7 @@ PHYSICS_BOUND = (
 """Randomizers that must run before physics."""
 
 
-IN_ROOMS = ("furnish", "object_states", "room_camera", "room_lighting")
+IN_ROOMS = ("furnish", "object_states", "room_camera", "room_lighting", "room_path")
 """Randomizers of furnished rooms, whose assets and rules are the real ones."""
 
 
@@ -70,7 +71,8 @@ IN_ROOMS = ("furnish", "object_states", "room_camera", "room_lighting")
 def furnished_room() -> Scene:
     """A bedroom with two cameras; ``furnish`` draws another one in its place."""
     library = open_library(())
-    scene = build_scene("test", (RoomLayout(name="room", kind="bedroom"),), library)
+    elements = (RoomLayout(name="room", kind="bedroom"), Carrier(name="carrier"))
+    scene = build_scene("test", elements, library)
     lens = Intrinsics.from_hfov(64, 48, 1.0)
     cameras = tuple(Camera(name, SE3((0.0, 0.0, 1.5)), lens) for name in ("left", "right"))
     return made("furnish")(replace(scene, cameras=cameras), library, rng_of("room"))

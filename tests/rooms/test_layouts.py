@@ -1,7 +1,6 @@
 """Layouts of rooms keep their rules, whatever is drawn.
 
-Bodies are measured by their boxes in the scene; rules and placed rectangles of the layout itself are
-not asked.
+Bodies are measured by their boxes in the scene; the layout's own rectangles are not asked.
 """
 
 from __future__ import annotations
@@ -27,13 +26,34 @@ from gen_data.scene_templates.builder import build_scene
 from gen_data.scene_templates.room_layout import RoomLayout
 
 KINDS = (
-    "living_room", "kitchen", "bedroom", "office", "bathroom", "workshop", "warehouse", "apartment",
-)  # fmt: skip
+    "living_room",
+    "kitchen",
+    "bedroom",
+    "office",
+    "bathroom",
+    "workshop",
+    "warehouse",
+    "apartment",
+)
 SEEDS = 6
 AGAINST_WALLS = (
-    "bed", "bookcase", "cooker", "dresser", "filing_cabinet", "kitchen_sink", "pallet_rack", "refrigerator",
-    "sofa", "steel_rack", "toilet", "tool_cabinet", "tv_stand", "wardrobe", "wash_basin", "washing_machine",
-)  # fmt: skip
+    "bed",
+    "bookcase",
+    "cooker",
+    "dresser",
+    "filing_cabinet",
+    "kitchen_sink",
+    "pallet_rack",
+    "refrigerator",
+    "sofa",
+    "steel_rack",
+    "toilet",
+    "tool_cabinet",
+    "tv_stand",
+    "wardrobe",
+    "wash_basin",
+    "washing_machine",
+)
 MAY_STAND_FREE = {"warehouse": {"pallet_rack"}}
 MOVABLE = {"armchair", "chair", "office_chair", "stool"}
 STRUCTURE = {"floor", "ceiling", "wall", "door", "window"}
@@ -144,7 +164,9 @@ def test_everything_is_inside_the_walls(kind: str) -> None:
                 for a, b, c, d in floors(scene)
             ]
             assert any(inside), (seed, body.name)
-            assert -1e-4 <= heights_m(body)[0] and heights_m(body)[1] <= scene.interior_m[1][2] + 1e-3
+            assert (
+                heights_m(body)[0] >= -1e-4 and heights_m(body)[1] <= scene.interior_m[1][2] + 1e-3
+            )
 
 
 @each
@@ -156,7 +178,10 @@ def test_pieces_that_need_a_wall_touch_one(kind: str) -> None:
             if family(body) in AGAINST_WALLS and family(body) not in MAY_STAND_FREE.get(kind, ()):
                 back = library().bounds_m(body.asset)[0][0]
                 x, y, _ = body.T_world_body.apply(np.array((back, 0.0, 0.0)))
-                gap = min(min(abs(x - a), abs(x - b), abs(y - c), abs(y - d)) for a, b, c, d in floors(scene))
+                gap = min(
+                    min(abs(x - a), abs(x - b), abs(y - c), abs(y - d))
+                    for a, b, c, d in floors(scene)
+                )
 
                 assert gap < 0.02, (seed, body.name)
 
@@ -164,8 +189,20 @@ def test_pieces_that_need_a_wall_touch_one(kind: str) -> None:
 @each
 def test_small_things_stand_on_something(kind: str) -> None:
     """Under the middle of what is not on the floor, a wall or the ceiling, there is a surface."""
-    hung = {"picture", "mirror", "radiator", "towel", "wall_clock", "whiteboard", "curtain", "wall_unit",
-            "range_hood", "ceiling_lamp", "tube_lamp", "wash_basin"}  # fmt: skip
+    hung = {
+        "picture",
+        "mirror",
+        "radiator",
+        "towel",
+        "wall_clock",
+        "whiteboard",
+        "curtain",
+        "wall_unit",
+        "range_hood",
+        "ceiling_lamp",
+        "tube_lamp",
+        "wash_basin",
+    }
     for seed in range(SEEDS):
         placed = pieces(furnished(kind, seed))
         for body in placed:
@@ -197,10 +234,14 @@ def test_every_door_is_reached_from_every_other_and_every_bed_and_cupboard_too(k
     for seed in range(SEEDS):
         scene = furnished(kind, seed)
         blocked = [
-            b for b in pieces(scene)
-            if heights_m(b)[0] < 1.9 and family(b) != "rug" and family(b) not in MOVABLE
-            and "floor_things" not in b.name and max(_size(b)) > 0.35
-        ]  # fmt: skip
+            b
+            for b in pieces(scene)
+            if heights_m(b)[0] < 1.9
+            and family(b) != "rug"
+            and family(b) not in MOVABLE
+            and "floor_things" not in b.name
+            and max(_size(b)) > 0.35
+        ]
         reached = _walk(scene, blocked)
         for body in pieces(scene):
             if family(body) in goals and heights_m(body)[0] < 0.3:
@@ -224,9 +265,13 @@ def _walk(scene: Scene, blocked: list[Body]) -> list[tuple[float, float]]:
 
     def is_free(i: int, j: int) -> bool:
         x, y = i * CELL_M, j * CELL_M
-        inside = any(a + half <= x <= b - half and c + half <= y <= d - half for a, b, c, d in rooms)
+        inside = any(
+            a + half <= x <= b - half and c + half <= y <= d - half for a, b, c, d in rooms
+        )
         passage = any(math.dist((x, y), d.T_world_body.translation_m[:2]) < 0.35 for d in doors)
-        clear = all(cv2.pointPolygonTest(box, (x, y), measureDist=True) < -half for box, _ in corners)
+        clear = all(
+            cv2.pointPolygonTest(box, (x, y), measureDist=True) < -half for box, _ in corners
+        )
         return passage or (inside and clear)
 
     first = doors[0].T_world_body.translation_m
@@ -246,7 +291,10 @@ def test_same_stream_makes_the_same_bytes(kind: str) -> None:
     """From two libraries."""
     rng = [Streams(3, 1).rng("furniture") for _ in range(2)]
     try:
-        made = [Furnish(name="f")(nominal(kind), assets, r) for assets, r in zip((library(), open_library(())), rng, strict=True)]
+        made = [
+            Furnish(name="f")(nominal(kind), assets, r)
+            for assets, r in zip((library(), open_library(())), rng, strict=True)
+        ]
     except LayoutRejected:
         pytest.skip("this attempt is rejected")
 
@@ -271,21 +319,27 @@ def test_an_unknown_type_of_room_is_refused_with_the_nearest() -> None:
 
 def test_furnish_needs_a_room_layout() -> None:
     """A scene without one is refused."""
-    with pytest.raises(ConfigError, match="randomizers.furniture.room: .*room_layout"):
+    with pytest.raises(ConfigError, match=r"randomizers.furniture.room: .*room_layout"):
         Furnish(name="furniture")(Scene("empty"), library(), Streams(3, 1).rng("furniture"))
 
 
 @pytest.mark.slow
 def test_no_two_of_two_hundred_rooms_are_nearly_alike_and_many_categories_occur() -> None:
-    """Of equal types, the multisets of (family, place to 0.25 m) differ in more than half."""
+    """Sets of (family, place to 0.25 m) share less than a quarter; 140 categories occur."""
     kinds = [k for k in KINDS if k != "apartment"]
     scenes = [(kinds[k % len(kinds)], furnished(kinds[k % len(kinds)], k)) for k in range(200)]
     cells = [
-        (kind, {(family(b), *(round(4 * v) for v in b.T_world_body.translation_m[:2])) for b in pieces(scene)})
+        (
+            kind,
+            {
+                (family(b), *(round(4 * v) for v in b.T_world_body.translation_m[:2]))
+                for b in pieces(scene)
+            },
+        )
         for kind, scene in scenes
     ]
     alike = [len(a & b) / len(a | b) for (k, a), (m, b) in combinations(cells, 2) if k == m]
     categories = {i.category for _, scene in scenes for i in scene.instances} - STRUCTURE
 
-    assert max(alike) < 0.5
-    assert len(categories) >= 80
+    assert max(alike) < 0.25
+    assert len(categories) >= 140

@@ -1,4 +1,4 @@
-"""What hangs, lies and shines in rooms: lamps, curtains, rugs, pictures, mirrors, screens, heaters."""
+"""What hangs, lies and shines in rooms: lamps, curtains, rugs, pictures, mirrors, screens."""
 
 from __future__ import annotations
 
@@ -7,7 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from gen_data.generator.assets.interiors.parts import Box, board, cloth, disc, front, lacquer, rod, solid, wood
+from gen_data.generator.assets.interiors.parts import (
+    Box,
+    board,
+    cloth,
+    disc,
+    front,
+    lacquer,
+    rod,
+    solid,
+    wood,
+)
 from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.furniture import rectangle
@@ -22,13 +32,18 @@ from gen_data.generator.assets.procedural.material_presets import (
     patterned_material,
     printed_material,
 )
-from gen_data.generator.assets.procedural.patches import Patch
+from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Keypoint, Material
 from gen_data.generator.core.se3 import Vec3
 
 LAMP = "lamp"
 """Role of slots that shine, and keypoint in the middle of the light."""
+
+
+def _scaled(color: Vec3, factor: float) -> Vec3:
+    r, g, b = color
+    return (factor * r, factor * g, factor * b)
 
 
 def _with_lamp(made: Solid, at_m: Vec3) -> Solid:
@@ -50,10 +65,22 @@ def _tube(r0: float, r1: float, z0: float, z1: float, slot: int) -> Patch:
 def ceiling_lamp(seed: int = 0) -> Solid:
     """A lamp under the ceiling, which is at z = 0. Slots: metal, shade."""
     rng = variant_rng("ceiling_lamp", seed)
-    paint = rng.choose((painted_material("#26282b", 0.4), metal_material(STAINLESS, 0.3), painted_material("#eeece6", 0.4)))
+    paint = rng.choose(
+        (
+            painted_material("#26282b", 0.4),
+            metal_material(STAINLESS, 0.3),
+            painted_material("#eeece6", 0.4),
+        )
+    )
     if seed % 3 == 0:
         r, h = rng.between(0.16, 0.26), rng.between(0.07, 0.12)
-        glow = shapes.lathe([(r, -0.02), (r, -0.5 * h), (0.86 * r, -0.85 * h), (0.5 * r, -h), (0.0, -1.04 * h)][::-1], 40, 1)
+        glow = shapes.lathe(
+            [(r, -0.02), (r, -0.5 * h), (0.86 * r, -0.85 * h), (0.5 * r, -h), (0.0, -1.04 * h)][
+                ::-1
+            ],
+            40,
+            1,
+        )
         patches = [disc(0, 0, -0.03, 0.0, r + 0.012, 0, 40), glow]
         made = solid(patches, [paint, _shade(rng)], [((-r, -r, -h), (r, r, 0.0))])
         return _with_lamp(made, (0.0, 0.0, -h - 0.06))
@@ -71,7 +98,7 @@ def ceiling_lamp(seed: int = 0) -> Solid:
 
 
 def tube_lamp(seed: int = 0) -> Solid:
-    """A long lamp of offices and halls under the ceiling, which is at z = 0. Slots: housing, tube."""
+    """A long lamp under the ceiling, which is at z = 0. Slots: housing, tube."""
     rng = variant_rng("tube_lamp", seed)
     w, d = rng.between(1.15, 1.5), rng.between(0.1, 0.2)
     box: Box = ((-0.5 * d, -0.5 * w, -0.06), (0.5 * d, 0.5 * w, 0.0))
@@ -96,7 +123,13 @@ def table_lamp(seed: int = 0) -> Solid:
 def _standing_lamp(rng: VariantRng, top_m: float, shade_m: float, foot_m: float) -> Solid:
     z, r = top_m, shade_m
     h = r * rng.between(0.9, 1.3)
-    paint = rng.choose((metal_material(STAINLESS, 0.3), painted_material("#26282b", 0.4), metal_material((0.75, 0.58, 0.34), 0.3)))
+    paint = rng.choose(
+        (
+            metal_material(STAINLESS, 0.3),
+            painted_material("#26282b", 0.4),
+            metal_material((0.75, 0.58, 0.34), 0.3),
+        )
+    )
     patches = [
         disc(0, 0, 0.0, 0.02, foot_m, 0, 32),
         rod((0.0, 0.0, 0.01), (0.0, 0.0, z - 0.5 * h), 0.011, 0),
@@ -104,12 +137,15 @@ def _standing_lamp(rng: VariantRng, top_m: float, shade_m: float, foot_m: float)
         shapes.ball(lambda d: 0.03 * d, 10, 14).moved(0.0, 0.0, z - 0.4 * h).painted(1),
         rod((-0.6 * r, 0.0, z - 0.5 * h), (0.6 * r, 0.0, z - 0.5 * h), 0.003, 0, 6),
     ]
-    boxes: list[Box] = [((-foot_m, -foot_m, 0.0), (foot_m, foot_m, 0.03)), ((-0.7 * r, -0.7 * r, z - h), (0.7 * r, 0.7 * r, z))]
+    boxes: list[Box] = [
+        ((-foot_m, -foot_m, 0.0), (foot_m, foot_m, 0.03)),
+        ((-0.7 * r, -0.7 * r, z - h), (0.7 * r, 0.7 * r, z)),
+    ]
     return _with_lamp(solid(patches, [paint, _shade(rng)], boxes), (0.0, 0.0, z + 0.06))
 
 
 def curtain(seed: int = 0) -> Solid:
-    """A curtain of 0.55 to 0.8 m by 2.1 to 2.4 m on a piece of rail; origin below. Slots: cloth, rail."""
+    """A curtain on a piece of rail; origin at the middle below. Slots: cloth, rail."""
     rng = variant_rng("curtain", seed)
     w, h = rng.between(0.4, 0.7), rng.between(2.1, 2.35)
     folds = round(w / 0.085)
@@ -120,21 +156,35 @@ def curtain(seed: int = 0) -> Solid:
     x = 0.03 * np.sin(turn)[None, :] * (0.55 + 0.45 * sway[:, None])
     points = np.stack(np.broadcast_arrays(x, y[None, :], z[:, None]), axis=2)
     sheet = shapes.grid(points)
-    patches = [sheet, sheet.flipped(), rod((0.0, -0.5 * w - 0.04, h + 0.015), (0.0, 0.5 * w + 0.04, h + 0.015), 0.012, 1)]
+    patches = [
+        sheet,
+        sheet.flipped(),
+        rod((0.0, -0.5 * w - 0.04, h + 0.015), (0.0, 0.5 * w + 0.04, h + 0.015), 0.012, 1),
+    ]
     light = cloth(rng)
-    made = replace(light, diffuse_transmission=tuple(0.3 * c for c in light.base_color))
-    return solid(patches, [made, metal_material(STAINLESS, 0.35)], [((-0.03, -0.5 * w, 0.0), (0.03, 0.5 * w, h))])
+    made = replace(light, diffuse_transmission=_scaled(light.base_color, 0.3))
+    return solid(
+        patches,
+        [made, metal_material(STAINLESS, 0.35)],
+        [((-0.03, -0.5 * w, 0.0), (0.03, 0.5 * w, h))],
+    )
 
 
 def rug(seed: int = 0) -> Solid:
     """A rug, rectangular or round. Slots: pile, border."""
     rng = variant_rng("rug", seed)
-    pile = patterned_material(f"texture/carpet?seed={int(rng.between(0, 16))}", rng.between(0.5, 1.2), 1.0)
+    pile = patterned_material(
+        f"texture/carpet?seed={int(rng.between(0, 16))}", rng.between(0.5, 1.2), 1.0
+    )
     edge = replace(pile, texture=f"texture/carpet?seed={int(rng.between(0, 16))}")
     t = 0.012
     if seed % 4 == 3:
         r = rng.between(0.6, 1.0)
-        return solid([disc(0, 0, 0, t, r, 0, 56)], [pile, edge], [((-0.7 * r, -0.7 * r, 0.0), (0.7 * r, 0.7 * r, t))])
+        return solid(
+            [disc(0, 0, 0, t, r, 0, 56)],
+            [pile, edge],
+            [((-0.7 * r, -0.7 * r, 0.0), (0.7 * r, 0.7 * r, t))],
+        )
     x, y, b = rng.between(0.6, 1.0), rng.between(0.9, 1.5), rng.between(0.04, 0.14)
     whole: Box = ((-x, -y, 0.0), (x, y, t))
     inner: Box = ((-x + b, -y + b, t - 0.001), (x - b, y - b, t + 0.001))
@@ -142,7 +192,7 @@ def rug(seed: int = 0) -> Solid:
 
 
 def picture(seed: int = 0) -> Solid:
-    """A framed picture; origin at the middle of its lower edge, on the wall. Slots: frame, mount, print."""
+    """A framed picture; origin at the middle below, on the wall. Slots: frame, mount, print."""
     rng = variant_rng("picture", seed)
     w, h = rng.between(0.25, 0.75), rng.between(0.25, 0.7)
     f, mount = rng.between(0.012, 0.035), rng.between(0.0, 0.07)
@@ -151,9 +201,25 @@ def picture(seed: int = 0) -> Solid:
     image = rectangle((0.011, -y, a), (0.0, 2 * y, 0.0), (0.0, 0.0, h - 2 * a)).painted(2)
     back: Box = ((0.0, -0.5 * w + 0.004, 0.004), (0.01, 0.5 * w - 0.004, h - 0.004))
     patches = [*frame, shapes.block(*back, 0.0, 1), image]
-    printed = rng.choose((f"texture/poster?seed={seed % 12}", f"texture/wide_poster?seed={seed % 12}", f"texture/marble?seed={seed % 16}", f"texture/book_cover?seed={seed}"))
-    edge = rng.choose((painted_material("#1f1f20", 0.4), wood(rng), metal_material((0.8, 0.66, 0.38), 0.35), painted_material("#f0efeb", 0.5)))
-    return solid(patches, [edge, painted_material("#f3f1ea", 0.8), printed_material(printed, 0.25)], [back])
+    printed = rng.choose(
+        (
+            f"texture/poster?seed={seed % 12}",
+            f"texture/wide_poster?seed={seed % 12}",
+            f"texture/marble?seed={seed % 16}",
+            f"texture/book_cover?seed={seed}",
+        )
+    )
+    edge = rng.choose(
+        (
+            painted_material("#1f1f20", 0.4),
+            wood(rng),
+            metal_material((0.8, 0.66, 0.38), 0.35),
+            painted_material("#f0efeb", 0.5),
+        )
+    )
+    return solid(
+        patches, [edge, painted_material("#f3f1ea", 0.8), printed_material(printed, 0.25)], [back]
+    )
 
 
 def mirror(seed: int = 0) -> Solid:
@@ -161,18 +227,24 @@ def mirror(seed: int = 0) -> Solid:
     rng = variant_rng("mirror", seed)
     w, h = rng.between(0.45, 0.9), rng.between(0.6, 1.1)
     f = rng.between(0.008, 0.04)
-    glass = rectangle((0.011, -0.5 * w + f, f), (0.0, w - 2 * f, 0.0), (0.0, 0.0, h - 2 * f)).painted(1)
+    glass = rectangle(
+        (0.011, -0.5 * w + f, f), (0.0, w - 2 * f, 0.0), (0.0, 0.0, h - 2 * f)
+    ).painted(1)
     back: Box = ((0.0, -0.5 * w + 0.004, 0.004), (0.01, 0.5 * w - 0.004, h - 0.004))
     silver = Material((0.93, 0.94, 0.93), 0.02, metallic=1.0, role="mirror")
-    return solid([*_frame(w, h, f, 0.025), shapes.block(*back), glass], [front(rng), silver], [back])
+    return solid(
+        [*_frame(w, h, f, 0.025), shapes.block(*back), glass], [front(rng), silver], [back]
+    )
 
 
 def _frame(w: float, h: float, f: float, depth_m: float) -> list[Patch]:
     y = 0.5 * w
     parts: list[Box] = [
-        ((0.0, -y, 0.0), (depth_m, y, f)), ((0.0, -y, h - f), (depth_m, y, h)),
-        ((0.0, -y, f), (depth_m, -y + f, h - f)), ((0.0, y - f, f), (depth_m, y, h - f)),
-    ]  # fmt: skip
+        ((0.0, -y, 0.0), (depth_m, y, f)),
+        ((0.0, -y, h - f), (depth_m, y, h)),
+        ((0.0, -y, f), (depth_m, -y + f, h - f)),
+        ((0.0, y - f, f), (depth_m, y, h - f)),
+    ]
     return [board(*p, 0, 0.003) for p in parts]
 
 
@@ -185,35 +257,58 @@ def radiator(seed: int = 0) -> Solid:
     for k in range(count):
         y = -0.5 * w + (k + 0.5) * w / count
         patches.append(shapes.block((0.088, y - 0.014, 0.03), (0.096, y + 0.014, h - 0.03), 0.004))
-    patches += [rod((0.05, 0.5 * w, 0.06), (0.05, 0.5 * w + 0.06, 0.06), 0.018, 1, 14), rod((0.05, 0.5 * w + 0.05, 0.06), (0.05, 0.5 * w + 0.05, -0.1), 0.008, 1),
-                shapes.block((0.0, -0.3 * w, 0.1), (0.03, -0.3 * w + 0.03, h - 0.1), 0.0), shapes.block((0.0, 0.3 * w, 0.1), (0.03, 0.3 * w + 0.03, h - 0.1), 0.0)]  # fmt: skip
-    return solid(patches, [painted_material("#f1f0ec", 0.35), painted_material("#e5e3dd", 0.4)], [((0.0, -0.5 * w, 0.0), (0.1, 0.5 * w, h))])
+    patches += [
+        rod((0.05, 0.5 * w, 0.06), (0.05, 0.5 * w + 0.06, 0.06), 0.018, 1, 14),
+        rod((0.05, 0.5 * w + 0.05, 0.06), (0.05, 0.5 * w + 0.05, -0.1), 0.008, 1),
+        shapes.block((0.0, -0.3 * w, 0.1), (0.03, -0.3 * w + 0.03, h - 0.1), 0.0),
+        shapes.block((0.0, 0.3 * w, 0.1), (0.03, 0.3 * w + 0.03, h - 0.1), 0.0),
+    ]
+    return solid(
+        patches,
+        [painted_material("#f1f0ec", 0.35), painted_material("#e5e3dd", 0.4)],
+        [((0.0, -0.5 * w, 0.0), (0.1, 0.5 * w, h))],
+    )
 
 
 def television(seed: int = 0) -> Solid:
     """A television on feet, on or off by its lit screen. Slots: housing, screen."""
     rng = variant_rng("television", seed)
-    return _screen(rng, rng.between(0.9, 1.35), 9 / 16, 0.05, "television", seed)
+    return _screen(rng.between(0.9, 1.35), 0.05, "television")
 
 
 def monitor(seed: int = 0) -> Solid:
     """A monitor on a stand. Slots: housing, screen."""
     rng = variant_rng("monitor", seed)
-    return _screen(rng, rng.between(0.5, 0.65), 9 / 16, 0.13, "monitor", seed)
+    return _screen(rng.between(0.5, 0.65), 0.13, "monitor")
 
 
-def _screen(rng: VariantRng, w: float, aspect: float, lift_m: float, name: str, seed: int) -> Solid:
-    h = w * aspect + 0.02
+def _screen(w: float, lift_m: float, name: str) -> Solid:
+    h = w * 9 / 16 + 0.02
     y = 0.5 * w
     panel: Box = ((-0.02, -y, lift_m), (0.015, y, lift_m + h))
-    glass = rectangle((0.0155, -y + 0.008, lift_m + 0.012), (0.0, w - 0.016, 0.0), (0.0, 0.0, h - 0.02)).painted(1)
+    glass = rectangle(
+        (0.0155, -y + 0.008, lift_m + 0.012), (0.0, w - 0.016, 0.0), (0.0, 0.0, h - 0.02)
+    ).painted(1)
     patches = [shapes.block(*panel, 0.004), glass]
     if name == "monitor":
-        patches += [shapes.block((-0.09, -0.11, 0.0), (0.09, 0.11, 0.012), 0.004), shapes.block((-0.045, -0.03, 0.01), (-0.02, 0.03, lift_m + 0.15), 0.004)]
+        patches += [
+            shapes.block((-0.09, -0.11, 0.0), (0.09, 0.11, 0.012), 0.004),
+            shapes.block((-0.045, -0.03, 0.01), (-0.02, 0.03, lift_m + 0.15), 0.004),
+        ]
     else:
         for sy in (-1, 1):
-            patches.append(shapes.block((-0.1, sy * 0.36 * w - 0.012, 0.0), (0.1, sy * 0.36 * w + 0.012, 0.01), 0.003))
-            patches.append(shapes.block((-0.01, sy * 0.36 * w - 0.01, 0.01), (0.005, sy * 0.36 * w + 0.01, lift_m + 0.01), 0.002))
+            patches.append(
+                shapes.block(
+                    (-0.1, sy * 0.36 * w - 0.012, 0.0), (0.1, sy * 0.36 * w + 0.012, 0.01), 0.003
+                )
+            )
+            patches.append(
+                shapes.block(
+                    (-0.01, sy * 0.36 * w - 0.01, 0.01),
+                    (0.005, sy * 0.36 * w + 0.01, lift_m + 0.01),
+                    0.002,
+                )
+            )
     dark = Material((0.01, 0.01, 0.011), 0.12, role="screen")
     foot: Box = ((-0.1, -0.4 * w, 0.0), (0.1, 0.4 * w, 0.012))
     return solid(patches, [painted_material("#17181a", 0.35), dark], [panel, foot])
@@ -227,19 +322,27 @@ def laptop(seed: int = 0) -> Solid:
     for row in range(5):
         for k in range(13):
             x, y = -0.5 * d + 0.04 + 0.02 * row, -0.44 * w + (k + 0.5) * 0.88 * w / 13
-            patches.append(shapes.block((x - 0.008, y - 0.009, 0.015), (x + 0.008, y + 0.009, 0.0175), 0.0, 1))
+            patches.append(
+                shapes.block((x - 0.008, y - 0.009, 0.015), (x + 0.008, y + 0.009, 0.0175), 0.0, 1)
+            )
     patches.append(shapes.block((0.14 * d, -0.06, 0.0155), (0.42 * d, 0.06, 0.0165), 0.0, 1))
     made = solid(patches, [_housing(rng), painted_material("#1b1c1e", 0.5)], [base])
     return replace(made, keypoints=(Keypoint("lid", (-0.5 * d, 0.0, 0.016), 0.05),))
 
 
 def laptop_lid(seed: int = 0) -> Solid:
-    """The lid of the laptop of the same seed, closed along +X from its hinge. Slots: housing, screen."""
+    """The lid of the laptop of the same seed, closed along +X. Slots: housing, screen."""
     rng, d, w = _laptop(seed)
     lid: Box = ((0.0, -0.5 * w, 0.002), (d, 0.5 * w, 0.009))
-    screen = rectangle((d - 0.012, -0.5 * w + 0.01, 0.0015), (0.0, w - 0.02, 0.0), (-d + 0.03, 0.0, 0.0))
+    screen = rectangle(
+        (d - 0.012, -0.5 * w + 0.01, 0.0015), (0.0, w - 0.02, 0.0), (-d + 0.03, 0.0, 0.0)
+    )
     screen = screen.flipped().painted(1)
-    return solid([shapes.block(*lid, 0.003), screen], [_housing(rng), Material((0.01, 0.01, 0.011), 0.15, role="screen")], [lid])
+    return solid(
+        [shapes.block(*lid, 0.003), screen],
+        [_housing(rng), Material((0.01, 0.01, 0.011), 0.15, role="screen")],
+        [lid],
+    )
 
 
 def _laptop(seed: int) -> tuple[VariantRng, float, float]:
@@ -256,19 +359,40 @@ def house_plant(seed: int = 0) -> Solid:
     """A plant in a pot. Slots: pot, soil, leaves."""
     rng = variant_rng("house_plant", seed)
     big = seed % 2 == 0
-    r, h = (rng.between(0.14, 0.2), rng.between(0.24, 0.36)) if big else (rng.between(0.06, 0.09), rng.between(0.1, 0.15))
-    pot = shapes.lathe([(0.0, 0.0), (0.75 * r, 0.0), (r, h), (0.92 * r, h), (0.9 * r, 0.85 * h), (0.0, 0.85 * h)], 32)
+    r, h = (
+        (rng.between(0.14, 0.2), rng.between(0.24, 0.36))
+        if big
+        else (rng.between(0.06, 0.09), rng.between(0.1, 0.15))
+    )
+    pot = shapes.lathe(
+        [(0.0, 0.0), (0.75 * r, 0.0), (r, h), (0.92 * r, h), (0.9 * r, 0.85 * h), (0.0, 0.85 * h)],
+        32,
+    )
     soil = disc(0, 0, 0.84 * h, 0.88 * h, 0.9 * r, 1)
     patches = [pot, soil]
     count = int(rng.between(16, 30)) if big else int(rng.between(9, 16))
     length = rng.between(0.45, 0.8) if big else rng.between(0.12, 0.24)
     for _ in range(count):
-        patches.append(_leaf(rng, length * rng.between(0.6, 1.0)).rotated("z", rng.between(0.0, 2 * math.pi)).moved(0.0, 0.0, 0.86 * h))
-    green = tuple(c * rng.between(0.7, 1.2) for c in (0.06, 0.16, 0.04))
-    leaf = Material(green, 0.45, diffuse_transmission=tuple(0.8 * g for g in green), role="leaf")
-    clay = Material(draw_linear(("#b5643c", "#f0ede6", "#3a3d40", "#8a9a8d", "#d8c7ab"), 0.1, rng), 0.6)
+        patches.append(
+            _leaf(rng, length * rng.between(0.6, 1.0))
+            .rotated("z", rng.between(0.0, 2 * math.pi))
+            .moved(0.0, 0.0, 0.86 * h)
+        )
+    green = (
+        0.06 * rng.between(0.7, 1.2),
+        0.16 * rng.between(0.7, 1.2),
+        0.04 * rng.between(0.7, 1.2),
+    )
+    leaf = Material(green, 0.45, diffuse_transmission=_scaled(green, 0.8), role="leaf")
+    clay = Material(
+        draw_linear(("#b5643c", "#f0ede6", "#3a3d40", "#8a9a8d", "#d8c7ab"), 0.1, rng), 0.6
+    )
     top = h + 0.6 * length
-    return solid(patches, [clay, Material((0.05, 0.035, 0.025), 1.0), leaf], [((-r, -r, 0.0), (r, r, h)), ((-0.6 * r, -0.6 * r, h), (0.6 * r, 0.6 * r, top))])
+    return solid(
+        patches,
+        [clay, Material((0.05, 0.035, 0.025), 1.0), leaf],
+        [((-r, -r, 0.0), (r, r, h)), ((-0.6 * r, -0.6 * r, h), (0.6 * r, 0.6 * r, top))],
+    )
 
 
 def _leaf(rng: VariantRng, length: float) -> Patch:
@@ -281,36 +405,73 @@ def _leaf(rng: VariantRng, length: float) -> Patch:
     z = np.concatenate([[0.0], np.cumsum(np.cos(angle[:-1]))]) * length / (steps - 1)
     wide = 0.14 * length * np.sin(np.pi * np.clip((s - 0.25) / 0.75, 0.0, 1.0)) + 0.004
     side = np.array([-1.0, 0.0, 1.0])
-    points = np.stack(np.broadcast_arrays(x[:, None], wide[:, None] * side, z[:, None] + 0.15 * wide[:, None] * np.abs(side)), axis=2)
+    points = np.stack(
+        np.broadcast_arrays(
+            x[:, None], wide[:, None] * side, z[:, None] + 0.15 * wide[:, None] * np.abs(side)
+        ),
+        axis=2,
+    )
     sheet = shapes.grid(points, slot=2)
-    return shapes.join_patches([sheet, sheet.flipped()])
+    return join_patches([sheet, sheet.flipped()])
 
 
 def waste_basket(seed: int = 0) -> Solid:
     """A waste basket. Slot: body."""
     rng = variant_rng("waste_basket", seed)
     r, h = rng.between(0.12, 0.17), rng.between(0.26, 0.36)
-    body = shapes.lathe([(0.0, 0.0), (0.8 * r, 0.0), (r, h), (r + 0.006, h), (r + 0.006, h + 0.008), (r - 0.004, h + 0.008), (0.8 * r - 0.004, 0.006), (0.0, 0.006)], 36)
-    paint = Material(draw_linear(PLASTICS, 0.1, rng), 0.4) if rng.chance(0.5) else painted_material("#2b2d30", 0.4)
+    body = shapes.lathe(
+        [
+            (0.0, 0.0),
+            (0.8 * r, 0.0),
+            (r, h),
+            (r + 0.006, h),
+            (r + 0.006, h + 0.008),
+            (r - 0.004, h + 0.008),
+            (0.8 * r - 0.004, 0.006),
+            (0.0, 0.006),
+        ],
+        36,
+    )
+    paint = (
+        Material(draw_linear(PLASTICS, 0.1, rng), 0.4)
+        if rng.chance(0.5)
+        else painted_material("#2b2d30", 0.4)
+    )
     return solid([body], [paint], [((-0.8 * r, -0.8 * r, 0.0), (0.8 * r, 0.8 * r, h))])
 
 
 def towel(seed: int = 0) -> Solid:
-    """A towel on a rail; origin at the middle of its lower edge, on the wall. Slots: cloth, rail."""
+    """A towel on a rail; origin at the middle below, on the wall. Slots: cloth, rail."""
     rng = variant_rng("towel", seed)
     w, h = rng.between(0.35, 0.5), rng.between(0.4, 0.65)
     folded: Box = ((0.05, -0.5 * w, 0.0), (0.075, 0.5 * w, h))
-    patches = [shapes.block(*folded, 0.011), rod((0.062, -0.5 * w - 0.06, h - 0.008), (0.062, 0.5 * w + 0.06, h - 0.008), 0.009, 1)]
+    patches = [
+        shapes.block(*folded, 0.011),
+        rod((0.062, -0.5 * w - 0.06, h - 0.008), (0.062, 0.5 * w + 0.06, h - 0.008), 0.009, 1),
+    ]
     for sy in (-1, 1):
-        patches.append(rod((0.0, sy * (0.5 * w + 0.05), h - 0.008), (0.066, sy * (0.5 * w + 0.05), h - 0.008), 0.009, 1))
-    return solid(patches, [cloth(rng), metal_material(STAINLESS, 0.2)], [((0.0, -0.5 * w, 0.0), (0.08, 0.5 * w, h))])
+        patches.append(
+            rod(
+                (0.0, sy * (0.5 * w + 0.05), h - 0.008),
+                (0.066, sy * (0.5 * w + 0.05), h - 0.008),
+                0.009,
+                1,
+            )
+        )
+    return solid(
+        patches,
+        [cloth(rng), metal_material(STAINLESS, 0.2)],
+        [((0.0, -0.5 * w, 0.0), (0.08, 0.5 * w, h))],
+    )
 
 
 def wall_clock(seed: int = 0) -> Solid:
     """A round clock for walls; origin at its lowest point. Slots: case, face, hands."""
     rng = variant_rng("wall_clock", seed)
     r = rng.between(0.12, 0.18)
-    case = shapes.lathe([(0.0, 0.0), (r, 0.0), (r, 0.035), (r - 0.012, 0.04), (r - 0.012, 0.025), (0.0, 0.025)], 48)
+    case = shapes.lathe(
+        [(0.0, 0.0), (r, 0.0), (r, 0.035), (r - 0.012, 0.04), (r - 0.012, 0.025), (0.0, 0.025)], 48
+    )
     patches = [case.rotated("y", 0.5 * math.pi).moved(0.0, 0.0, r)]
     face = shapes.fan(np.insert(shapes.circle(r - 0.013, 48), 0, 0.026, axis=1), 1)
     patches.append(face.moved(0.0, 0.0, r))
@@ -325,19 +486,23 @@ def wall_clock(seed: int = 0) -> Solid:
 
 
 def whiteboard(seed: int = 0) -> Solid:
-    """A board to write on; origin at the middle of its lower edge, on the wall. Slots: frame, board."""
+    """A board to write on; origin at the middle below, on the wall. Slots: frame, board."""
     rng = variant_rng("whiteboard", seed)
     w, h = rng.between(1.2, 1.8), rng.between(0.9, 1.2)
     back: Box = ((0.0, -0.5 * w + 0.004, 0.004), (0.012, 0.5 * w - 0.004, h - 0.004))
     tray: Box = ((0.0, -0.3 * w, -0.01), (0.06, 0.3 * w, 0.0))
     patches = [*_frame(w, h, 0.02, 0.022), shapes.block(*back, 0.0, 1), shapes.block(*tray, 0.003)]
-    return solid(patches, [metal_material(ALUMINIUM, 0.4), painted_material("#f5f6f5", 0.15)], [back])
+    return solid(
+        patches, [metal_material(ALUMINIUM, 0.4), painted_material("#f5f6f5", 0.15)], [back]
+    )
 
 
 def book_row(seed: int = 0) -> Solid:
     """Books that stand side by side, spines towards +X. Slots: one per cloth, pages last."""
     rng = variant_rng("book_row", seed)
-    covers = [Material(draw_linear(PALETTES["cloth"], 0.15, rng), rng.between(0.4, 0.8)) for _ in range(6)]
+    covers = [
+        Material(draw_linear(PALETTES["cloth"], 0.15, rng), rng.between(0.4, 0.8)) for _ in range(6)
+    ]
     patches: list[Patch] = []
     y, count = 0.0, int(rng.between(4, 15))
     tallest = 0.0
@@ -349,7 +514,12 @@ def book_row(seed: int = 0) -> Solid:
             shapes.block((x1 - d, y, 0.0), (x1, y + 0.002, h), 0.0, slot),
             shapes.block((x1 - d, y + thick - 0.002, 0.0), (x1, y + thick, h), 0.0, slot),
             shapes.block((x1 - 0.003, y, 0.0), (x1, y + thick, h), 0.001, slot),
-            shapes.block((x1 - d + 0.004, y + 0.002, 0.004), (x1 - 0.003, y + thick - 0.002, h - 0.004), 0.0, 6),
+            shapes.block(
+                (x1 - d + 0.004, y + 0.002, 0.004),
+                (x1 - 0.003, y + thick - 0.002, h - 0.004),
+                0.0,
+                6,
+            ),
         ]
         patches += book
         y, tallest = y + thick + 0.0008, max(tallest, h)
@@ -362,8 +532,14 @@ def picture_frame(seed: int = 0) -> Solid:
     """A framed photograph that stands, leaning back. Slots: frame, mount, print."""
     rng = variant_rng("picture_frame", seed)
     w, h, f = rng.between(0.1, 0.2), rng.between(0.13, 0.24), rng.between(0.008, 0.02)
-    image = rectangle((0.006, -0.5 * w + f, f), (0.0, w - 2 * f, 0.0), (0.0, 0.0, h - 2 * f)).painted(2)
-    patches = [*_frame(w, h, f, 0.014), shapes.block((0.0, -0.5 * w + 0.003, 0.003), (0.005, 0.5 * w - 0.003, h - 0.003), 0.0, 1), image]
+    image = rectangle(
+        (0.006, -0.5 * w + f, f), (0.0, w - 2 * f, 0.0), (0.0, 0.0, h - 2 * f)
+    ).painted(2)
+    patches = [
+        *_frame(w, h, f, 0.014),
+        shapes.block((0.0, -0.5 * w + 0.003, 0.003), (0.005, 0.5 * w - 0.003, h - 0.003), 0.0, 1),
+        image,
+    ]
     leaning = [patch.rotated("y", -0.22) for patch in patches]
     stand = board((-0.055, -0.015, 0.0), (-0.05, 0.015, 0.45 * h), 1)
     look = printed_material(f"texture/book_cover?seed={seed}", 0.15)

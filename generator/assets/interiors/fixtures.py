@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from gen_data.generator.assets.interiors.parts import Box, board, ceramic, disc, front, handle, rod, solid
+from gen_data.generator.assets.interiors.parts import (
+    Box,
+    board,
+    ceramic,
+    disc,
+    front,
+    handle,
+    rod,
+    solid,
+)
 from gen_data.generator.assets.interiors.storage import _looks
 from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.family import Solid
@@ -20,7 +29,7 @@ _CHROME = metal_material(STAINLESS, 0.15)
 
 
 def kitchen_sink(seed: int = 0) -> Solid:
-    """A unit with sink and tap, of the look of ``kitchen_unit``. Slots: carcass, front, steel, worktop."""
+    """A unit with a sink, as ``kitchen_unit``. Slots: carcass, front, steel, worktop."""
     rng = variant_rng("kitchen_sink", seed)
     patches = _base(hole=True)
     basin = [
@@ -32,8 +41,15 @@ def kitchen_sink(seed: int = 0) -> Solid:
     ]
     patches += [shapes.block(*b, 0.002, 2) for b in basin]
     patches += tap(-0.22, 0.0, 0.9, rng.between(0.2, 0.32), 2)
-    patches += [board((_X, -0.297, 0.103), (_X + 0.018, 0.297, 0.857), 1), *handle(_X + 0.018, 0.0, 0.78, 0.2, 2, upright=False)]
-    return solid(patches, _looks("kitchen_unit", rng, seed), [((-_X, -0.3, 0.0), (_X, 0.3, 0.72)), *_worktop(hole=True)])
+    patches += [
+        board((_X, -0.297, 0.103), (_X + 0.018, 0.297, 0.857), 1),
+        *handle(_X + 0.018, 0.0, 0.78, 0.2, 2, upright=False),
+    ]
+    return solid(
+        patches,
+        _looks("kitchen_unit", rng, seed),
+        [((-_X, -0.3, 0.0), (_X, 0.3, 0.72)), *_worktop(hole=True)],
+    )
 
 
 def tap(x: float, y: float, z: float, height_m: float, slot: int) -> list[Patch]:
@@ -42,7 +58,9 @@ def tap(x: float, y: float, z: float, height_m: float, slot: int) -> list[Patch]
         disc(x, y, z, z + 0.04, 0.024, slot),
         rod((x, y, z), (x, y, z + height_m), 0.011, slot, 12),
         rod((x - 0.008, y, z + height_m), (x + 0.17, y, z + height_m), 0.011, slot, 12),
-        rod((x + 0.16, y, z + height_m + 0.008), (x + 0.16, y, z + height_m - 0.04), 0.012, slot, 12),
+        rod(
+            (x + 0.16, y, z + height_m + 0.008), (x + 0.16, y, z + height_m - 0.04), 0.012, slot, 12
+        ),
         rod((x, y + 0.01, z + 0.06), (x, y + 0.07, z + 0.1), 0.007, slot),
     ]
 
@@ -52,8 +70,19 @@ def cooker(seed: int = 0) -> Solid:
     rng = variant_rng("cooker", seed)
     patches = _base(hole=False)
     patches.append(shapes.block((-0.25, -0.285, 0.9), (0.26, 0.285, 0.906), 0.002, 4))
-    for x, y, r in ((-0.12, -0.14, 0.075), (-0.12, 0.14, 0.09), (0.12, -0.14, 0.1), (0.12, 0.14, 0.075)):
-        ring = [(r - 0.004, 0.9062), (r, 0.9062), (r, 0.9066), (r - 0.004, 0.9066), (r - 0.004, 0.9062)]
+    for x, y, r in (
+        (-0.12, -0.14, 0.075),
+        (-0.12, 0.14, 0.09),
+        (0.12, -0.14, 0.1),
+        (0.12, 0.14, 0.075),
+    ):
+        ring = [
+            (r - 0.004, 0.9062),
+            (r, 0.9062),
+            (r, 0.9066),
+            (r - 0.004, 0.9066),
+            (r - 0.004, 0.9062),
+        ]
         patches.append(shapes.lathe(ring, 36, 5).moved(x, y))
     patches += [
         shapes.block((_X, -0.297, 0.105), (_X + 0.02, 0.297, 0.855), 0.004, 2),
@@ -61,8 +90,20 @@ def cooker(seed: int = 0) -> Solid:
         *handle(_X + 0.02, 0.0, 0.67, 0.46, 2, upright=False),
     ]
     for k in range(5):
-        patches.append(rod((_X + 0.018, -0.22 + 0.11 * k, 0.78), (_X + 0.045, -0.22 + 0.11 * k, 0.78), 0.02, 4, 18))
-    looks = [*_looks("kitchen_unit", rng, seed), Material((0.012, 0.012, 0.013), 0.06), painted_material("#9a9a98", 0.4)]
+        patches.append(
+            rod(
+                (_X + 0.018, -0.22 + 0.11 * k, 0.78),
+                (_X + 0.045, -0.22 + 0.11 * k, 0.78),
+                0.02,
+                4,
+                18,
+            )
+        )
+    looks = [
+        *_looks("kitchen_unit", rng, seed),
+        Material((0.012, 0.012, 0.013), 0.06),
+        painted_material("#9a9a98", 0.4),
+    ]
     return solid(patches, looks, [((-_X, -0.3, 0.0), (_X, 0.3, 0.906))])
 
 
@@ -71,7 +112,14 @@ def _base(*, hole: bool) -> list[Patch]:
     return [
         board(*carcass),
         board((-_X + 0.02, -0.3, 0.0), (_X - 0.05, 0.3, 0.1)),
-        *([board((-_X, -0.3, 0.715), (-_X + 0.018, 0.3, 0.86)), board((_X - 0.018, -0.3, 0.715), (_X, 0.3, 0.86))] if hole else []),
+        *(
+            [
+                board((-_X, -0.3, 0.715), (-_X + 0.018, 0.3, 0.86)),
+                board((_X - 0.018, -0.3, 0.715), (_X, 0.3, 0.86)),
+            ]
+            if hole
+            else []
+        ),
         *(shapes.block(*b, 0.002, 3) for b in _worktop(hole=hole)),
     ]
 
@@ -102,14 +150,28 @@ def toilet(seed: int = 0) -> Solid:
     rng = variant_rng("toilet", seed)
     z = rng.between(0.4, 0.44)
     cistern = seed % 2 == 0
-    outline = [(0.10, 0.0), (0.13, 0.05), (0.12, 0.15), (0.16, 0.3), (0.185, z - 0.03), (0.185, z), (0.13, z), (0.1, z - 0.14), (0.0, z - 0.2)]
+    outline = [
+        (0.10, 0.0),
+        (0.13, 0.05),
+        (0.12, 0.15),
+        (0.16, 0.3),
+        (0.185, z - 0.03),
+        (0.185, z),
+        (0.13, z),
+        (0.1, z - 0.14),
+        (0.0, z - 0.2),
+    ]
     bowl = shapes.lathe([(0.0, 0.0), *outline], 36).scaled(1.35, 1.0, 1.0).moved(0.1)
-    seat = shapes.lathe([(0.12, z), (0.19, z), (0.19, z + 0.018), (0.12, z + 0.018), (0.12, z)], 36, 1)
+    seat = shapes.lathe(
+        [(0.12, z), (0.19, z), (0.19, z + 0.018), (0.12, z + 0.018), (0.12, z)], 36, 1
+    )
     patches: list[Patch] = [bowl, seat.scaled(1.35, 1.0, 1.0).moved(0.1)]
     x = -0.35
     patches.append(shapes.block((x, -0.1, 0.08), (0.0, 0.1, z - 0.06), 0.03))
     closed = rng.chance(0.5)
-    lid = shapes.lathe([(0.0, 0.0), (0.19, 0.0), (0.19, 0.014), (0.0, 0.02)], 36, 1).scaled(1.35, 1.0, 1.0)
+    lid = shapes.lathe([(0.0, 0.0), (0.19, 0.0), (0.19, 0.014), (0.0, 0.02)], 36, 1).scaled(
+        1.35, 1.0, 1.0
+    )
     if closed:
         patches.append(lid.moved(0.1, 0.0, z + 0.018))
     else:
@@ -128,20 +190,23 @@ def wash_basin(seed: int = 0) -> Solid:
     d, w = rng.between(0.42, 0.5), (0.5, 0.6, 0.8)[seed % 3]
     x, y, z = 0.5 * d, 0.5 * w, 0.86
     rim: list[Box] = [
-        ((-x, -y, z - 0.06), (-x + 0.1, y, z)),
-        ((x - 0.04, -y, z - 0.06), (x, y, z)),
-        ((-x + 0.1, -y, z - 0.06), (x - 0.04, -y + 0.05, z)),
-        ((-x + 0.1, y - 0.05, z - 0.06), (x - 0.04, y, z)),
+        ((-x, -y, z - 0.095), (-x + 0.1, y, z)),
+        ((x - 0.04, -y, z - 0.095), (x, y, z)),
+        ((-x + 0.1, -y, z - 0.095), (x - 0.04, -y + 0.05, z)),
+        ((-x + 0.1, y - 0.05, z - 0.095), (x - 0.04, y, z)),
     ]
     low: Box = ((-x + 0.1, -y + 0.05, z - 0.1), (x - 0.04, y - 0.05, z - 0.09))
     chest: Box = ((-x, -y + 0.02, 0.25), (x - 0.03, y - 0.02, z - 0.095))
     patches = [
-        *(shapes.block(*b, 0.012) for b in rim), shapes.block(*low),
-        board(*chest, 1), board((x - 0.03, -y + 0.022, 0.254), (x - 0.012, -0.002, z - 0.1), 1),
+        *(shapes.block(*b, 0.012) for b in rim),
+        shapes.block(*low),
+        board(*chest, 1),
+        board((x - 0.03, -y + 0.022, 0.254), (x - 0.012, -0.002, z - 0.1), 1),
         board((x - 0.03, 0.002, 0.254), (x - 0.012, y - 0.022, z - 0.1), 1),
-        *handle(x - 0.012, -0.05, z - 0.2, 0.12, 2, upright=True), *handle(x - 0.012, 0.05, z - 0.2, 0.12, 2, upright=True),
+        *handle(x - 0.012, -0.05, z - 0.2, 0.12, 2, upright=True),
+        *handle(x - 0.012, 0.05, z - 0.2, 0.12, 2, upright=True),
         *tap(-x + 0.05, 0.0, z, rng.between(0.1, 0.18), 2),
-    ]  # fmt: skip
+    ]
     return solid(patches, [ceramic(), front(rng), _CHROME], [((-x, -y, 0.25), (x, y, z))])
 
 
@@ -155,15 +220,23 @@ def bathtub(seed: int = 0) -> Solid:
     keep = outer.corners_m[:, :, 2].min(axis=1) < z - 0.031
     shell = type(outer)(outer.corners_m[keep], outer.uvs[keep], outer.slots[keep])
     rim: list[Box] = [
-        ((-x, -y, z - 0.04), (-x + 0.07, y, z)), ((x - 0.07, -y, z - 0.04), (x, y, z)),
-        ((-x + 0.07, -y, z - 0.04), (x - 0.07, -y + 0.14, z)), ((-x + 0.07, y - 0.09, z - 0.04), (x - 0.07, y, z)),
-    ]  # fmt: skip
+        ((-x, -y, z - 0.04), (-x + 0.07, y, z)),
+        ((x - 0.07, -y, z - 0.04), (x, y, z)),
+        ((-x + 0.07, -y, z - 0.04), (x - 0.07, -y + 0.14, z)),
+        ((-x + 0.07, y - 0.09, z - 0.04), (x - 0.07, y, z)),
+    ]
     inner: list[Box] = [
         ((-x + 0.07, -y + 0.14, 0.14), (x - 0.07, y - 0.09, 0.15)),
-        ((-x + 0.06, -y + 0.13, 0.14), (-x + 0.07, y - 0.08, z - 0.01)), ((x - 0.07, -y + 0.13, 0.14), (x - 0.06, y - 0.08, z - 0.01)),
-        ((-x + 0.06, -y + 0.13, 0.14), (x - 0.06, -y + 0.14, z - 0.01)), ((-x + 0.06, y - 0.09, 0.14), (x - 0.06, y - 0.08, z - 0.01)),
-    ]  # fmt: skip
-    patches = [shell.painted(1), *(shapes.block(*b, 0.015) for b in rim), *(shapes.block(*b, 0.0) for b in inner)]
+        ((-x + 0.06, -y + 0.13, 0.14), (-x + 0.07, y - 0.08, z - 0.01)),
+        ((x - 0.07, -y + 0.13, 0.14), (x - 0.06, y - 0.08, z - 0.01)),
+        ((-x + 0.06, -y + 0.13, 0.14), (x - 0.06, -y + 0.14, z - 0.01)),
+        ((-x + 0.06, y - 0.09, 0.14), (x - 0.06, y - 0.08, z - 0.01)),
+    ]
+    patches = [
+        shell.painted(1),
+        *(shapes.block(*b, 0.015) for b in rim),
+        *(shapes.block(*b, 0.0) for b in inner),
+    ]
     patches += tap(-x + 0.05, 0.0, z, 0.12, 2)
     return solid(patches, [ceramic(), ceramic(0.2), _CHROME], [((-x, -y, 0.0), (x, y, z))])
 
@@ -176,10 +249,17 @@ def shower(seed: int = 0) -> Solid:
     tray: Box = ((-x, -x, 0.0), (x, x, 0.06))
     patches: list[Patch] = [shapes.block(*tray, 0.012)]
     pane = Material((0.94, 0.97, 0.96), 0.03, transmission=1.0, role="glass")
-    sides: list[Box] = [((-x, x - 0.008, 0.06), (x, x, 1.95)), ((x - 0.008, 0.0, 0.06), (x, x - 0.008, 1.95))]
+    sides: list[Box] = [
+        ((-x, x - 0.008, 0.06), (x, x, 1.95)),
+        ((x - 0.008, 0.0, 0.06), (x, x - 0.008, 1.95)),
+    ]
     patches += [shapes.block(*b, 0.0, 2) for b in sides]
     for b in sides:
-        patches.append(shapes.block((b[0][0], b[0][1] - 0.004, 1.94), (b[1][0], b[1][1] + 0.004, 1.97), 0.002, 1))
+        patches.append(
+            shapes.block(
+                (b[0][0], b[0][1] - 0.004, 1.94), (b[1][0], b[1][1] + 0.004, 1.97), 0.002, 1
+            )
+        )
     patches += [
         rod((-x + 0.06, 0.0, 0.9), (-x + 0.06, 0.0, 2.05), 0.011, 1),
         rod((-x + 0.06, 0.0, 2.05), (-x + 0.34, 0.0, 2.05), 0.011, 1),

@@ -54,8 +54,14 @@ def disc(
 ) -> Patch:
     """An upright cylinder with slightly rounded edges."""
     r = min(0.004, 0.3 * (z1 - z0), 0.3 * radius_m)
-    profile = [(0.0, z0), (radius_m - r, z0), (radius_m, z0 + r), (radius_m, z1 - r),
-               (radius_m - r, z1), (0.0, z1)]  # fmt: skip
+    profile = [
+        (0.0, z0),
+        (radius_m - r, z0),
+        (radius_m, z0 + r),
+        (radius_m, z1 - r),
+        (radius_m - r, z1),
+        (0.0, z1),
+    ]
     return shapes.lathe(profile, sides, slot).moved(x, y)
 
 
@@ -76,29 +82,33 @@ def handle(x: float, y: float, z: float, length_m: float, slot: int, upright: bo
     half = 0.5 * length_m
     dy, dz = (0.0, half) if upright else (half, 0.0)
     bar = shapes.block(
-        (x + 0.022, y - dy - 0.005, z - dz - 0.005), (x + 0.032, y + dy + 0.005, z + dz + 0.005),
-        0.002, slot,
-    )  # fmt: skip
+        (x + 0.022, y - dy - 0.005, z - dz - 0.005),
+        (x + 0.032, y + dy + 0.005, z + dz + 0.005),
+        0.002,
+        slot,
+    )
     feet = [
         shapes.block(
             (x, y + s * 0.8 * dy - 0.004, z + s * 0.8 * dz - 0.004),
-            (x + 0.024, y + s * 0.8 * dy + 0.004, z + s * 0.8 * dz + 0.004), 0.0, slot,
+            (x + 0.024, y + s * 0.8 * dy + 0.004, z + s * 0.8 * dz + 0.004),
+            0.0,
+            slot,
         )
         for s in (-1, 1)
-    ]  # fmt: skip
+    ]
     return [bar, *feet]
 
 
-def solid(
-    patches: Sequence[Patch], materials: Sequence[Material], boxes: Sequence[Box]
-) -> Solid:
+def solid(patches: Sequence[Patch], materials: Sequence[Material], boxes: Sequence[Box]) -> Solid:
     """An object in its own frame, with boxes for collisions."""
     return make_solid_in_place(patches, materials, [hulls.box(*b) for b in boxes])
 
 
 def wood(rng: VariantRng, roughness: float = 0.45) -> Material:
     """Oiled or varnished wood."""
-    return patterned_material(f"texture/wood_grain?seed={int(rng.between(0, _WOODS))}", 0.0, roughness)
+    return patterned_material(
+        f"texture/wood_grain?seed={int(rng.between(0, _WOODS))}", 0.0, roughness
+    )
 
 
 def lacquer(rng: VariantRng, roughness: float = 0.35) -> Material:

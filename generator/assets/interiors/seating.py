@@ -1,4 +1,4 @@
-"""Seats, beds and tables; sizes as furniture is sold, after DIN EN 1729, 527 and 12520 in spirit."""
+"""Seats, beds and tables. Sizes are assumed: those that furniture is usually sold in."""
 
 from __future__ import annotations
 
@@ -61,12 +61,22 @@ def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
     for k in range(places):
         a = y0 + arm + k * each
         patches.append(
-            cushion((x0 + 0.17, a + 0.004, seat_z - 0.16), (x1 + 0.01, a + each - 0.004, seat_z), 0, soft)
+            cushion(
+                (x0 + 0.17, a + 0.004, seat_z - 0.16),
+                (x1 + 0.01, a + each - 0.004, seat_z),
+                0,
+                soft,
+            )
         )
         patches.append(
-            cushion((x0 + 0.13, a + 0.01, seat_z - 0.02), (x0 + 0.31, a + each - 0.01, back_z + 0.06), 0, 0.08)
+            cushion(
+                (x0 + 0.13, a + 0.01, seat_z - 0.02),
+                (x0 + 0.31, a + each - 0.01, back_z + 0.06),
+                0,
+                0.08,
+            )
         )
-    for k in range(int(rng.between(0, places + 1))):
+    for _ in range(int(rng.between(0, places + 1))):
         y = rng.between(y0 + arm + 0.2, y1 - arm - 0.2) if places > 1 else 0.0
         pillow = cushion((-0.07, -0.21, -0.2), (0.07, 0.21, 0.2), 2, 0.068)
         patches.append(pillow.rotated("y", -0.35).moved(x0 + 0.38, y, seat_z + 0.2))
@@ -101,14 +111,26 @@ def bed(seed: int = 0) -> Solid:
     # The duvet hangs over the sides and is folded back at the head.
     fold = rng.between(0.45, 0.75)
     patches.append(
-        cushion((-0.5 * length + fold, -0.5 * w - 0.055, top - 0.17), (0.5 * length + 0.03, 0.5 * w + 0.055, top + 0.06), 2, 0.055)
+        cushion(
+            (-0.5 * length + fold, -0.5 * w - 0.055, top - 0.17),
+            (0.5 * length + 0.03, 0.5 * w + 0.055, top + 0.06),
+            2,
+            0.055,
+        )
     )
     patches.append(
-        cushion((-0.5 * length + fold - 0.04, -0.5 * w - 0.05, top - 0.05), (-0.5 * length + fold + 0.22, 0.5 * w + 0.05, top + 0.085), 1, 0.04)
+        cushion(
+            (-0.5 * length + fold - 0.04, -0.5 * w - 0.05, top - 0.05),
+            (-0.5 * length + fold + 0.22, 0.5 * w + 0.05, top + 0.085),
+            1,
+            0.04,
+        )
     )
     for y in (0.0,) if w < 1.2 else (-0.25 * w, 0.25 * w):
         pillow = cushion((-0.2, -0.34, -0.075), (0.2, 0.34, 0.075), 3, 0.07)
-        turned = pillow.rotated("y", rng.between(-0.35, -0.12)).rotated("z", rng.between(-0.08, 0.08))
+        turned = pillow.rotated("y", rng.between(-0.35, -0.12)).rotated(
+            "z", rng.between(-0.08, 0.08)
+        )
         patches.append(turned.moved(-0.5 * length + 0.25, y, top + 0.1))
     linen = painted_material(rng.choose(("#f3f1ec", "#e8ebee", "#efe6da")), 0.95)
     return solid(patches, [front(rng), linen, cloth(rng), linen], [head, mattress])
@@ -130,15 +152,27 @@ def chair(seed: int = 0) -> Solid:
         patches.append(rod((x, y, z - 0.02), (x - 0.04, 1.03 * y, 0.0), 0.014, legs))
         patches.append(rod((x, y, z - 0.03), (x - 0.07, y, back_z), 0.012, legs))
     if soft or seed % 3 == 2:
-        rest: Box = ((-0.02, -0.5 * w, -0.5 * (back_z - z) + 0.1), (0.02, 0.5 * w, 0.5 * (back_z - z)))
+        rest: Box = (
+            (-0.02, -0.5 * w, -0.5 * (back_z - z) + 0.1),
+            (0.02, 0.5 * w, 0.5 * (back_z - z)),
+        )
         patches.append(
-            cushion(*rest, 0, 0.02).rotated("y", -0.14).moved(x - 0.045, 0.0, 0.5 * (z + back_z) + 0.02)
+            cushion(*rest, 0, 0.02)
+            .rotated("y", -0.14)
+            .moved(x - 0.045, 0.0, 0.5 * (z + back_z) + 0.02)
         )
     else:
         for k in range(2 + seed % 2):
             h = back_z - 0.05 - 0.13 * k
             lean = x - 0.07 * (h - z) / (back_z - z)
-            patches.append(board((lean - 0.009, -0.5 * w + 0.02, h - 0.035), (lean + 0.009, 0.5 * w - 0.02, h + 0.035), 0, 0.006))
+            patches.append(
+                board(
+                    (lean - 0.009, -0.5 * w + 0.02, h - 0.035),
+                    (lean + 0.009, 0.5 * w - 0.02, h + 0.035),
+                    0,
+                    0.006,
+                )
+            )
     steel = metal_material(STEEL, 0.35) if rng.chance(0.5) else painted_material("#26282b", 0.4)
     body = upholstery(rng) if soft else (wood(rng) if rng.chance(0.65) else lacquer(rng))
     boxes: list[Box] = [seat, ((x - 0.08, -0.5 * w, z), (x + 0.01, 0.5 * w, back_z))]
@@ -154,8 +188,12 @@ def stool(seed: int = 0) -> Solid:
     for k in range(4):
         a = 0.25 * math.pi * (2 * k + 1)
         c, s = math.cos(a), math.sin(a)
-        patches.append(rod((0.7 * r * c, 0.7 * r * s, z - 0.03), (1.05 * r * c, 1.05 * r * s, 0.0), 0.014, 1))
-    return solid(patches, [front(rng), wood(rng)], [((-0.7 * r, -0.7 * r, 0.0), (0.7 * r, 0.7 * r, z))])
+        patches.append(
+            rod((0.7 * r * c, 0.7 * r * s, z - 0.03), (1.05 * r * c, 1.05 * r * s, 0.0), 0.014, 1)
+        )
+    return solid(
+        patches, [front(rng), wood(rng)], [((-0.7 * r, -0.7 * r, 0.0), (0.7 * r, 0.7 * r, z))]
+    )
 
 
 def office_chair(seed: int = 0) -> Solid:
@@ -166,10 +204,11 @@ def office_chair(seed: int = 0) -> Solid:
     patches = [
         cushion((-0.22, -0.5 * w, z - 0.08), (0.26, 0.5 * w, z), 0, 0.035),
         cushion((-0.035, -0.46 * w, 0.0), (0.035, 0.46 * w, top - z - 0.08), 0, 0.033)
-        .rotated("y", -0.12).moved(-0.24, 0.0, z + 0.08),
+        .rotated("y", -0.12)
+        .moved(-0.24, 0.0, z + 0.08),
         rod((0.0, 0.0, 0.1), (0.0, 0.0, z - 0.07), 0.026, 1),
         rod((-0.1, 0.0, z - 0.09), (-0.27, 0.0, z + 0.25), 0.02, 1),
-    ]  # fmt: skip
+    ]
     for k in range(5):
         a = 2.0 * math.pi * k / 5 + 0.3
         c, s = 0.29 * math.cos(a), 0.29 * math.sin(a)
@@ -178,11 +217,16 @@ def office_chair(seed: int = 0) -> Solid:
     if rng.chance(0.7):
         for sy in (-1, 1):
             y = sy * (0.5 * w + 0.03)
-            patches.append(cushion((-0.12, y - 0.03, z + 0.18), (0.14, y + 0.03, z + 0.215), 1, 0.015))
+            patches.append(
+                cushion((-0.12, y - 0.03, z + 0.18), (0.14, y + 0.03, z + 0.215), 1, 0.015)
+            )
             patches.append(rod((0.0, y, z + 0.19), (0.0, y, z - 0.06), 0.014, 1))
             patches.append(rod((0.0, y, z - 0.06), (0.0, 0.3 * y, z - 0.07), 0.014, 1))
     dark = painted_material("#1d1e20", 0.5) if rng.chance(0.7) else metal_material(ALUMINIUM, 0.3)
-    boxes: list[Box] = [((-0.28, -0.28, 0.0), (0.28, 0.28, z)), ((-0.32, -0.23, z), (-0.2, 0.23, top))]
+    boxes: list[Box] = [
+        ((-0.28, -0.28, 0.0), (0.28, 0.28, z)),
+        ((-0.32, -0.23, z), (-0.2, 0.23, top)),
+    ]
     return solid(patches, [upholstery(rng), dark], boxes)
 
 
@@ -191,7 +235,9 @@ def dining_table(seed: int = 0) -> Solid:
     rng = variant_rng("dining_table", seed)
     if seed % 4 == 3:
         return _round_table(rng, rng.between(0.45, 0.6), rng.between(0.73, 0.76))
-    return _rectangular_table(rng, rng.between(0.75, 0.95), rng.between(1.2, 1.9), rng.between(0.73, 0.76))
+    return _rectangular_table(
+        rng, rng.between(0.75, 0.95), rng.between(1.2, 1.9), rng.between(0.73, 0.76)
+    )
 
 
 def coffee_table(seed: int = 0) -> Solid:
@@ -199,7 +245,9 @@ def coffee_table(seed: int = 0) -> Solid:
     rng = variant_rng("coffee_table", seed)
     if seed % 3 == 2:
         return _round_table(rng, rng.between(0.34, 0.45), rng.between(0.38, 0.46))
-    return _rectangular_table(rng, rng.between(0.5, 0.65), rng.between(0.8, 1.2), rng.between(0.36, 0.46))
+    return _rectangular_table(
+        rng, rng.between(0.5, 0.65), rng.between(0.8, 1.2), rng.between(0.36, 0.46)
+    )
 
 
 def side_table(seed: int = 0) -> Solid:
@@ -212,7 +260,11 @@ def desk(seed: int = 0) -> Solid:
     """A desk, some with drawers at one side. Slots: top, legs."""
     rng = variant_rng("desk", seed)
     return _rectangular_table(
-        rng, rng.between(0.6, 0.8), rng.between(1.2, 1.8), rng.between(0.72, 0.76), drawers=seed % 2 == 1
+        rng,
+        rng.between(0.6, 0.8),
+        rng.between(1.2, 1.8),
+        rng.between(0.72, 0.76),
+        drawers=seed % 2 == 1,
     )
 
 
@@ -230,7 +282,11 @@ def workbench(seed: int = 0) -> Solid:
     low: Box = ((-0.5 * d + 0.06, -0.5 * w + 0.06, 0.18), (0.5 * d - 0.08, 0.5 * w - 0.06, 0.21))
     patches = [board(*top, 0, 0.005), board(*low, 0), *four_legs(d, w, z - 0.05, 0.07, 1, 0.06)]
     legs = painted_material(rng.choose(("#2f5d7c", "#3b4046", "#6b7074", "#8a2f26")), 0.45)
-    return solid(patches, [wood(rng, 0.6), legs if rng.chance(0.6) else wood(rng)], [top, low, *_legs_under(d, w, z)])
+    return solid(
+        patches,
+        [wood(rng, 0.6), legs if rng.chance(0.6) else wood(rng)],
+        [top, low, *_legs_under(d, w, z)],
+    )
 
 
 def _rectangular_table(
@@ -243,17 +299,34 @@ def _rectangular_table(
     apron = 0.02
     for sx in (-1, 1):
         x = sx * (0.5 * d - 0.05)
-        patches.append(board((x - apron / 2, -0.5 * w + 0.06, z - thick - 0.08), (x + apron / 2, 0.5 * w - 0.06, z - thick), 1))
+        patches.append(
+            board(
+                (x - apron / 2, -0.5 * w + 0.06, z - thick - 0.08),
+                (x + apron / 2, 0.5 * w - 0.06, z - thick),
+                1,
+            )
+        )
     boxes: list[Box] = [top, *_legs_under(d, w, z)]
     if drawers:
-        chest: Box = ((-0.5 * d + 0.06, 0.5 * w - 0.5, 0.1), (0.5 * d - 0.03, 0.5 * w - 0.08, z - thick))
+        chest: Box = (
+            (-0.5 * d + 0.06, 0.5 * w - 0.5, 0.1),
+            (0.5 * d - 0.03, 0.5 * w - 0.08, z - thick),
+        )
         patches.append(board(*chest, 1))
         for k in range(3):
             h = (z - thick - 0.1) / 3
             a = 0.1 + k * h
-            patches.append(board((0.5 * d - 0.03, 0.5 * w - 0.495, a + 0.004), (0.5 * d - 0.012, 0.5 * w - 0.085, a + h - 0.004), 0))
+            patches.append(
+                board(
+                    (0.5 * d - 0.03, 0.5 * w - 0.495, a + 0.004),
+                    (0.5 * d - 0.012, 0.5 * w - 0.085, a + h - 0.004),
+                    0,
+                )
+            )
         boxes.append(chest)
-    legs = painted_material(rng.choose(("#26282b", "#d9d8d4")), 0.4) if rng.chance(0.4) else wood(rng)
+    legs = (
+        painted_material(rng.choose(("#26282b", "#d9d8d4")), 0.4) if rng.chance(0.4) else wood(rng)
+    )
     return solid(patches, [front(rng), legs], boxes)
 
 
@@ -261,12 +334,27 @@ def _round_table(rng: VariantRng, radius_m: float, height_m: float) -> Solid:
     r, z = radius_m, height_m
     patches = [
         disc(0.0, 0.0, z - 0.025, z, r, 0, 40),
-        shapes.lathe([(0.0, 0.0), (0.6 * r, 0.0), (0.6 * r, 0.012), (0.05, 0.04), (0.03, 0.1),
-                      (0.03, z - 0.05), (0.1, z - 0.025), (0.0, z - 0.025)], 28, 1),
-    ]  # fmt: skip
+        shapes.lathe(
+            [
+                (0.0, 0.0),
+                (0.6 * r, 0.0),
+                (0.6 * r, 0.012),
+                (0.05, 0.04),
+                (0.03, 0.1),
+                (0.03, z - 0.05),
+                (0.1, z - 0.025),
+                (0.0, z - 0.025),
+            ],
+            28,
+            1,
+        ),
+    ]
     legs = painted_material("#26282b", 0.4) if rng.chance(0.6) else wood(rng)
     q = 0.7071 * r
-    boxes: list[Box] = [((-q, -q, z - 0.025), (q, q, z)), ((-0.4 * r, -0.4 * r, 0.0), (0.4 * r, 0.4 * r, z))]
+    boxes: list[Box] = [
+        ((-q, -q, z - 0.025), (q, q, z)),
+        ((-0.4 * r, -0.4 * r, 0.0), (0.4 * r, 0.4 * r, z)),
+    ]
     return solid(patches, [front(rng), legs], boxes)
 
 

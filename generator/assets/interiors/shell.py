@@ -52,12 +52,12 @@ def ceiling(size_m: tuple[float, float] = (4.0, 4.0)) -> Solid:
     face = rectangle((-x / 2, y / 2, 0.0), (x, 0.0, 0.0), (0.0, -y, 0.0))
     # A second side keeps the sun out for renderers that cull back faces.
     slab = (-x / 2, -y / 2, 0.0), (x / 2, y / 2, 0.2)
-    return solid([face, shapes.block(*slab).moved(z=0.001)], [painted_material("#f4f3ef", 0.9)], [slab])
+    return solid(
+        [face, shapes.block(*slab).moved(z=0.001)], [painted_material("#f4f3ef", 0.9)], [slab]
+    )
 
 
-def wall(
-    size_m: Vec3 = (4.0, 2.6, 0.12), openings: tuple[float, ...] = NO_OPENINGS
-) -> Solid:
+def wall(size_m: Vec3 = (4.0, 2.6, 0.12), openings: tuple[float, ...] = NO_OPENINGS) -> Solid:
     """A wall along X whose inner side, at y = 0, faces +Y. Slots: wall, skirting.
 
     Args:
@@ -121,9 +121,7 @@ def door_frame(size_m: Vec3 = (0.9, 2.05, 0.12)) -> Solid:
     return replace(made, keypoints=(Keypoint("hinge", (0.5 * t - 0.022, -0.5 * w + 0.03, 0.0)),))
 
 
-def door_leaf(
-    size_m: tuple[float, float] = (0.84, 2.02), style: int = 0
-) -> Solid:
+def door_leaf(size_m: tuple[float, float] = (0.84, 2.02), style: int = 0) -> Solid:
     """A door's leaf that hangs at the origin and is closed along +Y. Slots: leaf, handle, pane.
 
     Args:
@@ -147,16 +145,22 @@ def door_leaf(
                     shapes.block((lift[0], y0, a + 0.04), (lift[1], y1, b - 0.04), 0.004)
                 )
     if style == 3:
-        patches.append(shapes.block((-t - 0.002, 0.16, 0.9), (t + 0.002, w - 0.16, h - 0.16), 0.0, 2))
+        patches.append(
+            shapes.block((-t - 0.002, 0.16, 0.9), (t + 0.002, w - 0.16, h - 0.16), 0.0, 2)
+        )
     for sign in (-1, 1):
         patches += [
-            shapes.block(*_sorted((sign * t, w - 0.09, 0.94), (sign * (t + 0.006), w - 0.05, 1.12)), 0.002, 1),
+            shapes.block(
+                *_sorted((sign * t, w - 0.09, 0.94), (sign * (t + 0.006), w - 0.05, 1.12)), 0.002, 1
+            ),
             rod((sign * t, w - 0.07, 1.06), (sign * (t + 0.05), w - 0.07, 1.06), 0.009, 1),
             rod((sign * (t + 0.05), w - 0.06, 1.06), (sign * (t + 0.05), w - 0.19, 1.06), 0.009, 1),
         ]
     paint = painted_material(("#f2f0eb", "#e9e4d9", "#f2f0eb", "#dfe3e4")[style % 4], 0.4)
     pane = Material((0.75, 0.8, 0.8), 0.5)
-    return solid(patches, [paint, metal_material(STAINLESS, 0.3), pane], [((-t, 0.0, z0), (t, w, h))])
+    return solid(
+        patches, [paint, metal_material(STAINLESS, 0.3), pane], [((-t, 0.0, z0), (t, w, h))]
+    )
 
 
 def _sorted(a: Vec3, b: Vec3) -> tuple[Vec3, Vec3]:
@@ -196,7 +200,9 @@ def window(size_m: Vec3 = (1.4, 1.3, 0.12), panes: int = 2) -> Solid:
     return solid(patches, materials, [*boxes, sill])
 
 
-def outside(radius_m: float = 9.0, size_m: tuple[float, float] = (-1.5, 5.0), seed: int = 0) -> Solid:
+def outside(
+    radius_m: float = 9.0, size_m: tuple[float, float] = (-1.5, 5.0), seed: int = 0
+) -> Solid:
     """What windows show: a panorama on a cylinder around the origin. Slot: view.
 
     Args:
@@ -209,7 +215,12 @@ def outside(radius_m: float = 9.0, size_m: tuple[float, float] = (-1.5, 5.0), se
     rows = np.stack([np.insert(circle, 2, z, axis=1) for z in size_m])
     ring = shapes.grid(rows, u=np.linspace(0.0, 2.0, 97), v=np.array([0.0, 1.0]))
     view = Material(
-        (0.0, 0.0, 0.0), 1.0, specular=0.0, texture=f"texture/outdoor_view?seed={seed}", printed=True,
-        emission_cd_m2=(2000.0, 2000.0, 2000.0), role="outside",
-    )  # fmt: skip
+        (0.0, 0.0, 0.0),
+        1.0,
+        specular=0.0,
+        texture=f"texture/outdoor_view?seed={seed}",
+        printed=True,
+        emission_cd_m2=(2000.0, 2000.0, 2000.0),
+        role="outside",
+    )
     return solid([ring], [view], [((-0.01, -0.01, -5.0), (0.01, 0.01, -4.9))])

@@ -32,10 +32,10 @@ from gen_data.generator.assets.procedural.material_presets import (
 from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Keypoint, Material
-from gen_data.generator.core.se3 import Vec3
 
 _T = 0.018
 """Thickness of boards."""
+_WORKTOPS = ("marble", "wood_grain", "terrazzo", "concrete")
 VARIANTS_PER_LOOK = 2
 """Kitchen units of consecutive seeds that look alike."""
 PITCH_M = 0.36
@@ -72,7 +72,7 @@ def wardrobe_door(seed: int = 0) -> Solid:
 
 
 def kitchen_unit(seed: int = 0) -> Solid:
-    """A base unit with a worktop at 0.9 m, without its door. Slots: carcass, front, handle, worktop."""
+    """A base unit of 0.9 m, without its door. Slots: carcass, front, handle, worktop."""
     return _cupboard("kitchen_unit", seed)
 
 
@@ -82,7 +82,7 @@ def kitchen_unit_door(seed: int = 0) -> Solid:
 
 
 def wall_unit(seed: int = 0) -> Solid:
-    """A wall unit, without its left door; origin at the middle below. Slots: carcass, front, handle."""
+    """A wall unit, without its left door. Slots: carcass, front, handle."""
     return _cupboard("wall_unit", seed)
 
 
@@ -105,7 +105,14 @@ def _measures(family: str, seed: int) -> tuple[VariantRng, float, float, float, 
     """Draws, depth, width, lower and upper edge of the fronts, and number of doors."""
     rng = variant_rng(family, seed)
     if family == "wardrobe":
-        return rng, rng.between(0.55, 0.62), (0.8, 1.0, 1.2)[seed % 3], 0.08, rng.between(1.9, 2.2), 2
+        return (
+            rng,
+            rng.between(0.55, 0.62),
+            (0.8, 1.0, 1.2)[seed % 3],
+            0.08,
+            rng.between(1.9, 2.2),
+            2,
+        )
     if family == "refrigerator":
         return rng, rng.between(0.6, 0.66), rng.between(0.56, 0.68), 0.62, rng.between(1.55, 1.9), 1
     if family == "wall_unit":
@@ -123,9 +130,10 @@ def _looks(family: str, rng: VariantRng, seed: int) -> list[Material]:
         shared = variant_rng("kitchen", seed // VARIANTS_PER_LOOK)
         facing = front(shared)
         worktop = patterned_material(
-            f"texture/{shared.choose(('marble', 'wood_grain', 'terrazzo', 'concrete'))}?seed={int(shared.between(0, 16))}",
-            0.8, 0.3,
-        )  # fmt: skip
+            f"texture/{shared.choose(_WORKTOPS)}?seed={int(shared.between(0, 16))}",
+            0.8,
+            0.3,
+        )
         return [painted_material("#eeede9", 0.5), facing, steel, worktop]
     body = front(rng)
     return [body, body if rng.chance(0.5) else lacquer(rng), steel]
@@ -172,7 +180,9 @@ def _cupboard_door(family: str, seed: int) -> Solid:
     leaf: Box = ((0.0, 0.002, 0.003), (thick, width - 0.002, h - 0.003))
     patch = shapes.block(*leaf, 0.01, 1) if family == "refrigerator" else board(*leaf, 1)
     grip = 0.28 if family == "refrigerator" else _grip(low, high) - low
-    bar = handle(thick, width - 0.05, grip, 0.25 if family == "refrigerator" else 0.16, 2, upright=True)
+    bar = handle(
+        thick, width - 0.05, grip, 0.25 if family == "refrigerator" else 0.16, 2, upright=True
+    )
     return solid([patch, *bar], _looks(family, rng, seed), [leaf])
 
 
@@ -228,13 +238,34 @@ def _chest_measures(family: str, seed: int) -> tuple[VariantRng, float, float, f
     rng = variant_rng(family, seed)
     match family:
         case "dresser":
-            return rng, rng.between(0.42, 0.5), rng.between(0.8, 1.3), rng.between(0.74, 1.05), 0.09, 3 + seed % 2
+            return (
+                rng,
+                rng.between(0.42, 0.5),
+                rng.between(0.8, 1.3),
+                rng.between(0.74, 1.05),
+                0.09,
+                3 + seed % 2,
+            )
         case "bedside_table":
-            return rng, rng.between(0.35, 0.42), rng.between(0.4, 0.5), rng.between(0.42, 0.58), 0.1, 1 + seed % 2
+            return (
+                rng,
+                rng.between(0.35, 0.42),
+                rng.between(0.4, 0.5),
+                rng.between(0.42, 0.58),
+                0.1,
+                1 + seed % 2,
+            )
         case "filing_cabinet":
             return rng, 0.58, 0.42, (0.7, 1.02, 1.32)[seed % 3], 0.02, (2, 3, 4)[seed % 3]
         case _:
-            return rng, rng.between(0.42, 0.5), rng.between(0.6, 0.8), rng.between(0.8, 0.95), 0.12, 5
+            return (
+                rng,
+                rng.between(0.42, 0.5),
+                rng.between(0.6, 0.8),
+                rng.between(0.8, 0.95),
+                0.12,
+                5,
+            )
 
 
 def _chest_looks(family: str, rng: VariantRng) -> list[Material]:
@@ -257,7 +288,10 @@ def _chest(family: str, seed: int) -> Solid:
     boxes: list[Box] = [*boards]
     for k in range(count - 1):
         a = feet + _T * 0.5 + k * h
-        face: Box = ((-x + 0.02, -0.5 * w + 0.022, a + 0.002), (x + 0.016, 0.5 * w - 0.022, a + h - 0.003))
+        face: Box = (
+            (-x + 0.02, -0.5 * w + 0.022, a + 0.002),
+            (x + 0.016, 0.5 * w - 0.022, a + h - 0.003),
+        )
         patches.append(board(*face, 1))
         patches += handle(x + 0.016, 0.0, a + 0.6 * h, min(0.3, 0.4 * w), 2, upright=False)
         boxes.append(face)
@@ -306,10 +340,13 @@ def _shelves(d: float, w: float, z: float, looks: list[Material], *, posts: bool
     boards: list[Box] = [((-x + 0.004, -y + t, h - t), (x - 0.008, y - t, h)) for h in (*levels, z)]
     if posts:
         frame: list[Box] = [
-            ((sx * x - 0.02 * (sx + 1), sy * y - 0.02 * (sy + 1), 0.0),
-             (sx * x + 0.02 * (1 - sx), sy * y + 0.02 * (1 - sy), z))
-            for sx in (-1, 1) for sy in (-1, 1)
-        ]  # fmt: skip
+            (
+                (sx * x - 0.02 * (sx + 1), sy * y - 0.02 * (sy + 1), 0.0),
+                (sx * x + 0.02 * (1 - sx), sy * y + 0.02 * (1 - sy), z),
+            )
+            for sx in (-1, 1)
+            for sy in (-1, 1)
+        ]
     else:
         frame = [
             ((-x, -y, 0.0), (x, -y + t, z)),
@@ -352,7 +389,11 @@ def pallet_rack(seed: int = 0) -> Solid:
             a, b = 0.2 + k * (z - 0.4) / 6, 0.2 + (k + 1) * (z - 0.4) / 6
             xs = (-0.45, 0.45) if k % 2 else (0.45, -0.45)
             patches.append(rod((xs[0] * d, y, a), (xs[1] * d, y, b), 0.018, 0))
-    looks = [painted_material("#1f4e8c", 0.4), painted_material("#d9641e", 0.4), metal_material(ZINC, 0.5)]
+    looks = [
+        painted_material("#1f4e8c", 0.4),
+        painted_material("#d9641e", 0.4),
+        metal_material(ZINC, 0.5),
+    ]
     return solid(patches, looks, [*uprights, *beams, *decks])
 
 
@@ -361,7 +402,7 @@ PALLET_PITCH_M = 1.5
 
 
 def pallet(seed: int = 0) -> Solid:
-    """A pallet of 1.2 m by 0.8 m by 0.144 m (EN 13698-1), most with a load of boxes. Slots: wood, boxes."""
+    """A pallet of 1.2 m by 0.8 m (EN 13698-1), most with boxes. Slots: wood, boxes."""
     rng = variant_rng("pallet", seed)
     patches: list[Patch] = []
     for y in (-0.3275, 0.0, 0.3275):
@@ -383,7 +424,14 @@ def pallet(seed: int = 0) -> Solid:
                     continue
                 a, b = 1.18 / nx, 0.78 / ny
                 x, y, z = -0.59 + i * a, -0.39 + j * b, 0.144 + row * h
-                patches.append(shapes.block((x + 0.004, y + 0.004, z), (x + a - 0.004, y + b - 0.004, z + h - 0.002), 0.006, 1))
+                patches.append(
+                    shapes.block(
+                        (x + 0.004, y + 0.004, z),
+                        (x + a - 0.004, y + b - 0.004, z + h - 0.002),
+                        0.006,
+                        1,
+                    )
+                )
     if rows:
         boxes.append(((-0.59, -0.39, 0.144), (0.59, 0.39, 0.144 + rows * h)))
     card = patterned_material(f"texture/cardboard?seed={seed % 16}", 0.6, 0.85)
@@ -415,9 +463,14 @@ def tv_stand(seed: int = 0) -> Solid:
     for k in (0, 2):
         a = -0.5 * w + k * third
         patches.append(board((x, a + 0.003, 0.103), (x + 0.018, a + third - 0.003, z - 0.003), 1))
-    patches += [board((sx * (x - 0.05) - 0.02, sy * (0.5 * w - 0.1) - 0.02, 0.0),
-                      (sx * (x - 0.05) + 0.02, sy * (0.5 * w - 0.1) + 0.02, 0.1))
-                for sx in (-1, 1) for sy in (-1, 1)]  # fmt: skip
+    patches += [
+        board(
+            (sx * (x - 0.05) - 0.02, sy * (0.5 * w - 0.1) - 0.02, 0.0),
+            (sx * (x - 0.05) + 0.02, sy * (0.5 * w - 0.1) + 0.02, 0.1),
+        )
+        for sx in (-1, 1)
+        for sy in (-1, 1)
+    ]
     body = front(rng)
     whole: Box = ((-x, -0.5 * w, 0.0), (x + 0.018, 0.5 * w, z))
     return solid(patches, [body, body if rng.chance(0.5) else lacquer(rng)], [whole])
@@ -429,7 +482,19 @@ def washing_machine(seed: int = 0) -> Solid:
     d, x = rng.between(0.52, 0.6), 0.0
     x = 0.5 * d
     body: Box = ((-x, -0.3, 0.0), (x, 0.3, 0.85))
-    ring = shapes.lathe([(0.0, 0.0), (0.19, 0.0), (0.19, 0.02), (0.17, 0.035), (0.13, 0.03), (0.13, 0.01), (0.0, 0.01)], 40, 1)
+    ring = shapes.lathe(
+        [
+            (0.0, 0.0),
+            (0.19, 0.0),
+            (0.19, 0.02),
+            (0.17, 0.035),
+            (0.13, 0.03),
+            (0.13, 0.01),
+            (0.0, 0.01),
+        ],
+        40,
+        1,
+    )
     glass = shapes.lathe([(0.0, 0.0), (0.13, 0.012), (0.09, 0.035), (0.0, 0.045)], 32, 2)
     patches: list[Patch] = [
         shapes.block(*body, 0.008),
@@ -440,7 +505,10 @@ def washing_machine(seed: int = 0) -> Solid:
         rod((x, 0.1, 0.78), (x + 0.03, 0.1, 0.78), 0.028, 1, 20),
     ]
     paint = painted_material("#f3f3f1" if rng.chance(0.8) else "#8a8d90", 0.3)
-    looks = [paint, metal_material(STAINLESS, 0.25), Material((0.03, 0.03, 0.035), 0.08), painted_material("#2a2c2e", 0.3)]
+    looks = [
+        paint,
+        metal_material(STAINLESS, 0.25),
+        Material((0.03, 0.03, 0.035), 0.08),
+        painted_material("#2a2c2e", 0.3),
+    ]
     return solid(patches, looks, [body])
-
-
