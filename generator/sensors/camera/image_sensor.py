@@ -131,9 +131,10 @@ def _read_electrons(mean_e: Float32, read_noise_e: float, rng: Rng) -> Float32:
     """
     level = rng.standard_normal(mean_e.shape, dtype=np.float32)
     stddev_e = np.sqrt(mean_e + np.float32(read_noise_e * read_noise_e))
-    few = mean_e < _NORMAL_FROM_E
-    stddev_e[few] = read_noise_e
-    mean_e[few] = rng.poisson(mean_e[few])
+    # By number: NumPy is slow on masks.
+    few = np.flatnonzero(mean_e < _NORMAL_FROM_E)
+    stddev_e.reshape(-1)[few] = read_noise_e
+    mean_e.reshape(-1)[few] = rng.poisson(mean_e.reshape(-1)[few])
     level *= stddev_e
     level += mean_e
     return level

@@ -55,7 +55,7 @@ from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import 
 from gen_data.generator.renderers.warp.visibility.multisampling import draw_samples
 
 _PARTS = 2
-"""Samples per pixel on edges in reflections or behind glass."""
+"""Positions of further samples of pixels on edges in reflections or behind glass."""
 _COVERAGE_SAMPLES = 8
 """Samples per pixel on edges that determine what covers a photograph."""
 
@@ -207,7 +207,7 @@ def _shade_layers(
 ) -> None:
     """Shade those of ``number`` listed pixels that show layered surfaces, in place.
 
-    Pixels with edges in reflections or behind glass take several samples.
+    Pixels with edges in reflections or behind glass take a second sample.
     """
     # A module of its own: scenes without such surfaces neither compile nor load it.
     from gen_data.generator.renderers.warp.realtime.kernels import clearcoat_glass
@@ -225,7 +225,7 @@ def _shade_layers(
     mixed = cache.scratch("contrast colours", frame.pixels, wp.vec3)
     offsets = cache.constant(wp.vec2, pixel_samples, _PARTS)
     probe.few = cache.constant(wp.vec2, _dealt_sunflower, _PARTS, _PARTS)
-    inputs = [*frame.inputs, places, listed, probe, offsets]
+    inputs = [*frame.inputs, places, listed, probe, offsets, radiance]
     frame.launch(clearcoat_glass.shade_contrasts, found, inputs, [pixels, mixed])
     frame.launch(write_mixed, found, [pixels, mixed], [radiance])
 

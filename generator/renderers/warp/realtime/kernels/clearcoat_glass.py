@@ -769,25 +769,34 @@ def shade_contrasts(
     listed: ListedPixels,
     probe: Probe,
     offsets: wp.array[wp.vec2],
+    radiance: wp.array[wp.vec3],
     pixels: wp.array[int],
     mixed: wp.array[wp.vec3],
 ):
-    """Radiance of pixels with contrasts: the mean over several points of each.
+    """Radiance of pixels with contrasts: the mean over their centre and one more point.
 
     Args:
-        offsets: Positions within a pixel, [0, 1).
+        offsets: Two positions within a pixel, [0, 1), which neighbours take in turn.
+        radiance: Of the centres.
         pixels: The pixels.
         mixed: In their order.
     """
     place = wp.tid()
     k = places[place]
     i = listed.pixels[k]
-    x = float(i % view.width)
-    y = float(i / view.width)
-    total = wp.vec3(0.0)
-    for s in range(offsets.shape[0]):
-        total += layered_radiance(
-            view, world, images, x + offsets[s][0], y + offsets[s][1], listed, probe, s, k
-        )
+    x = i % view.width
+    y = i / view.width
+    s = (x + y) & 1
+    c = layered_radiance(
+        view,
+        world,
+        images,
+        float(x) + offsets[s][0],
+        float(y) + offsets[s][1],
+        listed,
+        probe,
+        s,
+        k,
+    )
     pixels[place] = i
-    mixed[place] = total / float(offsets.shape[0])
+    mixed[place] = (radiance[i] + c) * 0.5
