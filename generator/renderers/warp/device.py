@@ -93,7 +93,8 @@ def compile_kernels(device: str) -> None:
     """Fill Warp's cache for a device with the kernels of ``EVERY_FRAME``, if they are missing.
 
     On the CPU, a bundle of the distribution that fits these kernels, this version of Warp and this
-    platform has those of every frame and all others. Of several processes that find the cache empty, one compiles and the others wait.
+    platform has those of every frame and all others. Of several processes that find the cache
+    empty, one fills it and the others wait.
 
     Warns:
         CacheWarning: compiled kernels were damaged; they are compiled again.
