@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from hashlib import blake2b
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -167,6 +168,17 @@ def collision_shape(parts: ConvexParts) -> CollisionShape:
     return CollisionShape(
         hulls, (x, y, z), boxes=exact if len(exact) == len(boxes) <= _BOXES_MAX else ()
     )
+
+
+def box_shape(low_m: Vec3, high_m: Vec3) -> CollisionShape:
+    """The collision shape of an axis-aligned box, which needs no search for its hull."""
+    low, high = np.array(low_m), np.array(high_m)
+    sides = np.array(list(product((-1.0, 1.0), repeat=3)))
+    x, y, z = (round(float(v), 9) for v in 0.5 * (low + high))
+    vertices_m = np.where(sides < 0.0, low, high) - np.array([x, y, z])
+    box = _as_box(vertices_m)
+    hull = Hull(vertices_m, -sides, float((high - low).min()))
+    return CollisionShape((hull,), (x, y, z), boxes=() if box is None else (box,))
 
 
 @dataclass(frozen=True, eq=False, slots=True)

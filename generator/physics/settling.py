@@ -6,11 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from gen_data.generator.core.asset_types import ConvexParts
 from gen_data.generator.core.errors import Rejection
 from gen_data.generator.core.scene import Body, Scene, SupportSurface
 from gen_data.generator.core.se3 import SE3, Array
-from gen_data.generator.physics.collision_shapes import CollisionShape, collision_shape
+from gen_data.generator.physics.collision_shapes import CollisionShape, box_shape
 from gen_data.generator.physics.physics_config import PhysicsConfig
 from gen_data.generator.physics.world import World
 
@@ -253,13 +252,7 @@ def guard_walls(surface: SupportSurface) -> list[tuple[CollisionShape, SE3]]:
 
 
 def _box(half_x: float, half_y: float) -> CollisionShape:
-    corners = [
-        (x, y, z)
-        for x in (-half_x, half_x)
-        for y in (-half_y, half_y)
-        for z in (-_WALL_BELOW_M, _WALL_ABOVE_M)
-    ]
-    return collision_shape(ConvexParts((np.array(corners),)))
+    return box_shape((-half_x, -half_y, -_WALL_BELOW_M), (half_x, half_y, _WALL_ABOVE_M))
 
 
 def _holds(surface: SupportSurface, low_m: Array, high_m: Array, slack_m: float) -> bool:

@@ -10,6 +10,7 @@ import pytest
 from gen_data.generator.core.asset_types import ConvexParts
 from gen_data.generator.physics.collision_shapes import (
     SHELL_M,
+    box_shape,
     collision_shape,
     pack_shape,
     scale_step,
@@ -42,6 +43,22 @@ def test_upright_boxes_become_primitives_and_turned_ones_do_not() -> None:
 
     np.testing.assert_allclose(primitive, ((0, 0, 0), (0.1, 0.05, 0.2)), atol=1e-12)
     assert collision_shape(ConvexParts((turned,))).boxes == ()
+
+
+def test_a_box_of_its_corners_is_the_hull_that_qhull_finds() -> None:
+    """Not centred, and of three different sizes."""
+    low, high = (-0.3, -0.05, -0.2), (0.1, 0.05, 1.4)
+    corners = np.array(list(itertools.product(*zip(low, high, strict=True))))
+
+    made, found = box_shape(low, high), collision_shape(ConvexParts((corners,)))
+
+    assert made.center_of_mass_m == pytest.approx((-0.1, 0.0, 0.6), abs=1e-12)
+    assert made.center_of_mass_m == found.center_of_mass_m
+    np.testing.assert_array_equal(made.boxes, found.boxes)
+    (hull,), (expected,) = made.hulls, found.hulls
+    np.testing.assert_allclose(hull.vertices_m, expected.vertices_m, atol=1e-12)
+    np.testing.assert_allclose(hull.retreats, expected.retreats, atol=1e-9)
+    assert hull.width_m == pytest.approx(expected.width_m, abs=1e-12)
 
 
 @pytest.mark.parametrize("depth_m", [0.0005, SHELL_M])

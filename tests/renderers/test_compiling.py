@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import importlib
+import os
 import re
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
 import warp as wp
 
 from gen_data.generator.renderers import warp
-from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.device import EVERY_FRAME, open_device
+from gen_data.generator.renderers.warp.kernel_cache import copy_modules
 
 _REPORT_MODULES = """
+import sys
 import warp as wp
 from gen_data.generator.renderers.warp import device
 
@@ -29,6 +33,31 @@ from gen_data.generator.assemble.config import load_config
 spec = load_config("tabletop.yaml", overrides=["sensors=[{type: rgb_camera, size_px: [64, 48]}]"])
 with open_pipeline(spec) as pipeline:
     pipeline.sample(0)
+"""
+
+_FIRST_TABLETOP = """
+from gen_data.generator.assemble.pipeline_factory import open_pipeline
+from gen_data.generator.assemble.config import load_config
+
+with open_pipeline(load_config("tabletop.yaml")) as pipeline:
+    pipeline.sample(0)
+"""
+_MAKE_BUNDLE = """
+from pathlib import Path
+from gen_data.generator.renderers.warp import kernel_cache
+
+device.BUNDLES = Path(sys.argv[1])
+device.load_kernels(alias, [sys.argv[2]])
+device.bundle_folder().mkdir(parents=True)
+kernel_cache.copy_modules(device.kernel_folder(), device.bundle_folder())
+"""
+_USE_BUNDLE = """
+from pathlib import Path
+
+device.BUNDLES = Path(sys.argv[1])
+device.compile_in_parallel = None
+device.compile_kernels(alias)
+device.load_kernels(alias, [sys.argv[2]])
 """
 
 KERNEL_MODULES = sorted(
@@ -47,6 +76,46 @@ def test_what_is_compiled_side_by_side_is_all_that_a_photograph_takes() -> None:
 
 
 @pytest.mark.slow
+def test_a_tabletop_compiles_nothing_that_only_streets_weather_or_path_tracing_use() -> None:
+    """Beside the modules of every frame, the rays of its laser points; no other."""
+    loaded = {name for name, _ in _loaded_modules(_FIRST_TABLETOP)}
+
+    expected = {*EVERY_FRAME, "lidar.kernels.lidar_rays"}
+    assert loaded == {f"{warp.__name__}.{name}" for name in expected}
+
+
+@pytest.mark.slow
+def test_kernels_of_the_distribution_are_loaded_instead_of_compiled(tmp_path: Path) -> None:
+    """In an empty cache, Warp itself finds them, by the hash of sources, flags and target."""
+    arguments = [str(tmp_path / "bundles"), "visibility.kernels.edge_detection"]
+
+    built = _run(_MAKE_BUNDLE, arguments, {"WARP_CACHE_PATH": str(tmp_path / "build")})
+    used = _run(_USE_BUNDLE, arguments, {"WARP_CACHE_PATH": str(tmp_path / "cache")})
+
+    assert re.findall(r"edge_detection .*\((\w+)\)", built) == ["compiled"]
+    assert re.findall(r"edge_detection .*\((\w+)\)", used) == ["cached"]
+
+
+def test_modules_are_copied_without_sources_and_never_over_others(tmp_path: Path) -> None:
+    """Unfinished folders and those of other packages stay behind."""
+    source, target = tmp_path / "source", tmp_path / "target"
+    for name in ("wp_gen_data.a_1", "wp_gen_data.b_2", "wp_gen_data.c_3_p7_t8", "wp_other_4"):
+        (source / name).mkdir(parents=True)
+        (source / name / "x.o").write_bytes(b"new")
+        (source / name / "x.cpp").write_bytes(b"source")
+    (target / "wp_gen_data.b_2").mkdir(parents=True)
+    (target / "wp_gen_data.b_2" / "x.o").write_bytes(b"old")
+
+    copy_modules(source, target)
+
+    files = {
+        p.relative_to(target).as_posix(): p.read_bytes() for p in target.rglob("*.*") if p.is_file()
+    }
+    assert files == {"wp_gen_data.a_1/x.o": b"new", "wp_gen_data.b_2/x.o": b"old"}
+    assert sorted(path.name for path in target.iterdir()) == ["wp_gen_data.a_1", "wp_gen_data.b_2"]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KERNEL_MODULES)
 def test_kernels_compile_for_cuda(name: str, tmp_path: Path) -> None:
     """Compilation to PTX, which needs Warp's compiler but no GPU."""
@@ -61,8 +130,13 @@ def test_kernels_compile_for_cuda(name: str, tmp_path: Path) -> None:
 
 def _loaded_modules(program: str) -> set[tuple[str, str]]:
     """Names and hashes of the kernel modules that a program loads."""
+    return set(re.findall(r"Module (\S+) ([0-9a-f]+) load on device", _run(program)))
+
+
+def _run(program: str, arguments: Sequence[str] = (), environment: Mapping[str, str] = {}) -> str:
+    """What a program in a process of its own prints, Warp's reports included."""
     done = subprocess.run(
-        [sys.executable, "-c", _REPORT_MODULES + program],
-        check=True, capture_output=True, text=True,
+        [sys.executable, "-c", _REPORT_MODULES + program, *arguments],
+        check=True, capture_output=True, text=True, env={**os.environ, **environment},
     )  # fmt: skip
-    return set(re.findall(r"Module (\S+) ([0-9a-f]+) load on device", done.stdout))
+    return done.stdout

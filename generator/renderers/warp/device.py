@@ -1,15 +1,16 @@
 """Warp devices, with reproducible code generation and parallel compilation of kernels on first use.
 
 Warp compiles a module when it is first used, one at a time and on one core: the dozen modules that
-every image needs would delay the first sample. Here separate processes compile them side by side
-into Warp's cache. Failures are harmless: a module that is missing from the cache is compiled on
-first use.
+every image needs would delay the first sample. Here they are copied from the distribution into
+Warp's cache if it brings them, and else separate processes compile them side by side. Failures are
+harmless: a module that is missing from the cache is compiled on first use.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import platform
 import subprocess
 import sys
 import warnings
@@ -23,7 +24,7 @@ import warp as wp
 from gen_data.generator.core.errors import CacheWarning, ConfigError
 from gen_data.generator.core.processes import interrupts_blocked, silence_stdio, tie
 from gen_data.generator.core.system_calls import usable_cores, wait_for_lock
-from gen_data.generator.renderers.warp.kernel_cache import remove_damaged_modules
+from gen_data.generator.renderers.warp.kernel_cache import copy_modules, remove_damaged_modules
 
 # Not -march=native: fused multiply-adds would change bytes between machines. The inlining threshold
 # saves a quarter of all ray time.
@@ -81,6 +82,8 @@ EVERY_FRAME = (
     "scene.kernels.environment_lighting",
 )
 """Kernel modules, below this package, that every image needs; the slowest to compile come first."""
+BUNDLES = Path(__file__).parent / "compiled"
+"""Folder of modules that the distribution was built with; missing in a source tree."""
 _RECORD_BYTES = 64
 """Of a module's name in the pipe: longer than any, and short enough to be read in one piece."""
 
@@ -89,7 +92,9 @@ _RECORD_BYTES = 64
 def compile_kernels(device: str) -> None:
     """Fill Warp's cache for a device with the kernels of ``EVERY_FRAME``, if they are missing.
 
-    Of several processes that find the cache empty, one compiles and the others wait.
+    On the CPU, a bundle of the distribution that fits these kernels, this version of Warp and this
+    platform has those of every frame and all others. Of several processes that find the cache
+    empty, one fills it and the others wait.
 
     Warns:
         CacheWarning: compiled kernels were damaged; they are compiled again.
@@ -103,10 +108,21 @@ def compile_kernels(device: str) -> None:
         if damaged:
             fact = f"{folder}: {len(damaged)} compiled kernel module(s) were damaged"
             warnings.warn(f"{fact} and are compiled again", CacheWarning, stacklevel=2)
-        is_filled = stamp.exists() and not damaged
-        if cores > 1 and not is_filled and _compile_in_parallel(device, cores):
-            stamp.touch()
-            remove_damaged_modules(folder)
+        if stamp.exists() and not damaged:
+            return
+        bundle = bundle_folder()
+        if device == "cpu" and bundle.is_dir():
+            copy_modules(bundle, folder)
+        elif cores < 2 or not compile_in_parallel(device, EVERY_FRAME):
+            return
+        stamp.touch()
+        remove_damaged_modules(folder)
+
+
+def bundle_folder() -> Path:
+    """Folder of the CPU kernels compiled from these sources, by this Warp, on such a platform."""
+    _start()
+    return BUNDLES / f"{_digest()}-{sys.platform}-{platform.machine().lower()}"
 
 
 def load_kernels(device_name: str, names: Sequence[str]) -> None:
@@ -118,14 +134,14 @@ def load_kernels(device_name: str, names: Sequence[str]) -> None:
         wp.load_module(module, device=device)
 
 
-def _compile_in_parallel(device: str, cores: int) -> bool:
+def compile_in_parallel(device: str, names: Sequence[str]) -> bool:
     """Let one process per core take modules from a pipe; returns whether all succeeded."""
     queue, feed = os.pipe()
     running: list[subprocess.Popen[bytes]] = []
     try:
         with os.fdopen(feed, "wb") as file:
-            file.writelines(name.encode().ljust(_RECORD_BYTES) for name in EVERY_FRAME)
-        for _ in range(min(cores, len(EVERY_FRAME))):
+            file.writelines(name.encode().ljust(_RECORD_BYTES) for name in names)
+        for _ in range(min(usable_cores(), len(names))):
             command = tie([sys.executable, "-m", __name__, device])
             with interrupts_blocked():
                 running.append(subprocess.Popen(command, stdin=queue, stdout=subprocess.DEVNULL))

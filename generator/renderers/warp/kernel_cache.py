@@ -2,6 +2,10 @@
 
 A file of the digests of all compiled modules lies beside them. A module that differs from its
 digest, or that is cut off, is removed, and so compiled again by its next user.
+
+A distribution may bring compiled modules (``kernel_bundle.py``). They go into the cache under
+the names that Warp gave them, which contain the hash of everything they were compiled from, and
+Warp finds or ignores them as it does its own.
 """
 
 from __future__ import annotations
@@ -18,6 +22,7 @@ from pathlib import Path
 OURS = "wp_gen_data."
 SUMS_NAME = "gen-data-sums.json"
 SOURCES = frozenset({".cpp", ".cu"})
+_SOURCE_PATTERNS = tuple(f"*{suffix}" for suffix in sorted(SOURCES))
 UNFINISHED = re.compile(r"_p\d+_t\d+$")
 """Warp compiles in folders with the numbers of process and thread, and renames them."""
 ELF = b"\x7fELF"
@@ -46,6 +51,25 @@ def remove_damaged_modules(folder: Path) -> tuple[str, ...]:
     if kept != known:
         _write_sums(folder, kept)
     return tuple(sorted(module.name for module in damaged))
+
+
+def copy_modules(source: Path, target: Path) -> None:
+    """Copy the compiled modules of one folder into another that lacks them, without sources.
+
+    Each appears there whole. One process at a time may call it.
+    """
+    for module in sorted(source.glob(f"{OURS}*")):
+        copy = target / module.name
+        if copy.exists() or UNFINISHED.search(module.name):
+            continue
+        unfinished = target / f"{module.name}_p{os.getpid()}_t0"
+        shutil.copytree(module, unfinished, ignore=shutil.ignore_patterns(*_SOURCE_PATTERNS))
+        try:
+            unfinished.rename(copy)
+        except OSError:  # A process without the lock has just compiled it.
+            shutil.rmtree(unfinished)
+            if not copy.exists():
+                raise
 
 
 def _compiled_files(folder: Path) -> Iterator[Path]:

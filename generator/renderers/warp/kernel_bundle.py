@@ -1,0 +1,52 @@
+"""Compile all CPU kernels into the source tree, for a wheel that is then built from it.
+
+``python -m gen_data.generator.renderers.warp.kernel_bundle`` before ``python -m build --wheel``.
+The machine code fits every processor on which Warp compiles CPU kernels, because the compiler's
+flags name none; Warp's own names of the files contain its LLVM and the target triple.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from gen_data.generator.renderers.warp.device import (
+    BUNDLES,
+    EVERY_FRAME,
+    bundle_folder,
+    compile_in_parallel,
+    kernel_folder,
+)
+from gen_data.generator.renderers.warp.kernel_cache import copy_modules
+
+
+def kernel_modules() -> tuple[str, ...]:
+    """Names of all modules with kernels, below this package; the slowest to compile come first."""
+    sources = sorted(Path(__file__).parent.glob("*/kernels/*.py"))
+    names = [
+        f"{path.parts[-3]}.kernels.{path.stem}"
+        for path in sources
+        if "@wp.kernel" in path.read_text(encoding="utf-8")
+    ]
+    rare = [name for name in names if name not in EVERY_FRAME]
+    return (*rare, *EVERY_FRAME)
+
+
+def write_bundle() -> Path | None:
+    """Compile all modules anew and make them the only bundle; None if one fails to compile."""
+    with TemporaryDirectory() as cache:
+        os.environ["WARP_CACHE_PATH"] = cache
+        if not compile_in_parallel("cpu", kernel_modules()):
+            return None
+        bundle = bundle_folder()
+        shutil.rmtree(BUNDLES, ignore_errors=True)
+        bundle.mkdir(parents=True)
+        copy_modules(kernel_folder(), bundle)
+        return bundle
+
+
+if __name__ == "__main__":
+    sys.exit(write_bundle() is None)
