@@ -129,7 +129,7 @@ class DroneFlight(RandomizerBase):
     def _draw_flight(
         self, stretches: Sequence[Stretch], T_gimbal_drone: SE3, rng: Rng
     ) -> list[tuple[SE3, SE3]]:
-        """Draw poses of airframe and gimbal at all knots.
+        """Draw poses of the rigs of airframe and gimbal at all knots.
 
         ``T_gimbal_drone`` is the translation between them when the drone is level.
         """
@@ -171,12 +171,17 @@ class DroneFlight(RandomizerBase):
     def _fly(self, scene: Scene, poses: Sequence[tuple[SE3, SE3]]) -> Scene:
         names = (self.drone, f"{self.drone}_gimbal")
         tracks = tuple(
-            Trajectory(name, STEP_S, tuple(pair[k].rounded() for pair in poses), -MARGIN_S)
+            Trajectory(
+                scene.rig(name).body,
+                STEP_S,
+                tuple((pair[k] @ scene.rig(name).T_body_rig.inverse()).rounded() for pair in poses),
+                -MARGIN_S,
+            )
             for k, name in enumerate(names)
         )
         bodies = [
-            replace(scene.body(name), T_world_body=track.pose(scene.time_s).rounded())
-            for name, track in zip(names, tracks, strict=True)
+            replace(scene.body(track.body), T_world_body=track.pose(scene.time_s).rounded())
+            for track in tracks
         ]
         others = tuple(track for track in scene.tracks if track.body not in names)
         return place_sensors(replace(scene.with_bodies(*bodies), tracks=(*others, *tracks)))

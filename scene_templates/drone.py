@@ -14,6 +14,11 @@ GIMBAL_BELOW_M = 0.09
 """From the optical centre of the camera up to the airframe's centre (assumed)."""
 
 
+T_BODY_AIRFRAME = SE3((0.0, 0.0, 0.03))
+T_BODY_GIMBAL = SE3((0.037, 0.0, 0.02))
+"""Rigs on their bodies: the centre of the trunk, and the optical centre, before the lens."""
+
+
 class Drone(Element):
     """A quadrotor with two rigs, both X forward and Z up; never labelled.
 
@@ -33,8 +38,15 @@ class Drone(Element):
     def add(self, scene: Scene, assets: AssetIndex) -> Scene:
         """Add airframe and gimbal with their rigs."""
         x, y, z = self.at_m
-        gimbal = f"{self.name}_gimbal"
-        scene = add_background(scene, assets, self.name, self.asset, SE3(self.at_m))
-        below = SE3((x, y, z - GIMBAL_BELOW_M))
-        scene = add_background(scene, assets, gimbal, "gimbal", below)
-        return replace(scene, rigs=(*scene.rigs, Rig(self.name, self.name), Rig(gimbal, gimbal)))
+        rigs = {
+            self.name: (self.asset, SE3(self.at_m), T_BODY_AIRFRAME),
+            f"{self.name}_gimbal": (
+                "gimbal?seed=0",
+                SE3((x, y, z - GIMBAL_BELOW_M)),
+                T_BODY_GIMBAL,
+            ),
+        }
+        for name, (asset, T_world_rig, T_body_rig) in rigs.items():
+            scene = add_background(scene, assets, name, asset, T_world_rig @ T_body_rig.inverse())
+            scene = replace(scene, rigs=(*scene.rigs, Rig(name, name, T_body_rig)))
+        return scene

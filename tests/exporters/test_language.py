@@ -12,6 +12,7 @@ import pytest
 from pycocotools import mask as coco_mask
 
 from gen_data.exporters.coco import Coco
+from gen_data.exporters.label_map import AppliedLabelMap, LabelMap
 from gen_data.exporters.language import LanguageJsonl
 from gen_data.generator.core.sample import Relation, Sample
 from tests.exporters.test_birdseye import lines
@@ -110,3 +111,22 @@ def test_relations_have_both_directions_here_and_in_coco(
     )
     assert {tuple(triple) for triple in image["relationships"]} == expected
     assert "relationships" not in lines(folder / "train_images.jsonl")[1]
+
+
+def test_label_maps_drop_relations_and_text_about_dropped_objects(
+    world: Any, samples: list[Sample]
+) -> None:
+    """What is left names only objects that are left, and says the same as before."""
+    first = samples[0].truth["color"]
+    dropped = first.objects[0].instance.category
+    kept = {t.instance.category for t in first.objects} - {dropped}
+    mapping = LabelMap(classes={name: (name,) for name in kept}, others="drop")
+    mapped = AppliedLabelMap(mapping, world.info(7)).map_image(first)
+    gone = {t.instance.instance_id for t in first.objects if t.instance.category == dropped}
+
+    assert gone
+    assert mapped.relations == ()
+    assert mapped.utterances == tuple(
+        u for u in first.utterances or () if not gone & set(u.instances)
+    )
+    assert 0 < len(mapped.utterances or ()) < len(first.utterances or ())

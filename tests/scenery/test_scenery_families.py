@@ -64,7 +64,7 @@ LIMITS = {
     "hydrant": (0.7, 1.0, 1500), "bollard": (0.6, 1.1, 1500), "cone": (0.45, 0.8, 1500),
     "post_box": (1.1, 1.6, 1500), "bus_stop": (2.3, 2.8, 1500),
     "cabinet": (0.9, 1.4, 1500), "bike_rack": (0.7, 0.9, 1500), "barrier": (0.7, 1.3, 1500),
-    "traffic_light": (2.6, 7.0, 1600),
+    "traffic_light": (2.6, 7.0, 1600), "drone": (0.06, 0.12, 1500), "gimbal": (0.05, 0.1, 500),
     "pedestrian_signal": (2.4, 3.3, 1500), "traffic_sign": (2.1, 3.3, 1500),
     **{name: (*limits.height_m, limits.triangles) for name, limits in CLUTTER.items()},
 }  # fmt: skip

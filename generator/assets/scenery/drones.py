@@ -1,6 +1,6 @@
 """Quadrotors: airframes with four rotors, and the camera that hangs below on a gimbal.
 
-Frame: metres, X forward, Z up; the origin is the centre of gravity, or the camera's optical centre.
+Frame: metres, X forward, Z up, origin on the ground below.
 """
 
 from __future__ import annotations
@@ -35,14 +35,16 @@ def airframe(seed: int) -> Solid:
             blade.rotated("z", angle + rng.between(0.0, math.pi)).moved(x, y, 0.0).painted(1)
         )
     paints = (painted_material(PAINTS[seed % len(PAINTS)], 0.4), painted_material("#1d1e20", 0.5))
-    return make_solid(parts, paints, [hulls.box((-reach, -reach, -0.03), (reach, reach, 0.05))])
+    standing = [part.moved(0.0, 0.0, 0.03) for part in parts]
+    return make_solid(standing, paints, [hulls.box((-reach, -reach, 0.0), (reach, reach, 0.08))])
 
 
-def gimbal() -> Solid:
-    """The back of a camera on its yoke; the lens looks along +X from the origin, unobstructed."""
+def gimbal(seed: int) -> Solid:
+    """A camera on its yoke, 0.05 m long; its lens ends at x = 0.025 m, 0.02 m above the ground."""
+    grey = ("#1d1e20", "#3a3c40")[seed % 2]
     parts = [
-        block((-0.06, -0.02, -0.02), (-0.012, 0.02, 0.02), 0.005),
-        tube([(-0.035, 0.0, 0.02), (-0.035, 0.0, 0.06)], 0.006),
+        block((-0.025, -0.02, 0.0), (0.025, 0.02, 0.04), 0.005),
+        tube([(-0.01, 0.0, 0.035), (-0.01, 0.0, 0.08)], 0.006),
     ]
-    box = hulls.box((-0.06, -0.02, -0.02), (-0.012, 0.02, 0.06))
-    return make_solid(parts, (painted_material("#1d1e20", 0.5),), [box])
+    box = hulls.box((-0.025, -0.02, 0.0), (0.025, 0.02, 0.08))
+    return make_solid(parts, (painted_material(grey, 0.4),), [box])
