@@ -212,7 +212,7 @@ def test_a_carrier_too_wide_for_a_room_is_rejected_with_a_remedy() -> None:
 
 
 def test_the_map_of_a_room_agrees_with_outlines() -> None:
-    """Cells of 5 cm: free ones are outside of all that stands, occupied ones are not."""
+    """Occupied cells are in a box of what stands; free ones at most in its empty corners."""
     scene = states(flat(), is_open=OFF)
     pose = SE3((0.0, 0.0, 0.0))
     truth = EgoTruth(rig="carrier", T_world_ego=pose)
