@@ -14,7 +14,7 @@ import pytest
 import warp as wp
 
 from gen_data.generator.renderers import warp
-from gen_data.generator.renderers.warp.device import EVERY_FRAME, open_device
+from gen_data.generator.renderers.warp.device import EVERY_FRAME, compile_in_parallel, open_device
 from gen_data.generator.renderers.warp.kernel_cache import copy_modules
 
 _REPORT_MODULES = """
@@ -94,6 +94,18 @@ def test_kernels_of_the_distribution_are_loaded_instead_of_compiled(tmp_path: Pa
 
     assert re.findall(r"edge_detection .*\((\w+)\)", built) == ["compiled"]
     assert re.findall(r"edge_detection .*\((\w+)\)", used) == ["cached"]
+
+
+@pytest.mark.slow
+def test_modules_are_compiled_side_by_side_into_the_folder_given(tmp_path: Path) -> None:
+    """Directly within it, where the caller looks for them."""
+    name = "visibility.kernels.edge_detection"
+
+    assert compile_in_parallel("cpu", [name], tmp_path)
+
+    (module,) = tmp_path.glob("*")
+    assert module.name.startswith(f"wp_{warp.__name__}.{name}_")
+    assert list(module.glob("*.o"))
 
 
 def test_modules_are_copied_without_sources_and_never_over_others(tmp_path: Path) -> None:

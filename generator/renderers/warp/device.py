@@ -113,7 +113,7 @@ def compile_kernels(device: str) -> None:
         bundle = bundle_folder()
         if device == "cpu" and bundle.is_dir():
             copy_modules(bundle, folder)
-        elif cores < 2 or not compile_in_parallel(device, EVERY_FRAME):
+        elif cores < 2 or not compile_in_parallel(device, EVERY_FRAME, folder):
             return
         stamp.touch()
         remove_damaged_modules(folder)
@@ -134,15 +134,21 @@ def load_kernels(device_name: str, names: Sequence[str]) -> None:
         wp.load_module(module, device=device)
 
 
-def compile_in_parallel(device: str, names: Sequence[str]) -> bool:
-    """Let one process per core take modules from a pipe; returns whether all succeeded."""
+def compile_in_parallel(device: str, names: Sequence[str], folder: Path) -> bool:
+    """Let one process per core take modules from a pipe; returns whether all succeeded.
+
+    Args:
+        device: Warp's name of the device.
+        names: Of the modules, below this package.
+        folder: Cache that takes the compiled modules.
+    """
     queue, feed = os.pipe()
     running: list[subprocess.Popen[bytes]] = []
     try:
         with os.fdopen(feed, "wb") as file:
             file.writelines(name.encode().ljust(_RECORD_BYTES) for name in names)
         for _ in range(min(usable_cores(), len(names))):
-            command = tie([sys.executable, "-m", __name__, device])
+            command = tie([sys.executable, "-m", __name__, device, str(folder)])
             with interrupts_blocked():
                 running.append(subprocess.Popen(command, stdin=queue, stdout=subprocess.DEVNULL))
         codes = [process.wait() for process in running]
@@ -154,8 +160,11 @@ def compile_in_parallel(device: str, names: Sequence[str]) -> bool:
     return not any(codes)
 
 
-def _compile_queued(device: str) -> None:
+def _compile_queued(device: str, folder: str) -> None:
     """Compile the modules whose names arrive on standard input, which other processes share."""
+    _start()
+    # Set afterwards: Warp appends its version to a folder that it starts with.
+    wp.config.kernel_cache_dir = folder
     while record := os.read(sys.stdin.fileno(), _RECORD_BYTES):
         load_kernels(device, [record.decode().strip()])
 
@@ -169,4 +178,4 @@ def _digest() -> str:
 
 
 if __name__ == "__main__":
-    _compile_queued(sys.argv[1])
+    _compile_queued(*sys.argv[1:])

@@ -7,7 +7,6 @@ flags name none; Warp's own names of the files contain its LLVM and the target t
 
 from __future__ import annotations
 
-import os
 import shutil
 import sys
 from pathlib import Path
@@ -18,7 +17,6 @@ from gen_data.generator.renderers.warp.device import (
     EVERY_FRAME,
     bundle_folder,
     compile_in_parallel,
-    kernel_folder,
 )
 from gen_data.generator.renderers.warp.kernel_cache import copy_modules
 
@@ -38,13 +36,12 @@ def kernel_modules() -> tuple[str, ...]:
 def write_bundle() -> Path | None:
     """Compile all modules anew and make them the only bundle; None if one fails to compile."""
     with TemporaryDirectory() as cache:
-        os.environ["WARP_CACHE_PATH"] = cache
-        if not compile_in_parallel("cpu", kernel_modules()):
+        if not compile_in_parallel("cpu", kernel_modules(), Path(cache)):
             return None
         bundle = bundle_folder()
         shutil.rmtree(BUNDLES, ignore_errors=True)
         bundle.mkdir(parents=True)
-        copy_modules(kernel_folder(), bundle)
+        copy_modules(Path(cache), bundle)
         return bundle
 
 
