@@ -75,7 +75,7 @@ def tabulate(findings: Mapping[str, Any]) -> list[Table]:
                 _with_interval(facts["ap"]),
                 _with_interval(facts["ap50"]),
                 _with_interval(difference, "+") if difference else "",
-                f"{facts['p_adjusted']:.3f}" if difference else "",
+                _format_p(facts["p_adjusted"]) if difference else "",
                 facts.get("verdict", ""),
             ]
         )
@@ -118,6 +118,10 @@ def _verdict(difference: Interval, p: float) -> str:
     if p >= ALPHA:
         return "no difference found"
     return "better" if difference.mean > 0 else "worse"
+
+
+def _format_p(p: float) -> str:
+    return "< 0.001" if p < 0.001 else f"{p:.3f}"
 
 
 def _with_interval(value: Mapping[str, float], sign: str = "") -> str:

@@ -71,7 +71,7 @@ def _write(runs: Mapping[str, Sequence[Evaluation]], real: RealSet, out: Path) -
     findings = describe(runs)
     tables = [*tabulate(findings), _skipped(real)]
     findings |= {"source": str(real.source), "skipped": dict(real.skipped), "tables": tables}
-    page = format_page(f"study on {real.source}", tables, runs)
+    page = format_page(f"Study on {real.source}", tables, runs)
     try:
         out.mkdir(parents=True, exist_ok=True)
         (out / PAGE).write_text(page, encoding="utf-8", newline="\n")

@@ -79,6 +79,8 @@ READERS: Mapping[str, Reader] = {
     "pointclouds": Reader("open3d", f"{_HERE}.pointclouds:load_pointclouds"),
     "tfrecord": Reader("tfrecord", f"{_HERE}.tfrecord:load_tfrecord", 0.01),
     "usd": Reader("usd-core", f"{_HERE}.usd:load_usd"),
+    "voc": Reader("supervision", f"{_HERE}.detection_datasets:load_voc"),
     "webdataset": Reader("webdataset", f"{_HERE}.webdataset:load_webdataset"),
+    "yolo": Reader("supervision", f"{_HERE}.detection_datasets:load_yolo", 0.01),
 }
 """By the format's name."""
