@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -68,11 +69,13 @@ def test_shipped_schema_is_the_generated_one(tmp_path: Path) -> None:
 
 
 def test_doctor_finds_this_machine_fit(tmp_path: Path) -> None:
-    """Every check of a machine that runs the tests passes."""
+    """Every check of a machine that runs the tests passes, and one tells how fast it is."""
     done = gen_data("doctor", cwd=tmp_path)
 
     assert done.returncode == 0, done.stdout + done.stderr
     assert "FAIL" not in done.stdout
+    rate = re.search(r"^ok +speed +([0-9.]+) labelled samples/s", done.stdout, re.MULTILINE)
+    assert rate is not None and float(rate[1]) > 0.0
 
 
 BROKEN_MODULES = {
