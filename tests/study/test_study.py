@@ -3,12 +3,7 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -175,31 +170,3 @@ def test_an_interrupted_study_is_continued(tmp_path: Path) -> None:
     assert continued["variants"] == whole["variants"]
     assert continued["pictures"] == 12
     assert not list((tmp_path / "whole").glob("data/*"))
-
-
-@pytest.mark.slow
-def test_a_killed_study_is_continued(tmp_path: Path) -> None:
-    """SIGKILL in the middle of a training: the same detections, and the finished run is kept."""
-    config = tmp_path / "small.yaml"
-    config.write_text(CONFIG)
-    gen_data.generate(str(config), 8, out=tmp_path / "real", seed=900, workers=0)
-    sizes = {"n": 8, "seeds": 1, "steps": 60, "size": 64, "workers": 1}
-    command = [sys.executable, "-m", "gen_data", "study", str(tmp_path / "real/coco"), str(config)]
-    command += ["--without", "lamps", *(f"--{name}={value}" for name, value in sizes.items())]
-    killed, whole = tmp_path / "killed", tmp_path / "whole"
-
-    process = subprocess.Popen([*command, f"--out={killed}"])
-    log = killed / "runs/01-0/training.log"
-    while not (log.is_file() and "step 0" in log.read_text()):
-        assert process.poll() is None, "it ended before it could be killed"
-        time.sleep(0.05)
-    os.kill(process.pid, signal.SIGKILL)
-    process.wait()
-    done = (killed / "runs/00-0/results.json").stat().st_mtime_ns
-    assert not (killed / "runs/01-0/results.json").exists()
-    for out in (killed, whole):
-        subprocess.run([*command, f"--out={out}"], check=True)
-
-    assert (killed / "runs/00-0/results.json").stat().st_mtime_ns == done
-    for name in ("runs/00-0/results.json", "runs/01-0/results.json", "findings.json"):
-        assert (killed / name).read_bytes() == (whole / name).read_bytes()
