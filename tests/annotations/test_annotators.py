@@ -233,6 +233,7 @@ def test_every_annotator_fills_only_its_own_fields(name: str) -> None:
         "instance_masks": {"mask"},
         "keypoints": {"keypoints"},
         "motion": {"motion"},
+        "oriented_boxes2d": {"oriented_box"},
         "part_masks": {"part_px"},
         "poses": {"T_camera_object"},
         "semantic_masks": set(),

@@ -27,6 +27,7 @@ BYTES_DO_NOT_DEPEND_ON = {
     "rerun_cli": "shows samples",
     "rich": "draws progress on the terminal",
     "tfrecord": "reads exports for certificates",
+    "supervision": "reads exports for certificates",
     "torch": "trains detectors on finished data sets",
     "threadpoolctl": "limits BLAS to one thread, as workers do",
     "typing_extensions": "helps type checkers",

@@ -53,7 +53,7 @@ def test_describe_lists_and_explains(tmp_path: Path) -> None:
     listed = gen_data("describe", cwd=tmp_path)
     explained = gen_data("describe", "lighting", cwd=tmp_path)
 
-    assert "template: bin_picking, highway" in listed.stdout
+    assert "template: arm_task, bin_picking, highway" in listed.stdout
     assert "kitti_stereo" in listed.stdout
     assert "illuminance_lux" in explained.stdout
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -73,16 +74,16 @@ def test_lerobot_has_what_the_arm_does_at_every_step(
         assert np.linalg.norm(row["observation.ee_pose"][3:]) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_rlds_has_an_episode_per_record_with_steps_of_equal_length(
-    world: Any, samples: Any, tmp_path: Path
-) -> None:
-    """Lists of four steps; vectors of the steps follow one another; a failure has no reward."""
-    folder = world.export(Rlds(), drive_info(world), samples, tmp_path) / "train/toys_arm"
-    described = json.loads((folder / "features.json").read_text())
+def read_episode(folder: Path) -> Any:
+    """The only episode of a folder, by protobuf."""
     (record,) = tfrecord_iterator(str(folder / "episodes-00000-of-00001.tfrecord"))
     example = example_pb2.Example()
     example.ParseFromString(bytes(record))
+    return example
 
+
+def assert_episode(example: Any, described: Any, samples: Any) -> None:
+    """Lists of four steps; vectors of the steps follow one another; a failure has no reward."""
     assert set(example.features.feature) == set(described)
     for key, fact in described.items():
         count = 4 if key.startswith("steps/") else 1
@@ -105,6 +106,47 @@ def test_rlds_has_an_episode_per_record_with_steps_of_equal_length(
     assert np.array_equal(np.asarray(Image.open(io.BytesIO(picture))), expected)
 
 
+def test_rlds_has_an_episode_per_record_with_steps_of_equal_length(
+    world: Any, samples: Any, tmp_path: Path
+) -> None:
+    """Of the lengths that its description states."""
+    folder = world.export(Rlds(), drive_info(world), samples, tmp_path) / "train/toys_arm"
+
+    assert_episode(
+        read_episode(folder), json.loads((folder / "features.json").read_text()), samples
+    )
+
+
+def swap_steps(features: Any) -> None:
+    """The first two steps change places."""
+    states = features["steps/phase"].bytes_list.value
+    states[1], states[2] = states[2], states[1]
+
+
+def reward_a_failure(features: Any) -> None:
+    """As if it had succeeded."""
+    features["steps/reward"].float_list.value[3] = 1.0
+
+
+def lose_a_joint(features: Any) -> None:
+    """The last one of the last step."""
+    del features["steps/observation/state"].float_list.value[-1]
+
+
+@pytest.mark.damage("rlds")
+@pytest.mark.parametrize("damage", [swap_steps, reward_a_failure, lose_a_joint])
+def test_damage_of_an_episode_is_noticed(
+    world: Any, samples: Any, tmp_path: Path, damage: Callable[[Any], None]
+) -> None:
+    """The comparison fails for an episode that is slightly wrong."""
+    folder = world.export(Rlds(), drive_info(world), samples, tmp_path) / "train/toys_arm"
+    example = read_episode(folder)
+    damage(example.features.feature)
+
+    with pytest.raises(AssertionError):
+        assert_episode(example, json.loads((folder / "features.json").read_text()), samples)
+
+
 def test_rlds_rewards_the_last_step_of_a_success(world: Any, samples: Any, tmp_path: Path) -> None:
     """One, and a terminal state."""
     done = [
@@ -114,9 +156,7 @@ def test_rlds_rewards_the_last_step_of_a_success(world: Any, samples: Any, tmp_p
         for s in samples
     ]  # fmt: skip
     folder = world.export(Rlds(), drive_info(world), done, tmp_path) / "train/toys_arm"
-    (record,) = tfrecord_iterator(str(folder / "episodes-00000-of-00001.tfrecord"))
-    example = example_pb2.Example()
-    example.ParseFromString(bytes(record))
+    example = read_episode(folder)
 
     assert values(example, "steps/reward") == [0.0, 0.0, 0.0, 1.0]
     assert values(example, "steps/is_terminal") == [0, 0, 0, 1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -43,10 +44,8 @@ def test_every_image_has_a_label_file_of_its_name(world: Any, folder: Path) -> N
         assert label.read_text("utf-8").splitlines()[:2] == ["imagesource:gen-data", "gsd:null"]
 
 
-@pytest.mark.parametrize("below", [0.4, 0.95])
-def test_objects_are_those_of_the_truth(world: Any, tmp_path: Path, below: float) -> None:
+def assert_truth(world: Any, folder: Path, below: float) -> None:
     """Corners within a tenth of a pixel, and difficult if a share of them is hidden."""
-    folder = world.export(Dota(difficult_below=below), world.info(7), world.samples, tmp_path)
     for sample in world.samples:
         listed = parse_dota(folder / sample.split / f"labelTxt/{sample.index:09d}_color.txt")
         truth = [t for t in sample.truth["color"].objects if t.box is not None]
@@ -56,8 +55,46 @@ def test_objects_are_those_of_the_truth(world: Any, tmp_path: Path, below: float
                 assert corner == pytest.approx(expected, abs=0.051)
             assert row["name"] == thing.instance.category
             assert row["difficult"] == str(int(thing.visible_fraction < below))
+
+
+@pytest.mark.parametrize("below", [0.4, 0.95])
+def test_objects_are_those_of_the_truth(world: Any, tmp_path: Path, below: float) -> None:
+    """Some objects of the world are difficult at the larger limit, some are not."""
+    folder = world.export(Dota(difficult_below=below), world.info(7), world.samples, tmp_path)
+
+    assert_truth(world, folder, below)
     shares = [t.visible_fraction for s in world.samples for t in s.truth["color"].objects]
     assert min(shares) < 0.95 <= max(shares)
+
+
+def start_elsewhere(words: list[str]) -> list[str]:
+    """The same rectangle from another corner: another heading."""
+    return [*words[2:8], *words[:2], *words[8:]]
+
+
+def move_by_a_pixel(words: list[str]) -> list[str]:
+    """To the right."""
+    return [str(float(words[0]) + 1.0), *words[1:]]
+
+
+def turn_difficult(words: list[str]) -> list[str]:
+    """What is easy becomes difficult."""
+    return [*words[:9], str(1 - int(words[9]))]
+
+
+@pytest.mark.damage("dota")
+@pytest.mark.parametrize("damage", [start_elsewhere, move_by_a_pixel, turn_difficult])
+def test_damage_is_noticed(
+    world: Any, folder: Path, damage: Callable[[list[str]], list[str]]
+) -> None:
+    """The comparison fails for labels that are slightly wrong."""
+    path = folder / world.samples[0].split / "labelTxt/000000000_color.txt"
+    lines = path.read_text("utf-8").splitlines()
+    lines[2] = " ".join(damage(lines[2].split(" ")))
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+
+    with pytest.raises(AssertionError):
+        assert_truth(world, folder, Dota().difficult_below)
 
 
 def test_spaces_and_ignored_objects_are_left_out(world: Any, tmp_path: Path) -> None:

@@ -10,19 +10,26 @@ import numpy as np
 import pytest
 
 from gen_data.exporters.graspnet import GraspNet
-from gen_data.generator.core.sample import Grasp, Suction
+from gen_data.generator.core.sample import Grasp, Sample, Suction
 from gen_data.generator.core.se3 import SE3
 
+POSE = SE3.about_z(0.3, (5.0, 1.0, 0.4))
 
-def test_rows_are_in_the_camera_frame_of_visible_objects(world: Any, tmp_path: Path) -> None:
-    """Columns as graspnetAPI and suctionnetAPI have them; hidden things are left out."""
-    first = world.samples[0]
+
+@pytest.fixture
+def graspable(world: Any) -> Sample:
+    """A frame with a grasp and a suction of its first object, and a grasp of a hidden one."""
+    first: Sample = world.samples[0]
     seen = first.truth["color"].objects[0].instance.instance_id
-    pose = SE3.about_z(0.3, (5.0, 1.0, 0.4))
-    grasps = (Grasp(seen, pose, 0.05, 0.9), Grasp(999, pose, 0.04, 0.8))
+    grasps = (Grasp(seen, POSE, 0.05, 0.9), Grasp(999, POSE, 0.04, 0.8))
     suctions = (Suction(seen, (5.0, 1.0, 0.5), (0.0, 0.0, 1.0), 0.7),)
-    sample = replace(first, frame=replace(first.frame, grasps=grasps, suctions=suctions))
-    folder = world.export(GraspNet(), world.info(1), [sample], tmp_path)
+    assert first.frame is not None
+    return replace(first, frame=replace(first.frame, grasps=grasps, suctions=suctions))
+
+
+def assert_rows(folder: Path, sample: Sample) -> None:
+    """Columns as graspnetAPI and suctionnetAPI have them, in the camera frame."""
+    seen = sample.truth["color"].objects[0].instance.instance_id
     (row,) = np.load(folder / "train/000000000_color_grasps.npy")
     (cup,) = np.load(folder / "train/000000000_color_suctions.npy")
     T_world_camera = sample.truth["color"].camera.T_world_camera.matrix()
@@ -31,12 +38,36 @@ def test_rows_are_in_the_camera_frame_of_visible_objects(world: Any, tmp_path: P
     assert row[:4] == pytest.approx([0.9, 0.05, 0.02, 0.015])
     T_camera_grasp = np.eye(4)
     T_camera_grasp[:3, :3], T_camera_grasp[:3, 3] = row[4:13].reshape(3, 3), row[13:16]
-    assert pytest.approx(pose.matrix(), abs=1e-5) == T_world_camera @ T_camera_grasp
+    assert pytest.approx(POSE.matrix(), abs=1e-5) == T_world_camera @ T_camera_grasp
     assert row[16] == seen
     assert cup[0] == pytest.approx(0.7)
     assert T_world_camera[:3, :3] @ cup[1:4] == pytest.approx([0.0, 0.0, 1.0], abs=1e-5)
     assert T_world_camera @ [*cup[4:7], 1.0] == pytest.approx([5.0, 1.0, 0.5, 1.0], abs=1e-5)
     assert cup[7] == seen
+
+
+def test_rows_are_in_the_camera_frame_of_visible_objects(
+    world: Any, graspable: Sample, tmp_path: Path
+) -> None:
+    """Hidden things are left out."""
+    assert_rows(world.export(GraspNet(), world.info(1), [graspable], tmp_path), graspable)
+
+
+@pytest.mark.damage("graspnet")
+@pytest.mark.parametrize(("column", "change"), [(0, 0.1), (1, 0.02), (5, 0.3), (13, 0.01), (16, 1)])
+def test_damage_is_noticed(
+    world: Any, graspable: Sample, tmp_path: Path, column: int, change: float
+) -> None:
+    """The comparison fails for a row that is slightly wrong: score, width, pose, object."""
+    folder = world.export(GraspNet(), world.info(1), [graspable], tmp_path)
+    path = folder / "train/000000000_color_grasps.npy"
+    rows = np.load(path)
+    rows[0, column] += change
+    path.unlink()
+    np.save(path, rows)
+
+    with pytest.raises(AssertionError):
+        assert_rows(folder, graspable)
 
 
 def test_an_image_without_grasps_has_empty_arrays(world: Any, tmp_path: Path) -> None:

@@ -61,11 +61,8 @@ def test_hugging_face_reads_the_lines(world: Any, samples: list[Sample], tmp_pat
     assert list(table) == lines(path)
 
 
-def test_every_utterance_of_the_annotation_is_written_in_order(
-    world: Any, samples: list[Sample], tmp_path: Path
-) -> None:
-    """After a caption of the whole scene."""
-    folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path)
+def assert_said(folder: Path, samples: list[Sample]) -> None:
+    """The lines are the utterances of the annotation in order, after a caption of each scene."""
     train = [s for s in samples if s.split == "train"]
     said = [u for s in train for u in s.truth["color"].utterances or ()]
     rows = [row for row in lines(folder / "train.jsonl") if row["kind"] != "scene_caption"]
@@ -74,6 +71,28 @@ def test_every_utterance_of_the_annotation_is_written_in_order(
         (u.kind, u.text, u.answer, u.instances) for u in said
     ]
     assert said
+
+
+def test_every_utterance_of_the_annotation_is_written_in_order(
+    world: Any, samples: list[Sample], tmp_path: Path
+) -> None:
+    """After a caption of the whole scene."""
+    assert_said(world.export(LanguageJsonl(), world.info(7), samples, tmp_path), samples)
+
+
+@pytest.mark.damage("language")
+@pytest.mark.parametrize("damage", [{"answer": "many"}, {"object_ids": [999]}, {"text": "What?"}])
+def test_damage_is_noticed(
+    world: Any, samples: list[Sample], tmp_path: Path, damage: dict[str, Any]
+) -> None:
+    """The comparison fails for a line that is slightly wrong."""
+    folder = world.export(LanguageJsonl(), world.info(7), samples, tmp_path)
+    rows = lines(folder / "train.jsonl")
+    rows[-1].update(damage)
+    (folder / "train.jsonl").write_text("".join(f"{json.dumps(row)}\n" for row in rows), "utf-8")
+
+    with pytest.raises(AssertionError):
+        assert_said(folder, samples)
 
 
 def test_masks_and_ids_are_those_of_coco(world: Any, samples: list[Sample], tmp_path: Path) -> None:
