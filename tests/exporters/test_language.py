@@ -49,6 +49,7 @@ def test_lines_refer_to_objects_of_their_image(
         assert (folder / row["file_name"]).exists()
 
 
+@pytest.mark.slow
 def test_hugging_face_reads_the_lines(world: Any, samples: list[Sample], tmp_path: Path) -> None:
     """As a table with a row per line, whose columns have one type each."""
     datasets = pytest.importorskip("datasets")
