@@ -37,6 +37,7 @@ def test_every_task_is_demonstrated_with_success(task: str) -> None:
     assert [span.label for span in arm.episode.phases] == [*program, "settle"]
     grasped = any(step.verb == "grasp" for step in tasks()[task].program)
     assert bool(arm.episode.held) == grasped
+    assert arm.episode.phases[-1].end_s <= 15.0, "the sequence of arm_tasks.yaml is shorter"
 
 
 @pytest.mark.parametrize("failure", ["slip", "miss", "collision"])
