@@ -36,9 +36,10 @@ _MEAN_ROWS = 64
 _STRIP_ROWS = 16
 # Less light than this share of the rest is not computed.
 _NEGLIGIBLE = 1e-3
-# CIE S 011/E:2003, types 12 (clear) and 13 (clear, polluted): a to e. The turbidities are assumed.
+# CIE S 011/E:2003, types 12 (clear) and 13 (clear, polluted): a to e. The turbidity of the
+# latter is assumed; the former is that of daylight.CLEAR_TURBIDITY.
 _CLEAR, _POLLUTED = (-1.0, -0.32, 10.0, -3.0, 0.45), (-1.0, -0.32, 16.0, -3.0, 0.30)
-_CLEAR_TURBIDITY, _POLLUTED_TURBIDITY = 2.5, 6.0
+_POLLUTED_TURBIDITY = 6.0
 _TABLES = load_table(__package__, "preetham", tuple[tuple[float, ...], ...])
 # A cloud deck (about 6600 K), the clear horizon (D75, assumed), a city's glow, clean night air,
 # land from afar.
@@ -144,8 +145,9 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
         sun_altitude_rad: Over the horizon.
         turbidity: Of the air.
     """
-    way = _Way.of(d, sun_altitude_rad)
-    hazy = (turbidity - _CLEAR_TURBIDITY) / (_POLLUTED_TURBIDITY - _CLEAR_TURBIDITY)
+    angles = _SkyAngles.of(d, sun_altitude_rad)
+    clear_to = daylight.CLEAR_TURBIDITY
+    hazy = (turbidity - clear_to) / (_POLLUTED_TURBIDITY - clear_to)
     hazy = min(max(hazy, 0.0), 1.0)
     a, b, c, falloff, e = (
         (1.0 - hazy) * clear + hazy * polluted
@@ -153,11 +155,11 @@ def clear_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
     )
     # The standard's indicatrix is Perez' less a constant, so that it is 1 at a right angle.
     at_right_angle = 1.0 - c * math.exp(falloff * math.pi / 2.0)
-    luminance = way.relative((a, b, c, falloff, e), at_right_angle)
+    luminance = angles.relative((a, b, c, falloff, e), at_right_angle)
     # Preetham's fit turns pink at the horizon of clear air, which in truth is pale.
     high = _ramp(4.0, 20.0, math.degrees(sun_altitude_rad))
-    pale = np.exp(-way.up / 0.22)[..., None] * high
-    return _colored(way, turbidity, luminance, pale)
+    pale = np.exp(-angles.up / 0.22)[..., None] * high
+    return _colored(angles, turbidity, luminance, pale)
 
 
 def preetham_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
@@ -168,14 +170,14 @@ def preetham_sky(d: Array, sun_altitude_rad: float, turbidity: float) -> Array:
         sun_altitude_rad: Over the horizon.
         turbidity: Of the air.
     """
-    way = _Way.of(d, sun_altitude_rad)
-    luminance = way.relative(_perez_factors("luminance", turbidity))
-    return _colored(way, turbidity, luminance, np.zeros(1))
+    angles = _SkyAngles.of(d, sun_altitude_rad)
+    luminance = angles.relative(_perez_factors("luminance", turbidity))
+    return _colored(angles, turbidity, luminance, np.zeros(1))
 
 
 @dataclass(frozen=True, slots=True)
-class _Way:
-    """Where directions of the sky are; all formulas share these.
+class _SkyAngles:
+    """Angles of directions in the sky, which all formulas share.
 
     Attributes:
         up: Height of each row, its sine; at least 0.012, since they diverge at the horizon. [h, 1].
@@ -189,7 +191,7 @@ class _Way:
     sun_zenith_rad: float
 
     @classmethod
-    def of(cls, d: Array, sun_altitude_rad: float) -> _Way:
+    def of(cls, d: Array, sun_altitude_rad: float) -> _SkyAngles:
         """Of unit directions [h, w, 3], each row level."""
         towards = d[..., 0] * math.cos(sun_altitude_rad) + d[..., 2] * math.sin(sun_altitude_rad)
         towards = np.clip(towards, -1.0, 1.0)
@@ -215,20 +217,22 @@ def _perez_factors(table: str, turbidity: float) -> list[float]:
     return [factor * turbidity + constant for factor, constant in _TABLES[table]]
 
 
-def _colored(way: _Way, turbidity: float, luminance: Array, pale: Array) -> Array:
+def _colored(angles: _SkyAngles, turbidity: float, luminance: Array, pale: Array) -> Array:
     """Luminances in Preetham's colours.
 
     Args:
-        way: Directions.
+        angles: Of the directions.
         turbidity: Of the air.
         luminance: Of each direction [h, w].
         pale: Share of the horizon's own colour in place of Preetham's, broadcast to [h, w, 1].
     """
-    powers = np.array([way.sun_zenith_rad**3, way.sun_zenith_rad**2, way.sun_zenith_rad, 1.0])
+    powers = np.array(
+        [angles.sun_zenith_rad**3, angles.sun_zenith_rad**2, angles.sun_zenith_rad, 1.0]
+    )
     terms = np.array([turbidity**2, turbidity, 1.0])[:, None] * powers
     x, y = (
         float((np.array(_TABLES[f"zenith_{axis}"]) * terms).sum())
-        * way.relative(_perez_factors(axis, turbidity))
+        * angles.relative(_perez_factors(axis, turbidity))
         for axis in ("x", "y")
     )
     # Sum by sum: numpy is slow on products of three by three.
