@@ -18,21 +18,19 @@ Reference: https://docs.cvat.ai, "CVAT for images 1.1".
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
-from gen_data.exporters.fragments import fragment_rows, image_splits, write_image_rows
+from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.mask_polygons import mask_polygons
-from gen_data.exporters.sensor_selection import check_channels
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import MaskPx, ObjectTruth, Sample
@@ -41,12 +39,11 @@ OCCLUDED = 0.05
 """Hidden share of the silhouette in the image above which ``occluded`` is 1."""
 
 
-class Cvat(ExporterBase):
+class Cvat(ImageRowsExporter):
     """CVAT for images: objects of all cameras with the rgb channel, as shapes to be edited."""
 
     type: Literal["cvat"] = "cvat"
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     shapes: Literal["mask", "polygon", "box"] = "mask"
     """Shape of every object."""
 
@@ -54,23 +51,6 @@ class Cvat(ExporterBase):
     def needs(self) -> frozenset[str]:
         """Names of the annotators that it reads."""
         return frozenset({"instance_masks", "visibility"})
-
-    def check(self, info: DatasetInfo) -> None:
-        """Reject a data set without photographs.
-
-        Raises:
-            ConfigError: no sensor writes the rgb channel.
-        """
-        check_channels(info, (), self.type)
-
-    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write a JSON line per image with the elements of its shapes.
-
-        Raises:
-            ConfigError: see ``check``.
-        """
-        self.check(info)
-        write_image_rows(info, samples, shard_dir / self.type, partial(self._image_row, info))
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Number the images of each split, join their shapes, and link the images."""
@@ -94,7 +74,8 @@ class Cvat(ExporterBase):
                     link_or_copy(source, path.parent / "images" / name)
                 file.write("</annotations>\n")
 
-    def _image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
+    def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
+        """The elements of its shapes."""
         camera = sample.truth[sensor].camera.intrinsics
         suffix = info.encoding(sensor, Channel.RGB).suffix
         elements = [
@@ -105,8 +86,6 @@ class Cvat(ExporterBase):
         ]
         return {
             "file_name": image_name(sample.index, sensor, suffix),
-            "sensor": sensor,
-            "sample": sample.index,
             "width": camera.width_px,
             "height": camera.height_px,
             "shapes": "".join(f"    {line}\n" for line in elements),

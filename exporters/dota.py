@@ -17,17 +17,16 @@ Reference: https://captain-whu.github.io/DOTA/dataset.html, and its development 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 from pydantic import Field
 
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
-from gen_data.exporters.fragments import fragment_rows, image_splits, write_image_rows
+from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.sensor_selection import check_channels
+from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo
@@ -36,7 +35,7 @@ from gen_data.generator.core.sample import ObjectTruth, Sample
 HEADER = ("imagesource:gen-data", "gsd:null")
 
 
-class Dota(ExporterBase):
+class Dota(ImageRowsExporter):
     """DOTA labels of all cameras with the rgb channel.
 
     Attributes:
@@ -46,7 +45,6 @@ class Dota(ExporterBase):
 
     type: Literal["dota"] = "dota"
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     difficult_below: float = Field(0.4, ge=0, le=1)
 
     @property
@@ -56,33 +54,14 @@ class Dota(ExporterBase):
             {"oriented_boxes2d", "visibility"} if self.difficult_below else {"oriented_boxes2d"}
         )
 
-    def check(self, info: DatasetInfo) -> None:
-        """Reject a data set that this format cannot represent.
-
-        Raises:
-            ConfigError: no sensor writes the rgb channel.
-        """
-        check_channels(info, (), self.type)
-
-    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write a JSON line per image with the lines of its label file.
-
-        Raises:
-            ConfigError: see ``check``.
-        """
-        self.check(info)
-
-        def row_of(sample: Sample, sensor: str) -> dict[str, Any]:
-            suffix = info.encoding(sensor, Channel.RGB).suffix
-            things = sample.truth[sensor].objects
-            return {
-                "sensor": sensor,
-                "sample": sample.index,
-                "file_name": image_name(sample.index, sensor, suffix),
-                "lines": [self._line(t) for t in things if t.oriented_box and not t.ignored],
-            }
-
-        write_image_rows(info, samples, shard_dir / self.type, row_of)
+    def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
+        """The lines of its label file."""
+        suffix = info.encoding(sensor, Channel.RGB).suffix
+        things = sample.truth[sensor].objects
+        return {
+            "file_name": image_name(sample.index, sensor, suffix),
+            "lines": [self._line(t) for t in things if t.oriented_box and not t.ignored],
+        }
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the label files and link the images."""

@@ -7,13 +7,10 @@ samples, so that the merged data set does not depend on the size of shards.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gen_data.exporters.sensor_selection import rgb_cameras
-from gen_data.generator.core.interfaces import DatasetInfo
-from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.serialization import canonical_json
 
 
@@ -22,26 +19,6 @@ def write_fragment(folder: Path, name: str, rows: Iterable[Mapping[str, Any]]) -
     folder.mkdir(parents=True, exist_ok=True)
     text = "".join(canonical_json(row) + "\n" for row in rows)
     (folder / f"{name}.jsonl").write_text(text, encoding="utf-8", newline="\n")
-
-
-def write_image_rows(
-    info: DatasetInfo,
-    samples: Iterable[Sample],
-    folder: Path,
-    row_of: Callable[[Sample, str], Mapping[str, Any]],
-) -> None:
-    """Write a row per photograph to ``<folder>/<split>.images.jsonl``; creates the folder.
-
-    ``row_of`` makes the row of a sample and the name of its camera.
-    """
-    rows: dict[str, list[Mapping[str, Any]]] = {}
-    for sample in samples:
-        for sensor in rgb_cameras(info):
-            if sensor in sample.truth:
-                rows.setdefault(f"{sample.split}.images", []).append(row_of(sample, sensor))
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, lines in rows.items():
-        write_fragment(folder, name, lines)
 
 
 def image_splits(folders: Iterable[Path]) -> list[str]:

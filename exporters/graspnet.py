@@ -17,25 +17,24 @@ image; object ids are instance ids. Height and depth are those of the fingers: `
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import Field
 
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
-from gen_data.exporters.fragments import fragment_rows, image_splits, write_image_rows
+from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.sensor_selection import check_channels
+from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.sequences import write_bytes
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import Sample
 
 
-class GraspNet(ExporterBase):
+class GraspNet(ImageRowsExporter):
     """Grasps and suctions of the objects in every photograph.
 
     Attributes:
@@ -45,7 +44,6 @@ class GraspNet(ExporterBase):
 
     type: Literal["graspnet"] = "graspnet"
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     height_m: float = Field(0.02, gt=0)
     depth_m: float = Field(0.015, ge=0)
 
@@ -54,33 +52,14 @@ class GraspNet(ExporterBase):
         """Names of the annotators that it requires."""
         return frozenset({"grasps"})
 
-    def check(self, info: DatasetInfo) -> None:
-        """Reject a data set that this format cannot represent.
-
-        Raises:
-            ConfigError: no sensor writes the rgb channel.
-        """
-        check_channels(info, (), self.type)
-
-    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write a JSON line per image with the rows of its arrays.
-
-        Raises:
-            ConfigError: see ``check``.
-        """
-        self.check(info)
-
-        def row_of(sample: Sample, sensor: str) -> dict[str, Any]:
-            suffix = info.encoding(sensor, Channel.RGB).suffix
-            return {
-                "sensor": sensor,
-                "sample": sample.index,
-                "file_name": image_name(sample.index, sensor, suffix),
-                "grasps": self._grasps(sample, sensor),
-                "suctions": _suctions(sample, sensor),
-            }
-
-        write_image_rows(info, samples, shard_dir / self.type, row_of)
+    def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
+        """The rows of its arrays."""
+        suffix = info.encoding(sensor, Channel.RGB).suffix
+        return {
+            "file_name": image_name(sample.index, sensor, suffix),
+            "grasps": self._grasps(sample, sensor),
+            "suctions": _suctions(sample, sensor),
+        }
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the arrays and link the images."""

@@ -22,22 +22,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 from urllib.parse import quote
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
-from gen_data.exporters.fragments import fragment_rows, image_splits, write_image_rows
+from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.mask_polygons import mask_polygons
-from gen_data.exporters.sensor_selection import check_channels
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo
@@ -62,12 +61,11 @@ CONTROLS = {"mask": "BrushLabels", "polygon": "PolygonLabels", "box": "Rectangle
 Shape = Literal["mask", "polygon", "box"]
 
 
-class LabelStudio(ExporterBase):
+class LabelStudio(ImageRowsExporter):
     """Label Studio: objects of all cameras with the rgb channel, as regions to be edited."""
 
     type: Literal["label_studio"] = "label_studio"
 
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     shapes: Shape = "polygon"
     """Shape of every object."""
     kind: Literal["annotations", "predictions"] = "annotations"
@@ -79,23 +77,6 @@ class LabelStudio(ExporterBase):
     def needs(self) -> frozenset[str]:
         """Names of the annotators that it reads."""
         return frozenset({"instance_masks"})
-
-    def check(self, info: DatasetInfo) -> None:
-        """Reject a data set without photographs.
-
-        Raises:
-            ConfigError: no sensor writes the rgb channel.
-        """
-        check_channels(info, (), self.type)
-
-    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write a JSON line per image with its regions.
-
-        Raises:
-            ConfigError: see ``check``.
-        """
-        self.check(info)
-        write_image_rows(info, samples, shard_dir / self.type, partial(self._image_row, info))
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Write the tasks of each split, link their images, and describe the interface."""
@@ -118,7 +99,8 @@ class LabelStudio(ExporterBase):
         config = label_config(info.categories, self.shapes, sorted(keypoints))
         write_text(dataset_dir / "label_config.xml", config)
 
-    def _image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
+    def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
+        """Its regions, as a task."""
         camera = sample.truth[sensor].camera.intrinsics
         regions = [
             region
@@ -141,8 +123,6 @@ class LabelStudio(ExporterBase):
             facts.update(model_version="gen-data", score=1.0)
         return {
             "file_name": name,
-            "sensor": sensor,
-            "sample": sample.index,
             "keypoints": sorted(_keypoint_names(regions)),
             # As text, which merging copies: regions have thousands of numbers.
             "task": json.dumps({"data": data, self.kind: [facts]}, separators=(",", ":")),

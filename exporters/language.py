@@ -23,17 +23,16 @@ Visual Genome (Krishna et al., 2017); they are there with the annotation ``relat
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
-from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.captions import caption
 from gen_data.exporters.coco import box_xywh, image_name, scene_graph
-from gen_data.exporters.fragments import fragment_rows, image_splits, write_image_rows
+from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.image_files import link_or_copy
+from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.rle import encode_rle
-from gen_data.exporters.sensor_selection import check_channels
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import Sample, Utterance
@@ -43,43 +42,22 @@ UTTERANCE_STRIDE = 1_000
 """Ids of lines per image; more lines than this are left out."""
 
 
-class LanguageJsonl(ExporterBase):
+class LanguageJsonl(ImageRowsExporter):
     """Text about every photograph as JSON lines, with masks of what it is about."""
 
     type: Literal["language"] = "language"
-
-    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
 
     @property
     def needs(self) -> frozenset[str]:
         """Names of the annotators that it requires."""
         return frozenset({"instance_masks", "language"})
 
-    def check(self, info: DatasetInfo) -> None:
-        """Reject a data set that this format cannot represent.
-
-        Raises:
-            ConfigError: no sensor writes the rgb channel.
-        """
-        check_channels(info, (), self.type)
-
-    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write a line per image, with its text.
-
-        Raises:
-            ConfigError: see ``check``.
-        """
-        self.check(info)
-
-        def row_of(sample: Sample, sensor: str) -> dict[str, Any]:
-            return {
-                "sensor": sensor,
-                "sample": sample.index,
-                "image": _image(info, sample, sensor),
-                "lines": [_line(u) for u in _utterances(sample, sensor)],
-            }
-
-        write_image_rows(info, samples, shard_dir / self.type, row_of)
+    def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
+        """Its text and its objects."""
+        return {
+            "image": _image(info, sample, sensor),
+            "lines": [_line(u) for u in _utterances(sample, sensor)],
+        }
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Join the lines of all shards and link the images."""

@@ -1,0 +1,52 @@
+"""Base of exporters that keep a JSON line per photograph until their data set is merged."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+from gen_data.exporters.base import ANY_FORMAT, ExporterBase
+from gen_data.exporters.fragments import write_fragment
+from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
+from gen_data.generator.core.interfaces import DatasetInfo
+from gen_data.generator.core.sample import Sample
+
+
+class ImageRowsExporter(ExporterBase):
+    """An exporter of all cameras with the rgb channel, whose images it links."""
+
+    type: str
+    image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
+
+    def check(self, info: DatasetInfo) -> None:
+        """Reject a data set without photographs.
+
+        Raises:
+            ConfigError: no sensor writes the rgb channel.
+        """
+        check_channels(info, (), self.type)
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write a JSON line per photograph to ``<split>.images.jsonl``.
+
+        Raises:
+            ConfigError: see ``check``.
+        """
+        self.check(info)
+        rows: dict[str, list[Mapping[str, Any]]] = {}
+        for sample in samples:
+            for sensor in rgb_cameras(info):
+                if sensor in sample.truth:
+                    facts = self.image_row(info, sample, sensor)
+                    row = {**facts, "sensor": sensor, "sample": sample.index}
+                    rows.setdefault(f"{sample.split}.images", []).append(row)
+        folder = shard_dir / self.type
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, lines in rows.items():
+            write_fragment(folder, name, lines)
+
+    @abstractmethod
+    def image_row(self, info: DatasetInfo, sample: Sample, sensor: str) -> Mapping[str, Any]:
+        """What the line of a photograph has besides ``sensor`` and ``sample``."""
