@@ -10,14 +10,15 @@ The configuration's own values are a prior, whose wide deviations matter only wh
 hardly determine a parameter.
 
 What real statistics vary more than simulated ones, whose parameters are constant, is the spread of
-the parameters between recordings.
+the parameters between recordings. Statistics are no linear functions of parameters, so that spread
+shifts their means: parameters are estimated again from simulated recordings with this spread.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -27,17 +28,16 @@ from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Streams
 
 Simulate = Callable[[Array, int], Array]
-"""Statistics [scenes, k] for parameters [k] of so many of the simulated scenes, at most."""
+"""Statistics [scenes, k] for parameters [k], or those of each scene [scenes, k], of so many of the
+simulated scenes, at most."""
 EVERY = 1 << 30
 """All scenes."""
 
 CANDIDATES_MAX = 14
-CONVERGED = 1e-3
+CONVERGED = 0.02
 """Relative change of the parameters, and of the remaining distance, at which the search ends."""
 DERIVATIVE_SCENES = 12
 """Scenes for derivatives: differences within a scene scatter less than scenes do."""
-CONVERGED = 0.02
-"""Change of a parameter, in steps of its axis, at which the search ends."""
 TRIMMED = 0.1
 """Share of the recordings left out at either end of a mean."""
 RESAMPLES = 400
@@ -168,8 +168,10 @@ def fit(
 
     def estimate_some(positions: Sequence[int]) -> dict[int, Estimate]:
         own, columns = [axes[k] for k in positions], list(positions)
-        solution = solve(real[:, columns], partial(simulate, columns), own, start[columns])
-        return dict(zip(positions, estimate(real[:, columns], solution, own), strict=True))
+        estimates = estimate_with_spread(
+            real[:, columns], partial(simulate, columns), own, start[columns]
+        )
+        return dict(zip(positions, estimates, strict=True))
 
     found = estimate_some(used) if used else {}
     determined = [k for k, one in found.items() if one.determined]
@@ -178,8 +180,52 @@ def fit(
     return found
 
 
+def estimate_with_spread(
+    real: Array, simulate: Simulate, axes: Sequence[Axis], start: Array
+) -> list[Estimate]:
+    """Estimate parameters, and again with their spread in the simulation if there is any.
+
+    The spread is that of the first estimate, relative to a simulation with constant parameters.
+    """
+    solution = solve(real, simulate, axes, start)
+    found = estimate(real, solution, axes)
+    spreads = np.array([one.spread for one in found])
+    if not spreads.any():
+        return found
+    deviations = spreads * _normal_deviates(*solution.simulated.shape)
+    low, high = _bounds(axes)
+
+    def simulate_spread(at: Array, count: int) -> Array:
+        return simulate(np.clip(at + deviations, low, high)[:count], count)
+
+    again = solve(real, simulate_spread, axes, start, first=solution.parameters)
+    return [
+        replace(one, spread=before.spread)
+        for one, before in zip(estimate(real, again, axes), found, strict=True)
+    ]
+
+
+def _normal_deviates(scenes: int, k: int) -> Array:
+    """Normal deviates [scenes, k]: the middle quantiles of equal strata, in random order."""
+    from scipy.stats import norm
+
+    rng = Streams(seed=0, scene=0).rng("match/spread")
+    quantiles = norm.ppf((np.arange(scenes) + 0.5) / scenes)
+    return np.stack([rng.permutation(quantiles) for _ in range(k)], axis=1)
+
+
+def _bounds(axes: Sequence[Axis]) -> tuple[Array, Array]:
+    """Lowest and highest parameters, each [k]."""
+    return np.array([axis.low for axis in axes]), np.array([axis.high for axis in axes])
+
+
 def solve(
-    real: Array, simulate: Simulate, axes: Sequence[Axis], start: Array, slopes: Array | None = None
+    real: Array,
+    simulate: Simulate,
+    axes: Sequence[Axis],
+    start: Array,
+    slopes: Array | None = None,
+    first: Array | None = None,
 ) -> Solution:
     """Find the parameters with which the simulation has the means of the real statistics.
 
@@ -187,16 +233,18 @@ def solve(
         real: Statistics of the recordings, [n, k]; NaN = not measurable.
         simulate: Simulation of the same statistics.
         axes: Of the k parameters.
-        start: First parameters, [k].
+        start: Parameters of the configuration [k], the mean of the prior.
         slopes: Derivatives of the statistics [k, k] where they are known; None = measured.
+        first: Parameters [k] at which the search begins; None = ``start``.
     """
     from scipy.optimize import least_squares
 
-    bounds = tuple(np.array([getattr(axis, name) for axis in axes]) for name in ("low", "high"))
+    bounds = _bounds(axes)
     plausible = np.array([axis.plausible for axis in axes])
     start = np.clip(start, *bounds)
-    target, known = trimmed_mean(real), {start.tobytes(): simulate(start, EVERY)}
-    error = np.sqrt(_variance_of_mean(real) + _variance_of_mean(known[start.tobytes()]))
+    first = start if first is None else np.clip(first, *bounds)
+    target, known = trimmed_mean(real), {first.tobytes(): simulate(first, EVERY)}
+    error = np.sqrt(_variance_of_mean(real) + _variance_of_mean(known[first.tobytes()]))
 
     def found(at: Array) -> Array:
         if at.tobytes() not in known:
@@ -214,7 +262,7 @@ def solve(
         return np.vstack([derivatives(at) / error[:, None], np.diag(1.0 / plausible)])
 
     search = least_squares(
-        residuals, start, jacobian, bounds, x_scale=plausible, xtol=CONVERGED, ftol=CONVERGED,
+        residuals, first, jacobian, bounds, x_scale=plausible, xtol=CONVERGED, ftol=CONVERGED,
         gtol=None, max_nfev=CANDIDATES_MAX,
     )  # fmt: skip
     at = np.asarray(search.x)

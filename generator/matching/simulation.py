@@ -7,7 +7,7 @@ same random streams for all candidates.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -175,24 +175,26 @@ def measure_exposures(
     count: int,
     prepare: Callable[[ImagePipeline], ImagePipeline],
 ) -> Array:
-    """Statistics [scenes, k] of photographs with parameters [k].
+    """Statistics [scenes, k] of photographs.
 
     Args:
         exposures: The scenes.
         quantities: Parameters and their statistics.
-        coordinates: Values of the parameters.
+        coordinates: Values of the parameters, [k], or for each scene, [scenes, k].
         count: Number of scenes, at most.
         prepare: Further changes to every scene's own pipeline, before these.
     """
+    used = exposures[:count]
 
-    def measure(exposure: Exposure) -> list[float]:
+    def measure(exposure: Exposure, own: Array) -> list[float]:
         pipeline = prepare(exposure.pipeline)
-        for quantity, coordinate in zip(quantities, coordinates, strict=True):
+        for quantity, coordinate in zip(quantities, own, strict=True):
             pipeline = quantity.apply(pipeline, float(coordinate))
         picture = photograph(exposure, pipeline)
         return [quantity.measure(picture) for quantity in quantities]
 
-    return np.array(list(map_in_threads(measure, exposures[:count])))
+    rows = np.broadcast_to(coordinates, (len(used), len(quantities)))
+    return np.array(list(map_in_threads(measure, used, rows)))
 
 
 def measure_illuminations(
@@ -240,7 +242,7 @@ def _box(category: str, box: BoxPx) -> Box:
     return category, left, top, width, height
 
 
-def map_in_threads(function: Callable[[Any], T], items: Sequence[Any]) -> Iterator[T]:
-    """Results in order; most of the time is spent in libraries that let other threads run."""
+def map_in_threads(function: Callable[..., T], *items: Iterable[Any]) -> Iterator[T]:
+    """Results in order, as of ``map``; most of the time goes to libraries that let threads run."""
     with ThreadPoolExecutor(usable_cores()) as pool:
-        yield from pool.map(function, items)
+        yield from pool.map(function, *items)

@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.matching.indirect_inference import (
     Axis,
     direct_estimate,
     estimate,
+    estimate_with_spread,
     fit,
     solve,
     trimmed_mean,
@@ -64,6 +66,23 @@ def test_spread_between_recordings_is_told_from_that_of_scenes() -> None:
 
     assert first.spread == pytest.approx(0.5, abs=0.08)
     assert second.spread == 0.0
+
+
+def test_spread_shifts_the_mean_of_a_curved_statistic_but_not_the_fit() -> None:
+    """exp(p) of a normal p has the mean exp(mu + sigma^2 / 2), here 0.18 above exp(mu) in p."""
+    quantiles = (np.arange(2000) + 0.5) / 2000
+    real = np.exp(norm(1.0, 0.6).ppf(quantiles))[:, None]
+    scenes = 0.1 * np.random.default_rng(15).standard_normal((400, 1))
+    start = np.zeros(1)
+
+    def simulate(parameters: Array, count: int) -> Array:
+        return np.asarray(np.exp(parameters) + scenes[:count])
+
+    constant = solve(real, simulate, (AXIS,), start).parameters[0]
+    (found,) = estimate_with_spread(real, simulate, (AXIS,), start)
+
+    assert constant > 1.06
+    assert found.mean == pytest.approx(1.0, abs=0.03)
 
 
 def test_a_parameter_without_effect_is_not_determined_and_keeps_its_value() -> None:
