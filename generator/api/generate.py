@@ -16,7 +16,7 @@ from gen_data.generator.core.urls import is_url
 if TYPE_CHECKING:
     from gen_data.generator.assemble.config import Config
     from gen_data.generator.assemble.pipeline_factory import PipelineFactory
-    from gen_data.generator.runner.processes import Pool
+    from gen_data.generator.runner.processes import Pool, StandbyWorker
     from gen_data.generator.runner.progress import RunProgress, Summary
     from gen_data.generator.runner.ray_cluster import RayCluster
     from gen_data.generator.runner.shard import Job
@@ -70,38 +70,53 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
     Warns:
         ConfigWarning: ``n`` is so small that a split of the configuration stays empty.
     """
-    _check_arguments(config, n, out, workers, repair)
-    # Before the imports below, so that errors of a configuration come at once.
-    loaded = load_config(config, seed=seed, overrides=overrides, without=without)
+    with _standby_worker(cluster, workers) as standby:
+        _check_arguments(config, n, out, workers, repair)
+        # Before the imports below, so that errors of a configuration come at once.
+        loaded = load_config(config, seed=seed, overrides=overrides, without=without)
 
-    from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
-    from gen_data.generator.runner.identity import format_licences, make_plan
-    from gen_data.generator.runner.run import Settings, run
+        from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
+        from gen_data.generator.runner.identity import format_licences, make_plan
+        from gen_data.generator.runner.run import Settings, run
 
-    factory = _make_factory(loaded, n)
-    plan = make_plan(factory)
-    with _opened(cluster, workers) as (open_pool, count), _output_folder(loaded, out) as folder:
-        return run(
-            plan,
-            factory,
-            folder,
-            workers=count,
-            resume_command=resume_command,
-            licences=partial(format_licences, factory),
-            settings=Settings(
-                repair=repair,
-                allow_mixed_numerics=allow_mixed_numerics,
-                sample_bytes=estimate_sample_bytes(loaded, factory.info),
-                is_forced=force,
-                open_pool=open_pool,
-                shards=None if shards is None else check_shards(shards, plan.shard_count),
-            ),
-            progress=on_progress,
-        )
+        factory = _make_factory(loaded, n)
+        plan = make_plan(factory)
+        with _opened(cluster, workers, standby) as (pool, count), _folder(loaded, out) as folder:
+            return run(
+                plan,
+                factory,
+                folder,
+                workers=count,
+                resume_command=resume_command,
+                licences=partial(format_licences, factory),
+                settings=Settings(
+                    repair=repair,
+                    allow_mixed_numerics=allow_mixed_numerics,
+                    sample_bytes=estimate_sample_bytes(loaded, factory.info),
+                    is_forced=force,
+                    open_pool=pool,
+                    shards=None if shards is None else check_shards(shards, plan.shard_count),
+                ),
+                progress=on_progress,
+            )
 
 
 @contextmanager
-def _output_folder(loaded: Config, out: str | PathLike[str] | None) -> Iterator[Path | str]:
+def _standby_worker(
+    cluster: RayCluster | None, workers: int | None
+) -> Iterator[StandbyWorker | None]:
+    """The first worker of this machine, which prepares itself during planning; None if unused."""
+    from gen_data.generator.runner.processes import StandbyWorker
+
+    if cluster is not None or workers == 0:
+        yield None
+        return
+    with StandbyWorker() as standby:
+        yield standby
+
+
+@contextmanager
+def _folder(loaded: Config, out: str | PathLike[str] | None) -> Iterator[Path | str]:
     """Folder or URL of the data set; a finished run remembers its asset folders in a folder."""
     from gen_data.generator.config.paths import write_locations
     from gen_data.generator.runner.store import LocalStore
@@ -116,7 +131,7 @@ def _output_folder(loaded: Config, out: str | PathLike[str] | None) -> Iterator[
 
 @contextmanager
 def _opened(
-    cluster: RayCluster | None, workers: int | None
+    cluster: RayCluster | None, workers: int | None, standby: StandbyWorker | None
 ) -> Iterator[tuple[Callable[[Job], Pool], int]]:
     """Opener of the pool of workers, and their number."""
     from threadpoolctl import threadpool_limits
@@ -127,7 +142,7 @@ def _opened(
         raise ConfigError("workers: 0 on a cluster; expected at least 1, or no number")
     with threadpool_limits(limits=1):
         if cluster is None:
-            yield open_worker_pool, count_workers(workers)
+            yield partial(open_worker_pool, standby=standby), count_workers(workers)
             return
         with cluster.connected():
             yield cluster.open_pool, workers or cluster.worker_count()

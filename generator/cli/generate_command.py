@@ -20,9 +20,9 @@ from rich.table import Table
 
 from gen_data.generator.api.generate import generate
 from gen_data.generator.cli.options import ConfigurationOptions
-from gen_data.generator.runner.run import RunProgress, Summary
 
 if TYPE_CHECKING:
+    from gen_data.generator.runner.progress import RunProgress, Summary
     from gen_data.generator.runner.ray_cluster import RayCluster
 
 

@@ -15,18 +15,17 @@ import pickle
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, Pipe, wait
 from pathlib import Path
 from socket import socket
-from typing import Protocol
+from typing import IO, TYPE_CHECKING, Protocol
 
 from gen_data.generator.core.errors import GenDataError
 from gen_data.generator.core.processes import SINGLE_THREADED, interrupts_blocked
 from gen_data.generator.core.system_calls import KILLED, anonymous_file
-from gen_data.generator.runner.shard import Job
 from gen_data.generator.runner.supervisor import Supervisor
 from gen_data.generator.runner.termination_signals import Interruption
 from gen_data.generator.runner.worker_events import (
@@ -41,8 +40,13 @@ from gen_data.generator.runner.worker_events import (
     Tick,
 )
 
+if TYPE_CHECKING:
+    from gen_data.generator.runner.shard import Job
+
 TICK_S = 0.5
 ENDING_TICK_S = 0.02
+STANDBY = -1
+"""Number of a worker that waits for its number, its log and its job."""
 JOIN_S = 3.0
 """Time to wait for killed processes [s]. A process that the kernel cannot end, as on dead storage,
 must not block the run; its parent-death signal is pending."""
@@ -93,16 +97,56 @@ class Pool(Protocol):
         ...
 
 
+class StandbyWorker:
+    """A worker that imports and loads what most jobs need, while its job is still being planned.
+
+    A context manager: without a job, the process does not outlive it.
+
+    Attributes:
+        process: The process, which a pool may take over.
+    """
+
+    def __init__(self) -> None:
+        self._job_fd = anonymous_file("gen-data job")
+        # The folder of logs is not known yet.
+        with os.fdopen(anonymous_file("gen-data standby log"), "wb") as log:
+            child = _start_worker(STANDBY, self._job_fd, log)
+        self.process = child.process
+        self._child: _Child | None = child
+
+    def __enter__(self) -> StandbyWorker:
+        """Return the worker, whose process has started."""
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """End the process unless a pool has taken it."""
+        if self._child is not None:
+            child, job_fd = self.take()
+            _end([child])
+            os.close(job_fd)
+
+    def take(self) -> tuple[_Child, int]:
+        """The process, and the file from which it will read its job; the caller owns both."""
+        assert self._child is not None
+        child, self._child = self._child, None
+        return child, self._job_fd
+
+
 class WorkerPool:
     """The worker processes of one run. A context manager: leaves no process behind.
 
     Args:
         job: What the workers do.
         logs: Folder for the output of workers, one file per worker.
+        standby: Becomes the first worker.
     """
 
-    def __init__(self, job: Job, logs: Path) -> None:
-        self._job_fd = anonymous_file("gen-data job")
+    def __init__(self, job: Job, logs: Path, standby: StandbyWorker | None = None) -> None:
+        self._standby: _Child | None = None
+        if standby is None:
+            self._job_fd = anonymous_file("gen-data job")
+        else:
+            self._standby, self._job_fd = standby.take()
         with open(self._job_fd, "wb", closefd=False) as file:
             pickle.dump(job, file)
         self._logs = logs
@@ -115,13 +159,8 @@ class WorkerPool:
 
     def __exit__(self, *exception: object) -> None:
         """Kill the remaining processes and wait for them for at most ``JOIN_S``."""
-        for child in self._children.values():
-            child.process.kill()
-        deadline_s = time.monotonic() + JOIN_S
-        for child in self._children.values():
-            with suppress(subprocess.TimeoutExpired):
-                child.process.wait(max(0.0, deadline_s - time.monotonic()))
-            child.connection.close()
+        unused = [self._standby] if self._standby is not None else []
+        _end([*self._children.values(), *unused])
         self._children.clear()
         os.close(self._job_fd)
 
@@ -155,18 +194,15 @@ class WorkerPool:
         yield Tick()
 
     def _spawn(self, number: int) -> _Child:
-        ours, theirs = Pipe(duplex=True)
-        arguments = (number, theirs.fileno(), self._job_fd, os.getpid())
         log_path = self._logs / f"worker-{number}.log"
-        with theirs, log_path.open("wb") as log, interrupts_blocked():
-            process = subprocess.Popen(
-                [sys.executable, "-c", START_WORKER, *map(str, arguments), *sys.path],
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
-                pass_fds=(theirs.fileno(), self._job_fd),
-            )
-        return _Child(process, ours)
+        with log_path.open("wb") as log:
+            child, self._standby = self._standby, None
+            if child is None or child.process.poll() is not None:
+                return _start_worker(number, self._job_fd, log)
+            # The end of a worker arrives as Exited.
+            with suppress(BrokenPipeError, ConnectionResetError):
+                child.connection.send((number, str(log_path)))
+            return child
 
     def _on_exit(self, number: int, exit_code: int) -> Exited:
         self._children.pop(number).connection.close()
@@ -176,9 +212,34 @@ class WorkerPool:
         return Exited(number, exit_code, out_of_memory)
 
 
-def open_worker_pool(job: Job) -> Pool:
+def _start_worker(number: int, job_fd: int, log: IO[bytes]) -> _Child:
+    ours, theirs = Pipe(duplex=True)
+    arguments = (number, theirs.fileno(), job_fd, os.getpid())
+    with theirs, interrupts_blocked():
+        process = subprocess.Popen(
+            [sys.executable, "-c", START_WORKER, *map(str, arguments), *sys.path],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            pass_fds=(theirs.fileno(), job_fd),
+        )
+    return _Child(process, ours)
+
+
+def _end(children: Sequence[_Child]) -> None:
+    """Kill processes and wait for them for at most ``JOIN_S``."""
+    for child in children:
+        child.process.kill()
+    deadline_s = time.monotonic() + JOIN_S
+    for child in children:
+        with suppress(subprocess.TimeoutExpired):
+            child.process.wait(max(0.0, deadline_s - time.monotonic()))
+        child.connection.close()
+
+
+def open_worker_pool(job: Job, standby: StandbyWorker | None = None) -> Pool:
     """Open a pool of processes on this machine."""
-    return WorkerPool(job, job.store.run_dir)
+    return WorkerPool(job, job.store.run_dir, standby)
 
 
 def run_supervisor(

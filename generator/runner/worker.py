@@ -37,7 +37,8 @@ def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
     """Entry point of the process; returns when it receives None or the connection closes.
 
     Args:
-        number: Of the worker.
+        number: Of the worker; negative = told together with the path of its log, when the job is
+            ready.
         connection_fd: Socket for shard numbers (in) and events (out).
         job_fd: File with a pickled Job.
         parent_pid: Process whose end also ends this one.
@@ -50,10 +51,16 @@ def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
     forbid_core_dumps()
     faulthandler.enable()
     connection = Connection(connection_fd)
+    notices: list[str] = []
+    warnings.showwarning = partial(_show_warning, notices, warnings.showwarning)
     try:
+        if number < 0:
+            _prepare()
+            number, log = connection.recv()
+            _redirect_output(log)
         job = _load_job(job_fd)
         _set_temporary_folder(job.store.scratch_root)
-        _make_shards(number, connection, job)
+        _make_shards(number, connection, job, notices)
     except (EOFError, ConnectionError):
         # The supervisor has ended, so there is no reader for a report.
         sys.exit(1)
@@ -62,6 +69,27 @@ def main(number: int, connection_fd: int, job_fd: int, parent_pid: int) -> None:
         with suppress(ConnectionError):
             connection.send(Failed(number, make_sendable(error)))
         sys.exit(1)
+
+
+def _prepare() -> None:
+    """Import and load what most jobs need."""
+    from gen_data.generator.assemble import pipeline_factory
+    from gen_data.generator.renderers.warp import renderer
+    from gen_data.generator.renderers.warp.device import prepare_device
+    from gen_data.generator.runner import numerics_guard, shard
+
+    del pipeline_factory, renderer, numerics_guard, shard
+    try:
+        prepare_device("auto")
+    except Exception:
+        # The job may need no renderer; one that does reports the same error under its number.
+        traceback.print_exc()
+
+
+def _redirect_output(path: str) -> None:
+    with Path(path).open("ab") as file:
+        for stream in (1, 2):
+            os.dup2(file.fileno(), stream)
 
 
 def _load_job(descriptor: int) -> Job:
@@ -105,9 +133,7 @@ def _picklable_base(kind: type[GenDataError]) -> type[GenDataError]:
     )
 
 
-def _make_shards(number: int, connection: Connection, job: Job) -> None:
-    notices: list[str] = []
-    warnings.showwarning = partial(_show_warning, notices, warnings.showwarning)
+def _make_shards(number: int, connection: Connection, job: Job, notices: list[str]) -> None:
     with job.make_pipeline() as pipeline:
         # Existing objects live until the end. Collecting the others between shards suffices;
         # automatic collection takes 2 % of the run.

@@ -9,11 +9,13 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from gen_data.generator.core.errors import OutOfMemory, SampleError, SceneRejected, WorkerLost
+from gen_data.generator.runner.processes import StandbyWorker, open_worker_pool
 from gen_data.generator.runner.run import Limits, Settings
 from gen_data.generator.runner.worker import make_sendable
 from tests.runner.doubles import RESUME, Trouble, make, notes_of, tree_digest, write_raw_images
@@ -282,3 +284,41 @@ def test_an_error_that_cannot_travel_arrives_as_its_nearest_relative() -> None:
 
     assert type(arrived) is SampleError
     assert str(arrived).startswith("scene 3: no valid layout")
+
+
+def with_standby(standby: StandbyWorker) -> Settings:
+    """Settings of a run whose first worker has waited for it."""
+    return Settings(
+        open_pool=partial(open_worker_pool, standby=standby), write_media=write_raw_images
+    )
+
+
+def test_a_worker_that_stood_by_makes_the_same_files(tmp_path: Path, reference_digest: str) -> None:
+    """It takes part until it is dismissed; its output goes to the log of the first worker."""
+    with StandbyWorker() as standby:
+        make(tmp_path / "out", workers=1, settings=with_standby(standby))
+
+    assert standby.process.returncode == 0
+    assert tree_digest(tmp_path / "out") == reference_digest
+    assert notes_of(tmp_path / "out") == []
+
+
+def test_a_worker_that_died_while_it_stood_by_is_replaced(
+    tmp_path: Path, reference_digest: str
+) -> None:
+    """The run starts another process in its place."""
+    with StandbyWorker() as standby:
+        standby.process.kill()
+        standby.process.wait()
+        make(tmp_path / "out", workers=1, settings=with_standby(standby))
+
+    assert tree_digest(tmp_path / "out") == reference_digest
+    assert notes_of(tmp_path / "out") == []
+
+
+def test_a_worker_without_a_job_does_not_outlive_the_plan() -> None:
+    """As after an error in a configuration."""
+    with pytest.raises(KeyError), StandbyWorker() as standby:
+        raise KeyError
+
+    assert standby.process.returncode == -signal.SIGKILL

@@ -49,6 +49,13 @@ def open_device(name: str) -> wp.Device:
     return wp.get_device(name)
 
 
+def prepare_device(name: str) -> None:
+    """Load what every image needs on the device ``auto``, ``cpu`` or ``cuda:N``."""
+    alias = open_device(name).alias
+    compile_kernels(alias)
+    load_kernels(alias, EVERY_FRAME)
+
+
 @cache
 def _start() -> None:
     if hasattr(wp.config, "log_level"):
