@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.system_calls import CAN_PASS_FILES, usable_cores
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel
+
     from gen_data.generator.assemble.config import Config
+
+Model = TypeVar("Model", bound="BaseModel")
 
 ConfigLike = str | PathLike[str] | Mapping[str, Any]
 """A file, a shipped name, the folder of a data set, or a dictionary of the same content."""
@@ -34,6 +39,27 @@ def load_config(
     if isinstance(config, Mapping):
         return parse_config(_yaml_text(config), "<config>", "config", **choice)
     return load_config(fspath(config), **choice)
+
+
+def load_model(source: ConfigLike, model: type[Model], title: str) -> Model:
+    """Read a model from a YAML file, or from a dictionary, which errors call ``<title>``.
+
+    Raises:
+        ConfigError: the message lists all errors with their positions.
+    """
+    from gen_data.generator.config.problems import Problems
+    from gen_data.generator.config.validation import validate
+    from gen_data.generator.config.yaml_tree import load_yaml, parse_yaml
+
+    if isinstance(source, Mapping):
+        document = parse_yaml(_yaml_text(source), f"<{title}>")
+    else:
+        document = load_yaml(Path(source))
+    problems = Problems()
+    loaded = validate(document, model, problems)
+    problems.raise_if_any()
+    assert loaded is not None
+    return loaded
 
 
 def count_workers(workers: int | None) -> int:
