@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from pydantic import BaseModel
 
     from gen_data.generator.assemble.config import Config
+    from gen_data.generator.config.yaml_tree import Node
 
 Model = TypeVar("Model", bound="BaseModel")
 
@@ -41,20 +42,28 @@ def load_config(
     return load_config(fspath(config), **choice)
 
 
-def load_model(source: ConfigLike, model: type[Model], title: str) -> Model:
-    """Read a model from a YAML file, or from a dictionary, which errors call ``<title>``.
+def read_document(source: ConfigLike, title: str) -> Node:
+    """Read a YAML file, or a dictionary, which errors call ``<title>``.
+
+    Raises:
+        ConfigError: it cannot be read; the message has the position.
+    """
+    from gen_data.generator.config.yaml_tree import load_yaml, parse_yaml
+
+    if isinstance(source, Mapping):
+        return parse_yaml(_yaml_text(source), f"<{title}>")
+    return load_yaml(Path(source))
+
+
+def read_model(document: Node, model: type[Model]) -> Model:
+    """Validate a document as a model.
 
     Raises:
         ConfigError: the message lists all errors with their positions.
     """
     from gen_data.generator.config.problems import Problems
     from gen_data.generator.config.validation import validate
-    from gen_data.generator.config.yaml_tree import load_yaml, parse_yaml
 
-    if isinstance(source, Mapping):
-        document = parse_yaml(_yaml_text(source), f"<{title}>")
-    else:
-        document = load_yaml(Path(source))
     problems = Problems()
     loaded = validate(document, model, problems)
     problems.raise_if_any()

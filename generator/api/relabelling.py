@@ -8,7 +8,7 @@ from functools import cached_property
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from gen_data.generator.api.config import load_model
+from gen_data.generator.api.config import read_document, read_model
 from gen_data.generator.api.sample import SampleRecord
 from gen_data.generator.core.capture import Capture
 from gen_data.generator.core.errors import ConfigError
@@ -109,4 +109,4 @@ def load_label_map(source: LabelMapLike | None, config: Mapping[str, Any]) -> La
         if own is None:
             raise ConfigError("labels.map: the configuration has none; give a file or a mapping")
         source = own
-    return load_model(source, LabelMap, "label map")
+    return read_model(read_document(source, "label map"), LabelMap)

@@ -13,11 +13,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.generator.config.yaml_tree import Node
 from gen_data.generator.core.asset_types import RobotModel
-from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.kinematics import arm_joints, position_limits
 from gen_data.generator.core.se3 import SE3, Quaternion, Vec3, multiply_quaternions
-from gen_data.generator.environment.settings import EnvSettings
+from gen_data.generator.environment.settings import EnvSettings, refuse_field
 from gen_data.generator.physics.manipulation.inverse_kinematics import (
     Chain,
     grasp_pose,
@@ -155,8 +155,8 @@ class DeltaControl:
         return _action([*(v / self.step_m for v in motion_m), *turn, 2.0 * opening - 1.0])
 
 
-def make_control(robot: RobotModel, settings: EnvSettings) -> Control:
-    """The control of a robot with a gripper.
+def make_control(robot: RobotModel, settings: EnvSettings, document: Node) -> Control:
+    """The control of a robot with a gripper; ``document`` is the source of the settings.
 
     Raises:
         ConfigError: the arm has too few joints for poses, or cannot reach the workspace.
@@ -167,19 +167,21 @@ def make_control(robot: RobotModel, settings: EnvSettings) -> Control:
     assert robot.gripper is not None
     chain = make_chain(robot, robot.gripper)
     if len(chain.solved) < _JOINTS_MIN:
-        raise ConfigError(
-            f"control: '{settings.control}' needs an arm with {_JOINTS_MIN} joints, this one has "
+        fact = (
+            f"'{settings.control}' needs an arm with {_JOINTS_MIN} joints, this one has "
             f"{len(chain.solved)}; expected 'joint'"
         )
+        refuse_field(document, "control", fact)
     if settings.control == "cartesian_delta":
         return DeltaControl(chain, settings.delta_m_max, math.radians(settings.delta_deg_max))
     low_m, high_m = settings.workspace_m
     nearest = [min(max(0.0, a), b) for a, b in zip(low_m, high_m, strict=True)]
     if math.hypot(*nearest) > chain.reach_m:
-        raise ConfigError(
-            f"workspace_m: its nearest point is {math.hypot(*nearest):.2f} m from the base of the "
-            f"arm, which cannot reach farther than {chain.reach_m:.2f} m"
+        fact = (
+            f"its nearest point is {math.hypot(*nearest):.2f} m from the base of the arm, which "
+            f"cannot reach farther than {chain.reach_m:.2f} m"
         )
+        refuse_field(document, "workspace_m", fact)
     return PoseControl(chain, low_m, high_m)
 
 

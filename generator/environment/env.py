@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.api.config import ConfigLike, load_config, load_model
+from gen_data.generator.api.config import ConfigLike, load_config, read_document, read_model
 from gen_data.generator.api.dataset import GeneratedSamples
 from gen_data.generator.core.capture import SensorReading
 from gen_data.generator.core.errors import ConfigError
@@ -36,6 +36,8 @@ try:
 except ModuleNotFoundError as error:
     raise ConfigError(f"gen_data.Env {missing_packages('gymnasium') or error}") from error
 
+ENV_ID = "gen_data/Arm-v0"
+"""Name for ``gymnasium.make``, registered when this module is imported."""
 _SCENES = 2**31
 """Scenes that are drawn from without a seed."""
 _WITHOUT_LABELS = ("annotations=[]", "exporters=[]")
@@ -88,16 +90,17 @@ class Env(gymnasium.Env[Observation, Action]):
         loaded = load_config(
             config, seed=seed, overrides=(*overrides, *_WITHOUT_LABELS), without=without
         )
-        self.settings = load_model({} if settings is None else settings, EnvSettings, "settings")
+        document = read_document({} if settings is None else settings, "settings")
+        self.settings = read_model(document, EnvSettings)
         self.metadata = {**self.metadata, "render_fps": round(1.0 / self.settings.step_s)}
         self.render_mode = render_mode
         self._samples = GeneratedSamples(loaded, CHANNELS)
         factory = self._samples.make_pipeline
-        arm = choose_arm(factory, self.settings.arm)
+        arm = choose_arm(factory, self.settings.arm, document)
         robot = factory.library.robot(arm.asset)
         self._arm = arm.name
-        self._camera, image = choose_camera(factory, self.settings.camera)
-        self.control = make_control(robot, self.settings)
+        self._camera, image = choose_camera(factory, self.settings.camera, document)
+        self.control = make_control(robot, self.settings, document)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.control.size,), np.float32)
         self._space = observation_space(robot, image, self.settings)
         self.observation_space = self._space
@@ -116,8 +119,8 @@ class Env(gymnasium.Env[Observation, Action]):
         """Begin an episode.
 
         Args:
-            seed: Number of the scene, and beginning of those that follow; None = the next one. The
-                first reset without a seed takes that of the configuration.
+            seed: Number of the scene, and beginning of those that follow; None = the next one,
+                which without any seed before differs from run to run, as usual in Gymnasium.
             options: None are known.
 
         Raises:
@@ -126,8 +129,6 @@ class Env(gymnasium.Env[Observation, Action]):
         """
         if options:
             raise ConfigError(f"options: unknown option '{min(options)}'; none are expected")
-        if seed is None and self._np_random is None:
-            super().reset(seed=self._samples.make_pipeline.config.general.seed)
         super().reset(seed=seed)
         scene = int(self.np_random.integers(_SCENES)) if seed is None else seed
         with self._samples.pipeline() as pipeline:
@@ -234,3 +235,6 @@ def make_vec(config: ConfigLike, n: int, **options: Any) -> gymnasium.vector.Asy
         raise ConfigError(f"n: {n} environments; expected at least 1")
     # Processes that begin anew inherit no threads and no engine of this one.
     return gymnasium.vector.AsyncVectorEnv([partial(Env, config, **options)] * n, context="spawn")
+
+
+gymnasium.register(id=ENV_ID, entry_point=Env)

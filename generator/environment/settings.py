@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NoReturn
 
 from pydantic import Field, field_validator
 
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.problems import refuse
+from gen_data.generator.config.yaml_tree import Node
 from gen_data.generator.core.scene import Articulation, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng, Streams
@@ -109,6 +111,11 @@ class EnvSettings(Strict):
         if any(a >= b for a, b in zip(low, high, strict=True)):
             raise ValueError("expected the low corner, then the high one")
         return corners
+
+
+def refuse_field(document: Node, field: str, fact: str) -> NoReturn:
+    """Raise a ConfigError at a field of a document; a default has the document's position."""
+    refuse((document.get(field) or document).position, field, fact)
 
 
 def _vary_joints(arm: Articulation, factor: dist.Numeric[float], rng: Rng) -> Articulation:

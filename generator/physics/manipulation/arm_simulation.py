@@ -31,7 +31,9 @@ from gen_data.generator.physics.world import World
 _TOUCH_M = 0.0005
 """Fingers nearer than this to a body touch it."""
 _DEPTH_M = 0.002
-"""Fixed bodies stop the arm when it, or what it holds, is this deep inside them."""
+"""Fixed bodies stop the arm where it, or what it holds, is this deep inside them."""
+_PROBE = 0.05
+"""Share of their stroke by which fingers are closed to find what stops them."""
 _RELEASE = 0.01
 """Fingers let go when they are told to open by this share of their stroke."""
 
@@ -174,37 +176,56 @@ class ArmSimulation:
         speeds = np.clip(speeds, -self.speeds_max, self.speeds_max)
         self.positions = np.clip(before + self._step_s * speeds, *self.limits)
         self.speeds = (self.positions - before) / self._step_s
-        self._move_fingers(opening)
+        if opening > self.opening + _RELEASE:
+            self.held = ""
+        if not self.held:
+            change = self._finger_speed * self._step_s
+            self.opening += min(max(opening - self.opening, -change), change)
         self._show()
         if self._hits_obstacle():
             self.positions, self.opening = before, opening_before
             self.speeds = np.zeros_like(self.speeds)
             self.is_blocked = True
             self._show()
-
-    def _move_fingers(self, opening: float) -> None:
-        if self.held and opening <= self.opening + _RELEASE:
-            return
-        closes = opening < 1.0 and opening <= self.opening
-        self.held = self._between_fingers() if closes else ""
-        if self.held:
-            self._T_grasp_held = self.T_world_grasp.inverse() @ self._world.pose(self.held)
-            return
-        change = self._finger_speed * self._step_s
-        self.opening += min(max(opening - self.opening, -change), change)
+        if not self.held and opening < 1.0 and opening <= self.opening:
+            self.held = self._between_fingers()
+            if self.held:
+                self._T_grasp_held = self.T_world_grasp.inverse() @ self._world.pose(self.held)
 
     def _between_fingers(self) -> str:
-        """Name of the loose body that fingers touch from both sides; empty if there is none."""
-        T_grasp_world = self.T_world_grasp.inverse()
+        """Name of the loose body that stops fingers from both sides; empty if there is none."""
         for name in self._bodies.loose:
-            sides = set()
-            for finger in self._fingers:
-                if self._world.gap_m(finger, name, 2.0 * _TOUCH_M) < _TOUCH_M:
-                    low, high = self._world.bounds_m(finger)
-                    sides.add(float(T_grasp_world.apply(0.5 * (low + high))[1]) > 0.0)
-            if len(sides) == 2:
+            touching = [f for f in self._fingers if self._gap_m(f, name) < _TOUCH_M]
+            if len(touching) > 1 and len(self._sides_stopped(touching, name)) == 2:
                 return name
         return ""
+
+    def _sides_stopped(self, fingers: Sequence[str], name: str) -> set[bool]:
+        """Sides of the grasp frame, along Y, on which a body is in the way of closing fingers.
+
+        What lies before the fingers touches them, too, but they would slide along it.
+        """
+        T_grasp_world = self.T_world_grasp.inverse()
+        before = {f: (self._gap_m(f, name), self._middle_m(f)) for f in fingers}
+        opening = self.opening
+        self.opening = max(0.0, opening - _PROBE)
+        self._show()
+        stopped = set()
+        for finger, (gap_m, middle_m) in before.items():
+            way_m = float(np.linalg.norm(self._middle_m(finger) - middle_m))
+            if way_m > _TOUCH_M and gap_m - self._gap_m(finger, name) > 0.5 * way_m:
+                stopped.add(float(T_grasp_world.apply(middle_m)[1]) > 0.0)
+        self.opening = opening
+        self._show()
+        return stopped
+
+    def _gap_m(self, finger: str, name: str) -> float:
+        return self._world.gap_m(finger, name, 2.0 * _TOUCH_M)
+
+    def _middle_m(self, name: str) -> Array:
+        low, high = self._world.bounds_m(name)
+        middle: Array = 0.5 * (low + high)
+        return middle
 
     def _show(self) -> None:
         self._arm.show(self.joint_positions)
