@@ -237,4 +237,4 @@ def make_vec(config: ConfigLike, n: int, **options: Any) -> gymnasium.vector.Asy
     return gymnasium.vector.AsyncVectorEnv([partial(Env, config, **options)] * n, context="spawn")
 
 
-gymnasium.register(id=ENV_ID, entry_point=Env)
+gymnasium.register(id=ENV_ID, entry_point=f"{__name__}:{Env.__name__}")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -13,8 +15,11 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import gen_data
+from gen_data.generator.api.config import read_model
+from gen_data.generator.config.yaml_tree import parse_yaml
 from gen_data.generator.core.errors import ConfigError, SceneRejected
 from gen_data.generator.environment.env import ENV_ID, Env, make_vec
+from gen_data.generator.environment.settings import EnvSettings
 from tests.environment.small import CONFIG, arm_of, nominal, same, simulation_of, small
 
 pytest.importorskip("pybullet_data", reason="the Panda comes with pybullet's data")
@@ -246,6 +251,15 @@ def test_without_gymnasium_the_extra_is_named() -> None:
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, check=True)
     expected = "gen_data.Env needs the package gymnasium: pip install 'gen-data[env]'"
     assert done.stdout.decode().strip() == expected
+
+
+def test_the_documented_settings_are_valid() -> None:
+    """The block of docs/environment.md, read as a file would be."""
+    page = (Path(__file__).parents[2] / "docs/environment.md").read_text("utf-8")
+    (block,) = re.findall(r"^```\n(control:.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    settings = read_model(parse_yaml(block, "env.yaml"), EnvSettings)
+    assert (settings.control, settings.steps_max) == ("ik", 200)
+    assert settings.dynamics.mass_factor.support() == (0.5, 2.0)
 
 
 def test_wrong_calls_are_refused() -> None:
