@@ -47,12 +47,14 @@ if TYPE_CHECKING:
         VerificationError,
     )
     from gen_data.generator.core.scene import Scene
+    from gen_data.generator.environment.env import Env, make_vec
 
 _HOMES = {
     "Box2d": "gen_data.generator.api.sample",
     "Box3d": "gen_data.generator.api.sample",
     "CameraReading": "gen_data.generator.api.sample",
     "Dataset": "gen_data.generator.api.dataset",
+    "Env": "gen_data.generator.environment.env",
     "Loader": "gen_data.generator.api.loader",
     "Sample": "gen_data.generator.api.sample",
     "SampleSequence": "gen_data.generator.api.dataset",
@@ -62,6 +64,7 @@ _HOMES = {
     "export": "gen_data.generator.api.export",
     "generate": "gen_data.generator.api.generate",
     "write_sample": "gen_data.generator.api.write_sample",
+    "make_vec": "gen_data.generator.environment.env",
     "match": "gen_data.generator.api.match",
     "rerender": "gen_data.generator.api.rerender",
     "AssetError": "gen_data.generator.core.errors",
@@ -90,6 +93,7 @@ __all__ = [
     "ConfigWarning",
     "Dataset",
     "DeterminismError",
+    "Env",
     "GenDataError",
     "Interrupted",
     "Loader",
@@ -107,6 +111,7 @@ __all__ = [
     "certify",
     "export",
     "generate",
+    "make_vec",
     "match",
     "open",
     "rerender",

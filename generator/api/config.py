@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.system_calls import CAN_PASS_FILES, usable_cores
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel
+
     from gen_data.generator.assemble.config import Config
+    from gen_data.generator.config.yaml_tree import Node
+
+Model = TypeVar("Model", bound="BaseModel")
 
 ConfigLike = str | PathLike[str] | Mapping[str, Any]
 """A file, a shipped name, the folder of a data set, or a dictionary of the same content."""
@@ -34,6 +40,35 @@ def load_config(
     if isinstance(config, Mapping):
         return parse_config(_yaml_text(config), "<config>", "config", **choice)
     return load_config(fspath(config), **choice)
+
+
+def read_document(source: ConfigLike, title: str) -> Node:
+    """Read a YAML file, or a dictionary, which errors call ``<title>``.
+
+    Raises:
+        ConfigError: it cannot be read; the message has the position.
+    """
+    from gen_data.generator.config.yaml_tree import load_yaml, parse_yaml
+
+    if isinstance(source, Mapping):
+        return parse_yaml(_yaml_text(source), f"<{title}>")
+    return load_yaml(Path(source))
+
+
+def read_model(document: Node, model: type[Model]) -> Model:
+    """Validate a document as a model.
+
+    Raises:
+        ConfigError: the message lists all errors with their positions.
+    """
+    from gen_data.generator.config.problems import Problems
+    from gen_data.generator.config.validation import validate
+
+    problems = Problems()
+    loaded = validate(document, model, problems)
+    problems.raise_if_any()
+    assert loaded is not None
+    return loaded
 
 
 def count_workers(workers: int | None) -> int:

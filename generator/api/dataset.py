@@ -215,26 +215,34 @@ class GeneratedSamples:
     def __init__(self, config: Any, channels: frozenset[Channel]) -> None:
         from gen_data.generator.assemble.pipeline_factory import PipelineFactory
 
-        self._make_pipeline = PipelineFactory(config, n=1, extra_channels=channels)
+        self.make_pipeline = PipelineFactory(config, n=1, extra_channels=channels)
         self._pipeline: Pipeline | None = None
         self._thread_pools: tuple[int, ThreadpoolController] | None = None
         self._resources = ExitStack()
 
     def sample(self, index: int) -> SampleRecord:
         """Return the sample of that number."""
+        with self.pipeline() as pipeline:
+            return pipeline.sample(index)
+
+    @contextmanager
+    def pipeline(self) -> Iterator[Pipeline]:
+        """The pipeline, for computations whose bits do not depend on the surrounding program."""
         # The last bits of sums in BLAS, and so of poses, depend on the number of threads.
         with self._find_thread_pools().limit(limits=1), paused_collection():
-            return self._open_pipeline().sample(index)
+            if self._pipeline is None:
+                self._pipeline = self._resources.enter_context(self.make_pipeline())
+            yield self._pipeline
 
     @property
     def categories(self) -> tuple[str, ...]:
         """Sorted names of all categories that a sample may contain."""
-        return self._make_pipeline.categories
+        return self.make_pipeline.categories
 
     @property
     def config(self) -> Mapping[str, Any]:
         """The resolved configuration."""
-        return self._make_pipeline.config.resolved
+        return self.make_pipeline.config.resolved
 
     def close(self) -> None:
         """Stop the engines."""
@@ -249,11 +257,6 @@ class GeneratedSamples:
         if self._thread_pools is None or self._thread_pools[0] != modules:
             self._thread_pools = modules, ThreadpoolController()
         return self._thread_pools[1]
-
-    def _open_pipeline(self) -> Pipeline:
-        if self._pipeline is None:
-            self._pipeline = self._resources.enter_context(self._make_pipeline())
-        return self._pipeline
 
     def __getstate__(self) -> dict[str, Any]:
         """Engines stay in their process."""

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from gen_data.generator.api.config import read_document, read_model
 from gen_data.generator.api.sample import SampleRecord
 from gen_data.generator.core.capture import Capture
 from gen_data.generator.core.errors import ConfigError
@@ -103,23 +103,10 @@ def load_label_map(source: LabelMapLike | None, config: Mapping[str, Any]) -> La
         ConfigError: it is invalid, or the configuration has none.
     """
     from gen_data.exporters.label_map import LabelMap
-    from gen_data.generator.config.problems import Problems
-    from gen_data.generator.config.validation import validate
-    from gen_data.generator.config.yaml_tree import load_yaml, parse_yaml
 
     if source is None:
         own = (config.get("labels") or {}).get("map")
         if own is None:
             raise ConfigError("labels.map: the configuration has none; give a file or a mapping")
         source = own
-    if isinstance(source, Mapping):
-        import yaml
-
-        document = parse_yaml(yaml.safe_dump(dict(source), sort_keys=False), "<label map>")
-    else:
-        document = load_yaml(Path(source))
-    problems = Problems()
-    loaded = validate(document, LabelMap, problems)
-    problems.raise_if_any()
-    assert loaded is not None
-    return loaded
+    return read_model(read_document(source, "label map"), LabelMap)

@@ -74,6 +74,11 @@ def is_arm_joint(joint: Joint, robot: RobotModel) -> bool:
     return joint.movable and not joint.mimic and joint.name not in _finger_names(robot)
 
 
+def arm_joints(robot: RobotModel) -> list[Joint]:
+    """The joints whose positions goals set, in order."""
+    return [joint for joint in robot.movable if is_arm_joint(joint, robot)]
+
+
 def leader_of(joint: Joint, joints: Sequence[Joint]) -> tuple[Joint, float, float]:
     """The joint, of all ``joints`` of its robot, that determines a joint's position by ``mimic``.
 

@@ -8,6 +8,7 @@ EXTRAS = {
     "OpenEXR": ("OpenEXR", "exr"),
     "foxglove_schemas_protobuf": ("foxglove-schemas-protobuf", "formats"),
     "google_crc32c": ("google-crc32c", "formats"),
+    "gymnasium": ("gymnasium", "env"),
     "h5py": ("h5py", "formats"),
     "mcap": ("mcap", "formats"),
     "mcap_protobuf": ("mcap-protobuf-support", "formats"),

@@ -18,6 +18,11 @@ from gen_data.generator.physics.collision_shapes import (
     unpack_shape,
 )
 from gen_data.generator.physics.manipulation.arm_goals import Arm, ArmState
+from gen_data.generator.physics.manipulation.arm_simulation import (
+    ArmSimulation,
+    Servo,
+    SimulatedBodies,
+)
 from gen_data.generator.physics.manipulation.demonstration import demonstrate
 from gen_data.generator.physics.manipulation.joint_trajectories import TrajectoryRecording
 from gen_data.generator.physics.manipulation.manipulation_planner import TaskPlanner
@@ -74,19 +79,7 @@ class Engine:
         fixed = [b.name for b in _solids(scene) if b.motion != "dynamic" and b.name not in held]
         if not falling and not scene.articulations:
             return Settled(scene)
-        self._world.reset()
-        joints = {
-            joint.body: joint
-            for a in scene.articulations
-            if a.assignment is not None
-            for joint in a.assignment.joints
-        }
-        for body in _solids(scene):
-            self._add(body, body in falling, joints.get(body.name))
-        for name in joints:
-            # What is fixed does not stop a part that moves: the limits of its joint do.
-            self._world.ignore(name, [other for other in fixed if other != name])
-
+        self._fill(scene, falling, fixed)
         arms = self._solve_goals(scene, fixed, _resting_bodies(scene, falling))
         if isinstance(arms, Rejection):
             return Settled(scene, arms)
@@ -101,10 +94,58 @@ class Engine:
             return Settled(scene, planned)
         return Settled(planned)
 
+    def weigh(self, scene: Scene) -> Scene:
+        """The scene with a mass for every body that collides, guessed where none is known."""
+        return scene.with_bodies(*(replace(b, mass_kg=self._mass_kg(b)) for b in _solids(scene)))
+
+    def simulate(self, scene: Scene, arm: str, servo: Servo) -> ArmSimulation:
+        """Start the simulation of a settled scene in which one arm moves as it is told.
+
+        It is valid until the engine's next simulation, or until it settles a scene.
+
+        Args:
+            scene: The scene at its present poses.
+            arm: Name of the arm; all others stand still.
+            servo: Its motors.
+        """
+        own = next(a for a in scene.articulations if a.name == arm)
+        held = own.goal.grasped_object if own.goal and own.goal.kind == "hold" else ""
+        loose = [b for b in _solids(scene) if b.motion == "dynamic" or b.name == held]
+        fixed = [b.name for b in _solids(scene) if b not in loose]
+        joints = self._fill(scene, loose, fixed)
+        arms = {a.name: self._arm(a) for a in scene.articulations}
+        obstacles = [name for name in fixed if name not in joints]
+        obstacles += [name for a in arms.values() if a.articulation != own for name in a.bodies]
+        return ArmSimulation(
+            arms[arm],
+            self._world,
+            SimulatedBodies(tuple(b.name for b in loose), joints, tuple(obstacles), held),
+            servo,
+            self._config.time_step_s,
+        )
+
+    def _fill(self, scene: Scene, falling: list[Body], fixed: list[str]) -> dict[str, BodyJoint]:
+        """Start with a world of a scene's bodies; returns the joints of bodies."""
+        self._world.reset()
+        joints = {
+            joint.body: joint
+            for a in scene.articulations
+            if a.assignment is not None
+            for joint in a.assignment.joints
+        }
+        for body in _solids(scene):
+            self._add(body, body in falling, joints.get(body.name))
+        for name in joints:
+            # What is fixed does not stop a part that moves: the limits of its joint do.
+            self._world.ignore(name, [other for other in fixed if other != name])
+        return joints
+
+    def _mass_kg(self, body: Body) -> float:
+        half_m = self._shape(body.asset).half_extents_m
+        return body.mass_kg or _DENSITY_KG_M3 * 8.0 * float(half_m.prod()) * body.scale**3
+
     def _add(self, body: Body, falls: bool, joint: BodyJoint | None = None) -> None:
-        shape = self._shape(body.asset)
-        guess_kg = _DENSITY_KG_M3 * 8.0 * float(shape.half_extents_m.prod()) * body.scale**3
-        mass_kg = body.mass_kg or guess_kg
+        shape, mass_kg = self._shape(body.asset), self._mass_kg(body)
         if joint is not None:
             self._world.add_jointed(
                 body.name, shape, body.T_world_body, joint, mass_kg=mass_kg, friction=body.friction
@@ -139,9 +180,7 @@ class Engine:
         arms: list[tuple[Arm, ArmState]] = []
         obstacles = list(fixed)
         for articulation in scene.articulations:
-            robot = self._assets.robot(articulation.asset)
-            shapes = {link: self._shape(asset) for link, asset in robot.collisions.items()}
-            arm = Arm(articulation, robot, shapes, self._world)
+            arm = self._arm(articulation)
             state = arm.solve(obstacles, placed)
             if isinstance(state, Rejection):
                 return state
@@ -150,6 +189,11 @@ class Engine:
             if articulation.goal and state.T_world_held is not None:
                 obstacles.append(articulation.goal.grasped_object)
         return arms
+
+    def _arm(self, articulation: Articulation) -> Arm:
+        robot = self._assets.robot(articulation.asset)
+        shapes = {link: self._shape(asset) for link, asset in robot.collisions.items()}
+        return Arm(articulation, robot, shapes, self._world)
 
     def _add_arm_tracks(
         self, scene: Scene, fixed: list[str], fallen: list[str], arms: list[tuple[Arm, ArmState]]

@@ -18,6 +18,7 @@ BYTES_DO_NOT_DEPEND_ON = {
     "click": "parses the command line",
     "datasets": "reads exports for certificates",
     "fsspec": "copies finished files",
+    "gymnasium": "calls environments, which write no data set",
     "mlcroissant": "reads exports for certificates",
     "open3d": "casts rays for certificates",
     "platformdirs": "names the folders of caches",

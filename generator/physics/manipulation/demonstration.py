@@ -14,8 +14,8 @@ import numpy as np
 
 from gen_data.generator.core.errors import Rejection
 from gen_data.generator.core.kinematics import finger_links
-from gen_data.generator.core.scene import HAND, Condition, Episode, Span
-from gen_data.generator.core.se3 import SE3, Array
+from gen_data.generator.core.scene import Condition, Episode, Span
+from gen_data.generator.core.se3 import SE3
 from gen_data.generator.physics.manipulation.arm_goals import Arm
 from gen_data.generator.physics.manipulation.joint_trajectories import (
     STEP_S,
@@ -23,11 +23,11 @@ from gen_data.generator.physics.manipulation.joint_trajectories import (
     smooth_step,
 )
 from gen_data.generator.physics.manipulation.manipulation_planner import TaskPlanner
-from gen_data.generator.physics.world import World, joint_position
+from gen_data.generator.physics.manipulation.measures import Measures
+from gen_data.generator.physics.world import World
 
 _TOUCH_M = 0.0005
 """Bodies nearer than this touch."""
-_GAP_MAX_M = 0.1
 _STILL_M = 0.0005
 _STILL_RAD = 0.002
 """Smaller motions between knots are the simulator's noise."""
@@ -116,8 +116,9 @@ class Demonstration:
         assert assignment is not None
         self._arm, self._world, self._assignment = arm, world, assignment
         self._steps = max(1, round(STEP_S / time_step_s))
-        self._joints = {joint.body: joint for joint in assignment.joints}
-        self._start = {**loose, **{name: world.pose(name) for name in self._joints}}
+        joints = {joint.body: joint for joint in assignment.joints}
+        self._start = {**loose, **{name: world.pose(name) for name in joints}}
+        self._measures = Measures(world, self._start, joints)
         self._values: list[tuple[float, ...]] = []
         self._phases: list[str] = []
         self._held: list[str] = []
@@ -197,13 +198,13 @@ class Demonstration:
         before = self.poses[-1] if self.poses else self._start
         poses = {name: self._world.pose(name).rounded() for name in self._start}
         self.poses.append(
-            {n: p if n == held or _moved(before[n], p) else before[n] for n, p in poses.items()}
+            {n: p if n == held or has_moved(before[n], p) else before[n] for n, p in poses.items()}
         )
         self._phases.append(phase)
         self._held.append(held)
         self._contacts.append(frozenset(self._touching(held, before)))
         hand = np.array(self._arm.grasp_pose(positions).translation_m)
-        self._values.append(tuple(self._measure(c, hand) for c in self._assignment.success))
+        self._values.append(tuple(self._measures.value(c, hand) for c in self._assignment.success))
 
     def _touching(self, held: str, before: Mapping[str, SE3]) -> Iterator[str]:
         """Pairs of bodies in contact, one of which moves or is of the arm."""
@@ -225,30 +226,9 @@ class Demonstration:
             seen = [pair if pair in contacts else "" for contacts in self._contacts]
             yield from (span for span in _spans(seen, start_s) if span.label)
 
-    def _measure(self, condition: Condition, hand_m: Array) -> float:
-        """Value of a condition's measure now; see ``Condition``."""
-        world, body, other = self._world, condition.body, condition.other
 
-        def bounds(name: str) -> tuple[Array, Array]:
-            return (hand_m, hand_m) if name == HAND else world.bounds_m(name)
-
-        if condition.measure == "gap":
-            return world.gap_m(body, other, _GAP_MAX_M)
-        if condition.measure == "tilt":
-            up = np.array([0.0, 0.0, 1.0])
-            cosine = float(world.pose(body).rotate(up) @ self._start[body].rotate(up))
-            return math.acos(max(-1.0, min(1.0, cosine)))
-        if condition.measure == "travel":
-            return joint_position(self._joints[body], self._start[body], world.pose(body))
-        if condition.measure == "height":
-            return float(bounds(body)[0][2] - bounds(other)[1][2])
-        (low, high), (other_low, other_high) = bounds(body), bounds(other)
-        size = 2 if condition.measure == "offset" else 3
-        apart = 0.5 * (low + high - other_low - other_high)[:size]
-        return math.sqrt(float(apart @ apart))
-
-
-def _moved(one: SE3, other: SE3) -> bool:
+def has_moved(one: SE3, other: SE3) -> bool:
+    """Whether two poses of a body differ by more than the simulator's noise."""
     cosine = sum(a * b for a, b in zip(one.quaternion_wxyz, other.quaternion_wxyz, strict=True))
     turned = 2.0 * math.sqrt(max(0.0, 2.0 * (1.0 - abs(cosine)))) > _STILL_RAD
     return turned or math.dist(one.translation_m, other.translation_m) > _STILL_M

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from gen_data.generator.core.asset_types import Gripper, Joint, RobotModel
 from gen_data.generator.core.kinematics import (
-    is_arm_joint,
+    arm_joints,
     joint_transform,
     leader_of,
     position_limits,
@@ -78,7 +78,7 @@ def make_chain(robot: RobotModel, gripper: Gripper) -> Chain:
     while link in by_child:
         path.insert(0, by_child[link])
         link = by_child[link].parent
-    arm = [joint for joint in robot.movable if is_arm_joint(joint, robot)]
+    arm = arm_joints(robot)
     joints, offsets, drives, pending = [], [], [], SE3()
     for joint in path:
         pending = pending @ joint.T_parent_joint
@@ -100,6 +100,11 @@ def make_chain(robot: RobotModel, gripper: Gripper) -> Chain:
         indices=tuple(arm.index(joint) for joint in solved),
         rest=tuple(homes[joint.name] for joint in arm),
     )
+
+
+def grasp_pose(chain: Chain, positions: Sequence[float]) -> SE3:
+    """``T_base_grasp`` at positions of all arm joints [rad or m]."""
+    return _jacobian(chain, [positions[index] for index in chain.indices])[0]
 
 
 def solve_all(chain: Chain, T_base_grasp: SE3) -> Iterator[tuple[float, ...]]:

@@ -1,0 +1,1 @@
+"""A Gymnasium environment over scenes with a robot arm."""

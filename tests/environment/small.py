@@ -1,0 +1,67 @@
+"""A small configuration with a task, and environments over it."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from gen_data.generator.core.scene import Articulation
+from gen_data.generator.environment.env import Env
+from gen_data.generator.physics.manipulation.arm_simulation import ArmSimulation
+
+CONFIG: dict[str, Any] = {
+    "template": "arm_task",
+    "seed": 3,
+    "shared": {"robot": "franka_panda", "task": "reach"},
+    "randomizers": [{"type": "arm_task", "name": "things", "task": "$shared.task"}],
+    "sensors": [
+        {
+            "type": "rgb_camera",
+            "name": "color",
+            "size_px": [32, 24],
+            "hfov_deg": 60,
+            "channels": ["rgb"],
+        }
+    ],
+}
+NOMINAL = {
+    "mass_factor": 1,
+    "friction_factor": 1,
+    "joint_damping_per_s": 40,
+    "motor_gain_per_s2": 400,
+    "latency_steps": 0,
+}
+"""Dynamics without variation: critically damped motors."""
+
+
+def small(engine: str = "pybullet", task: str = "reach", **options: Any) -> Env:
+    """A new environment."""
+    shared = {**CONFIG["shared"], "task": task}
+    return Env({**CONFIG, "shared": shared, "physics": {"engine": engine}}, **options)
+
+
+@cache
+def nominal(engine: str, control: str, task: str = "reach") -> Env:
+    """An environment without variation of its dynamics, which tests share."""
+    return small(engine, task, settings={"control": control, "dynamics": NOMINAL})
+
+
+def arm_of(env: Env) -> Articulation:
+    """The arm of the running episode at time 0."""
+    assert env.rollout is not None
+    return env.rollout.arm
+
+
+def simulation_of(env: Env) -> ArmSimulation:
+    """The simulation of the running episode."""
+    assert env.rollout is not None
+    return env.rollout.simulation
+
+
+def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
+    """Whether two observations have the same bytes."""
+    return one.keys() == other.keys() and all(
+        np.asarray(one[k]).tobytes() == np.asarray(other[k]).tobytes() for k in one
+    )
