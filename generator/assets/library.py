@@ -95,7 +95,11 @@ class Library:
         """All assets of a kind that have every tag, sorted by id; may be empty."""
         key = (frozenset(tags), kind)
         if key not in self._found:
-            found = [*self._generated.find(*key), *self._files.find(*key)]
+            found = [
+                self._entries.get(asset.asset_id, lambda asset=asset: asset)
+                for part in (self._generated, self._files)
+                for asset in part.find(*key)
+            ]
             self._found[key] = tuple(sorted(found, key=lambda asset: asset.asset_id))
         return self._found[key]
 
