@@ -96,12 +96,16 @@ class Library:
         key = (frozenset(tags), kind)
         if key not in self._found:
             found = [
-                self._entries.get(asset.asset_id, lambda asset=asset: asset)
+                self._hold(asset)
                 for part in (self._generated, self._files)
                 for asset in part.find(*key)
             ]
             self._found[key] = tuple(sorted(found, key=lambda asset: asset.asset_id))
         return self._found[key]
+
+    def _hold(self, asset: Asset) -> Asset:
+        """Keep a description, so that asking for it by its id reads nothing again."""
+        return self._entries.get(asset.asset_id, lambda: asset)
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
         """The asset's own materials, one per mesh slot."""

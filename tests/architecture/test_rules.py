@@ -114,9 +114,8 @@ def test_only_the_command_line_prints_and_reads_the_environment() -> None:
     assert not offenders
 
 
-HEAVY = set(
-    "matplotlib mujoco networkx pandas PIL pxr pyarrow pybullet rich scipy torch trimesh warp".split()  # noqa: SIM905
-)
+HEAVY = {"mujoco", "pxr", "pybullet", "warp"} | {"matplotlib", "pandas", "pyarrow", "rich", "torch"}
+HEAVY |= {"networkx", "PIL", "scipy", "trimesh"}
 """Libraries that take a tenth of a second or more, or belong to a worker."""
 
 
@@ -156,8 +155,7 @@ def test_help_imports_click_and_nothing_else() -> None:
 def test_nothing_is_imported_before_the_first_worker_prepares_itself() -> None:
     """A worker's imports take longest, and begin when the command has read its arguments."""
     program = (
-        "import gen_data.generator.cli.generate_command\n"
-        "import gen_data.generator.runner.processes"
+        "import gen_data.generator.cli.generate_command\nimport gen_data.generator.runner.processes"
     )
 
     assert output_of(program)[-1] == "LOADED click gen_data"
