@@ -95,9 +95,17 @@ class Library:
         """All assets of a kind that have every tag, sorted by id; may be empty."""
         key = (frozenset(tags), kind)
         if key not in self._found:
-            found = [*self._generated.find(*key), *self._files.find(*key)]
+            found = [
+                self._hold(asset)
+                for part in (self._generated, self._files)
+                for asset in part.find(*key)
+            ]
             self._found[key] = tuple(sorted(found, key=lambda asset: asset.asset_id))
         return self._found[key]
+
+    def _hold(self, asset: Asset) -> Asset:
+        """Keep a description, so that asking for it by its id reads nothing again."""
+        return self._entries.get(asset.asset_id, lambda: asset)
 
     def materials(self, asset_id: str) -> tuple[Material, ...]:
         """The asset's own materials, one per mesh slot."""

@@ -46,14 +46,11 @@ def export(
     force: bool,
 ) -> None:
     """Export a finished data set."""
-    from rich.console import Console
-
     from gen_data.generator.api.export import export as write_exports
     from gen_data.generator.cli.generate_command import print_summary, progress_bar
     from gen_data.generator.runner.stored import StoredSamples
 
-    console = Console(stderr=True)
-    with progress_bar(console, StoredSamples(folder).n) as show:
+    with progress_bar(StoredSamples(folder).n) as show:
         summary = write_exports(
             folder,
             [_parse_format(text) for text in formats],
@@ -64,7 +61,7 @@ def export(
             on_progress=show,
             resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
         )
-    print_summary(console, summary)
+    print_summary(summary)
 
 
 def _parse_format(text: str) -> str | Mapping[str, Any]:

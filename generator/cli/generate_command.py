@@ -6,22 +6,15 @@ import shlex
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import TYPE_CHECKING
-
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeRemainingColumn,
-)
-from rich.table import Table
 
 from gen_data.generator.api.generate import generate
 from gen_data.generator.cli.options import ConfigurationOptions
 
 if TYPE_CHECKING:
+    from rich.progress import Progress, TaskID
+
     from gen_data.generator.runner.progress import RunProgress, Summary
     from gen_data.generator.runner.ray_cluster import RayCluster
 
@@ -43,8 +36,7 @@ def generate_with_progress(
     Raises:
         GenDataError: see ``gen_data.generator.api.generate``, which has the same arguments.
     """
-    console = Console(stderr=True)
-    with progress_bar(console, n) as show:
+    with progress_bar(n) as show:
         summary = generate(
             choice.source,
             n,
@@ -61,26 +53,22 @@ def generate_with_progress(
             on_progress=show,
             resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
         )
-    print_summary(console, summary)
+    print_summary(summary)
 
 
 @contextmanager
-def progress_bar(console: Console, n: int) -> Iterator[Callable[[RunProgress], None]]:
+def progress_bar(n: int) -> Iterator[Callable[[RunProgress], None]]:
     """Show the progress of a run of ``n`` samples."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[rejections]} rejected"),
-    )
-    bar = Progress(*columns, console=console)
-    task = bar.add_task("samples", total=n, rate="", rejections=0)
+
+    @cache
+    def started() -> tuple[Progress, TaskID]:
+        bar = _make_bar()
+        bar.start()
+        return bar, bar.add_task("samples", total=n, rate="", rejections=0)
 
     def show(progress: RunProgress) -> None:
         # Started by the first sample, so that errors and warnings of the configuration come alone.
-        bar.start()
+        bar, task = started()
         bar.update(
             task,
             completed=progress.done,
@@ -91,13 +79,38 @@ def progress_bar(console: Console, n: int) -> Iterator[Callable[[RunProgress], N
     try:
         yield show
     finally:
-        if bar.live.is_started:
-            bar.stop()
+        if started.cache_info().currsize:
+            started()[0].stop()
 
 
-def print_summary(console: Console, summary: Summary) -> None:
+def _make_bar() -> Progress:
+    # Not imported before: a worker already prepares itself when a run asks for its first bar.
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[rate]}"),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[rejections]} rejected"),
+        console=Console(stderr=True),
+    )
+
+
+def print_summary(summary: Summary) -> None:
     """Print the summary of a run as a table."""
+    from rich.console import Console
+    from rich.table import Table
+
     table = Table(title=summary.folder, show_header=False)
     for name, value in summary.rows():
         table.add_row(name, value)
-    console.print(table)
+    Console(stderr=True).print(table)

@@ -32,14 +32,11 @@ def merge(
 
     The result has the same bytes as one run. Shards that no part has are generated; parts stay.
     """
-    from rich.console import Console
-
     from gen_data.generator.api.merge import merge as join
     from gen_data.generator.cli.generate_command import print_summary, progress_bar
     from gen_data.generator.runner.merge import common_plan
 
-    console = Console(stderr=True)
-    with progress_bar(console, common_plan(parts).n) as show:
+    with progress_bar(common_plan(parts).n) as show:
         summary = join(
             parts,
             out,
@@ -48,4 +45,4 @@ def merge(
             on_progress=show,
             resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
         )
-    print_summary(console, summary)
+    print_summary(summary)

@@ -53,14 +53,11 @@ def rerender(
     force: bool,
 ) -> None:
     """Render a finished data set again."""
-    from rich.console import Console
-
     from gen_data.generator.api.rerender import rerender as render_again
     from gen_data.generator.cli.generate_command import print_summary, progress_bar
     from gen_data.generator.runner.stored import StoredSamples
 
-    console = Console(stderr=True)
-    with progress_bar(console, StoredSamples(folder).n) as show:
+    with progress_bar(StoredSamples(folder).n) as show:
         summary = render_again(
             folder,
             out,
@@ -72,4 +69,4 @@ def rerender(
             on_progress=show,
             resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
         )
-    print_summary(console, summary)
+    print_summary(summary)

@@ -197,8 +197,6 @@ def repair(folder: Path, source: Path | None, workers: int | None) -> None:
 
     Damaged and foreign files are moved to FOLDER/run/quarantine.
     """
-    from rich.console import Console
-
     from gen_data.generator.api.repair import repair as restore
     from gen_data.generator.cli.generate_command import print_summary, progress_bar
     from gen_data.generator.runner.plan import PLAN_NAME, load_plan
@@ -208,8 +206,7 @@ def repair(folder: Path, source: Path | None, workers: int | None) -> None:
         n = load_plan(folder).n if (folder / PLAN_NAME).is_file() else 0
     except GenDataError:
         n = 0
-    console = Console(stderr=True)
-    with progress_bar(console, n) as show:
+    with progress_bar(n) as show:
         summary = restore(
             folder,
             source=source,
@@ -217,7 +214,7 @@ def repair(folder: Path, source: Path | None, workers: int | None) -> None:
             on_progress=show,
             resume_command=shlex.join(["gen-data", *sys.argv[1:]]),
         )
-    print_summary(console, summary)
+    print_summary(summary)
 
 
 @click.command()

@@ -114,26 +114,69 @@ def test_only_the_command_line_prints_and_reads_the_environment() -> None:
     assert not offenders
 
 
-def test_help_imports_click_and_nothing_else() -> None:
-    """``gen-data --help`` answers at once because it loads no library but its own parser."""
-    program = (
-        "import sys\n"
-        "before = set(sys.modules)\n"
-        "from gen_data.generator.cli.main import main\n"
-        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+HEAVY = {"mujoco", "pxr", "pybullet", "warp"} | {"matplotlib", "pandas", "pyarrow", "rich", "torch"}
+HEAVY |= {"networkx", "PIL", "scipy", "trimesh"}
+"""Libraries that take a tenth of a second or more, or belong to a worker."""
+
+
+def output_of(program: str, *arguments: str) -> list[str]:
+    """Lines that a program prints; the last one lists the libraries that it imports."""
+    report = (
+        "import sys\nbefore = set(sys.modules)\n"
+        f"{program}\n"
         "loaded = {name.partition('.')[0] for name in set(sys.modules) - before}\n"
-        "print('LOADED', *sorted(loaded - sys.stdlib_module_names))\n"
+        "public = {name for name in loaded if not name.startswith('_')}\n"
+        "print('LOADED', *sorted(public - sys.stdlib_module_names))\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", program, "--help"],
+        [sys.executable, "-c", report, *arguments],
         cwd=ROOT,
         capture_output=True,
         text=True,
         check=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )
-    assert "--config" in done.stdout
-    assert done.stdout.splitlines()[-1] == "LOADED click gen_data"
+    return done.stdout.splitlines()
+
+
+def test_help_imports_click_and_nothing_else() -> None:
+    """``gen-data --help`` answers at once because it loads no library but its own parser."""
+    program = (
+        "from gen_data.generator.cli.main import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass"
+    )
+
+    *shown, loaded = output_of(program, "--help")
+
+    assert "--config" in "\n".join(shown)
+    assert loaded == "LOADED click gen_data"
+
+
+def test_nothing_is_imported_before_the_first_worker_prepares_itself() -> None:
+    """A worker's imports take longest, and begin when the command has read its arguments."""
+    program = (
+        "import gen_data.generator.cli.generate_command\nimport gen_data.generator.runner.processes"
+    )
+
+    assert output_of(program)[-1] == "LOADED click gen_data"
+
+
+def test_planning_a_tabletop_loads_no_engine() -> None:
+    """The command reads, checks and plans; physics, rendering and tables belong to workers."""
+    program = (
+        "from gen_data.generator.assemble.config import load_config\n"
+        "from gen_data.generator.assemble.pipeline_factory import PipelineFactory\n"
+        "from gen_data.generator.runner.identity import make_plan\n"
+        "from gen_data.generator.runner import run\n"
+        "factory = PipelineFactory(load_config('tabletop.yaml'), n=1)\n"
+        "factory.check()\n"
+        "make_plan(factory)"
+    )
+
+    loaded = set(output_of(program)[-1].split())
+
+    assert {"numpy", "pydantic"} <= loaded
+    assert loaded & HEAVY == set()
 
 
 def test_no_test_measures_the_wall_clock() -> None:
