@@ -25,7 +25,7 @@ its SensReader and its benchmark's scripts.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -163,7 +163,7 @@ def classes_of_instances(
     return labels
 
 
-@cache
+@lru_cache(maxsize=4)
 def class_numbers(classes: str) -> Mapping[str, int]:
     """Number, from 1, of the class of each category in a public list."""
     listed = enumerate(public_classes(classes).items(), 1)
