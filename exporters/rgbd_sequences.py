@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any, ClassVar
 
 from gen_data.exporters.base import ExporterBase
 from gen_data.exporters.image_files import depth_units, read_image
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sensor_selection import pinhole_camera
+from gen_data.exporters.sequences import frame_facts, write_frames
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo, media_path
 from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.sample import Sample
 
 
 class RgbdExporter(ExporterBase):
@@ -22,6 +26,8 @@ class RgbdExporter(ExporterBase):
         camera: Sensor of the images; empty = the first one, by name, with the rgb channel.
     """
 
+    channels: ClassVar[tuple[Channel, ...]] = (Channel.Z_DEPTH,)
+    """Channels that the camera must write besides rgb."""
     type: str
     camera: str = ""
 
@@ -31,17 +37,38 @@ class RgbdExporter(ExporterBase):
         Raises:
             ConfigError: the camera is missing, is no pinhole or lacks a channel.
         """
-        self._camera(info, (Channel.Z_DEPTH,))
-
-    def _camera(self, info: DatasetInfo, channels: Iterable[Channel] = ()) -> str:
-        camera = pinhole_camera(info, self.camera, self.type)
-        for channel in channels:
+        camera = self._camera(info)
+        for channel in self.channels:
             if channel not in info.media[camera]:
                 raise ConfigError(
                     f"exporter '{self.type}': camera '{camera}' does not write the channel "
                     f"{channel.value}; add it to the channels of the sensor"
                 )
-        return camera
+
+    def _camera(self, info: DatasetInfo) -> str:
+        return pinhole_camera(info, self.camera, self.type)
+
+    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
+        """Write the files of each frame and a line for it.
+
+        Raises:
+            ConfigError: see ``check``.
+            StorageError: an image is missing.
+        """
+        self.check(info)
+        camera = self._camera(info)
+        rows = [
+            frame_facts(info, sample) | self.write_frame(info, sample, camera, shard_dir)
+            for sample in samples
+            if camera in sample.truth
+        ]
+        write_frames(shard_dir / self.type, rows)
+
+    @abstractmethod
+    def write_frame(
+        self, info: DatasetInfo, sample: Sample, camera: str, shard_dir: Path
+    ) -> dict[str, Any]:
+        """Write the files of a frame and return what its line has besides ``frame_facts``."""
 
 
 def depth_png(

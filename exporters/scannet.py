@@ -24,7 +24,7 @@ its SensReader and its benchmark's scripts.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar, Literal
@@ -39,16 +39,13 @@ from gen_data.exporters.label_png import encode_label_png
 from gen_data.exporters.rgbd_sequences import RgbdExporter, depth_png, opencv_pinhole
 from gen_data.exporters.sequences import (
     check_sequence_count,
-    frame_facts,
     read_sequences,
     write_bytes,
-    write_frames,
     write_text,
 )
 from gen_data.generator.core.capture import Channel, ImageEncoding
 from gen_data.generator.core.interfaces import DatasetInfo, media_path
 from gen_data.generator.core.sample import Sample
-from gen_data.generator.core.scene import Camera
 from gen_data.generator.core.se3 import Array
 
 UNITS_PER_M = 1000
@@ -69,6 +66,7 @@ class ScanNet(RgbdExporter):
     """
 
     image_formats: ClassVar[frozenset[str]] = PNG_OR_JPEG
+    channels: ClassVar[tuple[Channel, ...]] = (Channel.Z_DEPTH, Channel.INSTANCE)
     type: Literal["scannet"] = "scannet"
     classes: Literal["nyu40", "ade20k"] = "nyu40"
 
@@ -78,34 +76,28 @@ class ScanNet(RgbdExporter):
         return True
 
     def check(self, info: DatasetInfo) -> None:
-        """Reject a data set that this format cannot represent.
+        """Reject a data set without such a camera, or with more scenes than names.
 
         Raises:
-            ConfigError: the camera is missing, is no pinhole or lacks a channel, or there are too
-                many sequences.
+            ConfigError: see ``RgbdExporter.check``, or there are too many sequences.
         """
-        self._camera(info, (Channel.Z_DEPTH, Channel.INSTANCE))
+        super().check(info)
         check_sequence_count(info, SPACES_MAX * info.views_per_scene, self.type)
 
-    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write the images of each frame in the format's units, and a line for it.
-
-        Raises:
-            ConfigError: see ``check``.
-            StorageError: an image is missing.
-        """
-        self.check(info)
-        camera, rows = self._camera(info), []
-        for sample in samples:
-            if camera not in sample.truth:
-                continue
-            for kind, data in self._images(info, sample, camera, shard_dir).items():
-                name = f"{kind}/{sample.index:09d}{IMAGES[kind]}"
-                write_bytes(shard_dir / self.type / name, data)
-            view = sample.truth[camera].camera
-            facts = {"pose": view.T_world_camera.matrix().tolist(), **camera_facts(view)}
-            rows.append(frame_facts(info, sample) | facts)
-        write_frames(shard_dir / self.type, rows)
+    def write_frame(
+        self, info: DatasetInfo, sample: Sample, camera: str, shard_dir: Path
+    ) -> dict[str, Any]:
+        """Write the images in the format's units; return pose, size and calibration."""
+        for kind, data in self._images(info, sample, camera, shard_dir).items():
+            name = f"{kind}/{sample.index:09d}{IMAGES[kind]}"
+            write_bytes(shard_dir / self.type / name, data)
+        view = sample.truth[camera].camera
+        k = view.intrinsics
+        return {
+            "pose": view.T_world_camera.matrix().tolist(),
+            "size_px": [k.width_px, k.height_px],
+            "pinhole": opencv_pinhole(k),
+        }
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link the frames of all shards into scans and list them by split."""
@@ -175,12 +167,6 @@ def label_table(classes: str) -> str:
     head = f"id\traw_category\tcategory\t{classes}id\t{classes}class\n"
     rows = (f"{k}\t{n}\t{n}\t{k}\t{n}\n" for k, n in enumerate(public_classes(classes), 1))
     return head + "".join(rows)
-
-
-def camera_facts(view: Camera) -> Mapping[str, Any]:
-    """What a frame's line tells of the camera."""
-    k = view.intrinsics
-    return {"size_px": [k.width_px, k.height_px], "pinhole": opencv_pinhole(k)}
 
 
 def camera_texts(row: Mapping[str, Any], frame_count: int) -> Mapping[str, str]:

@@ -30,10 +30,8 @@ from gen_data.exporters.rgbd_sequences import RgbdExporter, depth_png, opencv_pi
 from gen_data.exporters.sensor_selection import instant_s
 from gen_data.exporters.sequences import (
     Frame,
-    frame_facts,
     read_sequences,
     write_bytes,
-    write_frames,
     write_text,
 )
 from gen_data.generator.core.capture import Channel
@@ -66,29 +64,19 @@ class TumRgbd(RgbdExporter):
         super().check(info)
         self._imu(info)
 
-    def write_shard(self, info: DatasetInfo, samples: Iterable[Sample], shard_dir: Path) -> None:
-        """Write depth in the format's units, and a line per frame.
-
-        Raises:
-            ConfigError: see ``check``.
-            StorageError: an image is missing.
-        """
-        self.check(info)
-        camera, rows = self._camera(info), []
-        for sample in samples:
-            if camera not in sample.truth:
-                continue
-            data = depth_png(info, shard_dir, camera, sample.index, UNITS_PER_M)
-            write_bytes(shard_dir / self.type / f"{sample.index:09d}.png", data)
-            view = sample.truth[camera].camera
-            w, *xyz = view.T_world_camera.quaternion_wxyz
-            row = {
-                "time_s": instant_s(sample, camera),
-                "pose": [*view.T_world_camera.translation_m, *xyz, w],
-                "calibration": opencv_pinhole(view.intrinsics),
-            }
-            rows.append(frame_facts(info, sample) | row)
-        write_frames(shard_dir / self.type, rows)
+    def write_frame(
+        self, info: DatasetInfo, sample: Sample, camera: str, shard_dir: Path
+    ) -> dict[str, Any]:
+        """Write depth in the format's units; return time, pose and calibration."""
+        data = depth_png(info, shard_dir, camera, sample.index, UNITS_PER_M)
+        write_bytes(shard_dir / self.type / f"{sample.index:09d}.png", data)
+        view = sample.truth[camera].camera
+        w, *xyz = view.T_world_camera.quaternion_wxyz
+        return {
+            "time_s": instant_s(sample, camera),
+            "pose": [*view.T_world_camera.translation_m, *xyz, w],
+            "calibration": opencv_pinhole(view.intrinsics),
+        }
 
     def finalize(self, info: DatasetInfo, shard_dirs: Sequence[Path], dataset_dir: Path) -> None:
         """Link the images of all shards and list the frames of each sequence."""

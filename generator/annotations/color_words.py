@@ -77,13 +77,13 @@ def color_of(bodies: Sequence[Body], assets: AssetLibrary) -> str:
     areas: dict[str, float] = {}
     for body in bodies:
         materials = body.materials or assets.materials(body.asset)
-        for slot, area_m2 in enumerate(_slot_areas(body.asset, assets)):
-            word = ""
-            if slot < len(materials):
-                material = materials[slot]
-                plain = max(material.metallic, material.transmission) <= CLEAR_MAX
-                if plain and not material.texture and not any(material.emission_cd_m2):
-                    word = color_word(material.base_color)
+        if not materials:
+            return ""
+        # Slots beyond the last used one have no surface.
+        for material, area_m2 in zip(materials, _slot_areas(body.asset, assets), strict=False):
+            plain = max(material.metallic, material.transmission) <= CLEAR_MAX
+            shows = plain and not material.texture and not any(material.emission_cd_m2)
+            word = color_word(material.base_color) if shows else ""
             areas[word] = areas.get(word, 0.0) + area_m2 * body.scale**2
     main = max(areas, key=lambda word: areas[word], default="")
     return main if main and areas[main] >= SURFACE * sum(areas.values()) else ""
