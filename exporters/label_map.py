@@ -25,6 +25,7 @@ from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.generator.core.scene import Instance, Scene
 
 CLASS_NAME_MAX = 60
+PublicList = Literal["coco80", "kitti", "nuscenes", "cityscapes", "nyu40", "ade20k"]
 Sources = tuple[str, ...]
 """Categories of the data set."""
 
@@ -38,7 +39,8 @@ class LabelMap(Strict):
     Attributes:
         classes: ``{class: categories}``, in the order of class ids; a class without categories
             takes the category of its own name. Or the name of a public list: ``coco80``,
-            ``kitti``, ``nuscenes``, ``cityscapes``. Without it, all categories keep their names.
+            ``kitti``, ``nuscenes``, ``cityscapes``, ``nyu40``, ``ade20k``. Without it, all
+            categories keep their names.
         others: Objects of all other categories: left out, or kept as ignored regions (in formats
             that have such regions without a class, such as KITTI's DontCare).
         ignore: Categories whose objects become ignored regions.
@@ -49,9 +51,7 @@ class LabelMap(Strict):
         below: Objects that miss one of these limits: left out, or kept as ignored regions.
     """
 
-    classes: (
-        Literal["coco80", "kitti", "nuscenes", "cityscapes"] | Mapping[str, Sources | None] | None
-    ) = None
+    classes: PublicList | Mapping[str, Sources | None] | None = None
     others: Literal["drop", "ignore"] = "drop"
     ignore: tuple[str, ...] = ()
     min_visible_fraction: float = Field(0.0, ge=0.0, le=1.0)

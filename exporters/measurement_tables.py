@@ -75,7 +75,7 @@ class Tables(ExporterBase):
             folder = dataset_dir / sensor
             poses = (d / self.type / sensor / "poses.jsonl" for d in shard_dirs)
             write_text(folder / "poses.jsonl", "".join(path.read_text("utf-8") for path in poses))
-            for sequence, rows in _sequences(info, shard_dirs, sensor):
+            for sequence, rows in sequence_rows(info, shard_dirs, sensor):
                 path = folder / f"{sequence:06d}.{self.format}"
                 path.write_bytes({"csv": csv_bytes, "npy": npy_bytes}[self.format](rows))
 
@@ -132,7 +132,7 @@ def _choose_format(kind: np.dtype[Any]) -> Any:
     return repr if kind.itemsize == 8 else "{:.7g}".format
 
 
-def _sequences(
+def sequence_rows(
     info: DatasetInfo, shard_dirs: Sequence[Path], sensor: str
 ) -> Iterator[tuple[int, NDArray[np.void]]]:
     """Yield number and rows of every sequence with readings of the device, in order."""

@@ -16,6 +16,7 @@ TABLE = PluginTable[Randomizer](
         "camera_intrinsics": "gen_data.randomizers.camera_intrinsics:CameraIntrinsics",
         "camera_on_lane": "gen_data.randomizers.camera_on_lane:CameraOnLane",
         "camera_pose": "gen_data.randomizers.camera_pose:CameraPose",
+        "ceiling_camera": "gen_data.randomizers.ceiling_camera:CeilingCamera",
         "ceiling_lights": "gen_data.randomizers.ceiling_lights:CeilingLights",
         "colors": "gen_data.randomizers.colors:Colors",
         "companions": "gen_data.randomizers.companions:Companions",

@@ -6,6 +6,7 @@ and nothing is said about what cannot be seen. The grammar is the table ``langua
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,6 +15,7 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
+from gen_data.generator.annotations.color_words import color_of
 from gen_data.generator.annotations.instance_extents import find_extents
 from gen_data.generator.annotations.relations import Relations
 from gen_data.generator.annotations.visibility import Visibility
@@ -29,6 +31,8 @@ from gen_data.generator.core.scene import ObjectGroup, Scene
 CONTACTS = ("inside", "on", "held_by")
 """Predicates that say where a thing is, the most telling one first."""
 SIDES = ("left_of", "right_of")
+LARGER = 1.25
+"""Smallest ratio of the diagonals of two boxes of which one thing is called the larger."""
 
 
 class Language(Strict):
@@ -38,8 +42,10 @@ class Language(Strict):
     of its own ("the mug"), only if that is true with every barely visible thing, and with those of
     similar categories (``kin`` in ``language.yaml``). An expression is true of one thing in the
     image; "leftmost" and "to the left" mean separate boxes, and no other candidate is near enough
-    to be meant. Questions about absent things name categories that the template could have placed
-    and the scene does not have.
+    to be meant. Colours are true base colours (``color_words``), said only where that of every
+    candidate is beyond doubt; "largest" and "smallest" compare true sizes of one category.
+    Questions about absent things name categories that the template could have placed and the scene
+    does not have.
 
     Attributes:
         min_visible_px: Smallest number of visible pixels of a thing to be spoken of.
@@ -61,13 +67,15 @@ class Language(Strict):
         graph = truth
         if graph.relations is None:
             graph = Relations().annotate_image(scene, assets, reading, truth)
-        things = tuple(self._things(scene, reading, truth))
+        things = tuple(self._things(scene, assets, reading, truth))
         present = {_in_words(i.category) for i in scene.instances}
         edges = frozenset(both_ways(graph.relations or ()))
         view = View(things, edges, present, _placeable(scene.groups, assets))
         return replace(truth, utterances=tuple(self._spread(view.utterances())))
 
-    def _things(self, scene: Scene, reading: SensorReading, truth: ImageTruth) -> Iterator[Thing]:
+    def _things(
+        self, scene: Scene, assets: AssetLibrary, reading: SensorReading, truth: ImageTruth
+    ) -> Iterator[Thing]:
         """Everything with a visible pixel; annotated things are clear only if they are listed."""
         listed = {t.instance.instance_id: t for t in truth.objects}
         extents = find_extents(reading.channels[Channel.INSTANCE])
@@ -81,7 +89,9 @@ class Language(Strict):
                     clear and number in listed and self._is_whole(scene, reading, listed[number])
                 )
             category, box = _in_words(instance.category), extents[number].box
-            yield Thing(number, category, box, clear, instance.annotated)
+            color = color_of([b for b in scene.bodies if b.instance_id == number], assets)
+            diagonal_m = math.dist(instance.box_min_m, instance.box_max_m)
+            yield Thing(number, category, box, clear, instance.annotated, color, diagonal_m)
 
     def _is_whole(self, scene: Scene, reading: SensorReading, truth: ObjectTruth) -> bool:
         """Whether enough of an object's silhouette is visible."""
@@ -109,6 +119,8 @@ class Thing:
         box: Around its visible pixels.
         clear: Whether it is visible enough to be spoken of.
         annotated: Whether it is annotated; others are landmarks only.
+        color: Its colour word; empty = none is beyond doubt.
+        diagonal_m: Diagonal of its 3D box.
     """
 
     instance_id: int
@@ -116,6 +128,8 @@ class Thing:
     box: BoxPx
     clear: bool
     annotated: bool
+    color: str = ""
+    diagonal_m: float = 0.0
 
     @property
     def middle(self) -> float:
@@ -152,6 +166,10 @@ class View:
                 yield Utterance("expression", text, instances=(thing.instance_id,))
         yield from self._numbers()
         yield from self._places()
+        for thing in self.spoken:
+            if thing.color and thing.instance_id in self.names:
+                text = grammar()["questions"]["color"].format(a=self.names[thing.instance_id])
+                yield Utterance("color", text, thing.color, (thing.instance_id,))
 
     @cached_property
     def spoken(self) -> tuple[Thing, ...]:
@@ -193,6 +211,9 @@ class View:
             alike = {t.category for t in others} == {thing.category}
             if alike and all(_is_beside(thing, side, t) for t in others):
                 yield forms[word].format(**words)
+        yield from (forms[word].format(**words) for word in _sizes(thing, others))
+        if others and thing.color and all(t.color not in ("", thing.color) for t in others):
+            yield forms["color"].format(color=thing.color, **words)
         for predicate in CONTACTS:
             for landmark in self._objects(number, predicate):
                 if others and not any(
@@ -285,6 +306,15 @@ def _is_beside(one: Thing, side: str, other: Thing) -> bool:
     """Whether the boxes of two things are separate, the first one on that side."""
     left, right = (one, other) if side == "left_of" else (other, one)
     return left.box.x_max <= right.box.x_min
+
+
+def _sizes(thing: Thing, others: Sequence[Thing]) -> Iterator[str]:
+    """Superlatives of size that are true of a thing beyond doubt."""
+    if {t.category for t in others} == {thing.category}:
+        if all(thing.diagonal_m > LARGER * t.diagonal_m for t in others):
+            yield "largest"
+        if all(t.diagonal_m > LARGER * thing.diagonal_m for t in others):
+            yield "smallest"
 
 
 def _is_across(one: Thing, side: str, landmark: Thing) -> bool:

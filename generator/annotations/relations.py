@@ -26,6 +26,8 @@ UPWARD = 0.5
 than the friction angle of nearly all materials (assumed)."""
 OPPOSITE = -0.5
 """Fingers hold a thing by contacts whose normals differ by at least 120 degrees."""
+SHELL = frozenset({"floor", "wall", "ceiling"})
+"""Categories of the surfaces of rooms: a lamp below a ceiling does not carry it."""
 COMPASS = np.array([[np.cos(a), np.sin(a), 0.0] for a in np.arange(8) * np.pi / 4])
 """Eight horizontal directions in which a container must have a wall."""
 
@@ -36,7 +38,8 @@ class Relations(Strict):
     In space, for images between instances that are both visible:
 
     ``supported_by``: the subject's mesh touches the object's from above, at more points than from
-    below. Fixed things are supported by fixed things only.
+    below. Fixed things are supported by fixed things only, which reach lower or end where they
+    begin; floors, walls and ceilings by nothing.
     ``inside``: the centre of the subject's box and most of its surface are in the convex hull of
     the object, which has walls in eight horizontal directions around that centre.
     ``on``: supported, and neither inside nor held.
@@ -96,6 +99,7 @@ class Thing:
         motion: ``dynamic`` if any of its bodies is, else that of its first body.
         box: Pose and corners of its box.
         robot: Whether it is a robot.
+        shell: Whether it is a surface of a room.
     """
 
     instance_id: int
@@ -104,6 +108,7 @@ class Thing:
     motion: Motion
     box: tuple[SE3, tuple[float, float, float], tuple[float, float, float]]
     robot: bool
+    shell: bool
 
 
 class Shape:
@@ -179,6 +184,7 @@ def _thing(instance: Instance, bodies: Sequence[Body], robot: bool) -> Thing:
         "dynamic" if moves else bodies[0].motion,
         (instance.T_world_instance, instance.box_min_m, instance.box_max_m),
         robot,
+        instance.category in SHELL,
     )
 
 
@@ -220,9 +226,10 @@ def _relate_pair(one: Shape, other: Shape, contact_m: float, near_m: float) -> I
             return Relation(a.thing.instance_id, predicate, b.thing.instance_id)
 
         held = b.thing.robot and bool((normals @ normals.T < OPPOSITE).any())
-        fixed_on_loose = a.thing.motion != "dynamic" and b.thing.motion == "dynamic"
         lift = normals[:, 2]
-        supported = not fixed_on_loose and bool((lift >= UPWARD).any()) and float(lift.sum()) > 0.0
+        supported = (
+            _may_carry(b, a, contact_m) and bool((lift >= UPWARD).any()) and float(lift.sum()) > 0.0
+        )
         inside = b.is_around(a)
         close |= held or supported or inside
         if held:
@@ -237,6 +244,16 @@ def _relate_pair(one: Shape, other: Shape, contact_m: float, near_m: float) -> I
     if both and not close and are_within(one.triangles_m, other.triangles_m, near_m):
         first, second = sorted((one.thing.instance_id, other.thing.instance_id))
         yield Relation(first, "near", second)
+
+
+def _may_carry(below: Shape, above: Shape, contact_m: float) -> bool:
+    """Whether one thing may support another; fixed things that stand side by side do not."""
+    if above.thing.motion == "dynamic":
+        return True
+    if above.thing.shell or below.thing.motion == "dynamic":
+        return False
+    low_m = above.low_m[2]
+    return bool(low_m > below.low_m[2] + contact_m or low_m >= below.high_m[2] - contact_m)
 
 
 def _away(T_world_camera: SE3) -> Array:

@@ -200,7 +200,7 @@ class Utterance:
         instances: Ids of the things it is about: the mask of an answer is the union of theirs.
     """
 
-    kind: Literal["caption", "relation", "expression", "counting", "existence", "spatial"]
+    kind: Literal["caption", "relation", "expression", "counting", "existence", "spatial", "color"]
     text: str
     answer: str = ""
     instances: tuple[int, ...] = ()

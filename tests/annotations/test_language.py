@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import colorsys
 import re
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
 from gen_data.generator.annotations.annotate import Thresholds, annotate_reading
+from gen_data.generator.annotations.color_words import cielab, color_word
 from gen_data.generator.annotations.instance_masks import InstanceMasks
 from gen_data.generator.annotations.language import Language, Thing, View, kin
 from gen_data.generator.annotations.relations import Relations
@@ -18,6 +21,7 @@ from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.pipeline_factory import open_pipeline
 from gen_data.generator.core.boxes import BoxPx
 from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.colorimetry import srgb_decode
 from gen_data.generator.core.sample import ImageTruth, Utterance
 from gen_data.generator.core.scene import Scene
 
@@ -30,6 +34,8 @@ class Picture:
     names: dict[int, str]
     columns: dict[int, float]
     pixels: dict[int, int]
+    sizes_m: dict[int, float]
+    colors: dict[int, set[str]]
     related: set[tuple[int, str, int]]
     scene: Scene
 
@@ -46,7 +52,7 @@ def picture(config: str, index: int) -> Picture:
     with open_pipeline(load_config(config, overrides=small), wanted) as made:
         sample = made.sample(index)
         reading = next(iter(sample.capture.readings.values()))
-        annotators = [InstanceMasks(), Relations(), Language(most=1000)]
+        annotators = (InstanceMasks(), Relations(), Language(most=1000))
         truth = annotate_reading(sample.scene, reading, annotators, Thresholds(), made.assets)
     image = np.asarray(reading.channels[Channel.INSTANCE])
     ids = [int(n) for n in np.unique(image) if n]
@@ -54,7 +60,32 @@ def picture(config: str, index: int) -> Picture:
     columns = {n: float(np.nonzero((image == n).any(0))[0][[0, -1]].mean()) for n in ids}
     pixels = {n: int((image == n).sum()) for n in ids}
     related = {(r.subject, str(r.predicate), r.object) for r in truth.relations or ()}
-    return Picture(truth, names, columns, pixels, related, sample.scene)
+    boxes = {n: sample.scene.instance(n).box3d for n in ids}
+    sizes_m = {n: float(np.linalg.norm(box.size_m)) for n, box in boxes.items()}
+    colors: dict[int, set[str]] = {n: set() for n in ids}
+    for body in sample.scene.bodies:
+        if body.instance_id in colors:
+            for material in body.materials or made.assets.materials(body.asset):
+                colors[body.instance_id] |= possible_words(material.base_color)
+    return Picture(truth, names, columns, pixels, sizes_m, colors, related, sample.scene)
+
+
+def possible_words(rgb: tuple[float, float, float]) -> set[str]:
+    """Words that a surface may have by hue, saturation and value of its sRGB: wide, overlapping."""
+    hue, saturation, value = colorsys.rgb_to_hsv(*(max(c, 0.0) ** (1 / 2.2) for c in rgb))
+    hues = {
+        "red": (335, 380), "orange": (15, 48), "yellow": (38, 72), "green": (75, 185),
+        "blue": (180, 262), "purple": (255, 330), "pink": (300, 385), "brown": (355, 410),
+    }  # fmt: skip
+    found = {
+        word
+        for word, (low, high) in hues.items()
+        if saturation > 0.15 and any(low <= 360 * hue + turn <= high for turn in (0, 360))
+    }
+    grey = {"white": value > 0.75, "gray": 0.2 < value < 0.85, "black": value < 0.35}
+    return found | {
+        word for word, fits in grey.items() if fits and (saturation < 0.3 or word == "black")
+    }
 
 
 PICTURES = [("tabletop", 0), ("tabletop", 5), ("tabletop", 11), ("bin_picking", 0)]
@@ -64,16 +95,22 @@ each = pytest.mark.parametrize(("config", "index"), PICTURES)
 def resolve(seen: Picture, text: str) -> set[int]:
     """Things that an expression may mean, by its words alone."""
     match = re.fullmatch(
-        r"the (?:(leftmost|rightmost) )?(.+?)"
+        r"the (?:(leftmost|rightmost|largest|smallest|red|green|blue|yellow|orange|purple|pink"
+        r"|brown|white|black|gray) )?(.+?)"
         r"(?: (on|in|held by|to the left of|to the right of) (the .+))?",
         text,
     )
     assert match, text
     superlative, name, words, landmark = match.groups()
     found = {n for n, own in seen.names.items() if own == name}
-    if superlative:
+    if superlative in ("leftmost", "rightmost"):
         pick = min if superlative == "leftmost" else max
         found = {pick(found, key=lambda n: seen.columns[n])}
+    elif superlative in ("largest", "smallest"):
+        pick = min if superlative == "smallest" else max
+        found = {pick(found, key=lambda n: seen.sizes_m[n])}
+    elif superlative:
+        found = {n for n in found if superlative in seen.colors[n]}
     if landmark:
         (at,) = resolve(seen, landmark)
         spatial = {"on": "on", "in": "inside", "held by": "held_by"}
@@ -222,6 +259,51 @@ def test_a_side_of_a_landmark_tells_things_apart_only_if_no_other_reaches_there(
 
     assert "the mug to the left of the bowl" not in texts(doubtful, "expression")
     assert "the mug to the left of the bowl" in texts(certain, "expression")
+
+
+def test_a_colour_is_said_only_where_no_candidate_may_have_it() -> None:
+    """Of a red and a blue mug; not beside one whose colour is doubtful."""
+    red, blue = thing(1, "mug", 0, 10, color="red"), thing(2, "mug", 5, 30, color="blue")
+
+    assert texts(view(red, blue), "expression") == ["the red mug", "the blue mug"]
+    assert texts(view(red, thing(2, "mug", 5, 30)), "expression") == []
+    assert texts(view(red, thing(2, "cup", 5, 30, color="blue")), "expression") == [
+        "the red mug", "the blue cup",
+    ]  # fmt: skip
+    assert texts(view(red), "color") == ["What color is the mug?"]
+    assert texts(view(red, blue), "color") == []
+
+
+def test_sizes_are_said_only_of_things_that_differ_clearly() -> None:
+    """By a quarter at least, within one category."""
+    small = thing(1, "mug", 0, 10, diagonal_m=0.1)
+
+    for diagonal_m, said in ((0.13, ["the smallest mug", "the largest mug"]), (0.12, [])):
+        other = thing(2, "mug", 5, 30, diagonal_m=diagonal_m)
+        assert texts(view(small, other), "expression") == said
+    assert texts(view(small, thing(2, "cup", 5, 30, diagonal_m=0.3)), "expression") == []
+
+
+@pytest.mark.parametrize(
+    ("srgb", "word"),
+    [("DC143C", "red"), ("2E8B57", "green"), ("4682B4", "blue"), ("FFFFFF", "white"),
+     ("000000", "black"), ("808080", "gray"), ("FFD700", "yellow"), ("FFC0CB", "pink"),
+     ("800080", "purple"), ("FF8C00", "orange"), ("8B4513", "brown"), ("808000", ""),
+     ("008080", ""), ("FF4500", ""), ("9ACD32", "")],
+)  # fmt: skip
+def test_web_colours_have_the_basic_word_of_their_name(srgb: str, word: str) -> None:
+    """Crimson, sea green, steel blue, ...; olive, teal, orange red and yellow green have none."""
+    encoded = np.array([int(srgb[k : k + 2], 16) / 255 for k in (0, 2, 4)])
+
+    assert color_word(tuple(srgb_decode(encoded).tolist())) == word
+
+
+def test_cielab_is_that_of_opencv() -> None:
+    """To its single precision and its own digits of the matrix."""
+    rgb = np.random.default_rng(0).uniform(0.0, 1.0, (1, 200, 3)).astype(np.float32)
+    expected = cv2.cvtColor(rgb, cv2.COLOR_LRGB2LAB)
+
+    assert np.abs(cielab(rgb[0].astype(float)) - expected[0]).max() < 0.2
 
 
 def test_most_limits_each_kind() -> None:

@@ -237,6 +237,27 @@ def test_what_the_hand_holds_is_held_and_on_nothing() -> None:
     assert held not in {subject for subject, _ in world.pairs("on")}
 
 
+def test_furniture_stands_on_the_floor_and_things_on_furniture_below_them() -> None:
+    """In a furnished room: no wall, ceiling or floor is carried, nothing by what is beside it."""
+    world = settled("rooms", 31)
+    category = {i.instance_id: i.category for i in world.scene.instances}
+    low_m = {k: float(mesh.vertices[:, 2].min()) for k, mesh in world.meshes.items()}
+    carried: dict[int, set[int]] = {}
+    for subject, below in world.pairs("supported_by"):
+        carried.setdefault(subject, set()).add(below)
+    shell = {k for k, name in category.items() if name in ("floor", "wall", "ceiling")}
+    (floor,) = (k for k in shell if category[k] == "floor")
+    standing = [k for k in low_m if abs(low_m[k]) < 1e-4 and k not in shell]
+
+    assert len(shell) == 6
+    assert not carried.keys() & shell
+    assert len(standing) > 5
+    assert {k: carried.get(k) for k in standing} == {k: {floor} for k in standing}
+    raised = {k: below for k, below in carried.items() if k not in standing}
+    assert len(raised) > 5
+    assert all(low_m[k] > low_m[b] for k, below in raised.items() for b in below)
+
+
 @each
 def test_views_follow_from_boxes_and_depths(config: str, index: int) -> None:
     """Left and right by columns; before and behind, for things in the same columns, by distance."""

@@ -63,7 +63,9 @@ PHYSICS_BOUND = (
 """Randomizers that must run before physics."""
 
 
-IN_ROOMS = ("furnish", "object_states", "room_camera", "room_lighting", "room_path")
+IN_ROOMS = (
+    "ceiling_camera", "furnish", "object_states", "room_camera", "room_lighting", "room_path",
+)  # fmt: skip
 """Randomizers of furnished rooms, whose assets and rules are the real ones."""
 
 

@@ -32,7 +32,9 @@ from gen_data.exporters.kitti_tracking import KittiTracking
 from gen_data.exporters.measurement_tables import Tables
 from gen_data.exporters.motchallenge import MotChallenge
 from gen_data.exporters.pointclouds import PointClouds
+from gen_data.exporters.scannet import ScanNet
 from gen_data.exporters.semantickitti import SemanticKitti
+from gen_data.exporters.tum_rgbd import TumRgbd
 from tests.exporters import (
     test_birdseye,
     test_coco,
@@ -41,6 +43,7 @@ from tests.exporters import (
     test_kitti_stereo,
     test_kitti_tracking,
     test_motchallenge,
+    test_rgbd_sequences,
     test_scans,
     test_semantickitti,
     test_tables,
@@ -200,6 +203,11 @@ def columns_of_a_row(match: re.Match[str]) -> str:
     values = np.array(match[2].split()).reshape(3, 4)
     values[:, :3] = values[:, :3].T.copy()
     return f"{match[1]} {' '.join(values.ravel())}"
+
+
+def matrix_lines(matrix: Any) -> str:
+    """A row per line."""
+    return "".join(" ".join(f"{v:.9f}" for v in row) + "\n" for row in matrix.tolist())
 
 
 FORMATS = {
@@ -416,6 +424,30 @@ FORMATS = {
             "a field renamed": edit_bytes("top/000000000.ply", b" ring\n", b" beam\n"),
         },
     ),
+    "scannet": Format(
+        ScanNet(),
+        drive,
+        (
+            test_rgbd_sequences.test_scannet_points_lie_on_the_scene,
+            test_rgbd_sequences.test_scannet_labels_are_nyu40_of_the_instances,
+            test_rgbd_sequences.test_scannet_scans_are_listed_by_split,
+        ),
+        {
+            "poses of the world in the camera": edit_text(
+                "scans/*/pose/*.txt",
+                r"(?s)\A.+\Z",
+                lambda m: matrix_lines(np.linalg.inv(np.array(m[0].split(), float).reshape(4, 4))),
+            ),
+            "depth of TUM": edit_image("scans/*/depth/*.png", lambda d: 5 * d),
+            "classes from 0": edit_image(
+                "scans/*/label-filt/*.png", lambda v: np.where(v > 0, v - 1, 0).astype(np.uint16)
+            ),
+            "instances of the next class": edit_image(
+                "scans/*/instance-filt/*.png", lambda v: v + (v > 0).astype(np.uint16)
+            ),
+            "a photograph is missing": remove("scans/*/color/*.jpg"),
+        },
+    ),
     "semantickitti": Format(
         SemanticKitti(),
         drive,
@@ -452,6 +484,27 @@ FORMATS = {
             ),
             "columns in another order": edit_columns("imu/*.csv", lambda c: swap(c, 2, 3), ","),
             "a sequence is missing": remove("imu/*.csv"),
+        },
+    ),
+    "tum_rgbd": Format(
+        TumRgbd(),
+        drive,
+        (
+            test_rgbd_sequences.test_tum_points_lie_on_the_scene,
+            test_rgbd_sequences.test_tum_lists_every_image,
+        ),
+        {
+            "scalar first": edit_columns(
+                "*/*/groundtruth.txt", lambda c: c.insert(4, c.pop()), " "
+            ),
+            "depth in millimetres": edit_image("*/*/depth/*.png", lambda d: d // 5),
+            "principal point at pixel edges": edit_columns(
+                "*/*/calibration.txt", lambda c: add(c, 3, 0.5), " "
+            ),
+            "times of the next frame": edit_text(
+                "*/*/depth.txt", r"^0\.([012])", lambda m: f"0.{int(m[1]) + 1}"
+            ),
+            "a depth image is missing": remove("*/*/depth/*.png"),
         },
     ),
 }  # fmt: skip

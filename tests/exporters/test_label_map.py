@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from pydantic import ValidationError
 
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.kitti import Kitti
 from gen_data.exporters.label_map import AppliedLabelMap, LabelMap, MappedExporter, public_classes
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import PipelineFactory
 from gen_data.generator.core.errors import ConfigError, ConfigWarning
 
 CITYSCAPES_THINGS = ["person", "rider", "car", "truck", "bus", "train", "motorcycle", "bicycle"]
@@ -141,6 +145,21 @@ def test_public_lists_have_the_published_classes() -> None:
     assert list(public_classes("cityscapes")) == CITYSCAPES_THINGS
     assert len(public_classes("nuscenes")) == 10
     assert len(public_classes("kitti")) == 8
+    nyu, ade = list(public_classes("nyu40")), list(public_classes("ade20k"))
+    assert (len(nyu), nyu[0], nyu[21], nyu[-1]) == (40, "wall", "ceiling", "otherprop")
+    assert (len(ade), ade[0], ade[5], ade[-1]) == (150, "wall", "ceiling", "flag")
+
+
+@pytest.mark.parametrize("name", ["nyu40", "ade20k"])
+def test_every_category_of_rooms_has_a_class_or_is_listed_without_one(name: Any) -> None:
+    """So that no pixel of a room loses its class unseen."""
+    text = files("gen_data.exporters").joinpath("label_maps.yaml").read_text("utf-8")
+    without = yaml.safe_load(text)["without_class"][name]
+    mapped = {c for own in LabelMap(classes=name).classes_of.values() for c in own}
+    rooms = PipelineFactory(load_config("indoor_rgbd.yaml"), n=1).categories
+
+    assert set(rooms) - mapped == set(without)
+    assert {"wall", "floor", "ceiling", "window", "door"} <= mapped & set(rooms)
 
 
 @pytest.mark.parametrize("name", ["", " ", "a\nb", "\0", "x" * 61])

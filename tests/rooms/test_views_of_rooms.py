@@ -20,6 +20,7 @@ from gen_data.generator.core.scene import Camera, Scene
 from gen_data.generator.core.scene_time import scene_at
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.streams import Streams
+from gen_data.randomizers.ceiling_camera import CeilingCamera
 from gen_data.randomizers.furnish import Furnish
 from gen_data.randomizers.object_states import ObjectStates
 from gen_data.randomizers.room_camera import RoomCamera
@@ -249,3 +250,23 @@ def _area_m2(scene: Scene) -> float:
             (x0, y0, _), (x1, y1, _) = library().bounds_m(body.asset)
             area += (x1 - x0) * (y1 - y0)
     return area
+
+
+def test_ceiling_cameras_are_below_the_ceiling_of_a_room_and_look_down() -> None:
+    """Within their distances and tilt, by every draw; the room is around and below them."""
+    scene = flat()
+    ceilings = [b for b in scene.bodies if b.name.endswith("/ceiling")]
+    for stream in range(12):
+        moved = CeilingCamera(name="c")(scene, library(), Streams(5, stream).rng("c"))
+        pose = moved.camera("color").T_world_camera
+        eye_m, forward = np.array(pose.translation_m), pose.rotation()[:, 2]
+        inside = []
+        for body in ceilings:
+            low, high = (
+                body.T_world_body.apply(np.array(c)) for c in library().bounds_m(body.asset)
+            )
+            inside.append(bool(((eye_m > low)[:2] & (eye_m < high)[:2]).all()))
+            below_m = body.T_world_body.translation_m[2] - eye_m[2]
+            assert 0.06 - 1e-6 <= below_m <= 0.14 + 1e-6
+        assert sum(inside) == 1
+        assert math.degrees(math.acos(-forward[2])) <= 4.0 + 1e-3
