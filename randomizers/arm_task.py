@@ -43,6 +43,7 @@ _APART_M = 0.03
 _YAWS = 8
 """Rotations of a held object to try at its destination."""
 _LIFT_M = 0.0005
+_EXAMPLES = {"fingers": "franka_panda", "suction": "franka_panda_suction"}
 
 Span = tuple[float, float]
 
@@ -106,6 +107,8 @@ class Step(Strict):
             ``reach``.
         opening: Of the gripper: 0 closed, 1 open.
         touches: Names of the things that ``move`` may touch.
+        pivots: Whether ``move`` leads the hand along the arc without turning it, with fingers so
+            loose that the held thing turns between them where it meets ``touches``.
         phase: Name of the step in labels.
         pace: Factor on the arm's speed.
     """
@@ -123,6 +126,7 @@ class Step(Strict):
     opening: float = Field(1.0, ge=0, le=1)
     carries: bool = False
     touches: tuple[str, ...] = ()
+    pivots: bool = False
     phase: str = Field(min_length=1)
     pace: float = Field(1.0, gt=0, le=1)
 
@@ -146,12 +150,14 @@ class Task(Strict):
         things: By name, in the order in which they are placed.
         program: Steps in order.
         success: Conditions, all of which must hold.
+        hand: What the arm must hold things with; None = either will do.
     """
 
     instruction: str
     things: dict[str, Thing]
     program: tuple[Step, ...] = Field(min_length=1)
     success: tuple[Success, ...] = Field(min_length=1)
+    hand: Literal["fingers", "suction"] | None = "fingers"
 
     @model_validator(mode="after")
     def _names_its_things(self) -> Task:
@@ -236,11 +242,20 @@ class ArmTask(RandomizerBase):
                     f"'{asset.partition('?')[0]}'; expected it among its assets (ids)"
                 )
         arm = self._find_arm(scene)
-        if assets.robot(arm.asset).gripper is None:
+        gripper = assets.robot(arm.asset).gripper
+        if gripper is None:
             raise ConfigError(
                 f"randomizers.{self.name}: arm '{arm.name}' ({arm.asset}) has no gripper; expected "
                 "a robot with one, such as franka_panda, robots/ur5e or robots/sawyer"
             )
+        hand = "fingers" if gripper.cup is None else "suction"
+        for name in self._possible_tasks():
+            if tasks()[name].hand not in (hand, None):
+                raise ConfigError(
+                    f"randomizers.{self.name}.task: '{name}' needs {tasks()[name].hand}, but arm "
+                    f"'{arm.name}' ({arm.asset}) has {hand}; expected another robot, such as "
+                    f"{_EXAMPLES[str(tasks()[name].hand)]}"
+                )
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with the things of a task, and an arm that has it to do."""
@@ -412,7 +427,13 @@ def _goals(
         frame = _frame(step, placed, arm)
         if step.verb == "move":
             waypoints = tuple(_motions(step, frame, latest_m))
-            yield ArmGoal("move", waypoints=waypoints, touches=touches, phase=step.phase)
+            yield ArmGoal(
+                "move",
+                waypoints=waypoints,
+                touches=touches,
+                pivots=step.pivots,
+                phase=step.phase,
+            )
             continue
         latest_m = (frame @ SE3(step.offset_m)).translation_m
         carried = step.carries or step.verb == "place"
