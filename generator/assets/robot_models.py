@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import combinations
 
-from gen_data.generator.assets.folder_index import RobotEntry
 from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.folder_index import RobotEntry
 from gen_data.generator.assets.robot_tools import tool_gripper, with_tool
 from gen_data.generator.assets.urdf import Urdf, read_urdf
 from gen_data.generator.core.asset_types import Gripper, RobotModel

@@ -131,4 +131,6 @@ def _link(name: str, *shapes: Shape) -> Link:
 
 
 def _fixed_joint(parent: str, child: str, T_parent_joint: SE3) -> Joint:
-    return Joint(f"{child}_joint", "fixed", parent, child, T_parent_joint, (1.0, 0.0, 0.0), 0.0, 0.0)
+    return Joint(
+        f"{child}_joint", "fixed", parent, child, T_parent_joint, (1.0, 0.0, 0.0), 0.0, 0.0
+    )

@@ -342,6 +342,13 @@ class ContactSpan(Span):
     forces_n: tuple[float, ...] = ()
     points_m: tuple[Vec3, ...] = ()
 
+    def at(self, time_s: float) -> tuple[float, Vec3]:
+        """Force and point at an instant of the span."""
+        # Times of steps are sums of floats.
+        number = int((time_s - self.start_s + 1e-6) / self.step_s)
+        number = max(0, min(number, len(self.forces_n) - 1))
+        return self.forces_n[number], self.points_m[number]
+
 
 @dataclass(frozen=True, slots=True)
 class Episode:

@@ -132,9 +132,7 @@ class BulletWorld:
             angularDamping=ANGULAR_DAMPING_PER_S,
             **self._here,
         )
-        self._solids[name] = _Solid(
-            number, shape, scale, T_body_center, mass_kg, friction
-        )
+        self._solids[name] = _Solid(number, shape, scale, T_body_center, mass_kg, friction)
         self._names[number] = name
 
     def add_jointed(

@@ -9,7 +9,7 @@ from gen_data.generator.assemble.pipeline_factory import open_pipeline
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import canonical_json
-from gen_data.randomizers.arm_task import tasks
+from gen_data.randomizers.arm_task_table import tasks
 
 pytest.importorskip("pybullet_data")
 

@@ -9,7 +9,8 @@ from gen_data.generator.config.distributions import Constant
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.scene import HAND, Articulation, ObjectGroup, Scene, SupportSurface
 from gen_data.generator.core.se3 import SE3
-from gen_data.randomizers.arm_task import ArmTask, Failures, Task, tasks
+from gen_data.randomizers.arm_task import ArmTask, Failures
+from gen_data.randomizers.arm_task_table import Task, tasks
 from tests.randomizers.doubles import FakeAssets, two_link_arm
 
 ARM = Articulation("arm", "two_link", 1, SE3((-0.5, 0.0, 0.74)), two_link_arm().home)

@@ -1,9 +1,9 @@
 """Demonstrations: an arm carries out its legs in physics, which tells what becomes of the bodies.
 
 The arm and what it holds move as planned; everything else is simulated. The fingers push what they
-meet, but carry nothing by friction: a held body is attached to the hand until the fingers open. While
-it pivots, the fingers are a hinge with friction, and contacts turn it. A suction cup holds a body
-only if it seals on it, and as long as its force is large enough.
+meet, but carry nothing by friction: a held body is attached to the hand until the fingers open.
+While it pivots, the fingers are a hinge with friction, and contacts turn it. A suction cup holds a
+body only if it seals on it, and as long as its force is large enough.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ _NORMAL = np.array([0.0, 0.0, 1.0])
 
 
 def is_sealed(world: World, body: str, T_world_grasp: SE3, cup: SuctionCup) -> bool:
-    """Whether a cup with this grasp frame touches a body all around its rim, and is normal to it."""
+    """Whether a cup with this grasp frame is normal to a body and touches it all around its rim."""
     depths_m = rim_depths_m(world, body, T_world_grasp, cup)
     if not bool((np.abs(depths_m) <= CONTACT_M).all()):
         return False
