@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal
 
-from pydantic import Field, WithJsonSchema, model_validator
+from pydantic import Field, model_validator
+from pydantic.config import JsonDict
 
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.config.base_model import Strict
@@ -40,8 +41,8 @@ _APART_M = 0.03
 _YAWS = 8
 """Rotations of a held object to try at its destination."""
 _LIFT_M = 0.0005
-_TASKS_SCHEMA = {"anyOf": [{"type": "string", "pattern": r"\.ya?ml$"}, {"type": "object"}]}
-"""A file name is replaced by the file's content before validation: see ``load_tasks``."""
+# A file name is replaced by the file's content before validation: see ``load_tasks``.
+_OR_A_FILE: JsonDict = {"type": ["object", "string"]}
 _EXAMPLES = {"fingers": "franka_panda", "suction": "franka_panda_suction"}
 
 
@@ -83,7 +84,7 @@ class ArmTask(RandomizerBase):
     type: Literal["arm_task"] = "arm_task"
     stage: Literal["scene"] = "scene"
     task: dist.Name = dist.Choice({"pick_and_place": 1.0})
-    tasks: Annotated[dict[str, Task], WithJsonSchema(_TASKS_SCHEMA)] = Field(default_factory=dict)
+    tasks: dict[str, Task] = Field(default_factory=dict, json_schema_extra=_OR_A_FILE)
     group: str = ""
     arm: str = ""
     failures: Failures = Failures()

@@ -335,6 +335,8 @@ def _add_body(
         # Of the bounding box, as Bullet's.
         squares = np.maximum(half_m, _FLAT_M) ** 2
         body.explicitinertial, body.mass = True, solid.mass_kg
+        # By default the centre of mass is at the position of the body in the world.
+        body.ipos, body.iquat = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
         body.inertia = solid.mass_kg / 3.0 * (squares.sum() - squares)
         if solid.joint is None:
             body.add_freejoint()

@@ -264,7 +264,7 @@ def _tube(rings: Array) -> Patch:
 
 
 def _turned(points: Array, seed: int, pose: str) -> Array:
-    """Points of the hand frame, mirrored if left, with the thumb up if it grasps, palm up if open."""
+    """Points of the hand frame, mirrored if left; thumb up if it grasps, palm up if open."""
     mirrored = points * np.array([1.0, -1.0, 1.0]) if is_left(seed) else points
     if pose == OPEN:
         return rotate(mirrored, "x", math.pi)
