@@ -114,9 +114,9 @@ class Success(Strict):
     measure: Measure
     body: str
     other: str = ""
+    ever: bool = False
     at_least: float | None = None
     at_most: float | None = None
-    ever: bool = False
 
 
 class Task(Strict):

@@ -8,7 +8,7 @@ import pytest
 
 from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.errors import AssetError, ConfigError
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import canonical_json
@@ -27,6 +27,8 @@ OWN = """nudge:
   success:
     - {measure: tilt, body: thing, at_least: 0, at_most: 0.1}
 """
+JOINTS = (("z", 0.0), ("y", 0.2), ("y", 0.4), ("z", 0.2), ("y", 0.2), ("z", 0.08))
+"""Axis of every joint of ``my_arm``, and its height above the one before [m]."""
 NONE_FAIL = ("randomizers.things.failures={}", "shared.robot=franka_panda")
 
 
@@ -114,11 +116,73 @@ def test_tasks_of_a_users_file_are_demonstrated(tmp_path: Path) -> None:
     assert arm.assignment is not None
     assert arm.assignment.instruction == "Nudge the red block."
     table.write_text(OWN.replace("at_least", "at_leest"))
-    with pytest.raises(ConfigError, match=r"(?s)mine.yaml:9:36: .*tasks.nudge.success\[0\].at_leest"):
+    with pytest.raises(
+        ConfigError, match=r"(?s)mine.yaml:9:36: .*tasks.nudge.success\[0\].at_leest"
+    ):
         load_config(str(config))
     table.unlink()
     with pytest.raises(ConfigError, match=r"config.yaml:4:27: tasks: there is no file of tasks"):
         load_config(str(config))
+
+
+def my_arm(limit: str = '<limit lower="-2.9" upper="2.9" velocity="2"/>') -> str:
+    """A URDF of boxes: six joints and a flange, but no hand."""
+    axes = {"y": "0 1 0", "z": "0 0 1"}
+    links, joints = ['<link name="link0"/>'], []
+    for k, (axis, rise_m) in enumerate(JOINTS):
+        next_m = JOINTS[k + 1][1] if k + 1 < len(JOINTS) else 0.04
+        box = (
+            f'<origin xyz="0 0 {0.5 * next_m}"/>'
+            f'<geometry><box size="0.05 0.05 {max(0.03, next_m - 0.06)}"/></geometry>'
+        )
+        links.append(
+            f'<link name="link{k + 1}"><visual>{box}</visual><collision>{box}</collision></link>'
+        )
+        joints.append(
+            f'<joint name="joint{k + 1}" type="revolute"><parent link="link{k}"/>'
+            f'<child link="link{k + 1}"/><origin xyz="0 0 {rise_m}"/>'
+            f'<axis xyz="{axes[axis]}"/>{limit}</joint>'
+        )
+    return f'<robot name="my_arm">{"".join(links + joints)}</robot>'
+
+
+def own_arm(folder: Path, urdf: str) -> Path:
+    """A configuration with a user's arm, on whose flange fingers are made."""
+    (folder / "arms").mkdir()
+    (folder / "arms/my_arm.urdf").write_text(urdf)
+    (folder / "arms/assets.yaml").write_text(
+        "robots:\n  - id: my_arm\n    file: my_arm.urdf\n"
+        "    home: {joint2: 0.3, joint3: 1.2, joint5: 1.6}\n"
+        "    tool: {kind: fingers, flange: link6, offset_m: 0.04}\n"
+    )
+    config = folder / "config.yaml"
+    config.write_text(
+        "extends: arm_tasks\nassets: {folders: [arms]}\n"
+        "shared: {robot: {choice: {user/my_arm: 1}}, task: {choice: {stack: 1}}}\n"
+        "randomizers:\n  - {name: things, failures: {}}\n"
+    )
+    return config
+
+
+def test_an_arm_of_a_user_stacks_with_fingers_made_for_it(tmp_path: Path) -> None:
+    """From a URDF of six joints; physics confirms the stack."""
+    config = own_arm(tmp_path, my_arm())
+    with open_pipeline(load_config(str(config), overrides=SMALL)) as pipeline:
+        (arm,) = pipeline.accepted_scene(0).scene.articulations
+    assert arm.asset == "user/my_arm"
+    assert len(arm.joint_positions) == len(JOINTS) + 2
+    assert arm.episode is not None
+    assert arm.episode.succeeded
+
+
+def test_an_arm_of_a_user_without_limits_is_refused_by_its_joint(tmp_path: Path) -> None:
+    """Before anything is drawn."""
+    config = own_arm(tmp_path, my_arm(limit=""))
+    with (
+        pytest.raises((AssetError, ConfigError), match="joint 'joint1' has no limits"),
+        open_pipeline(load_config(str(config), overrides=SMALL)),
+    ):
+        pass
 
 
 def test_a_demonstration_alone_equals_the_one_after_others() -> None:
