@@ -13,7 +13,9 @@ Features: ``observation.state``, the positions of all movable joints [rad or m];
 ``observation.images.<camera>``. Demonstrations of tasks (randomizer ``arm_task``) add
 ``observation.ee_pose``, the grasp frame in the frame of the arm's base [m, quaternion w x y z];
 ``observation.gripper`` and ``action.gripper``, its opening from 0 to 1; and texts
-``annotation.{phase,held,contacts,failure}`` with ``annotation.succeeded``. ``timestamp`` is the
+``annotation.{phase,held,contacts,failure}`` with ``annotation.succeeded``. Of every contact, in
+the order of ``contacts`` and separated by commas, ``annotation.contact_forces_n`` has the normal
+force and ``annotation.contact_points_m`` the point ``x y z`` in the world. ``timestamp`` is the
 frame's number divided by the frame rate.
 Joints are named in ``info.json``, in the order of the robot's description.
 
@@ -79,6 +81,8 @@ LABELS = {
     "annotation.phase": "string",
     "annotation.held": "string",
     "annotation.contacts": "string",
+    "annotation.contact_forces_n": "string",
+    "annotation.contact_points_m": "string",
     "annotation.succeeded": "bool",
     "annotation.failure": "string",
 }
@@ -213,8 +217,10 @@ def _labels(step: DemonstrationStep) -> dict[str, Any]:
     """Features of a demonstration at one instant."""
     pose = (*step.T_base_grasp.translation_m, *step.T_base_grasp.quaternion_wxyz)
     contacts = ", ".join(step.contacts)
-    values = (pose, step.opening, step.opening_action, step.phase, step.held, contacts,
-              step.succeeded, step.failure)  # fmt: skip
+    forces = ", ".join(f"{force_n:g}" for force_n in step.contact_forces_n)
+    points = ", ".join(f"{x:g} {y:g} {z:g}" for x, y, z in step.contact_points_m)
+    values = (pose, step.opening, step.opening_action, step.phase, step.held, contacts, forces,
+              points, step.succeeded, step.failure)  # fmt: skip
     return dict(zip(LABELS, values, strict=True))
 
 

@@ -12,7 +12,8 @@ Steps are lists of equal length under ``steps/``: ``observation/image/<camera>``
 ``discount``, ``language_instruction``. Demonstrations of tasks also have ``observation/ee_pose``
 (x, y, z, qw, qx, qy, qz of the grasp frame in the frame of the arm's base),
 ``observation/gripper``, ``action_gripper``, ``phase``, ``held``, ``contacts`` (separated by
-commas), and of the whole episode ``episode_metadata/{succeeded,failure,sequence}``. Vectors of all
+commas, as ``contact_forces_n`` and ``contact_points_m``, which are ``x y z``), and of the whole
+episode ``episode_metadata/{succeeded,failure,sequence}``. Vectors of all
 steps follow one another.
 
 Reference: Ramos et al., RLDS: an ecosystem to generate, share and use datasets in reinforcement
@@ -50,6 +51,8 @@ TEXTS = {
     "steps/phase": "annotation.phase",
     "steps/held": "annotation.held",
     "steps/contacts": "annotation.contacts",
+    "steps/contact_forces_n": "annotation.contact_forces_n",
+    "steps/contact_points_m": "annotation.contact_points_m",
 }
 """Keys of the record, and of the frame's line or its labels."""
 _REWARDS = ("steps/reward", "steps/discount")

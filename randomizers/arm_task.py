@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
+from pydantic.config import JsonDict
 
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.config.base_model import Strict
-from gen_data.generator.config.data_files import load_data
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.members import Member, add_members, remove_members
@@ -25,13 +23,13 @@ from gen_data.generator.core.scene import (
     BodyJoint,
     Condition,
     FailureKind,
-    Measure,
     ObjectGroup,
     Scene,
 )
 from gen_data.generator.core.se3 import IDENTITY, SE3, Vec3
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.arm_configuration import hand_pose
+from gen_data.randomizers.arm_task_table import Step, Success, Task, Thing, tasks
 from gen_data.randomizers.base import RandomizerBase, check_known
 from gen_data.randomizers.placement import half_extents_m
 
@@ -43,133 +41,9 @@ _APART_M = 0.03
 _YAWS = 8
 """Rotations of a held object to try at its destination."""
 _LIFT_M = 0.0005
-
-Span = tuple[float, float]
-
-
-class Thing(Strict):
-    """A thing of a task.
-
-    Attributes:
-        assets: Its name in instructions, and the id of its asset; an id without parameters is a
-            family of variants. One of several is drawn.
-        x_m, y_m: Bounds of its middle: ahead of the arm's base and to its left; from ``near``, if
-            given, along its axes.
-        yaw_deg: Bounds of its rotation about Z.
-        near: Name of another thing that it is placed by, at ``z_m`` from that one's bottom.
-        z_m: Height of its bottom above the table, or above the bottom of ``near``.
-        mass_kg: 0 = fixed; None = the asset's own.
-        joint: Joint of a part that moves, in the frame of the part.
-    """
-
-    assets: dict[str, str] = Field(min_length=1)
-    x_m: Span = (0.35, 0.6)
-    y_m: Span = (-0.25, 0.25)
-    yaw_deg: Span = (-180.0, 180.0)
-    near: str = ""
-    z_m: float = 0.0
-    mass_kg: float | None = None
-    joint: Joint | None = None
-
-
-class Joint(Strict):
-    """A joint of a thing; see ``BodyJoint``."""
-
-    kind: Literal["prismatic", "revolute"]
-    axis: Vec3
-    anchor_m: Vec3 = (0.0, 0.0, 0.0)
-    limits: Span
-    friction: float = 1.0
-    stiffness: float = 0.0
-
-
-class Step(Strict):
-    """One step of a program: a verb and what it refers to.
-
-    Attributes:
-        verb: ``grasp`` lifts ``at``. ``place`` puts the held thing down on top of ``at``.
-            ``reach`` takes the hand, or with ``carries`` the held thing, to a point above the top
-            of ``at``, around all obstacles. ``move`` moves the hand along straight lines or an
-            arc, and may touch and push. ``grip`` opens or closes the fingers.
-        at: Name of a thing.
-        along: Thing that the X axis of the step's frame points to, horizontally; ``own`` = the X
-            axis of ``at``; empty = away from the arm. Z is up.
-        carries: Whether ``reach`` takes the held thing there. It keeps its rotation or turns by
-            eighths; with ``yaws``, its X axis is that of the step's frame, or turned evenly.
-        offset_m: Of the goal of ``reach``, in the step's frame.
-        yaw_deg: Of the hand against that frame; at 0 the fingers open along its Y.
-        yaws: Number of evenly spaced rotations to try; 0 = two of the hand.
-        by_m: Displacements of ``move``, each from its beginning, in the step's frame.
-        turn_deg: Turn during ``move``, about ``axis`` through ``pivot_m``, after displacements.
-        axis: Of the turn, in the step's frame.
-        pivot_m: Point of the axis, from the top of ``at``; None = the hand's goal of the latest
-            ``reach``.
-        opening: Of the gripper: 0 closed, 1 open.
-        touches: Names of the things that ``move`` may touch.
-        phase: Name of the step in labels.
-        pace: Factor on the arm's speed.
-    """
-
-    verb: Literal["reach", "move", "grasp", "place", "grip"]
-    at: str = ""
-    along: str = ""
-    offset_m: Vec3 = (0.0, 0.0, 0.0)
-    yaw_deg: float = 0.0
-    yaws: int = Field(0, ge=0)
-    by_m: tuple[Vec3, ...] = ()
-    turn_deg: float = 0.0
-    axis: Vec3 = (0.0, 0.0, 1.0)
-    pivot_m: Vec3 | None = None
-    opening: float = Field(1.0, ge=0, le=1)
-    carries: bool = False
-    touches: tuple[str, ...] = ()
-    phase: str = Field(min_length=1)
-    pace: float = Field(1.0, gt=0, le=1)
-
-
-class Success(Strict):
-    """A condition of success; see ``Condition``. Angles of ``tilt`` and ``travel`` in radians."""
-
-    measure: Measure
-    body: str
-    other: str = ""
-    at_least: float | None = None
-    at_most: float | None = None
-    ever: bool = False
-
-
-class Task(Strict):
-    """An entry of the table.
-
-    Attributes:
-        instruction: Sentence with names of things in braces.
-        things: By name, in the order in which they are placed.
-        program: Steps in order.
-        success: Conditions, all of which must hold.
-    """
-
-    instruction: str
-    things: dict[str, Thing]
-    program: tuple[Step, ...] = Field(min_length=1)
-    success: tuple[Success, ...] = Field(min_length=1)
-
-    @model_validator(mode="after")
-    def _names_its_things(self) -> Task:
-        used = [step.at for step in self.program] + [t.near for t in self.things.values()]
-        used += [name for step in self.program for name in (*step.touches, step.along)]
-        used += [name for c in self.success for name in (c.body, c.other)]
-        unknown = sorted({*used} - {*self.things, "", "own", HAND})
-        if unknown:
-            raise ValueError(f"there is no thing '{unknown[0]}'")
-        return self
-
-
-@cache
-def tasks() -> Mapping[str, Task]:
-    """The table of tasks, by name."""
-    plain = load_data(__package__, "arm_tasks")
-    # Strict models take lists for tuples from JSON only.
-    return {name: Task.model_validate_json(json.dumps(entry)) for name, entry in plain.items()}
+# A file name is replaced by the file's content before validation: see ``load_tasks``.
+_OR_A_FILE: JsonDict = {"type": ["object", "string"]}
+_EXAMPLES = {"fingers": "franka_panda", "suction": "franka_panda_suction"}
 
 
 class Failures(Strict):
@@ -199,7 +73,9 @@ class ArmTask(RandomizerBase):
 
     Attributes:
         group: Name of the template's object group; empty = the randomizer's own name.
-        task: Name of a task of the table ``arm_tasks.yaml``.
+        task: Name of a task.
+        tasks: Name of a YAML file of tasks beside the configuration, besides those of
+            ``arm_tasks.yaml``; of the same name, they replace them.
         arm: Name of the arm; empty = the first one.
         failures: Shares of demonstrations that fail on purpose, of tasks that grasp.
         speed: Fraction of the joints' speed and acceleration limits to use.
@@ -208,6 +84,7 @@ class ArmTask(RandomizerBase):
     type: Literal["arm_task"] = "arm_task"
     stage: Literal["scene"] = "scene"
     task: dist.Name = dist.Choice({"pick_and_place": 1.0})
+    tasks: dict[str, Task] = Field(default_factory=dict, json_schema_extra=_OR_A_FILE)
     group: str = ""
     arm: str = ""
     failures: Failures = Failures()
@@ -216,10 +93,11 @@ class ArmTask(RandomizerBase):
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
         """Ids of the assets of all tasks that it can draw."""
         del assets
+        table = self._table()
         found = {
             asset
             for name in self._possible_tasks()
-            for thing in tasks()[name].things.values()
+            for thing in table[name].things.values()
             for chosen in thing.assets.values()
             for asset in _variants(chosen)
         }
@@ -236,17 +114,28 @@ class ArmTask(RandomizerBase):
                     f"'{asset.partition('?')[0]}'; expected it among its assets (ids)"
                 )
         arm = self._find_arm(scene)
-        if assets.robot(arm.asset).gripper is None:
+        gripper = assets.robot(arm.asset).gripper
+        if gripper is None:
             raise ConfigError(
                 f"randomizers.{self.name}: arm '{arm.name}' ({arm.asset}) has no gripper; expected "
                 "a robot with one, such as franka_panda, robots/ur5e or robots/sawyer"
             )
+        hand = "fingers" if gripper.cup is None else "suction"
+        for name in self._possible_tasks():
+            needed = self._table()[name].hand
+            if needed not in (hand, None):
+                raise ConfigError(
+                    f"randomizers.{self.name}.task: '{name}' needs {needed}, but arm '{arm.name}' "
+                    f"({arm.asset}) has {hand}; expected another robot, such as "
+                    f"{_EXAMPLES[str(needed)]}"
+                )
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with the things of a task, and an arm that has it to do."""
         name = self.task.draw(rng)
-        check_known(name, tuple(tasks()), f"randomizers.{self.name}.task: unknown task")
-        task, arm = tasks()[name], self._find_arm(scene)
+        table, arm = self._table(), self._find_arm(scene)
+        check_known(name, tuple(table), f"randomizers.{self.name}.task: unknown task")
+        task = table[name]
         speed, failure = round(self.speed.draw(rng), 4), self._draw_failure(task, rng)
         group = self._find_group(scene)
         placed = self._place_things(task, arm, assets, rng)
@@ -275,8 +164,12 @@ class ArmTask(RandomizerBase):
     def _possible_tasks(self) -> tuple[str, ...]:
         names = tuple(str(name) for name in self.task.outcomes())
         for name in names:
-            check_known(name, tuple(tasks()), f"randomizers.{self.name}.task: unknown task")
+            check_known(name, tuple(self._table()), f"randomizers.{self.name}.task: unknown task")
         return names
+
+    def _table(self) -> dict[str, Task]:
+        """The shipped tasks and the user's own, by name."""
+        return {**tasks(), **self.tasks}
 
     def _find_group(self, scene: Scene) -> ObjectGroup:
         name, known = self.group or self.name, {group.name: group for group in scene.groups}
@@ -412,7 +305,13 @@ def _goals(
         frame = _frame(step, placed, arm)
         if step.verb == "move":
             waypoints = tuple(_motions(step, frame, latest_m))
-            yield ArmGoal("move", waypoints=waypoints, touches=touches, phase=step.phase)
+            yield ArmGoal(
+                "move",
+                waypoints=waypoints,
+                touches=touches,
+                pivots=step.pivots,
+                phase=step.phase,
+            )
             continue
         latest_m = (frame @ SE3(step.offset_m)).translation_m
         carried = step.carries or step.verb == "place"

@@ -20,6 +20,7 @@ from gen_data.generator.config.yaml_scalars import quote_value
 from gen_data.generator.config.yaml_tree import Node, load_yaml, parse_yaml, with_override
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.sensors.lidar.datasheets import load_sheets
+from gen_data.randomizers.arm_task_table import load_tasks
 
 LISTS = ("randomizers", "sensors", "annotations", "exporters")
 """Lists of plug-ins of a configuration, besides its elements."""
@@ -70,15 +71,18 @@ def resolve_document(
         resolved = with_override(resolved, path.strip(), value.strip())
     resolved = replace_old_words(resolved)
     refuse_moved_keys(resolved)
-    return _without_randomizers(_with_datasheets(resolved), without)
+    return _without_randomizers(_with_files(resolved), without)
 
 
-def _with_datasheets(document: Node) -> Node:
-    """Replace references to datasheets in sensors by their contents."""
-    sensors = document.entries["sensors"]
+def _with_files(document: Node) -> Node:
+    """Replace names of data sheets in sensors, and of tasks in randomizers, by the content."""
+    sensors, randomizers = document.entries["sensors"], document.entries["randomizers"]
     if isinstance(sensors.content, tuple):
         sensors = sensors.with_children(lambda _, sensor: load_sheets(sensor))
-    return replace(document, content={**document.entries, "sensors": sensors})
+    if isinstance(randomizers.content, tuple):
+        randomizers = randomizers.with_children(lambda _, randomizer: load_tasks(randomizer))
+    content = {**document.entries, "sensors": sensors, "randomizers": randomizers}
+    return replace(document, content=content)
 
 
 def load_config_document(name: str) -> Node:

@@ -47,10 +47,10 @@ from gen_data.generator.assets.parsing import (
     parse_surroundings,
     unpack_value,
 )
-from gen_data.generator.assets.robot_models import robot_model
+from gen_data.generator.assets.robot_models import robot_model, robot_urdf
 from gen_data.generator.assets.sandbox import run_sandboxed
 from gen_data.generator.assets.texture_maps import compose_texture, find_maps
-from gen_data.generator.assets.urdf import Urdf, read_urdf
+from gen_data.generator.assets.urdf import Urdf
 from gen_data.generator.assets.usd_stages import is_stage
 from gen_data.generator.core.asset_types import (
     Asset,
@@ -289,7 +289,8 @@ class FileLibrary:
 
     def _urdf(self, one: IndexedAsset) -> Urdf:
         if one.asset_id not in self._urdfs:
-            self._urdfs[one.asset_id] = read_urdf(Folder(one.root), one.entry.file)
+            assert isinstance(one.entry, RobotEntry)
+            self._urdfs[one.asset_id] = robot_urdf(Folder(one.root), one.entry)
         return self._urdfs[one.asset_id]
 
     def _asset(self, one: IndexedAsset) -> Asset:

@@ -275,6 +275,20 @@ class GripperEntry(Strict):
     """Limit of the finger joints at which the gripper is open (Robotiq: lower)."""
 
 
+class ToolEntry(Strict):
+    """A gripper made by code, on the flange of an arm; see ``robot_tools``."""
+
+    kind: Literal["fingers", "suction"]
+    flange: str
+    """Link whose Z points out of the arm."""
+    offset_m: float = 0.0
+    """From the flange link's origin to the face that the tool is screwed to, along Z."""
+    yaw_deg: float = 0.0
+    """Of the tool about Z; at 0 its fingers open along the flange's Y."""
+    instead_of: str = ""
+    """Link that is left out, with all below it; empty = none."""
+
+
 class RobotEntry(Origin):
     """A robot."""
 
@@ -286,6 +300,8 @@ class RobotEntry(Origin):
     home: dict[str, float] = Field(default_factory=dict)
     """Position [rad or m] per joint; by default 0, or mid-range if 0 is outside the limits."""
     gripper: GripperEntry | None = None
+    tool: ToolEntry | None = None
+    """Instead of a gripper in its URDF."""
     touching: tuple[tuple[str, str], ...] = ()
     """Link pairs in permanent contact, besides neighbours."""
     palette: bool = False
@@ -293,6 +309,12 @@ class RobotEntry(Origin):
     max_faces: Annotated[int, Field(ge=100)] = 2_000
     """Per link."""
     materials: dict[str, Finish] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _has_one_hand(self) -> RobotEntry:
+        if self.gripper is not None and self.tool is not None:
+            raise ValueError("expected either gripper or tool")
+        return self
 
     def files(self) -> tuple[str, ...]:
         """The files that it names."""

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import combinations
 
+from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.folder_index import RobotEntry
-from gen_data.generator.assets.urdf import Urdf
+from gen_data.generator.assets.robot_tools import tool_gripper, with_tool
+from gen_data.generator.assets.urdf import Urdf, read_urdf
 from gen_data.generator.core.asset_types import Gripper, RobotModel
 from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.kinematics import POSITION_DECIMALS, finger_links, positions_of
@@ -14,6 +16,16 @@ from gen_data.generator.core.se3 import SE3
 
 _TOLERANCE = 10.0**-POSITION_DECIMALS
 """Tolerance when comparing positions [rad or m]."""
+
+
+def robot_urdf(folder: Folder, entry: RobotEntry) -> Urdf:
+    """Links and joints of a robot with its tool.
+
+    Raises:
+        AssetError: its description is malformed, or has no such flange.
+    """
+    urdf = read_urdf(folder, entry.file)
+    return with_tool(urdf, entry.tool, str(folder.root / entry.file)) if entry.tool else urdf
 
 
 def robot_model(robot_id: str, urdf: Urdf, entry: RobotEntry, place: str) -> RobotModel:
@@ -81,6 +93,8 @@ def _home_positions(urdf: Urdf, entry: RobotEntry, place: str) -> tuple[float, .
 
 def _make_gripper(entry: RobotEntry) -> Gripper | None:
     gripper = entry.gripper
+    if entry.tool is not None:
+        return tool_gripper(entry.tool)
     if gripper is None:
         return None
     grasp = SE3((0.0, 0.0, gripper.grasp_offset_m))

@@ -213,6 +213,19 @@ class Joint:
 
 
 @dataclass(frozen=True, slots=True)
+class SuctionCup:
+    """A vacuum cup, whose rim is a circle about the grasp frame's Z, in its XY plane.
+
+    Attributes:
+        radius_m: Of the rim.
+        force_n: Largest force that it holds; a larger one tears the object off.
+    """
+
+    radius_m: float
+    force_n: float
+
+
+@dataclass(frozen=True, slots=True)
 class Gripper:
     """How a robot holds things.
 
@@ -223,6 +236,7 @@ class Gripper:
         finger_joints: Joints that open the gripper, each over its whole range.
         stroke_m: Distance between the fingers when fully open; 0 is closed.
         open_at: Limit of the finger joints at which the gripper is fully open.
+        cup: Holds by vacuum instead of fingers; None = it has fingers.
     """
 
     link: str
@@ -230,6 +244,7 @@ class Gripper:
     finger_joints: tuple[str, ...]
     stroke_m: float
     open_at: Literal["lower", "upper"] = "upper"
+    cup: SuctionCup | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from gen_data.generator.core.asset_types import RobotModel
 from gen_data.generator.core.kinematics import gripper_opening, link_poses
 from gen_data.generator.core.scene import Articulation, Episode, Span
-from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.se3 import SE3, Vec3
+
+AnySpan = TypeVar("AnySpan", bound=Span)
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,10 +22,13 @@ class DemonstrationStep:
         positions: Of all movable joints [rad or m].
         action: Their positions one step later, which a position controller would be given.
         T_base_grasp: Pose of the grasp frame; of the root without a gripper.
-        opening, opening_action: Of the gripper now and one step later, 0 closed and 1 open.
+        opening, opening_action: Of the gripper now and one step later, 0 closed and 1 open; of a
+            suction cup 0 while it holds something and else 1.
         phase: Name of the part of the program.
         held: Name of the body in the hand; empty = none.
         contacts: Pairs of bodies that touch, as in ``Episode``.
+        contact_forces_n: Normal force of each of them, as in ``ContactSpan``.
+        contact_points_m: Point of each of them in the world.
         succeeded: Whether physics confirmed the whole demonstration.
         failure: Why it failed; empty = it did not.
     """
@@ -35,6 +41,8 @@ class DemonstrationStep:
     phase: str
     held: str
     contacts: tuple[str, ...]
+    contact_forces_n: tuple[float, ...]
+    contact_points_m: tuple[Vec3, ...]
     succeeded: bool
     failure: str
 
@@ -46,23 +54,30 @@ def demonstration_step(
 
     After the end of the demonstration the arm rests, and the labels of its end hold.
     """
-    episode = arm.episode
+    episode, hand = arm.episode, robot.gripper
     if episode is None:
         return None
     positions, action = joint_positions(arm, time_s), joint_positions(arm, time_s + step_s)
-    at_s = min(time_s, _end_s(episode) - 1e-3)
+    end_s = _end_s(episode) - 1e-3
+    at_s, next_s = min(time_s, end_s), min(time_s + step_s, end_s)
+    contacts = _spans_at(episode.contacts, at_s)
+    touching = [contact.at(at_s) for contact in contacts]
+    openings = [round(gripper_opening(robot, q), 6) for q in (positions, action)]
+    if hand is not None and hand.cup is not None:
+        openings = [0.0 if _spans_at(episode.held, t) else 1.0 for t in (at_s, next_s)]
     poses = link_poses(robot, SE3(), positions)
-    hand = robot.gripper
     T_base_grasp = poses[hand.link] @ hand.T_link_grasp if hand else poses[robot.links[0]]
     return DemonstrationStep(
         positions,
         action,
         T_base_grasp.rounded(),
-        round(gripper_opening(robot, positions), 6),
-        round(gripper_opening(robot, action), 6),
-        next(iter(_labels_at(episode.phases, at_s)), ""),
-        next(iter(_labels_at(episode.held, at_s)), ""),
-        tuple(_labels_at(episode.contacts, at_s)),
+        openings[0],
+        openings[1],
+        next((span.label for span in _spans_at(episode.phases, at_s)), ""),
+        next((span.label for span in _spans_at(episode.held, at_s)), ""),
+        tuple(contact.label for contact in contacts),
+        tuple(force_n for force_n, _ in touching),
+        tuple(point_m for _, point_m in touching),
         episode.succeeded,
         episode.failure,
     )
@@ -79,6 +94,6 @@ def _end_s(episode: Episode) -> float:
     return max((span.end_s for span in episode.phases), default=0.0)
 
 
-def _labels_at(spans: Sequence[Span], time_s: float) -> list[str]:
+def _spans_at(spans: Sequence[AnySpan], time_s: float) -> list[AnySpan]:
     # Times of steps are sums of floats: a span begins a little earlier than it says.
-    return [s.label for s in spans if s.start_s - 1e-6 <= time_s < s.end_s - 1e-6]
+    return [s for s in spans if s.start_s - 1e-6 <= time_s < s.end_s - 1e-6]

@@ -221,6 +221,8 @@ class ArmGoal:
         carries: Whether candidates of ``reach`` are, as for ``place``, points below the held
             object and its rotation about Z, instead of poses of the hand.
         touches: Names of the bodies that a ``move`` may touch and push.
+        pivots: Whether a ``move`` leads the hand's origin along the waypoints without turning the
+            hand; what it holds turns about the line between the fingers as contacts make it.
         phase: Name of this part of a demonstration in labels; empty = the kind.
     """
 
@@ -234,6 +236,7 @@ class ArmGoal:
     waypoints: tuple[SE3, ...] = ()
     carries: bool = False
     touches: tuple[str, ...] = ()
+    pivots: bool = False
     phase: str = ""
 
 
@@ -323,6 +326,31 @@ class Span:
 
 
 @dataclass(frozen=True, slots=True)
+class ContactSpan(Span):
+    """A time during which two bodies touch.
+
+    Attributes:
+        label: Names of both, sorted, with `` + `` between them.
+        step_s: Time between the values of ``forces_n`` and ``points_m``, of which the first one
+            is that at ``start_s``.
+        forces_n: Sum of the normal forces that the engine found between them; 0 where it pushed
+            neither: what a hand holds moves as planned.
+        points_m: Middle of their contact points in the world.
+    """
+
+    step_s: float = 0.0
+    forces_n: tuple[float, ...] = ()
+    points_m: tuple[Vec3, ...] = ()
+
+    def at(self, time_s: float) -> tuple[float, Vec3]:
+        """Force and point at an instant of the span."""
+        # Times of steps are sums of floats.
+        number = int((time_s - self.start_s + 1e-6) / self.step_s)
+        number = max(0, min(number, len(self.forces_n) - 1))
+        return self.forces_n[number], self.points_m[number]
+
+
+@dataclass(frozen=True, slots=True)
 class Episode:
     """A simulated demonstration of an Assignment.
 
@@ -331,15 +359,14 @@ class Episode:
         failure: Why it failed; empty if it succeeded.
         phases: Parts of the program, one after the other.
         held: Times at which a body is in the hand; the label is its name.
-        contacts: Times at which two bodies touch, one of them in motion or of the arm; the label
-            has both names, sorted, with `` + `` between them.
+        contacts: Times at which two bodies touch, one of them in motion or of the arm.
     """
 
     succeeded: bool
     failure: FailureKind = ""
     phases: tuple[Span, ...] = ()
     held: tuple[Span, ...] = ()
-    contacts: tuple[Span, ...] = ()
+    contacts: tuple[ContactSpan, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

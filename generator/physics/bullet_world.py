@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import weakref
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from gen_data.generator.core.processes import silence_stdio
@@ -21,6 +21,7 @@ from gen_data.generator.physics.world import (
     ANGULAR_DAMPING_PER_S,
     GRAVITY_M_S2,
     ROLLING_FRICTION_SHARE,
+    Contact,
     joint_position,
     jointed_pose,
 )
@@ -38,6 +39,8 @@ class _Solid:
     shape: CollisionShape
     scale: float
     T_body_center: SE3
+    mass_kg: float
+    friction: float
     joint: BodyJoint | None = None
     T_world_home: SE3 = IDENTITY
 
@@ -129,7 +132,7 @@ class BulletWorld:
             angularDamping=ANGULAR_DAMPING_PER_S,
             **self._here,
         )
-        self._solids[name] = _Solid(number, shape, scale, T_body_center)
+        self._solids[name] = _Solid(number, shape, scale, T_body_center, mass_kg, friction)
         self._names[number] = name
 
     def add_jointed(
@@ -177,8 +180,32 @@ class BulletWorld:
         pybullet.setJointMotorControl2(
             number, 0, pybullet.VELOCITY_CONTROL, force=joint.friction, **self._here
         )
-        self._solids[name] = _Solid(number, shape, 1.0, T_body_center, joint, T_world_body)
+        self._solids[name] = _Solid(
+            number, shape, 1.0, T_body_center, mass_kg, friction, joint, T_world_body
+        )
         self._names[number] = name
+
+    def hinge(self, name: str, joint: BodyJoint) -> None:
+        """Let a loose body move along a joint only, from its present pose on, at rest."""
+        solid, pose = self._solids[name], self.pose(name)
+        self.remove(name)
+        self.add_jointed(name, solid.shape, pose, joint, mass_kg=solid.mass_kg, friction=0.0)
+        self._solids[name] = replace(self._solids[name], friction=solid.friction)
+
+    def carry(self, name: str, T_world_home: SE3) -> None:
+        """Move the joint of a body; position and speed of the joint remain."""
+        solid = self._solids[name]
+        assert solid.joint is not None
+        position, orientation = _bullet_pose(T_world_home @ SE3(solid.joint.anchor_m))
+        pybullet.resetBasePositionAndOrientation(solid.number, position, orientation, **self._here)
+        self._solids[name] = replace(solid, T_world_home=T_world_home)
+        self._bounds.pop(name, None)
+
+    def unhinge(self, name: str) -> None:
+        """Make a jointed body loose, at its present pose and at rest."""
+        solid, pose = self._solids[name], self.pose(name)
+        self.remove(name)
+        self.add(name, solid.shape, pose, mass_kg=solid.mass_kg, friction=solid.friction)
 
     def remove(self, name: str) -> None:
         """Remove a body."""
@@ -250,11 +277,22 @@ class BulletWorld:
         linear, angular = pybullet.getBaseVelocity(self._solids[name].number, **self._here)
         return math.dist(linear, (0.0, 0.0, 0.0)), math.dist(angular, (0.0, 0.0, 0.0))
 
-    def contacts(self) -> list[tuple[str, str, float]]:
-        """All pairs of bodies in contact and their gap [m], negative if they overlap."""
+    def mass_kg(self, name: str) -> float:
+        """Mass of a body; 0 = it is static."""
+        return self._solids[name].mass_kg
+
+    def hits_m(self, name: str, origins_m: Array, direction: Array) -> Array:
+        """Distances [n] from points [n, 3] to a body along a unit vector [3]; inf = missed."""
+        solid = self._solids[name]
+        return solid.shape.hits_m(self._center(solid), solid.scale, origins_m, direction)
+
+    def contacts(self) -> list[Contact]:
+        """All points at which bodies touch, one of which can move."""
         pybullet.performCollisionDetection(**self._here)
-        points = pybullet.getContactPoints(**self._here)
-        return [(self._names[p[1]], self._names[p[2]], float(p[8])) for p in points]
+        return [
+            Contact(self._names[p[1]], self._names[p[2]], float(p[8]), float(p[9]), tuple(p[6]))
+            for p in pybullet.getContactPoints(**self._here)
+        ]
 
     def _center(self, solid: _Solid) -> SE3:
         if solid.joint is not None:

@@ -109,6 +109,36 @@ class CollisionShape:
             first = last + 1
         return "\n".join(lines) + "\n"
 
+    @cached_property
+    def _planes(self) -> list[Array]:
+        """Normal and offset [n, 4] of the faces of every part that is not flat."""
+        from scipy.spatial import ConvexHull, QhullError
+
+        planes = []
+        for hull in self.hulls:
+            with contextlib.suppress(QhullError):
+                planes.append(ConvexHull(hull.vertices_m).equations)
+        return planes
+
+    def hits_m(
+        self, T_world_center: SE3, scale: float, origins_m: Array, direction: Array
+    ) -> Array:
+        """Distances [n] from points [n, 3] along a unit vector [3]; inf = missed, 0 = inside."""
+        inverse = T_world_center.inverse()
+        origins, along = inverse.apply(origins_m) / scale, inverse.rotate(direction)
+        nearest = np.full(len(origins), np.inf)
+        for planes in self._planes:
+            heights = np.einsum("nk,pk->np", origins, planes[:, :3]) + planes[:, 3]
+            rates = np.broadcast_to(np.einsum("pk,k->p", planes[:, :3], along), heights.shape)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                crossings = -heights / rates
+            enters = np.where(rates < 0.0, crossings, 0.0).max(axis=1, initial=0.0)
+            leaves = np.where(rates > 0.0, crossings, np.inf).min(axis=1, initial=np.inf)
+            beside = ((rates == 0.0) & (heights > 0.0)).any(axis=1)
+            hits = (enters <= leaves) & ~beside
+            nearest = np.where(hits, np.minimum(nearest, enters), nearest)
+        return nearest * scale
+
     def bounds_m(self, T_world_center: SE3, scale: float) -> tuple[Array, Array]:
         """Low and high corner in the world [m] with the centre of mass at a pose."""
         points = T_world_center.apply(self.vertices_m * scale)

@@ -25,6 +25,7 @@ from gen_data.generator.physics.world import (
     GRAVITY_M_S2,
     JOINT_DAMPING_S,
     ROLLING_FRICTION_SHARE,
+    Contact,
     joint_position,
     jointed_pose,
 )
@@ -55,6 +56,7 @@ class _Solid:
     geoms: tuple[int, ...] = ()
     joint: BodyJoint | None = None
     T_world_home: SE3 = field(default_factory=SE3)
+    is_smooth: bool = False
 
     @property
     def T_body_center(self) -> SE3:  # noqa: N802
@@ -139,6 +141,39 @@ class MujocoWorld:
         solid = self._solids[name]
         solid.joint, solid.T_world_home = joint, T_world_body
 
+    def hinge(self, name: str, joint: BodyJoint) -> None:
+        """Let a loose body move along a joint only, from its present pose on, at rest."""
+        self._suspend()
+        solid = self._solids[name]
+        solid.joint, solid.T_world_home, solid.velocity = joint, self.pose(name), (0.0,) * 6
+        solid.is_smooth = True
+
+    def carry(self, name: str, T_world_home: SE3) -> None:
+        """Move the joint of a body; position and speed of the joint remain."""
+        solid = self._solids[name]
+        assert solid.joint is not None
+        position = joint_position(solid.joint, solid.T_world_home, self.pose(name))
+        solid.T_world_home = T_world_home
+        pose = jointed_pose(solid.joint, T_world_home, position)
+        solid.T_world_center = pose @ solid.T_body_center
+        if self._current is not None:
+            model = self._current.model
+            number = int(model.geom_bodyid[solid.geoms[0]])
+            home = T_world_home @ solid.T_body_center
+            model.body_pos[number], model.body_quat[number] = (
+                home.translation_m,
+                home.quaternion_wxyz,
+            )
+            self._current.is_stale = True
+        self._bounds.pop(name, None)
+
+    def unhinge(self, name: str) -> None:
+        """Make a jointed body loose, at its present pose and at rest."""
+        self._suspend()
+        solid = self._solids[name]
+        solid.joint, solid.velocity, solid.is_smooth = None, (0.0,) * 6, False
+        self._ignored = {pair for pair in self._ignored if name not in pair}
+
     def remove(self, name: str) -> None:
         """Remove a body."""
         self._suspend()
@@ -198,17 +233,33 @@ class MujocoWorld:
         x, y, z, *spin = self._solids[name].velocity
         return math.hypot(x, y, z), math.hypot(*spin)
 
-    def contacts(self) -> list[tuple[str, str, float]]:
-        """All pairs of bodies in contact and their gap [m], negative if they overlap."""
+    def mass_kg(self, name: str) -> float:
+        """Mass of a body; 0 = it is static."""
+        return self._solids[name].mass_kg
+
+    def hits_m(self, name: str, origins_m: Array, direction: Array) -> Array:
+        """Distances [n] from points [n, 3] to a body along a unit vector [3]; inf = missed."""
+        solid = self._solids[name]
+        return solid.shape.hits_m(solid.T_world_center, solid.scale, origins_m, direction)
+
+    def contacts(self) -> list[Contact]:
+        """All points at which bodies touch, one of which can move."""
         world = self._compile()
-        world.update()
-        mujoco.mj_collision(world.model, world.data)
+        # Asking for forces must not change where the solver starts in the next step.
+        start = world.data.qacc_warmstart.copy()
+        mujoco.mj_forward(world.model, world.data)
+        world.data.qacc_warmstart[:] = start
+        world.is_stale = False
         found = world.data.contact
         bodies = world.model.geom_bodyid[found.geom].tolist()
-        return [
-            (world.names[a], world.names[b], gap_m)
-            for (a, b), gap_m in zip(bodies, found.dist.tolist(), strict=True)
-        ]
+        wrench = np.zeros(6)
+        contacts = []
+        for k, (a, b) in enumerate(bodies):
+            mujoco.mj_contactForce(world.model, world.data, k, wrench)
+            x, y, z = found.pos[k].tolist()
+            gap_m, force_n = float(found.dist[k]), float(wrench[0])
+            contacts.append(Contact(world.names[a], world.names[b], gap_m, force_n, (x, y, z)))
+        return contacts
 
     def _suspend(self) -> None:
         """Drop the compiled model; ``_Solid`` has the state of each body."""
@@ -284,16 +335,19 @@ def _add_body(
         # Of the bounding box, as Bullet's.
         squares = np.maximum(half_m, _FLAT_M) ** 2
         body.explicitinertial, body.mass = True, solid.mass_kg
+        # By default the centre of mass is at the position of the body in the world.
+        body.ipos, body.iquat = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
         body.inertia = solid.mass_kg / 3.0 * (squares.sum() - squares)
         if solid.joint is None:
             body.add_freejoint()
         else:
             _add_joint(body, solid, solid.joint)
+    friction = 0.0 if solid.is_smooth else solid.friction
     surface = {
-        "friction": (solid.friction**2, rolling_m, rolling_m),
+        "friction": (friction**2, rolling_m, rolling_m),
         "condim": _ROLLING_DIMENSIONS if falls else _SLIDING_DIMENSIONS,
         # What is smooth stays smooth in contact with anything.
-        "priority": int(solid.friction == 0.0),
+        "priority": int(friction == 0.0),
         "solref": (2.0 * time_step_s, 1.0),
         "solimp": _SOLIMP,
     }

@@ -93,8 +93,8 @@ class Settling:
         guards = self._guards() if self._config.guard_walls else []
         rests = self._come_to_rest()
         leaning = any(
-            (one in guards or other in guards) and gap_m < _TOUCH_M
-            for one, other, gap_m in (self._world.contacts() if guards else ())
+            (c.one in guards or c.other in guards) and c.gap_m < _TOUCH_M
+            for c in (self._world.contacts() if guards else ())
         )
         for name in guards:
             self._world.remove(name)
@@ -189,7 +189,7 @@ class Settling:
         return not surfaces or is_supported(surfaces, *self._world.bounds_m(body.name))
 
     def _check_overlaps(self) -> Rejection | None:
-        deepest = min((gap_m for _, _, gap_m in self._world.contacts()), default=0.0)
+        deepest = min((contact.gap_m for contact in self._world.contacts()), default=0.0)
         if deepest >= -self._config.penetration_m_max:
             return None
         remedy = f"{self._fewer()}, a larger surface, or a larger physics.penetration_m_max"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.scene import BodyJoint
-from gen_data.generator.core.se3 import SE3, Array
+from gen_data.generator.core.se3 import SE3, Array, Vec3
 from gen_data.generator.physics.collision_shapes import CollisionShape
 from gen_data.generator.physics.physics_config import PhysicsConfig, missing_engine
 
@@ -19,6 +19,23 @@ JOINT_DAMPING_S = 0.2
 ROLLING_FRICTION_SHARE = 0.1
 """Rolling friction over an object's smallest half extent: balls and cans stop within a few turns,
 too little for anything to rest visibly out of balance."""
+
+
+class Contact(NamedTuple):
+    """A point at which two bodies touch.
+
+    Attributes:
+        gap_m: Distance between them, negative if they overlap.
+        force_n: Normal force in the latest step; 0 if the engine pushed neither body, as where both
+            are placed instead of simulated.
+        point_m: In the world.
+    """
+
+    one: str
+    other: str
+    gap_m: float
+    force_n: float
+    point_m: Vec3
 
 
 class World(Protocol):
@@ -71,6 +88,27 @@ class World(Protocol):
         """
         ...
 
+    def hinge(self, name: str, joint: BodyJoint) -> None:
+        """Let a loose body move along a joint only, from its present pose on, at rest.
+
+        Until ``unhinge`` its contacts are free of friction, whose direction would be wrong: the
+        solvers do not know of the speed at which ``carry`` moves the joint.
+        """
+        ...
+
+    def carry(self, name: str, T_world_home: SE3) -> None:
+        """Move the joint of a body; position and speed of the joint remain.
+
+        Args:
+            name: Of a jointed body.
+            T_world_home: Pose of the body at position 0.
+        """
+        ...
+
+    def unhinge(self, name: str) -> None:
+        """Make a jointed body loose, at its present pose and at rest."""
+        ...
+
     def remove(self, name: str) -> None:
         """Remove a body."""
         ...
@@ -103,8 +141,19 @@ class World(Protocol):
         """Linear [m/s] and angular speed [rad/s] of a body."""
         ...
 
-    def contacts(self) -> list[tuple[str, str, float]]:
-        """All pairs of bodies in contact and their gap [m], negative if they overlap."""
+    def mass_kg(self, name: str) -> float:
+        """Mass of a body; 0 = it is static."""
+        ...
+
+    def hits_m(self, name: str, origins_m: Array, direction: Array) -> Array:
+        """Distances [n] from points [n, 3] to a body along a unit vector [3]; inf = it is missed.
+
+        A point inside the body has distance 0.
+        """
+        ...
+
+    def contacts(self) -> list[Contact]:
+        """All points at which bodies touch, one of which can move."""
         ...
 
 

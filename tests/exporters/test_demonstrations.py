@@ -19,7 +19,7 @@ from tfrecord.reader import tfrecord_iterator
 from gen_data.exporters.lerobot import LeRobot
 from gen_data.exporters.rlds import Rlds
 from gen_data.generator.core.demonstrations import demonstration_step
-from gen_data.generator.core.scene import Assignment, Episode, Span
+from gen_data.generator.core.scene import Assignment, ContactSpan, Episode, Span
 from gen_data.generator.core.se3 import SE3
 from tests.exporters.drives import drive_info
 from tests.randomizers.doubles import two_link_arm
@@ -30,7 +30,10 @@ EPISODE = Episode(
     "slip",
     (Span("pick", 0.0, 0.2), Span("place", 0.2, 0.4)),
     (Span("crate/0", 0.1, 0.3),),
-    (Span("arm/finger + crate/0", 0.1, 0.3), Span("crate/0 + table", 0.2, 0.3)),
+    (
+        ContactSpan("arm/finger + crate/0", 0.1, 0.3, 0.1, (1.5, 2.5), ((0.1, 0.2, 0.3),) * 2),
+        ContactSpan("crate/0 + table", 0.2, 0.3, 0.1, (9.81,), ((0.0, 0.5, 0.75),)),
+    ),
 )
 
 
@@ -66,6 +69,8 @@ def test_lerobot_has_what_the_arm_does_at_every_step(
     assert [row["annotation.held"] for row in rows] == ["", "crate/0", "crate/0", ""]
     assert [row["annotation.contacts"] for row in rows] == [
         "", "arm/finger + crate/0", "arm/finger + crate/0, crate/0 + table", ""]  # fmt: skip
+    assert [row["annotation.contact_forces_n"] for row in rows] == ["", "1.5", "2.5, 9.81", ""]
+    assert rows[2]["annotation.contact_points_m"] == "0.1 0.2 0.3, 0 0.5 0.75"
     assert {(row["annotation.succeeded"], row["annotation.failure"]) for row in rows} == {
         (False, "slip")
     }
@@ -94,6 +99,7 @@ def assert_episode(example: Any, described: Any, samples: Any) -> None:
     assert values(example, "steps/language_instruction") == [INSTRUCTION.encode()] * 4
     assert values(example, "steps/phase") == [b"pick", b"pick", b"place", b"place"]
     assert values(example, "episode_metadata/failure") == [b"slip"]
+    assert values(example, "steps/contact_forces_n") == [b"", b"1.5", b"2.5, 9.81", b""]
     (arm,) = samples[0].scene.articulations
     track = arm.joint_track
     states = [track.positions(0.1 * k) for k in range(4)]

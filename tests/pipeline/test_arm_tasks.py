@@ -2,24 +2,44 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.pipeline_factory import open_pipeline
+from gen_data.generator.core.errors import AssetError, ConfigError
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import canonical_json
-from gen_data.randomizers.arm_task import tasks
+from gen_data.randomizers.arm_task_table import tasks
 
 pytest.importorskip("pybullet_data")
 
 SMALL = ("sensors.color.size_px=[96,72]", "sensors.wrist.size_px=[96,72]")
+OWN = """nudge:
+  instruction: Nudge the {thing}.
+  things: {thing: {assets: {red block: "box?color=red&size_m=0.06,0.06,0.06"}, mass_kg: 0.2}}
+  program:
+    - {verb: reach, phase: approach, at: thing, along: own, offset_m: [-0.08, 0, 0.06], opening: 0}
+    - {verb: move, phase: lower, by_m: [[0, 0, -0.105]]}
+    - {verb: move, phase: push, at: thing, along: own, by_m: [[0.1, 0, 0]], touches: [thing]}
+  success:
+    - {measure: tilt, body: thing, at_least: 0, at_most: 0.1}
+"""
+JOINTS = (("z", 0.0), ("y", 0.2), ("y", 0.4), ("z", 0.2), ("y", 0.2), ("z", 0.08))
+"""Axis of every joint of ``my_arm``, and its height above the one before [m]."""
 NONE_FAIL = ("randomizers.things.failures={}", "shared.robot=franka_panda")
 
 
 def demonstrated(task: str, scene_index: int = 0, failures: str = "{}") -> Scene:
     """A scene of one task, at time 0."""
-    changes = (f"shared.task={task}", f"randomizers.things.failures={failures}", NONE_FAIL[1])
+    robot = "franka_panda_suction" if tasks()[task].hand == "suction" else "franka_panda"
+    changes = (
+        f"shared.task={task}",
+        f"randomizers.things.failures={failures}",
+        f"shared.robot={robot}",
+    )
     with open_pipeline(load_config("arm_tasks.yaml", overrides=(*SMALL, *changes))) as pipeline:
         return pipeline.accepted_scene(scene_index).scene
 
@@ -46,6 +66,123 @@ def test_failures_are_drawn_by_their_share(failure: str) -> None:
     episode = demonstrated("stack", failures=f"{{{failure}: 1}}").articulations[0].episode
     assert episode is not None
     assert (episode.succeeded, episode.failure) == (False, failure)
+
+
+@pytest.mark.parametrize("robot", ["kuka_iiwa_gripper", "xarm6_gripper"])
+def test_arms_with_made_fingers_put_things_down_where_they_should(robot: str) -> None:
+    """The fingers are those of ``robot_tools``; physics confirms the place."""
+    changes = ("shared.task=pick_and_place", NONE_FAIL[0], f"shared.robot={robot}")
+    with open_pipeline(load_config("arm_tasks.yaml", overrides=(*SMALL, *changes))) as pipeline:
+        (arm,) = pipeline.accepted_scene(0).scene.articulations
+    assert arm.episode is not None
+    assert arm.episode.succeeded
+    assert any("tool_left_finger + things/0" in span.label for span in arm.episode.contacts)
+
+
+def test_a_thing_that_pivots_is_pressed_by_the_mat_and_turns_in_the_hand() -> None:
+    """Held while it turns by 55 degrees; the mat pushes with the pads' torque over the lever arm.
+
+    At the beginning the edge is 0.035 sin 35 deg - 0.0175 cos 35 deg = 5.7 mm beside the axis, so
+    that 0.05 N m take 8.7 N; the lever only grows from there.
+    """
+    episode = demonstrated("pivot").articulations[0].episode
+    assert episode is not None
+    pivot = next(span for span in episode.phases if span.label == "pivot")
+    (held,) = episode.held
+    assert held.start_s < pivot.start_s
+    assert held.end_s >= pivot.end_s
+    (pressed,) = [
+        span
+        for span in episode.contacts
+        if span.label == "things/0 + things/1"
+        and span.start_s < pivot.end_s < span.end_s + 1.0
+        and span.start_s <= pivot.start_s + 0.1
+    ]
+    forces = [pressed.at(pivot.start_s + 0.1 + 0.05 * k)[0] for k in range(10)]
+    assert all(2.0 < force_n < 12.0 for force_n in forces)
+
+
+def test_tasks_of_a_users_file_are_demonstrated(tmp_path: Path) -> None:
+    """``tasks`` names a file beside the configuration; faults in it have its line and column."""
+    table = tmp_path / "mine.yaml"
+    table.write_text(OWN)
+    config = tmp_path / "config.yaml"
+    config.write_text(
+        "extends: arm_tasks\nshared: {robot: {choice: {franka_panda: 1}}, task: {choice: "
+        "{nudge: 1}}}\nrandomizers:\n  - {name: things, tasks: mine.yaml, failures: {}}\n"
+    )
+    with open_pipeline(load_config(str(config), overrides=SMALL)) as pipeline:
+        (arm,) = pipeline.accepted_scene(0).scene.articulations
+    assert arm.assignment is not None
+    assert arm.assignment.instruction == "Nudge the red block."
+    table.write_text(OWN.replace("at_least", "at_leest"))
+    with pytest.raises(
+        ConfigError, match=r"(?s)mine.yaml:9:36: .*tasks.nudge.success\[0\].at_leest"
+    ):
+        load_config(str(config))
+    table.unlink()
+    with pytest.raises(ConfigError, match=r"config.yaml:4:27: tasks: there is no file of tasks"):
+        load_config(str(config))
+
+
+def my_arm(limit: str = '<limit lower="-2.9" upper="2.9" velocity="2"/>') -> str:
+    """A URDF of boxes: six joints and a flange, but no hand."""
+    axes = {"y": "0 1 0", "z": "0 0 1"}
+    links, joints = ['<link name="link0"/>'], []
+    for k, (axis, rise_m) in enumerate(JOINTS):
+        next_m = JOINTS[k + 1][1] if k + 1 < len(JOINTS) else 0.04
+        box = (
+            f'<origin xyz="0 0 {0.5 * next_m}"/>'
+            f'<geometry><box size="0.05 0.05 {max(0.03, next_m - 0.06)}"/></geometry>'
+        )
+        links.append(
+            f'<link name="link{k + 1}"><visual>{box}</visual><collision>{box}</collision></link>'
+        )
+        joints.append(
+            f'<joint name="joint{k + 1}" type="revolute"><parent link="link{k}"/>'
+            f'<child link="link{k + 1}"/><origin xyz="0 0 {rise_m}"/>'
+            f'<axis xyz="{axes[axis]}"/>{limit}</joint>'
+        )
+    return f'<robot name="my_arm">{"".join(links + joints)}</robot>'
+
+
+def own_arm(folder: Path, urdf: str) -> Path:
+    """A configuration with a user's arm, on whose flange fingers are made."""
+    (folder / "arms").mkdir()
+    (folder / "arms/my_arm.urdf").write_text(urdf)
+    (folder / "arms/assets.yaml").write_text(
+        "robots:\n  - id: my_arm\n    file: my_arm.urdf\n"
+        "    home: {joint2: 0.3, joint3: 1.2, joint5: 1.6}\n"
+        "    tool: {kind: fingers, flange: link6, offset_m: 0.04}\n"
+    )
+    config = folder / "config.yaml"
+    config.write_text(
+        "extends: arm_tasks\nassets: {folders: [arms]}\n"
+        "shared: {robot: {choice: {user/my_arm: 1}}, task: {choice: {stack: 1}}}\n"
+        "randomizers:\n  - {name: things, failures: {}}\n"
+    )
+    return config
+
+
+def test_an_arm_of_a_user_stacks_with_fingers_made_for_it(tmp_path: Path) -> None:
+    """From a URDF of six joints; physics confirms the stack."""
+    config = own_arm(tmp_path, my_arm())
+    with open_pipeline(load_config(str(config), overrides=SMALL)) as pipeline:
+        (arm,) = pipeline.accepted_scene(0).scene.articulations
+    assert arm.asset == "user/my_arm"
+    assert len(arm.joint_positions) == len(JOINTS) + 2
+    assert arm.episode is not None
+    assert arm.episode.succeeded
+
+
+def test_an_arm_of_a_user_without_limits_is_refused_by_its_joint(tmp_path: Path) -> None:
+    """Before anything is drawn."""
+    config = own_arm(tmp_path, my_arm(limit=""))
+    with (
+        pytest.raises((AssetError, ConfigError), match="joint 'joint1' has no limits"),
+        open_pipeline(load_config(str(config), overrides=SMALL)),
+    ):
+        pass
 
 
 def test_a_demonstration_alone_equals_the_one_after_others() -> None:

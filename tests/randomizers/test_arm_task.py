@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from pydantic import ValidationError
 
@@ -9,13 +11,20 @@ from gen_data.generator.config.distributions import Constant
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.scene import HAND, Articulation, ObjectGroup, Scene, SupportSurface
 from gen_data.generator.core.se3 import SE3
-from gen_data.randomizers.arm_task import ArmTask, Failures, Task, tasks
+from gen_data.randomizers.arm_task import ArmTask, Failures
+from gen_data.randomizers.arm_task_table import Task, tasks
 from tests.randomizers.doubles import FakeAssets, two_link_arm
 
 ARM = Articulation("arm", "two_link", 1, SE3((-0.5, 0.0, 0.74)), two_link_arm().home)
 TABLE = SupportSurface("table", "table", SE3((0.0, 0.0, 0.74)), (1.2, 0.8), 1.0)
 GROUP = ObjectGroup("things", ("table",), (), 0, "scatter")
 SCENE = Scene("test", surfaces=(TABLE,), groups=(GROUP,), articulations=(ARM,))
+SUCK = Task.model_validate_json(
+    """{"instruction": "Lift the {it}.", "hand": "suction",
+ "things": {"it": {"assets": {"box": "box"}}},
+ "program": [{"verb": "grasp", "at": "it", "phase": "pick"}],
+ "success": [{"measure": "distance", "body": "it", "other": "hand", "at_most": 0.1}]}"""
+)
 MINIMAL = """{"instruction": "Move over the {it}.",
  "things": {"it": {"assets": {"cup": "cup?seed=0"}}},
  "program": [{"verb": "reach", "at": "%s", "phase": "reach"}],
@@ -46,6 +55,8 @@ def test_a_task_that_refers_to_an_unknown_thing_is_refused() -> None:
     assert Task.model_validate_json(MINIMAL % "it")
     with pytest.raises(ValidationError, match="there is no thing 'cup'"):
         Task.model_validate_json(MINIMAL % "cup")
+    with pytest.raises(ValidationError, match="there is no thing 'lid'"):
+        Task.model_validate_json((MINIMAL % "it").replace("{it}.", "{lid}."))
 
 
 def test_more_failures_than_demonstrations_are_refused() -> None:
@@ -66,6 +77,17 @@ def test_a_template_without_the_group_is_refused() -> None:
         ConfigError, match=r"randomizers\.toys\.group: the template has no object group 'toys'"
     ):
         ArmTask(name="toys", task=Constant("reach")).check(SCENE, FakeAssets())
+
+
+def test_a_task_for_suction_is_refused_with_fingers() -> None:
+    """By the name of the task, with a robot that would do."""
+    group = replace(GROUP, assets=("box", "bin"))
+    scene = replace(SCENE, groups=(group,))
+    task = ArmTask(name="things", task=Constant("suck"), tasks={"suck": SUCK})
+    with pytest.raises(
+        ConfigError, match=r"'suck' needs suction, but arm 'arm' .* has fingers; .*panda_suction"
+    ):
+        task.check(scene, FakeAssets())
 
 
 def test_hands_are_named_in_conditions() -> None:

@@ -33,6 +33,8 @@ from gen_data.generator.core.asset_types import Keypoint, Material
 from gen_data.generator.core.se3 import Vec3
 
 GRASP = "grasp"
+OPEN = "open"
+"""Flat with the palm up, to receive something; the forearm's end is lower than the hand."""
 POSE_NAMES = ("relaxed", "flat", GRASP, "point", "pinch", "fist")
 RADII_M = (0.015, 0.046)
 """Smallest and largest radius that a hand holds."""
@@ -51,7 +53,7 @@ def hand(seed: int, pose: str = "any", radii_mm: Sequence[float] = (0.0,) * 4) -
 
     Args:
         seed: Draws size, skin, side and sleeve; with pose ``any`` also the pose.
-        pose: One of ``POSE_NAMES``, or ``any``.
+        pose: One of ``POSE_NAMES``, ``open``, or ``any``, which is never ``open``.
         radii_mm: For ``grasp``: radius of what is held beside index, middle, ring and little
             finger; all 0 = drawn.
 
@@ -64,7 +66,8 @@ def hand(seed: int, pose: str = "any", radii_mm: Sequence[float] = (0.0,) * 4) -
     stout = rng.between(0.9, 1.04)
     size = 1.0 if pose == GRASP else rng.between(0.9, 1.06)
     held = draw_radii(seed, radii_mm) if pose == GRASP else ()
-    bones = hand_shape.grasp_bones(held, _lift_deg(seed)) if held else hand_shape.pose_bones(pose)
+    shown = "flat" if pose == OPEN else pose
+    bones = hand_shape.grasp_bones(held, _lift_deg(seed)) if held else hand_shape.pose_bones(shown)
     flesh = hand_shape.make_flesh_mesh(bones, stout, _STEP_M)
     skin, owner = _map_texture(flesh, bones, stout)
     plates = [_nail(bones, k, stout, rng).painted(2) for k in range(5)]
@@ -77,7 +80,7 @@ def hand(seed: int, pose: str = "any", radii_mm: Sequence[float] = (0.0,) * 4) -
 
 def hand_pose(seed: int, pose: str = "any") -> str:
     """The pose of a variant. Raises AssetError if there is no such pose."""
-    return choose_option("hand", "pose", pose, POSE_NAMES, seed)
+    return pose if pose == OPEN else choose_option("hand", "pose", pose, POSE_NAMES, seed)
 
 
 def is_left(seed: int) -> bool:
@@ -261,8 +264,10 @@ def _tube(rings: Array) -> Patch:
 
 
 def _turned(points: Array, seed: int, pose: str) -> Array:
-    """Points of the hand frame, mirrored if left, turned with the thumb up if it grasps."""
+    """Points of the hand frame, mirrored if left; thumb up if it grasps, palm up if open."""
     mirrored = points * np.array([1.0, -1.0, 1.0]) if is_left(seed) else points
+    if pose == OPEN:
+        return rotate(mirrored, "x", math.pi)
     if pose != GRASP:
         return np.asarray(mirrored)
     return rotate(mirrored, "x", (-0.5 if is_left(seed) else 0.5) * math.pi)

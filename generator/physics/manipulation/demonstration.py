@@ -2,29 +2,33 @@
 
 The arm and what it holds move as planned; everything else is simulated. The fingers push what they
 meet, but carry nothing by friction: a held body is attached to the hand until the fingers open.
+While it pivots, the fingers are a hinge with friction, and contacts turn it. A suction cup holds a
+body only if it seals on it, and as long as its force is large enough.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from gen_data.generator.core.errors import Rejection
 from gen_data.generator.core.kinematics import finger_links
-from gen_data.generator.core.scene import Condition, Episode, Span
-from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.scene import BodyJoint, Condition, ContactSpan, Episode, Span
+from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.physics.manipulation.arm_goals import Arm
 from gen_data.generator.physics.manipulation.joint_trajectories import (
     STEP_S,
+    Held,
     Leg,
     smooth_step,
 )
 from gen_data.generator.physics.manipulation.manipulation_planner import TaskPlanner
 from gen_data.generator.physics.manipulation.measures import Measures
-from gen_data.generator.physics.world import World
+from gen_data.generator.physics.manipulation.suction import is_sealed, needed_force_n
+from gen_data.generator.physics.world import Contact, World
 
 _TOUCH_M = 0.0005
 """Bodies nearer than this touch."""
@@ -33,6 +37,9 @@ _STILL_RAD = 0.002
 """Smaller motions between knots are the simulator's noise."""
 _SLIP_KNOTS = 12
 """A slip happens after a body has been held for 0.6 s."""
+_PAD_FRICTION_N_M = 0.05
+"""Torque that turns a thing between two finger tips: a 100 g block held 2 cm off its centre does
+not turn by its weight (0.02 N m), and turns when its edge is pressed down with 2 N (assumed)."""
 _SETTLE_S = 0.6
 """After the last goal, so that what was let go comes to rest."""
 
@@ -68,9 +75,7 @@ def demonstrate(
             legs = _without_approach(legs)
         shown.run(legs, goal.phase or goal.kind)
         if not assignment.failure:
-            planner.resting.update(
-                {n: p for n, p in shown.poses[-1].items() if n in planner.resting}
-            )
+            planner.observe(shown.poses[-1])
     shown.settle()
     failed = shown.failed_conditions()
     if assignment.failure and not failed:
@@ -122,7 +127,8 @@ class Demonstration:
         self._values: list[tuple[float, ...]] = []
         self._phases: list[str] = []
         self._held: list[str] = []
-        self._contacts: list[frozenset[str]] = []
+        self._contacts: list[dict[str, tuple[float, Vec3]]] = []
+        self._torn = ""
         self._fingers = [arm.body(k) for k in finger_links(arm.robot) if k in arm.links]
         self._first_held = ""
         self.legs: list[Leg] = []
@@ -136,6 +142,10 @@ class Demonstration:
             if not self.poses:
                 self._arm.show(leg.start)
                 self._record(phase, self._held_body(leg), leg.start)
+            pivoting = leg.held if leg.pivots and self._held_body(leg) else None
+            if pivoting is not None:
+                self._world.hinge(pivoting.body, _finger_joint(pivoting))
+                self._world.ignore(pivoting.body, self._arm.bodies)
             count = round(leg.duration_s / STEP_S)
             for knot in range(count):
                 held = self._held_body(leg)
@@ -143,14 +153,21 @@ class Demonstration:
                     share = (knot + step / self._steps) / count
                     positions = leg.at(smooth_step(share))
                     self._arm.show(positions)
-                    if held and leg.held is not None:
-                        pose = self._arm.grasp_pose(positions) @ leg.held.T_grasp_held
-                        self._world.place(held, pose)
+                    self._move_held(leg, held, positions)
                     self._world.step(1)
-                if held and leg.held is not None:
-                    self._world.place(held, self._arm.grasp_pose(positions) @ leg.held.T_grasp_held)
+                self._move_held(leg, held, positions)
                 self._record(phase, held, positions)
+            if pivoting is not None:
+                self._world.unhinge(pivoting.body)
         self.legs += legs
+
+    def _move_held(self, leg: Leg, held: str, positions: Sequence[float]) -> None:
+        """Take the held body, or the hinge that it pivots about, to where the hand is."""
+        if not held or leg.held is None:
+            return
+        pose = self._arm.grasp_pose(positions) @ leg.held.T_grasp_held
+        move = self._world.carry if leg.pivots else self._world.place
+        move(held, pose)
 
     def settle(self) -> None:
         """Wait at the end until everything has come to rest."""
@@ -186,6 +203,11 @@ class Demonstration:
     def _held_body(self, leg: Leg) -> str:
         """Name of the body that is in the hand on a leg; empty where it fails to hold it."""
         if leg.held is None:
+            self._torn = ""
+            return ""
+        if self._tears_off(leg.held):
+            self._torn = leg.held.body
+        if self._torn:
             return ""
         body, failure = leg.held.body, self._assignment.failure
         self._first_held = self._first_held or body
@@ -193,6 +215,21 @@ class Demonstration:
             return body
         slips_later = failure == "slip" and self._held.count(body) < _SLIP_KNOTS
         return body if slips_later else ""
+
+    def _tears_off(self, held: Held) -> bool:
+        """Whether a suction cup does not seal on a body, or the load exceeds its force."""
+        gripper = self._arm.robot.gripper
+        if gripper is None or gripper.cup is None or self._torn:
+            return False
+        if self._held[-1:] != [held.body]:
+            T_world_grasp = self._world.pose(held.body) @ held.T_grasp_held.inverse()
+            return not is_sealed(self._world, held.body, T_world_grasp, gripper.cup)
+        if self._held[-3:] != [held.body] * 3:
+            return False
+        one, two, three = (np.array(p[held.body].translation_m) for p in self.poses[-3:])
+        acceleration = (one - 2.0 * two + three) / STEP_S**2
+        needed_n = needed_force_n(self._world.mass_kg(held.body), acceleration)
+        return needed_n > gripper.cup.force_n
 
     def _record(self, phase: str, held: str, positions: Sequence[float]) -> None:
         before = self.poses[-1] if self.poses else self._start
@@ -202,29 +239,61 @@ class Demonstration:
         )
         self._phases.append(phase)
         self._held.append(held)
-        self._contacts.append(frozenset(self._touching(held, before)))
+        self._contacts.append(_sum_contacts(self._touching(held, before)))
         hand = np.array(self._arm.grasp_pose(positions).translation_m)
         self._values.append(tuple(self._measures.value(c, hand) for c in self._assignment.success))
 
-    def _touching(self, held: str, before: Mapping[str, SE3]) -> Iterator[str]:
-        """Pairs of bodies in contact, one of which moves or is of the arm."""
+    def _touching(self, held: str, before: Mapping[str, SE3]) -> Iterator[Contact]:
+        """Contacts of two bodies, one of which moves or is of the arm."""
         moving = {n for n, pose in self.poses[-1].items() if pose != before[n]} | {held}
         moving |= {self._arm.body(link) for link in self._arm.moving}
         links = set(self._arm.bodies)
         # A grasp leaves some micrometres, which not every simulator counts as contact.
         grasped = [
-            (link, held, self._world.gap_m(link, held, _TOUCH_M))
+            Contact(link, held, self._world.gap_m(link, held, _TOUCH_M), 0.0, self._middle_m(link))
             for link in (self._fingers if held else ())
         ]
-        for one, other, gap_m in (*self._world.contacts(), *grasped):
+        for contact in (*self._world.contacts(), *grasped):
+            one, other = contact.one, contact.other
             own = one in links and other in links
-            if gap_m < _TOUCH_M and not own and (one in moving or other in moving):
-                yield " + ".join(sorted((one, other)))
+            if contact.gap_m < _TOUCH_M and not own and (one in moving or other in moving):
+                yield contact
 
-    def _contact_spans(self, start_s: float) -> Iterator[Span]:
-        for pair in sorted(frozenset().union(*self._contacts)):
+    def _contact_spans(self, start_s: float) -> Iterator[ContactSpan]:
+        for pair in sorted({pair for contacts in self._contacts for pair in contacts}):
             seen = [pair if pair in contacts else "" for contacts in self._contacts]
-            yield from (span for span in _spans(seen, start_s) if span.label)
+            for span in (span for span in _spans(seen, start_s) if span.label):
+                first, end = (round((t - start_s) / STEP_S) for t in (span.start_s, span.end_s))
+                values = [c[pair] for c in self._contacts[first:end] if pair in c]
+                forces, points = zip(*values, strict=True)
+                yield ContactSpan(pair, span.start_s, span.end_s, STEP_S, forces, points)
+
+    def _middle_m(self, link: str) -> Vec3:
+        low, high = self._world.bounds_m(link)
+        x, y, z = (0.5 * (low + high)).tolist()
+        return (x, y, z)
+
+
+def _finger_joint(held: Held) -> BodyJoint:
+    """The joint that a held body turns about: the line between the fingers."""
+    T_held_grasp = held.T_grasp_held.inverse()
+    x, y, z = T_held_grasp.rotate(np.array([0.0, 1.0, 0.0])).tolist()
+    anchor_m = T_held_grasp.translation_m
+    return BodyJoint(
+        held.body, "revolute", (x, y, z), anchor_m, -math.pi, math.pi, _PAD_FRICTION_N_M
+    )
+
+
+def _sum_contacts(contacts: Iterable[Contact]) -> dict[str, tuple[float, Vec3]]:
+    """Sum of forces [N] and middle of the points [m] of every pair of bodies."""
+    points: dict[str, list[Contact]] = {}
+    for contact in contacts:
+        points.setdefault(" + ".join(sorted((contact.one, contact.other))), []).append(contact)
+    summed = {}
+    for pair, found in points.items():
+        x, y, z = (round(math.fsum(c.point_m[k] for c in found) / len(found), 4) for k in range(3))
+        summed[pair] = (round(math.fsum(c.force_n for c in found), 3), (x, y, z))
+    return summed
 
 
 def has_moved(one: SE3, other: SE3) -> bool:

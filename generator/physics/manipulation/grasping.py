@@ -10,11 +10,18 @@ import numpy as np
 from gen_data.generator.core.asset_types import Gripper, RobotModel
 from gen_data.generator.core.kinematics import all_positions, finger_links, link_poses, rigid_group
 from gen_data.generator.core.se3 import SE3, Array, Vec3
+from gen_data.generator.physics.manipulation.suction import (
+    is_sealed,
+    needed_force_n,
+    rim_depths_m,
+)
 from gen_data.generator.physics.world import World
 
 _PALM_GAP_M = 0.002
 _PAD_GAP_M = 0.002
 """Both fingers must come this near to the object between them."""
+_CUP_GAP_M = 0.0005
+"""Between the rim of a cup and the object that it holds: they touch without overlapping."""
 _BISECTIONS = 14
 """Halvings of the opening: a stroke of 8 cm is closed to within 5 micrometres."""
 
@@ -55,6 +62,11 @@ class Hand:
         self._arm_home = [0.0] * len(robot.movable)
         self._known: dict[tuple[str, Vec3], Grasp | None] = {}
 
+    @property
+    def sucks(self) -> bool:
+        """Whether it holds by a suction cup instead of fingers."""
+        return self._gripper.cup is not None
+
     def grasp(self, held: str, T_world_grasp: SE3) -> Grasp | None:
         """The grasp that holds a body as upright as the hand allows; None if it does not fit."""
         up = max(_UPRIGHT_AXES, key=lambda axis: float(T_world_grasp.rotate(np.array(axis))[2]))
@@ -78,6 +90,29 @@ class Hand:
         if opening <= 0.0 or any(gap >= _PAD_GAP_M for gap in gaps):
             return None
         return Grasp(opening, pose)
+
+    def suck_in_place(self, held: str, T_world_held: SE3, T_world_above: SE3) -> Grasp | None:
+        """The grasp of a resting body by a cup that comes straight down on it.
+
+        None if the cup does not seal, or cannot bear the body's weight.
+
+        Args:
+            held: Name of the body.
+            T_world_held: Its pose.
+            T_world_above: Pose of the cup above it.
+        """
+        cup = self._gripper.cup
+        if cup is None or self._world.mass_kg(held) <= 0.0:
+            return None
+        self._world.place(held, T_world_held)
+        weight_n = needed_force_n(self._world.mass_kg(held), np.zeros(3))
+        depth_m = float(rim_depths_m(self._world, held, T_world_above, cup).min())
+        if weight_n > cup.force_n or not np.isfinite(depth_m):
+            return None
+        T_world_grasp = T_world_above @ SE3((0.0, 0.0, depth_m - _CUP_GAP_M))
+        if not is_sealed(self._world, held, T_world_grasp, cup):
+            return None
+        return Grasp(0.0, T_world_grasp.inverse() @ T_world_held)
 
     def palm_height_m(self) -> float:
         """Distance from the palm forward to the grasp frame's origin."""

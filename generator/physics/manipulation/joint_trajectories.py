@@ -62,6 +62,7 @@ class Leg:
         via: Positions to pass between them; each line takes the same share of the path.
         duration_s: A multiple of ``STEP_S``; 0 = not yet timed.
         held: The body that moves with the hand; None = the hand is empty.
+        pivots: Whether the held body turns about the grasp frame's Y as contacts make it.
     """
 
     start: tuple[float, ...]
@@ -69,6 +70,7 @@ class Leg:
     duration_s: float = 0.0
     held: Held | None = None
     via: tuple[tuple[float, ...], ...] = ()
+    pivots: bool = False
 
     @property
     def lines(self) -> list[tuple[tuple[float, ...], tuple[float, ...]]]:

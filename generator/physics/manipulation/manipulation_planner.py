@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 from gen_data.generator.core.errors import Rejection
 from gen_data.generator.core.kinematics import (
@@ -24,6 +25,7 @@ from gen_data.generator.physics.world import World
 
 CANNOT_REACH = "its pose or joint positions are out of reach"
 NOTHING_TO_GRASP = "no listed object lies free and fits between the fingers"
+NOTHING_TO_SUCK = "on no listed object that lies free can the suction cup seal and bear the load"
 NOTHING_HELD = "the gripper holds nothing to place"
 NO_PLACE = "no candidate is a free and stable place for the held object"
 
@@ -118,6 +120,14 @@ class TaskPlanner:
         self.positions = legs[-1].end
         return legs
 
+    def observe(self, poses: Mapping[str, SE3]) -> None:
+        """Plan from here on with the poses of bodies that physics tells, ``T_world_body``."""
+        self.resting.update({name: pose for name, pose in poses.items() if name in self.resting})
+        if self._held is not None:
+            T_grasp_world = self._arm.grasp_pose(self.positions).inverse()
+            moved = T_grasp_world @ poses[self._held.body]
+            self._held = replace(self._held, T_grasp_held=moved)
+
     def plan_blow(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
         """Timed legs of a closed hand that knock away the first object of a grasp.
 
@@ -206,10 +216,18 @@ class TaskPlanner:
     def _plan_move(self, goal: ArmGoal, number: int) -> list[Leg] | Rejection:
         """One leg along straight lines of the hand, which may touch some bodies."""
         hand = self._arm.grasp_pose(self.positions)
-        way = self._motion.follow([motion @ hand for motion in goal.waypoints], self.positions)
+        poses = [motion @ hand for motion in goal.waypoints]
+        if goal.pivots:
+            if self._held is None:
+                return self._reject([], NOTHING_HELD, number)
+            poses = [SE3(pose.translation_m, hand.quaternion_wxyz) for pose in poses]
+        way = self._motion.follow(poses, self.positions)
         if way is None:
             return self._reject([], CANNOT_REACH, number)
-        leg = Leg(self.positions, way[-1], held=self._held, via=tuple(way[:-1]))
+        via = tuple(way[:-1])
+        leg = Leg(self.positions, way[-1], held=self._held, via=via, pivots=goal.pivots)
+        # How far a thing that pivots has turned on the way, physics will tell.
+        checked = None if goal.pivots else self._held
         obstacles = Obstacles(
             [name for name in self._fixed if name not in goal.touches],
             [name for name in self.resting if name not in goal.touches],
@@ -217,7 +235,7 @@ class TaskPlanner:
         )
         self._restore_world()
         for start, end in leg.lines:
-            collision = self._motion.first_collision(Leg(start, end, held=leg.held), obstacles)
+            collision = self._motion.first_collision(Leg(start, end, held=checked), obstacles)
             if collision is not None:
                 return self._reject([collision], CANNOT_REACH, number)
         return [leg]
@@ -257,7 +275,8 @@ class TaskPlanner:
                     del self.resting[body]
                     return legs
                 collisions.append(legs)
-        return self._reject(collisions, NOTHING_TO_GRASP, number)
+        otherwise = NOTHING_TO_SUCK if self._hand.sucks else NOTHING_TO_GRASP
+        return self._reject(collisions, otherwise, number)
 
     def _grasp_candidates(
         self, grasps: list[Grasp], body: str, rest: SE3
@@ -285,7 +304,11 @@ class TaskPlanner:
         grasps = []
         for k in range(_YAWS):
             yaw = SE3.about_z(math.pi * k / _YAWS, (x, y, height))
-            grasp = hand.grasp_in_place(body, (yaw @ _FLIP).inverse() @ T_world_held)
+            if hand.sucks:
+                above = SE3((0.0, 0.0, top - height)) @ yaw @ _FLIP
+                grasp = hand.suck_in_place(body, T_world_held, above)
+            else:
+                grasp = hand.grasp_in_place(body, (yaw @ _FLIP).inverse() @ T_world_held)
             if grasp is not None:
                 grasps.append(grasp)
         self._restore_world()

@@ -1,0 +1,172 @@
+"""Tasks of robot arms as data: things, program and conditions of success of each.
+
+The shipped ones are in ``arm_tasks.yaml``. Users' own are in a file beside their configuration,
+whose content replaces its name there, so that plans are self-contained and errors name the file,
+line and column that they come from.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from string import Formatter
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from gen_data.generator.config.base_model import Strict
+from gen_data.generator.config.data_files import load_data
+from gen_data.generator.config.paths import find_path
+from gen_data.generator.config.yaml_tree import Node, load_yaml
+from gen_data.generator.core.scene import HAND, Measure
+from gen_data.generator.core.se3 import Vec3
+
+Span = tuple[float, float]
+
+
+class Thing(Strict):
+    """A thing of a task.
+
+    Attributes:
+        assets: Its name in instructions, and the id of its asset; an id without parameters is a
+            family of variants. One of several is drawn.
+        x_m, y_m: Bounds of its middle: ahead of the arm's base and to its left; from ``near``, if
+            given, along its axes.
+        yaw_deg: Bounds of its rotation about Z.
+        near: Name of another thing that it is placed by, at ``z_m`` from that one's bottom.
+        z_m: Height of its bottom above the table, or above the bottom of ``near``.
+        mass_kg: 0 = fixed; None = the asset's own.
+        joint: Joint of a part that moves, in the frame of the part.
+    """
+
+    assets: dict[str, str] = Field(min_length=1)
+    x_m: Span = (0.35, 0.6)
+    y_m: Span = (-0.25, 0.25)
+    yaw_deg: Span = (-180.0, 180.0)
+    near: str = ""
+    z_m: float = 0.0
+    mass_kg: float | None = None
+    joint: Joint | None = None
+
+
+class Joint(Strict):
+    """A joint of a thing; see ``BodyJoint``."""
+
+    kind: Literal["prismatic", "revolute"]
+    axis: Vec3
+    anchor_m: Vec3 = (0.0, 0.0, 0.0)
+    limits: Span
+    friction: float = 1.0
+    stiffness: float = 0.0
+
+
+class Step(Strict):
+    """One step of a program: a verb and what it refers to.
+
+    Attributes:
+        verb: ``grasp`` lifts ``at``. ``place`` puts the held thing down on top of ``at``.
+            ``reach`` takes the hand, or with ``carries`` the held thing, to a point above the top
+            of ``at``, around all obstacles. ``move`` moves the hand along straight lines or an
+            arc, and may touch and push. ``grip`` opens or closes the fingers.
+        at: Name of a thing.
+        along: Thing that the X axis of the step's frame points to, horizontally; ``own`` = the X
+            axis of ``at``; empty = away from the arm. Z is up.
+        carries: Whether ``reach`` takes the held thing there. It keeps its rotation or turns by
+            eighths; with ``yaws``, its X axis is that of the step's frame, or turned evenly.
+        offset_m: Of the goal of ``reach``, in the step's frame.
+        yaw_deg: Of the hand against that frame; at 0 the fingers open along its Y.
+        yaws: Number of evenly spaced rotations to try; 0 = two of the hand.
+        by_m: Displacements of ``move``, each from its beginning, in the step's frame.
+        turn_deg: Turn during ``move``, about ``axis`` through ``pivot_m``, after displacements.
+        axis: Of the turn, in the step's frame.
+        pivot_m: Point of the axis, from the top of ``at``; None = the hand's goal of the latest
+            ``reach``.
+        opening: Of the gripper: 0 closed, 1 open.
+        touches: Names of the things that ``move`` may touch.
+        pivots: Whether ``move`` leads the hand along the arc without turning it, with fingers so
+            loose that the held thing turns between them where it meets ``touches``.
+        phase: Name of the step in labels.
+        pace: Factor on the arm's speed.
+    """
+
+    verb: Literal["reach", "move", "grasp", "place", "grip"]
+    at: str = ""
+    along: str = ""
+    offset_m: Vec3 = (0.0, 0.0, 0.0)
+    yaw_deg: float = 0.0
+    yaws: int = Field(0, ge=0)
+    by_m: tuple[Vec3, ...] = ()
+    turn_deg: float = 0.0
+    axis: Vec3 = (0.0, 0.0, 1.0)
+    pivot_m: Vec3 | None = None
+    opening: float = Field(1.0, ge=0, le=1)
+    carries: bool = False
+    touches: tuple[str, ...] = ()
+    pivots: bool = False
+    phase: str = Field(min_length=1)
+    pace: float = Field(1.0, gt=0, le=1)
+
+
+class Success(Strict):
+    """A condition of success; see ``Condition``. Angles of ``tilt`` and ``travel`` in radians."""
+
+    measure: Measure
+    body: str
+    other: str = ""
+    ever: bool = False
+    at_least: float | None = None
+    at_most: float | None = None
+
+
+class Task(Strict):
+    """An entry of the table.
+
+    Attributes:
+        instruction: Sentence with names of things in braces.
+        things: By name, in the order in which they are placed.
+        program: Steps in order.
+        success: Conditions, all of which must hold.
+        hand: What the arm must hold things with; None = either will do.
+    """
+
+    instruction: str
+    things: dict[str, Thing]
+    program: tuple[Step, ...] = Field(min_length=1)
+    success: tuple[Success, ...] = Field(min_length=1)
+    hand: Literal["fingers", "suction"] | None = "fingers"
+
+    @model_validator(mode="after")
+    def _names_its_things(self) -> Task:
+        used = [step.at for step in self.program] + [t.near for t in self.things.values()]
+        used += [name for step in self.program for name in (*step.touches, step.along)]
+        used += [name for c in self.success for name in (c.body, c.other)]
+        used += [name or "" for _, name, _, _ in Formatter().parse(self.instruction)]
+        unknown = sorted({*used} - {*self.things, "", "own", HAND})
+        if unknown:
+            raise ValueError(f"there is no thing '{unknown[0]}'")
+        return self
+
+
+@cache
+def tasks() -> Mapping[str, Task]:
+    """The shipped tasks, by name."""
+    plain = load_data(__package__, "arm_tasks")
+    # Strict models take lists for tuples from JSON only.
+    return {name: Task.model_validate_json(json.dumps(entry)) for name, entry in plain.items()}
+
+
+def load_tasks(randomizer: Node) -> Node:
+    """Replace the name of a file of tasks, in the document of a randomizer, by its content.
+
+    Raises:
+        ConfigError: there is no such file, or it is no YAML.
+    """
+    kind, own = randomizer.get("type"), randomizer.get("tasks")
+    if kind is None or kind.content != "arm_task" or own is None:
+        return randomizer
+    if not isinstance(own.content, str):
+        return randomizer
+    path = find_path(own.text, own.position, "tasks", "file of tasks")
+    content = {**randomizer.entries, "tasks": load_yaml(path)}
+    return Node(randomizer.position, content, randomizer.key_positions)
