@@ -203,7 +203,7 @@ def window(size_m: Vec3 = (1.4, 1.3, 0.12), panes: int = 2) -> Solid:
 def outside(
     radius_m: float = 9.0, size_m: tuple[float, float] = (-1.5, 5.0), seed: int = 0
 ) -> Solid:
-    """What windows show: a panorama on a cylinder around the origin. Slot: view.
+    """What windows show: a panorama on a cylinder around the origin, closed below. Slot: view.
 
     Args:
         radius_m: Of the cylinder.
@@ -212,8 +212,11 @@ def outside(
     """
     turn = 2.0 * math.pi * np.arange(97) / 96
     circle = np.stack([radius_m * np.cos(turn), -radius_m * np.sin(turn)], axis=1)
-    rows = np.stack([np.insert(circle, 2, z, axis=1) for z in size_m])
-    ring = shapes.grid(rows, u=np.linspace(0.0, 2.0, 97), v=np.array([0.0, 1.0]))
+    low, high = (np.insert(circle, 2, z, axis=1) for z in size_m)
+    # Cameras at ceilings look down through windows: the lowest colours go on below the rooms. They
+    # are taken from inside the texture, whose lower edge blends into the upper one.
+    rows = np.stack([low * (0.01, 0.01, 1.0), low, high])
+    ring = shapes.grid(rows, u=np.linspace(0.0, 2.0, 97), v=np.array([0.02, 0.02, 1.0]))
     view = Material(
         (0.0, 0.0, 0.0),
         1.0,
