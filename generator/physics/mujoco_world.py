@@ -343,9 +343,11 @@ def _add_body(
         else:
             _add_joint(body, solid, solid.joint)
     friction = 0.0 if solid.is_smooth else solid.friction
+    dimensions = _ROLLING_DIMENSIONS if falls else _SLIDING_DIMENSIONS
     surface = {
         "friction": (friction**2, rolling_m, rolling_m),
-        "condim": _ROLLING_DIMENSIONS if falls else _SLIDING_DIMENSIONS,
+        # A cone without sliding friction has rolling friction only, and diverges.
+        "condim": 1 if solid.is_smooth else dimensions,
         # What is smooth stays smooth in contact with anything.
         "priority": int(friction == 0.0),
         "solref": (2.0 * time_step_s, 1.0),

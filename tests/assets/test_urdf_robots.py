@@ -12,6 +12,8 @@ from gen_data.generator.core.asset_types import RobotModel
 from gen_data.generator.core.se3 import SE3
 
 ROBOTS = ("franka_panda", "kuka_iiwa", "xarm6")
+TOOLED = ("franka_panda_suction", "kuka_iiwa_gripper", "kuka_iiwa_suction", "xarm6_gripper")
+"""The same arms with tools made by code."""
 
 
 @pytest.fixture(scope="module")
@@ -43,6 +45,36 @@ def test_the_panda_reaches_where_its_maker_says(library: Library) -> None:
     flange = link_poses(robot, (0.0,) * 9)["panda_link8"]
     assert flange.translation_m == pytest.approx((0.088, 0.0, 0.926), abs=1e-6)
     assert flange.rotate(np.array([0.0, 0.0, 1.0])) == pytest.approx([0.0, 0.0, -1.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("name", TOOLED)
+def test_tools_point_out_of_the_flange_and_close_at_the_grasp(library: Library, name: str) -> None:
+    """Closed fingers meet at the grasp frame's origin; a cup's rim is there, below its tube."""
+    robot = library.robot(name)
+    gripper = robot.gripper
+    assert gripper is not None
+    closed = tuple(
+        0.0 if joint.name in gripper.finger_joints else q
+        for joint, q in zip(robot.movable, robot.home, strict=True)
+    )
+    poses = link_poses(robot, closed)
+    T_grasp_world = (poses[gripper.link] @ gripper.T_link_grasp).inverse()
+    tips = [link for link in robot.links if link.endswith("finger")] or [gripper.link]
+    points = np.concatenate(
+        [
+            (T_grasp_world @ poses[tip]).apply(library.mesh(f"{name}/{tip}").vertices_m)
+            for tip in tips
+        ]
+    )
+    if gripper.cup is not None:
+        rim = points[points[:, 2] > -1e-6]
+        assert points[:, 2].max() == pytest.approx(0.0, abs=1e-6)
+        assert np.hypot(rim[:, 0], rim[:, 1]).max() == pytest.approx(0.017, abs=1e-3)
+        assert gripper.cup.force_n == pytest.approx(60e3 * math.pi * 0.015**2, abs=0.1)
+    else:
+        assert points[:, 2].min() < 0.0 < points[:, 2].max()
+        assert points[:, 1].min() == pytest.approx(-points[:, 1].max(), abs=1e-6)
+        assert np.abs(points[:, 1]).min() == pytest.approx(0.0, abs=1e-6)
 
 
 def test_the_panda_has_seven_joints_and_two_fingers(library: Library) -> None:
@@ -128,4 +160,4 @@ def test_links_can_be_asked_for_by_id(library: Library) -> None:
     """A link has the licence and category of its robot."""
     link = library.get("franka_panda/panda_link3")
     assert (link.kind, link.category, link.licence) == ("object", "robot", "Apache-2.0")
-    assert [a.asset_id for a in library.find({"arm"}, "robot")] == sorted(ROBOTS)
+    assert [a.asset_id for a in library.find({"arm"}, "robot")] == sorted((*ROBOTS, *TOOLED))

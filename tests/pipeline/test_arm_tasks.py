@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
 
 from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.pipeline_factory import open_pipeline
-from gen_data.generator.core.errors import AssetError, ConfigError
+from gen_data.generator.core.errors import AssetError, ConfigError, SceneRejected
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import canonical_json
@@ -123,6 +124,31 @@ def test_tasks_of_a_users_file_are_demonstrated(tmp_path: Path) -> None:
     table.unlink()
     with pytest.raises(ConfigError, match=r"config.yaml:4:27: tasks: there is no file of tasks"):
         load_config(str(config))
+
+
+@pytest.mark.parametrize(("mass_kg", "holds"), [(4.0, True), (4.5, False)])
+def test_a_cup_lifts_what_its_force_bears(tmp_path: Path, mass_kg: float, holds: bool) -> None:
+    """42.4 N: 4 kg weigh 39.2 N, 4.5 kg 44.1 N."""
+    (tmp_path / "mine.yaml").write_text(
+        f"""suck:
+  instruction: Lift the {{it}}.
+  hand: suction
+  things: {{it: {{assets: {{red box: "box?color=red&size_m=0.1,0.1,0.05"}}, mass_kg: {mass_kg}}}}}
+  program: [{{verb: grasp, phase: pick, at: it}}]
+  success: [{{measure: tilt, body: it, at_most: 0.1}}]
+"""
+    )
+    config = tmp_path / "config.yaml"
+    config.write_text(
+        "extends: arm_tasks\nphysics: {layout_attempts_max: 1}\nshared: {robot: {choice: "
+        "{franka_panda_suction: 1}}, task: {choice: {suck: 1}}}\n"
+        "randomizers:\n  - {name: things, tasks: mine.yaml, failures: {}, speed: 0.1}\n"
+    )
+    expected = nullcontext() if holds else pytest.raises(SceneRejected, match="bear the load")
+    with open_pipeline(load_config(str(config), overrides=SMALL)) as pipeline, expected:
+        (arm,) = pipeline.accepted_scene(0).scene.articulations
+        assert arm.episode is not None
+        assert [span.label for span in arm.episode.held] == ["things/0"]
 
 
 def my_arm(limit: str = '<limit lower="-2.9" upper="2.9" velocity="2"/>') -> str:
