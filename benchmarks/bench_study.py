@@ -51,7 +51,7 @@ def run_weakness(out: Path, sizes: Mapping[str, int]) -> bool:
     """Adapt to what a detector misses, and compare the next round with the configuration.
 
     Returns:
-        Whether the distance is re-weighted, twice with the same bytes and equal data sets,
+        Whether the exposure is re-weighted, twice with the same bytes and equal data sets,
         and the study finds the next round better.
     """
     config = str(CONFIGS / "weakness.yaml")
@@ -82,7 +82,7 @@ def run_weakness(out: Path, sizes: Mapping[str, int]) -> bool:
     return (
         replays
         and len(set(ids)) == 1
-        and "orbit.distance_m" in rounds[0].changed
+        and "shared.exposure_ev" in rounds[0].changed
         and found["variants"]["round 1"]["verdict"] == "better"
     )
 
