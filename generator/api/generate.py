@@ -108,7 +108,7 @@ def _standby_worker(
     """The first worker of this machine, which prepares itself during planning; None if unused."""
     from gen_data.generator.runner.processes import StandbyWorker
 
-    if cluster is not None or workers == 0:
+    if cluster is not None or count_workers(workers) == 0:
         yield None
         return
     with StandbyWorker() as standby:

@@ -25,7 +25,11 @@ def main() -> None:
     gc.set_threshold(50_000, 20, 100)
     from gen_data.generator.cli.main import main as run
 
-    run()
+    try:
+        run()
+    finally:
+        # The process ends: what is frozen is not searched again by the interpreter's last steps.
+        gc.freeze()
 
 
 if __name__ == "__main__":
