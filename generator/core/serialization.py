@@ -111,6 +111,8 @@ def _fields_of(kind: type) -> Callable[[Any], Iterable[tuple[str, Any]]] | None:
 def _builder(kind: Any) -> Callable[[Any], Any]:
     """Function that builds values of an annotation from plain ones; compiled once."""
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
+    # ``NDArray`` is an alias type (PEP 695) from NumPy 2.5 on: what it stands for is one step away.
+    origin = typing.get_origin(getattr(origin, "__value__", kind))
     if dataclasses.is_dataclass(kind) and isinstance(kind, type):
         return _dataclass_builder(kind)
     if origin in (typing.Union, types.UnionType):
