@@ -10,6 +10,7 @@ import numpy as np
 from gen_data.generator.core.scene import Articulation
 from gen_data.generator.environment.env import Env
 from gen_data.generator.physics.manipulation.arm_simulation import ArmSimulation
+from tests.engines import INSTALLED
 
 CONFIG: dict[str, Any] = {
     "template": "arm_task",
@@ -36,7 +37,7 @@ NOMINAL = {
 """Dynamics without variation: critically damped motors."""
 
 
-def small(engine: str = "pybullet", task: str = "reach", **options: Any) -> Env:
+def small(engine: str = INSTALLED[0], task: str = "reach", **options: Any) -> Env:
     """A new environment."""
     shared = {**CONFIG["shared"], "task": task}
     return Env({**CONFIG, "shared": shared, "physics": {"engine": engine}}, **options)

@@ -12,13 +12,12 @@ import pytest
 from numpy.typing import NDArray
 
 from gen_data.generator.environment.env import Env
-from gen_data.generator.physics.bullet_world import BulletWorld
 from gen_data.generator.physics.manipulation.arm_simulation import Servo
 from gen_data.generator.physics.mujoco_world import MujocoWorld
+from tests.engines import INSTALLED
 from tests.environment.small import NOMINAL, nominal, simulation_of, small
 from tests.physics.panda import urdf_path
 
-pybullet = pytest.importorskip("pybullet")
 pytest.importorskip("pybullet_data", reason="the Panda comes with pybullet's data")
 
 HAND_LINK, ARM_JOINTS = b"panda_hand", 7
@@ -29,6 +28,7 @@ GRASP_M = 0.1034
 @contextmanager
 def bullet_arm() -> Iterator[tuple[int, int, int]]:
     """Pybullet's own Panda: client, robot, number of the hand's link."""
+    pybullet = pytest.importorskip("pybullet")
     client = pybullet.connect(pybullet.DIRECT)
     robot = pybullet.loadURDF(str(urdf_path()), useFixedBase=True, physicsClientId=client)
     count = pybullet.getNumJoints(robot, physicsClientId=client)
@@ -42,6 +42,7 @@ def hand_poses(
 ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Positions [m] and rotation matrices of the grasp frame, by pybullet's forward kinematics."""
     found = []
+    pybullet = pytest.importorskip("pybullet")
     with bullet_arm() as (client, robot, link):
         for at in positions:
             for k in range(ARM_JOINTS):
@@ -64,7 +65,7 @@ def settled(env: Env, action: NDArray[np.float32], steps: int = 20) -> NDArray[n
     return simulation_of(env).positions.copy()
 
 
-@pytest.mark.parametrize("engine", ["pybullet", "mujoco"])
+@pytest.mark.parametrize("engine", INSTALLED)
 def test_a_delta_moves_the_hand_as_told(engine: str) -> None:
     """By (20, -10, 15) mm and 5 degrees about Z of the base, to 0.2 mm and 0.1 degrees."""
     env = nominal(engine, "cartesian_delta")
@@ -83,7 +84,7 @@ def test_a_delta_moves_the_hand_as_told(engine: str) -> None:
 
 def test_poses_are_reached_in_the_frame_of_the_base() -> None:
     """A hand that points down at a given place, turned by 30 degrees about Z."""
-    env = nominal("pybullet", "ik")
+    env = nominal(INSTALLED[0], "ik")
     env.reset(seed=1)
     turn = math.radians(30.0)
     action = env.control.encode((0.45, 0.1, 0.3), 1.0, (0.0, 0.0, turn))  # type: ignore[attr-defined]
@@ -98,8 +99,9 @@ def test_poses_are_reached_in_the_frame_of_the_base() -> None:
 
 def test_joint_actions_are_positions_within_the_limits_of_the_urdf() -> None:
     """-1 and 1 are the limits, 0 the middle of each joint."""
-    env = nominal("pybullet", "joint")
+    env = nominal(INSTALLED[0], "joint")
     env.reset(seed=1)
+    pybullet = pytest.importorskip("pybullet")
     with bullet_arm() as (client, robot, _):
         infos = [pybullet.getJointInfo(robot, k, physicsClientId=client) for k in range(7)]
     low, high = np.array([info[8:10] for info in infos]).T
@@ -150,7 +152,7 @@ def test_latency_delays_by_exactly_its_steps(latency: int) -> None:
     assert len(set(at_once)) == len(at_once)
 
 
-@pytest.mark.parametrize("engine", ["pybullet", "mujoco"])
+@pytest.mark.parametrize("engine", INSTALLED)
 def test_drawn_dynamics_reach_the_engine(engine: str) -> None:
     """Masses and friction read from the engine are the nominal ones times factors in the range."""
     dynamics = {
@@ -181,10 +183,10 @@ def _read(env: Env, name: str) -> tuple[float, float]:
     """Mass [kg] and coefficient of friction of a body, from the engine itself."""
     env.step(np.zeros(env.action_space.shape, np.float32))
     world = simulation_of(env)._world
-    if isinstance(world, BulletWorld):
+    if not isinstance(world, MujocoWorld):
+        pybullet = pytest.importorskip("pybullet")
         found = pybullet.getDynamicsInfo(world._solids[name].number, -1, **world._here)
         return float(found[0]), float(found[1])
-    assert isinstance(world, MujocoWorld)
     compiled = world._compile()
     number = next(k for k, known in compiled.names.items() if known == name)
     model: mujoco.MjModel = compiled.model

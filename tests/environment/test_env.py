@@ -20,12 +20,13 @@ from gen_data.generator.config.yaml_tree import parse_yaml
 from gen_data.generator.core.errors import ConfigError, SceneRejected
 from gen_data.generator.environment.env import ENV_ID, Env, make_vec
 from gen_data.generator.environment.settings import EnvSettings
+from tests.engines import INSTALLED
 from tests.environment.small import CONFIG, arm_of, nominal, same, simulation_of, small
 
 pytest.importorskip("pybullet_data", reason="the Panda comes with pybullet's data")
 
 
-@pytest.fixture(params=["pybullet", "mujoco"])
+@pytest.fixture(params=INSTALLED)
 def engine(request: pytest.FixtureRequest) -> str:
     """Name of an engine."""
     return str(request.param)
@@ -74,7 +75,7 @@ def test_equal_seeds_give_equal_bytes_whatever_happened_before() -> None:
 
 def test_resets_without_a_seed_continue_from_the_latest_one() -> None:
     """The same sequence of scenes after the same seed, all of them different."""
-    env = nominal("pybullet", "joint")
+    env = nominal(INSTALLED[0], "joint")
     env.reset(seed=1)
     following = [env.reset()[1]["scene_index"] for _ in range(2)]
     env.reset(seed=1)

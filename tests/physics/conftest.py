@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import get_args
 
 import pytest
 
 from gen_data.generator.physics import PhysicsConfig
 from gen_data.generator.physics.engine import Engine
-from gen_data.generator.physics.physics_config import EngineName, is_installed
+from gen_data.generator.physics.physics_config import EngineName
+from tests.engines import INSTALLED
 from tests.physics.doubles import Solids
 
 
-@pytest.fixture(params=[name for name in get_args(EngineName) if is_installed(name)])
+@pytest.fixture(params=INSTALLED)
 def engine_name(request: pytest.FixtureRequest) -> EngineName:
     """Name of an engine."""
     name: EngineName = request.param
