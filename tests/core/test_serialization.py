@@ -7,9 +7,12 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Literal
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import array_shapes, arrays
+from numpy.typing import NDArray
 
 from gen_data.generator.core.scene import Body, Environment, Light, Scene, SupportSurface
 from gen_data.generator.core.se3 import IDENTITY, SE3
@@ -82,6 +85,25 @@ def test_a_scene_survives_json() -> None:
     )
 
     assert from_plain(Scene, json.loads(canonical_json(scene))) == scene
+
+
+@dataclass(frozen=True)
+class Labelled:
+    """A value with a binary mask."""
+
+    mask: NDArray[np.bool_]
+
+
+@given(arrays(np.bool_, array_shapes(min_dims=2, max_dims=2, min_side=0, max_side=7)))
+def test_masks_survive_json(mask: NDArray[np.bool_]) -> None:
+    """As lengths of row-major runs, the first one of unset pixels."""
+    plain = json.loads(canonical_json(Labelled(mask)))["mask"]
+    assert plain["size"] == list(mask.shape)
+    expected = [pixel for k, n in enumerate(plain["runs"]) for pixel in [k % 2 == 1] * n]
+    assert mask.ravel().tolist() == expected
+    found = from_plain(Labelled, {"mask": plain}).mask
+    assert found.dtype == bool
+    assert np.array_equal(found, mask)
 
 
 def test_canonical_json_is_one_line_with_sorted_keys() -> None:
