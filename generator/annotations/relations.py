@@ -12,7 +12,13 @@ import numpy as np
 from pydantic import Field
 
 from gen_data.generator.annotations.instance_extents import find_extents
-from gen_data.generator.annotations.surface_contacts import are_within, find_contacts, hits_by_rays
+from gen_data.generator.annotations.surface_contacts import (
+    Contacts,
+    are_within,
+    find_contacts,
+    hits_by_rays,
+    meet_along,
+)
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.boxes import BoxPx
 from gen_data.generator.core.capture import Channel, SensorReading
@@ -24,6 +30,8 @@ from gen_data.generator.core.se3 import SE3, Array
 UPWARD = 0.5
 """A contact carries what is above it if its normal is at most 60 degrees from the vertical: more
 than the friction angle of nearly all materials (assumed)."""
+PLUMB_M = 1e-4
+"""Points whose verticals are at most this far apart are over each other."""
 OPPOSITE = -0.5
 """Fingers hold a thing by contacts whose normals differ by at least 120 degrees."""
 SHELL = frozenset({"floor", "wall", "ceiling"})
@@ -218,17 +226,18 @@ def _relate_pair(one: Shape, other: Shape, contact_m: float, near_m: float) -> I
     """Relations in space of two things, in both directions."""
     contacts = find_contacts(one.triangles_m, other.triangles_m, contact_m)
     close = False
-    for a, b, normals in ((one, other, contacts.normals), (other, one, -contacts.normals)):
+    for a, b, touching in ((one, other, contacts), (other, one, contacts.inverse())):
         if not a.thing.annotated:
             continue
 
         def relate(predicate: Predicate, a: Shape = a, b: Shape = b) -> Relation:
             return Relation(a.thing.instance_id, predicate, b.thing.instance_id)
 
-        held = b.thing.robot and bool((normals @ normals.T < OPPOSITE).any())
-        lift = normals[:, 2]
+        held = b.thing.robot and bool((touching.normals @ touching.normals.T < OPPOSITE).any())
         supported = (
-            _may_carry(b, a, contact_m) and bool((lift >= UPWARD).any()) and float(lift.sum()) > 0.0
+            _may_carry(b, a, contact_m)
+            and float(touching.normals[:, 2].sum()) > 0.0
+            and _lies_over(a, b, touching, contact_m)
         )
         inside = b.is_around(a)
         close |= held or supported or inside
@@ -254,6 +263,24 @@ def _may_carry(below: Shape, above: Shape, contact_m: float) -> bool:
         return False
     low_m = above.low_m[2]
     return bool(low_m > below.low_m[2] + contact_m or low_m >= below.high_m[2] - contact_m)
+
+
+def _lies_over(above: Shape, below: Shape, contacts: Contacts, contact_m: float) -> bool:
+    """Whether one thing meets another from above: where they touch, the one is over the other.
+
+    Edges that pass each other at a distance have a slanted normal, too, and carry nothing. The
+    contacts are those of the upper thing with the lower one.
+    """
+    up = contacts.normals[:, 2] >= UPWARD
+    upper_m, gaps_m = contacts.points_m[up], contacts.gaps_m[up, None]
+    offsets_m = gaps_m * contacts.normals[up]
+    if (np.hypot(offsets_m[:, 0], offsets_m[:, 1]) <= PLUMB_M).any():
+        return True
+    # Rays begin behind the surfaces, which may overlap by the same distance.
+    down_m, length_m = np.array([0.0, 0.0, -contact_m]), contact_m + contact_m / UPWARD
+    return meet_along(upper_m - down_m, down_m, below.triangles_m, length_m) or meet_along(
+        upper_m - offsets_m + down_m, -down_m, above.triangles_m, length_m
+    )
 
 
 def _away(T_world_camera: SE3) -> Array:

@@ -39,6 +39,12 @@ class Contacts:
     normals: Array
     gaps_m: Array
 
+    def inverse(self) -> Contacts:
+        """The same contacts of body B with body A."""
+        return Contacts(
+            self.points_m - self.gaps_m[:, None] * self.normals, -self.normals, self.gaps_m
+        )
+
 
 def find_contacts(a: Array, b: Array, tolerance_m: float) -> Contacts:
     """Contacts of two meshes: regular pairs of features at most a tolerance apart.
@@ -111,6 +117,16 @@ def hits_by_rays(origins_m: Array, directions: Array, triangles: Array) -> Array
             hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0)
         distances[k, hit] = t[hit]
     return distances
+
+
+def meet_along(points_m: Array, direction: Array, triangles: Array, length_m: float) -> bool:
+    """Whether a ray from any of the points [n, 3] hits a mesh within a distance [m]."""
+    near = triangles[_reaching(triangles, points_m, length_m)] if len(points_m) else triangles[:0]
+    if not len(near):
+        return False
+    unit = direction / np.linalg.norm(direction)
+    hits = hits_by_rays(points_m, np.tile(unit, (len(points_m), 1)), near)
+    return bool((hits <= length_m).any())
 
 
 def _reaching(triangles: Array, others: Array, limit_m: float) -> NDArray[np.bool_]:

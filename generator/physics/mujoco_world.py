@@ -341,7 +341,7 @@ def _add_body(
         if solid.joint is None:
             body.add_freejoint()
         else:
-            _add_joint(body, solid, solid.joint)
+            _add_joint(body, solid, solid.joint, time_step_s)
     friction = 0.0 if solid.is_smooth else solid.friction
     dimensions = _ROLLING_DIMENSIONS if falls else _SLIDING_DIMENSIONS
     surface = {
@@ -374,7 +374,7 @@ def _add_body(
         body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh, **surface)
 
 
-def _add_joint(body: mujoco.MjsBody, solid: _Solid, joint: BodyJoint) -> None:
+def _add_joint(body: mujoco.MjsBody, solid: _Solid, joint: BodyJoint, time_step_s: float) -> None:
     prismatic = joint.kind == "prismatic"
     anchor = (solid.T_body_center.inverse() @ SE3(joint.anchor_m)).translation_m
     body.add_joint(
@@ -385,6 +385,9 @@ def _add_joint(body: mujoco.MjsBody, solid: _Solid, joint: BodyJoint) -> None:
         # Degrees are the unit of specifications.
         range=[v if prismatic else math.degrees(v) for v in (joint.lower, joint.upper)],
         frictionloss=joint.friction,
+        # Soft by default: a slow joint would not meet the whole friction.
+        solref_friction=(2.0 * time_step_s, 1.0),
+        solimp_friction=_SOLIMP,
         damping=JOINT_DAMPING_S * joint.friction,
         stiffness=joint.stiffness,
     )

@@ -20,6 +20,7 @@ from gen_data.generator.assemble.pipeline_factory import open_pipeline
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.sample import ImageTruth, Relation
 from gen_data.generator.core.scene import Scene
+from tests.engines import INSTALLED
 
 SAMPLING_M = 0.001
 """Points on surfaces are so dense that the true distance is at most this much smaller."""
@@ -107,9 +108,10 @@ class Settled:
 
 
 @cache
-def settled(config: str, index: int) -> Settled:
+def settled(config: str, index: int, engine: str = INSTALLED[0]) -> Settled:
     """Sample of a shipped configuration, settled by physics."""
-    small = ("sensors[0].size_px=[320, 240]", "exporters=[]", "annotations=[]")
+    small = ["sensors[0].size_px=[320, 240]", "exporters=[]", "annotations=[]"]
+    small.append(f"physics.engine={engine}")
     with open_pipeline(load_config(config, overrides=small), frozenset({Channel.INSTANCE})) as made:
         sample = made.sample(index)
         reading = next(iter(sample.capture.readings.values()))
@@ -143,14 +145,17 @@ def distance_m(one: trimesh.Trimesh, other: trimesh.Trimesh) -> float:
     return min(found)
 
 
-WORLDS = [("tabletop", 0), ("tabletop", 10), ("bin_picking", 0)]
-each = pytest.mark.parametrize(("config", "index"), WORLDS)
+WORLDS = [("tabletop", 0, INSTALLED[0]), ("tabletop", 10, INSTALLED[0])]
+WORLDS += [("bin_picking", 0, engine) for engine in INSTALLED]
+each = pytest.mark.parametrize(("config", "index", "engine"), WORLDS)
 
 
 @each
-def test_supported_things_touch_what_supports_them_from_above(config: str, index: int) -> None:
+def test_supported_things_touch_what_supports_them_from_above(
+    config: str, index: int, engine: str
+) -> None:
     """Rays straight down from points of the subject, and up from its support, find the other."""
-    world = settled(config, index)
+    world = settled(config, index, engine)
     assert world.pairs("supported_by")
     for subject, support in world.pairs("supported_by"):
         one, other = world.meshes[subject], world.meshes[support]
@@ -166,9 +171,11 @@ def test_supported_things_touch_what_supports_them_from_above(config: str, index
 
 
 @each
-def test_everything_at_rest_is_supported_down_to_the_furniture(config: str, index: int) -> None:
+def test_everything_at_rest_is_supported_down_to_the_furniture(
+    config: str, index: int, engine: str
+) -> None:
     """Physics stability: nothing floats. Chains of supports end at what physics cannot move."""
-    world = settled(config, index)
+    world = settled(config, index, engine)
     below: dict[int, set[int]] = {}
     for subject, support in world.pairs("supported_by") | world.pairs("held_by"):
         below.setdefault(subject, set()).add(support)
@@ -183,17 +190,19 @@ def test_everything_at_rest_is_supported_down_to_the_furniture(config: str, inde
 
 
 @each
-def test_no_two_things_carry_each_other(config: str, index: int) -> None:
+def test_no_two_things_carry_each_other(config: str, index: int, engine: str) -> None:
     """Gravity has one direction."""
-    pairs = settled(config, index).pairs("supported_by")
+    pairs = settled(config, index, engine).pairs("supported_by")
 
     assert not {(a, b) for a, b in pairs if (b, a) in pairs}
 
 
 @each
-def test_near_things_are_nearer_than_half_the_smaller_one(config: str, index: int) -> None:
+def test_near_things_are_nearer_than_half_the_smaller_one(
+    config: str, index: int, engine: str
+) -> None:
     """And all others are farther; things that touch, hold or contain each other are left out."""
-    world = settled(config, index)
+    world = settled(config, index, engine)
     annotated = sorted(i.instance_id for i in world.scene.instances if i.annotated)
     related = {frozenset((r.subject, r.object)) for r in world.relations if r.predicate != "near"}
     near = world.pairs("near")
@@ -259,9 +268,9 @@ def test_furniture_stands_on_the_floor_and_things_on_furniture_below_them() -> N
 
 
 @each
-def test_views_follow_from_boxes_and_depths(config: str, index: int) -> None:
+def test_views_follow_from_boxes_and_depths(config: str, index: int, engine: str) -> None:
     """Left and right by columns; before and behind, for things in the same columns, by distance."""
-    world = settled(config, index)
+    world = settled(config, index, engine)
     boxes = {t.instance.instance_id: t.box for t in world.image.objects if t.box}
     stated = {(r.subject, r.predicate, r.object) for r in world.image.relations or ()}
     pose = world.image.camera.T_world_camera
