@@ -12,18 +12,18 @@ import shutil
 import tempfile
 import time
 from collections.abc import Generator
-from importlib.util import find_spec
 from typing import Any
 
 import pytest
+
+from tests.wheels import HAS_RERUN
 
 # Packs that happen to be installed on this machine must not change what tests see; processes that
 # tests start inherit it. Set before anything asks, hence not in a fixture.
 os.environ["GEN_DATA_ASSETS"] = tempfile.mkdtemp(prefix="gen-data-no-packs-")
 atexit.register(shutil.rmtree, os.environ["GEN_DATA_ASSETS"], ignore_errors=True)
 
-# rerun-sdk has no wheel for Python 3.10.
-collect_ignore = [] if find_spec("rerun") else ["exporters/test_rerun.py", "preview"]
+collect_ignore = [] if HAS_RERUN else ["exporters/test_rerun.py", "preview"]
 
 SKIPS_ALLOWED_IN_CI = (
     "this machine computes otherwise",  # where another processor stored digests

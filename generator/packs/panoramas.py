@@ -55,9 +55,11 @@ def exr_bytes(script: bytes, place: str) -> bytes:
     """Decode the data URL in a JavaScript module. Raises AssetError if it has none."""
     match = _DATA_URL.search(script)
     try:
-        return base64.b64decode(match[1] if match else b"=", validate=True)
+        if match:
+            return base64.b64decode(match[1], validate=True)
     except binascii.Error:
-        raise AssetError(f"{place}: holds no base64 data URL") from None
+        pass  # the same as none
+    raise AssetError(f"{place}: holds no base64 data URL")
 
 
 def encode_radiance(rgb: Float32) -> bytes:

@@ -20,7 +20,7 @@ from gen_data.generator.assemble.pipeline_factory import open_pipeline
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.sample import ImageTruth, Relation
 from gen_data.generator.core.scene import Scene
-from tests.engines import INSTALLED
+from tests.wheels import INSTALLED
 
 SAMPLING_M = 0.001
 """Points on surfaces are so dense that the true distance is at most this much smaller."""

@@ -16,6 +16,9 @@ from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
+import PIL
+
 from gen_data.generator.assets.asset_arrays import pack_imported, pack_texture
 from gen_data.generator.assets.asset_cache import Arrays, DiskCache, Store
 from gen_data.generator.assets.asset_ids import AssetId, parse_asset_id
@@ -29,6 +32,17 @@ def read_stored() -> tuple[dict[str, str], dict[str, dict[str, str]]]:
     """Digests of the machine's computations, and by family ``{content key: digest of bytes}``."""
     stored = json.loads(FILE.read_text("utf-8"))
     return stored["numerics"], stored["families"]
+
+
+def numerics() -> dict[str, str]:
+    """What bytes of assets depend on besides the code: the machine, and two libraries' releases."""
+    image = np.sin(np.arange(512 * 512, dtype=np.int64) ** 2 % 7919).astype(np.float32)
+    return {
+        **host_digests(),
+        # NumPy 2.2, for Python 3.10, adds long rows of float32 in another order.
+        "reductions": f"{image.std()!r} {image.mean()!r}",
+        "text": PIL.__version__.split(".")[0],
+    }
 
 
 def digests_of(library: ProceduralLibrary) -> Mapping[str, dict[str, str]]:
@@ -73,7 +87,7 @@ def main() -> None:
     os.environ["GEN_DATA_ASSETS"] = tempfile.mkdtemp(prefix="gen-data-no-packs-")
     with tempfile.TemporaryDirectory() as folder:
         families = digests_of(open_procedural(Path(folder)))
-    stored = {"numerics": host_digests(), "families": families}
+    stored = {"numerics": numerics(), "families": families}
     FILE.write_text(json.dumps(stored, indent=1, sort_keys=True) + "\n", "utf-8")
 
 

@@ -18,6 +18,7 @@ import pytest
 from PIL import Image
 
 from tests.end_to_end.running import ROOT, SMALL, command, environment, gen_data
+from tests.wheels import needs_rerun
 
 
 def test_contact_sheet_of_a_dataset_has_one_tile_per_sample(dataset: Path, tmp_path: Path) -> None:
@@ -33,6 +34,7 @@ def test_contact_sheet_of_a_dataset_has_one_tile_per_sample(dataset: Path, tmp_p
     assert sheet.std() > 20
 
 
+@needs_rerun
 def test_recording_is_accepted_by_rerun(tmp_path: Path) -> None:
     """``rerun rrd verify`` reads what ``preview --save`` wrote."""
     done = gen_data("preview", "tabletop.yaml", "--n", "2", "--save", "x.rrd", *SMALL, cwd=tmp_path)
@@ -128,6 +130,7 @@ def test_a_report_counts_the_annotations_of_a_dataset(dataset: Path, tmp_path: P
     assert "Occlusion and truncation" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+@needs_rerun
 @pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGKILL])
 def test_a_preview_for_browsers_listens_on_this_machine_only(
     tmp_path: Path, signal_number: signal.Signals
@@ -157,6 +160,7 @@ def test_a_preview_for_browsers_listens_on_this_machine_only(
     assert not any(member.is_running() for member in family)
 
 
+@needs_rerun
 def test_an_address_of_another_machine_is_refused(tmp_path: Path) -> None:
     """192.0.2.1 is reserved for documentation (RFC 5737): no machine has it."""
     done = gen_data("preview", "tabletop.yaml", "--web", "--host", "192.0.2.1", cwd=tmp_path)

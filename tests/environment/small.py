@@ -10,7 +10,7 @@ import numpy as np
 from gen_data.generator.core.scene import Articulation
 from gen_data.generator.environment.env import Env
 from gen_data.generator.physics.manipulation.arm_simulation import ArmSimulation
-from tests.engines import INSTALLED
+from tests.wheels import INSTALLED
 
 CONFIG: dict[str, Any] = {
     "template": "arm_task",

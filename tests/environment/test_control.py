@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from gen_data.generator.environment.env import Env
 from gen_data.generator.physics.manipulation.arm_simulation import Servo
 from gen_data.generator.physics.mujoco_world import MujocoWorld
-from tests.engines import INSTALLED
 from tests.environment.small import NOMINAL, nominal, simulation_of, small
 from tests.physics.panda import urdf_path
+from tests.wheels import INSTALLED
 
 pytest.importorskip("pybullet_data", reason="the Panda comes with pybullet's data")
 

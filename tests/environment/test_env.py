@@ -20,8 +20,8 @@ from gen_data.generator.config.yaml_tree import parse_yaml
 from gen_data.generator.core.errors import ConfigError, SceneRejected
 from gen_data.generator.environment.env import ENV_ID, Env, make_vec
 from gen_data.generator.environment.settings import EnvSettings
-from tests.engines import INSTALLED
 from tests.environment.small import CONFIG, arm_of, nominal, same, simulation_of, small
+from tests.wheels import INSTALLED
 
 pytest.importorskip("pybullet_data", reason="the Panda comes with pybullet's data")
 

@@ -63,6 +63,7 @@ from gen_data.generator.core.scene_time import RIG_AXES, add_twists, place_senso
 from gen_data.generator.core.se3 import SE3, Array, look_at
 from gen_data.generator.runner.shard import drop_pixels
 from tests.exporters.drives import drive_info
+from tests.wheels import NO_RERUN
 
 CATEGORIES = ("car", "crate", "pedestrian")
 MEDIA = (Channel.RGB, Channel.Z_DEPTH, Channel.INSTANCE, Channel.CATEGORY)
@@ -521,6 +522,8 @@ def export(
     keep_arrays: bool = False,
 ) -> Path:
     """Write samples shard by shard, merge the shards, and return the data set's folder."""
+    if exporter.type == "rerun":
+        pytest.importorskip("rerun", reason=NO_RERUN)
     exporter = exporter.with_assets(Props())
     shards = [list(samples[i : i + shard_size]) for i in range(0, len(samples), shard_size)]
     shard_dirs = [folder / f"shards/{k:06d}" for k in range(len(shards))]

@@ -49,6 +49,7 @@ from tests.exporters import (
     test_tables,
 )
 from tests.exporters.drives import DRIVE, drive_info
+from tests.wheels import needs_rerun
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -612,6 +613,7 @@ def marked_damages() -> Iterator[tuple[str, int]]:
                 yield marks["damage"].args[0], len(list(marks["parametrize"].args[1]))
 
 
+@needs_rerun
 def test_every_format_is_damaged() -> None:
     """At least twice each, and often enough in total; a new format is damaged, too."""
     counts = Counter(name for name, _ in CASES)

@@ -9,8 +9,8 @@ import pytest
 from gen_data.generator.physics import PhysicsConfig
 from gen_data.generator.physics.engine import Engine
 from gen_data.generator.physics.physics_config import EngineName
-from tests.engines import INSTALLED
 from tests.physics.doubles import Solids
+from tests.wheels import INSTALLED
 
 
 @pytest.fixture(params=INSTALLED)
