@@ -240,7 +240,6 @@ class Builder:
         counts: dict[str, int] = {}
         for piece in pieces:
             number = counts[piece.family] = counts.get(piece.family, -1) + 1
-            pose = SE3.about_z(piece.yaw_rad, piece.position_m)
             word = piece.family.replace("/", "_")
             part = None
             if piece.family in parts:
@@ -249,7 +248,7 @@ class Builder:
             self.add(
                 f"{room.name}/{word}_{number}",
                 piece.asset,
-                pose,
+                piece.pose,
                 room.kind,
                 part=part,
                 group=self._name,

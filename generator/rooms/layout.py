@@ -19,11 +19,13 @@ from gen_data.generator.assets.interiors.storage import (
     VARIANTS_PER_LOOK,
     board_levels_m,
 )
+from gen_data.generator.core.bounded_cache import ObjectCache
 from gen_data.generator.core.boxes import Rectangle, overlap_of
 from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.se3 import SE3, Array, Quaternion, Vec3
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.rooms.floor_plan import Opening, Room, between, direction, draw_count
+from gen_data.generator.rooms.resting import LOOSE, UPRIGHT, turn_to_rest
 from gen_data.generator.rooms.rules import RoomType, Rule
 
 Options = Mapping[str, Sequence[str]]
@@ -41,6 +43,13 @@ _CROWDED = 0.25
 """Distance within which a piece before a window hides it."""
 _FLAT = frozenset({"rug"})
 _BOARDS = frozenset({"bookcase", "steel_rack"})
+_EDGES_M = {"bookcase": 0.03, "steel_rack": 0.03, "pallet_rack": 0.09}
+"""Width of the border of surfaces that stays free: that of sides and posts."""
+_TOP_M = 0.003
+"""Depth of the rounded border of tops."""
+_EDGE_OF_TOP_M = 0.008
+_TOPS: ObjectCache[dict[str, Array]] = ObjectCache(2)
+_SHAPES: ObjectCache[dict[str, _Shape]] = ObjectCache(2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +62,7 @@ class Piece:
         footprint: Rectangle that it covers, world.
         low_m, high_m: Heights between which it extends.
         on: Index of the piece that carries it; -1 = none.
+        rest: Turn of its own frame, before ``yaw_rad``, with which it lies on a level surface.
     """
 
     role: str
@@ -64,6 +74,12 @@ class Piece:
     low_m: float
     high_m: float
     on: int = -1
+    rest: Quaternion = UPRIGHT
+
+    @property
+    def pose(self) -> SE3:
+        """``T_world_piece``."""
+        return SE3.about_z(self.yaw_rad, self.position_m) @ SE3(quaternion_wxyz=self.rest)
 
 
 class Conflict(Exception):
@@ -81,7 +97,11 @@ class Conflict(Exception):
 
 @dataclass(frozen=True, slots=True)
 class _Shape:
-    """Bounds of an asset: middle of its footprint, half extents, lowest and highest point [m]."""
+    """Bounds of an asset at rest [m]: middle of its footprint, half extents, lowest and highest.
+
+    Attributes:
+        rest: Turn of its own frame with which it lies on a level surface; None if there is none.
+    """
 
     x: float
     y: float
@@ -89,6 +109,30 @@ class _Shape:
     half_y: float
     low: float
     high: float
+    rest: Quaternion | None
+
+
+def _find_shape(assets: AssetIndex, asset: str) -> _Shape:
+    low, high = assets.bounds_m(asset)
+    rest: Quaternion | None = UPRIGHT
+    if asset.partition("?")[0] in LOOSE:
+        points_m = np.asarray(assets.vertices_m(asset), np.float64)
+        rest = turn_to_rest(points_m)
+        if rest is not None:
+            turned_m = SE3(quaternion_wxyz=rest).apply(points_m)
+            low, high = turned_m.min(axis=0).tolist(), turned_m.max(axis=0).tolist()
+    (x0, y0, z0), (x1, y1, z1) = low, high
+    middle, half = (0.5 * (x0 + x1), 0.5 * (y0 + y1)), (0.5 * (x1 - x0), 0.5 * (y1 - y0))
+    return _Shape(*middle, *half, z0, z1, rest)
+
+
+def _find_top(assets: AssetIndex, asset: str) -> Array:
+    """Sides of the convex outline of a piece's top, [n, 3]: ``a x + b y + c < 0`` inside [m]."""
+    from scipy.spatial import ConvexHull
+
+    points_m = assets.vertices_m(asset)
+    top_m = points_m[points_m[:, 2] > points_m[:, 2].max() - _TOP_M, :2]
+    return np.asarray(ConvexHull(top_m).equations, np.float64)
 
 
 @dataclass
@@ -110,8 +154,26 @@ class Layout:
 
     def shape(self, asset: str) -> _Shape:
         """Extents of an asset."""
-        (x0, y0, z0), (x1, y1, z1) = self.assets.bounds_m(asset)
-        return _Shape(0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (x1 - x0), 0.5 * (y1 - y0), z0, z1)
+        known = _SHAPES.get(self.assets, dict)
+        if asset not in known:
+            known[asset] = _find_shape(self.assets, asset)
+        return known[asset]
+
+    def is_on_top(self, footprint: Rectangle, carrier: Piece) -> bool:
+        """Whether a footprint is on the top of a piece, which may be round."""
+        known = _TOPS.get(self.assets, dict)
+        if carrier.asset not in known:
+            known[carrier.asset] = _find_top(self.assets, carrier.asset)
+        x, y, c, s, a, b = footprint
+        corners_m = np.array(
+            [
+                (x + u * a * c - v * b * s, y + u * a * s + v * b * c, 0.0)
+                for u, v in ((-1, -1), (-1, 1), (1, -1), (1, 1))
+            ]
+        )
+        inside_m = carrier.pose.inverse().apply(corners_m)[:, :2]
+        sides = known[carrier.asset]
+        return bool((inside_m @ sides[:, :2].T + sides[:, 2] < -_EDGE_OF_TOP_M).all())
 
     def pick(self, options: Sequence[str]) -> str:
         """Draw one of several."""
@@ -133,6 +195,9 @@ class Layout:
     ) -> bool:
         """Place the middle of an asset's footprint at a point, unless something is in the way."""
         s = self.shape(asset)
+        if s.rest is None:
+            self.refused["does not stand by itself"] += 1
+            return False
         c, sn = _cos_sin(yaw_rad)
         footprint: Rectangle = (at[0], at[1], c, sn, s.half_x, s.half_y)
         high_m = low_m + s.high - s.low
@@ -145,7 +210,9 @@ class Layout:
         position = (round(x, 5), round(y, 5), round(low_m - s.low, 5))
         on = ignore if rule.place == "on" else -1
         self.pieces.append(
-            Piece(rule.piece, family, asset, position, yaw_rad, footprint, low_m, high_m, on)
+            Piece(
+                rule.piece, family, asset, position, yaw_rad, footprint, low_m, high_m, on, s.rest
+            )
         )
         if zone is not None:
             self.zones.append((zone, len(self.pieces) - 1))
@@ -531,8 +598,9 @@ def _put_thing(
     family = layout.pick(rule.things)
     asset = layout.pick(options[family])
     s = layout.shape(asset)
-    boards = layout.pieces[k].family in (*_BOARDS, "pallet_rack")
-    if s.high - s.low > clearance:
+    carrier = layout.pieces[k]
+    boards = carrier.family in (*_BOARDS, "pallet_rack")
+    if s.rest is None or s.high - s.low > clearance:
         return
     for _ in range(8):
         turn = layout.signed(0.25 if boards else math.pi)
@@ -540,15 +608,17 @@ def _put_thing(
             turn = 0.0
         tc, ts = abs(math.cos(turn)), abs(math.sin(turn))
         reach = (s.half_x * tc + s.half_y * ts, s.half_x * ts + s.half_y * tc)
-        edge = 0.03 if boards else 0.05
+        edge = _EDGES_M.get(carrier.family, 0.05)
         free = a - edge - reach[0], b - edge - reach[1]
         if min(free) < 0.0:
             continue
         dx, dy = layout.signed(max(free[0], 0.0)), layout.signed(max(free[1], 0.0))
         at = (x + c * dx - sn * dy, y + sn * dx + c * dy)
-        yaw = layout.pieces[k].yaw_rad + turn
+        yaw = carrier.yaw_rad + turn
         c2, s2 = _cos_sin(yaw)
         footprint: Rectangle = (at[0], at[1], c2, s2, s.half_x, s.half_y)
+        if not boards and not layout.is_on_top(footprint, carrier):
+            continue
         top = height + s.high - s.low
         taken = any(
             n != k
@@ -562,7 +632,7 @@ def _put_thing(
         px, py = at[0] - c2 * s.x + s2 * s.y, at[1] - s2 * s.x - c2 * s.y
         position = (round(px, 5), round(py, 5), round(height - s.low, 5))
         layout.pieces.append(
-            Piece("thing", family, asset, position, yaw, footprint, height, top, k)
+            Piece("thing", family, asset, position, yaw, footprint, height, top, k, s.rest)
         )
         return
 

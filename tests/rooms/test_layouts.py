@@ -91,8 +91,20 @@ def family(body: Body) -> str:
     return body.asset.partition("?")[0]
 
 
+def is_tilted(body: Body) -> bool:
+    """Whether a body is turned about another axis than the vertical."""
+    return any(body.T_world_body.quaternion_wxyz[1:3])
+
+
+def world_vertices(body: Body) -> NDArray[np.float64]:
+    """Vertices of a body in the world [m]."""
+    return body.T_world_body.apply(library().vertices_m(body.asset).astype(np.float64))
+
+
 def outline(body: Body) -> NDArray[np.float32]:
-    """Corners of the rectangle that a body covers on the floor, [4, 2]."""
+    """Corners of the outline that a body covers on the floor, [n, 2]; of its box if upright."""
+    if is_tilted(body):
+        return cv2.convexHull(world_vertices(body)[:, :2].astype(np.float32))[:, 0]
     (x0, y0, _), (x1, y1, _) = library().bounds_m(body.asset)
     corners = body.T_world_body.apply(
         np.array([(x0, y0, 0.0), (x1, y0, 0.0), (x1, y1, 0.0), (x0, y1, 0.0)])
@@ -112,6 +124,9 @@ def distance_m(body: Body, x: float, y: float) -> float:
 
 def heights_m(body: Body) -> tuple[float, float]:
     """Lowest and highest point of a body."""
+    if is_tilted(body):
+        z_m = world_vertices(body)[:, 2]
+        return float(z_m.min()), float(z_m.max())
     low, high = library().bounds_m(body.asset)
     z = body.T_world_body.translation_m[2]
     return z + low[2], z + high[2]

@@ -1,0 +1,198 @@
+"""Physics confirms that furnished rooms are at rest.
+
+Bullet simulates them with exact triangle meshes of what is fixed, and the convex hulls of all else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import cv2
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from gen_data.generator.core.scene import Body
+from gen_data.generator.core.se3 import SE3, Array
+from gen_data.generator.rooms.resting import LOOSE, turn_to_rest
+from gen_data.generator.rooms.rules import room_types
+from tests.rooms.test_layouts import KINDS, family, furnished, library
+
+HUNG = {
+    "ceiling_lamp", "curtain", "mirror", "picture", "radiator", "range_hood", "towel", "tube_lamp",
+    "wall_clock", "wall_unit", "whiteboard",
+}  # fmt: skip
+"""On walls and ceilings."""
+FIXED = {
+    "bathtub", "cooker", "kitchen_sink", "kitchen_unit", "shower", "toilet", "vise", "wash_basin",
+}  # fmt: skip
+"""Screwed to walls, floors and benches."""
+HOLLOW = {
+    "armchair", "bed", "bedside_table", "bookcase", "coffee_table", "desk", "dining_table",
+    "dresser", "filing_cabinet", "meeting_table", "pallet_rack", "refrigerator", "side_table",
+    "sofa", "steel_rack", "tool_cabinet", "tv_stand", "wardrobe", "washing_machine", "workbench",
+}  # fmt: skip
+"""What may carry or contain others, for which a convex hull has no room; simulated by itself."""
+SOFT = {"rug"}
+"""Gives way to the feet of furniture."""
+SHELL = {"ceiling", "door_frame", "door_leaf", "floor", "wall", "window"}
+STEP_S = 1.0 / 240.0
+MOVE_M, TURN_DEG = 0.01, 9.0
+"""More is a fall. Bullet keeps hulls 1 to 2 mm apart, which turns small things by some degrees."""
+DENSITY_KG_M3 = 300.0
+
+
+def mesh_of(bodies: Sequence[Body]) -> trimesh.Trimesh:
+    """The meshes of bodies in the world."""
+    parts = []
+    for body in bodies:
+        mesh = library().mesh(body.asset)
+        corners = body.T_world_body.apply(mesh.vertices_m.astype(np.float64))
+        parts.append(trimesh.Trimesh(corners, mesh.faces, process=False))
+    return trimesh.util.concatenate(parts)
+
+
+class Bullet:
+    """A world under gravity."""
+
+    def __init__(self, client: int) -> None:
+        self.pb = pytest.importorskip("pybullet")
+        self.here = {"physicsClientId": client}
+        self.starts: dict[int, tuple[str, Array]] = {}
+
+    def fix(self, mesh: trimesh.Trimesh) -> None:
+        """Add triangles that do not move."""
+        shape = self.pb.createCollisionShape(
+            self.pb.GEOM_MESH,
+            vertices=mesh.vertices.tolist(),
+            indices=mesh.faces.ravel().tolist(),
+            flags=self.pb.GEOM_FORCE_CONCAVE_TRIMESH,
+            **self.here,
+        )
+        self.pb.createMultiBody(0, shape, **self.here)
+
+    def drop(self, name: str, mesh: trimesh.Trimesh) -> None:
+        """Add a convex hull that is free to move; wood and plastic slide and roll like this."""
+        hull = mesh.convex_hull
+        center, points = hull.center_mass, hull.vertices
+        # Bullet takes few vertices: the outermost ones, and all of the base.
+        ways = np.random.default_rng(0).normal(size=(400, 3))
+        base = np.flatnonzero(points[:, 2] < points[:, 2].min() + 3e-3)
+        few = points[sorted({*np.argmax(points @ ways.T, axis=0), *base})]
+        shape = self.pb.createCollisionShape(
+            self.pb.GEOM_MESH, vertices=(few - center).tolist(), **self.here
+        )
+        mass_kg = DENSITY_KG_M3 * max(hull.volume, 1e-6)
+        number = self.pb.createMultiBody(mass_kg, shape, basePosition=center.tolist(), **self.here)
+        self.pb.changeDynamics(
+            number, -1, lateralFriction=0.5, rollingFriction=5e-4, restitution=0.0, **self.here
+        )
+        self.starts[number] = name, center
+
+    def fallen(self, seconds: float = 2.0) -> dict[str, tuple[float, float]]:
+        """How far [m] and by how much [deg] things have moved that were not at rest."""
+        for _ in range(round(seconds / STEP_S)):
+            self.pb.stepSimulation(**self.here)
+        found = {}
+        for number, (name, start) in self.starts.items():
+            position, turn = self.pb.getBasePositionAndOrientation(number, **self.here)
+            moved_m = float(np.linalg.norm(np.array(position) - start))
+            turned_deg = math.degrees(2.0 * math.acos(min(1.0, abs(turn[3]))))
+            if moved_m > MOVE_M or turned_deg > TURN_DEG:
+                found[name] = moved_m, turned_deg
+        return found
+
+
+@contextmanager
+def bullet() -> Iterator[Bullet]:
+    """A world of its own."""
+    pb = pytest.importorskip("pybullet")
+    client = pb.connect(pb.DIRECT)
+    pb.setGravity(0.0, 0.0, -9.81, physicsClientId=client)
+    try:
+        yield Bullet(client)
+    finally:
+        pb.disconnect(client)
+
+
+def settle(kind: str, seed: int) -> tuple[int, dict[str, tuple[float, float]]]:
+    """Number of things in a room that could fall, and those that did."""
+    instances: dict[int, list[Body]] = {}
+    for body in furnished(kind, seed).bodies:
+        if body.collides and family(body) not in SOFT:
+            instances.setdefault(body.instance_id, []).append(body)
+    with bullet() as world:
+        for bodies in instances.values():
+            if family(bodies[0]) in HUNG | FIXED | HOLLOW | SHELL:
+                world.fix(mesh_of(bodies))
+            else:
+                world.drop(bodies[0].name, mesh_of(bodies))
+        return len(world.starts), world.fallen()
+
+
+@pytest.mark.parametrize("kind", ["living_room", "workshop"])
+def test_nothing_falls_in_a_room(kind: str) -> None:
+    """Two seconds of simulation."""
+    number, fallen = settle(kind, 2)
+    assert number > 5
+    assert fallen == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_falls_in_ten_rooms_of_each_type(kind: str) -> None:
+    """Tables, shelves and floors carry what is on them."""
+    results = [settle(kind, seed) for seed in range(10)]
+    assert sum(number for number, _ in results) > 20
+    assert [fallen for _, fallen in results if fallen] == []
+
+
+def standing_families() -> list[str]:
+    """Families that rooms place on floors and surfaces, as they are."""
+    places = {"wall", "corner", "free", "front", "beside", "around", "on", "across"}
+    rules = [rule for kind in room_types().values() for rule in kind.pieces]
+    placed = {f for rule in rules if rule.place in places for f in rule.assets}
+    things = {f for rule in rules for f in rule.things}
+    return sorted((placed | things) - LOOSE - HUNG - FIXED - SOFT)
+
+
+@pytest.mark.slow
+def test_what_is_placed_as_it_is_stands_as_it_is() -> None:
+    """Eight variants of each family, among them those that ``settle`` does not let fall."""
+    families = standing_families()
+    assert set(families) > HOLLOW
+    with bullet() as world:
+        world.fix(trimesh.creation.box((900.0, 60.0, 0.2)).apply_translation((0.0, 0.0, -0.1)))
+        for k, name in enumerate(families):
+            for seed in range(8):
+                at_m = (4.0 * k - 2.0 * len(families), 4.0 * seed - 16.0, 0.0)
+                low_m = library().bounds_m(f"{name}?seed={seed}")[0][2]
+                body = Body(name, f"{name}?seed={seed}", SE3((*at_m[:2], -low_m)))
+                world.drop(f"{name} {seed}", mesh_of([body]))
+        assert world.fallen() == {}
+
+
+clouds = arrays(np.float64, (12, 3), elements=st.floats(-1.0, 1.0, width=32))
+
+
+@settings(max_examples=60)
+@given(clouds)
+def test_the_centre_of_mass_is_above_the_base_after_the_turn(points_m: Array) -> None:
+    """By trimesh's centre of mass, and the convex hull of the lowest points."""
+    if np.linalg.matrix_rank(points_m - points_m.mean(axis=0), tol=0.05) < 3:
+        return
+    turn = turn_to_rest(points_m)
+    if turn is None:
+        return
+    turned_m = SE3(quaternion_wxyz=turn).apply(points_m)
+    hull = trimesh.convex.convex_hull(turned_m)
+    base = turned_m[turned_m[:, 2] < turned_m[:, 2].min() + 1e-6]
+    assert len(base) >= 3
+    outline = cv2.convexHull(base[:, :2].astype(np.float32))
+    x, y, _ = hull.center_mass.tolist()
+    assert cv2.pointPolygonTest(outline, (x, y), measureDist=True) > -1e-5
