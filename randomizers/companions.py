@@ -31,8 +31,9 @@ class Companions(GroupRandomizer):
 
     List it after the randomizer that draws the group. Companions of somebody who walks walk beside
     them in the same direction; companions of somebody who stands form a circle with them and talk.
-    Those who would overlap something else are left out. Everybody has one way to walk in company
-    and one way to talk, so that meshes are used again.
+    Those who would overlap something else are left out, and so are people of packs and files whose
+    one pose is to stand, beside walkers. Everybody has one way to walk in company and one way to
+    talk, so that meshes are used again.
 
     Attributes:
         size: Number of people in a company, including the one who has a place already. By default a
@@ -88,11 +89,13 @@ class Companions(GroupRandomizer):
         side = 1.0 if rng.uniform() < 0.5 else -1.0
         gap_m = self.gap_m.draw(rng)
         for k in range(others):
-            asset = _walking(draw_asset(weights, rng), assets)
+            drawn = draw_asset(weights, rng)
             aside_m = side * gap_m * (k // 2 + 1) * (-1.0 if k % 2 else 1.0)
             ahead_m = _SWAY_M * float(rng.normal())
+            if not _fits(drawn, _WALKS, assets) and not _has_poses(drawn):
+                continue  # a mesh that stands cannot walk
             place = leader.T_world_body @ SE3((ahead_m, aside_m, 0.0))
-            made += self._place(asset, place, ground, assets)
+            made += self._place(_walking(drawn, assets), place, ground, assets)
         return made
 
     def _stand_around(
@@ -137,12 +140,22 @@ def _talking(asset: str, assets: AssetIndex) -> str:
 
 
 def _posed(asset: str, fitting: Collection[str], pose: str, assets: AssetIndex) -> str:
-    """The asset, in another pose unless its own fits; assets without poses stay as they are."""
-    own = dict(assets.get(asset).attributes).get("pose")
-    if own is None or own in fitting:
+    """The asset, in another pose unless its own fits; meshes with one pose stay as they are."""
+    if _fits(asset, fitting, assets) or not _has_poses(asset):
         return asset
     parsed = parse_asset_id(asset)
     return str(AssetId(parsed.name, {**parsed.parameters, "pose": pose}))
+
+
+def _fits(asset: str, fitting: Collection[str], assets: AssetIndex) -> bool:
+    """Whether its pose is one of these; what names no pose fits everywhere."""
+    own = dict(assets.get(asset).attributes).get("pose")
+    return own is None or own in fitting
+
+
+def _has_poses(asset: str) -> bool:
+    """Whether it is made in any pose: ids of files of packs and users have no parameters."""
+    return bool(parse_asset_id(asset).parameters)
 
 
 def _free_number(members: Sequence[Body]) -> int:

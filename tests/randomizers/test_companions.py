@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from gen_data.generator.assets.library import open_library
 from gen_data.generator.assets.people.posing import MOVING_POSES
@@ -120,3 +122,27 @@ def test_everybody_has_one_way_to_walk_in_company_and_one_to_talk(library: Asset
         found |= {body.asset for body in scene.bodies} - given
     assert 4 < len(found) <= 2 * len(ASSETS)
     assert not any("phase" in asset for asset in found)
+
+
+@pytest.mark.parametrize(("pose", "companions"), [("walk", 0), ("stand", 8)])
+def test_a_mesh_that_stands_joins_a_circle_but_walks_with_nobody(
+    tmp_path: Path, pose: str, companions: int
+) -> None:
+    """A figure from a file has one pose, which its attributes state."""
+    figure = trimesh.creation.box((0.4, 0.5, 1.8))
+    figure.export(tmp_path / "figure.obj")
+    (tmp_path / "assets.yaml").write_text(
+        "licence: CC0-1.0\nauthor: Someone\nsource: workshop\n"
+        "assets:\n  - {id: figure, file: figure.obj, category: person, mass_kg: 75,\n"
+        "     origin: floor, attributes: {pose: standing}}\n"
+    )
+    library = open_library([tmp_path], cache_dir=tmp_path / "cache")
+    scene = people(library, pose, 4)
+    group = replace(scene.groups[0], assets=("user/figure",))
+    draw = Companions(name="company", group="people", size=Constant(3))
+
+    company = draw(replace(scene, groups=(group,)), library, rng_of("stream"))
+
+    figures = [body for body in company.bodies if body.asset == "user/figure"]
+    assert len(figures) == companions
+    assert len(company.bodies) == 4 + companions
