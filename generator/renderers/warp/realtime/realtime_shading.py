@@ -42,6 +42,7 @@ from gen_data.generator.renderers.warp.scene.light_selection import (
     extract_sky_lights,
     keep_main_lamps,
 )
+from gen_data.generator.renderers.warp.scene.struct_dtypes import take_rows
 from gen_data.generator.renderers.warp.visibility.kernels import (
     distortion,
     edge_antialiasing,
@@ -295,10 +296,9 @@ def _weigh_lamps(frame: CameraView, lattice: Lattice) -> wp.array:
     frame.launch(soft_shadows.weigh_lamps, points, [world, lattice], [shares, matters])
     kept = np.flatnonzero(matters.numpy())
     if len(kept) < count:
-        lamps = world.lamps.numpy()[kept]
-        world.lamps = wp.array(lamps, dtype=records.LightRecord, device=cache.device)
+        world.lamps = take_rows(world.lamps, kept)
         if len(kept):
-            shares = wp.array(shares.numpy()[kept], dtype=float, device=cache.device)
+            shares = take_rows(shares, kept)
     return shares
 
 
