@@ -1,6 +1,6 @@
-"""Bytes between host and device, and host waits, per frame: ``python -m benchmarks.bench_device_traffic``.
+"""Bytes between host and device, and waits: ``python -m benchmarks.bench_device_traffic``.
 
-Counts what would cross on a GPU, by the function that asks for it; needs none. On the CPU device,
+Counts, frame by frame, what would cross on a GPU, by the function that asks for it; needs none. On the CPU device,
 where host and device are one memory, every array that is read or made from host data is counted as
 if it crossed. Visibility is found by rays, as on a GPU. Arguments of kernels (less than 1 kB each)
 are not counted.
@@ -21,6 +21,7 @@ from gen_data.generator.assemble.pipeline_factory import open_pipeline
 from gen_data.generator.core.capture import Channel, LidarHits, LidarRays, SensorReading
 from gen_data.generator.core.interfaces import Renderer
 from gen_data.generator.core.scene import Camera, Lidar, Scene
+from gen_data.generator.renderers.warp.renderer import WarpRenderer
 
 _RENDERER = "gen_data.generator.renderers.warp."
 _UPLOADERS = frozenset({"to_device", "_upload", "constant"})
@@ -201,7 +202,11 @@ def count_frames(config: str, samples: int, *overrides: str) -> list[Frame]:
     """Frames of the first samples of a shipped configuration."""
     spec = load_config(config, seed=1, overrides=(*AS_ON_GPU, *overrides))
     with open_pipeline(spec) as pipeline:
-        counting = CountingRenderer(pipeline.renderer)
+        renderer = pipeline.renderer
+        assert isinstance(renderer, WarpRenderer)
+        # A GPU has memory of its own.
+        renderer._cache.shares_memory = False
+        counting = CountingRenderer(renderer)
         pipeline.__dict__["renderer"] = counting
         for index in range(samples):
             counting.label = f"{config.removesuffix('.yaml')} {index}"
@@ -227,10 +232,8 @@ def main() -> None:
     print(f"{'frame':<44} {'requested':>10} {'other down':>10} {'up':>10} {'waits':>5}  [kB]")
     for config, overrides in cases:
         for frame in count_frames(config, args.samples, *overrides):
-            sizes = (frame.requested / 1e3, frame.down / 1e3, frame.up / 1e3, frame.waits)
-            print(
-                f"{frame.name:<44} {sizes[0]:>10.1f} {sizes[1]:>10.1f} {sizes[2]:>10.1f} {sizes[3]:>5}"
-            )
+            sizes = (f"{size / 1e3:>10.1f}" for size in (frame.requested, frame.down, frame.up))
+            print(f"{frame.name:<44} {' '.join(sizes)} {frame.waits:>5}")
             if args.callers:
                 print(format_callers(frame.traffic))
 

@@ -18,7 +18,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.asset_types import Float32, Int32
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.colorimetry import srgb_decode
 from gen_data.generator.core.errors import SampleError
@@ -165,7 +165,7 @@ def cover_by_foreground(frame: CameraView, backdrop: Backdrop, radiance: wp.arra
     """Show the photograph where its foreground hides everything else, in place."""
     if backdrop.mask is None:
         return
-    rows = _rows(frame)
+    rows = rows_of(frame)
     image = radiance.numpy().reshape(frame.view.height, frame.view.width, 3)
     share = backdrop.mask[rows][..., None]
     shown = image * (1.0 - share) + backdrop.photo[rows] * share
@@ -175,17 +175,24 @@ def cover_by_foreground(frame: CameraView, backdrop: Backdrop, radiance: wp.arra
 def things_in(frame: CameraView) -> NDArray[np.bool_]:
     """Pixels whose centres show neither background nor the photograph's ground, bool [h, w]."""
     body = frame.gbuffer.hits.numpy().reshape(frame.view.height, frame.view.width, 2)[..., 0]
-    catchers = [k for k, b in enumerate(frame.state.scene.bodies) if is_catcher(b)]
-    return np.asarray((body >= 0) & ~np.isin(body, catchers))
+    return things_at(body, frame.state.scene)
 
 
-def hide_labels(frame: CameraView, backdrop: Backdrop, images: dict[Channel, NDArray[Any]]) -> None:
+def things_at(bodies: Int32, scene: Scene) -> NDArray[np.bool_]:
+    """As ``things_in``, given the numbers of the bodies at pixels."""
+    catchers = [k for k, body in enumerate(scene.bodies) if is_catcher(body)]
+    return np.asarray((bodies >= 0) & ~np.isin(bodies, catchers))
+
+
+def hide_labels(
+    things: NDArray[np.bool_], backdrop: Backdrop, rows: slice, images: dict[Channel, NDArray[Any]]
+) -> None:
     """Set labels to nothing where no depth is known or the foreground covers them, in place.
 
-    The depth of the photograph is known on its ground only.
+    The depth of the photograph is known on its ground only. ``things`` are those of ``things_in``
+    in these rows of the photograph.
     """
-    rows = _rows(frame)
-    hidden = backdrop.hidden[rows] | ~(things_in(frame) | backdrop.ground[rows])
+    hidden = backdrop.hidden[rows] | ~(things | backdrop.ground[rows])
     for channel, image in images.items():
         nothing = np.inf if channel in (Channel.Z_DEPTH, Channel.RANGE) else 0
         image[hidden] = nothing
@@ -211,10 +218,10 @@ def _split(
     is_empty = body < 0
     is_ground = ~is_empty & ~things_in(frame)
     image = np.asarray(radiance.numpy().reshape(*shape, 3))
-    return _rows(frame), image, np.asarray(is_ground), np.asarray(is_empty)
+    return rows_of(frame), image, np.asarray(is_ground), np.asarray(is_empty)
 
 
-def _rows(frame: CameraView) -> slice:
+def rows_of(frame: CameraView) -> slice:
     """Rows of the image that a frame shows."""
     first = round(frame.state.camera.intrinsics.cy_px - float(frame.view.cy))
     return slice(first, first + int(frame.view.height))

@@ -26,7 +26,7 @@ class Readback:
     """Arrays of a device that the host reads together.
 
     Attributes:
-        parts: The arrays, not initialised.
+        parts: The arrays, not initialised; valid as long as ``memory`` is.
         memory: What holds them, one after another.
         dtypes: Their types.
     """

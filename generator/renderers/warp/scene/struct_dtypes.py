@@ -35,12 +35,12 @@ def to_device(records: NDArray[np.void], struct: Any, device: wp.Device) -> wp.a
     return wp.clone(here, device=device)
 
 
-def take_rows(values: wp.array, rows: Sequence[int]) -> wp.array:
+def take_rows(values: wp.array, rows: NDArray[np.integer]) -> wp.array:
     """Some rows of a contiguous array, copied on its own device."""
     taken = wp.empty((len(rows), *values.shape[1:]), dtype=values.dtype, device=values.device)
     width = values.size // max(len(values), 1)
-    for k, row in enumerate(rows):
-        wp.copy(taken, values, k * width, int(row) * width, width)
+    for k, row in enumerate(rows.tolist()):
+        wp.copy(taken, values, k * width, row * width, width)
     return taken
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.renderers.warp.frame_context import CameraView
-from gen_data.generator.renderers.warp.plates import hide_labels
+from gen_data.generator.renderers.warp.plates import hide_labels, rows_of, things_in
 from gen_data.generator.renderers.warp.readback import Readback
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.visibility.kernels import label_resolve
@@ -23,7 +23,7 @@ def label_images(frame: CameraView, channels: frozenset[Channel]) -> dict[Channe
     drawn = draw_labels(frame, channels)
     images = read_images(drawn, frame.view.height, frame.view.width)
     if frame.context.backdrop is not None:
-        hide_labels(frame, frame.context.backdrop, images)
+        hide_labels(things_in(frame), frame.context.backdrop, rows_of(frame), images)
     return images
 
 
