@@ -105,7 +105,7 @@ class DeviceCache:
         self._optics: ByteCache[DeviceOptics] = ByteCache(_OPTICS_BYTES, _LENSES)
         self._scratch: dict[str, _Scratch] = {}
         self._constants: dict[tuple[object, ...], wp.array] = {}
-        self._latest: dict[str, _Latest] = {}
+        self._latest: dict[str, list[_Latest]] = {}
 
     def mesh(self, asset_id: str) -> DeviceMesh:
         """Geometry of an asset on the device."""
@@ -176,17 +176,19 @@ class DeviceCache:
     def latest(self, name: str, values: NDArray[Any], dtype: Any) -> wp.array:
         """Values on the device, read-only; those of a name cross only when they change.
 
-        On the CPU, the array may be a view of the values.
+        The last two of a name are kept: a rig also scans its scene without itself. On the CPU, the
+        array may be a view of the values.
         """
-        held = None if self.shares_memory else self._latest.get(name)
-        if held is not None and _is_same(held.values, values):
-            return held.array
+        kept = [] if self.shares_memory else self._latest.get(name, [])
+        for held in kept:
+            if _is_same(held.values, values):
+                return held.array
         if values.dtype.names:
             array = to_device(values, dtype, self.device)
         else:
             array = wp.array(values, dtype=dtype, device=self.device, copy=not self.device.is_cpu)
         if not self.shares_memory:
-            self._latest[name] = _Latest(values.copy(), array)
+            self._latest[name] = [_Latest(values.copy(), array), *kept[:1]]
         return array
 
     def scratch(self, name: str, shape: int | tuple[int, ...], dtype: Any) -> wp.array:
