@@ -1,9 +1,9 @@
 """Bytes between host and device, and waits: ``python -m benchmarks.bench_device_traffic``.
 
-Counts, frame by frame, what would cross on a GPU, by the function that asks for it; needs none. On the CPU device,
-where host and device are one memory, every array that is read or made from host data is counted as
-if it crossed. Visibility is found by rays, as on a GPU. Arguments of kernels (less than 1 kB each)
-are not counted.
+Counts, frame by frame, what would cross on a GPU, by the function that asks for it; needs none. On
+the CPU device, where host and device are one memory, every array that is read or made from host
+data is counted as if it crossed. Visibility is found by rays, as on a GPU. Arguments of kernels
+(less than 1 kB each) are not counted.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ from gen_data.generator.renderers.warp.renderer import WarpRenderer
 _RENDERER = "gen_data.generator.renderers.warp."
 _UPLOADERS = frozenset({"to_device", "_upload", "constant"})
 """Functions that upload on behalf of their callers."""
+_ASSETS = ("scene.device_assets.", "scene.environment_maps.", "lidar.infrared_materials.")
+"""Modules that prepare an asset when a scene first uses it."""
 AS_ON_GPU = ("render.visibility=rays",)
 """Overrides that make the CPU device take the path of a GPU."""
 
@@ -139,26 +141,37 @@ class Frame:
     Attributes:
         name: Configuration, sample, sensor.
         requested: Bytes of the channels, silhouettes or laser hits that were asked for.
+        given: Bytes of the directions and origins of a scan's rays.
     """
 
     name: str
     traffic: Traffic
     requested: int
+    given: int = 0
 
     @property
     def down(self) -> int:
-        """Bytes from the device beyond those requested."""
-        return self.traffic.down.total() - self.requested
+        """Bytes from the device beyond those requested; less than 0 if masks cross as bits."""
+        return _without_assets(self.traffic.down) - self.requested
+
+    @property
+    def assets(self) -> int:
+        """Bytes of assets that the device did not have."""
+        return self.traffic.up.total() - _without_assets(self.traffic.up)
 
     @property
     def up(self) -> int:
-        """Bytes to the device."""
-        return self.traffic.up.total()
+        """Bytes to the device beyond assets and rays."""
+        return max(_without_assets(self.traffic.up) - self.given, 0)
 
     @property
     def waits(self) -> int:
-        """Reads of device memory."""
-        return self.traffic.waits.total()
+        """Reads of device memory, other than while an asset is uploaded."""
+        return _without_assets(self.traffic.waits)
+
+
+def _without_assets(counts: Counter[str]) -> int:
+    return sum(count for caller, count in counts.items() if not caller.startswith(_ASSETS))
 
 
 class CountingRenderer:
@@ -188,7 +201,10 @@ class CountingRenderer:
         """As of Renderer."""
         with counted_traffic() as traffic:
             hits = self._renderer.scan(scene, lidar, beams)
-        self.frames.append(Frame(f"{self.label} {lidar.name}", traffic, _hit_bytes(hits)))
+        rays = (beams.directions, beams.origins_m)
+        given = sum(values.nbytes for values in rays if values is not None)
+        name = f"{self.label} {lidar.name}"
+        self.frames.append(Frame(name, traffic, _hit_bytes(hits), given))
         return hits
 
 
@@ -229,11 +245,14 @@ def main() -> None:
     parser.add_argument("--configs", nargs="*", help="others than tabletop, street and kitti_rig")
     args = parser.parse_args()
     cases = [(name, ()) for name in args.configs] if args.configs else CASES
-    print(f"{'frame':<44} {'requested':>10} {'other down':>10} {'up':>10} {'waits':>5}  [kB]")
+    print(
+        f"{'[kB]':<32} {'requested':>10} {'other down':>10} {'assets':>10} {'other up':>10} waits"
+    )
     for config, overrides in cases:
         for frame in count_frames(config, args.samples, *overrides):
-            sizes = (f"{size / 1e3:>10.1f}" for size in (frame.requested, frame.down, frame.up))
-            print(f"{frame.name:<44} {' '.join(sizes)} {frame.waits:>5}")
+            sizes = (frame.requested, frame.down, frame.assets, frame.up)
+            row = " ".join(f"{size / 1e3:>10.1f}" for size in sizes)
+            print(f"{frame.name:<32} {row} {frame.waits:>5}")
             if args.callers:
                 print(format_callers(frame.traffic))
 
