@@ -84,9 +84,10 @@ def counted_traffic() -> Iterator[Traffic]:
 
     from gen_data.generator.renderers.warp.scene import device_assets
 
+    assets: Any = device_assets
     traffic = Traffic()
     make, read, assign, clone = wp.array.__init__, wp.array.numpy, wp.array.assign, wp.clone
-    upload = device_assets._upload
+    upload = assets._upload
 
     def counted_make(self: Any, data: Any = None, *args: Any, **kwargs: Any) -> None:
         with traffic.once() as outermost:
@@ -119,12 +120,12 @@ def counted_traffic() -> Iterator[Traffic]:
         return uploaded
 
     wp.array.__init__, wp.array.numpy, wp.array.assign = counted_make, counted_read, counted_assign
-    wp.clone, device_assets._upload = counted_clone, counted_upload
+    wp.clone, assets._upload = counted_clone, counted_upload
     try:
         yield traffic
     finally:
         wp.array.__init__, wp.array.numpy, wp.array.assign = make, read, assign
-        wp.clone, device_assets._upload = clone, upload
+        wp.clone, assets._upload = clone, upload
 
 
 def _nbytes(values: Any) -> int:
