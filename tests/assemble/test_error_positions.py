@@ -40,7 +40,7 @@ def test_a_device_that_the_machine_lacks_is_refused_with_its_place() -> None:
         pass
 
     assert str(caught.value).startswith(
-        "--set:1:15: render.device: 'cuda:99' does not exist on this machine; expected one of auto,"
+        "--set:1:15: render.device: 'cuda:99' does not exist on this machine; it has cpu"
     )
 
 

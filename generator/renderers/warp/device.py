@@ -44,8 +44,8 @@ def open_device(name: str) -> wp.Device:
     known = ["cpu", *(device.alias for device in wp.get_cuda_devices())]
     if name not in known:
         raise ConfigError(
-            f"render.device: '{name}' does not exist on this machine; expected one of"
-            f" {', '.join(['auto', *known])} (GPUs need an NVIDIA driver)"
+            f"render.device: '{name}' does not exist on this machine; it has {', '.join(known)}."
+            " Choose 'auto' or 'cpu', or install an NVIDIA driver."
         )
     return wp.get_device(name)
 
