@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.renderers.warp.frame_context import CameraView
-from gen_data.generator.renderers.warp.plates import hide_labels, rows_of, things_in
+from gen_data.generator.renderers.warp.plates import hide_labels
 from gen_data.generator.renderers.warp.readback import Readback
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.visibility.kernels import label_resolve
@@ -21,10 +21,7 @@ from gen_data.generator.renderers.warp.visibility.kernels import label_resolve
 def label_images(frame: CameraView, channels: frozenset[Channel]) -> dict[Channel, NDArray[Any]]:
     """All requested label channels, as documented at Channel."""
     drawn = draw_labels(frame, channels)
-    images = read_images(drawn, frame.view.height, frame.view.width)
-    if frame.context.backdrop is not None:
-        hide_labels(things_in(frame), frame.context.backdrop, rows_of(frame), images)
-    return images
+    return read_images(drawn, frame.view.height, frame.view.width)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -67,7 +64,14 @@ def draw_labels(frame: CameraView, channels: frozenset[Channel]) -> DrawnLabels:
     drawn = empty_labels(channels, frame.pixels, frame.cache.device)
     for channel, image in zip(drawn.channels, drawn.memory.parts, strict=True):
         _draw_label(frame, channel, image)
+        if frame.context.backdrop is not None:
+            hide_labels(frame, frame.context.backdrop, image, _nothing(channel))
     return drawn
+
+
+def _nothing(channel: Channel) -> Any:
+    """Value of a pixel that shows nothing."""
+    return wp.inf if channel in (Channel.Z_DEPTH, Channel.RANGE) else _DTYPES[channel](0)
 
 
 def _draw_label(frame: CameraView, channel: Channel, image: wp.array) -> None:

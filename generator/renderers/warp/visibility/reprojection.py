@@ -30,7 +30,6 @@ from gen_data.generator.renderers.warp.frame_context import (
     is_moving,
     render_view,
 )
-from gen_data.generator.renderers.warp.plates import hide_labels, things_at
 from gen_data.generator.renderers.warp.readback import Readback
 from gen_data.generator.renderers.warp.visibility.label_images import (
     draw_labels,
@@ -143,7 +142,6 @@ def render_bands(
     requested.
     """
     lens, device = reference.state.camera.intrinsics, reference.cache.device
-    backdrop = reference.context.backdrop
     pixels = lens.height_px * lens.width_px
     memory = Readback.allocate(pixels, _IMAGES, device)
     labels = empty_labels(channels, pixels, device)
@@ -163,11 +161,7 @@ def render_bands(
         for image, part in copies:
             wp.copy(image, part, place, begin, (band.end - band.first) * lens.width_px)
     images = read_images(labels, lens.height_px, lens.width_px)
-    whole = BandedGBuffer(tuple(bands), memory)
-    if backdrop is not None:
-        scene = reference.state.scene
-        hide_labels(things_at(whole.hits[..., 0], scene), backdrop, slice(None), images)
-    return RenderedBands(whole, images, radiance)
+    return RenderedBands(BandedGBuffer(tuple(bands), memory), images, radiance)
 
 
 def add_margin(band: RowBand, height_px: int) -> tuple[int, int]:
