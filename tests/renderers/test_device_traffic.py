@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 import warp as wp
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from benchmarks.bench_device_traffic import Frame, count_frames, counted_traffic, format_callers
@@ -147,6 +147,7 @@ def test_rows_are_taken_as_by_numpy(rows: list[int]) -> None:
     np.testing.assert_array_equal(taken.numpy().reshape(-1, 5), values[rows])
 
 
+@settings(deadline=None, derandomize=True)
 @given(st.lists(st.booleans(), min_size=8, max_size=800))
 def test_bits_are_packed_as_by_numpy(pixels: list[bool]) -> None:
     """Whole words of eight pixels."""
@@ -188,6 +189,7 @@ lengths = st.floats(0.05, 8.0)
 places = st.floats(-6.0, 6.0)
 
 
+@settings(deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 @given(
     st.tuples(places, places, st.floats(-6.0, -0.01)),
     st.tuples(lengths, lengths, st.floats(0.1, 8.0)),

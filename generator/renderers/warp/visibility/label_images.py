@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -71,7 +72,7 @@ def draw_labels(frame: CameraView, channels: frozenset[Channel]) -> DrawnLabels:
 
 def _nothing(channel: Channel) -> Any:
     """Value of a pixel that shows nothing."""
-    return wp.inf if channel in (Channel.Z_DEPTH, Channel.RANGE) else _DTYPES[channel](0)
+    return math.inf if channel in (Channel.Z_DEPTH, Channel.RANGE) else _DTYPES[channel](0)
 
 
 def _draw_label(frame: CameraView, channel: Channel, image: wp.array) -> None:
