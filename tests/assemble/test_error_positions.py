@@ -33,6 +33,17 @@ def test_names_counts_and_repetitions_are_refused_when_read(override: str, messa
     assert str(caught.value).startswith(message)
 
 
+def test_a_device_that_the_machine_lacks_is_refused_with_its_place() -> None:
+    """No machine has a hundred GPUs; those that exist are named."""
+    config = load_config("tabletop.yaml", overrides=["render.device=cuda:99"])
+    with pytest.raises(ConfigError) as caught, PipelineFactory(config, n=1)():
+        pass
+
+    assert str(caught.value).startswith(
+        "--set:1:15: render.device: 'cuda:99' does not exist on this machine; it has cpu"
+    )
+
+
 @pytest.mark.parametrize(
     ("override", "message"),
     [
