@@ -202,7 +202,7 @@ def encode(
 def compute_loss(logits: Tensor, boxes: Tensor, truths: Sequence[Truth]) -> Tensor:
     """Focal loss of the heat maps, plus five times the GIoU loss of the boxes."""
     weights = torch.stack([truth.weights for truth in truths])
-    focal: Tensor = CentreLoss.apply(logits, truths)  # type: ignore[no-untyped-call]
+    focal: Tensor = CentreLoss.apply(logits, truths)
     overlap = compute_giou(boxes, torch.stack([truth.boxes for truth in truths]))
     return focal + 5.0 * ((1.0 - overlap) * weights).sum() / weights.sum().clamp(min=1e-6)
 

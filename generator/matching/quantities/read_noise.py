@@ -20,8 +20,9 @@ from gen_data.generator.matching.quantities.noise import measure_flat_blocks
 from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline
 from gen_data.generator.sensors.camera.image_sensor import ImageSensor
 
-DARKEST, BRIGHTEST = 6.0, 40.0
-"""Grey values of dark blocks: below, clipping at black takes half of the noise."""
+DARKEST, BRIGHTEST = 6.0, 64.0
+"""Grey values of dark blocks: below, clipping at black takes half of the noise; up to middle tones,
+as most pictures have only few darker blocks."""
 LEAST = 1e-10
 """Variance added before the logarithm: no noise at all has a value."""
 LEAST_E = 0.25
