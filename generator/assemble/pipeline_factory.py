@@ -188,6 +188,7 @@ def pipeline_config(
         layout_attempts_max=config.general.physics.layout_attempts_max,
         exporters=ready_exporters(config, info, library),
         strides=_strides(info),
+        located_errors=partial(located_errors, config.document),
     )
 
 
