@@ -15,6 +15,7 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     ray_origin,
     sheet_side,
 )
+from gen_data.generator.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE
 from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import (
     CROWN_GLOW,
     CROWN_M,
@@ -24,7 +25,6 @@ from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import (
     path_to_lamp,
     surface_tolerance,
 )
-from gen_data.generator.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     above_horizon_fraction,
     beam_from,
