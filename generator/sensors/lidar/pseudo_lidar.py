@@ -26,8 +26,6 @@ from gen_data.generator.sensors.mounting import Mounted, add_lidar, find_camera
 
 MODEL = "pseudo_lidar"
 """Model of these scanners in scenes; their points are pixels of a camera."""
-_CHANNELS = frozenset({Channel.RANGE, Channel.INSTANCE, Channel.CATEGORY})
-"""Most cameras have just rendered them: a renderer returns them once more without work."""
 
 
 class PseudoLidar(Mounted):
@@ -88,15 +86,20 @@ class PseudoLidar(Mounted):
         if camera.shutter.open_s > 0.0:
             # A cloud has a single pose: all its rays leave at one instant.
             camera = replace(camera, shutter=INSTANT)
-        images = renderer.render(scene, camera, _CHANNELS).channels
+        # What most cameras have just rendered: a renderer returns it once more without work.
+        straight = camera.intrinsics.straight
+        depth = Channel.Z_DEPTH if straight else Channel.RANGE
+        wanted = (depth, Channel.INSTANCE, Channel.CATEGORY)
+        images = renderer.render(scene, camera, frozenset(wanted)).channels
         every_nth = slice(self.stride_px // 2, None, self.stride_px)
-        range_m, instances, categories = (
-            images[channel][every_nth, every_nth].ravel()
-            for channel in (Channel.RANGE, Channel.INSTANCE, Channel.CATEGORY)
+        distance_m, instances, categories = (
+            images[channel][every_nth, every_nth].ravel() for channel in wanted
         )
         coarse = every_nth_pixel(camera.intrinsics, self.stride_px)
+        rays = coarse.pixel_rays().reshape(-1, 3)
+        range_m = distance_m / rays[:, 2] if straight else distance_m.astype(np.float64)
         hit = np.flatnonzero(range_m <= self.range_max_m)
-        p_camera = coarse.pixel_rays().reshape(-1, 3)[hit] * range_m[hit, None].astype(np.float64)
+        p_camera = rays[hit] * range_m[hit, None]
         T_lidar_camera = lidar.T_world_lidar.inverse() @ camera.T_world_camera
         points: NDArray[Any] = np.zeros(len(hit), POINT)
         points["position_m"] = T_lidar_camera.apply(p_camera)
