@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from gen_data.generator.assets.asset_cache import Arrays, DiskCache, Store, content_key
 from gen_data.generator.assets.asset_ids import parse_asset_id
 from gen_data.generator.assets.file_library import FileLibrary
@@ -35,6 +37,8 @@ VEHICLES = frozenset(
 _ENTRIES = 8192
 _SUMMARIES = 4096
 """Kept in memory: about 1 and 5 kB each."""
+_BOUNDS = "bounds 1"
+"""Name of stored bounds; it changes with their definition."""
 
 
 def open_library(
@@ -53,12 +57,15 @@ def open_library(
     return Library(roots, cache_dir or default_cache_dir(), packs or packs_dir())
 
 
+Bounds = tuple[Vec3, Vec3]
+
+
 @dataclass(frozen=True, slots=True)
 class _MeshSummary:
     """Small properties of an asset with a mesh, kept in memory."""
 
-    bounds_m: tuple[Vec3, Vec3]
-    body_bounds_m: tuple[Vec3, Vec3] | None
+    bounds_m: Bounds
+    body_bounds_m: Bounds | None
     materials: tuple[Material, ...]
     keypoints: tuple[Keypoint, ...]
 
@@ -80,6 +87,7 @@ class Library:
         self._entries: CountCache[Asset] = CountCache(_ENTRIES)
         self._found: dict[tuple[frozenset[str], str], tuple[Asset, ...]] = {}
         self._summaries: CountCache[_MeshSummary] = CountCache(_SUMMARIES)
+        self._boxes: CountCache[tuple[Bounds, ...]] = CountCache(_SUMMARIES)
 
     def get(self, asset_id: str) -> Asset:
         """Description of an asset. Raises UnknownAsset if there is none."""
@@ -111,11 +119,11 @@ class Library:
         """The asset's own materials, one per mesh slot."""
         return self._summarize(asset_id).materials
 
-    def bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3]:
+    def bounds_m(self, asset_id: str) -> Bounds:
         """Smallest and largest coordinates of the asset's mesh in its own frame [m]."""
-        return self._summarize(asset_id).bounds_m
+        return self._bounds(asset_id)[0]
 
-    def body_bounds_m(self, asset_id: str) -> tuple[Vec3, Vec3] | None:
+    def body_bounds_m(self, asset_id: str) -> Bounds | None:
         """The same without a vehicle's exterior mirrors; None if it has none.
 
         Vehicles have the tag ``vehicle`` or a category of ``VEHICLES``.
@@ -123,7 +131,8 @@ class Library:
         asset = self.get(asset_id)
         if "vehicle" not in asset.tags and asset.category not in VEHICLES:
             return None
-        return self._summarize(asset_id).body_bounds_m
+        _, *body = self._bounds(asset_id)
+        return body[0] if body else None
 
     def vertices_m(self, asset_id: str) -> Float32:
         """Vertices of the asset's mesh in its own frame [m], float32 [n, 3].
@@ -204,6 +213,25 @@ class Library:
         content = {"asset": self.get(owner).sha256, "id": asset_id, "derived": name}
         return self._disk.arrays(content_key(content), compute)
 
+    def _bounds(self, asset_id: str) -> tuple[Bounds, ...]:
+        """Bounds of the mesh and, if there are any, those of the body.
+
+        Stored beside the mesh: of the things that a scene tries to place, half find no place, and
+        their meshes need not be read.
+        """
+
+        def compute() -> Arrays:
+            summary = self._summarize(asset_id)
+            body = () if summary.body_bounds_m is None else (summary.body_bounds_m,)
+            return {"corners_m": np.array((summary.bounds_m, *body), np.float64)}
+
+        def read() -> tuple[Bounds, ...]:
+            known = asset_id in self._summaries
+            arrays = compute() if known else self.derived(asset_id, _BOUNDS, compute)
+            return tuple((_vec3(low), _vec3(high)) for low, high in arrays["corners_m"].tolist())
+
+        return self._boxes.get(asset_id, read)
+
     def _summarize(self, asset_id: str) -> _MeshSummary:
         """Bounds, materials and keypoints. Raises AssetError if there is no mesh."""
 
@@ -244,6 +272,11 @@ class Library:
         held = ", ".join(f"{count} {kind}s" for kind, count in sorted(counts.items())) or "nothing"
         some = f": {', '.join(ours[:3])}{', ...' if len(ours) > 3 else ''}" if ours else ""
         return f"unknown; your asset folders hold {held}{some}"
+
+
+def _vec3(values: Sequence[float]) -> Vec3:
+    x, y, z = values
+    return (x, y, z)
 
 
 def default_cache_dir() -> Path:

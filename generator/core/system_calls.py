@@ -6,11 +6,14 @@ call itself, not for the name of the system.
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import socket
 import tempfile
 import time
+from contextlib import suppress
+from functools import cache
 from importlib import import_module
 from typing import Any
 
@@ -28,8 +31,31 @@ CAN_PASS_FILES = hasattr(os, "fork")
 """Whether new processes can be given open files, as workers need."""
 KILLED = -int(getattr(signal, "SIGKILL", 9))
 """Exit status of a process that was killed."""
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
 _LOCKED_BYTE = 1 << 30
 """Windows locks bytes, which nobody else may read then: one beyond the content."""
+
+
+_HEAP_ARRAY_BYTES = 32 << 20
+_HEAP_FREE_BYTES = 128 << 20
+
+
+@cache
+def keep_freed_memory() -> None:
+    """Let this process use the memory of freed arrays again, instead of new pages of the system.
+
+    By default, glibc unmaps arrays of 128 kB and more when they are freed and trims the heap; every
+    temporary image then costs one page fault per 4 kB. ``malloc_trim`` still returns everything.
+    Sizes are the largest arrays on the heap, as large as glibc allows, and what may be free at its
+    end. Other C libraries have no such settings.
+    """
+    with suppress(AttributeError, OSError, TypeError):
+        libc = ctypes.CDLL(None)
+        for parameter, size in (
+            (_M_MMAP_THRESHOLD, _HEAP_ARRAY_BYTES),
+            (_M_TRIM_THRESHOLD, _HEAP_FREE_BYTES),
+        ):
+            libc.mallopt(parameter, size)
 
 
 def stop_signals() -> tuple[signal.Signals, ...]:

@@ -33,6 +33,27 @@ def entries(folder: Path) -> list[Path]:
     return sorted(folder.rglob("*.arrays"))
 
 
+@pytest.mark.parametrize("asset", ["car?seed=3", ASSET])
+def test_stored_bounds_are_those_of_the_mesh_which_is_not_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asset: str
+) -> None:
+    """Things that find no place in a scene cost no mesh; a car has bounds without mirrors too."""
+    first = open_library(cache_dir=tmp_path)
+    first.bounds_m(asset)
+    vertices_m = first.mesh(asset).vertices_m
+    of_body = first.body_bounds_m(asset)
+
+    later = open_library(cache_dir=tmp_path)
+    monkeypatch.delattr(type(later), "_imported")
+
+    assert later.bounds_m(asset) == (
+        tuple(vertices_m.min(axis=0).tolist()),
+        tuple(vertices_m.max(axis=0).tolist()),
+    )
+    assert later.body_bounds_m(asset) == of_body
+    assert (of_body is not None) == asset.startswith("car")
+
+
 def test_cold_warm_and_another_cache_give_the_same_bytes(tmp_path: Path) -> None:
     """Cached values equal computed ones."""
     cold = open_library(cache_dir=tmp_path / "a")

@@ -23,7 +23,7 @@ import warp as wp
 
 from gen_data.generator.core.errors import CacheWarning, ConfigError
 from gen_data.generator.core.processes import interrupts_blocked, silence_stdio, tie
-from gen_data.generator.core.system_calls import usable_cores, wait_for_lock
+from gen_data.generator.core.system_calls import keep_freed_memory, usable_cores, wait_for_lock
 from gen_data.generator.renderers.warp.kernel_cache import copy_modules, remove_damaged_modules
 
 # Not -march=native: fused multiply-adds would change bytes between machines. The inlining threshold
@@ -65,6 +65,7 @@ def _start() -> None:
         wp.config.quiet = True
     wp.config.enable_backward = False
     wp.config.cpu_compiler_flags = _COMPILER_FLAGS
+    keep_freed_memory()
     with silence_stdio():  # Warp warns about a missing CUDA driver
         wp.init()
 

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
+
+from numpy.typing import NDArray
 
 from gen_data.generator.core.capture import Channel, LidarHits, LidarRays, SensorReading
 from gen_data.generator.core.errors import ConfigError
@@ -29,12 +33,17 @@ from gen_data.generator.renderers.warp.visibility.label_images import label_imag
 from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow_images
 from gen_data.generator.renderers.warp.visibility.reprojection import copy_gbuffer
 
+Images = Mapping[Channel, NDArray[Any]]
+
+_KEPT = frozenset({Channel.Z_DEPTH, Channel.RANGE, Channel.INSTANCE, Channel.CATEGORY})
+"""Label channels that sensors ask for again."""
+
 
 class WarpRenderer:
     """Renders on the CPU or on a CUDA device with the same kernels.
 
-    A pure function of its arguments: between calls it keeps only assets and scratch memory. A call
-    uses one core; run several processes to use more.
+    A pure function of its arguments: between calls it keeps only assets, scratch memory and the
+    label images of the latest scene. A call uses one core; run several processes to use more.
 
     Args:
         assets: Source of meshes, textures and environments.
@@ -57,6 +66,7 @@ class WarpRenderer:
             )
         compile_kernels(self._device.alias)
         self._cache = DeviceCache(assets, self._device)
+        self._labels = _LatestLabels()
         self._context = RenderContext(self._cache, self._settings)
         if self._settings.tier == "pathtraced":
             # Its kernels take long to compile, and the realtime tier does not need them.
@@ -67,6 +77,16 @@ class WarpRenderer:
 
     def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
         """All requested channels of one camera."""
+        known = self._labels.of(scene, camera)
+        if channels <= known.keys():
+            images = {channel: known[channel] for channel in sorted(channels)}
+            return SensorReading(camera.name, camera, images, {}, scene.time_s)
+        reading = self._render(scene, camera, channels)
+        self._labels.keep(scene, camera, reading)
+        return reading
+
+    def _render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
+        """As ``render``, in any case."""
         context = self._with_photo(scene, camera, channels)
         reading = expose_shutter(scene, camera, channels, context)
         return reading or self._render_instant(scene, camera, channels, context)
@@ -114,3 +134,26 @@ class WarpRenderer:
     def scan(self, scene: Scene, lidar: Lidar, beams: LidarRays) -> LidarHits:
         """First hits of a laser scanner's rays, and the reflectance of the surfaces."""
         return trace_scan(scene, lidar, beams, self._cache)
+
+
+class _LatestLabels:
+    """Label images of one scene's cameras, for sensors that look through them again.
+
+    Scene and cameras are recognised by identity: equal ones are rendered again.
+    """
+
+    def __init__(self) -> None:
+        self._scene: Scene | None = None
+        self._known: dict[str, tuple[Camera, Images]] = {}
+
+    def of(self, scene: Scene, camera: Camera) -> Images:
+        """Images of the camera by channel; empty if there are none."""
+        seen, images = self._known.get(camera.name, (None, {}))
+        return images if scene is self._scene and camera is seen else {}
+
+    def keep(self, scene: Scene, camera: Camera, reading: SensorReading) -> None:
+        """Keep the label images of a reading, and drop those of other scenes."""
+        if scene is not self._scene:
+            self._scene, self._known = scene, {}
+        images = {c: image for c, image in reading.channels.items() if c in _KEPT}
+        self._known[camera.name] = (camera, images)

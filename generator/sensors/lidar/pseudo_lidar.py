@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from gen_data.generator.config.base_model import NAME_PATTERN
-from gen_data.generator.core.capture import POINT, Channel, LidarRays, PointCloud
+from gen_data.generator.core.capture import POINT, Channel, PointCloud
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import Modality, Renderer, SensorInfo
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.scene import Lidar, Scene
 from gen_data.generator.core.se3 import Vec3
+from gen_data.generator.core.shutter import INSTANT
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.mounting import Mounted, add_lidar, find_camera
 
@@ -30,8 +31,8 @@ MODEL = "pseudo_lidar"
 class PseudoLidar(Mounted):
     """Points of a camera's depth image: one pixel of each ``stride_px`` x ``stride_px``.
 
-    A point is the first hit of the ray through its pixel's centre, at the instant of the reading
-    and without noise. Its intensity is 0, its ring the row of its pixel among the selected ones.
+    A point is what the depth image shows there, at the instant of the reading and without noise.
+    Its intensity is 0, its ring the row of its pixel among the selected ones.
     The first pixel of each axis is number ``stride_px // 2``.
 
     Attributes:
@@ -82,23 +83,28 @@ class PseudoLidar(Mounted):
         """Capture the points at the scene's instant, row by row of the image."""
         del channels, rng
         lidar, camera = scene.lidar(self.name), scene.camera(self.camera)
-        intrinsics = every_nth_pixel(camera.intrinsics, self.stride_px)
-        # One ray per selected pixel costs far less than an image of its own. All rays leave at
-        # one instant, whatever the camera's shutter, as a cloud has a single pose.
-        rays = intrinsics.pixel_rays().reshape(-1, 3)
-        x, y, z = rays.T
-        in_field = np.flatnonzero(np.isfinite(x) & np.isfinite(y) & np.isfinite(z))
-        beams = LidarRays(rays[in_field].astype(np.float32), 0.0, 1, self.range_max_m)
-        eye = Lidar(self.name, self.camera, T_world_lidar=camera.T_world_camera)
-        hits = renderer.scan(scene, eye, beams)
-        hit = np.flatnonzero(np.isfinite(hits.range_m[:, 0]))
-        p_camera = rays[in_field[hit]] * hits.range_m[hit].astype(np.float64)
+        if camera.shutter.open_s > 0.0:
+            # A cloud has a single pose: all its rays leave at one instant.
+            camera = replace(camera, shutter=INSTANT)
+        # What most cameras have just rendered: a renderer returns it once more without work.
+        straight = camera.intrinsics.straight
+        depth = Channel.Z_DEPTH if straight else Channel.RANGE
+        wanted = (depth, Channel.INSTANCE, Channel.CATEGORY)
+        images = renderer.render(scene, camera, frozenset(wanted)).channels
+        every_nth = slice(self.stride_px // 2, None, self.stride_px)
+        distance_m, instances, categories = (
+            images[channel][every_nth, every_nth].ravel() for channel in wanted
+        )
+        coarse = every_nth_pixel(camera.intrinsics, self.stride_px)
+        rays = coarse.pixel_rays().reshape(-1, 3)
+        range_m = distance_m / rays[:, 2] if straight else distance_m.astype(np.float64)
+        hit = np.flatnonzero(range_m <= self.range_max_m)
+        p_camera = rays[hit] * range_m[hit, None]
         T_lidar_camera = lidar.T_world_lidar.inverse() @ camera.T_world_camera
         points: NDArray[Any] = np.zeros(len(hit), POINT)
         points["position_m"] = T_lidar_camera.apply(p_camera)
-        points["ring"] = in_field[hit] // intrinsics.width_px
-        points["instance_id"] = hits.instance_id[hit, 0]
-        points["category_id"] = hits.category_id[hit, 0]
+        points["ring"] = hit // coarse.width_px
+        points["instance_id"], points["category_id"] = instances[hit], categories[hit]
         points["return_number"] = points["return_count"] = 1
         return PointCloud(self.name, lidar, points, scene.time_s)
 
@@ -106,8 +112,7 @@ class PseudoLidar(Mounted):
 def every_nth_pixel(camera: Intrinsics, stride_px: int) -> Intrinsics:
     """Intrinsics whose pixel centres are every n-th one of another camera's, from ``n // 2`` on.
 
-    Labels depend only on the ray through a pixel's centre: the smaller image has the same values at
-    ``1 / n^2`` of the cost.
+    Its rays are those of the selected pixels.
     """
     first = stride_px // 2
     return replace(

@@ -256,10 +256,11 @@ def _upload(
     light: Float32, lamps: tuple[SkyLamp, ...], image: wp.array, rest: wp.array
 ) -> DeviceEnvironment:
     device = image.device
+    sources = {height: _shrink(light, height) for height in {*_SOURCE_HEIGHTS}}
     maps = np.stack(
         [
-            add_border(_prefilter_level(light, level, device).numpy())
-            for level in range(1, _GLOSSY_LEVELS + 1)
+            add_border(_prefilter_level(sources[height], level, device).numpy())
+            for level, height in enumerate(_SOURCE_HEIGHTS, start=1)
         ]
     )
     irradiance = irradiance_coefficients(_shrink(light, _IRRADIANCE_HEIGHT))
@@ -298,8 +299,7 @@ def add_border(maps: Float32) -> Float32:
     return wide
 
 
-def _prefilter_level(image: Float32, level: int, device: wp.Device) -> wp.array:
-    source = _shrink(image, _SOURCE_HEIGHTS[level - 1])
+def _prefilter_level(source: Float32, level: int, device: wp.Device) -> wp.array:
     shares = _texel_weights(source.shape[0], level, device.alias)
     smoothed = wp.zeros(_GLOSSY_SIZE**2, dtype=wp.vec3, device=device)
     radiance = wp.array(source.reshape(-1, 3), dtype=wp.vec3, device=device)

@@ -35,8 +35,10 @@ def draw_samples(
     repeats = -(-_QUAD // len(positions))
     offsets = np.tile((positions * 256.0 - 128.0).astype(np.int32).T, repeats)
     shape = (max(len(pixels), 1), offsets.shape[1])
-    nearness = wp.zeros(shape, dtype=float, device=cache.device)
-    hits = wp.full(shape, wp.vec2i(-1, -1), dtype=wp.vec2i, device=cache.device)
+    nearness = cache.scratch("sample nearness", shape, float)
+    nearness.zero_()
+    hits = cache.scratch("sample hits", shape, wp.vec2i)
+    hits.fill_(wp.vec2i(-1, -1))
     window = rasterizer.Window()
     window.width, window.height = view.width, view.height
     inputs = [view, window, world.record, projected.in_view, projected.p_camera, projected.xy]

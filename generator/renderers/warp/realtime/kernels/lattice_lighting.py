@@ -15,9 +15,12 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     ray_origin,
     sheet_side,
 )
+from gen_data.generator.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE
 from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import (
     CROWN_GLOW,
     CROWN_M,
+    SMOOTHED_SHARE,
+    lamp_weight,
     make_frame,
     path_to_lamp,
     surface_tolerance,
@@ -480,10 +483,22 @@ def find_pixel_visibility(
         side = sheet_normal(
             world, surface_index(world, images.hits[i]), images.hits[i], images.weights[i]
         )
+        # As by weigh_lamps: of faint lamps the lattice has no light either.
+        total = wp.max(wp.max(sky_irradiance(world.sky, n)) * wp.pi, 1.0e-9)
         for j in range(world.lamps.shape[0]):
-            listed.lit[j, k] = visible_lamp_fraction(
-                world, world.lamps[j], p, origin, n, side, probe.parts
-            )
+            listed.lit[j, k] = lamp_weight(world.lamps[j], origin, n, side)
+            total += wp.max(listed.lit[j, k], 0.0)
+        for j in range(world.lamps.shape[0]):
+            weight = listed.lit[j, k] / total
+            listed.lit[j, k] = 0.0
+            if weight > SMOOTHED_SHARE:
+                listed.lit[j, k] = visible_lamp_fraction(
+                    world, world.lamps[j], p, origin, n, side, probe.parts
+                )
+            elif weight > FAINT_SHARE:
+                listed.lit[j, k] = visible_lamp_fraction(
+                    world, world.lamps[j], p, origin, n, side, probe.centre
+                )
         sky, corners = body_sky_visibility(lattice, lattice_sky, cell.first, body)
         if corners == 0.0:
             sky = visible_sky_fraction(world, body, p, origin, n, side, probe.disc, probe.radius_m)

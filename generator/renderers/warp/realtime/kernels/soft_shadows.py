@@ -19,6 +19,7 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     Departure,
     Lattice,
     departure_to,
+    sheet_side,
 )
 from gen_data.generator.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE, TILE
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
@@ -171,6 +172,26 @@ def agreed_value(lattice: Lattice, values: wp.array2d[float], j: int, x: int, y:
     return value
 
 
+@wp.func
+def lamp_weight(lamp: LightRecord, origin: wp.vec3, n: wp.vec3, side: wp.vec3):
+    """Unshadowed illuminance by a lamp that tells how much it matters [lx]; UNSEEN behind surfaces.
+
+    Args:
+        side: Direction away from a translucent surface, lamps behind which count like those before
+            it; 0 for opaque surfaces.
+    """
+    beam = beam_from(lamp, origin)
+    cosine = wp.dot(beam.direction, n)
+    if wp.dot(side, side) > 0.0:
+        cosine = wp.abs(cosine)
+    brightest = wp.max(beam.normal_lux)
+    lux = float(UNSEEN)
+    if cosine > -beam.spread and brightest > 0.0:
+        # Grazing highlights remain bright: the cosine has a floor.
+        lux = brightest * wp.max(cosine, 0.2)
+    return lux
+
+
 @wp.kernel
 def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float], matters: wp.array[int]):
     """Share of each lamp in each point's unshadowed light [lamp, point]; UNSEEN behind surfaces.
@@ -184,20 +205,11 @@ def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float], matte
     if lattice.body[i] < 0:
         return
     n = lattice.normal[i]
-    translucent = is_translucent(world, lattice.surface[i])
+    side = sheet_side(world, lattice, i)
     total = wp.max(wp.max(sky_irradiance(world.sky, n)) * wp.pi, 1.0e-9)
     for j in range(world.lamps.shape[0]):
-        beam = beam_from(world.lamps[j], lattice.origin_m[i])
-        cosine = wp.dot(beam.direction, n)
-        if translucent:
-            cosine = wp.abs(cosine)
-        brightest = wp.max(beam.normal_lux)
-        lux = float(UNSEEN)
-        if cosine > -beam.spread and brightest > 0.0:
-            # Grazing highlights remain bright: the cosine has a floor.
-            lux = brightest * wp.max(cosine, 0.2)
-            total += lux
-        shares[j, i] = lux
+        shares[j, i] = lamp_weight(world.lamps[j], lattice.origin_m[i], n, side)
+        total += wp.max(shares[j, i], 0.0)
     for j in range(world.lamps.shape[0]):
         if shares[j, i] > 0.0:
             shares[j, i] = shares[j, i] / total
