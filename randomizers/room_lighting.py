@@ -17,6 +17,8 @@ from gen_data.generator.core.scene import Body, Environment, Light, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.rooms.bodies import OUTSIDE, keypoint_m
+from gen_data.generator.rooms.interreflection import find_interreflection
+from gen_data.generator.rooms.lit_rooms import find_lit_rooms
 from gen_data.randomizers.base import (
     RandomizerBase,
     add_attributes,
@@ -96,7 +98,14 @@ class RoomLighting(RandomizerBase):
         )
         scene = scene.with_bodies(replace(view, materials=glow))
         lights = (*sun, *panels, *lamps)
-        return replace(scene, lights=lights, environment=_reflected(scene, lights))
+        rooms = find_lit_rooms(scene, self.room, assets)
+        ambience = Environment(
+            "environment/neutral?seed=0",
+            0.05,
+            visible=False,
+            volumes=find_interreflection(rooms, lights),
+        )
+        return replace(scene, lights=lights, environment=ambience)
 
     def _switch_lamps(
         self, scene: Scene, own: Sequence[Body], assets: AssetIndex, rng: Rng, *, must: bool
@@ -176,21 +185,3 @@ def _window_light(window: Body, assets: AssetIndex, luminance_cd_m2: float) -> L
         side=(-s, c, 0.0),
         intensity_cd=round(luminance_cd_m2 * width * height, 3),
     )
-
-
-def _reflected(scene: Scene, lights: Sequence[Light]) -> Environment:
-    """Uniform light from all around: what the walls of the room send back."""
-    (x0, y0, z0), (x1, y1, z1) = scene.interior_m
-    a, b, c = x1 - x0, y1 - y0, z1 - z0
-    area = 2.0 * (a * b + b * c + c * a)
-    flux = 0.0
-    for light in lights:
-        if light.kind == "sphere":
-            flux += 4.0 * math.pi * light.intensity_cd
-        elif light.kind == "rectangle":
-            flux += math.pi * light.intensity_cd
-        else:
-            # A square metre of floor in the sun.
-            flux += light.illuminance_lux * abs(light.direction[2])
-    luminance = flux * _REFLECTANCE / (math.pi * area * (1.0 - _REFLECTANCE))
-    return Environment("environment/neutral?seed=0", max(round(luminance, 3), 0.05), visible=False)

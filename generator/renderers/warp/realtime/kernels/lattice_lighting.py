@@ -22,6 +22,10 @@ from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import (
     path_to_lamp,
     surface_tolerance,
 )
+from gen_data.generator.renderers.warp.scene.kernels.ambient_light import (
+    ambient_irradiance,
+    ambient_reflection,
+)
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     above_horizon_fraction,
     beam_from,
@@ -30,10 +34,6 @@ from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     representative_direction,
 )
 from gen_data.generator.renderers.warp.scene.kernels.brdf import Brdf, make_brdf, specular_lobe
-from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
-    sky_irradiance,
-    sky_reflection,
-)
 from gen_data.generator.renderers.warp.scene.kernels.material_eval import (
     SurfaceMaterial,
     evaluate_material,
@@ -244,8 +244,8 @@ def light_at(
     lamps = sum_lamp_light(world, brdf, n, side, p_world, v, lit, k)
     light = LatticeLight()
     light.towards = lamps.towards
-    ambient = sky_irradiance(world.sky, n) * open_sky
-    mirror = sky_reflection(world.sky, n * (2.0 * n_v) - v, brdf.roughness)
+    ambient = ambient_irradiance(world, p_world, n) * open_sky
+    mirror = ambient_reflection(world, p_world, n * (2.0 * n_v) - v, brdf.roughness)
     # Lambert: illuminance over pi is luminance per albedo.
     lux = lamps.lux * (1.0 / wp.pi)
     received = lux + ambient
@@ -253,7 +253,7 @@ def light_at(
     if wp.dot(side, side) > 0.0:
         # What hides the sky from a leaf hides it from its reflections, at any angle.
         mirrored = wp.min(mirrored, open_sky)
-        behind = lamps.behind * (1.0 / wp.pi) + sky_irradiance(world.sky, -n) * open_sky
+        behind = lamps.behind * (1.0 / wp.pi) + ambient_irradiance(world, p_world, -n) * open_sky
         received += wp.cw_mul(material.translucency, behind)
     light.diffuse = wp.cw_mul(brdf.matte, received)
     light.rest = wp.cw_mul(brdf.gloss, mirror) * mirrored + lamps.shine

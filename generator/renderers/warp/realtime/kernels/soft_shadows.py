@@ -21,6 +21,7 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     departure_to,
 )
 from gen_data.generator.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE, TILE
+from gen_data.generator.renderers.warp.scene.kernels.ambient_light import ambient_irradiance
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     DISK,
     RECTANGLE,
@@ -28,7 +29,6 @@ from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     SUN_DISTANCE_M,
     beam_from,
 )
-from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_irradiance
 from gen_data.generator.renderers.warp.scene.kernels.material_eval import is_translucent
 from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
     NOBODY,
@@ -185,7 +185,7 @@ def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float], matte
         return
     n = lattice.normal[i]
     translucent = is_translucent(world, lattice.surface[i])
-    total = wp.max(wp.max(sky_irradiance(world.sky, n)) * wp.pi, 1.0e-9)
+    total = wp.max(wp.max(ambient_irradiance(world, lattice.p_m[i], n)) * wp.pi, 1.0e-9)
     for j in range(world.lamps.shape[0]):
         beam = beam_from(world.lamps[j], lattice.origin_m[i])
         cosine = wp.dot(beam.direction, n)
