@@ -27,8 +27,8 @@ from gen_data.randomizers.base import (
 )
 from gen_data.randomizers.color_space import hsv_to_linear
 
-TRIES = 16
-"""Layouts tried per room before the scene is rejected."""
+TRIES, TRIES_PER_ROOM = 12, 3
+"""Floor plans tried before the scene is rejected, and layouts of each of their rooms."""
 _VIEWS = 12
 _DOOR_STYLES = 4
 
@@ -109,17 +109,16 @@ class Furnish(RandomizerBase):
             )
             made = []
             for room in rooms:
-                rules = find_room_type(room.kind, "")
-                try:
-                    made.append(furnish(room, rules, options, assets, rng, clutter))
-                except Conflict as conflict:
-                    conflicts[f"{room.kind}: {conflict.piece}", conflict.reason] += 1
+                pieces = _try_to_furnish(room, options, assets, rng, clutter, conflicts)
+                if pieces is None:
                     break
+                made.append(pieces)
             if len(made) == len(rooms):
                 return rooms, made
         (piece, reason), count = conflicts.most_common(1)[0]
+        total = sum(conflicts.values())
         raise self.reject(
-            f"no layout keeps the rules; most often ({count} of {TRIES}) {piece}: {reason}",
+            f"no layout keeps the rules; most often ({count} of {total}) {piece}: {reason}",
             "a larger length_m or width_m",
         )
 
@@ -163,6 +162,24 @@ class Furnish(RandomizerBase):
         white = 0.78 + 0.1 * float(rng.random())
         styles, views = int(rng.random() * _DOOR_STYLES), int(rng.random() * _VIEWS)
         return Looks(ground, walls, Material((white, white, white), 0.95), styles, views)
+
+
+def _try_to_furnish(
+    room: Room,
+    options: dict[str, tuple[str, ...]],
+    assets: AssetIndex,
+    rng: Rng,
+    clutter: float,
+    conflicts: Counter[tuple[str, str]],
+) -> list[Piece] | None:
+    """Pieces of a room; None if no layout of several keeps the rules. Conflicts are counted."""
+    rules = find_room_type(room.kind, "")
+    for _ in range(TRIES_PER_ROOM):
+        try:
+            return furnish(room, rules, options, assets, rng, clutter)
+        except Conflict as conflict:
+            conflicts[f"{room.kind}: {conflict.piece}", conflict.reason] += 1
+    return None
 
 
 def _moving_parts(assets: AssetIndex) -> dict[str, tuple[str, str]]:
