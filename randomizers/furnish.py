@@ -18,6 +18,7 @@ from gen_data.generator.rooms.bodies import JOINTS, Builder, Looks, remove_room
 from gen_data.generator.rooms.floor_plan import Room, draw_plan
 from gen_data.generator.rooms.layout import Conflict, Piece, furnish
 from gen_data.generator.rooms.options import families_of, find_options
+from gen_data.generator.rooms.outlook import draw_outlook, outlook_assets
 from gen_data.generator.rooms.rules import APARTMENT, Range, find_room_type
 from gen_data.randomizers.base import (
     RandomizerBase,
@@ -29,8 +30,9 @@ from gen_data.randomizers.color_space import hsv_to_linear
 
 TRIES, TRIES_PER_ROOM = 12, 3
 """Floor plans tried before the scene is rejected, and layouts of each of their rooms."""
-_VIEWS = 12
 _DOOR_STYLES = 4
+_BLINDS = 0.45
+"""Share of rooms with blinds."""
 
 
 class Furnish(RandomizerBase):
@@ -55,9 +57,9 @@ class Furnish(RandomizerBase):
     clutter: dist.NonNegative = dist.Uniform(0.4, 1.4)
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
-        """Ids of the texture files of floors and walls; the element's group lists the furniture."""
+        """Ids of what is outside, and texture files; the element's group lists the furniture."""
         floors = find_textures(assets, ("floor",), f"randomizers.{self.name}")
-        return find_texture_files(assets, floors)
+        return (*find_texture_files(assets, floors), *outlook_assets())
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with the room redrawn.
@@ -75,6 +77,7 @@ class Furnish(RandomizerBase):
         builder.add_shells(
             rooms, {room.name: self._draw_looks(room, assets, rng) for room in rooms}
         )
+        builder.add_outlook(draw_outlook(rooms, rng))
         parts = _moving_parts(assets)
         for room, placed in zip(rooms, pieces, strict=True):
             builder.add_pieces(room, placed, parts)
@@ -160,8 +163,25 @@ class Furnish(RandomizerBase):
         scale = round(0.9 + 0.9 * float(rng.random()), 3)
         ground = Material((1.0, 1.0, 1.0), 1.0, texture=floor, texture_scale_m=scale)
         white = 0.78 + 0.1 * float(rng.random())
-        styles, views = int(rng.random() * _DOOR_STYLES), int(rng.random() * _VIEWS)
-        return Looks(ground, walls, Material((white, white, white), 0.95), styles, views)
+        door, blind = int(rng.random() * _DOOR_STYLES), int(rng.random() * 2.0)
+        return Looks(
+            ground,
+            walls,
+            Material((white, white, white), 0.95),
+            door,
+            blind,
+            _draw_blinds(room, rng),
+        )
+
+
+def _draw_blinds(room: Room, rng: Rng) -> tuple[float, ...]:
+    """Share of each opening that a blind covers; rooms have blinds at all windows or at none."""
+    has_blinds = room.kind not in ("warehouse", "workshop") and rng.random() < _BLINDS
+    shares = [round(0.08 + 0.55 * float(rng.random()) ** 2, 3) for _ in room.openings]
+    return tuple(
+        share if has_blinds and opening.kind == "window" else 0.0
+        for opening, share in zip(room.openings, shares, strict=True)
+    )
 
 
 def _try_to_furnish(

@@ -14,12 +14,13 @@ from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.members import free_instance_ids
 from gen_data.generator.core.scene import Body, Instance, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.rooms.floor_plan import WALL_M, Opening, Room, outer_radius_m, walls_of
+from gen_data.generator.rooms.floor_plan import WALL_M, Opening, Room, walls_of
 from gen_data.generator.rooms.layout import Piece
+from gen_data.generator.rooms.outlook import Outlook
 
 OUTSIDE = "outside"
-_VIEW_AWAY_M = 5.0
-_VIEW_HEIGHTS_M = (-2.5, 5.2)
+_BLIND_M = 0.03
+"""Depth of blinds, which hang in the reveals of windows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,13 +50,18 @@ JOINTS: Mapping[str, Joint] = {
 
 @dataclass(frozen=True, slots=True)
 class Looks:
-    """Materials of a shell."""
+    """Materials of a shell.
+
+    Attributes:
+        blind_drops: Share of each opening that a blind covers; 0, or none given, = no blind.
+    """
 
     floor: Material
     walls: Material
     ceiling: Material
     door_style: int = 0
-    view_seed: int = 0
+    blind_style: int = 0
+    blind_drops: tuple[float, ...] = ()
 
 
 def part_pose(T_world_piece: SE3, at_m: Vec3, joint: Joint, opening: float) -> SE3:
@@ -153,13 +159,18 @@ class Builder:
         )
 
     def add_shells(self, rooms: Sequence[Room], looks: Mapping[str, Looks]) -> None:
-        """Add floors, ceilings, walls, doors and windows, and the view outside."""
+        """Add floors, ceilings, walls, doors, windows and blinds."""
         for room in rooms:
             self._add_shell(room, looks[room.name])
-        first = looks[rooms[0].name]
-        radius_m = round(outer_radius_m(tuple(rooms)) + _VIEW_AWAY_M, 3)
-        view = _id(OUTSIDE, radius_m=radius_m, size_m=_VIEW_HEIGHTS_M, seed=first.view_seed)
-        self._bodies.append(Body(f"{self._name}/{OUTSIDE}", view, SE3(), collides=False))
+
+    def add_outlook(self, outlook: Outlook) -> None:
+        """Add what windows show; it has no labels."""
+        ground = Material((1.0, 1.0, 1.0), 1.0, texture=outlook.ground, texture_scale_m=3.0)
+        name = f"{self._name}/{OUTSIDE}"
+        at = SE3((0.0, 0.0, -outlook.ground_m))
+        self._bodies.append(Body(name, OUTSIDE, at, collides=False, materials=(ground,)))
+        for k, (asset, pose) in enumerate(outlook.things):
+            self._bodies.append(Body(f"{name}_{k}", asset, pose, collides=False))
 
     def _add_shell(self, room: Room, looks: Looks) -> None:
         x, y, z = room.size_m
@@ -218,6 +229,7 @@ class Builder:
             panes = max(1, round(width / 0.75))
             asset = _id("window", size_m=(width, height, depth), panes=panes)
             self.add(name, asset, pose, room.kind)
+            self._add_blind(room, k, opening, looks)
             return
         frame = _id("door_frame", size_m=(width, height, depth))
         leaf = _id(
@@ -226,6 +238,18 @@ class Builder:
             style=looks.door_style,
         )
         self.add(name, frame, pose, room.kind, part=Part("leaf", leaf))
+
+    def _add_blind(self, room: Room, k: int, opening: Opening, looks: Looks) -> None:
+        """A blind in the reveal of a window."""
+        drop = looks.blind_drops[k] if k < len(looks.blind_drops) else 0.0
+        if drop == 0.0:
+            return
+        at = room.at_wall(opening.wall, opening.along_m, -_BLIND_M)
+        pose = SE3.about_z(0.5 * math.pi * opening.wall, (*at, opening.high_m))
+        height = opening.high_m - opening.low_m
+        size = (round(opening.width_m - 0.02, 4), round(drop * height, 4), _BLIND_M)
+        asset = _id("blind", size_m=size, style=looks.blind_style)
+        self.add(f"{room.name}/blind_{k}", asset, pose, room.kind)
 
     def add_pieces(
         self, room: Room, pieces: Sequence[Piece], parts: Mapping[str, tuple[str, str]]

@@ -268,7 +268,7 @@ def _rectangular_table(
     if drawers:
         chest: Box = (
             (-0.5 * d + 0.06, 0.5 * w - 0.5, 0.1),
-            (0.5 * d - 0.03, 0.5 * w - 0.08, z - thick),
+            (0.5 * d - 0.02, 0.5 * w - 0.08, z - thick),
         )
         patches.append(board(*chest, 1))
         for k in range(3):
@@ -276,8 +276,8 @@ def _rectangular_table(
             a = 0.1 + k * h
             patches.append(
                 board(
-                    (0.5 * d - 0.03, 0.5 * w - 0.495, a + 0.004),
-                    (0.5 * d - 0.012, 0.5 * w - 0.085, a + h - 0.004),
+                    (0.5 * d - 0.02, 0.5 * w - 0.495, a + 0.002),
+                    (0.5 * d - 0.012, 0.5 * w - 0.085, a + h - 0.002),
                     0,
                 )
             )

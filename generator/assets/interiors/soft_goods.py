@@ -82,14 +82,21 @@ def _over_edge(t: Array, edge_m: float, radius_m: float) -> tuple[Array, Array]:
 
 
 def _duvet(
-    x0: float, x1: float, half_y: float, z: float, hang_m: float, rng: VariantRng, slot: int
+    ends_x: tuple[float, float],
+    half_y: float,
+    z: float,
+    hang_m: float,
+    rng: VariantRng,
+    slot: int,
+    crease_m: float = 0.035,
 ) -> Patch:
-    """A cover over a mattress from x0 to x1: it hangs over both sides and, if long, the foot."""
+    """A cover over a mattress, from the head's end on: it hangs over both sides and the foot."""
+    x0, x1 = ends_x
     s = np.linspace(x0, x1 + 0.06, 44)[:, None]
     t = np.linspace(-half_y - hang_m, half_y + hang_m, 56)[None, :]
     y, down = _over_edge(t, half_y, 0.05)
     x, fall = _over_edge(s - x0, x1 - x0 - 0.02, 0.05)
-    crease = folds(s, t, rng, 0.42, 0.035)
+    crease = folds(s, t, rng, 0.42, crease_m)
     swell = 0.035 * np.minimum(np.abs(half_y - np.abs(t)) / 0.2, 1.0) * (np.abs(t) < half_y)
     hem = 1.0 + 0.16 * np.sin(t * 0.0 + s * 9.0 + np.sign(t)) * (np.abs(t) > half_y)
     points = np.stack(
@@ -123,8 +130,10 @@ def bed(seed: int = 0) -> Solid:
     patches.append(cushion(*mattress, 1, 0.05))
     fold, hang = rng.between(0.5, 0.75), rng.between(0.16, 0.26)
     start = -0.5 * length + fold
-    patches.append(_duvet(start, 0.5 * length, 0.5 * w, top + 0.02, hang, rng, 2))
-    back = _duvet(start - 0.03, start + 0.24, 0.5 * w, top + 0.045, 0.9 * hang, rng, 1)
+    patches.append(_duvet((start, 0.5 * length), 0.5 * w, top + 0.02, hang, rng, 2))
+    back = _duvet(
+        (start - 0.03, start + 0.24), 0.5 * w + 0.02, top + 0.075, 0.9 * hang, rng, 1, 0.012
+    )
     patches.append(back)
     for y in (0.0,) if w < 1.2 else (-0.25 * w, 0.25 * w):
         lying = pillow(0.22, 0.36, 0.17, rng, 3).rotated("y", rng.between(-0.3, -0.12))
@@ -135,7 +144,7 @@ def bed(seed: int = 0) -> Solid:
             patches.append(small.moved(-0.5 * length + 0.5, y + rng.between(-0.1, 0.1), top + 0.07))
     if rng.chance(0.5):
         throw_at = rng.between(0.05, 0.25) * length
-        throw = _duvet(throw_at, throw_at + 0.55, 0.5 * w + 0.02, top + 0.07, hang, rng, 5)
+        throw = _duvet((throw_at, throw_at + 0.55), 0.5 * w + 0.04, top + 0.09, hang, rng, 5, 0.012)
         patches.append(throw)
     linen = painted_material(rng.choose(_LINEN), 0.95)
     looks = [front(rng), linen, fabric(rng), linen, fabric(rng), fabric(rng)]

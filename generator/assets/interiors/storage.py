@@ -294,6 +294,11 @@ def _chest(family: str, seed: int) -> Solid:
         )
         patches.append(board(*face, 1))
         patches += handle(x + 0.016, 0.0, a + 0.6 * h, min(0.3, 0.4 * w), 2, upright=False)
+        # A rail behind the gap below: nothing dark shows through.
+        rail = shapes.block(
+            (x - 0.012, -0.5 * w + 0.018, a - 0.015), (x + 0.01, 0.5 * w - 0.018, a + 0.02), 0.0, 1
+        )
+        patches.append(rail)
         boxes.append(face)
     for sx in (-1, 1):
         for sy in (-1, 1):
