@@ -31,6 +31,7 @@ from gen_data.randomizers.color_space import hsv_to_linear
 TRIES, TRIES_PER_ROOM = 12, 3
 """Floor plans tried before the scene is rejected, and layouts of each of their rooms."""
 _DOOR_STYLES = 4
+_PALE_WALLS = 0.75
 _BLINDS = 0.45
 """Share of rooms with blinds."""
 
@@ -54,7 +55,7 @@ class Furnish(RandomizerBase):
     length_m: dist.Positive | None = None
     width_m: dist.Positive | None = None
     height_m: Annotated[dist.Scalar, dist.Bounds(2.0, 12.0)] | None = None
-    clutter: dist.NonNegative = dist.Uniform(0.4, 1.4)
+    clutter: dist.NonNegative = dist.Uniform(0.6, 1.6)
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
         """Ids of what is outside, and texture files; the element's group lists the furniture."""
@@ -145,11 +146,7 @@ class Furnish(RandomizerBase):
         field = f"randomizers.{self.name}"
         floor = choose(find_textures(assets, (choose(rules.floor, rng),), field), rng)
         wall = choose(rules.walls, rng)
-        tint = hsv_to_linear(
-            float(rng.random()),
-            0.25 * float(rng.random()) ** 1.5,
-            0.82 + 0.13 * float(rng.random()),
-        )
+        tint = _draw_paint(rng)
         if wall == "paint":
             walls = Material(tint, 0.9)
         else:
@@ -172,6 +169,15 @@ class Furnish(RandomizerBase):
             blind,
             _draw_blinds(room, rng),
         )
+
+
+def _draw_paint(rng: Rng) -> Vec3:
+    """Colour of a wall: three in four are near white, warm or cool; the others are muted."""
+    strong, hue = float(rng.random()), float(rng.random())
+    amount, value = float(rng.random()), float(rng.random())
+    if strong < _PALE_WALLS:
+        return hsv_to_linear(0.07 + 0.08 * hue, 0.1 * amount, 0.84 + 0.11 * value)
+    return hsv_to_linear(hue, 0.08 + 0.2 * amount, 0.68 + 0.2 * value)
 
 
 def _draw_blinds(room: Room, rng: Rng) -> tuple[float, ...]:

@@ -19,6 +19,9 @@ from gen_data.generator.rooms.layout import Piece
 from gen_data.generator.rooms.outlook import Outlook
 
 OUTSIDE = "outside"
+LEADS_OUT = "leads_out"
+"""Attribute of doors without a room behind them."""
+_VESSELS = frozenset({"bowl", "cup", "mug", "tumbler", "wine_glass"})
 _BLIND_M = 0.03
 """Depth of blinds, which hang in the reveals of windows."""
 
@@ -92,10 +95,16 @@ def remove_room(scene: Scene, name: str) -> Scene:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A part that moves on its piece: its name in ``JOINTS``, and its asset."""
+    """A part that moves on its piece.
+
+    Attributes:
+        name: Its name in ``JOINTS``.
+        leads_out: Whether it is a door without a room behind it.
+    """
 
     name: str
     asset: str
+    leads_out: bool = False
 
 
 class Builder:
@@ -131,7 +140,10 @@ class Builder:
         number, pose = next(self._ids), pose.rounded()
         full = f"{self._name}/{name}"
         body = Body(full, asset, pose, instance_id=number, group=group, materials=materials)
+        found = self._assets.get(asset)
         attributes: list[tuple[str, str]] = [("room", room)]
+        if asset.partition("?")[0] in _VESSELS:
+            attributes.append(("full", "1" if "contents" in dict(found.attributes) else "0"))
         if part is None:
             self._bodies.append(body)
         else:
@@ -145,11 +157,13 @@ class Builder:
             )
             self._bodies += [replace(body, part_id=1), moving]
             attributes.append(("open", "0"))
+            if part.leads_out:
+                attributes.append((LEADS_OUT, "1"))
         self._instances.append(
             Instance(
                 number,
                 full,
-                self._assets.get(asset).category,
+                found.category,
                 0,
                 asset,
                 annotated=self._annotated or bool(group),
@@ -237,7 +251,8 @@ class Builder:
             size_m=(round(width - 0.06, 4), round(height - 0.03, 4)),
             style=looks.door_style,
         )
-        self.add(name, frame, pose, room.kind, part=Part("leaf", leaf))
+        part = Part("leaf", leaf, leads_out=not shared)
+        self.add(name, frame, pose, room.kind, part=part)
 
     def _add_blind(self, room: Room, k: int, opening: Opening, looks: Looks) -> None:
         """A blind in the reveal of a window."""
