@@ -44,7 +44,7 @@ class ObjectStates(RandomizerBase):
     is_open: dist.Flag = dist.Probability(0.35)
     opening: dist.UnitInterval = dist.Uniform(0.1, 1.0)
     is_on: dist.Flag = dist.Probability(0.6)
-    luminance_cd_m2: dist.NonNegative = dist.LogUniform(80.0, 300.0)
+    luminance_cd_m2: dist.NonNegative = dist.LogUniform(40.0, 200.0)
     runs: dist.Flag = dist.Probability(0.2)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:

@@ -146,11 +146,8 @@ def door_leaf(size_m: tuple[float, float] = (0.84, 2.02), style: int = 0) -> Sol
     columns = {1: [(0.13, w - 0.13)], 2: [(0.11, 0.5 * w - 0.04), (0.5 * w + 0.04, w - 0.11)]}
     for y0, y1 in columns.get(style, []):
         for a, b in pairwise([0.16, *rails, h - 0.1]):
-            for sign in (-1, 1):
-                lift = sorted((sign * t, sign * (t + 0.006)))
-                patches.append(
-                    shapes.block((lift[0], y0, a + 0.04), (lift[1], y1, b - 0.04), 0.004)
-                )
+            panel = _raised_panel((y0, y1), (a + 0.04, b - 0.04)).moved(t)
+            patches += [panel, panel.rotated("z", math.pi).moved(0.0, y0 + y1)]
     if style == 3:
         patches.append(
             shapes.block((-t - 0.002, 0.16, 0.9), (t + 0.002, w - 0.16, h - 0.16), 0.0, 2)
@@ -168,6 +165,17 @@ def door_leaf(size_m: tuple[float, float] = (0.84, 2.02), style: int = 0) -> Sol
     return solid(
         patches, [paint, metal_material(STAINLESS, 0.3), pane], [((-t, 0.0, z0), (t, w, h))]
     )
+
+
+def _raised_panel(ys: tuple[float, float], zs: tuple[float, float]) -> Patch:
+    """A panel before the plane x = 0 that faces +X, with wide sloped borders."""
+    slope = 0.03
+    ring = [[ys[0], zs[0]], [ys[1], zs[0]], [ys[1], zs[1]], [ys[0], zs[1]]]
+    outer = np.array([[0.0, y, z] for y, z in ring])
+    inset = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * slope
+    inner = np.insert(outer[:, 1:] + inset, 0, 0.009, axis=1)
+    rows = np.stack([np.concatenate([loop, loop[:1]]) for loop in (outer, inner)])
+    return join_patches([shapes.grid(rows), shapes.fan(inner)])
 
 
 def _sorted(a: Vec3, b: Vec3) -> tuple[Vec3, Vec3]:

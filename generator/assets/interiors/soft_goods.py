@@ -96,7 +96,7 @@ def _duvet(
     t = np.linspace(-half_y - hang_m, half_y + hang_m, 56)[None, :]
     y, down = _over_edge(t, half_y, 0.05)
     x, fall = _over_edge(s - x0, x1 - x0 - 0.02, 0.05)
-    crease = folds(s, t, rng, 0.42, crease_m)
+    crease = folds(s, t, rng, 0.42, crease_m) * np.clip((s - x0) / 0.4, 0.1, 1.0)
     swell = 0.035 * np.minimum(np.abs(half_y - np.abs(t)) / 0.2, 1.0) * (np.abs(t) < half_y)
     hem = 1.0 + 0.16 * np.sin(t * 0.0 + s * 9.0 + np.sign(t)) * (np.abs(t) > half_y)
     points = np.stack(
@@ -132,7 +132,7 @@ def bed(seed: int = 0) -> Solid:
     start = -0.5 * length + fold
     patches.append(_duvet((start, 0.5 * length), 0.5 * w, top + 0.02, hang, rng, 2))
     back = _duvet(
-        (start - 0.03, start + 0.24), 0.5 * w + 0.02, top + 0.075, 0.9 * hang, rng, 1, 0.012
+        (start - 0.03, start + 0.24), 0.5 * w + 0.02, top + 0.085, 0.9 * hang, rng, 1, 0.012
     )
     patches.append(back)
     for y in (0.0,) if w < 1.2 else (-0.25 * w, 0.25 * w):
@@ -144,7 +144,7 @@ def bed(seed: int = 0) -> Solid:
             patches.append(small.moved(-0.5 * length + 0.5, y + rng.between(-0.1, 0.1), top + 0.07))
     if rng.chance(0.5):
         throw_at = rng.between(0.05, 0.25) * length
-        throw = _duvet((throw_at, throw_at + 0.55), 0.5 * w + 0.04, top + 0.09, hang, rng, 5, 0.012)
+        throw = _duvet((throw_at, throw_at + 0.55), 0.5 * w + 0.04, top + 0.11, hang, rng, 5, 0.012)
         patches.append(throw)
     linen = painted_material(rng.choose(_LINEN), 0.95)
     looks = [front(rng), linen, fabric(rng), linen, fabric(rng), fabric(rng)]

@@ -40,8 +40,9 @@ from gen_data.generator.renderers.warp.scene.kernels.alpha_test import OUT_OF_LI
 from gen_data.generator.renderers.warp.scene.kernels.ambient_light import (
     ambient_irradiance,
     ambient_reflection,
+    volume_around,
 )
-from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import beam_from
+from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
 from gen_data.generator.renderers.warp.scene.kernels.brdf import (
     fresnel_dielectric,
     make_brdf,
@@ -292,7 +293,11 @@ def light_at_hit(
     surface = surface_index(world, m.hit)
     side = sheet_normal(world, surface, m.hit, m.weight)
     faint_lux = FAINT_SHARE * wp.pi * wp.max(ambient_irradiance(world, p, m.normal))
+    indoors = volume_around(world, p) >= 0
     for j in range(world.lamps.shape[0]):
+        # As in soft_shadows.weigh_lamps.
+        if indoors and world.lamps[j].kind == SUN:
+            continue
         faint_lux += FAINT_SHARE * wp.max(beam_from(world.lamps[j], p).normal_lux)
     for j in range(world.lamps.shape[0]):
         # Scratch memory holds values of earlier rays: set every lamp.

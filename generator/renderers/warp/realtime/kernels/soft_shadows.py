@@ -21,7 +21,10 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     departure_to,
 )
 from gen_data.generator.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE, TILE
-from gen_data.generator.renderers.warp.scene.kernels.ambient_light import ambient_irradiance
+from gen_data.generator.renderers.warp.scene.kernels.ambient_light import (
+    ambient_irradiance,
+    volume_around,
+)
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     DISK,
     RECTANGLE,
@@ -186,6 +189,7 @@ def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float], matte
     n = lattice.normal[i]
     translucent = is_translucent(world, lattice.surface[i])
     total = wp.max(wp.max(ambient_irradiance(world, lattice.p_m[i], n)) * wp.pi, 1.0e-9)
+    indoors = volume_around(world, lattice.p_m[i]) >= 0
     for j in range(world.lamps.shape[0]):
         beam = beam_from(world.lamps[j], lattice.origin_m[i])
         cosine = wp.dot(beam.direction, n)
@@ -196,7 +200,9 @@ def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float], matte
         if cosine > -beam.spread and brightest > 0.0:
             # Grazing highlights remain bright: the cosine has a floor.
             lux = brightest * wp.max(cosine, 0.2)
-            total += lux
+            # A sun that is nearly always behind walls hides no lamp.
+            if not indoors or world.lamps[j].kind != SUN:
+                total += lux
         shares[j, i] = lux
     for j in range(world.lamps.shape[0]):
         if shares[j, i] > 0.0:
