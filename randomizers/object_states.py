@@ -119,14 +119,15 @@ def _open(
     for step in _STEPS:
         opening = round(share * step, 3)
         pose = part_pose(piece.T_world_body, at_m, joint, opening * joint.limit)
-        if opening == 0.0 or joint.axis == "y" or _is_free(scene, assets, part, pose):
+        if opening == 0.0 or joint.axis == "y" or _is_free(scene, assets, part, piece, pose):
             return replace(part, T_world_body=pose), opening
     closed = part_pose(piece.T_world_body, at_m, joint, 0.0)
     return replace(part, T_world_body=closed), 0.0
 
 
-def _is_free(scene: Scene, assets: AssetIndex, part: Body, pose: SE3) -> bool:
-    """Whether a part there overlaps nothing but its own piece and the floor."""
+def _is_free(scene: Scene, assets: AssetIndex, part: Body, piece: Body, pose: SE3) -> bool:
+    """Whether a part there overlaps nothing but its own piece, the piece's wall, and the floor."""
+    frame = Footprint.of(piece.T_world_body, assets.bounds_m(piece.asset)).rectangle
     own = Footprint.of(pose, assets.bounds_m(part.asset)).rectangle
     low, high = _heights_m(pose, assets.bounds_m(part.asset))
     x, y, _ = pose.translation_m
@@ -140,7 +141,8 @@ def _is_free(scene: Scene, assets: AssetIndex, part: Body, pose: SE3) -> bool:
         other_low, other_high = _heights_m(body.T_world_body, bounds)
         if other_low > high - 0.002 or other_high < low + 0.025:
             continue
-        if overlap_of(own, Footprint.of(body.T_world_body, bounds, body.scale).rectangle):
+        there = Footprint.of(body.T_world_body, bounds, body.scale).rectangle
+        if overlap_of(own, there) and not ("/wall_" in body.name and overlap_of(frame, there)):
             return False
     return True
 

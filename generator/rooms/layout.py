@@ -338,12 +338,15 @@ def furnish(
             x, y = room.at_wall(opening.wall, opening.along_m, 0.5 * DOOR_ZONE_M)
             c, s = direction(opening.wall)
             layout.zones.append(((x, y, c, s, 0.5 * DOOR_ZONE_M, 0.5 * opening.width_m + 0.05), -1))
+    larger = room.size_m[0] * room.size_m[1] / rules.usual_area_m2
     for rule in rules.pieces:
         layout.refused = Counter()
         low, high = rule.count
         wanted = draw_count(rng, (low, high))
-        if rule.piece == "floor_things":
+        if rule.piece in ("floor_things", "beside_walls"):
             wanted = round(wanted * clutter)
+        if rule.optional and rule.place in ("wall", "free", "corner", "hang"):
+            wanted = round(wanted * larger)
         placed = _PLACES[rule.place](layout, rule, options, wanted)
         related = not rule.of or any(p.role in rule.of for p in layout.pieces)
         required = not rule.optional and rule.place not in ("on", "around", "front")
@@ -383,7 +386,8 @@ def _at_wall(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
             along = corner if rule.place == "corner" else layout.signed(max(free, 0.0))
             gap = 0.0005 if rule.place == "hang" else WALL_GAP_M
             at = layout.room.at_wall(wall, along, s.half_x + gap)
-            low = between(layout.rng, rule.height_m) if rule.place == "hang" else 0.0
+            # Basins on walls begin above the floor.
+            low = between(layout.rng, rule.height_m) if rule.place == "hang" else max(s.low, 0.0)
             if layout.put(rule, family, asset, at, wall * 0.5 * math.pi, low):
                 placed += 1
                 break

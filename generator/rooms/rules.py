@@ -85,6 +85,12 @@ class RoomType:
     pieces: tuple[Rule, ...]
 
     @property
+    def usual_area_m2(self) -> float:
+        """Area of a floor of the mean size."""
+        (x0, x1), (y0, y1), _ = self.size_m
+        return 0.25 * (x0 + x1) * (y0 + y1)
+
+    @property
     def families(self) -> frozenset[str]:
         """Families of everything that may be in such a room."""
         return frozenset(name for rule in self.pieces for name in (*rule.assets, *rule.things))

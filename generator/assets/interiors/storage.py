@@ -431,8 +431,8 @@ def pallet(seed: int = 0) -> Solid:
                 x, y, z = -0.59 + i * a, -0.39 + j * b, 0.144 + row * h
                 patches.append(
                     shapes.block(
-                        (x + 0.004, y + 0.004, z),
-                        (x + a - 0.004, y + b - 0.004, z + h - 0.002),
+                        (x + 0.001, y + 0.001, z),
+                        (x + a - 0.001, y + b - 0.001, z + h - 0.0005),
                         0.006,
                         1,
                     )
