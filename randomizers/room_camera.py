@@ -82,8 +82,8 @@ class RoomCamera(RandomizerBase):
             drawn = self._draw_pose(scene, floors, pieces, assets, rng)
             if drawn is None:
                 continue
-            floor, *pose = drawn
-            moved = replace(camera, T_world_camera=look_at(*pose).rounded())
+            floor, eye, target, roll = drawn
+            moved = replace(camera, T_world_camera=look_at(eye, target, roll).rounded())
             if _count_in_view(moved, origins_m) < least:
                 continue
             if hidden_share(moved, scene, assets, self.near_m) > _HIDDEN_MAX:

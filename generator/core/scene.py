@@ -15,6 +15,7 @@ from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.motion import STILL, JointTrajectory, StateChange, Trajectory, Twist
 from gen_data.generator.core.se3 import IDENTITY, SE3, Vec3
+from gen_data.generator.core.serialization import SPARSE
 from gen_data.generator.core.shutter import INSTANT, Shutter
 
 SharedValue = str | float | int | bool
@@ -474,7 +475,7 @@ class Environment:
     luminance_cd_m2: float = 100.0
     yaw_rad: float = 0.0
     visible: bool = True
-    volumes: tuple[IrradianceVolume, ...] = ()
+    volumes: tuple[IrradianceVolume, ...] = field(default=(), metadata={SPARSE: True})
 
 
 @dataclass(frozen=True, slots=True)

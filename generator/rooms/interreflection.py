@@ -145,7 +145,7 @@ def _through_doors(
 
 def _reflectance(room: LitRoom, patches: _Patches, cover: Array) -> Array:
     """Reflectance of patches, [n, 3]: of their sides, less that of what holes cover and pass."""
-    walls = np.array(room.reflectance)[patches.side]
+    walls: Array = np.array(room.reflectance)[patches.side]
     for hole, share in zip(room.holes, cover, strict=True):
         left = _GLASS if hole.twin is None else 1.0 - hole.passes
         walls = walls * (1.0 - (1.0 - left) * share)[:, None]
@@ -280,8 +280,10 @@ def _solid_angles(points_m: Array, centers_m: Array, inward: Array, area_m2: Arr
     way = centers_m[None] - points_m[:, None]
     square = (way * way).sum(axis=2)
     cosine = np.maximum(-(way * inward[None]).sum(axis=2), 0.0) / np.sqrt(square + 1e-12)
-    return cosine * area_m2 / (square + area_m2 / math.pi)
+    angles: Array = cosine * area_m2 / (square + area_m2 / math.pi)
+    return angles
 
 
 def _normalized(weights: Array) -> Array:
-    return weights / weights.sum(axis=-1, keepdims=True)
+    shares: Array = weights / weights.sum(axis=-1, keepdims=True)
+    return shares

@@ -240,7 +240,7 @@ def fruit_bowl(seed: int = 0) -> Solid:
     places = [(0.055, 0.2 + 2.0 * math.pi * k / 5, 0.045) for k in range(5)] + [(0.0, 0.0, 0.1)]
     for k, (away, a, z) in enumerate(places):
         size = rng.between(0.034, 0.04)
-        fruit = shapes.ball(lambda d, s=size: s * d * (1.0, 1.0, 0.92), 12, 18)
+        fruit = shapes.ball(lambda d: d * (1.0, 1.0, 0.92), 12, 18).scaled(size, size, size)
         patches.append(fruit.painted(1 + k % 2).moved(away * math.cos(a), away * math.sin(a), z))
     skins = [
         Material(draw_linear(("#b32d22", "#c7a52c", "#7fa33a"), 0.1, rng), 0.3),
