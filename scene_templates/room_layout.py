@@ -14,7 +14,6 @@ from gen_data.generator.rooms.options import families_of, find_options
 from gen_data.generator.rooms.rules import APARTMENT, find_room_type
 from gen_data.scene_templates.element import Element
 
-
 _IN_SHELLS = {"blind", "window"}
 """Assets of shells that the nominal room may lack."""
 
