@@ -423,8 +423,9 @@ def game_box(seed: int = 0) -> Solid:
     rng = variant_rng("game_box", seed)
     patches: list[Patch] = []
     z, x, y = 0.0, 0.0, 0.0
-    for k in range(1 + seed % 3):
-        a, b, t = rng.between(0.13, 0.15), rng.between(0.13, 0.19), rng.between(0.04, 0.07)
+    sizes = sorted((rng.between(0.13, 0.19) for _ in range(1 + seed % 3)), reverse=True)
+    for k, b in enumerate(sizes):
+        a, t = min(b, rng.between(0.13, 0.15)), rng.between(0.04, 0.07)
         part = [
             shapes.block((-a, -b, 0.0), (a, b, t), 0.002, k % 2),
             shapes.grid(
