@@ -59,8 +59,8 @@ def draw_outlook(rooms: Sequence[Room], rng: Rng) -> Outlook:
     ground_m = _STEP_M + storey * _STOREY_M
     things = []
     for families, count, away_m in (
-        (_HOUSES, draw_count(rng, (5, 8)), (16.0, 34.0)),
-        (_NEAR, draw_count(rng, (5, 10)), (4.5, 15.0)),
+        (_HOUSES, draw_count(rng, (5, 8)), (18.0, 36.0)),
+        (_NEAR, draw_count(rng, (5, 10)), (6.0, 16.0)),
     ):
         first = between(rng, (0.0, 2.0 * math.pi))
         for k in range(count):
