@@ -42,6 +42,8 @@ _TRIES = 36
 _HEAD_M = 1.9
 _CROWDED = 0.25
 """Distance within which a piece before a window hides it."""
+_SILL_M = 0.026
+"""Height of sills below the openings of windows."""
 _FLAT = frozenset({"rug"})
 _BOARDS = frozenset({"bookcase", "steel_rack"})
 _EDGES_M = {
@@ -290,7 +292,7 @@ class Layout:
         """Whether something stands before a window, or hangs before a door."""
         return any(
             low_m < opening.high_m
-            and high_m > opening.low_m + 0.03
+            and high_m > opening.low_m - _SILL_M
             and overlap_of(footprint, self.before_opening(opening))
             for opening in self.room.openings
         )

@@ -449,18 +449,19 @@ def plush_toy(seed: int = 0) -> Solid:
     rabbit = seed % 3 == 2
 
     def lump(x: float, y: float, z: float, a: float, b: float, c: float, slot: int = 0) -> Patch:
-        ball = shapes.ball(lambda d: d * (a, b, c), 12, 18).painted(slot)
-        return ball.moved(x, y, z)
+        ball = shapes.ball(lambda d: d * (a, b, c), 12, 18).painted(slot).moved(x, y, z)
+        # Flat where it sits.
+        return replace(ball, corners_m=np.maximum(ball.corners_m, (-9.0, -9.0, 0.0)))
 
     patches = [
-        lump(0.0, 0.0, 0.085, 0.07, 0.08, 0.085),
+        lump(0.0, 0.0, 0.068, 0.07, 0.08, 0.085),
         lump(0.045, 0.0, 0.08, 0.035, 0.055, 0.06, 1),
         lump(0.01, 0.0, 0.205, 0.06, 0.066, 0.058),
         lump(0.06, 0.0, 0.19, 0.026, 0.03, 0.022, 1),
     ]
     for sy in (-1, 1):
         patches += [
-            lump(0.085, sy * 0.062, 0.034, 0.055, 0.034, 0.034),
+            lump(0.085, sy * 0.062, 0.025, 0.055, 0.034, 0.034),
             lump(0.05, sy * 0.085, 0.12, 0.03, 0.026, 0.05),
             lump(
                 0.0,
