@@ -18,6 +18,7 @@ from gen_data.generator.rooms.bodies import JOINTS, Builder, Looks, remove_room
 from gen_data.generator.rooms.floor_plan import Room, draw_plan
 from gen_data.generator.rooms.layout import Conflict, Piece, furnish
 from gen_data.generator.rooms.options import families_of, find_options
+from gen_data.generator.rooms.outlook import draw_outlook, outlook_assets
 from gen_data.generator.rooms.rules import APARTMENT, Range, find_room_type
 from gen_data.randomizers.base import (
     RandomizerBase,
@@ -27,10 +28,12 @@ from gen_data.randomizers.base import (
 )
 from gen_data.randomizers.color_space import hsv_to_linear
 
-TRIES = 16
-"""Layouts tried per room before the scene is rejected."""
-_VIEWS = 12
+TRIES, TRIES_PER_ROOM = 12, 3
+"""Floor plans tried before the scene is rejected, and layouts of each of their rooms."""
 _DOOR_STYLES = 4
+_PALE_WALLS = 0.75
+_BLINDS = 0.45
+"""Share of rooms with blinds."""
 
 
 class Furnish(RandomizerBase):
@@ -52,12 +55,12 @@ class Furnish(RandomizerBase):
     length_m: dist.Positive | None = None
     width_m: dist.Positive | None = None
     height_m: Annotated[dist.Scalar, dist.Bounds(2.0, 12.0)] | None = None
-    clutter: dist.NonNegative = dist.Uniform(0.4, 1.4)
+    clutter: dist.NonNegative = dist.Uniform(0.6, 1.6)
 
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
-        """Ids of the texture files of floors and walls; the element's group lists the furniture."""
+        """Ids of what is outside, and texture files; the element's group lists the furniture."""
         floors = find_textures(assets, ("floor",), f"randomizers.{self.name}")
-        return find_texture_files(assets, floors)
+        return (*find_texture_files(assets, floors), *outlook_assets())
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with the room redrawn.
@@ -75,6 +78,7 @@ class Furnish(RandomizerBase):
         builder.add_shells(
             rooms, {room.name: self._draw_looks(room, assets, rng) for room in rooms}
         )
+        builder.add_outlook(draw_outlook(rooms, rng))
         parts = _moving_parts(assets)
         for room, placed in zip(rooms, pieces, strict=True):
             builder.add_pieces(room, placed, parts)
@@ -109,17 +113,16 @@ class Furnish(RandomizerBase):
             )
             made = []
             for room in rooms:
-                rules = find_room_type(room.kind, "")
-                try:
-                    made.append(furnish(room, rules, options, assets, rng, clutter))
-                except Conflict as conflict:
-                    conflicts[f"{room.kind}: {conflict.piece}", conflict.reason] += 1
+                pieces = _try_to_furnish(room, options, assets, rng, clutter, conflicts)
+                if pieces is None:
                     break
+                made.append(pieces)
             if len(made) == len(rooms):
                 return rooms, made
         (piece, reason), count = conflicts.most_common(1)[0]
+        total = sum(conflicts.values())
         raise self.reject(
-            f"no layout keeps the rules; most often ({count} of {TRIES}) {piece}: {reason}",
+            f"no layout keeps the rules; most often ({count} of {total}) {piece}: {reason}",
             "a larger length_m or width_m",
         )
 
@@ -143,11 +146,7 @@ class Furnish(RandomizerBase):
         field = f"randomizers.{self.name}"
         floor = choose(find_textures(assets, (choose(rules.floor, rng),), field), rng)
         wall = choose(rules.walls, rng)
-        tint = hsv_to_linear(
-            float(rng.random()),
-            0.25 * float(rng.random()) ** 1.5,
-            0.82 + 0.13 * float(rng.random()),
-        )
+        tint = _draw_paint(rng)
         if wall == "paint":
             walls = Material(tint, 0.9)
         else:
@@ -161,8 +160,52 @@ class Furnish(RandomizerBase):
         scale = round(0.9 + 0.9 * float(rng.random()), 3)
         ground = Material((1.0, 1.0, 1.0), 1.0, texture=floor, texture_scale_m=scale)
         white = 0.78 + 0.1 * float(rng.random())
-        styles, views = int(rng.random() * _DOOR_STYLES), int(rng.random() * _VIEWS)
-        return Looks(ground, walls, Material((white, white, white), 0.95), styles, views)
+        door, blind = int(rng.random() * _DOOR_STYLES), int(rng.random() * 2.0)
+        return Looks(
+            ground,
+            walls,
+            Material((white, white, white), 0.95),
+            door,
+            blind,
+            _draw_blinds(room, rng),
+        )
+
+
+def _draw_paint(rng: Rng) -> Vec3:
+    """Colour of a wall: three in four are near white, warm or cool; the others are muted."""
+    strong, hue = float(rng.random()), float(rng.random())
+    amount, value = float(rng.random()), float(rng.random())
+    if strong < _PALE_WALLS:
+        return hsv_to_linear(0.07 + 0.08 * hue, 0.1 * amount, 0.84 + 0.11 * value)
+    return hsv_to_linear(hue, 0.08 + 0.2 * amount, 0.68 + 0.2 * value)
+
+
+def _draw_blinds(room: Room, rng: Rng) -> tuple[float, ...]:
+    """Share of each opening that a blind covers; rooms have blinds at all windows or at none."""
+    has_blinds = room.kind not in ("warehouse", "workshop") and rng.random() < _BLINDS
+    shares = [round(0.08 + 0.55 * float(rng.random()) ** 2, 3) for _ in room.openings]
+    return tuple(
+        share if has_blinds and opening.kind == "window" else 0.0
+        for opening, share in zip(room.openings, shares, strict=True)
+    )
+
+
+def _try_to_furnish(
+    room: Room,
+    options: dict[str, tuple[str, ...]],
+    assets: AssetIndex,
+    rng: Rng,
+    clutter: float,
+    conflicts: Counter[tuple[str, str]],
+) -> list[Piece] | None:
+    """Pieces of a room; None if no layout of several keeps the rules. Conflicts are counted."""
+    rules = find_room_type(room.kind, "")
+    for _ in range(TRIES_PER_ROOM):
+        try:
+            return furnish(room, rules, options, assets, rng, clutter)
+        except Conflict as conflict:
+            conflicts[f"{room.kind}: {conflict.piece}", conflict.reason] += 1
+    return None
 
 
 def _moving_parts(assets: AssetIndex) -> dict[str, tuple[str, str]]:

@@ -1,4 +1,4 @@
-"""States of things: doors, drawers and lids that are open, screens that are on."""
+"""States of things: doors, drawers and lids that are open, screens and taps that are on."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Literal
 
+from gen_data.generator.assets.asset_ids import AssetId
+from gen_data.generator.assets.interiors.fixtures import DRAIN, TAP
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.boxes import overlap_of
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.core.streams import Rng
-from gen_data.generator.rooms.bodies import JOINTS, Joint, keypoint_m, part_pose
+from gen_data.generator.rooms.bodies import JOINTS, LEADS_OUT, Joint, keypoint_m, part_pose
 from gen_data.randomizers.base import RandomizerBase, add_attributes, body_materials
 from gen_data.randomizers.free_space import Footprint
 
@@ -25,29 +27,33 @@ _STEPS = (1.0, 0.6, 0.3)
 
 
 class ObjectStates(RandomizerBase):
-    """Opens doors, drawers and lids as far as nothing is in their way, and switches screens on.
+    """Opens doors, drawers and lids as far as nothing is in their way, and switches things on.
 
     Labels carry ``open``, from 0 to 1, ``joint``: the turn [rad] or way [m] of the part, and
-    ``state``: on or off.
+    ``state``: on or off, of screens and taps. Doors that lead out of all rooms stay closed.
 
     Attributes:
         is_open: Whether a part is open at all.
         opening: Share of the joint's range, if it is.
         is_on: Whether a screen is on.
         luminance_cd_m2: Of screens that are on.
+        runs: Whether water runs from a tap.
     """
 
     type: Literal["object_states"] = "object_states"
     is_open: dist.Flag = dist.Probability(0.35)
     opening: dist.UnitInterval = dist.Uniform(0.1, 1.0)
     is_on: dist.Flag = dist.Probability(0.6)
-    luminance_cd_m2: dist.NonNegative = dist.LogUniform(80.0, 300.0)
+    luminance_cd_m2: dist.NonNegative = dist.LogUniform(40.0, 200.0)
+    runs: dist.Flag = dist.Probability(0.2)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with states drawn and stated by the instances' attributes."""
         attributes: dict[int, list[tuple[str, str]]] = {}
+        facts = {i.instance_id: dict(i.attributes) for i in scene.instances}
         for part, piece, joint in _find_parts(scene):
             is_open, opening = self.is_open.draw(rng), self.opening.draw(rng)
+            is_open = is_open and LEADS_OUT not in facts[part.instance_id]
             moved, share = _open(scene, assets, part, piece, joint, opening if is_open else 0.0)
             scene = scene.with_bodies(moved)
             way = f"{share * joint.limit:.4g}"
@@ -55,7 +61,15 @@ class ObjectStates(RandomizerBase):
                 [("joint", way), ("open", f"{share:.3g}")]
             )
         changed = []
+        streams = []
         for body in scene.bodies:
+            mouth_m = keypoint_m(assets, body.asset, TAP) if body.instance_id else None
+            if mouth_m is not None:
+                runs = self.runs.draw(rng)
+                if runs:
+                    streams.append(_stream(body, mouth_m, assets))
+                state = ("state", "on" if runs else "off")
+                attributes.setdefault(body.instance_id, []).append(state)
             slots = body_materials(body, assets)
             if not any(m.role == SCREEN for m in slots):
                 continue
@@ -72,7 +86,19 @@ class ObjectStates(RandomizerBase):
                 changed.append(replace(body, materials=lit))
             state = ("state", "on" if is_on else "off")
             attributes.setdefault(body.instance_id, []).append(state)
-        return add_attributes(scene.with_bodies(*changed), attributes)
+        scene = scene.with_bodies(*changed)
+        scene = replace(scene, bodies=(*scene.bodies, *streams))
+        return add_attributes(scene, attributes)
+
+
+def _stream(piece: Body, mouth_m: Vec3, assets: AssetIndex) -> Body:
+    """The water that falls from a tap of a piece; it belongs to the piece's instance."""
+    drain_m = keypoint_m(assets, piece.asset, DRAIN)
+    assert drain_m is not None, f"{piece.asset} has no keypoint {DRAIN}"
+    asset = str(AssetId("tap_stream", {"length_m": round(mouth_m[2] - drain_m[2], 4)}))
+    pose = (piece.T_world_body @ SE3(mouth_m)).rounded()
+    number, group = piece.instance_id, piece.group
+    return Body(f"{piece.name}/water", asset, pose, instance_id=number, group=group, collides=False)
 
 
 def _find_parts(scene: Scene) -> Iterator[tuple[Body, Body, Joint]]:
@@ -93,14 +119,15 @@ def _open(
     for step in _STEPS:
         opening = round(share * step, 3)
         pose = part_pose(piece.T_world_body, at_m, joint, opening * joint.limit)
-        if opening == 0.0 or joint.axis == "y" or _is_free(scene, assets, part, pose):
+        if opening == 0.0 or joint.axis == "y" or _is_free(scene, assets, part, piece, pose):
             return replace(part, T_world_body=pose), opening
     closed = part_pose(piece.T_world_body, at_m, joint, 0.0)
     return replace(part, T_world_body=closed), 0.0
 
 
-def _is_free(scene: Scene, assets: AssetIndex, part: Body, pose: SE3) -> bool:
-    """Whether a part there overlaps nothing but its own piece and the floor."""
+def _is_free(scene: Scene, assets: AssetIndex, part: Body, piece: Body, pose: SE3) -> bool:
+    """Whether a part there overlaps nothing but its own piece, the piece's wall, and the floor."""
+    frame = Footprint.of(piece.T_world_body, assets.bounds_m(piece.asset)).rectangle
     own = Footprint.of(pose, assets.bounds_m(part.asset)).rectangle
     low, high = _heights_m(pose, assets.bounds_m(part.asset))
     x, y, _ = pose.translation_m
@@ -114,7 +141,8 @@ def _is_free(scene: Scene, assets: AssetIndex, part: Body, pose: SE3) -> bool:
         other_low, other_high = _heights_m(body.T_world_body, bounds)
         if other_low > high - 0.002 or other_high < low + 0.025:
             continue
-        if overlap_of(own, Footprint.of(body.T_world_body, bounds, body.scale).rectangle):
+        there = Footprint.of(body.T_world_body, bounds, body.scale).rectangle
+        if overlap_of(own, there) and not ("/wall_" in body.name and overlap_of(frame, there)):
             return False
     return True
 

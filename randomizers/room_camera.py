@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Annotated, Literal
 
@@ -13,7 +12,7 @@ from pydantic import Field
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Camera, Scene
-from gen_data.generator.core.se3 import Vec3, look_at
+from gen_data.generator.core.se3 import Array, Vec3, look_at
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.free_space import hidden_share, is_clear
@@ -38,6 +37,7 @@ class RoomCamera(RandomizerBase):
         near_m: Distance within which bodies may hide a fifth of the image at most.
         min_pieces: Smallest number of pieces whose origins are in the image; half of
             all pieces if that is fewer.
+        choices: Number of places to choose from: the one from which most of the room is in view.
     """
 
     type: Literal["room_camera"] = "room_camera"
@@ -53,6 +53,7 @@ class RoomCamera(RandomizerBase):
     clearance_m: float = Field(0.25, ge=0)
     near_m: float = Field(0.7, ge=0)
     min_pieces: int = Field(7, ge=0, le=100)
+    choices: int = Field(4, ge=1, le=32)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with its cameras moved. Raises LayoutRejected if no place is free."""
@@ -61,21 +62,39 @@ class RoomCamera(RandomizerBase):
         for k, camera in enumerate(cameras):
             if camera.rig:
                 continue
-            for _ in range(TRIES):
-                pose = self._draw_pose(scene, floors, pieces, assets, rng)
-                if pose is None:
-                    continue
-                moved = replace(camera, T_world_camera=look_at(*pose).rounded())
-                if (
-                    _count_in_view(moved, pieces) >= min(self.min_pieces, len(pieces) // 2)
-                    and hidden_share(moved, scene, assets, self.near_m) <= _HIDDEN_MAX
-                ):
-                    cameras[k] = moved
-                    break
-            else:
-                remedy = "a smaller away_m, clearance_m or near_m, or another height_m"
-                raise self.reject("no free place for a camera in the room", remedy)
+            cameras[k] = self._place(camera, scene, floors, pieces, assets, rng)
         return replace(scene, cameras=tuple(cameras))
+
+    def _place(
+        self,
+        camera: Camera,
+        scene: Scene,
+        floors: list[Body],
+        pieces: list[Body],
+        assets: AssetIndex,
+        rng: Rng,
+    ) -> Camera:
+        """The camera at the best of several places. Raises LayoutRejected if there is none."""
+        origins_m = np.array([body.T_world_body.translation_m for body in pieces])
+        least = min(self.min_pieces, len(pieces) // 2)
+        found: list[tuple[int, Camera]] = []
+        for _ in range(TRIES):
+            drawn = self._draw_pose(scene, floors, pieces, assets, rng)
+            if drawn is None:
+                continue
+            floor, eye, target, roll = drawn
+            moved = replace(camera, T_world_camera=look_at(eye, target, roll).rounded())
+            if _count_in_view(moved, origins_m) < least:
+                continue
+            if hidden_share(moved, scene, assets, self.near_m) > _HIDDEN_MAX:
+                continue
+            found.append((_count_in_view(moved, _points_in(floor, scene, assets)), moved))
+            if len(found) == self.choices:
+                break
+        if not found:
+            remedy = "a smaller away_m, clearance_m or near_m, or another height_m"
+            raise self.reject("no free place for a camera in the room", remedy)
+        return max(found, key=lambda one: one[0])[1]
 
     def _find(self, scene: Scene) -> tuple[list[Body], list[Body]]:
         """Floors of the rooms, and pieces to look at."""
@@ -85,8 +104,8 @@ class RoomCamera(RandomizerBase):
 
     def _draw_pose(
         self, scene: Scene, floors: list[Body], pieces: list[Body], assets: AssetIndex, rng: Rng
-    ) -> tuple[Vec3, Vec3, float] | None:
-        """Draw eye, target and roll; None if the place is taken or too near."""
+    ) -> tuple[Body, Vec3, Vec3, float] | None:
+        """Draw floor, eye, target and roll; None if the place is taken or too near."""
         floor = floors[min(int(rng.random() * len(floors)), len(floors) - 1)]
         (x0, y0, _), (x1, y1, _) = assets.bounds_m(floor.asset)
         mx, my, _ = floor.T_world_body.translation_m
@@ -117,13 +136,25 @@ class RoomCamera(RandomizerBase):
             y + math.cos(pitch) * math.sin(yaw),
             eye[2] + math.sin(pitch),
         )
-        return eye, target, roll
+        return floor, eye, target, roll
 
 
-def _count_in_view(camera: Camera, pieces: Sequence[Body]) -> int:
-    """Number of pieces whose origins are within the image."""
-    points = np.array([body.T_world_body.translation_m for body in pieces])
-    x, y, z = camera.T_world_camera.inverse().apply(points).T
+def _points_in(floor: Body, scene: Scene, assets: AssetIndex) -> Array:
+    """Points spread over a room between knees and eyes, [n, 3]."""
+    (x0, y0, _), (x1, y1, _) = assets.bounds_m(floor.asset)
+    mx, my, _ = floor.T_world_body.translation_m
+    x, y = (np.linspace(0.1, 0.9, 6) * (b - a) + a for a, b in ((x0, x1), (y0, y1)))
+    z = np.array([0.3, 1.0, min(1.7, scene.interior_m[1][2])])
+    grid = np.meshgrid(x + mx, y + my, z, indexing="ij")
+    points: Array = np.stack(grid, axis=-1).reshape(-1, 3)
+    return points
+
+
+def _count_in_view(camera: Camera, points_m: Array) -> int:
+    """Number of points [n, 3] that are within the image."""
+    if not len(points_m):
+        return 0
+    x, y, z = camera.T_world_camera.inverse().apply(points_m).T
     k = camera.intrinsics
     ahead = z > 0.3
     deep = np.where(ahead, z, 1.0)

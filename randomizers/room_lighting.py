@@ -17,10 +17,11 @@ from gen_data.generator.core.scene import Body, Environment, Light, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.rooms.bodies import OUTSIDE, keypoint_m
+from gen_data.generator.rooms.interreflection import find_interreflection
+from gen_data.generator.rooms.lit_rooms import find_lit_rooms
 from gen_data.randomizers.base import (
     RandomizerBase,
     add_attributes,
-    body_materials,
     scale_emission,
     set_emission,
 )
@@ -29,23 +30,23 @@ from gen_data.randomizers.color_space import Temperature, temperature_to_linear
 LAMP = "lamp"
 _SHADE_M2 = 0.35
 """Assumed luminous area of a lamp: a shade of 0.2 m radius and 0.25 m height."""
-_REFLECTANCE = 0.5
-"""Assumed mean reflectance of the surfaces of rooms (EN 12464-1 asks for 0.2 to 0.9)."""
 _BULB_M = 0.06
-_VIEW_MEAN = 0.6
-"""Mean of the panoramas outside, relative to their brightest point."""
+_VIEW_MEAN = 0.7
+"""What windows send in, relative to the mean outside: houses hide some sky, and panes reflect."""
+_SKIES = 8
+_NIGHT_CD_M2 = 0.2
+"""Assumed mean outdoors by night in towns: a lit street has 1 cd/m^2 (EN 13201-2), a sky 0.01."""
 
 
 class RoomLighting(RandomizerBase):
     """Replaces the lights of a furnished room: lamps, daylight from windows, and the sun.
 
-    Each window is a panel with the luminance of the view outside. What walls send back is a
-    uniform light of luminance ``flux * reflectance / (pi * area * (1 - reflectance))`` (Sumpner,
-    "The diffusion of light", 1892). Labels of lamps carry ``state``: on or off.
+    Each window is a panel with the luminance of the view outside; what surfaces send to each other
+    is found by radiosity. Labels of lamps carry ``state``: on or off.
 
     Attributes:
         room: Name of the template's ``room_layout`` element.
-        daylight_cd_m2: Luminance of the brightest sky outside by day.
+        daylight_cd_m2: Mean luminance of sky and surroundings by day.
         night: Whether it is night; the view outside is nearly black then, and the lamps of all
             ceilings are on, as in rooms without windows.
         is_on: Whether a lamp is on; drawn for each, and once for all on the ceiling of a room.
@@ -82,21 +83,22 @@ class RoomLighting(RandomizerBase):
             )
         windows = [b for b in own if "/window_" in b.name]
         night, bright = self.night.draw(rng), self.daylight_cd_m2.draw(rng)
-        outside = 0.3 if night else round(bright, 1)
+        outside = _NIGHT_CD_M2 if night else round(bright, 1)
         scene = remove_lights(scene)
         lamps, scene = self._switch_lamps(scene, own, assets, rng, must=night or not windows)
         panels = (
-            [_window_light(w, assets, _VIEW_MEAN * outside) for w in windows] if not night else []
+            [_window_light(w, own, assets, _VIEW_MEAN * outside) for w in windows]
+            if not night
+            else []
         )
         sun = self._draw_sun(windows, rng, shines=not night)
-        view = scene.body(f"{self.room}/{OUTSIDE}")
-        glow = tuple(
-            replace(m, emission_cd_m2=(outside, outside, outside))
-            for m in body_materials(view, assets)
-        )
-        scene = scene.with_bodies(replace(view, materials=glow))
         lights = (*sun, *panels, *lamps)
-        return replace(scene, lights=lights, environment=_reflected(scene, lights))
+        volumes = find_interreflection(find_lit_rooms(scene, self.room, assets), lights)
+        sky = "night_city" if night else "clear_sky" if sun else "overcast"
+        image = f"environment/{sky}?seed={int(rng.random() * _SKIES)}"
+        yaw = round(2.0 * math.pi * float(rng.random()), 6)
+        ambience = Environment(image, outside, yaw, visible=True, volumes=volumes)
+        return replace(scene, lights=lights, environment=ambience)
 
     def _switch_lamps(
         self, scene: Scene, own: Sequence[Body], assets: AssetIndex, rng: Rng, *, must: bool
@@ -159,11 +161,15 @@ def _lamp_light(name: str, body: Body, at_m: Vec3, flux_lm: float, color: Vec3) 
     return scale_to_flux(Light(name, "sphere", (x, y, z), color=color, radius_m=_BULB_M), flux_lm)
 
 
-def _window_light(window: Body, assets: AssetIndex, luminance_cd_m2: float) -> Light:
-    """A panel in the plane of a window's panes that shines into the room."""
+def _window_light(
+    window: Body, own: Sequence[Body], assets: AssetIndex, luminance_cd_m2: float
+) -> Light:
+    """A panel in the plane of a window's panes that shines into the room, below its blind."""
     low, high = assets.bounds_m(window.asset)
-    width, height = round(high[1] - low[1] - 0.2, 4), round(high[2] - 0.12, 4)
-    x, y, z = window.T_world_body.apply(np.array((0.055, 0.0, 0.5 * high[2])))
+    blind = next((b for b in own if b.name == window.name.replace("window_", "blind_")), None)
+    drop = -assets.bounds_m(blind.asset)[0][2] if blind else 0.06
+    width, height = round(high[1] - low[1] - 0.2, 4), round(high[2] - 0.06 - drop, 4)
+    x, y, z = window.T_world_body.apply(np.array((0.055, 0.0, 0.06 + 0.5 * height)))
     w, _, _, qz = window.T_world_body.quaternion_wxyz
     c, s = round(1.0 - 2.0 * qz * qz, 6), round(2.0 * w * qz, 6)
     return Light(
@@ -176,21 +182,3 @@ def _window_light(window: Body, assets: AssetIndex, luminance_cd_m2: float) -> L
         side=(-s, c, 0.0),
         intensity_cd=round(luminance_cd_m2 * width * height, 3),
     )
-
-
-def _reflected(scene: Scene, lights: Sequence[Light]) -> Environment:
-    """Uniform light from all around: what the walls of the room send back."""
-    (x0, y0, z0), (x1, y1, z1) = scene.interior_m
-    a, b, c = x1 - x0, y1 - y0, z1 - z0
-    area = 2.0 * (a * b + b * c + c * a)
-    flux = 0.0
-    for light in lights:
-        if light.kind == "sphere":
-            flux += 4.0 * math.pi * light.intensity_cd
-        elif light.kind == "rectangle":
-            flux += math.pi * light.intensity_cd
-        else:
-            # A square metre of floor in the sun.
-            flux += light.illuminance_lux * abs(light.direction[2])
-    luminance = flux * _REFLECTANCE / (math.pi * area * (1.0 - _REFLECTANCE))
-    return Environment("environment/neutral?seed=0", max(round(luminance, 3), 0.05), visible=False)

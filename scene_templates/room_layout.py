@@ -14,6 +14,9 @@ from gen_data.generator.rooms.options import families_of, find_options
 from gen_data.generator.rooms.rules import APARTMENT, find_room_type
 from gen_data.scene_templates.element import Element
 
+_IN_SHELLS = {"blind", "window"}
+"""Assets of shells that the nominal room may lack."""
+
 
 class RoomLayout(Element):
     """An empty room of a type, with floor, ceiling, walls, a door and windows.
@@ -43,7 +46,9 @@ class RoomLayout(Element):
         )
         builder.add_shells(rooms, {room.name: looks for room in rooms})
         scene = builder.scene()
-        ids = sorted({i for ids in find_options(assets, families).values() for i in ids})
+        ids = sorted(
+            {i for ids in find_options(assets, families).values() for i in ids} | _IN_SHELLS
+        )
         group = ObjectGroup(self.name, (), tuple(ids), 0, "scatter")
         x, y, z = rooms[0].size_m
         (mx, my) = rooms[0].center_m

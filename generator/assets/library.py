@@ -25,6 +25,7 @@ from gen_data.generator.core.asset_types import (
     TextureData,
 )
 from gen_data.generator.core.bounded_cache import CountCache
+from gen_data.generator.core.colorimetry import srgb_decode
 from gen_data.generator.core.errors import AssetError, UnknownAsset, did_you_mean
 from gen_data.generator.core.plates import Plate
 from gen_data.generator.core.scene import Lane, StageModel
@@ -88,6 +89,7 @@ class Library:
         self._found: dict[tuple[frozenset[str], str], tuple[Asset, ...]] = {}
         self._summaries: CountCache[_MeshSummary] = CountCache(_SUMMARIES)
         self._boxes: CountCache[tuple[Bounds, ...]] = CountCache(_SUMMARIES)
+        self._mean_colors: CountCache[Vec3] = CountCache(_SUMMARIES)
 
     def get(self, asset_id: str) -> Asset:
         """Description of an asset. Raises UnknownAsset if there is none."""
@@ -195,6 +197,17 @@ class Library:
         if self._is_generated(texture_id.partition("#")[0]):
             return self._generated.texture(parse_asset_id(texture_id))
         return self._files.texture(texture_id)
+
+    def mean_color(self, texture_id: str) -> Vec3:
+        """Mean reflectance of a texture, linear RGB."""
+
+        def read() -> Vec3:
+            # Every eighth texel in both directions: a mean needs no more.
+            albedo = self.texture(texture_id).albedo[::8, ::8].reshape(-1, 3)
+            r, g, b = srgb_decode(albedo.astype(np.float64) / 255.0).mean(axis=0).tolist()
+            return (round(r, 4), round(g, 4), round(b, 4))
+
+        return self._mean_colors.get(texture_id, read)
 
     def environment(self, environment_id: str) -> Float32:
         """Equirectangular relative radiance; see ``AssetLibrary.environment``."""

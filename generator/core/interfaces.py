@@ -102,6 +102,10 @@ class AssetIndex(Protocol):
         """
         ...
 
+    def mean_color(self, texture_id: str) -> Vec3:
+        """Mean reflectance of a texture, linear RGB."""
+        ...
+
     def keypoints(self, asset_id: str) -> tuple[Keypoint, ...]:
         """Named points of the asset, in its own frame; empty if it has none."""
         ...

@@ -15,6 +15,7 @@ from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.motion import STILL, JointTrajectory, StateChange, Trajectory, Twist
 from gen_data.generator.core.se3 import IDENTITY, SE3, Vec3
+from gen_data.generator.core.serialization import SPARSE
 from gen_data.generator.core.shutter import INSTANT, Shutter
 
 SharedValue = str | float | int | bool
@@ -438,6 +439,26 @@ class Light:
 
 
 @dataclass(frozen=True, slots=True)
+class IrradianceVolume:
+    """Ambient light inside a box: ambient cubes on a grid of probes.
+
+    Sources: Greger et al., "The irradiance volume", IEEE CG&A 18, 1998; McTaggart, "Half-Life 2 /
+    Valve Source shading", GDC 2004 (ambient cubes).
+
+    Attributes:
+        low_m, high_m: Corners of the box, world.
+        counts: Numbers of probes along X, Y and Z, each in the middle of a cell of the box.
+        light_cd_m2: Irradiance over pi from around +X, -X, +Y, -Y, +Z and -Z, linear RGB, of all
+            probes; Z is fastest.
+    """
+
+    low_m: Vec3
+    high_m: Vec3
+    counts: tuple[int, int, int]
+    light_cd_m2: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Environment:
     """Light from all around: an equirectangular image of relative luminance (mean 1).
 
@@ -446,12 +467,15 @@ class Environment:
         luminance_cd_m2: Mean luminance over the sphere.
         yaw_rad: Rotation about world Z.
         visible: Whether it is visible as background; else the background is black.
+        volumes: Boxes in which other ambient light replaces it, such as rooms; the path-traced tier
+            finds that light itself.
     """
 
     image: str = "environment/neutral?seed=0"
     luminance_cd_m2: float = 100.0
     yaw_rad: float = 0.0
     visible: bool = True
+    volumes: tuple[IrradianceVolume, ...] = field(default=(), metadata={SPARSE: True})
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 T = TypeVar("T")
+SPARSE = "sparse"
+"""Metadata of fields that are left out while empty: data of scenes without them stay the same."""
 
 
 def to_plain(value: Any) -> Any:
@@ -101,6 +103,11 @@ def _fields_of(kind: type) -> Callable[[Any], Iterable[tuple[str, Any]]] | None:
     if not dataclasses.is_dataclass(kind):
         return None
     names = tuple(field.name for field in dataclasses.fields(kind))
+    sparse = {field.name for field in dataclasses.fields(kind) if field.metadata.get(SPARSE)}
+    if sparse:
+        return lambda value: [
+            (name, item) for name in names if (item := getattr(value, name)) or name not in sparse
+        ]
     if len(names) < 2:
         return lambda value: [(name, getattr(value, name)) for name in names]
     values_of = operator.attrgetter(*names)

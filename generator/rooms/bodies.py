@@ -14,12 +14,16 @@ from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.members import free_instance_ids
 from gen_data.generator.core.scene import Body, Instance, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.rooms.floor_plan import WALL_M, Opening, Room, outer_radius_m, walls_of
+from gen_data.generator.rooms.floor_plan import WALL_M, Opening, Room, walls_of
 from gen_data.generator.rooms.layout import Piece
+from gen_data.generator.rooms.outlook import Outlook
 
 OUTSIDE = "outside"
-_VIEW_AWAY_M = 5.0
-_VIEW_HEIGHTS_M = (-2.5, 5.2)
+LEADS_OUT = "leads_out"
+"""Attribute of doors without a room behind them."""
+_VESSELS = frozenset({"bowl", "cup", "mug", "tumbler", "wine_glass"})
+_BLIND_M = 0.03
+"""Depth of blinds, which hang in the reveals of windows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,13 +53,18 @@ JOINTS: Mapping[str, Joint] = {
 
 @dataclass(frozen=True, slots=True)
 class Looks:
-    """Materials of a shell."""
+    """Materials of a shell.
+
+    Attributes:
+        blind_drops: Share of each opening that a blind covers; 0, or none given, = no blind.
+    """
 
     floor: Material
     walls: Material
     ceiling: Material
     door_style: int = 0
-    view_seed: int = 0
+    blind_style: int = 0
+    blind_drops: tuple[float, ...] = ()
 
 
 def part_pose(T_world_piece: SE3, at_m: Vec3, joint: Joint, opening: float) -> SE3:
@@ -86,10 +95,16 @@ def remove_room(scene: Scene, name: str) -> Scene:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A part that moves on its piece: its name in ``JOINTS``, and its asset."""
+    """A part that moves on its piece.
+
+    Attributes:
+        name: Its name in ``JOINTS``.
+        leads_out: Whether it is a door without a room behind it.
+    """
 
     name: str
     asset: str
+    leads_out: bool = False
 
 
 class Builder:
@@ -125,7 +140,10 @@ class Builder:
         number, pose = next(self._ids), pose.rounded()
         full = f"{self._name}/{name}"
         body = Body(full, asset, pose, instance_id=number, group=group, materials=materials)
+        found = self._assets.get(asset)
         attributes: list[tuple[str, str]] = [("room", room)]
+        if asset.partition("?")[0] in _VESSELS:
+            attributes.append(("full", "1" if "contents" in dict(found.attributes) else "0"))
         if part is None:
             self._bodies.append(body)
         else:
@@ -139,11 +157,13 @@ class Builder:
             )
             self._bodies += [replace(body, part_id=1), moving]
             attributes.append(("open", "0"))
+            if part.leads_out:
+                attributes.append((LEADS_OUT, "1"))
         self._instances.append(
             Instance(
                 number,
                 full,
-                self._assets.get(asset).category,
+                found.category,
                 0,
                 asset,
                 annotated=self._annotated or bool(group),
@@ -153,13 +173,18 @@ class Builder:
         )
 
     def add_shells(self, rooms: Sequence[Room], looks: Mapping[str, Looks]) -> None:
-        """Add floors, ceilings, walls, doors and windows, and the view outside."""
+        """Add floors, ceilings, walls, doors, windows and blinds."""
         for room in rooms:
             self._add_shell(room, looks[room.name])
-        first = looks[rooms[0].name]
-        radius_m = round(outer_radius_m(tuple(rooms)) + _VIEW_AWAY_M, 3)
-        view = _id(OUTSIDE, radius_m=radius_m, size_m=_VIEW_HEIGHTS_M, seed=first.view_seed)
-        self._bodies.append(Body(f"{self._name}/{OUTSIDE}", view, SE3(), collides=False))
+
+    def add_outlook(self, outlook: Outlook) -> None:
+        """Add what windows show; it has no labels."""
+        ground = Material((1.0, 1.0, 1.0), 1.0, texture=outlook.ground, texture_scale_m=3.0)
+        name = f"{self._name}/{OUTSIDE}"
+        at = SE3((0.0, 0.0, -outlook.ground_m))
+        self._bodies.append(Body(name, OUTSIDE, at, collides=False, materials=(ground,)))
+        for k, (asset, pose) in enumerate(outlook.things):
+            self._bodies.append(Body(f"{name}_{k}", asset, pose, collides=False))
 
     def _add_shell(self, room: Room, looks: Looks) -> None:
         x, y, z = room.size_m
@@ -218,6 +243,7 @@ class Builder:
             panes = max(1, round(width / 0.75))
             asset = _id("window", size_m=(width, height, depth), panes=panes)
             self.add(name, asset, pose, room.kind)
+            self._add_blind(room, k, opening, looks)
             return
         frame = _id("door_frame", size_m=(width, height, depth))
         leaf = _id(
@@ -225,7 +251,20 @@ class Builder:
             size_m=(round(width - 0.06, 4), round(height - 0.03, 4)),
             style=looks.door_style,
         )
-        self.add(name, frame, pose, room.kind, part=Part("leaf", leaf))
+        part = Part("leaf", leaf, leads_out=not shared)
+        self.add(name, frame, pose, room.kind, part=part)
+
+    def _add_blind(self, room: Room, k: int, opening: Opening, looks: Looks) -> None:
+        """A blind in the reveal of a window."""
+        drop = looks.blind_drops[k] if k < len(looks.blind_drops) else 0.0
+        if drop == 0.0:
+            return
+        at = room.at_wall(opening.wall, opening.along_m, -_BLIND_M)
+        pose = SE3.about_z(0.5 * math.pi * opening.wall, (*at, opening.high_m))
+        height = opening.high_m - opening.low_m
+        size = (round(opening.width_m - 0.02, 4), round(drop * height, 4), _BLIND_M)
+        asset = _id("blind", size_m=size, style=looks.blind_style)
+        self.add(f"{room.name}/blind_{k}", asset, pose, room.kind)
 
     def add_pieces(
         self, room: Room, pieces: Sequence[Piece], parts: Mapping[str, tuple[str, str]]

@@ -8,7 +8,7 @@ what faces into the room.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -20,6 +20,8 @@ WALL_M = 0.1
 DOOR_M = (0.88, 2.04)
 """Width and height of the openings of doors; DIN 18101 has leaves of 0.86 m by 1.985 m."""
 GATE_M = (3.0, 3.2)
+_SILLS_M: Mapping[str, Range] = {"bathroom": (1.2, 1.35), "kitchen": (0.96, 1.1)}
+"""Heights of windows, where they are higher than elsewhere: over worktops, against views."""
 _ASIDE_M = 0.12
 """Smallest distance of an opening from a corner or another opening."""
 _TRIES = 40
@@ -168,7 +170,7 @@ def _open(
             room, "door", (size[0], 0.0, min(size[1], room.size_m[2] - 0.2)), list(walls), rng
         )
     for _ in range(draw_count(rng, rules.windows)):
-        low = between(rng, (0.8, 0.95)) if room.kind != "bathroom" else between(rng, (1.2, 1.35))
+        low = between(rng, _SILLS_M.get(room.kind, (0.8, 0.95)))
         if room.kind in ("warehouse", "workshop"):
             low = room.size_m[2] - 1.5
         high = min(room.size_m[2] - 0.25, low + between(rng, (1.2, 1.45)))

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.generator.assets.interiors.parts import SUPPORT
 from gen_data.generator.assets.interiors.storage import (
     PALLET_PITCH_M,
     VARIANTS_PER_LOOK,
@@ -41,10 +42,24 @@ _TRIES = 36
 _HEAD_M = 1.9
 _CROWDED = 0.25
 """Distance within which a piece before a window hides it."""
+_SILL_M = 0.026
+"""Height of sills below the openings of windows."""
 _FLAT = frozenset({"rug"})
 _BOARDS = frozenset({"bookcase", "steel_rack"})
-_EDGES_M = {"bookcase": 0.03, "steel_rack": 0.03, "pallet_rack": 0.09}
-"""Width of the border of surfaces that stays free: that of sides and posts."""
+_EDGES_M = {
+    "bookcase": (0.02, 0.03),
+    "steel_rack": (0.03, 0.03),
+    "pallet_rack": (0.0, 0.09),
+    "wall_shelf": (0.01, 0.02),
+}
+"""Width of the border of surfaces that stays free, in depth and width: that of sides and posts.
+Pallets reach over the beams of their racks."""
+_SEATS = frozenset({"armchair", "sofa"})
+_SQUARE = frozenset({"book_row", "binder_row", "dish_rack", "microwave", "pallet", "spice_rack"})
+"""Things that stand square to what carries them."""
+_SQUARE_SHARE = 0.4
+"""Share of things on tables that lie square to them."""
+_TRIES_ON = 6
 _TOP_M = 0.003
 """Depth of the rounded border of tops."""
 _EDGE_OF_TOP_M = 0.008
@@ -277,7 +292,7 @@ class Layout:
         """Whether something stands before a window, or hangs before a door."""
         return any(
             low_m < opening.high_m
-            and high_m > opening.low_m + 0.03
+            and high_m > opening.low_m - _SILL_M
             and overlap_of(footprint, self.before_opening(opening))
             for opening in self.room.openings
         )
@@ -325,15 +340,19 @@ def furnish(
             x, y = room.at_wall(opening.wall, opening.along_m, 0.5 * DOOR_ZONE_M)
             c, s = direction(opening.wall)
             layout.zones.append(((x, y, c, s, 0.5 * DOOR_ZONE_M, 0.5 * opening.width_m + 0.05), -1))
+    larger = room.size_m[0] * room.size_m[1] / rules.usual_area_m2
     for rule in rules.pieces:
         layout.refused = Counter()
         low, high = rule.count
         wanted = draw_count(rng, (low, high))
-        if rule.piece == "floor_things":
+        if rule.piece in ("floor_things", "beside_walls"):
             wanted = round(wanted * clutter)
+        if rule.optional and rule.place in ("wall", "free", "corner", "hang"):
+            wanted = round(wanted * larger)
         placed = _PLACES[rule.place](layout, rule, options, wanted)
         related = not rule.of or any(p.role in rule.of for p in layout.pieces)
-        if placed < low and related and rule.place not in ("on", "around", "front"):
+        required = not rule.optional and rule.place not in ("on", "around", "front")
+        if placed < low and related and required:
             reason = layout.refused.most_common(1)
             raise Conflict(rule.piece, reason[0][0] if reason else "no place")
     unreachable = find_unreachable(layout)
@@ -369,7 +388,8 @@ def _at_wall(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
             along = corner if rule.place == "corner" else layout.signed(max(free, 0.0))
             gap = 0.0005 if rule.place == "hang" else WALL_GAP_M
             at = layout.room.at_wall(wall, along, s.half_x + gap)
-            low = between(layout.rng, rule.height_m) if rule.place == "hang" else 0.0
+            # Basins on walls begin above the floor.
+            low = between(layout.rng, rule.height_m) if rule.place == "hang" else max(s.low, 0.0)
             if layout.put(rule, family, asset, at, wall * 0.5 * math.pi, low):
                 placed += 1
                 break
@@ -530,6 +550,24 @@ def _below_windows(layout: Layout, rule: Rule, options: Options, wanted: int) ->
     return placed
 
 
+def _at_doors(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
+    """On the wall at a side of doors."""
+    placed = 0
+    doors = [o for o in layout.room.openings if o.kind == "door"]
+    for opening in doors[:wanted]:
+        family, asset = _draw_asset(layout, rule, options)
+        s = layout.shape(asset)
+        low = between(layout.rng, rule.height_m)
+        side = 1 if layout.rng.random() < 0.5 else -1
+        for way in (side, -side):
+            along = opening.along_m + way * (0.5 * opening.width_m + 0.12 + s.half_y)
+            at = layout.room.at_wall(opening.wall, along, s.half_x + 0.0005)
+            if layout.put(rule, family, asset, at, opening.wall * 0.5 * math.pi, low):
+                placed += 1
+                break
+    return placed
+
+
 def _at_ceiling(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
     """In a row, or in two rows from four on, under the ceiling; all of one kind."""
     (mx, my), (sx, sy, height) = layout.room.center_m, layout.room.size_m
@@ -563,22 +601,55 @@ _PLACES = {
     "window": _at_windows,
     "below": _below_windows,
     "ceiling": _at_ceiling,
+    "door": _at_doors,
 }
 
 
-def supports(piece: Piece) -> list[tuple[float, float]]:
-    """Height of each level surface of a piece that carries things, and the free height above."""
-    height = piece.high_m - piece.low_m
+@dataclass(frozen=True, slots=True)
+class Support:
+    """A level surface of a piece that carries things.
+
+    Attributes:
+        height_m: World height.
+        clearance_m: Free height above.
+        middle_m, half_m: Middle and half extents of the surface in the piece's footprint.
+        is_top: Whether it is the piece's top, which may be round.
+    """
+
+    height_m: float
+    clearance_m: float
+    middle_m: tuple[float, float]
+    half_m: tuple[float, float]
+    is_top: bool = False
+
+
+def supports(piece: Piece, assets: AssetIndex) -> list[Support]:
+    """Surfaces of a piece that carry things."""
+    height, half = piece.high_m - piece.low_m, piece.footprint[4:]
+    corners = [k.position_m for k in assets.keypoints(piece.asset) if k.name == SUPPORT]
+    if corners:
+        (x0, y0, z), (x1, y1, _) = corners
+        low, high = assets.bounds_m(piece.asset)
+        middle = tuple(
+            0.5 * (a + b) - 0.5 * (c + d)
+            for a, b, c, d in zip((x0, y0), (x1, y1), low[:2], high[:2], strict=True)
+        )
+        free = (0.5 * (x1 - x0), 0.5 * (y1 - y0))
+        return [Support(piece.low_m + z, 0.35, (middle[0], middle[1]), free)]
+    if piece.family in _SEATS:
+        # Seats of packs do not say where they are level.
+        return []
+    edge_x, edge_y = _EDGES_M.get(piece.family, (0.05, 0.05))
+    inner = (half[0] - edge_x, half[1] - edge_y)
     if piece.family in _BOARDS:
         levels = board_levels_m(round(height, 6))
-        return [(piece.low_m + z, height / len(levels) - 0.05) for z in levels]
+        free_m = height / len(levels) - 0.05
+        return [Support(piece.low_m + z, free_m, (0.0, 0.0), inner) for z in levels]
     if piece.family == "pallet_rack":
         return [
-            (0.0, PALLET_PITCH_M - 0.16),
-            (PALLET_PITCH_M, PALLET_PITCH_M - 0.16),
-            (2 * PALLET_PITCH_M, 1.2),
+            Support(k * PALLET_PITCH_M, PALLET_PITCH_M - 0.16, (0.0, 0.0), inner) for k in range(3)
         ]
-    return [(piece.high_m, 0.6)]
+    return [Support(piece.high_m, 0.6, (0.0, 0.0), inner, is_top=True)]
 
 
 def _put_things(layout: Layout, rule: Rule, options: Options, clutter: float) -> None:
@@ -586,55 +657,61 @@ def _put_things(layout: Layout, rule: Rule, options: Options, clutter: float) ->
     for k, piece in enumerate(list(layout.pieces)):
         if piece.role != rule.piece or piece.on >= 0 or piece.family not in rule.assets:
             continue
-        for height, clearance in supports(piece):
+        near = [
+            p
+            for n, p in enumerate(layout.pieces)
+            if n != k and overlap_of(p.footprint, piece.footprint)
+        ]
+        for support in supports(piece, layout.assets):
             for _ in range(round(draw_count(layout.rng, rule.how_many) * clutter)):
-                _put_thing(layout, rule, options, k, height, clearance)
+                placed = _put_thing(layout, rule, options, k, support, near)
+                if placed is not None:
+                    layout.pieces.append(placed)
+                    near.append(placed)
 
 
 def _put_thing(
-    layout: Layout, rule: Rule, options: Options, k: int, height: float, clearance: float
-) -> None:
-    x, y, c, sn, a, b = layout.pieces[k].footprint
+    layout: Layout,
+    rule: Rule,
+    options: Options,
+    k: int,
+    support: Support,
+    near: Sequence[Piece],
+) -> Piece | None:
+    """A thing on a surface of piece k; None if there is no place for it."""
+    carrier, height = layout.pieces[k], support.height_m
+    x, y, c, sn, _, _ = carrier.footprint
     family = layout.pick(rule.things)
     asset = layout.pick(options[family])
     s = layout.shape(asset)
-    carrier = layout.pieces[k]
-    boards = carrier.family in (*_BOARDS, "pallet_rack")
-    if s.rest is None or s.high - s.low > clearance:
-        return
-    for _ in range(8):
-        turn = layout.signed(0.25 if boards else math.pi)
-        if family == "pallet":
+    if s.rest is None or s.high - s.low > support.clearance_m:
+        return None
+    for _ in range(_TRIES_ON):
+        turn = layout.signed(math.pi if support.is_top else 0.25)
+        if family in _SQUARE or (support.is_top and layout.rng.random() < _SQUARE_SHARE):
             turn = 0.0
         tc, ts = abs(math.cos(turn)), abs(math.sin(turn))
         reach = (s.half_x * tc + s.half_y * ts, s.half_x * ts + s.half_y * tc)
-        edge = _EDGES_M.get(carrier.family, 0.05)
-        free = a - edge - reach[0], b - edge - reach[1]
+        free = support.half_m[0] - reach[0], support.half_m[1] - reach[1]
         if min(free) < 0.0:
             continue
-        dx, dy = layout.signed(max(free[0], 0.0)), layout.signed(max(free[1], 0.0))
+        dx = support.middle_m[0] + layout.signed(free[0])
+        dy = support.middle_m[1] + layout.signed(free[1])
         at = (x + c * dx - sn * dy, y + sn * dx + c * dy)
         yaw = carrier.yaw_rad + turn
         c2, s2 = _cos_sin(yaw)
         footprint: Rectangle = (at[0], at[1], c2, s2, s.half_x, s.half_y)
-        if not boards and not layout.is_on_top(footprint, carrier):
-            continue
         top = height + s.high - s.low
         taken = any(
-            n != k
-            and p.low_m < top
-            and height < p.high_m - 1e-6
-            and overlap_of(footprint, p.footprint)
-            for n, p in enumerate(layout.pieces)
+            p.low_m < top and height < p.high_m - 1e-6 and overlap_of(footprint, p.footprint)
+            for p in near
         )
-        if taken:
+        if taken or (support.is_top and not layout.is_on_top(footprint, carrier)):
             continue
         px, py = at[0] - c2 * s.x + s2 * s.y, at[1] - s2 * s.x - c2 * s.y
         position = (round(px, 5), round(py, 5), round(height - s.low, 5))
-        layout.pieces.append(
-            Piece("thing", family, asset, position, yaw, footprint, height, top, k, s.rest)
-        )
-        return
+        return Piece("thing", family, asset, position, yaw, footprint, height, top, k, s.rest)
+    return None
 
 
 def free_floor(

@@ -26,6 +26,7 @@ Place = Literal[
     "window",
     "below",
     "ceiling",
+    "door",
 ]
 APARTMENT = "apartment"
 """Type of several joined rooms."""
@@ -46,6 +47,7 @@ class Rule:
         height_m: Height of its lowest point, for what hangs [m].
         at: Place on the top that carries it, from -1 to 1 along depth and width.
         matching: Whether all matching pieces of a room have one look.
+        optional: Whether a room may do without it, whatever ``count`` says.
         things: Families of small things on it.
         how_many: Smallest and largest number of them per surface.
     """
@@ -60,6 +62,7 @@ class Rule:
     height_m: Range = (0.0, 0.0)
     at: tuple[float, float] = (0.0, 0.0)
     matching: bool = False
+    optional: bool = False
     things: tuple[str, ...] = ()
     how_many: tuple[int, int] = (0, 0)
 
@@ -80,6 +83,12 @@ class RoomType:
     floor: tuple[str, ...]
     walls: tuple[str, ...]
     pieces: tuple[Rule, ...]
+
+    @property
+    def usual_area_m2(self) -> float:
+        """Area of a floor of the mean size."""
+        (x0, x1), (y0, y1), _ = self.size_m
+        return 0.25 * (x0 + x1) * (y0 + y1)
 
     @property
     def families(self) -> frozenset[str]:

@@ -14,7 +14,14 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import NDArray
 
-from gen_data.generator.core.scene import Body, Environment, Light, Scene, SupportSurface
+from gen_data.generator.core.scene import (
+    Body,
+    Environment,
+    IrradianceVolume,
+    Light,
+    Scene,
+    SupportSurface,
+)
 from gen_data.generator.core.se3 import IDENTITY, SE3
 from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
 
@@ -141,3 +148,12 @@ def test_unknown_fields_are_refused() -> None:
 def test_plain_data_holds_no_tuples_and_no_enums() -> None:
     """Only what JSON knows."""
     assert to_plain({"a": (Colour.RED, {3, 1})}) == {"a": ["red", [1, 3]]}
+
+
+def test_sparse_fields_are_left_out_while_empty_and_read_back() -> None:
+    """An environment without volumes has the data of before; one with volumes keeps them."""
+    box = IrradianceVolume((0.0, 0.0, 0.0), (1.0, 2.0, 3.0), (1, 1, 1), (0.5,) * 18)
+
+    assert set(to_plain(Environment())) == {"image", "luminance_cd_m2", "visible", "yaw_rad"}
+    for environment in (Environment(), Environment(volumes=(box,))):
+        assert from_plain(Environment, json.loads(canonical_json(environment))) == environment

@@ -163,8 +163,9 @@ def test_no_two_pieces_overlap(kind: str) -> None:
 
 
 def _is_inside_shelf(a: Body, b: Body) -> bool:
-    """Whether one of two is a shelf, whose box holds what stands on its boards."""
-    return bool({family(a), family(b)} & {"bookcase", "steel_rack", "pallet_rack"})
+    """Whether one of two is a shelf or seat, whose box holds what is on its boards or cushions."""
+    shelves = {"armchair", "bookcase", "pallet_rack", "sofa", "steel_rack", "trolley"}
+    return bool({family(a), family(b)} & shelves)
 
 
 @each
@@ -205,6 +206,17 @@ def test_pieces_that_need_a_wall_touch_one(kind: str) -> None:
 def test_small_things_stand_on_something(kind: str) -> None:
     """Under the middle of what is not on the floor, a wall or the ceiling, there is a surface."""
     hung = {
+        "bathroom_cabinet",
+        "coat_hooks",
+        "light_switch",
+        "notice_board",
+        "parts_bins",
+        "pegboard",
+        "roll_holder",
+        "socket",
+        "utensil_rail",
+        "wall_calendar",
+        "wall_shelf",
         "picture",
         "mirror",
         "radiator",

@@ -24,8 +24,10 @@ from gen_data.generator.rooms.rules import room_types
 from tests.rooms.test_layouts import KINDS, family, furnished, library
 
 HUNG = {
-    "ceiling_lamp", "curtain", "mirror", "picture", "radiator", "range_hood", "towel", "tube_lamp",
-    "wall_clock", "wall_unit", "whiteboard",
+    "bathroom_cabinet", "ceiling_lamp", "coat_hooks", "curtain", "light_switch", "mirror",
+    "notice_board", "parts_bins", "pegboard", "picture", "radiator", "range_hood", "roll_holder",
+    "socket", "towel", "tube_lamp", "utensil_rail", "wall_calendar", "wall_clock", "wall_shelf",
+    "wall_unit", "whiteboard",
 }  # fmt: skip
 """On walls and ceilings."""
 FIXED = {
@@ -35,12 +37,13 @@ FIXED = {
 HOLLOW = {
     "armchair", "bed", "bedside_table", "bookcase", "coffee_table", "desk", "dining_table",
     "dresser", "filing_cabinet", "meeting_table", "pallet_rack", "refrigerator", "side_table",
-    "sofa", "steel_rack", "tool_cabinet", "tv_stand", "wardrobe", "washing_machine", "workbench",
+    "sofa", "steel_rack", "tool_cabinet", "trolley", "tv_stand", "wardrobe", "washing_machine",
+    "workbench",
 }  # fmt: skip
 """What may carry or contain others, for which a convex hull has no room; simulated by itself."""
 SOFT = {"rug"}
 """Gives way to the feet of furniture."""
-SHELL = {"ceiling", "door_frame", "door_leaf", "floor", "wall", "window"}
+SHELL = {"blind", "ceiling", "door_frame", "door_leaf", "floor", "wall", "window"}
 STEP_S = 1.0 / 240.0
 MOVE_M, TURN_DEG = 0.01, 8.0
 """More is a fall; feet of bins, speakers and dogs are some tenths of a millimetre apart."""

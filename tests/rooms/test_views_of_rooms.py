@@ -82,7 +82,7 @@ def test_the_joint_of_a_label_is_the_turn_of_the_part() -> None:
 def test_screens_that_are_on_shine_and_say_so() -> None:
     """Every screen is lit with is_on, none without."""
     for is_on, word in ((ON, "on"), (OFF, "off")):
-        scene = states(flat(), is_on=is_on)
+        scene = states(flat(kind="office"), is_on=is_on)
         screens = [
             b
             for b in scene.bodies

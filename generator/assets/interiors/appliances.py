@@ -418,14 +418,6 @@ def alarm_clock(seed: int = 0) -> Solid:
     )
 
 
-def cushion_pillow(seed: int = 0) -> Solid:
-    """A cushion that lies flat. Slot: cloth."""
-    rng = variant_rng("cushion_pillow", seed)
-    s = rng.between(0.18, 0.24)
-    body: Box = ((-s, -s, 0.0), (s, s, 0.12))
-    return solid([cushion(*body, 0, 0.058)], [cloth(rng)], [body])
-
-
 def shoes(seed: int = 0) -> Solid:
     """A pair of shoes. Slots: upper, sole."""
     rng = variant_rng("shoes", seed)

@@ -254,9 +254,13 @@ def radiator(seed: int = 0) -> Solid:
     w, h = rng.between(0.6, 1.4), rng.between(0.4, 0.6)
     count = round(w / 0.05)
     patches = [shapes.block((0.03, -0.5 * w, 0.0), (0.09, 0.5 * w, h), 0.008)]
-    for k in range(count):
-        y = -0.5 * w + (k + 0.5) * w / count
-        patches.append(shapes.block((0.088, y - 0.014, 0.03), (0.096, y + 0.014, h - 0.03), 0.004))
+    # A pressed sheet: waves, which shade softly at any distance, rather than ribs.
+    y = np.linspace(-0.49 * w, 0.49 * w, 8 * count + 1)
+    z = np.array([0.02, 0.035, h - 0.035, h - 0.02])
+    rise = np.array([0.0, 1.0, 1.0, 0.0])[:, None]
+    x = 0.0902 + 0.007 * rise * (0.5 - 0.5 * np.cos(2.0 * math.pi * count * (y / (0.98 * w) + 0.5)))
+    sheet = shapes.grid(np.stack(np.broadcast_arrays(x, y[None, :], z[:, None]), axis=2))
+    patches.append(sheet)
     patches += [
         rod((0.05, 0.5 * w, 0.06), (0.05, 0.5 * w + 0.06, 0.06), 0.018, 1, 14),
         rod((0.05, 0.5 * w + 0.05, 0.06), (0.05, 0.5 * w + 0.05, -0.1), 0.008, 1),

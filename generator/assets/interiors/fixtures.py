@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
+
 from gen_data.generator.assets.interiors.parts import (
     Box,
     board,
@@ -22,8 +26,11 @@ from gen_data.generator.assets.procedural.material_presets import (
 )
 from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.variant_rng import variant_rng
-from gen_data.generator.core.asset_types import Material
+from gen_data.generator.core.asset_types import Keypoint, Material
+from gen_data.generator.core.se3 import Vec3
 
+TAP, DRAIN = "tap", "drain"
+"""Keypoints where water comes out of a tap, and where it falls to."""
 _X = 0.29
 _CHROME = metal_material(STAINLESS, 0.15)
 
@@ -40,16 +47,18 @@ def kitchen_sink(seed: int = 0) -> Solid:
         ((-0.16, 0.19, 0.726), (0.18, 0.2, 0.902)),
     ]
     patches += [shapes.block(*b, 0.002, 2) for b in basin]
-    patches += tap(-0.22, 0.0, 0.9, rng.between(0.2, 0.32), 2)
+    height = rng.between(0.2, 0.32)
+    patches += tap(-0.22, 0.0, 0.9, height, 2)
     patches += [
         board((_X, -0.297, 0.103), (_X + 0.018, 0.297, 0.857), 1),
         *handle(_X + 0.018, 0.0, 0.78, 0.2, 2, upright=False),
     ]
-    return solid(
+    made = solid(
         patches,
         _looks("kitchen_unit", rng, seed),
         [((-_X, -0.3, 0.0), (_X, 0.3, 0.72)), *_worktop(hole=True)],
     )
+    return _with_water(made, (-0.22, 0.0, 0.9), height, 0.726)
 
 
 def tap(x: float, y: float, z: float, height_m: float, slot: int) -> list[Patch]:
@@ -63,6 +72,29 @@ def tap(x: float, y: float, z: float, height_m: float, slot: int) -> list[Patch]
         ),
         rod((x, y + 0.01, z + 0.06), (x, y + 0.07, z + 0.1), 0.007, slot),
     ]
+
+
+def _with_water(made: Solid, tap_m: Vec3, height_m: float, basin_m: float) -> Solid:
+    """The solid with keypoints where the water of its tap comes out and where it arrives."""
+    x, y, z = tap_m
+    mouth, drain = (x + 0.16, y, z + height_m - 0.04), (x + 0.16, y, basin_m)
+    return replace(made, keypoints=(Keypoint(TAP, mouth), Keypoint(DRAIN, drain)))
+
+
+def tap_stream(length_m: float = 0.2) -> Solid:
+    """Water that falls from the origin. Slot: water.
+
+    Args:
+        length_m: Height of the fall.
+    """
+    # Falling water is thinner the faster it is: the radius goes with v^-1/2 (continuity).
+    z = np.linspace(0.0, length_m, 9)
+    speed = np.sqrt(0.6**2 + 2.0 * 9.81 * z)
+    radius = 0.006 * np.sqrt(0.6 / speed)
+    profile = [(0.0, 0.0), *zip(radius.tolist(), (-z).tolist(), strict=True), (0.0, -length_m)]
+    water = Material((0.96, 0.98, 0.98), 0.08, transmission=1.0, ior=1.33, thin=False)
+    stream = shapes.lathe([(r, h) for r, h in profile[::-1]], 14)
+    return solid([stream], [water], [((-0.004, -0.004, -length_m), (0.004, 0.004, 0.0))])
 
 
 def cooker(seed: int = 0) -> Solid:
@@ -189,6 +221,7 @@ def wash_basin(seed: int = 0) -> Solid:
     rng = variant_rng("wash_basin", seed)
     d, w = rng.between(0.42, 0.5), (0.5, 0.6, 0.8)[seed % 3]
     x, y, z = 0.5 * d, 0.5 * w, 0.86
+    height = rng.between(0.1, 0.18)
     rim: list[Box] = [
         ((-x, -y, z - 0.095), (-x + 0.1, y, z)),
         ((x - 0.04, -y, z - 0.095), (x, y, z)),
@@ -205,9 +238,10 @@ def wash_basin(seed: int = 0) -> Solid:
         board((x - 0.03, 0.002, 0.254), (x - 0.012, y - 0.022, z - 0.1), 1),
         *handle(x - 0.012, -0.05, z - 0.2, 0.12, 2, upright=True),
         *handle(x - 0.012, 0.05, z - 0.2, 0.12, 2, upright=True),
-        *tap(-x + 0.05, 0.0, z, rng.between(0.1, 0.18), 2),
+        *tap(-x + 0.05, 0.0, z, height, 2),
     ]
-    return solid(patches, [ceramic(), front(rng), _CHROME], [((-x, -y, 0.25), (x, y, z))])
+    made = solid(patches, [ceramic(), front(rng), _CHROME], [((-x, -y, 0.25), (x, y, z))])
+    return _with_water(made, (-x + 0.05, 0.0, z), height, z - 0.09)
 
 
 def bathtub(seed: int = 0) -> Solid:
@@ -238,7 +272,8 @@ def bathtub(seed: int = 0) -> Solid:
         *(shapes.block(*b, 0.0) for b in inner),
     ]
     patches += tap(-x + 0.05, 0.0, z, 0.12, 2)
-    return solid(patches, [ceramic(), ceramic(0.2), _CHROME], [((-x, -y, 0.0), (x, y, z))])
+    made = solid(patches, [ceramic(), ceramic(0.2), _CHROME], [((-x, -y, 0.0), (x, y, z))])
+    return _with_water(made, (-x + 0.05, 0.0, z), 0.12, 0.15)
 
 
 def shower(seed: int = 0) -> Solid:

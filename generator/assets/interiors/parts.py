@@ -21,6 +21,8 @@ from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
 
 Box = tuple[Vec3, Vec3]
+SUPPORT = "support"
+"""Keypoints at two opposite corners of a level surface that carries things and is not a top."""
 LACQUERS = ("#f1efea", "#e8e6e0", "#d9d6cf", "#3a3d40", "#b9c2bd", "#5c6b73", "#8d9a86")
 """Lacquers of furniture, sRGB."""
 _WOODS = 18

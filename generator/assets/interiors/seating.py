@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from gen_data.generator.assets.interiors.parts import (
+    SUPPORT,
     Box,
     board,
     cloth,
@@ -27,8 +29,8 @@ from gen_data.generator.assets.procedural.material_presets import (
     metal_material,
     painted_material,
 )
-from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
+from gen_data.generator.core.asset_types import Keypoint
 
 
 def sofa(seed: int = 0) -> Solid:
@@ -86,54 +88,10 @@ def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
         for sy in (-1, 1)
     ]
     seat: Box = ((x0 + 0.17, y0 + arm, leg), (x1, y1 - arm, seat_z))
-    return solid(patches, [upholstery(rng), wood(rng), cloth(rng)], [base, back, *arms, seat])
-
-
-def bed(seed: int = 0) -> Solid:
-    """A bed of 0.9 to 1.8 m, made; its head at -X. Slots: frame, mattress, duvet, pillows."""
-    rng = variant_rng("bed", seed)
-    w = (0.9, 1.4, 1.6, 1.8)[seed % 4]
-    length, top = 2.0, rng.between(0.42, 0.55)
-    x0, x1, y0, y1 = -0.5 * length - 0.06, 0.5 * length + 0.04, -0.5 * w - 0.04, 0.5 * w + 0.04
-    rail = rng.between(0.24, 0.34)
-    head: Box = ((x0, y0, 0.0), (x0 + 0.05, y1, rng.between(0.8, 1.15)))
-    sides: list[Box] = [
-        ((x0 + 0.05, y0, 0.12), (x1, y0 + 0.03, rail)),
-        ((x0 + 0.05, y1 - 0.03, 0.12), (x1, y1, rail)),
-        ((x1 - 0.03, y0 + 0.03, 0.12), (x1, y1 - 0.03, rail)),
-    ]
-    soft_head = rng.chance(0.4)
-    patches: list[Patch] = [cushion(*head, 2, 0.03) if soft_head else board(*head, 0, 0.006)]
-    patches += [board(*b) for b in sides]
-    patches += four_legs(x1 - x0, y1 - y0, 0.2, 0.06, 0)
-    mattress: Box = ((-0.5 * length, -0.5 * w, 0.14), (0.5 * length, 0.5 * w, top))
-    patches.append(cushion(*mattress, 1, 0.05))
-    # The duvet hangs over the sides and is folded back at the head.
-    fold = rng.between(0.45, 0.75)
-    patches.append(
-        cushion(
-            (-0.5 * length + fold, -0.5 * w - 0.055, top - 0.17),
-            (0.5 * length + 0.03, 0.5 * w + 0.055, top + 0.06),
-            2,
-            0.055,
-        )
-    )
-    patches.append(
-        cushion(
-            (-0.5 * length + fold - 0.04, -0.5 * w - 0.05, top - 0.05),
-            (-0.5 * length + fold + 0.22, 0.5 * w + 0.05, top + 0.085),
-            1,
-            0.04,
-        )
-    )
-    for y in (0.0,) if w < 1.2 else (-0.25 * w, 0.25 * w):
-        pillow = cushion((-0.2, -0.34, -0.075), (0.2, 0.34, 0.075), 3, 0.07)
-        turned = pillow.rotated("y", rng.between(-0.35, -0.12)).rotated(
-            "z", rng.between(-0.08, 0.08)
-        )
-        patches.append(turned.moved(-0.5 * length + 0.25, y, top + 0.1))
-    linen = painted_material(rng.choose(("#f3f1ec", "#e8ebee", "#efe6da")), 0.95)
-    return solid(patches, [front(rng), linen, cloth(rng), linen], [head, mattress])
+    made = solid(patches, [upholstery(rng), wood(rng), cloth(rng)], [base, back, *arms, seat])
+    # Before the pillows, and clear of the round edges of the cushions.
+    corners = (x0 + 0.52, y0 + arm + soft, seat_z), (x1 - soft, y1 - arm - soft, seat_z)
+    return replace(made, keypoints=tuple(Keypoint(SUPPORT, corner) for corner in corners))
 
 
 def chair(seed: int = 0) -> Solid:
@@ -310,7 +268,7 @@ def _rectangular_table(
     if drawers:
         chest: Box = (
             (-0.5 * d + 0.06, 0.5 * w - 0.5, 0.1),
-            (0.5 * d - 0.03, 0.5 * w - 0.08, z - thick),
+            (0.5 * d - 0.02, 0.5 * w - 0.08, z - thick),
         )
         patches.append(board(*chest, 1))
         for k in range(3):
@@ -318,8 +276,8 @@ def _rectangular_table(
             a = 0.1 + k * h
             patches.append(
                 board(
-                    (0.5 * d - 0.03, 0.5 * w - 0.495, a + 0.004),
-                    (0.5 * d - 0.012, 0.5 * w - 0.085, a + h - 0.004),
+                    (0.5 * d - 0.02, 0.5 * w - 0.495, a + 0.002),
+                    (0.5 * d - 0.012, 0.5 * w - 0.085, a + h - 0.002),
                     0,
                 )
             )

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gen_data.generator.assets.interiors.parts import rod, solid
+from gen_data.generator.assets.interiors.parts import Box, rod, solid
 from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.furniture import check_size, rectangle
@@ -18,7 +18,7 @@ from gen_data.generator.assets.procedural.material_presets import (
     painted_material,
     patterned_material,
 )
-from gen_data.generator.assets.procedural.patches import Patch
+from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.core.asset_types import Keypoint, Material
 from gen_data.generator.core.se3 import Vec3
 
@@ -87,18 +87,23 @@ def wall(size_m: Vec3 = (4.0, 2.6, 0.12), openings: tuple[float, ...] = NO_OPENI
             boxes.append(((a, -thick, 0.0), (b, 0.0, low)))
         if high < height:
             boxes.append(((a, -thick, high), (b, 0.0, height)))
-    boards = [
-        shapes.block((a[0], 0.0, 0.0), (b[0], SKIRTING_M[1], SKIRTING_M[0]), 0.003, 1)
-        for a, b in boxes
-        if a[2] == 0.0
-    ]
+    boards = [_skirting(a[0], b[0]) for a, b in boxes if a[2] == 0.0]
     patches = [*(shapes.block(*box) for box in boxes), *boards]
     paint = patterned_material("texture/plaster?seed=3", 1.5, 0.9)
     return solid(patches, [paint, painted_material("#eceae4", 0.5)], boxes)
 
 
+def _skirting(x0: float, x1: float) -> Patch:
+    """A board along a wall, its upper edge sloped: a level one is thinner than a pixel."""
+    height, thick = SKIRTING_M
+    profile = [(0.0, 0.0), (thick, 0.0), (thick, height - 1.6 * thick), (0.0, height)]
+    corners = np.array([[(x, y, z) for y, z in profile] for x in (x0, x1)])
+    ends = [shapes.fan(corners[0, ::-1], 1), shapes.fan(corners[1], 1)]
+    return join_patches([shapes.grid(corners[:, [1, 2, 3]], slot=1), *ends])
+
+
 def door_frame(size_m: Vec3 = (0.9, 2.05, 0.12)) -> Solid:
-    """The frame of a door, its opening along Y, its middle at the origin. Slot: frame.
+    """The frame of a door, its opening along Y, its middle at the origin. Slots: frame, threshold.
 
     Its leaf hangs at the keypoint ``hinge`` and opens towards +X.
 
@@ -115,9 +120,11 @@ def door_frame(size_m: Vec3 = (0.9, 2.05, 0.12)) -> Solid:
         ((-a, 0.5 * w - c, 0.0), (a, 0.5 * w + 0.05, h + 0.05)),
         ((-a, -0.5 * w + c, h - c), (a, 0.5 * w - c, h + 0.05)),
     ]
-    made = solid(
-        [shapes.block(*b, 0.003) for b in boxes], [painted_material("#f0eee9", 0.4)], boxes
-    )
+    # Leaves end above it: no light shines through below them.
+    threshold: Box = ((-a, -0.5 * w + c, 0.0), (a, 0.5 * w - c, 0.006))
+    patches = [*(shapes.block(*b, 0.003) for b in boxes), shapes.block(*threshold, 0.002, 1)]
+    looks = [painted_material("#f0eee9", 0.4), painted_material("#8a7d6c", 0.5)]
+    made = solid(patches, looks, [*boxes, threshold])
     return replace(made, keypoints=(Keypoint("hinge", (0.5 * t - 0.022, -0.5 * w + 0.03, 0.0)),))
 
 
@@ -139,11 +146,8 @@ def door_leaf(size_m: tuple[float, float] = (0.84, 2.02), style: int = 0) -> Sol
     columns = {1: [(0.13, w - 0.13)], 2: [(0.11, 0.5 * w - 0.04), (0.5 * w + 0.04, w - 0.11)]}
     for y0, y1 in columns.get(style, []):
         for a, b in pairwise([0.16, *rails, h - 0.1]):
-            for sign in (-1, 1):
-                lift = sorted((sign * t, sign * (t + 0.006)))
-                patches.append(
-                    shapes.block((lift[0], y0, a + 0.04), (lift[1], y1, b - 0.04), 0.004)
-                )
+            panel = _raised_panel((y0, y1), (a + 0.04, b - 0.04)).moved(t)
+            patches += [panel, panel.rotated("z", math.pi).moved(0.0, y0 + y1)]
     if style == 3:
         patches.append(
             shapes.block((-t - 0.002, 0.16, 0.9), (t + 0.002, w - 0.16, h - 0.16), 0.0, 2)
@@ -163,6 +167,17 @@ def door_leaf(size_m: tuple[float, float] = (0.84, 2.02), style: int = 0) -> Sol
     )
 
 
+def _raised_panel(ys: tuple[float, float], zs: tuple[float, float]) -> Patch:
+    """A panel before the plane x = 0 that faces +X, with wide sloped borders."""
+    slope = 0.03
+    ring = [[ys[0], zs[0]], [ys[1], zs[0]], [ys[1], zs[1]], [ys[0], zs[1]]]
+    outer = np.array([[0.0, y, z] for y, z in ring])
+    inset = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * slope
+    inner = np.insert(outer[:, 1:] + inset, 0, 0.009, axis=1)
+    rows = np.stack([np.concatenate([loop, loop[:1]]) for loop in (outer, inner)])
+    return join_patches([shapes.grid(rows), shapes.fan(inner)])
+
+
 def _sorted(a: Vec3, b: Vec3) -> tuple[Vec3, Vec3]:
     low = (min(a[0], b[0]), min(a[1], b[1]), min(a[2], b[2]))
     return low, (max(a[0], b[0]), max(a[1], b[1]), max(a[2], b[2]))
@@ -171,7 +186,7 @@ def _sorted(a: Vec3, b: Vec3) -> tuple[Vec3, Vec3]:
 def window(size_m: Vec3 = (1.4, 1.3, 0.12), panes: int = 2) -> Solid:
     """A window in an opening along Y, inside towards +X; origin at the opening's lower middle.
 
-    Slots: frame, sill. Its panes are as clear as air.
+    Slots: frame, sill, pane.
 
     Args:
         size_m: Width and height of the opening, thickness of the wall.
@@ -196,34 +211,61 @@ def window(size_m: Vec3 = (1.4, 1.3, 0.12), panes: int = 2) -> Solid:
     grip = shapes.block((x1, at - 0.012, 0.42 * h), (x1 + 0.04, at + 0.012, 0.42 * h + 0.12), 0.004)
     sill = ((x1, -0.5 * w - 0.04, -0.025), (0.5 * t + 0.05, 0.5 * w + 0.04, 0.003))
     patches = [*(shapes.block(*b, 0.006) for b in boxes), grip, shapes.block(*sill, 0.004, 1)]
-    materials = [painted_material("#f3f2ee", 0.35), painted_material("#ece9e2", 0.3)]
+    glass = Material((0.95, 0.97, 0.96), 0.02, transmission=1.0, role="glass")
+    x = 0.5 * (x0 + x1)
+    pane = rectangle((x, -0.5 * w, 0.0), (0.0, w, 0.0), (0.0, 0.0, h)).painted(2)
+    patches += [pane, pane.flipped()]
+    materials = [painted_material("#f3f2ee", 0.35), painted_material("#ece9e2", 0.3), glass]
     return solid(patches, materials, [*boxes, sill])
 
 
-def outside(
-    radius_m: float = 9.0, size_m: tuple[float, float] = (-1.5, 5.0), seed: int = 0
-) -> Solid:
-    """What windows show: a panorama on a cylinder around the origin, closed below. Slot: view.
+def outside(radius_m: float = 80.0) -> Solid:
+    """The ground around a building, at z = 0, from its middle to a horizon. Slot: ground.
 
     Args:
-        radius_m: Of the cylinder.
-        size_m: Height of its lower and upper edge.
-        seed: Of the panorama.
+        radius_m: Of the disc.
     """
-    turn = 2.0 * math.pi * np.arange(97) / 96
-    circle = np.stack([radius_m * np.cos(turn), -radius_m * np.sin(turn)], axis=1)
-    low, high = (np.insert(circle, 2, z, axis=1) for z in size_m)
-    # Cameras at ceilings look down through windows: the lowest colours go on below the rooms. They
-    # are taken from inside the texture, whose lower edge blends into the upper one.
-    rows = np.stack([low * (0.01, 0.01, 1.0), low, high])
-    ring = shapes.grid(rows, u=np.linspace(0.0, 2.0, 97), v=np.array([0.02, 0.02, 1.0]))
-    view = Material(
-        (0.0, 0.0, 0.0),
-        1.0,
-        specular=0.0,
-        texture=f"texture/outdoor_view?seed={seed}",
-        printed=True,
-        emission_cd_m2=(2000.0, 2000.0, 2000.0),
-        role="outside",
+    turn = 2.0 * math.pi * np.arange(49) / 48
+    reach = np.array([0.05, 0.15, 0.4, 1.0])[:, None] * radius_m
+    points = np.stack(
+        np.broadcast_arrays(reach * np.cos(turn), reach * np.sin(turn), np.zeros(1)), axis=2
     )
-    return solid([ring], [view], [((-0.01, -0.01, -5.0), (0.01, 0.01, -4.9))])
+    middle = shapes.fan(points[0, :-1])
+    ground = patterned_material("texture/grass?seed=0", 3.0, 1.0)
+    ring = shapes.grid(points).flipped()
+    slab = (-radius_m, -radius_m, -1.0), (radius_m, radius_m, 0.0)
+    return solid([middle, ring], [ground], [slab])
+
+
+def blind(size_m: Vec3 = (1.4, 0.5, 0.03), style: int = 0) -> Solid:
+    """A blind before a window, hanging down from z = 0, its back at x = 0. Slots: cloth, rail.
+
+    Args:
+        size_m: Width, drop, depth.
+        style: 0 roller blind, 1 slats.
+
+    Raises:
+        AssetError: if a size is not usable.
+    """
+    w, drop, d = check_size("blind", size_m, 0.01)
+    rail: Box = ((0.0, -0.5 * w, -0.035), (d, 0.5 * w, 0.0))
+    patches: list[Patch] = [shapes.block(*rail, 0.004, 1)]
+    x = 0.5 * d
+    if style == 1:
+        count = max(2, round(drop / 0.022))
+        for k in range(count):
+            z = -0.04 - (drop - 0.05) * k / (count - 1)
+            slat = shapes.block((-0.011, -0.5 * w, -0.0006), (0.011, 0.5 * w, 0.0006))
+            patches.append(slat.rotated("y", 0.7).moved(x, 0.0, z))
+    else:
+        patches.append(
+            shapes.block((x, -0.5 * w + 0.01, -drop), (x + 0.001, 0.5 * w - 0.01, -0.03))
+        )
+    end: Box = ((x - 0.008, -0.5 * w, -drop - 0.012), (x + 0.008, 0.5 * w, -drop))
+    patches.append(shapes.block(*end, 0.003, 1))
+    cloth = replace(painted_material("#ece8dd", 0.9), diffuse_transmission=(0.3, 0.28, 0.24))
+    looks = [
+        cloth if style == 0 else painted_material("#e9e8e4", 0.4),
+        painted_material("#f0efec", 0.4),
+    ]
+    return solid(patches, looks, [((0.0, -0.5 * w, -drop), (d, 0.5 * w, 0.0))])

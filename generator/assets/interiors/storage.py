@@ -294,6 +294,11 @@ def _chest(family: str, seed: int) -> Solid:
         )
         patches.append(board(*face, 1))
         patches += handle(x + 0.016, 0.0, a + 0.6 * h, min(0.3, 0.4 * w), 2, upright=False)
+        # A rail behind the gap below: nothing dark shows through.
+        rail = shapes.block(
+            (x - 0.012, -0.5 * w + 0.018, a - 0.015), (x + 0.01, 0.5 * w - 0.018, a + 0.02), 0.0, 1
+        )
+        patches.append(rail)
         boxes.append(face)
     for sx in (-1, 1):
         for sy in (-1, 1):
@@ -426,8 +431,8 @@ def pallet(seed: int = 0) -> Solid:
                 x, y, z = -0.59 + i * a, -0.39 + j * b, 0.144 + row * h
                 patches.append(
                     shapes.block(
-                        (x + 0.004, y + 0.004, z),
-                        (x + a - 0.004, y + b - 0.004, z + h - 0.002),
+                        (x + 0.001, y + 0.001, z),
+                        (x + a - 0.001, y + b - 0.001, z + h - 0.0005),
                         0.006,
                         1,
                     )

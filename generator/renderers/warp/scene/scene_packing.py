@@ -17,6 +17,7 @@ from gen_data.generator.core.scene import (
     Body,
     Camera,
     Environment,
+    IrradianceVolume,
     Light,
     Scene,
     Weather,
@@ -174,6 +175,7 @@ def _pack_scene(scene: Scene, cache: DeviceCache) -> _PackedScene:
     world = copy_struct(bodies.record, records.World)
     world.lamps = to_device(lamp_records(scene.lights), records.LightRecord, cache.device)
     world.sky = sky_record(scene.environment, environment)
+    _fill_volumes(world, scene.environment.volumes, cache.device)
     return replace(bodies, record=world, assets=(*bodies.assets, environment))
 
 
@@ -327,6 +329,22 @@ def sky_record(environment: Environment, light: DeviceEnvironment) -> records.En
     sky.cos_yaw, sky.sin_yaw = math.cos(environment.yaw_rad), math.sin(environment.yaw_rad)
     sky.visible = int(environment.visible)
     return sky
+
+
+def _fill_volumes(
+    world: records.World, volumes: Sequence[IrradianceVolume], device: wp.Device
+) -> None:
+    """Fill in the volumes of a World record, and their probes."""
+    values = np.zeros(len(volumes), dtype=struct_dtype(records.VolumeRecord))
+    probes = [np.array(volume.light_cd_m2, np.float32).reshape(-1, 6, 3) for volume in volumes]
+    for value, volume in zip(values, volumes, strict=True):
+        value["low_m"], value["high_m"] = volume.low_m, volume.high_m
+        value["counts"] = volume.counts
+    if volumes:
+        values["first"] = np.cumsum([0, *(len(part) for part in probes[:-1])])
+    world.volumes = to_device(values, records.VolumeRecord, device)
+    joined = np.concatenate([np.zeros((0, 6, 3), np.float32), *probes])
+    world.probes = wp.array(joined, dtype=wp.vec3, device=device)
 
 
 def lamp_records(lights: Sequence[Light]) -> NDArray[np.void]:

@@ -37,7 +37,12 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice_lighting import 
     visible_sky_fraction,
 )
 from gen_data.generator.renderers.warp.scene.kernels.alpha_test import OUT_OF_LINE, uv_at
-from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import beam_from
+from gen_data.generator.renderers.warp.scene.kernels.ambient_light import (
+    ambient_irradiance,
+    ambient_reflection,
+    volume_around,
+)
+from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
 from gen_data.generator.renderers.warp.scene.kernels.brdf import (
     fresnel_dielectric,
     make_brdf,
@@ -47,7 +52,6 @@ from gen_data.generator.renderers.warp.scene.kernels.brdf import (
 )
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
     sky_image,
-    sky_irradiance,
     sky_reflection,
     sky_rest,
 )
@@ -288,8 +292,12 @@ def light_at_hit(
         disc = probe.few[sample]
     surface = surface_index(world, m.hit)
     side = sheet_normal(world, surface, m.hit, m.weight)
-    faint_lux = FAINT_SHARE * wp.pi * wp.max(sky_irradiance(world.sky, m.normal))
+    faint_lux = FAINT_SHARE * wp.pi * wp.max(ambient_irradiance(world, p, m.normal))
+    indoors = volume_around(world, p) >= 0
     for j in range(world.lamps.shape[0]):
+        # As in soft_shadows.weigh_lamps.
+        if indoors and world.lamps[j].kind == SUN:
+            continue
         faint_lux += FAINT_SHARE * wp.max(beam_from(world.lamps[j], p).normal_lux)
     for j in range(world.lamps.shape[0]):
         # Scratch memory holds values of earlier rays: set every lamp.
@@ -493,7 +501,7 @@ def add_clearcoat(
         # The reflected ray will find these lamps itself: do not count them twice.
         layers.own -= lamps.shown * coat
     else:
-        sky = sky_reflection(world.sky, n * (2.0 * c) - v, lacquer.roughness)
+        sky = ambient_reflection(world, p, n * (2.0 * c) - v, lacquer.roughness)
         layers.own += sky * (share * specular_occlusion(lacquer, open_sky))
     return layers
 
@@ -540,11 +548,11 @@ def layers_at(
         gloss = gloss * (1.0 - clear) + mirrored * clear
         layers.behind = passed * clear
     lamps = sum_lamp_light(world, brdf, material.normal, side, p, v, lit, k)
-    ambient = sky_irradiance(world.sky, material.normal) * open_sky
+    ambient = ambient_irradiance(world, p, material.normal) * open_sky
     diffuse = wp.cw_mul(brdf.matte, material.albedo) * (1.0 - clear)
     received = lamps.lux * (1.0 / wp.pi) + ambient
     if wp.dot(side, side) > 0.0:
-        behind = sky_irradiance(world.sky, -material.normal) * open_sky
+        behind = ambient_irradiance(world, p, -material.normal) * open_sky
         behind += lamps.behind * (1.0 / wp.pi)
         received += wp.cw_mul(material.translucency, behind)
     layers.own = wp.cw_mul(diffuse, received) + lamps.shine
@@ -555,7 +563,7 @@ def layers_at(
         layers.own -= lamps.shown
     else:
         # Rough layers reflect the prefiltered environment, dimmed by specular occlusion.
-        sky = sky_reflection(world.sky, material.normal * (2.0 * n_v) - v, brdf.roughness)
+        sky = ambient_reflection(world, p, material.normal * (2.0 * n_v) - v, brdf.roughness)
         layers.own += wp.cw_mul(gloss, sky) * specular_occlusion(brdf, open_sky)
     coat = world.surfaces[surface].coat * bare
     if coat > 0.0:

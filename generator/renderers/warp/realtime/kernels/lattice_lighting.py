@@ -25,7 +25,13 @@ from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import (
     path_to_lamp,
     surface_tolerance,
 )
+from gen_data.generator.renderers.warp.scene.kernels.ambient_light import (
+    ambient_irradiance,
+    ambient_reflection,
+    volume_around,
+)
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
+    SUN,
     above_horizon_fraction,
     beam_from,
     lobe_widening,
@@ -33,10 +39,6 @@ from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     representative_direction,
 )
 from gen_data.generator.renderers.warp.scene.kernels.brdf import Brdf, make_brdf, specular_lobe
-from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
-    sky_irradiance,
-    sky_reflection,
-)
 from gen_data.generator.renderers.warp.scene.kernels.material_eval import (
     SurfaceMaterial,
     evaluate_material,
@@ -247,8 +249,8 @@ def light_at(
     lamps = sum_lamp_light(world, brdf, n, side, p_world, v, lit, k)
     light = LatticeLight()
     light.towards = lamps.towards
-    ambient = sky_irradiance(world.sky, n) * open_sky
-    mirror = sky_reflection(world.sky, n * (2.0 * n_v) - v, brdf.roughness)
+    ambient = ambient_irradiance(world, p_world, n) * open_sky
+    mirror = ambient_reflection(world, p_world, n * (2.0 * n_v) - v, brdf.roughness)
     # Lambert: illuminance over pi is luminance per albedo.
     lux = lamps.lux * (1.0 / wp.pi)
     received = lux + ambient
@@ -256,7 +258,7 @@ def light_at(
     if wp.dot(side, side) > 0.0:
         # What hides the sky from a leaf hides it from its reflections, at any angle.
         mirrored = wp.min(mirrored, open_sky)
-        behind = lamps.behind * (1.0 / wp.pi) + sky_irradiance(world.sky, -n) * open_sky
+        behind = lamps.behind * (1.0 / wp.pi) + ambient_irradiance(world, p_world, -n) * open_sky
         received += wp.cw_mul(material.translucency, behind)
     light.diffuse = wp.cw_mul(brdf.matte, received)
     light.rest = wp.cw_mul(brdf.gloss, mirror) * mirrored + lamps.shine
@@ -484,10 +486,12 @@ def find_pixel_visibility(
             world, surface_index(world, images.hits[i]), images.hits[i], images.weights[i]
         )
         # As by weigh_lamps: of faint lamps the lattice has no light either.
-        total = wp.max(wp.max(sky_irradiance(world.sky, n)) * wp.pi, 1.0e-9)
+        total = wp.max(wp.max(ambient_irradiance(world, p, n)) * wp.pi, 1.0e-9)
+        indoors = volume_around(world, p) >= 0
         for j in range(world.lamps.shape[0]):
             listed.lit[j, k] = lamp_weight(world.lamps[j], origin, n, side)
-            total += wp.max(listed.lit[j, k], 0.0)
+            if not indoors or world.lamps[j].kind != SUN:
+                total += wp.max(listed.lit[j, k], 0.0)
         for j in range(world.lamps.shape[0]):
             weight = listed.lit[j, k] / total
             listed.lit[j, k] = 0.0

@@ -22,6 +22,10 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
     sheet_side,
 )
 from gen_data.generator.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE, TILE
+from gen_data.generator.renderers.warp.scene.kernels.ambient_light import (
+    ambient_irradiance,
+    volume_around,
+)
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     DISK,
     RECTANGLE,
@@ -29,7 +33,6 @@ from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     SUN_DISTANCE_M,
     beam_from,
 )
-from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import sky_irradiance
 from gen_data.generator.renderers.warp.scene.kernels.material_eval import is_translucent
 from gen_data.generator.renderers.warp.scene.kernels.ray_queries import (
     NOBODY,
@@ -206,10 +209,14 @@ def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float], matte
         return
     n = lattice.normal[i]
     side = sheet_side(world, lattice, i)
-    total = wp.max(wp.max(sky_irradiance(world.sky, n)) * wp.pi, 1.0e-9)
+    p = lattice.p_m[i]
+    total = wp.max(wp.max(ambient_irradiance(world, p, n)) * wp.pi, 1.0e-9)
+    indoors = volume_around(world, p) >= 0
     for j in range(world.lamps.shape[0]):
         shares[j, i] = lamp_weight(world.lamps[j], lattice.origin_m[i], n, side)
-        total += wp.max(shares[j, i], 0.0)
+        # A sun that is nearly always behind walls hides no lamp.
+        if not indoors or world.lamps[j].kind != SUN:
+            total += wp.max(shares[j, i], 0.0)
     for j in range(world.lamps.shape[0]):
         if shares[j, i] > 0.0:
             shares[j, i] = shares[j, i] / total

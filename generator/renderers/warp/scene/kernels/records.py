@@ -230,6 +230,22 @@ class EnvironmentRecord:
 
 
 @wp.struct
+class VolumeRecord:
+    """A box with ambient light of its own.
+
+    Attributes:
+        low_m, high_m: Corners.
+        counts: Numbers of probes along X, Y and Z.
+        first: Row of its first probe.
+    """
+
+    low_m: wp.vec3
+    high_m: wp.vec3
+    counts: wp.vec3i
+    first: int
+
+
+@wp.struct
 class GBufferRecord:
     """G-buffer at every pixel centre, flat; fields as in gbuffer.GBuffer."""
 
@@ -427,6 +443,8 @@ class World:
         cutouts: Numbers of the bodies with faces that rays may pass.
         cutout_hierarchy: Warp's hierarchy over their boxes; 0 without any.
         lobes: Directional albedo of specular lobes, see brdf.directional_albedo.
+        volumes: Boxes in which ``probes`` replace the sky's ambient light.
+        probes: Irradiance over pi from around +X, -X, +Y, -Y, +Z and -Z, [probes, 6].
     """
 
     boxes: wp.array[wp.float32]
@@ -442,6 +460,8 @@ class World:
     lobes: wp.array2d[wp.vec2]
     sky: EnvironmentRecord
     ground: GroundRecord
+    volumes: wp.array[VolumeRecord]
+    probes: wp.array2d[wp.vec3]
 
 
 # Functions take a World and an index rather than a BodyRecord or a Geometry: copying a record costs

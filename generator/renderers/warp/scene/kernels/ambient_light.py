@@ -1,0 +1,88 @@
+"""Ambient light at a point: that of a volume around it, else that of the sky.
+
+Source: McTaggart, "Half-Life 2 / Valve Source shading", GDC 2004 (ambient cubes).
+"""
+
+from __future__ import annotations
+
+import warp as wp
+
+from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
+    sky_irradiance,
+    sky_reflection,
+)
+from gen_data.generator.renderers.warp.scene.kernels.records import World, floor_int
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 3})
+
+MARGIN_M = wp.constant(0.12)
+"""Reach of volumes beyond their boxes: reveals of windows, and leaves of doors."""
+
+
+@wp.func
+def volume_around(world: World, p: wp.vec3):
+    """Number of the volume that contains a point; -1 = none."""
+    found = int(-1)
+    for i in range(world.volumes.shape[0]):
+        low = p - world.volumes[i].low_m
+        high = world.volumes[i].high_m - p
+        if wp.min(wp.min(low), wp.min(high)) > -MARGIN_M:
+            found = i
+    return found
+
+
+@wp.func
+def probe_light(world: World, row: int, n: wp.vec3):
+    """Irradiance over pi around a direction, by one ambient cube."""
+    x = world.probes[row, wp.where(n[0] >= 0.0, 0, 1)] * (n[0] * n[0])
+    y = world.probes[row, wp.where(n[1] >= 0.0, 2, 3)] * (n[1] * n[1])
+    z = world.probes[row, wp.where(n[2] >= 0.0, 4, 5)] * (n[2] * n[2])
+    return x + y + z
+
+
+@wp.func
+def volume_light(world: World, v: int, p: wp.vec3, n: wp.vec3):
+    """Irradiance over pi in a volume, trilinear between its probes [cd/m^2]."""
+    low = world.volumes[v].low_m
+    size = world.volumes[v].high_m - low
+    counts = world.volumes[v].counts
+    total = wp.vec3(0.0)
+    at = wp.vec3(0.0)
+    base = wp.vec3i(0, 0, 0)
+    for k in range(3):
+        last = float(counts[k] - 1)
+        place = wp.clamp((p[k] - low[k]) / size[k] * float(counts[k]) - 0.5, 0.0, last)
+        base[k] = wp.min(floor_int(place), wp.max(counts[k] - 2, 0))
+        at[k] = place - float(base[k])
+    for corner in range(8):
+        dx = corner & 1
+        dy = (corner >> 1) & 1
+        dz = (corner >> 2) & 1
+        weight = wp.where(dx == 1, at[0], 1.0 - at[0])
+        weight *= wp.where(dy == 1, at[1], 1.0 - at[1])
+        weight *= wp.where(dz == 1, at[2], 1.0 - at[2])
+        if weight > 0.0:
+            row = ((base[0] + dx) * counts[1] + base[1] + dy) * counts[2] + base[2] + dz
+            total += probe_light(world, world.volumes[v].first + row, n) * weight
+    return total
+
+
+@wp.func
+def ambient_irradiance(world: World, p: wp.vec3, n: wp.vec3):
+    """Irradiance over pi from the hemisphere around a normal [cd/m^2]."""
+    if world.volumes.shape[0] > 0:
+        v = volume_around(world, p)
+        if v >= 0:
+            return volume_light(world, v, p, n)
+    return sky_irradiance(world.sky, n)
+
+
+@wp.func
+def ambient_reflection(world: World, p: wp.vec3, d: wp.vec3, roughness: float):
+    """Radiance averaged over the lobe of a roughness around a mirrored direction."""
+    if world.volumes.shape[0] > 0:
+        v = volume_around(world, p)
+        if v >= 0:
+            # Walls are near and even: what a hemisphere of them sends stands for any lobe.
+            return volume_light(world, v, p, d)
+    return sky_reflection(world.sky, d, roughness)
