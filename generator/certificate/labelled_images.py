@@ -90,7 +90,7 @@ def image_of(image: ImageLabels, rgb: NDArray[np.uint8]) -> LabelledImage:
 
 def digest_pixels(rgb: NDArray[np.uint8]) -> str:
     """Digest of a photograph, uint8 [h, w, 3]."""
-    return hashlib.sha256(np.ascontiguousarray(rgb)).hexdigest()
+    return hashlib.sha256(np.ascontiguousarray(rgb).data).hexdigest()
 
 
 def image_mask(mask: Mapping[str, Any], size_px: tuple[int, int]) -> Rle:
