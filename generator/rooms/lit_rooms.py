@@ -19,7 +19,7 @@ _SIDES = {"wall_0": 1, "wall_1": 3, "wall_2": 0, "wall_3": 2, "ceiling": 4, "flo
 """Sides of ``interreflection.AXES`` by the names of bodies."""
 _HIDES = 0.55
 """Share of the surface of a piece's box that light meets: legs, gaps and backs at walls do not
-count (assumed; agrees with path-traced rooms)."""
+count (assumed)."""
 
 
 def find_lit_rooms(scene: Scene, name: str, assets: AssetIndex) -> tuple[LitRoom, ...]:
