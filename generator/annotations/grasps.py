@@ -8,9 +8,15 @@ from dataclasses import replace
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
-from gen_data.generator.annotations.surface_contacts import hits_by_rays, triangle_normals
+from gen_data.generator.annotations.surface_contacts import (
+    Rows,
+    first_hits,
+    hits_by_rays,
+    triangle_normals,
+)
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import AssetLibrary
@@ -25,6 +31,10 @@ SPACING_M = 0.004
 """Distance of the points on surfaces that grippers must not contain."""
 AROUND = 12
 """Directions of approach per pair of contacts."""
+SAMPLED = 16
+"""Every so many points are tested first: most grippers that are not free contain some of these."""
+RIM = 8
+"""Points of a cup's rim that are tested."""
 LEAST_WIDTH_M = 0.001
 """Thinner things cannot be told from the rounding of a surface."""
 PALM_M = (0.05, 0.03)
@@ -78,15 +88,18 @@ class Grasps(Strict):
         scene = scenes[""]
         meshes = world_meshes(scene, assets)
         loose = {b.instance_id for b in scene.bodies if b.motion == "dynamic"}
+        things = {
+            instance: np.concatenate([t for owner, t in meshes if owner == instance.instance_id])
+            for instance in sorted(scene.instances, key=lambda i: i.instance_id)
+            if instance.annotated and instance.instance_id in loose
+        }
+        if not things:
+            return replace(truth, grasps=(), suctions=())
+        margin_m = self.opening_m + self.finger_m[2] + PALM_M[0]
+        nearby = points_near([t for _, t in meshes], list(things.values()), margin_m)
         grasps: list[Grasp] = []
         suctions: list[Suction] = []
-        for instance in sorted(scene.instances, key=lambda i: i.instance_id):
-            number = instance.instance_id
-            if not instance.annotated or number not in loose:
-                continue
-            mesh = np.concatenate([t for owner, t in meshes if owner == number])
-            margin_m = self.opening_m + self.finger_m[2] + PALM_M[0]
-            around = points_near([t for _, t in meshes], mesh, margin_m)
+        for (instance, mesh), around in zip(things.items(), nearby, strict=True):
             points, normals = spread_points(mesh, self.tried)
             grasps += self._grasps(instance, mesh, points, normals, around)
             suctions += self._suctions(instance, mesh, points, normals, around)
@@ -104,7 +117,7 @@ class Grasps(Strict):
         # Nothing of the object lies between a contact and its finger.
         apart_m = self.clearance_m + self.finger_m[0]
         beyond = ((hits > widths[:, None] + 1e-6) & (hits < widths[:, None] + apart_m)).any(axis=1)
-        before = (hits_by_rays(points + 1e-6 * normals, normals, mesh) < apart_m).any(axis=1)
+        before = first_hits(points + 1e-6 * normals, normals, mesh) < apart_m
         cosines = -(normals * triangle_normals(mesh[faces])).sum(axis=1)
         needs = np.sqrt(np.maximum(1.0 - cosines**2, 0.0)) / np.maximum(cosines, 1e-9)
         holding = (widths > 0.0) & (needs <= self.friction) & ~beyond & ~before
@@ -128,57 +141,70 @@ class Grasps(Strict):
         down /= math.sqrt(float(down @ down))
         side = np.cross(line, down)
         middle = 0.5 * (one + other)
-        reach_m = math.hypot(self.finger_m[2] + PALM_M[0], self.opening_m)
-        offsets = around - middle
-        offsets = offsets[(offsets * offsets).sum(axis=1) < reach_m**2]
-        turns = sorted(range(AROUND), key=lambda k: (min(k, AROUND - k), k))
-        for angle in (2.0 * math.pi * k / AROUND for k in turns):
-            forward = math.cos(angle) * down + math.sin(angle) * side
-            rotation = np.stack([forward, line, np.cross(forward, line)], axis=1)
-            if not self._is_blocked(offsets @ rotation, math.dist(one, other)):
-                matrix = np.eye(4)
-                matrix[:3, :3], matrix[:3, 3] = rotation, middle
-                return SE3.from_matrix(matrix)
-        return None
+        turns = np.array(sorted(range(AROUND), key=lambda k: (min(k, AROUND - k), k)))
+        for part in (around[::SAMPLED], around):
+            points = (part - middle) @ np.stack([down, line, side], axis=1)
+            turns = turns[self._are_free(turns, points, math.dist(one, other))]
+            if not len(turns):
+                return None
+        angle = 2.0 * math.pi * float(turns[0]) / AROUND
+        forward = math.cos(angle) * down + math.sin(angle) * side
+        matrix = np.eye(4)
+        matrix[:3, :3] = np.stack([forward, line, np.cross(forward, line)], axis=1)
+        matrix[:3, 3] = middle
+        return SE3.from_matrix(matrix)
 
-    def _is_blocked(self, points: Array, width_m: float) -> bool:
-        """Whether an open gripper contains any of the points, given in its frame."""
-        x, y, z = points[:, 0], np.abs(points[:, 1]), np.abs(points[:, 2])
+    def _are_free(self, turns: Rows, points: Array, width_m: float) -> NDArray[np.bool_]:
+        """Whether open grippers, turned about the line of the contacts, contain no points.
+
+        Points are along the downward direction, along the line, and across both.
+        """
         thick_m, height_m, length_m = self.finger_m
         inner = 0.5 * width_m + self.clearance_m
+        outer = max(inner, 0.5 * self.opening_m) + thick_m
+        longest_m = max(self.reach_m, length_m + PALM_M[0])
+        reach_m = math.hypot(longest_m, max(0.5 * height_m, PALM_M[1]))
+        points = points[np.abs(points[:, 1]) < outer]
+        points = points[points[:, 0] ** 2 + points[:, 2] ** 2 < reach_m**2]
+        angles = turns[:, None] * 2.0 * math.pi / AROUND
+        x = np.cos(angles) * points[:, 0] + np.sin(angles) * points[:, 2]
+        z = np.abs(np.sin(angles) * points[:, 0] - np.cos(angles) * points[:, 2])
+        y = np.abs(points[:, 1])
         in_finger = (x > -length_m) & (x < self.reach_m) & (z < 0.5 * height_m)
         in_finger &= (y > inner) & (y < inner + thick_m)
         in_palm = (x <= -length_m) & (x > -length_m - PALM_M[0]) & (z < PALM_M[1])
         in_palm &= y < 0.5 * self.opening_m + thick_m
-        return bool((in_finger | in_palm).any())
+        return np.asarray(~(in_finger | in_palm).any(axis=1))
 
     def _suctions(
         self, instance: Instance, mesh: Array, points: Array, normals: Array, around: Array
     ) -> list[Suction]:
         """Suction points of one object, the best ones first."""
-        found = []
         center = np.array(instance.box3d.T_frame_box.translation_m)
-        for point, normal in zip(points, normals, strict=True):
-            if normal[2] <= 0.0:
-                continue
-            rim = rim_points(point, normal, self.cup_m) + 2.0 * self.seal_m * normal
-            depths = hits_by_rays(rim, np.tile(-normal, (len(rim), 1)), mesh).min(axis=1)
-            deviation_m = float(np.abs(depths - 2.0 * self.seal_m).max())
-            lever_m = math.dist(point[:2], center[:2])
-            score = (1.0 - deviation_m / self.seal_m) * (1.0 - lever_m / self.lever_m)
-            if deviation_m >= self.seal_m or lever_m >= self.lever_m:
-                continue
-            height = (around - point) @ normal
-            apart = around - point - height[:, None] * normal
-            inside = (apart * apart).sum(1) < self.cup_m**2
-            room_m = self.finger_m[2] + PALM_M[0]
-            if not (inside & (height > 2.0 * self.seal_m) & (height < room_m)).any():
-                x, y, z = (round(float(v), 6) for v in point)
-                nx, ny, nz = (round(float(v), 6) for v in normal)
-                found.append(
-                    Suction(instance.instance_id, (x, y, z), (nx, ny, nz), round(score, 6))
-                )
+        levers_m = np.hypot(points[:, 0] - center[0], points[:, 1] - center[1])
+        fit = (normals[:, 2] > 0.0) & (levers_m < self.lever_m)
+        points, normals, levers_m = points[fit], normals[fit], levers_m[fit]
+        rims = rim_points(points, normals, self.cup_m) + 2.0 * self.seal_m * normals[:, None]
+        downs = np.repeat(-normals, RIM, axis=0)
+        depths = first_hits(rims.reshape(-1, 3), downs, mesh).reshape(-1, RIM)
+        deviations_m = np.abs(depths - 2.0 * self.seal_m).max(axis=1)
+        scores = (1.0 - deviations_m / self.seal_m) * (1.0 - levers_m / self.lever_m)
+        found = []
+        for k in np.flatnonzero(deviations_m < self.seal_m):
+            if self._has_room(points[k], normals[k], around):
+                x, y, z = (round(float(v), 6) for v in points[k])
+                nx, ny, nz = (round(float(v), 6) for v in normals[k])
+                score = round(float(scores[k]), 6)
+                found.append(Suction(instance.instance_id, (x, y, z), (nx, ny, nz), score))
         return sorted(found, key=lambda s: -s.score)[: self.most]
+
+    def _has_room(self, point: Array, normal: Array, around: Array) -> bool:
+        """Whether a cup, and the tube behind it, contain no point of any surface."""
+        offsets = around - point
+        height = offsets @ normal
+        beside = (height > 2.0 * self.seal_m) & (height < self.finger_m[2] + PALM_M[0])
+        apart = offsets[beside] - height[beside, None] * normal
+        return not ((apart * apart).sum(1) < self.cup_m**2).any()
 
 
 def world_meshes(scene: Scene, assets: AssetLibrary) -> list[tuple[int, Array]]:
@@ -204,33 +230,48 @@ def spread_points(mesh: Array, count: int) -> tuple[Array, Array]:
     return points, triangle_normals(mesh[faces])
 
 
-def points_near(meshes: Sequence[Array], mesh: Array, margin_m: float) -> Array:
-    """Points on all meshes at most ``SPACING_M`` apart, in the bounds of one and a margin."""
-    low, high = mesh.min((0, 1)) - margin_m, mesh.max((0, 1)) + margin_m
+def points_near(meshes: Sequence[Array], things: Sequence[Array], margin_m: float) -> list[Array]:
+    """Points on all meshes about ``SPACING_M`` apart, in the bounds and a margin of each thing."""
+    low = np.array([thing.min((0, 1)) for thing in things]) - margin_m
+    high = np.array([thing.max((0, 1)) for thing in things]) + margin_m
     found = [np.zeros((0, 3))]
     for triangles in meshes:
-        near = (triangles.max(1) >= low).all(1) & (triangles.min(1) <= high).all(1)
-        chosen = triangles[near]
-        edges = np.sqrt(((np.roll(chosen, -1, axis=1) - chosen) ** 2).sum(2)).max(1)
-        counts = np.minimum(np.ceil(edges / SPACING_M).astype(int), 1024)
-        for n in np.unique(counts):
-            i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
-            u, v = ((w[i + j <= n] / max(n, 1))[None, :, None] for w in (i, j))
-            a, b, c = (chosen[counts == n][:, None, k] for k in range(3))
-            points = (a + u * (b - a) + v * (c - a)).reshape(-1, 3)
-            found.append(points[((points >= low) & (points <= high)).all(1)])
+        near = (triangles.max(1) >= low.min(0)).all(1) & (triangles.min(1) <= high.max(0)).all(1)
+        points = lattice(triangles[near])
+        found.append(points[((points >= low.min(0)) & (points <= high.max(0))).all(1)])
     points = np.concatenate(found)
     # Fine meshes have many points per cell: one is enough.
-    cells = np.floor((points - low) / (0.5 * SPACING_M)).astype(np.int64)
+    cells = np.floor((points - low.min(0)) / (0.5 * SPACING_M)).astype(np.int64)
     keys = (cells[:, 0] << 40) + (cells[:, 1] << 20) + cells[:, 2]
-    return points[np.unique(keys, return_index=True)[1]]
+    points = points[np.unique(keys, return_index=True)[1]]
+    return [points[((points >= a) & (points <= b)).all(1)] for a, b in zip(low, high, strict=True)]
 
 
-def rim_points(point: Array, normal: Array, radius_m: float) -> Array:
-    """Eight points on a circle around a point, across its normal, [8, 3]."""
-    helper = np.eye(3)[int(np.argmin(np.abs(normal)))]
-    u = np.cross(normal, helper)
-    u /= math.sqrt(float(u @ u))
-    angles = np.arange(8) * math.pi / 4
-    around = np.cos(angles)[:, None] * u + np.sin(angles)[:, None] * np.cross(normal, u)
-    return np.asarray(point + radius_m * around)
+def lattice(triangles: Array) -> Array:
+    """Points on triangles at most ``SPACING_M`` apart along and across each, [n, 3].
+
+    They are on lines from a corner to points of the opposite edge, the shortest one: a sliver has
+    few lines.
+    """
+    edges_m = np.sqrt(((np.roll(triangles, -1, axis=1) - triangles) ** 2).sum(2))
+    rows, first = np.arange(len(triangles)), edges_m.argmin(axis=1)
+    a, b, c = (triangles[rows, (first + k) % 3] for k in range(3))
+    across = np.clip(np.ceil(edges_m.min(1) / SPACING_M), 1, 1024).astype(int)
+    along = np.clip(np.ceil(edges_m.max(1) / SPACING_M), 1, 1024).astype(int)
+    counts = (across + 1) * (along + 1)
+    owner = np.repeat(rows, counts)
+    number = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    u = (number % (across + 1)[owner] / across[owner])[:, None]
+    v = (number // (across + 1)[owner] / along[owner])[:, None]
+    return np.asarray((1.0 - v) * (a[owner] + u * (b - a)[owner]) + v * c[owner])
+
+
+def rim_points(points: Array, normals: Array, radius_m: float) -> Array:
+    """Points on circles around points, across their normals, [n, RIM, 3]."""
+    helpers = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    u = np.cross(normals, helpers)
+    u /= np.sqrt((u * u).sum(axis=1))[:, None]
+    angles = np.arange(RIM) * 2.0 * math.pi / RIM
+    v = np.cross(normals, u)
+    around = np.cos(angles)[:, None] * u[:, None] + np.sin(angles)[:, None] * v[:, None]
+    return np.asarray(points[:, None] + radius_m * around)

@@ -79,6 +79,14 @@ class Urdf:
         return poses
 
 
+class _MisplacedJoint(ValueError):
+    """A joint that keeps links from forming a tree."""
+
+    def __init__(self, joint: Joint, reason: str) -> None:
+        super().__init__(f"joint '{joint.name[:40]}' {reason}")
+        self.joint = joint
+
+
 def read_urdf(folder: Folder, relative: str) -> Urdf:
     """Read a URDF file.
 
@@ -106,6 +114,11 @@ def read_urdf(folder: Folder, relative: str) -> Urdf:
             leader_of(joint, joints)
         at = root
         return _sort_links(links, joints)
+    except _MisplacedJoint as error:
+        at = elements[joints.index(error.joint)]
+        raise AssetError(
+            f"{place}{format_position(at)}: malformed URDF ({error}); correct it"
+        ) from None
     except (ValueError, KeyError) as error:
         reason = f"missing {error}" if isinstance(error, KeyError) else error
         raise AssetError(
@@ -232,15 +245,13 @@ def _sort_links(links: dict[str, Link], joints: list[Joint]) -> Urdf:
     by_parent: dict[str, list[Joint]] = {}
     for joint in joints:
         if joint.parent not in links or joint.child not in links:
-            raise ValueError(f"joint '{joint.name[:40]}' refers to a missing link")
+            raise _MisplacedJoint(joint, "refers to a missing link")
         by_parent.setdefault(joint.parent, []).append(joint)
     children = [joint.child for joint in joints]
     for k, joint in enumerate(joints):
         if joint.child in children[:k]:
-            raise ValueError(
-                f"joint '{joint.name[:40]}' closes a loop: link '{joint.child[:40]}' has another "
-                "parent already"
-            )
+            reason = f"closes a loop: link '{joint.child[:40]}' has another parent already"
+            raise _MisplacedJoint(joint, reason)
     roots = [name for name in links if name not in set(children)]
     if len(roots) != 1:
         raise ValueError(f"its links form no tree: {len(roots)} of them have no parent")
@@ -252,7 +263,7 @@ def _sort_links(links: dict[str, Link], joints: list[Joint]) -> Urdf:
         pending += reversed(by_parent.get(joint.child, []))
     if len(order) != len(links):
         loop = next(joint for joint in joints if joint.child not in order)
-        raise ValueError(f"joint '{loop.name[:40]}' is part of a loop")
+        raise _MisplacedJoint(loop, "is part of a loop")
     return Urdf({name: links[name] for name in order}, tuple(ordered_joints))
 
 

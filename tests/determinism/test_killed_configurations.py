@@ -1,0 +1,58 @@
+"""Every shipped configuration, killed and resumed, gives the bytes of an uninterrupted run."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import pytest
+
+from tests.end_to_end.running import ROOT, command, digest, environment, gen_data
+
+NAMES = sorted(path.name for path in (ROOT / "configs").glob("*.yaml"))
+N = 3
+WAIT_S = 600
+
+
+def started(name: str, out: Path) -> list[str]:
+    """Arguments that generate a shard per sample."""
+    return [
+        "--config",
+        name,
+        "--n",
+        str(N),
+        "--workers",
+        "1",
+        "--set",
+        "shard_size=1",
+        "--out",
+        str(out),
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", NAMES)
+def test_killed_after_a_shard_and_resumed_it_is_the_same_data_set(
+    tmp_path: Path, name: str
+) -> None:
+    """SIGKILL of the whole process group as soon as the first of three shards is committed."""
+    whole = gen_data(*started(name, tmp_path / "whole"), cwd=tmp_path)
+    assert whole.returncode == 0, whole.stderr
+
+    out = tmp_path / "killed"
+    with subprocess.Popen(
+        command(*started(name, out)), cwd=tmp_path, env=environment(),
+        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+    ) as process:  # fmt: skip
+        end_s = time.monotonic() + WAIT_S
+        while not list(out.glob("shards/*.json")) and time.monotonic() < end_s:
+            time.sleep(0.005)
+        os.killpg(process.pid, signal.SIGKILL)
+    assert 1 <= len(list(out.glob("shards/*.json"))) < N, "killed too late, or nothing was made"
+
+    resumed = gen_data(*started(name, out), cwd=tmp_path)
+    assert resumed.returncode == 0, resumed.stderr
+    assert digest(out) == digest(tmp_path / "whole")
