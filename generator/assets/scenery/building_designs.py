@@ -184,7 +184,7 @@ def building_materials(plan: Design, seed: int, region: str = "any") -> tuple[Ma
         _base(plan, wall, rng),
         _plain_material(trim_code, 0.85, "trim"),
         _plain_material(frame, 0.45, "trim"),
-        Material((0.012, 0.016, 0.019), roughness=0.04, specular=1.0, role="window"),
+        Material((0.012, 0.016, 0.019), roughness=0.04, specular=1.0, role="trim"),
         _glass_material(f"texture/window_view?seed={views[0]}&kind={kind}"),
         _glass_material(f"texture/window_view?seed={views[1]}&kind={other}"),
         _glass_material(f"texture/window_view?seed={display}&kind=shop"),
