@@ -22,19 +22,20 @@ from gen_data.generator.matching.recordings import Photo
 from gen_data.generator.matching.results import FittedQuantity
 from gen_data.generator.matching.simulation import photograph, rescan
 from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline
-from tests.matching.scenes import exposures, illuminations, scanner
+from tests.matching.scenes import RESPONSE, exposures, illuminations, scanner
 
 BASE = ImagePipeline.model_validate({"preset": "industrial", "focus": None})
 CAMERA = {
     "exposure": -0.7,
-    "tone": 1.4,
+    "tone": 1.375,
     "white balance": 0.3,
     "saturation": 0.75,
     "blur": 1.0,
     "noise": 3000.0,
+    "read noise": 12.0,
     "JPEG quality": 92.0,
 }
-SCANNER = {"reflectance gain": 0.25, "dropout": 0.7, "range": 30.0}
+SCANNER = {"reflectance gain": 0.25, "dark returns": 0.2, "dropout": 0.7, "range": 30.0}
 FittedRows = Iterable[FittedQuantity]
 STRIDE = 1000
 """Seeds between repetitions."""
@@ -52,7 +53,10 @@ def fit_photographs(first: int, pictures: int, scenes: int, spread_ev: float) ->
         "saturation": CAMERA["saturation"],
         "warmth_ev": CAMERA["white balance"],
         "blur_px": CAMERA["blur"],
-        "image_sensor": {"full_well_e": CAMERA["noise"]},
+        "image_sensor": {
+            "full_well_e": CAMERA["noise"],
+            "read_noise_e": CAMERA["read noise"],
+        },
         "jpeg_quality": CAMERA["JPEG quality"],
     }).model_copy(update={"exposure_compensation_ev": exposure})  # fmt: skip
     photos = [
@@ -67,12 +71,13 @@ def fit_scans(first: int, scans: int, scenes: int) -> FittedRows:
     """Fit sweeps of one scanner."""
     real = scanner(
         white_intensity=SCANNER["reflectance gain"],
+        response={**RESPONSE, "dark": SCANNER["dark returns"]},
         window=SCANNER["dropout"],
         range_m=(0.5, SCANNER["range"]),
     )
     made = [rescan(one, real) for one in illuminations(range(first, first + scans), real)]
     seeds = range(first + STRIDE // 2, first + STRIDE // 2 + scenes)
-    return fit_lidar(illuminations(seeds, scanner()), made, 0).quantities
+    return fit_lidar(illuminations(seeds, scanner(response=RESPONSE)), made, 0).quantities
 
 
 def main() -> None:

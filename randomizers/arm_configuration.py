@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -14,7 +14,7 @@ from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import ArmGoal, Articulation, Body, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase, check_known
+from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.placement import half_extents_m
 
 MODES = ("joints", "reach", "hold")
@@ -39,7 +39,9 @@ class ArmConfiguration(RandomizerBase):
 
     type: Literal["arm_configuration"] = "arm_configuration"
     stage: Literal["scene"] = "scene"
-    mode: dist.Name = dist.Choice({"joints": 1.0, "reach": 2.0, "hold": 1.0})
+    mode: Annotated[dist.Name, dist.OneOf(MODES)] = dist.Choice(
+        {"joints": 1.0, "reach": 2.0, "hold": 1.0}
+    )
     candidates: int = Field(24, ge=1, le=256)
     range_share: float = Field(0.9, gt=0, le=1)
     tilt_deg: dist.NonNegative = dist.Uniform(0.0, 35.0)
@@ -53,7 +55,6 @@ class ArmConfiguration(RandomizerBase):
 
     def _draw_goal(self, arm: Articulation, scene: Scene, assets: AssetIndex, rng: Rng) -> ArmGoal:
         mode = self.mode.draw(rng)
-        check_known(mode, MODES, f"randomizers.{self.name}.mode: unknown mode")
         robot = assets.robot(arm.asset)
         opening = round(self.opening.draw(rng), 4)
         held = _draw_graspable(scene, robot, assets, rng) if mode == "hold" else ""

@@ -82,7 +82,7 @@ class ArmMotion(RandomizerBase):
 
     type: Literal["arm_motion"] = "arm_motion"
     stage: Literal["scene"] = "scene"
-    task: dist.Name = dist.Choice({"pick_and_place": 1.0})
+    task: Annotated[dist.Name, dist.OneOf(TASKS)] = dist.Choice({"pick_and_place": 1.0})
     way: tuple[Stop, ...] = ()
     objects: tuple[str, ...] = ()
     count: int = Field(1, ge=1, le=20)
@@ -106,16 +106,11 @@ class ArmMotion(RandomizerBase):
                 self._goal_at_stop(stop, f"{where}[{k}]", arm, scene, assets, rng)
                 for k, stop in enumerate(self.way)
             ]
-        elif self._draw_task(rng) == "reach" or assets.robot(arm.asset).gripper is None:
+        elif self.task.draw(rng) == "reach" or assets.robot(arm.asset).gripper is None:
             goals = [self._draw_reach_goal(arm, assets, rng) for _ in range(self.count)]
         else:
             goals = self._draw_pick_and_place(arm, scene, assets, rng)
         return tuple(replace(goal, speed=speed) for goal in goals)
-
-    def _draw_task(self, rng: Rng) -> str:
-        task = self.task.draw(rng)
-        check_known(task, TASKS, f"randomizers.{self.name}.task: unknown task")
-        return task
 
     def _draw_reach_goal(self, arm: Articulation, assets: AssetIndex, rng: Rng) -> ArmGoal:
         robot = assets.robot(arm.asset)

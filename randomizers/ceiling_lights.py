@@ -18,7 +18,7 @@ from gen_data.generator.core.photometry import (
 from gen_data.generator.core.scene import PANEL_KINDS, Light, LightKind, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase, check_known
+from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.color_space import Temperature, temperature_to_linear
 
 
@@ -37,7 +37,7 @@ class CeilingLights(RandomizerBase):
     """
 
     type: Literal["ceiling_lights"] = "ceiling_lights"
-    kind: dist.Name = dist.Constant("rectangle")
+    kind: Annotated[dist.Name, dist.OneOf(PANEL_KINDS)] = dist.Constant("rectangle")
     rows: dist.Count = dist.UniformInteger(1, 2)
     columns: dist.Count = dist.UniformInteger(2, 3)
     size_m: tuple[Annotated[float, Field(gt=0.0)], Annotated[float, Field(gt=0.0)]] = (0.6, 0.6)
@@ -67,9 +67,7 @@ class CeilingLights(RandomizerBase):
         return scene
 
     def _draw_kind(self, rng: Rng) -> LightKind:
-        drawn = self.kind.draw(rng)
-        check_known(drawn, PANEL_KINDS, f"randomizers.{self.name}.kind: unknown panel")
-        return "rectangle" if drawn == "rectangle" else "disk"
+        return "rectangle" if self.kind.draw(rng) == "rectangle" else "disk"
 
     def _make_panel(self, name: str, kind: LightKind, at_m: Vec3) -> Light:
         return Light(

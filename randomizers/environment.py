@@ -9,6 +9,7 @@ from typing import Literal
 from pydantic import Field
 
 from gen_data.generator.config import distributions as dist
+from gen_data.generator.config.yaml_scalars import quote_value
 from gen_data.generator.core.errors import ConfigError, did_you_mean
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Environment, Scene
@@ -35,19 +36,20 @@ class EnvironmentLight(RandomizerBase):
     def possible_assets(self, assets: AssetIndex) -> tuple[str, ...]:
         """Ids of the environment maps to draw from."""
         every = assets.find((), kind="environment")
-        fitting = tuple(
-            a.asset_id
-            for a in every
-            if not self.images
-            or any(n in a.tags or f"/{n}?" in f"{a.asset_id}?" for n in self.images)
-        )
-        if not fitting:
-            known = sorted({tag for a in every for tag in a.tags})
-            raise ConfigError(
-                f"randomizers.{self.name}.images: no environment is {' or '.join(self.images)}; "
-                f"expected one of {', '.join(known)}{did_you_mean(self.images[0], known)}"
-            )
-        return fitting
+        if not self.images:
+            return tuple(a.asset_id for a in every)
+        fitting = {
+            name: {a.asset_id for a in every if name in a.tags or f"/{name}?" in f"{a.asset_id}?"}
+            for name in self.images
+        }
+        known = sorted({tag for a in every for tag in a.tags})
+        for name, found in fitting.items():
+            if not found:
+                raise ConfigError(
+                    f"randomizers.{self.name}.images: no environment is {quote_value(name)}; "
+                    f"expected some of {', '.join(known)}{did_you_mean(name, known)}"
+                )
+        return tuple(a.asset_id for a in every if any(a.asset_id in f for f in fitting.values()))
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with a drawn environment map."""

@@ -22,7 +22,7 @@ from gen_data.generator.core.photometry import (
 from gen_data.generator.core.scene import LIGHT_KINDS, PANEL_KINDS, Light, LightKind, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
-from gen_data.randomizers.base import RandomizerBase, check_known
+from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.color_space import Temperature, temperature_to_linear
 from gen_data.randomizers.free_space import is_in_the_open, is_inside
 
@@ -57,7 +57,7 @@ class Lighting(RandomizerBase):
 
     type: Literal["lighting"] = "lighting"
     count: Annotated[dist.Count, dist.Bounds(0, COUNT_MAX)] = dist.UniformInteger(1, 3)
-    kind: dist.Name = dist.Constant("sphere")
+    kind: Annotated[dist.Name, dist.OneOf(LIGHT_KINDS)] = dist.Constant("sphere")
     illuminance_lux: dist.NonNegative = dist.LogUniform(250.0, 1200.0)
     luminous_flux_lm: dist.NonNegative | None = Field(None)
     distance_m: dist.Positive = dist.Uniform(1.0, 1.9)
@@ -129,7 +129,6 @@ class Lighting(RandomizerBase):
 
     def _draw_kind(self, rng: Rng) -> LightKind:
         drawn = self.kind.draw(rng)
-        check_known(drawn, LIGHT_KINDS, f"randomizers.{self.name}.kind: unknown light")
         kind = next(known for known in LIGHT_KINDS if known == drawn)
         if kind == "sun" and self.luminous_flux_lm is not None:
             raise ConfigError(

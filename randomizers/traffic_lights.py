@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.core.interfaces import AssetIndex
@@ -16,7 +16,6 @@ from gen_data.randomizers.base import (
     RandomizerBase,
     add_attributes,
     body_materials,
-    check_known,
     set_emission,
 )
 
@@ -61,7 +60,9 @@ class TrafficLights(RandomizerBase):
     """
 
     type: Literal["traffic_lights"] = "traffic_lights"
-    state: dist.Name = dist.Choice({"red": 0.46, "green": 0.44, "yellow": 0.06, "red_yellow": 0.04})
+    state: Annotated[dist.Name, dist.OneOf(tuple(LIT))] = dist.Choice(
+        {"red": 0.46, "green": 0.44, "yellow": 0.06, "red_yellow": 0.04}
+    )
     luminance_cd_m2: dist.Positive = dist.Uniform(5000.0, 10000.0)
     junction_m: dist.Positive = dist.Constant(40.0)
 
@@ -76,7 +77,7 @@ class TrafficLights(RandomizerBase):
         states: dict[int, tuple[tuple[str, str]]] = {}
         pedestrian = {i.instance_id for i in scene.instances if i.subcategory == "pedestrian"}
         for junction in group_junctions(signals, self.junction_m.draw(rng)):
-            state, luminance = self._draw_state(rng), round(self.luminance_cd_m2.draw(rng), 2)
+            state, luminance = self.state.draw(rng), round(self.luminance_cd_m2.draw(rng), 2)
             for signal in junction:
                 own = state if runs_along(junction[0], signal) else _crossing_state(state)
                 bodies.append(show_state(signal.body, assets, own, luminance))
@@ -84,11 +85,6 @@ class TrafficLights(RandomizerBase):
                 shown = own if number not in pedestrian else "walk" if own == "green" else "stop"
                 states[number] = (("state", shown),)
         return add_attributes(scene, states).with_bodies(*bodies)
-
-    def _draw_state(self, rng: Rng) -> str:
-        state = self.state.draw(rng)
-        check_known(state, LIT, f"randomizers.{self.name}.state: unknown state")
-        return state
 
 
 def _crossing_state(state: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field
 
@@ -20,6 +20,7 @@ from gen_data.randomizers.base import (
 )
 from gen_data.randomizers.daylight import is_dark
 
+INDICATORS = ("none", "left", "right", "both")
 _WHITE: Vec3 = (1.02, 1.0, 0.94)
 RED: Vec3 = (4.2, 0.14, 0.06)
 AMBER: Vec3 = (2.35, 0.66, 0.02)
@@ -50,7 +51,9 @@ class VehicleLights(SurfaceRandomizer):
     type: Literal["vehicle_lights"] = "vehicle_lights"
     headlights: dist.Flag = dist.Probability(0.35)
     braking: dist.Flag = dist.Probability(0.2)
-    indicator: dist.Name = dist.Choice({"none": 0.9, "left": 0.05, "right": 0.05})
+    indicator: Annotated[dist.Name, dist.OneOf(INDICATORS)] = dist.Choice(
+        {"none": 0.9, "left": 0.05, "right": 0.05}
+    )
     headlight_cd_m2: dist.Positive = dist.Uniform(15_000.0, 40_000.0)
     taillight_cd_m2: dist.Positive = dist.Uniform(600.0, 1500.0)
     brakelight_cd_m2: dist.Positive = dist.Uniform(6000.0, 15_000.0)

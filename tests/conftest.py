@@ -16,12 +16,15 @@ from typing import Any
 
 import pytest
 
+from tests.pybullet_files import provide_pybullet_data
 from tests.wheels import HAS_RERUN
 
 # Packs that happen to be installed on this machine must not change what tests see; processes that
 # tests start inherit it. Set before anything asks, hence not in a fixture.
 os.environ["GEN_DATA_ASSETS"] = tempfile.mkdtemp(prefix="gen-data-no-packs-")
 atexit.register(shutil.rmtree, os.environ["GEN_DATA_ASSETS"], ignore_errors=True)
+
+provide_pybullet_data()
 
 collect_ignore = [] if HAS_RERUN else ["exporters/test_rerun.py", "preview"]
 

@@ -163,6 +163,7 @@ def _image_faults(
     if ids != sorted(set(ids)):
         yield "objects", f"are not in ascending order of unique instance ids: {ids[:20]}"
     yield from _relation_faults(truth.relations, instances)
+    points = {name: np.bincount(cloud.points["instance_id"]) for name, cloud in clouds.items()}
     for number, item in enumerate(truth.objects):
         field = f"objects[{number}] (instance {item.instance.instance_id} '{item.instance.name}')"
         known = instances.get(item.instance.instance_id)
@@ -173,8 +174,17 @@ def _image_faults(
                 yield f"{field}.{part}", fact
         for part, fact in _object_faults(reading, truth, item):
             yield f"{field}.{part}", fact
-        if item.lidar_points is not None and not item.lidar_points.keys() <= clouds.keys():
-            yield f"{field}.lidar_points", f"names a scanner without a scan: {item.lidar_points}"
+        for fact in _scan_faults(item, points):
+            yield f"{field}.lidar_points", fact
+
+
+def _scan_faults(item: ObjectTruth, points: Mapping[str, NDArray[np.intp]]) -> Iterator[str]:
+    number = item.instance.instance_id
+    for name, stated in (item.lidar_points or {}).items():
+        if name not in points:
+            yield f"names the scanner '{name}', which has no scan"
+        elif stated != (count := int(points[name][number]) if number < len(points[name]) else 0):
+            yield f"'{name}': {stated} are stated, the scan has {count}"
 
 
 def _relation_faults(relations: Iterable[Relation] | None, ids: Container[int]) -> Iterator[Fault]:

@@ -27,6 +27,7 @@ from gen_data.generator.core.interfaces import (
     Modality,
     Publication,
     Randomizer,
+    Renderer,
     Sensor,
     SensorInfo,
 )
@@ -41,6 +42,12 @@ from gen_data.randomizers.base import RandomizerBase
 from gen_data.scene_templates.builder import build_scene
 
 NOMINAL_SCENES_KEPT = 32
+
+
+def _open_renderer(config: Config, library: Library) -> Renderer:
+    """Open the renderer. Raises ConfigError, with its place, if this machine lacks the device."""
+    with located_errors(config.document):
+        return config.render.open(library)
 
 
 @dataclass(frozen=True)
@@ -69,7 +76,7 @@ class PipelineFactory:
             resolved,
             library,
             open_physics=partial(open_engine, library, config.general.physics),
-            open_renderer=partial(config.render.open, library),
+            open_renderer=partial(_open_renderer, config, library),
         )
 
     @cached_property
@@ -181,6 +188,7 @@ def pipeline_config(
         layout_attempts_max=config.general.physics.layout_attempts_max,
         exporters=ready_exporters(config, info, library),
         strides=_strides(info),
+        located_errors=partial(located_errors, config.document),
     )
 
 

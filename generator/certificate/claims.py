@@ -80,6 +80,12 @@ CLAIMS = (
         "parameters:check_draws",
     ),
     Claim(
+        "generated again",
+        "Random samples that are generated again from the plan have the stored pictures, points "
+        "and labels.",
+        "again:check_again",
+    ),
+    Claim(
         "distributions",
         "Drawn parameters follow their declared distributions.",
         "parameters:check_parameters",

@@ -6,8 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gen_data.generator.assemble.config import Config, load_config
 from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import GenDataError
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.streams import Rng, Streams
@@ -15,8 +19,7 @@ from gen_data.generator.pipeline.finalize_scene import Timeline
 from gen_data.generator.report.drawn_parameters import Replay, replay_scenes
 from gen_data.generator.report.stored_labels import ImageLabels, read_images
 from gen_data.generator.runner.exports import StoredPipeline
-from gen_data.generator.runner.plan import load_plan
-from gen_data.generator.runner.regeneration import plan_regeneration
+from gen_data.generator.runner.regeneration import Regeneration, plan_regeneration
 from gen_data.generator.runner.stored import StoredSamples
 
 
@@ -25,7 +28,8 @@ class Scope:
     """How much is examined; everything that is not listed here is examined completely.
 
     Attributes:
-        samples: Samples whose pixels and laser points are compared with an independent ray caster.
+        samples: Samples whose pixels and laser points are compared with an independent ray caster,
+            and that are generated again.
         rays: Pixels of every image of these samples, and points of every scan.
         scenes: Scenes whose parameters are drawn again.
         alpha: Probability that a correct data set fails the claim on distributions.
@@ -71,30 +75,48 @@ class Examined:
     @cached_property
     def changes(self) -> str:
         """Why this installation does not draw the same scenes; empty if it does."""
-        plan = load_plan(self.stored.folder)
+        plan = self.stored.plan
         if plan.scenes_of:
             return f"the scenes are those of the data set {plan.scenes_of[:16]}: certify that one"
         try:
-            changes = plan_regeneration(self.stored.folder, plan).changes
+            changes = self.regeneration.changes
         except GenDataError as error:
             return f"the scenes cannot be drawn on this machine: {error}"
         listed = "; ".join(changes[:3]) + ("; ..." if len(changes) > 3 else "")
         return f"this installation differs from the one of the data set: {listed}" * bool(changes)
 
+    @cached_property
+    def regeneration(self) -> Regeneration:
+        """What makes its samples again.
+
+        Raises:
+            ConfigError, AssetError: the configuration or an asset is not available here.
+        """
+        return plan_regeneration(self.stored.folder, self.stored.plan)
+
     def images(self) -> Iterator[ImageLabels]:
         """The labels of every image, in order."""
         return read_images(self.stored)
+
+    def photograph(self, index: int, camera: str) -> NDArray[np.uint8]:
+        """The photograph of a camera in a sample, uint8 [h, w, 3]."""
+        reading = self.stored.labelled(index).capture.readings[camera]
+        return np.asarray(reading.channels[Channel.RGB], np.uint8)
 
     def rng(self, name: str) -> Rng:
         """A stream for choosing what is sampled: the same for the same data set."""
         return Streams(0, 0).rng(f"certificate/{self.stored.dataset_id}/{name}")
 
-    def chosen_samples(self) -> list[Sample]:
-        """Random samples, ascending; all if there are few."""
+    def chosen_indices(self) -> list[int]:
+        """Numbers of random samples, ascending; all if there are few."""
         count = min(self.scope.samples, self.stored.n)
         chosen = self.rng("samples").permutation(self.stored.n)[:count]
+        return sorted(int(index) for index in chosen)
+
+    def chosen_samples(self) -> list[Sample]:
+        """The samples of these numbers."""
         pipeline = StoredPipeline(self.stored, {}, self.config.asset_folders)
-        return [pipeline.sample(int(index)) for index in sorted(chosen)]
+        return [pipeline.sample(index) for index in self.chosen_indices()]
 
     def timeline(self, sample: Sample) -> Timeline:
         """The sample's world through time."""

@@ -1,7 +1,7 @@
 """Claim: readers of other makers find in each export exactly what the labels of the data set say.
 
-Boxes, categories, splits and masks must be equal; and the labels, scored as predictions against the
-export by COCO's evaluation, must have an average precision of 1.
+Pictures, boxes, categories, splits and masks must be equal; and the labels, scored as predictions
+against the export by COCO's evaluation, must have an average precision of 1.
 """
 
 from __future__ import annotations
@@ -38,7 +38,11 @@ def check_exports(examined: Examined) -> Iterator[Finding]:
             continue
         if stated is None:
             cameras = rgb_cameras(examined.stored.info)
-            stated = [image_of(i) for i in examined.images() if i.camera in cameras]
+            stated = [
+                image_of(image, examined.photograph(image.index, image.camera))
+                for image in examined.images()
+                if image.camera in cameras
+            ]
         yield _check_export(examined, root, reader, stated)
 
 
@@ -91,6 +95,7 @@ def _compare(
         contradictions.add(fact)
     figures: dict[str, Figure] = {
         "images": len(found),
+        "pictures": sum(bool(image.pixels) for image in found),
         "objects": sum(len(image.objects) for image in found),
     }
     masked = all(o.mask is not None for image in (*stated, *found) for o in image.objects)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_data.generator.report.stored_labels import ImageLabels, decode_mask
 
@@ -36,6 +38,7 @@ class LabelledImage:
 
     Attributes:
         index: Number of the sample.
+        pixels: Digest of its photograph; empty if it is not stated, or compressed anew.
     """
 
     index: int
@@ -43,6 +46,7 @@ class LabelledImage:
     split: str
     size_px: tuple[int, int]
     objects: tuple[LabelledObject, ...]
+    pixels: str = ""
 
     def __str__(self) -> str:
         """Sample and camera."""
@@ -64,8 +68,8 @@ class Loaded:
     faults: Sequence[str] = ()
 
 
-def image_of(image: ImageLabels) -> LabelledImage:
-    """An image as the labels of the data set state it; objects without a box are left out."""
+def image_of(image: ImageLabels, rgb: NDArray[np.uint8]) -> LabelledImage:
+    """An image as the data set states it, with its photograph; without objects that have no box."""
     return LabelledImage(
         image.index,
         image.camera,
@@ -80,7 +84,13 @@ def image_of(image: ImageLabels) -> LabelledImage:
             for item in image.objects
             if item.get("box") is not None
         ),
+        digest_pixels(rgb),
     )
+
+
+def digest_pixels(rgb: NDArray[np.uint8]) -> str:
+    """Digest of a photograph, uint8 [h, w, 3]."""
+    return hashlib.sha256(np.ascontiguousarray(rgb)).hexdigest()
 
 
 def image_mask(mask: Mapping[str, Any], size_px: tuple[int, int]) -> Rle:
@@ -119,6 +129,8 @@ def compare_images(
             yield f"{image}: is in the split {other.split}, expected {image.split}"
         if other.size_px != image.size_px:
             yield f"{image}: has {other.size_px} px, expected {image.size_px}"
+        if image.pixels and other.pixels not in ("", image.pixels):
+            yield f"{image}: its picture is not that of the data set"
         yield from (f"{image}: {fact}" for fact in _compare_objects(image, other, tolerance_px))
     yield from (f"{name}: is no image of the data set" for name in by_name)
 

@@ -25,6 +25,13 @@ from gen_data.generator.core.se3 import Array
 
 RELATIVE_TOLERANCE = 1e-4
 """Of distances: 32-bit coordinates of the renderer, in worlds of some hundred metres (assumed)."""
+ROLLING_TOLERANCE = 1e-3
+"""Of distances in rows of a rolling shutter among moving things.
+
+Rows share an instant while nothing in them moves farther than 0.25 pixels. What comes nearer at the
+centre of an image, while points at its border, 600 pixels away, move so far, does so by 0.25 / 600
+of its distance; by more if it is nearer than they are.
+"""
 
 
 def check_pixels(examined: Examined) -> Iterator[Finding]:
@@ -58,8 +65,9 @@ def _compare(examined: Examined, sample: Sample, name: str, agreement: Agreement
     stored = next((c for c in (Channel.RANGE, Channel.Z_DEPTH) if c in reading.channels), None)
     rng = examined.rng(f"pixels/{sample.index}/{name}")
     v, u = np.nonzero(ids != UNSTATED) if stored is None else np.indices(ids.shape).reshape(2, -1)
-    time_s = reading.time_s
+    time_s, relative_tolerance = reading.time_s, RELATIVE_TOLERANCE
     if camera.shutter.rolls and sample.scene.tracks and len(v):
+        relative_tolerance = ROLLING_TOLERANCE
         # Every row has an instant of its own: one row costs one world.
         row = v[int(rng.integers(0, len(v)))]
         u, v = u[v == row], v[v == row]
@@ -80,7 +88,8 @@ def _compare(examined: Examined, sample: Sample, name: str, agreement: Agreement
     else:
         image = reading.channels[stored][v, u].astype(np.float64)
         per_ray = np.ones(len(u)) if stored is Channel.RANGE else directions[:, 2]
-        seen = state_distances(image, per_ray, ids[v, u], examined.stored.info.depth_scale_m)
+        scale_m = examined.stored.info.depth_scale_m
+        seen = state_distances(image, per_ray, ids[v, u], scale_m, relative_tolerance)
     scene = examined.timeline(sample).at(time_s)
     pose = scene.camera(name).T_world_camera
     origin_m = np.array(pose.translation_m)
@@ -114,7 +123,13 @@ def stated_ids(reading: SensorReading, truth: ImageTruth | None) -> NDArray[np.i
     return ids
 
 
-def state_distances(image: Array, per_ray: Array, ids: NDArray[np.int64], scale_m: float) -> Seen:
+def state_distances(
+    image: Array,
+    per_ray: Array,
+    ids: NDArray[np.int64],
+    scale_m: float,
+    relative_tolerance: float = RELATIVE_TOLERANCE,
+) -> Seen:
     """Distances along unit rays that the pixels of a depth or range image state; arrays [n].
 
     Args:
@@ -122,10 +137,11 @@ def state_distances(image: Array, per_ray: Array, ids: NDArray[np.int64], scale_
         per_ray: Depth per distance along the ray; 1 for ranges.
         ids: Instance ids.
         scale_m: Metres per unit of the file.
+        relative_tolerance: Of distances, beside the rounding of the file.
     """
     distance = image / per_ray
     vacant = np.isinf(distance)
-    tolerance = 0.51 * scale_m / per_ray + RELATIVE_TOLERANCE * np.where(vacant, 0.0, distance)
+    tolerance = 0.51 * scale_m / per_ray + relative_tolerance * np.where(vacant, 0.0, distance)
     reach = (DEPTH_UNITS_MAX - 0.5) * scale_m / per_ray
     # Beyond the reach of the file there may be a thing, at an unknown distance.
     return Seen(distance, tolerance, np.where(vacant, UNSTATED, ids), reach)

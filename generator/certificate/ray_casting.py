@@ -74,23 +74,30 @@ class Agreement:
         """The finding about a sensor, whose readings and rays have these names in the plural.
 
         Disagreements fail a sensor if so many are improbable at ``DISAGREEING_SHARE`` (binomial
-        test). The limit to their share in all samples is that of Clopper and Pearson (Biometrika
-        26, 1934), for rays that are drawn independently.
+        test).
         """
         from scipy import stats
 
         if not self.rays:
             return not_checked(sensor, f"none of the {reading} of the sampled steps has {ray}")
         tolerated = int(stats.binom.isf(FALSE_ALARM, self.rays, DISAGREEING_SHARE))
-        k, n = self.contradictions.count, self.rays
-        limit = 1.0 if k >= n else float(stats.beta.ppf(CONFIDENCE, k + 1, n - k))
         figures = {
             reading: self.readings,
-            ray: n,
+            ray: self.rays,
             **dict(sorted(self.others.items())),
-            "disagreeing share, at most (99 %)": round(limit, 5),
+            "disagreeing share, at most (99 %)": share_limit(self.contradictions.count, self.rays),
         }
         return self.contradictions.judge(sensor, figures, tolerated)
+
+
+def share_limit(k: int, n: int) -> float:
+    """Upper limit, at ``CONFIDENCE``, to a share of which k of n independent draws were found.
+
+    That of Clopper and Pearson (Biometrika 26, 1934).
+    """
+    from scipy import stats
+
+    return 1.0 if k >= n else round(float(stats.beta.ppf(CONFIDENCE, k + 1, n - k)), 5)
 
 
 class RayCaster:

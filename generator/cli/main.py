@@ -13,6 +13,7 @@ from functools import partial
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from gen_data.generator import __version__
 from gen_data.generator.cli.options import (
@@ -194,14 +195,20 @@ def cli(
     without: tuple[str, ...],
 ) -> None:
     """Generate a data set, unless a command follows."""
+    given = _given_options(context)
     if context.invoked_subcommand is not None:
         if config is not None:
             raise ConfigError(
                 f"--config cannot precede a command; expected: "
                 f"gen-data {context.invoked_subcommand} {config}"
             )
+        if given:
+            command = context.invoked_subcommand
+            raise ConfigError(f"{given[0]} cannot precede a command; expected it after {command}")
         return
     if config is None:
+        if given:
+            raise ConfigError("--config is missing: a file, or the name of a shipped configuration")
         click.echo(context.get_help())
         return
     if n is None:
@@ -220,6 +227,15 @@ def cli(
         shards=shards,
         cluster=choose_cluster(runner, address, cpus, gpus),
     )
+
+
+def _given_options(context: click.Context) -> list[str]:
+    """Options on the command line, such as ``--config``."""
+    return [
+        parameter.opts[0]
+        for parameter in context.command.params
+        if context.get_parameter_source(parameter.name or "") is ParameterSource.COMMANDLINE
+    ]
 
 
 def main() -> None:

@@ -55,13 +55,15 @@ def report(folder: Path, compare: Path | None, html: Path | None, scenes: int) -
     # Poses of scenes that are drawn again must have the last bits of the stored ones.
     with threadpool_limits(limits=1):
         sets = [_describe(one, scenes, len(folders), Console(stderr=True)) for one in folders]
+    if page is not None:
+        # Before the tables: their reader may close the output early, as `| head` does.
+        _write(page, sets)
     console = Console()
     for number, described in enumerate(sets):
         if len(sets) > 1:
             console.rule(str(folders[number]))
         print_tables(console, described["tables"])
     if page is not None:
-        _write(page, sets)
         click.echo(f"wrote {page}")
 
 

@@ -21,7 +21,7 @@ pictures. The same command goes on after an interruption.
 \b
 gen-data study photographs tabletop.yaml --without each
 gen-data study photographs tabletop.yaml --set randomizers.clutter.count=20 --mix 50
-gen-data study photographs tabletop.yaml --against closeup.yaml
+gen-data study photographs tabletop.yaml --against shelf.yaml
 gen-data study photographs --results old=a.json --results new=b.json
 """
 

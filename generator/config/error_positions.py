@@ -14,6 +14,7 @@ _FIELD = re.compile(
     r"(?P<list>elements|randomizers|sensors)\.(?P<name>[\w-]+)(\.(?P<field>[\w.]+))?: (?P<fact>.*)",
     re.DOTALL,
 )
+_SECTION = re.compile(r"(?P<field>render\.[\w.]+): (?P<fact>.*)", re.DOTALL)
 _PLUGIN = re.compile(r"(?P<list>sensor|exporter) '(?P<name>[\w-]+)': (?P<fact>.*)", re.DOTALL)
 
 
@@ -22,11 +23,17 @@ def located_errors(document: Node) -> Iterator[None]:
     """Add ``file:line:column`` to a ConfigError of a plug-in of a document.
 
     Its message begins with ``elements.<name>.<field>:``, ``randomizers...``, ``sensors...``,
-    ``sensor '<name>':`` or ``exporter '<type>':``; others stay as they are.
+    ``sensor '<name>':``, ``exporter '<type>':`` or ``render.<field>:``; others stay as they are.
     """
     try:
         yield
     except ConfigError as error:
+        section = _SECTION.fullmatch(str(error))
+        if section is not None and type(error) is ConfigError:
+            value = document.get(*section["field"].split("."))
+            if value is None:
+                raise
+            refuse(value.position, section["field"], section["fact"])
         found = _FIELD.fullmatch(str(error)) or _PLUGIN.fullmatch(str(error))
         if found is None or type(error) is not ConfigError:
             raise

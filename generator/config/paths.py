@@ -66,6 +66,8 @@ def find_path(
             f"'{abbreviate(name)}' is a URL; expected a {kind} on this machine: copy it first, as "
             "with 'aws s3 cp --recursive'"
         )
+    elif name and not is_folder and path.is_dir():
+        fact = f"'{abbreviate(str(path), 300)}' is a folder; expected a file with a {kind}"
     elif by_name:
         fact += f"; shipped are {', '.join(by_name)}{did_you_mean(name, by_name)}"
     raise _error(position, field, fact)

@@ -39,6 +39,10 @@ MAX_NODES = 50_000
 MAX_ALIASED_NODES = 1_000
 MAX_STRING_BYTES = 4096
 
+_TOO_DEEP = f"nested deeper than {MAX_DEPTH} levels"
+_LIBYAML_TOO_DEEP = "exceeded maximum nesting depth"
+"""What libyaml says from version 0.2.6 on of 1,000 open brackets, before it returns the first."""
+
 ORIGIN = "--set"
 """Name of overrides in messages, in place of a file."""
 
@@ -218,6 +222,8 @@ class _Reader:
             yield from yaml.parse(self._text, Loader=_LOADER)
         except yaml.MarkedYAMLError as error:
             what = ", ".join(part for part in (error.context, error.problem) if part)
+            if _LIBYAML_TOO_DEEP in what:
+                self._abort(self._place_of(error), _TOO_DEEP)
             self._abort(self._place_of(error), f"not valid YAML: {what}")
         except yaml.YAMLError as error:
             self._abort(self._at(0, 0), f"not valid YAML: {abbreviate(str(error), 200)}")
@@ -276,7 +282,7 @@ class _Reader:
         if self._nodes > MAX_NODES:
             self._abort(where, f"more than {MAX_NODES} values in one document")
         if depth >= MAX_DEPTH:
-            self._abort(where, f"nested deeper than {MAX_DEPTH} levels")
+            self._abort(where, _TOO_DEEP)
 
     def _scalar(self, event: ScalarEvent, where: Position) -> Node:
         text = self._text_of(event, where)
@@ -349,7 +355,7 @@ class _Reader:
         if self._aliased > MAX_ALIASED_NODES:
             self._abort(where, f"aliases stand for more than {MAX_ALIASED_NODES} values")
         if depth + levels > MAX_DEPTH:
-            self._abort(where, f"nested deeper than {MAX_DEPTH} levels")
+            self._abort(where, _TOO_DEEP)
         return target
 
     def _start_of(self, event: Any) -> Position:

@@ -20,6 +20,7 @@ from gen_data.generator.matching.picture import Picture
 from gen_data.generator.matching.quantities import CAMERA, CameraQuantity, jpeg_quality
 from gen_data.generator.matching.quantities.base import FieldChange, round_digits, typical
 from gen_data.generator.matching.quantities.noise import NOISE
+from gen_data.generator.matching.quantities.read_noise import READ_NOISE
 from gen_data.generator.matching.recordings import Photo
 from gen_data.generator.matching.results import (
     ComparedStatistic,
@@ -151,7 +152,8 @@ def _unmeasurable(
 ) -> list[str]:
     """Reason for each of ``CAMERA`` that cannot be fitted; empty for the others."""
     sensorless = exposures[0].pipeline.image_sensor is None
-    quiet = [quantity for quantity in CAMERA if not (sensorless and quantity is NOISE)]
+    added = (NOISE, READ_NOISE) if sensorless else ()
+    quiet = [quantity for quantity in CAMERA if quantity not in added]
     own = [float(start[CAMERA.index(quantity)]) for quantity in quiet]
 
     def measure(exposure: Exposure) -> list[float]:
@@ -170,9 +172,13 @@ def _unmeasurable(
             reason = "not measurable in any photograph"
         elif not len(ours):
             reason = "not measurable in any simulated photograph"
-        elif quantity not in quiet and np.median(theirs) < np.median(ours) + NOISE_EXCESS:
+        elif quantity in added and np.median(theirs) < np.median(ours) + NOISE_EXCESS:
             reason = "no noise beyond that of eight bits; the camera has no image_sensor"
         reasons.append(reason)
+    if sensorless:
+        # A sensor is added as a whole, or not at all.
+        noise, read_noise = (CAMERA.index(quantity) for quantity in (NOISE, READ_NOISE))
+        reasons[read_noise] = reasons[noise] or reasons[read_noise]
     return reasons
 
 

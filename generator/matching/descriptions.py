@@ -37,15 +37,8 @@ PICTURES: tuple[tuple[str, Callable[[Picture], float]], ...] = (
 )
 
 
-def _dark_share(scan: Scan) -> float:
-    return float((scan.intensity <= 0.0).mean())
-
-
 def _median_range(scan: Scan) -> float:
     return float(np.median(scan.range_m))
 
 
-SCANS: tuple[tuple[str, Callable[[Scan], float]], ...] = (
-    ("share of points with intensity 0", _dark_share),
-    ("median range [m]", _median_range),
-)
+SCANS: tuple[tuple[str, Callable[[Scan], float]], ...] = (("median range [m]", _median_range),)

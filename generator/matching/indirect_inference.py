@@ -33,9 +33,10 @@ simulated scenes, at most."""
 EVERY = 1 << 30
 """All scenes."""
 
-CANDIDATES_MAX = 14
-CONVERGED = 0.02
-"""Relative change of the parameters, and of the remaining distance, at which the search ends."""
+CANDIDATES_MAX = 20
+CONVERGED = 5e-3
+"""Relative change of the parameters, in plausible deviations from their first values, and of the
+remaining distance, at which the search ends."""
 DERIVATIVE_SCENES = 12
 """Scenes for derivatives: differences within a scene scatter less than scenes do."""
 TRIMMED = 0.1
@@ -65,6 +66,7 @@ class Axis:
         plausible: Standard deviation of the values to expect around the configuration's own.
         enough: Half width of an interval that is narrow enough for most uses.
         varies: Whether the parameter may differ from recording to recording.
+        grid: Simulations round the parameter to multiples of this; 0 = they do not.
     """
 
     low: float
@@ -73,6 +75,7 @@ class Axis:
     plausible: float
     enough: float
     varies: bool = True
+    grid: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -239,34 +242,46 @@ def solve(
     """
     from scipy.optimize import least_squares
 
-    bounds = _bounds(axes)
+    low, high = _bounds(axes)
     plausible = np.array([axis.plausible for axis in axes])
-    start = np.clip(start, *bounds)
-    first = start if first is None else np.clip(first, *bounds)
-    target, known = trimmed_mean(real), {first.tobytes(): simulate(first, EVERY)}
-    error = np.sqrt(_variance_of_mean(real) + _variance_of_mean(known[first.tobytes()]))
+    start = np.clip(start, low, high)
+
+    def locate(place: Array) -> Array:
+        """Parameters at a place of the search, which is 1 for the configuration's values."""
+        return np.asarray(np.clip(start + plausible * (place - 1.0), low, high))
+
+    def place(at: Array) -> Array:
+        return np.asarray(1.0 + (at - start) / plausible)
+
+    begin = start if first is None else np.clip(first, low, high)
+    target, known = trimmed_mean(real), dict[bytes, Array]()
 
     def found(at: Array) -> Array:
         if at.tobytes() not in known:
             known[at.tobytes()] = simulate(at, EVERY)
         return known[at.tobytes()]
 
-    def residuals(at: Array) -> Array:
-        gap = np.nan_to_num(trimmed_mean(found(at)) - target)
-        return np.concatenate([gap / error, (at - start) / plausible])
+    error = np.sqrt(_variance_of_mean(real) + _variance_of_mean(found(begin)))
+
+    def residuals(place: Array) -> Array:
+        gap = np.nan_to_num(trimmed_mean(found(locate(place))) - target)
+        return np.concatenate([gap / error, place - 1.0])
 
     def derivatives(at: Array) -> Array:
         return _derivatives(simulate, at, found(at), axes) if slopes is None else slopes
 
-    def jacobian(at: Array) -> Array:
-        return np.vstack([derivatives(at) / error[:, None], np.diag(1.0 / plausible)])
+    def jacobian(place: Array) -> Array:
+        steep = derivatives(locate(place)) * plausible / error[:, None]
+        return np.vstack([steep, np.eye(len(axes))])
 
+    # In plausible deviations, so that no parameter's unit decides when the search has converged;
+    # from 1 and not 0, as the first trust region has the size of the first place.
     search = least_squares(
-        residuals, first, jacobian, bounds, x_scale=plausible, xtol=CONVERGED, ftol=CONVERGED,
-        gtol=None, max_nfev=CANDIDATES_MAX,
+        residuals, place(begin), jacobian, (place(low), place(high)),
+        xtol=CONVERGED, ftol=CONVERGED, gtol=None, max_nfev=CANDIDATES_MAX,
     )  # fmt: skip
-    at = np.asarray(search.x)
-    last = search.jac[: len(axes)] * error[:, None]
+    at = locate(search.x)
+    last = search.jac[: len(axes)] * error[:, None] / plausible
     gain, determined = _gain(last, real, found(at), axes)
     return Solution(at, last, gain, determined, found(at))
 

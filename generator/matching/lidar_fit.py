@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.matching.descriptions import SCANS
 from gen_data.generator.matching.indirect_inference import Estimate, fit, trimmed_mean
-from gen_data.generator.matching.quantities import LIDAR
+from gen_data.generator.matching.quantities import LIDAR, LidarQuantity
 from gen_data.generator.matching.quantities.base import FieldChange, round_digits
+from gen_data.generator.matching.quantities.dark_returns import DARK_RETURNS, LEAST
 from gen_data.generator.matching.quantities.lidar_range import RANGE
 from gen_data.generator.matching.recordings import Scan
 from gen_data.generator.matching.results import (
@@ -47,29 +48,38 @@ def fit_lidar(illuminations: Sequence[Illumination], scans: Sequence[Scan], sens
         quantities = [LIDAR[k] for k in positions]
         return measure_illuminations(illuminations, quantities, coordinates, count)
 
-    start = _start(own, trimmed_mean(real))
-    found = list(fit(real, simulate, axes, start, range(len(LIDAR))).values())
+    reports = scanner.device.response is not None
+    used = [k for k, quantity in enumerate(LIDAR) if reports or quantity is not DARK_RETURNS]
+    estimates = fit(real, simulate, axes, _start(own, trimmed_mean(real)), used)
+    found = {LIDAR[k]: one for k, one in estimates.items()}
     rows = tuple(
-        fitted_quantity(
-            quantity, one, float(before), round_digits(quantity.to_value(one.mean)), quantity.path
-        )
-        for quantity, one, before in zip(LIDAR, found, own, strict=True)
+        _row(quantity, found.get(quantity), float(before))
+        for quantity, before in zip(LIDAR, own, strict=True)
     )
     statistics = _compare(illuminations, scans, found)
     return Part(rows, statistics, _fields(_with(scanner, found), rows, sensor))
 
 
+def _row(quantity: LidarQuantity, found: Estimate | None, before: float) -> FittedQuantity:
+    if found is None:
+        (row,) = not_fitted([quantity], "the data sheet has no response: no point has intensity 0")
+        return row
+    value = round_digits(quantity.to_value(found.mean))
+    return fitted_quantity(quantity, found, before, value, quantity.path)
+
+
 def _start(own: Array, real: Array) -> Array:
-    """First parameters: a limit of range shows only if it is near the real scans' range."""
+    """First parameters: limits show only if they are near what there is to see."""
     start: Array = own.copy()
-    number = LIDAR.index(RANGE)
-    start[number] = min(own[number], real[number] + 0.5 * RANGE.axis.step)
+    reach, dark = LIDAR.index(RANGE), LIDAR.index(DARK_RETURNS)
+    start[reach] = min(own[reach], real[reach] + 0.5 * RANGE.axis.step)
+    start[dark] = max(own[dark], LEAST)
     return start
 
 
-def _with(sensor: LidarSensor, found: Sequence[Estimate]) -> LidarSensor:
+def _with(sensor: LidarSensor, found: Mapping[LidarQuantity, Estimate]) -> LidarSensor:
     """The scanner with all parameters that were determined."""
-    for quantity, one in zip(LIDAR, found, strict=True):
+    for quantity, one in found.items():
         if one.determined:
             sensor = quantity.apply(sensor, one.mean)
     return sensor
@@ -91,7 +101,9 @@ def _fields(
 
 
 def _compare(
-    illuminations: Sequence[Illumination], scans: Sequence[Scan], found: Sequence[Estimate]
+    illuminations: Sequence[Illumination],
+    scans: Sequence[Scan],
+    found: Mapping[LidarQuantity, Estimate],
 ) -> tuple[ComparedStatistic, ...]:
     """Statistics of real scans, and of simulated ones before and after."""
     before = [rescan(one, one.sensor) for one in illuminations]

@@ -7,6 +7,7 @@ same random streams for all candidates.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -193,8 +194,21 @@ def measure_exposures(
         picture = photograph(exposure, pipeline)
         return [quantity.measure(picture) for quantity in quantities]
 
-    rows = np.broadcast_to(coordinates, (len(used), len(quantities)))
+    grids = [quantity.axis.grid for quantity in quantities]
+    rows = np.broadcast_to(coordinates, (len(used), len(quantities))) + _dither(len(used), grids)
     return np.array(list(map_in_threads(measure, used, rows)))
+
+
+def _dither(scenes: int, grids: Sequence[float]) -> Array:
+    """Offsets [scenes, k] of parameters that the pipeline rounds to multiples; 0 = it does not.
+
+    They are spread evenly over a step, so that the mean of the rounded values is the parameter, and
+    mean statistics change steadily with it (dither: Schuchman, "Dither signals and their effect on
+    quantization noise", IEEE Transactions on Communication Technology 12, 1964). Multiples of the
+    golden ratio are even, however many there are.
+    """
+    shares = (0.5 + np.arange(scenes) * (math.sqrt(5.0) - 1.0) / 2.0) % 1.0 - 0.5
+    return np.asarray(shares[:, None] * np.array(grids))
 
 
 def measure_illuminations(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import TracebackType
@@ -62,6 +62,7 @@ class PipelineConfig:
         split_assignment: How scenes are assigned to splits.
         layout_attempts_max: Largest number of attempts at one scene.
         strides: Steps between readings, by sensor; 1 for all others.
+        located_errors: Opens a block that adds places in the configuration to errors of plug-ins.
     """
 
     info: DatasetInfo
@@ -74,6 +75,7 @@ class PipelineConfig:
     strides: Mapping[str, int] = field(default_factory=dict)
     frame_truth: Callable[[Mapping[str, Scene]], EgoTruth | None] | None = None
     split_assignment: Assignment = "random"
+    located_errors: Callable[[], AbstractContextManager[None]] = nullcontext
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,17 +166,19 @@ class Pipeline:
         """Generate sample number ``index``, from 0.
 
         Raises:
+            ConfigError: a plug-in finds that a drawn value of its fields does not fit the scene.
             SceneRejected: no valid layout within the bounded number of attempts.
             SampleError: the labels contradict each other.
         """
         view_number, step_index = divmod(index, self.info.steps_per_scene)
         scene_index, view_index = divmod(view_number, self.info.views_per_scene)
-        accepted = self.accepted_scene(scene_index)
-        first = view_index == 0 and step_index == 0
-        timings: dict[str, float] = dict(accepted.timings_s) if first else {}
-        with _timed(timings, "randomize"):
-            view = self.drawn_view(accepted, view_index)
-        sample = self.read_sensors(view, accepted.sensors, step_index, timings)
+        with self.config.located_errors():
+            accepted = self.accepted_scene(scene_index)
+            first = view_index == 0 and step_index == 0
+            timings: dict[str, float] = dict(accepted.timings_s) if first else {}
+            with _timed(timings, "randomize"):
+                view = self.drawn_view(accepted, view_index)
+            sample = self.read_sensors(view, accepted.sensors, step_index, timings)
         return replace(sample, attempts=accepted.attempt + 1)
 
     def read_sensors(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,7 +18,7 @@ from gen_data.generator.runner.durable_files import write_durably
 from gen_data.generator.runner.seal import read_or_empty
 
 if TYPE_CHECKING:
-    from gen_data.generator.runner.shard import Job, PipelineLike
+    from gen_data.generator.runner.shard import EnteredPipeline, Job, PipelineLike
     from gen_data.generator.runner.store import LocalStore
 
 NUMERICS_NAME = "numerics.json"
@@ -46,6 +46,15 @@ def admit_numerics(job: Job, pipeline: PipelineLike) -> None:
         if not job.allow_mixed_numerics:
             raise NumericsError(_describe(known[0], entry))
         job.store.append_run_file(NUMERICS_NAME, line)
+
+
+def is_admitted(store: LocalStore, make_pipeline: Callable[[], EnteredPipeline]) -> bool:
+    """Whether this process computes as one of those that generated a data set, or none is known."""
+    known = _parse(store.read_run_file(NUMERICS_NAME))
+    with make_pipeline() as pipeline:
+        compute = getattr(pipeline, "numerics", None)
+        digests = None if compute is None else dict(compute())
+    return not known or any(digests == one.get("digests") for one in known)
 
 
 def gather_numerics(run_dirs: Sequence[Path], store: LocalStore, allow_mixed: bool) -> None:

@@ -119,8 +119,9 @@ def compare_plans(old: Plan, new: Plan) -> list[str]:
     Fields of the configuration are named as in YAML, all others as in Plan.
     """
     was, now = to_plain(old), to_plain(new)
-    lines = list(differences("", was.pop("config"), now.pop("config")))
-    return lines + list(differences("", was, now))
+    configs = differences("", was.pop("config"), now.pop("config"))
+    # The seed is part of both, under the same name.
+    return list(dict.fromkeys((*configs, *differences("", was, now))))
 
 
 def differences(place: str, was: Any, now: Any) -> Iterator[str]:

@@ -223,8 +223,10 @@ class _Check:
             data = read_or_empty(place)
             record = parse_unchecked_record(data)
             if record is None or hashlib.sha256(data).hexdigest() != digest:
-                text = "its sha256 is not the one in the manifest" if data else "is missing"
-                yield Finding("digest", path, text, self._samples_of(path))
+                # One that is missing is found among the files of SHA256SUMS.
+                if place.is_file():
+                    text = "its sha256 is not the one in the manifest"
+                    yield Finding("digest", path, text, self._samples_of(path))
                 continue
             yield from self._compare_record(shard, record)
             by_digest.update({file.sha256: file.bytes for file in record.files})

@@ -12,6 +12,16 @@ from gen_data.generator.study.failures import count_groups
 ALPHA = 0.05
 """False alarm rate of all verdicts of a study together."""
 
+CLASS = "class"
+BY_GROUP, BY_CLASS = "objects found, by group", "objects found, by class"
+"""Titles of tables."""
+ORDER = (
+    *("dark", "middle", "bright"),
+    *("visible", "partly occluded", "largely occluded"),
+    *("small", "medium", "large"),
+)
+"""Groups from little to much."""
+
 Table = dict[str, Any]
 """``title``, ``header``, ``rows`` of texts, ``note``."""
 
@@ -87,27 +97,38 @@ def tabulate(findings: Mapping[str, Any]) -> list[Table]:
     )
     header = ["variant", "AP", "AP50", "AP - baseline", "p", "verdict"]
     tables: list[Table] = [{"title": "variants", "header": header, "rows": rows, "note": note}]
-    names = list(findings["groups"])
-    groups = sorted({(g["kind"], g["group"]) for rows in findings["groups"].values() for g in rows})
-    shares = {
-        name: {(g["kind"], g["group"]): g for g in findings["groups"][name]} for name in names
-    }
-    tables.append(
+    return [*tables, *_tabulate_groups(findings["groups"], seeds)]
+
+
+def _tabulate_groups(groups: Mapping[str, Any], seeds: int) -> list[Table]:
+    """Shares of objects found by group, and by class: there may be a hundred of them."""
+    names = list(groups)
+    shares = {name: {(g["kind"], g["group"]): g for g in groups[name]} for name in names}
+    every = sorted({key for row in shares.values() for key in row}, key=_rank)
+    note = "IoU of 0.5 at least, at the score with the best F1 of each run"
+    return [
         {
-            "title": "objects found, by group",
-            "header": ["group", "objects", *names],
+            "title": title,
+            "header": [title.rpartition(" ")[2], "objects", *names],
             "rows": [
                 [
-                    f"{kind}: {group}",
+                    group if kind == CLASS else f"{kind}: {group}",
                     str(shares[names[0]][kind, group]["objects"] // seeds),
                     *(_percent(shares[name].get((kind, group))) for name in names),
                 ]
-                for kind, group in groups
+                for kind, group in every
+                if (kind == CLASS) == (title == BY_CLASS)
             ],
-            "note": "IoU of 0.5 at least, at the score with the best F1 of each run",
+            "note": note,
         }
-    )
-    return tables
+        for title in (BY_GROUP, BY_CLASS)
+    ]
+
+
+def _rank(key: tuple[str, str]) -> tuple[str, int, str]:
+    """Order of a group by its kind, and from little to much within it."""
+    kind, group = key
+    return kind, ORDER.index(group) if group in ORDER else 0, group
 
 
 def _plain(value: Interval) -> dict[str, float]:

@@ -11,10 +11,13 @@ import cv2
 from gen_data.generator.report.html_page import format_document, format_table
 from gen_data.generator.study.evaluation import Evaluation
 from gen_data.generator.study.failures import draw_faults, worst_pictures
-from gen_data.generator.study.findings import Table
+from gen_data.generator.study.findings import BY_CLASS, Table
 
 PICTURES_MAX = 12
 """Pictures of faults per variant."""
+
+LAST = (BY_CLASS,)
+"""Titles of the tables that are below the pictures, as they may be long."""
 
 _LEGEND = (
     '<p class="legend"><span><i class="key found"></i>found</span>'
@@ -27,10 +30,13 @@ def format_page(
     title: str, tables: Sequence[Table], runs: Mapping[str, Sequence[Evaluation]]
 ) -> str:
     """Format the HTML document: tables, and the pictures of each variant with most faults."""
-    shown = "".join(format_table(**table) for table in tables)
+    first, last = (
+        "".join(format_table(**table) for table in tables if (table["title"] in LAST) == is_last)
+        for is_last in (False, True)
+    )
     pictures = "".join(_pictures(name, evaluations) for name, evaluations in runs.items())
     return format_document(
-        title, f"<main><h1>{escape(title)}</h1>{shown}{_LEGEND}{pictures}</main>"
+        title, f"<main><h1>{escape(title)}</h1>{first}{_LEGEND}{pictures}{last}</main>"
     )
 
 

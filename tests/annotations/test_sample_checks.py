@@ -93,8 +93,8 @@ def make_sample() -> Sample:
         "test", bodies=tuple(bodies), instances=tuple(instances), cameras=(camera,),
         lidars=(lidar,), devices=(device,),
     )  # fmt: skip
-    points = np.zeros(50, POINT)
-    points["instance_id"], points["return_count"] = np.arange(50) % 21, 1
+    points = np.zeros(63, POINT)
+    points["instance_id"], points["return_count"] = np.arange(63) % 21, 1
     points["return_number"] = 1
     rows = np.zeros(5, [("time_s", "<f8"), ("acceleration_m_s2", "<f4", (3,))])
     flow = np.zeros((HEIGHT_PX, WIDTH_PX, 2), np.float32)
@@ -270,6 +270,7 @@ MUTATIONS: dict[str, Mutation] = {
     "part unknown": change_object(part_px={"lids": 10}),
     "keypoint unknown": change_object(keypoints=(KeypointTruth("tip", (0.0, 0.0, 1.0)),)),
     "lidar unknown": change_object(lidar_points={"roof": 1}),
+    "lidar miscounted": change_object(lidar_points={"top": 4}),
     "lidar negative": change_object(lidar_points={"top": -1}),
     "motion NaN": change_object(motion=MotionTruth(Twist((NAN, 0.0, 0.0)), Twist())),
     "category 0": change_instance(category_id=0),

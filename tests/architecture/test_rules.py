@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import ast
-import os
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+
+from tests.end_to_end.running import environment
 
 ROOT = Path(__file__).parents[2]
 OURS = ("generator", "randomizers", "exporters", "scene_templates")
@@ -134,7 +135,7 @@ def output_of(program: str, *arguments: str) -> list[str]:
         capture_output=True,
         text=True,
         check=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        env=environment(),
     )
     return done.stdout.splitlines()
 

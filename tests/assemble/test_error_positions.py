@@ -33,6 +33,17 @@ def test_names_counts_and_repetitions_are_refused_when_read(override: str, messa
     assert str(caught.value).startswith(message)
 
 
+def test_a_device_that_the_machine_lacks_is_refused_with_its_place() -> None:
+    """No machine has a hundred GPUs; those that exist are named."""
+    config = load_config("tabletop.yaml", overrides=["render.device=cuda:99"])
+    with pytest.raises(ConfigError) as caught, PipelineFactory(config, n=1)():
+        pass
+
+    assert str(caught.value).startswith(
+        "--set:1:15: render.device: 'cuda:99' does not exist on this machine; it has cpu"
+    )
+
+
 @pytest.mark.parametrize(
     ("override", "message"),
     [
@@ -57,3 +68,37 @@ def test_errors_across_plugins_are_found_before_any_engine_starts(
         factory.check()
 
     assert str(caught.value).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        (
+            "randomizers.pose.mode={choice: {hod: 1}}",
+            "--set:1:23: randomizers[3].mode: there is no 'hod'; expected one of joints,",
+        ),
+        ("randomizers.lamps.kind={choice: [sphere, sqare]}", "--set:1:24: randomizers[9].kind:"),
+    ],
+)
+def test_names_that_a_distribution_may_draw_are_checked_when_read(
+    override: str, message: str
+) -> None:
+    """The sample that drew the name ended the run."""
+    with pytest.raises(ConfigError) as caught:
+        load_config("tabletop.yaml", overrides=[override])
+
+    assert str(caught.value).startswith(message)
+
+
+def test_errors_that_only_a_drawn_scene_shows_have_their_place() -> None:
+    """The first sample finds that no body and no group has this name."""
+    choice = ["randomizers.cover.targets=[clutter, tabel]", "physics.settle_time_s_max=0.1"]
+    with (
+        PipelineFactory(load_config("tabletop.yaml", overrides=choice), 1)() as pipeline,
+        pytest.raises(ConfigError) as caught,
+    ):
+        pipeline.sample(0)
+
+    message = "--set:1:27: randomizers[6].targets: there is no 'tabel'; expected one of"
+    assert str(caught.value).startswith(message)
+    assert "(did you mean 'table'?)" in str(caught.value)

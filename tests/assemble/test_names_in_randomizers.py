@@ -43,7 +43,12 @@ def refusal(folder: Path, *lines: str) -> str:
         (
             "{type: environment, name: e, images: [studoi]}",
             "mine.yaml:4:42: randomizers[0].images",
-            "no environment is studoi",
+            "no environment is 'studoi'",
+        ),
+        (
+            "{type: environment, name: e, images: [indoor, studoi]}",
+            "mine.yaml:4:42: randomizers[0].images",
+            "no environment is 'studoi'",
         ),
         (
             "{type: objects, name: cluter}",

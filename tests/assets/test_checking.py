@@ -66,6 +66,15 @@ def test_a_robot_is_measured_at_home(folder: Path, tmp_path: Path) -> None:
     assert arm.size_m[2] == pytest.approx(0.05 + ball_z + 0.05, abs=0.002)
 
 
+def test_a_folder_without_assets_is_refused(tmp_path: Path) -> None:
+    """It is probably the wrong one."""
+    (tmp_path / "thesis.txt").write_text("irreplaceable")
+    result = CliRunner().invoke(assets, ["check", str(tmp_path)])
+
+    assert isinstance(result.exception, AssetError)
+    assert "has no assets; expected OBJ" in str(result.exception)
+
+
 def test_the_command_fails_if_an_asset_cannot_be_used(folder: Path) -> None:
     """The message names the asset and the reason."""
     result = CliRunner().invoke(assets, ["check", str(folder)])

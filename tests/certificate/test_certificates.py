@@ -31,7 +31,7 @@ from tests.certificate.sealing import SMALL, reseal
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
 pytest.importorskip("open3d", reason="certificates cast rays with open3d")
 
-QUICK = {"samples": 4, "rays": 200, "scenes": 0}
+QUICK = {"samples": 2, "rays": 400, "scenes": 0}
 """A scope for claims that need no scene drawn again."""
 
 
@@ -85,6 +85,7 @@ def test_a_good_data_set_passes_every_claim(certified: Path) -> None:
             ("pixels", "color"),
             ("laser points", "pseudo_lidar"),
             ("draws", ""),
+            ("generated again", ""),
             ("distributions", ""),
             ("splits", ""),
         ],
@@ -98,7 +99,9 @@ def test_figures_say_how_much_was_checked(certified: Path) -> None:
     figures = {c["name"]: c["findings"][0]["figures"] for c in plain["claims"]}
 
     assert (figures["pixels"]["images"], figures["pixels"]["pixels"]) == (4, 800)
-    assert figures["exports"]["images"] == 64
+    assert figures["exports"]["images"] == figures["exports"]["pictures"] == 64
+    # None of 4 differs: 1 - 0.01 ** (1 / 4), by the binomial distribution.
+    assert figures["generated again"]["differing share, at most (99 %)"] == 0.68377
     assert figures["exports"]["AP of boxes"] == figures["exports"]["AP of masks"] == 1.0
     assert figures["draws"]["scenes"] == figures["splits"]["scenes"] == 32
     assert figures["distributions"]["false-alarm rate of all tests"] == 0.001
@@ -203,9 +206,45 @@ def test_scaled_depth_is_named(damaged: Callable[[], Path]) -> None:
 
     certificate = gen_data.certify(copy, **QUICK)
 
-    assert failed(certificate) == {"pixels"}
+    assert failed(certificate) == {"pixels", "generated again"}
     evidence = findings(certificate)["pixels: color"].evidence
     assert "a ray does not meet what is stated" in evidence[0]
+
+
+def test_exchanged_photographs_are_named(damaged: Callable[[], Path]) -> None:
+    """In exports, too: nothing but generating them again tells that each is the other's picture."""
+    copy = damaged()
+    first, second = (copy / f"shards/000000/color/rgb/{k:09d}.png" for k in (2, 9))
+    pictures = first.read_bytes(), second.read_bytes()
+    links = [[p for p in copy.rglob("*.png") if p.read_bytes() == data] for data in pictures]
+    for paths, data in zip(links, reversed(pictures), strict=True):
+        for path in paths:
+            path.write_bytes(data)
+    reseal(copy)
+
+    certificate = gen_data.certify(copy, samples=64, rays=1, scenes=0)
+
+    assert failed(certificate) == {"generated again"}
+    evidence = findings(certificate)["generated again"].evidence
+    assert [text.split(":")[0] for text in evidence] == ["sample 2", "sample 9"]
+    assert "first difference in stage render" in evidence[0]
+
+
+def test_a_picture_that_is_another_one_in_an_export_is_named(damaged: Callable[[], Path]) -> None:
+    """The file of COCO is edited, that of the sample is not."""
+    copy = damaged()
+    path = next((copy / "coco").glob("*/000000007_color.png"))
+    mirrored = cv2.imread(str(path))[:, ::-1]
+    path.unlink()
+    cv2.imwrite(str(path), mirrored)
+    reseal(copy)
+
+    certificate = gen_data.certify(copy, **QUICK)
+
+    assert failed(certificate) == {"exports"}
+    assert findings(certificate)["exports: coco"].evidence == (
+        "sample 7, color: its picture is not that of the data set",
+    )
 
 
 def test_exchanged_instances_are_named(damaged: Callable[[], Path]) -> None:
@@ -230,7 +269,7 @@ def test_moved_laser_points_are_named(damaged: Callable[[], Path]) -> None:
 
     certificate = gen_data.certify(copy, **QUICK)
 
-    assert failed(certificate) == {"laser points"}
+    assert failed(certificate) == {"laser points", "generated again"}
     evidence = findings(certificate)["laser points: pseudo_lidar"].evidence
     assert "a ray does not meet instance" in evidence[0]
 

@@ -31,6 +31,7 @@ from gen_data.generator.config.distributions import (
     Name,
     Normal,
     Numeric,
+    OneOf,
     Position,
     Probability,
     QuaternionWxyz,
@@ -47,6 +48,7 @@ from gen_data.generator.config.problems import Problems
 from gen_data.generator.config.validation import validate
 from gen_data.generator.config.yaml_scalars import to_flow_yaml
 from gen_data.generator.config.yaml_tree import parse_yaml
+from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.streams import Rng, Streams
 
 
@@ -494,3 +496,32 @@ def test_a_scalar_is_drawn_in_microseconds() -> None:
     seconds = min(timeit.repeat(lambda: [d.draw(rng) for d in distributions], number=200, repeat=5))
 
     assert seconds / (200 * len(distributions)) < 50e-6
+
+
+class Sides(Strict):
+    """A field with few names."""
+
+    side: Annotated[Name, OneOf(("left", "right"))] = Constant("left")
+
+
+@pytest.mark.parametrize("text", ["right", "{choice: {left: 1, lfet: 0}}", "{sequence: [right]}"])
+def test_names_of_a_closed_set_are_read_as_any_others(text: str) -> None:
+    """A name without weight is never drawn, and so not checked."""
+    problems = Problems()
+    validate(parse_yaml(f"side: {text}", "test"), Sides, problems)
+    assert not len(problems)
+
+
+@pytest.mark.parametrize("text", ["lfet", "{choice: [right, lfet]}", "{sequence: [lfet]}"])
+def test_other_names_are_refused_with_the_nearest(text: str) -> None:
+    """Wherever they stand in a distribution."""
+    problems = Problems()
+    validate(parse_yaml(f"side: {text}", "test"), Sides, problems)
+    with pytest.raises(ConfigError, match=r"side: there is no 'lfet'; expected one of left, right"):
+        problems.raise_if_any()
+
+
+def test_the_schema_lists_the_names_of_a_closed_set() -> None:
+    """For editors."""
+    constant, _ = Sides.model_json_schema()["properties"]["side"]["anyOf"]
+    assert constant["enum"] == ["left", "right"]

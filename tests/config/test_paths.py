@@ -46,6 +46,17 @@ def test_on_the_command_line_a_path_starts_from_the_current_folder(
     assert find_path("assets", position, "", "folder", is_folder=True) == Path("assets")
 
 
+def test_a_folder_in_the_place_of_a_file_is_named_as_such(tmp_path: Path) -> None:
+    """It was said not to be there."""
+    (tmp_path / "coco").mkdir()
+    (tmp_path / "mine.yaml").touch()
+
+    with pytest.raises(ConfigError, match=r"coco' is a folder; expected a file with a model"):
+        find_path("coco", at(tmp_path / "mine.yaml"), "sensors[0].model", "model")
+    with pytest.raises(ConfigError, match=r"coco' is a folder; expected a file with a config"):
+        load_config(str(tmp_path / "coco"))
+
+
 def test_a_tilde_is_the_users_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In documents, too, which no shell expands."""
     (tmp_path / "sheet.yaml").touch()

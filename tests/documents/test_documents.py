@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import importlib.util
 import re
+import shlex
 from pathlib import Path
 
+import click
 import pytest
 import yaml
 
 from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+from gen_data.generator.cli.main import cli
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("examples/**/*.md")])
@@ -95,3 +98,35 @@ def test_modules_exist(page: Path) -> None:
         )
     ):
         assert (ROOT / name).exists(), name
+
+
+def commands_of(page: Path) -> list[str]:
+    """Command lines in a page's blocks of shell code and in its tables."""
+    text = page.read_text("utf-8")
+    blocks = re.findall(r"^```(?:bash|sh)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    lines = [line for block in blocks for line in block.replace("\\\n", " ").splitlines()]
+    lines += re.findall(r"`(gen-data [a-z-][^`]*)`", text)
+    return [part for line in lines for part in re.split(r"&&|\||;|>", line.partition(" #")[0])]
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if page not in OLD_NAMES], ids=lambda page: page.name
+)
+def test_commands_and_their_options_exist(page: Path) -> None:
+    """Every ``gen-data`` line of a page is accepted by the parser of its command."""
+    for line in commands_of(page):
+        if not line.strip().startswith("gen-data ") or "..." in line:
+            continue
+        context = click.Context(cli, info_name="gen-data")
+        command: click.Command = cli
+        words = shlex.split(line)[1:]
+        while isinstance(command, click.Group) and words and not words[0].startswith("-"):
+            found = command.get_command(context, words[0])
+            assert found is not None, f"{page.name}: {line}"
+            command, words = found, words[1:]
+            context = click.Context(command, info_name=words[0] if words else None, parent=context)
+        # The parser looks at names only: folders and files of the examples do not exist here.
+        try:
+            command.make_parser(context).parse_args(words)
+        except click.UsageError as error:
+            pytest.fail(f"{page.name}: {line}: {error.format_message()}")

@@ -23,9 +23,11 @@ def command(*arguments: str) -> list[str]:
     return [sys.executable, "-m", "gen_data.generator.cli", *arguments]
 
 
-def environment() -> dict[str, str]:
-    """This process's environment, with the working tree importable from any folder."""
-    return {**os.environ, "PYTHONPATH": str(ROOT)}
+def environment(*before: Path) -> dict[str, str]:
+    """This process's environment; it imports from these folders, then from the working tree."""
+    inherited = os.environ.get("PYTHONPATH", "")
+    folders = [*map(str, before), str(ROOT), *inherited.split(os.pathsep)]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, folders))}
 
 
 def gen_data(*arguments: str, cwd: Path, **variables: str) -> subprocess.CompletedProcess[str]:

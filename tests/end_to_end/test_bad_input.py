@@ -29,6 +29,8 @@ def assert_refused(tmp_path: Path, arguments: tuple[str, ...], code: int, *texts
         (("--config", "tabletop.yaml", "--n", "0"), ("n: 0",)),
         (("--config", "tabletop.yaml", "--n", "-3"), ("n: -3",)),
         (("--config", "tabletop.yaml"), ("--n is missing",)),
+        (("--n", "2"), ("--config is missing",)),
+        (("--seed", "3", "plan", "shelf.yaml", "--n", "2"), ("--seed cannot precede a command",)),
         (("--config", "tabletop.yaml", "--n", "x"), ("--n",)),
         (("--config", "tabeltop.yaml", *JOB), ("did you mean 'tabletop.yaml'?",)),
         (("--config", "tabletop.yaml", *JOB, "--seed", "-1"), ("--seed: -1 is negative",)),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
 import signal
@@ -17,7 +16,7 @@ import psutil
 import pytest
 from PIL import Image
 
-from tests.end_to_end.running import ROOT, SMALL, command, environment, gen_data
+from tests.end_to_end.running import SMALL, command, environment, gen_data
 from tests.wheels import needs_rerun
 
 
@@ -102,7 +101,7 @@ def test_doctor_finds_an_engine_that_cannot_be_used(
         f"doctor.CHECKS = tuple(c for c in doctor.CHECKS if c.name == {check!r})\n"
         "main.main()\n"
     )
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join((str(tmp_path), str(ROOT))))
+    monkeypatch.setenv("PYTHONPATH", environment(tmp_path)["PYTHONPATH"])
 
     done = subprocess.run(
         [sys.executable, "-c", program, "doctor"],

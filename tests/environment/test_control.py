@@ -18,8 +18,6 @@ from tests.environment.small import NOMINAL, nominal, simulation_of, small
 from tests.physics.panda import urdf_path
 from tests.wheels import INSTALLED
 
-pytest.importorskip("pybullet_data", reason="the Panda comes with pybullet's data")
-
 HAND_LINK, ARM_JOINTS = b"panda_hand", 7
 GRASP_M = 0.1034
 """From the hand's frame to the grasp frame (Franka Emika, "Franka Hand product manual")."""

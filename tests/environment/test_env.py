@@ -23,8 +23,6 @@ from gen_data.generator.environment.settings import EnvSettings
 from tests.environment.small import CONFIG, arm_of, nominal, same, simulation_of, small
 from tests.wheels import INSTALLED
 
-pytest.importorskip("pybullet_data", reason="the Panda comes with pybullet's data")
-
 
 @pytest.fixture(params=INSTALLED)
 def engine(request: pytest.FixtureRequest) -> str:

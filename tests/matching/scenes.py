@@ -38,6 +38,15 @@ SHEET = {
     "seen": {"reflectance": 0.1, "range_m": 20.0},
     "white_intensity": 0.4,
 }
+RESPONSE = {
+    "half": 0.2,
+    "dark": 0.05,
+    "range_exponent": 0.0,
+    "noise": 0.02,
+    "laser_spread": 0.05,
+    "step": 0.01,
+}
+"""Of a scanner that reports 0 for dark surfaces."""
 
 
 def leaves(seed: int) -> Float32:

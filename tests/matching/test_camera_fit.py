@@ -20,11 +20,11 @@ TRUTH = ImagePipeline.model_validate({
     "preset": "industrial",
     "focus": None,
     "exposure_compensation_ev": {"normal": {"mean": -0.7, "stddev": 0.4, "clip": (-2.0, 1.0)}},
-    "contrast": 1.4,
+    "contrast": 1.375,
     "saturation": 0.75,
     "warmth_ev": 0.3,
     "blur_px": 1.0,
-    "image_sensor": {"full_well_e": 3000.0},
+    "image_sensor": {"full_well_e": 3000.0, "read_noise_e": 12.0},
     "jpeg_quality": {"choice": {"92": 3.0, "95": 1.0}},
 })  # fmt: skip
 
@@ -48,11 +48,11 @@ def row(part: Part, name: str) -> FittedQuantity:
     ("name", "truth", "tolerance"),
     [
         ("exposure", -0.7, 0.2),
-        ("tone", 1.4, 0.15),
+        ("tone", 1.375, 0.15),
         ("white balance", 0.3, 0.06),
         ("saturation", 0.75, 0.1),
         ("blur", 1.0, 0.06),
-        ("noise", 3000.0, 450.0),
+        ("noise", 3000.0, 1000.0),
     ],
 )
 def test_known_parameters_are_recovered(
@@ -70,6 +70,28 @@ def test_known_parameters_are_recovered(
     assert found.high is not None
     assert abs(truth - 0.5 * (found.low + found.high)) <= 1.35 * 0.5 * (found.high - found.low)
     assert found.is_fitted
+
+
+@pytest.mark.slow
+def test_read_noise_is_recovered() -> None:
+    """From sixty pictures, by 32 scenes, within a factor of two: photons make noise too."""
+    truth = {"full_well_e": 3000.0, "read_noise_e": 12.0}
+    real = ImagePipeline.model_validate(
+        {"preset": "industrial", "focus": None, "image_sensor": truth}
+    )
+    photos = [
+        measure_photo(Photo(f"{k}.png", photograph(one, real).rgb, (320, 240), None))
+        for k, one in enumerate(exposures(range(1000, 1060), real))
+    ]
+    part = fit_camera(exposures(range(32), BASE), photos, 0)
+
+    for name, value in (("read noise", 12.0), ("noise", 3000.0)):
+        found = row(part, name)
+        assert found.is_fitted
+        assert found.mean is not None
+        assert 0.5 * value < found.mean < 2.0 * value
+    fields = {one.change.field for one in part.fields}
+    assert "image_pipeline.image_sensor.read_noise_e" in fields
 
 
 def test_a_spread_of_exposures_becomes_a_distribution(fitted: Part) -> None:

@@ -21,6 +21,7 @@ from gen_data.generator.matching.indirect_inference import (
 
 AXIS = Axis(-10.0, 10.0, step=0.5, plausible=3.0, enough=0.1)
 AXES = (AXIS, AXIS)
+AXES_OF_TWO_SIZES = (AXIS, replace(AXIS, low=0.0, high=2000.0, plausible=30.0))
 SLOPES = np.array([[2.0, 0.5], [-1.0, 1.5]])
 """Statistics of a linear model by parameters."""
 
@@ -57,6 +58,20 @@ def test_a_curved_statistic_is_solved_by_repeated_derivatives() -> None:
     solution = solve(real, lambda p, n: (p**4 + scenes)[:n], (AXIS,), np.array([1.0]))
 
     assert solution.parameters[0] == pytest.approx(2.0, abs=0.02)
+
+
+def test_a_parameter_of_large_numbers_does_not_end_the_search() -> None:
+    """Two parameters of a curved model, the second about 1000: both are found."""
+    scenes = np.random.default_rng(20).standard_normal((40, 2))
+    real = np.array([2.0**4, 1000.0]) + np.random.default_rng(21).standard_normal((40, 2))
+
+    def simulate(parameters: Array, count: int) -> Array:
+        return np.asarray(np.array([parameters[0] ** 4, parameters[1]]) + scenes)[:count]
+
+    solution = solve(real, simulate, AXES_OF_TWO_SIZES, np.array([1.0, 990.0]))
+
+    assert solution.parameters[0] == pytest.approx(2.0, abs=0.02)
+    assert solution.parameters[1] == pytest.approx(1000.0, abs=1.0)
 
 
 def test_spread_between_recordings_is_told_from_that_of_scenes() -> None:

@@ -9,6 +9,7 @@ from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 
+import pybullet_data
 import pytest
 
 from gen_data.generator.assemble.config import load_config
@@ -17,8 +18,6 @@ from gen_data.generator.assets.library import Library, open_library
 from gen_data.generator.core.errors import UnknownAsset
 from gen_data.generator.packs.install import install
 from gen_data.generator.packs.pack_table import find_pack
-
-pybullet_data = pytest.importorskip("pybullet_data")
 
 KINDS = ("colors16.png", "franka_panda", "lego", "soccerball", "teddy")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-import pytest
+import pybullet_data
 
 from gen_data.generator.core.asset_types import Gripper, Joint, RobotModel
 from gen_data.generator.core.se3 import SE3, multiply_quaternions
@@ -19,9 +19,8 @@ HAND, GRASP = "panda_hand", "panda_grasptarget"
 
 @cache
 def urdf_path() -> Path:
-    """The file; without pybullet's data the calling test is skipped."""
-    data = pytest.importorskip("pybullet_data", reason="the Panda comes with pybullet's data")
-    return Path(data.getDataPath()) / "franka_panda" / "panda.urdf"
+    """The file of pybullet, or of its pack."""
+    return Path(pybullet_data.getDataPath()) / "franka_panda" / "panda.urdf"
 
 
 def panda() -> RobotModel:

@@ -19,9 +19,6 @@ from gen_data.generator.physics.manipulation.joint_trajectories import smooth_st
 from gen_data.generator.physics.physics_config import EngineName
 from tests.physics.doubles import TABLE_TOP_Z_M, Solids, table_scene, thing, world_vertices
 from tests.physics.panda import panda
-
-pytest.importorskip("pybullet_data")
-
 from tests.physics.test_arms import above_table, armed
 
 ROBOT = panda()

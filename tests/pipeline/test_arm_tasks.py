@@ -15,8 +15,6 @@ from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.randomizers.arm_task_table import tasks
 
-pytest.importorskip("pybullet_data")
-
 SMALL = ("sensors.color.size_px=[96,72]", "sensors.wrist.size_px=[96,72]")
 OWN = """nudge:
   instruction: Nudge the {thing}.

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from gen_data.generator.config.distributions import Choice, Constant, Uniform
 from gen_data.generator.core.asset_types import RobotModel
-from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.scene import ArmGoal, Articulation, Body, Scene
 from gen_data.generator.core.se3 import SE3
 from gen_data.randomizers.arm_configuration import ArmConfiguration
@@ -127,5 +127,5 @@ def test_modes_come_as_often_as_their_weights_say() -> None:
 
 def test_unknown_mode_is_named() -> None:
     """With what was probably meant."""
-    with pytest.raises(ConfigError, match=r"unknown mode 'reech'.*did you mean 'reach'"):
+    with pytest.raises(ValidationError, match=r"there is no 'reech'.*did you mean 'reach'"):
         goal("reech")

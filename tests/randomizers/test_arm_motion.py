@@ -111,11 +111,10 @@ def test_a_given_way_is_taken_as_it_stands() -> None:
         ({"way": (Stop(place_m=(2.0, 0.0)),)}, r"no surface at \(2.0, 0.0\)"),
         ({"way": (Stop(grasp=("cluter",)),)}, "did you mean 'clutter'"),
         ({"objects": ("cups",)}, "no object group 'cups'"),
-        ({"task": Constant("pick")}, "unknown task 'pick'"),
     ],
 )
 def test_what_cannot_be_is_a_mistake_that_is_named(given: dict[str, object], message: str) -> None:
-    """Joints, surfaces, groups and tasks."""
+    """Joints, surfaces and groups."""
     with pytest.raises(ConfigError, match=message):
         drawn(scene("brick"), **given)
 

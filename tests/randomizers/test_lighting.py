@@ -264,13 +264,13 @@ def test_broken_ceiling_panels_are_dark_and_there() -> None:
 
 def test_unknown_kind_of_panel_is_named() -> None:
     """With what was probably meant."""
-    with pytest.raises(ConfigError, match=r"unknown panel 'dsik'.*did you mean 'disk'"):
+    with pytest.raises(ValidationError, match=r"there is no 'dsik'.*did you mean 'disk'"):
         ceiling(kind="dsik")
 
 
 def test_unknown_kind_of_light_is_named() -> None:
     """With what was probably meant."""
-    with pytest.raises(ConfigError, match=r"unknown light 'spehre'.*did you mean 'sphere'"):
+    with pytest.raises(ValidationError, match=r"there is no 'spehre'.*did you mean 'sphere'"):
         lit(kind=Choice(["spehre"]))
 
 
@@ -293,5 +293,5 @@ def test_environment_is_one_of_those_asked_for() -> None:
 
 def test_unknown_environment_is_named() -> None:
     """With what was probably meant."""
-    with pytest.raises(ConfigError, match=r"no environment is studoi.*did you mean 'studio'"):
+    with pytest.raises(ConfigError, match=r"no environment is 'studoi'.*did you mean 'studio'"):
         EnvironmentLight(name="sky", images=("studoi",))(SCENE, FakeAssets(), rng_of())

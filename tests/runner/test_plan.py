@@ -71,6 +71,14 @@ def test_differences_name_the_field_as_in_yaml_and_both_values() -> None:
     ]
 
 
+def test_a_seed_that_differs_is_named_once() -> None:
+    """It is a field of the configuration and of the plan."""
+    old = replace(fake_plan(), seed=3, config={"seed": 3})
+    new = replace(fake_plan(), seed=9, config={"seed": 9})
+
+    assert compare_plans(old, new) == ["seed: was 3, now 9"]
+
+
 @pytest.mark.parametrize("text", ["", "[]", "{}", '{"n": 1}', "not json", '{"config": 1, "q": 2}'])
 def test_what_is_no_plan_is_refused_by_name(tmp_path: Path, text: str) -> None:
     """Any damage to plan.json is one StorageError that names the file."""

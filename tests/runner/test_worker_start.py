@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.end_to_end.running import environment
 from tests.runner.doubles import RESUME, notes_of
 from tests.runner.test_processes import HANG_S, ROOT, processes_of_session, start_fake_run, wait_for
 
@@ -45,7 +46,7 @@ def with_action_at_birth(folder: Path, action: str) -> Mapping[str, str]:
     """The environment in which the first worker does something before it is a worker."""
     text = AT_BIRTH.format(marker=str(folder / "born"), action=action)
     (folder / "sitecustomize.py").write_text(text)
-    return {**os.environ, "PYTHONPATH": os.pathsep.join((str(folder), str(ROOT)))}
+    return environment(folder)
 
 
 def finish(process: subprocess.Popen[str]) -> str:

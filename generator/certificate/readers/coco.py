@@ -6,12 +6,20 @@ import contextlib
 import io
 from pathlib import Path
 
-from gen_data.generator.certificate.labelled_images import LabelledImage, LabelledObject, Loaded
+import numpy as np
+from PIL import Image
+
+from gen_data.generator.certificate.labelled_images import (
+    LabelledImage,
+    LabelledObject,
+    Loaded,
+    digest_pixels,
+)
 from gen_data.generator.runner.stored import StoredSamples
 
 
 def load_coco(root: Path, stored: StoredSamples) -> Loaded:
-    """Read the instances of every split."""
+    """Read the instances and pictures of every split."""
     from pycocotools.coco import COCO
 
     del stored
@@ -30,6 +38,18 @@ def load_coco(root: Path, stored: StoredSamples) -> Loaded:
                 objects.append(LabelledObject(names[item["category_id"]], box, mask))
             split, size_px = path.stem.removeprefix("instances_"), (row["width"], row["height"])
             images.append(
-                LabelledImage(row["sample"], row["sensor"], split, size_px, tuple(objects))
+                LabelledImage(
+                    row["sample"],
+                    row["sensor"],
+                    split,
+                    size_px,
+                    tuple(objects),
+                    _digest_picture(root / split / row["file_name"]),
+                )
             )
     return Loaded(images, {"files": len(paths)})
+
+
+def _digest_picture(path: Path) -> str:
+    with Image.open(path) as image:
+        return digest_pixels(np.asarray(image.convert("RGB")))

@@ -9,7 +9,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.certificate.labelled_images import LabelledImage, LabelledObject, Loaded
+import numpy as np
+
+from gen_data.generator.certificate.labelled_images import (
+    LabelledImage,
+    LabelledObject,
+    Loaded,
+    digest_pixels,
+)
 from gen_data.generator.runner.stored import StoredSamples
 
 
@@ -34,6 +41,7 @@ def load_croissant(root: Path, stored: StoredSamples) -> Loaded:
                 row["split"].decode(),
                 size_px,
                 tuple(objects.pop(row["image_id"], ())),
+                digest_pixels(np.asarray(row["content"].convert("RGB"))),
             )
             if row["content"].size != size_px:
                 raise ValueError(f"{image}: its picture has {row['content'].size} px")

@@ -6,7 +6,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.certificate.labelled_images import LabelledImage, LabelledObject, Loaded
+from gen_data.generator.certificate.labelled_images import (
+    LabelledImage,
+    LabelledObject,
+    Loaded,
+    digest_pixels,
+)
 from gen_data.generator.runner.stored import StoredSamples
 
 
@@ -55,6 +60,8 @@ def _images(dataset: Any, split_of: Callable[[str], str]) -> Iterator[LabelledIm
             for box, label in zip(boxes, labels, strict=True)
         )
         height, width = image.shape[:2]
+        # OpenCV has blue first. Files of JPEG may have been compressed anew.
+        pixels = "" if path.endswith(".jpg") else digest_pixels(image[..., ::-1])
         yield LabelledImage(
-            int(number), camera, split_of(Path(path).stem), (width, height), tuple(things)
+            int(number), camera, split_of(Path(path).stem), (width, height), tuple(things), pixels
         )

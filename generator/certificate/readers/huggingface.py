@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gen_data.generator.certificate.labelled_images import LabelledImage, LabelledObject, Loaded
+import numpy as np
+
+from gen_data.generator.certificate.labelled_images import (
+    LabelledImage,
+    LabelledObject,
+    Loaded,
+    digest_pixels,
+)
 from gen_data.generator.core.temporary_folders import temporary_folder
 from gen_data.generator.runner.stored import StoredSamples
 
@@ -28,7 +35,10 @@ def load_huggingface(root: Path, stored: StoredSamples) -> Loaded:
                     runs = things["rle"] and things["rle"][k]
                     mask = {"size": [size_px[1], size_px[0]], "counts": runs} if runs else None
                     objects.append(LabelledObject(names[things["category"][k]], box, mask))
-                image = LabelledImage(row["sample"], row["sensor"], split, size_px, tuple(objects))
+                pixels = digest_pixels(np.asarray(row["image"].convert("RGB")))
+                image = LabelledImage(
+                    row["sample"], row["sensor"], split, size_px, tuple(objects), pixels
+                )
                 images.append(image)
                 if row["image"].size != size_px:
                     raise ValueError(f"{image}: its picture has {row['image'].size} px")

@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.certificate.labelled_images import LabelledImage, LabelledObject, Loaded
+import numpy as np
+from PIL import Image
+
+from gen_data.generator.certificate.labelled_images import (
+    LabelledImage,
+    LabelledObject,
+    Loaded,
+    digest_pixels,
+)
 from gen_data.generator.runner.stored import StoredSamples
 
 SIDES = ("xmin", "ymin", "xmax", "ymax")
@@ -45,4 +54,6 @@ def _image(split: str, values: Mapping[str, Any]) -> LabelledImage:
         for name, x0, y0, x1, y1 in zip(names, *columns, strict=True)
     )
     sensor = values["image/sensor"][0].decode()
-    return LabelledImage(values["image/sample"][0], sensor, split, (width, height), objects)
+    with Image.open(io.BytesIO(values["image/encoded"][0])) as image:
+        pixels = digest_pixels(np.asarray(image.convert("RGB")))
+    return LabelledImage(values["image/sample"][0], sensor, split, (width, height), objects, pixels)

@@ -7,7 +7,14 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from gen_data.generator.certificate.labelled_images import LabelledImage, LabelledObject, Loaded
+import numpy as np
+
+from gen_data.generator.certificate.labelled_images import (
+    LabelledImage,
+    LabelledObject,
+    Loaded,
+    digest_pixels,
+)
 from gen_data.generator.runner.stored import StoredSamples
 
 
@@ -22,9 +29,9 @@ def load_webdataset(root: Path, stored: StoredSamples) -> Loaded:
         for sample in _samples(paths):
             labels = sample["json"]
             images += (
-                _image(labels["index"], camera, folder.name, row)
+                _image(labels["index"], camera, folder.name, row, photograph)
                 for camera, row in labels["cameras"].items()
-                if _has_photograph(sample, camera)
+                if (photograph := _find_photograph(sample, camera)) is not None
             )
     return Loaded(images, {"files": tars})
 
@@ -39,14 +46,21 @@ def _samples(paths: list[Path]) -> Iterator[Mapping[str, Any]]:
     gc.collect()
 
 
-def _has_photograph(sample: Mapping[str, Any], camera: str) -> bool:
-    return any(key.startswith(f"{camera}.rgb.".lower()) for key in sample)
+def _find_photograph(sample: Mapping[str, Any], camera: str) -> Any:
+    """The photograph of a camera, as Pillow has it; None if there is none."""
+    names = (key for key in sample if key.startswith(f"{camera}.rgb.".lower()))
+    return next((sample[name] for name in names), None)
 
 
-def _image(index: int, camera: str, split: str, row: Mapping[str, Any]) -> LabelledImage:
+def _image(
+    index: int, camera: str, split: str, row: Mapping[str, Any], photograph: Any
+) -> LabelledImage:
     objects = []
     for item in row["annotations"]:
         x, y, width, height = item["bbox"]
         box = (x, y, x + width, y + height)
         objects.append(LabelledObject(item["category"], box, item["segmentation"] or None))
-    return LabelledImage(index, camera, split, (row["width"], row["height"]), tuple(objects))
+    pixels = digest_pixels(np.asarray(photograph.convert("RGB")))
+    return LabelledImage(
+        index, camera, split, (row["width"], row["height"]), tuple(objects), pixels
+    )

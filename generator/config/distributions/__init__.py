@@ -49,15 +49,16 @@ from gen_data.generator.config.distributions.space import (
     UnitVector,
 )
 from gen_data.generator.config.yaml_scalars import format_number, quote_value
+from gen_data.generator.core.errors import did_you_mean
 from gen_data.generator.core.se3 import Quaternion, Vec3
 
 __all__ = [
     "CHANCE", "DIRECTION", "DISTRIBUTIONS", "DISTRIBUTION_TITLE", "FLAG", "MEANT", "NAME", "NUMBER",
     "POSITION", "ROTATION", "WHOLE_NUMBER", "AboutZ", "Bounds", "Box", "Cap", "Chance", "Choice",
     "Constant", "Count", "Direction", "Distribution", "EulerDeg", "FieldOf", "Flag", "LogUniform",
-    "Malformed", "Mixture", "Name", "NonNegative", "Normal", "Numeric", "Position", "Positive",
-    "Probability", "QuaternionWxyz", "Rotation", "Scalar", "Sequence", "Shell", "So3", "Sphere",
-    "Uniform", "UniformInteger", "UnitInterval", "distribution_schema",
+    "Malformed", "Mixture", "Name", "NonNegative", "Normal", "Numeric", "OneOf", "Position",
+    "Positive", "Probability", "QuaternionWxyz", "Rotation", "Scalar", "Sequence", "Shell", "So3",
+    "Sphere", "Uniform", "UniformInteger", "UnitInterval", "distribution_schema",
 ]  # fmt: skip
 
 if TYPE_CHECKING:
@@ -169,6 +170,37 @@ class Bounds:
     def within(self) -> str:
         """The limits as part of a sentence: ``in (1, 170)``, ``>= 0``."""
         return str(self) if math.isinf(self.low) or math.isinf(self.high) else f"in {self}"
+
+
+@dataclass(frozen=True)
+class OneOf:
+    """Every name that can be drawn must be one of a few: ``Annotated[Name, OneOf(("a", "b"))]``."""
+
+    names: tuple[str, ...]
+
+    def check(self, value: Distribution[str]) -> Distribution[str]:
+        """The distribution itself. Raises Malformed unless all it can give is known."""
+        for name in value.outcomes():
+            if name not in self.names:
+                raise Malformed(
+                    f"there is no {quote_value(name)}; expected one of {', '.join(self.names)}"
+                    f"{did_you_mean(name, self.names)}"
+                )
+        return value
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        """Check after reading."""
+        return core_schema.no_info_after_validator_function(self.check, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """The same schema, with the names of its constant."""
+        inner = handler(schema)
+        inner["anyOf"][0]["enum"] = list(self.names)
+        return inner
 
 
 def distribution_schema(kind: Kind[Any]) -> dict[str, Any]:

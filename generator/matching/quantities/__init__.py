@@ -15,17 +15,27 @@ from gen_data.generator.matching.quantities.blur import BLUR
 from gen_data.generator.matching.quantities.box_positions import BOX_POSITIONS
 from gen_data.generator.matching.quantities.box_sizes import BOX_SIZES
 from gen_data.generator.matching.quantities.contrast import CONTRAST
+from gen_data.generator.matching.quantities.dark_returns import DARK_RETURNS
 from gen_data.generator.matching.quantities.dropout import DROPOUT
 from gen_data.generator.matching.quantities.exposure import EXPOSURE
 from gen_data.generator.matching.quantities.lidar_range import RANGE
 from gen_data.generator.matching.quantities.noise import NOISE
+from gen_data.generator.matching.quantities.read_noise import READ_NOISE
 from gen_data.generator.matching.quantities.reflectance import REFLECTANCE
 from gen_data.generator.matching.quantities.saturation import SATURATION
 from gen_data.generator.matching.quantities.white_balance import WHITE_BALANCE
 
-CAMERA: tuple[CameraQuantity, ...] = (EXPOSURE, CONTRAST, WHITE_BALANCE, SATURATION, BLUR, NOISE)
+CAMERA: tuple[CameraQuantity, ...] = (
+    EXPOSURE,
+    CONTRAST,
+    WHITE_BALANCE,
+    SATURATION,
+    BLUR,
+    NOISE,
+    READ_NOISE,
+)
 """Fitted together, by simulation. JPEG's quality comes before: see ``jpeg_quality``."""
-LIDAR: tuple[LidarQuantity, ...] = (REFLECTANCE, DROPOUT, RANGE)
+LIDAR: tuple[LidarQuantity, ...] = (REFLECTANCE, DARK_RETURNS, DROPOUT, RANGE)
 LABELS: tuple[LabelQuantity, ...] = (BOX_SIZES, BOX_POSITIONS)
 
 __all__ = ["CAMERA", "LABELS", "LIDAR", "CameraQuantity", "LabelQuantity", "LidarQuantity"]

@@ -15,7 +15,7 @@ from gen_data.generator.config.distributions import Constant
 from gen_data.generator.matching.indirect_inference import Axis
 from gen_data.generator.matching.picture import Picture
 from gen_data.generator.matching.quantities.base import CameraQuantity, typical
-from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline
+from gen_data.generator.sensors.camera.image_pipeline import CONTRASTS, ImagePipeline
 
 
 def measure(picture: Picture) -> float:
@@ -36,9 +36,8 @@ def _fields(value: Any) -> Mapping[str, Any]:
     return {"contrast": value}
 
 
-# The step is a multiple of 1 / 16, to which the pipeline rounds contrasts.
 CONTRAST = CameraQuantity(
     "tone", "power", "stops between 10 % and 90 % of luminance", "image_pipeline.contrast",
     measure, _start, _apply, _fields,
-    Axis(0.5, 3.0, step=0.1875, plausible=0.6, enough=0.1),
+    Axis(0.5, 3.0, step=0.1875, plausible=0.6, enough=0.1, grid=1.0 / CONTRASTS),
 )  # fmt: skip

@@ -3,8 +3,7 @@
 Statistic: variance over level, in linear light, of the flattest blocks: the slope of the noise
 level function (Foi et al., "Practical Poissonian-Gaussian noise modeling and fitting for
 single-image raw-data", IEEE Transactions on Image Processing 17, 2008). Variances are those of
-Immerkaer's mask, which is blind to slopes ("Fast noise variance estimation", Computer Vision and
-Image Understanding 64, 1996).
+``Picture.noise_blocks``.
 """
 
 from __future__ import annotations
@@ -13,51 +12,51 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import cv2
 import numpy as np
 
 from gen_data.generator.core.colorimetry import srgb_decode
+from gen_data.generator.core.se3 import Array
 from gen_data.generator.matching.indirect_inference import Axis
 from gen_data.generator.matching.picture import Picture
 from gen_data.generator.matching.quantities.base import CameraQuantity
 from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline
 from gen_data.generator.sensors.camera.image_sensor import ImageSensor
 
-BLOCK_PX = 8
+BLOCKS_MIN = 20
+"""Smallest number of blocks between the grey values."""
 FLATTEST = 0.15
 """Share of the blocks that counts, those with the smallest gradients after smoothing."""
 DARKEST, BRIGHTEST = 40.0, 215.0
-"""Grey values between which the tone curve keeps noise."""
-_MASK = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32) / 6.0
+"""Grey values between which the tone curve keeps noise, and photons make most of it."""
 LEAST = 2e-8
 """Variance over level added before the logarithm: no noise at all has a value."""
 
 
 def measure(picture: Picture) -> float:
     """Logarithm, base 2, of the linear variance over level in flat blocks; NaN without any."""
-    grey = picture.grey
-    rough = cv2.filter2D(grey, cv2.CV_32F, _MASK)
-    smooth = cv2.GaussianBlur(grey, (0, 0), 2.0)
-    gradient = cv2.Laplacian(smooth, cv2.CV_32F)
-    level, variance, slope = (_block_means(x) for x in (grey, rough * rough, gradient * gradient))
-    usable = (level > DARKEST) & (level < BRIGHTEST)
-    if usable.sum() < 20:
+    found = measure_flat_blocks(picture, DARKEST, BRIGHTEST)
+    if found is None:
         return float("nan")
+    level, variance = found
+    return float(np.log2(np.median(variance / level) + LEAST))
+
+
+def measure_flat_blocks(
+    picture: Picture, darkest: float, brightest: float
+) -> tuple[Array, Array] | None:
+    """Linear level and variance of noise [n] of the flattest blocks between two grey values.
+
+    None if there are too few of them.
+    """
+    level, variance, slope = picture.noise_blocks
+    usable = (level > darkest) & (level < brightest)
+    if usable.sum() < BLOCKS_MIN:
+        return None
     flat = usable & (slope <= np.quantile(slope[usable], FLATTEST))
     encoded = level[flat] / 255.0
-    linear = srgb_decode(encoded)
     # The slope of sRGB's transfer function turns noise of bytes into that of light.
     steepness = (srgb_decode(encoded + 1e-3) - srgb_decode(encoded - 1e-3)) / 2e-3
-    ratio = variance[flat] / 255.0**2 * steepness**2 / linear
-    return float(np.log2(np.median(ratio) + LEAST))
-
-
-def _block_means(image: np.ndarray) -> np.ndarray:
-    """Means of the blocks of an image [h, w], float64 [blocks]."""
-    rows, columns = (side // BLOCK_PX for side in image.shape)
-    whole = image[: rows * BLOCK_PX, : columns * BLOCK_PX]
-    blocks = cv2.resize(whole, (columns, rows), interpolation=cv2.INTER_AREA)
-    return np.asarray(blocks.ravel(), np.float64)
+    return srgb_decode(encoded), variance[flat] / 255.0**2 * steepness**2
 
 
 def _start(pipeline: ImagePipeline) -> float:

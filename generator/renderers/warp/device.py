@@ -32,18 +32,19 @@ _COMPILER_FLAGS = "-ffp-contract=off -mllvm=-inline-threshold=30000"
 
 
 def open_device(name: str) -> wp.Device:
-    """The Warp device named ``auto``, ``cpu`` or ``cuda:N``.
+    """The Warp device named ``auto``, ``cpu``, ``cuda:N`` or, for the first one, ``cuda``.
 
     Raises:
         ConfigError: the machine has no such device.
     """
     _start()
     if name == "auto":
-        name = "cuda:0" if wp.is_cuda_available() else "cpu"
+        name = "cuda" if wp.is_cuda_available() else "cpu"
+    name = "cuda:0" if name == "cuda" else name
     known = ["cpu", *(device.alias for device in wp.get_cuda_devices())]
     if name not in known:
         raise ConfigError(
-            f"renderer device '{name}' does not exist on this machine; it has {', '.join(known)}."
+            f"render.device: '{name}' does not exist on this machine; it has {', '.join(known)}."
             " Choose 'auto' or 'cpu', or install an NVIDIA driver."
         )
     return wp.get_device(name)

@@ -11,7 +11,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.bounded_cache import ByteCache, ObjectCache
+from gen_data.generator.core.bounded_cache import ByteCache, CountCache, ObjectCache
 from gen_data.generator.core.interfaces import AssetLibrary, DerivedArrays
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.mapped_files import PageLimiter
@@ -31,6 +31,7 @@ from gen_data.generator.renderers.warp.scene.environment_maps import (
     upload_environment,
     upload_split,
 )
+from gen_data.generator.renderers.warp.scene.struct_dtypes import to_device
 from gen_data.generator.renderers.warp.visibility.distortion_lut import DeviceOptics, upload_optics
 
 _MESH_BYTES, _TEXTURE_BYTES = 176 << 20, 384 << 20
@@ -57,6 +58,20 @@ class _Scratch:
     part: wp.array
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class _Latest:
+    """Values that were uploaded, and where they are."""
+
+    values: NDArray[Any]
+    array: wp.array
+
+
+def _is_same(one: NDArray[Any], other: NDArray[Any]) -> bool:
+    """Whether two arrays have the same bytes."""
+    same_form = one.dtype == other.dtype and one.shape == other.shape
+    return same_form and one.tobytes() == other.tobytes()
+
+
 class DeviceCache:
     """Meshes, textures and environments on one device, each cache bounded in bytes.
 
@@ -64,7 +79,9 @@ class DeviceCache:
         bodies: The latest packed bodies, which all views of a scene share.
         scenes: The latest packed scene, which all cameras and scanners of a sample share.
         material_records, infrared: Records of a body's materials, by their tuple.
+        coarsest: The coarsest texel of textures, on the host.
         pages: Returns pages of files to the system.
+        shares_memory: Whether the device is the CPU, so that nothing has to cross.
     """
 
     def __init__(self, assets: AssetLibrary, device: wp.Device) -> None:
@@ -72,12 +89,14 @@ class DeviceCache:
         # Asked once: it takes as long as loading a small mesh.
         self._store = assets if isinstance(assets, DerivedArrays) else None
         self.device = device
+        self.shares_memory = bool(device.is_cpu)
         self.pages = PageLimiter()
         self.lobes = wp.array(lobe_albedo(), dtype=wp.vec2, device=device)
         self.bodies: ObjectCache[Any] = ObjectCache(1)
         self.scenes: ObjectCache[Any] = ObjectCache(1)
         self.material_records: ObjectCache[Any] = ObjectCache(_BODIES)
         self.infrared: ObjectCache[NDArray[np.void]] = ObjectCache(_BODIES)
+        self.coarsest: CountCache[NDArray[np.uint32]] = CountCache(_TEXTURES)
         mesh_bytes = _OWN_MESH_BYTES if device.is_cpu else _MESH_BYTES
         texture_bytes = _OWN_TEXTURE_BYTES if device.is_cpu else _TEXTURE_BYTES
         self._meshes: ByteCache[DeviceMesh] = ByteCache(mesh_bytes, _MESHES)
@@ -86,6 +105,7 @@ class DeviceCache:
         self._optics: ByteCache[DeviceOptics] = ByteCache(_OPTICS_BYTES, _LENSES)
         self._scratch: dict[str, _Scratch] = {}
         self._constants: dict[tuple[object, ...], wp.array] = {}
+        self._latest: dict[str, list[_Latest]] = {}
 
     def mesh(self, asset_id: str) -> DeviceMesh:
         """Geometry of an asset on the device."""
@@ -152,6 +172,24 @@ class DeviceCache:
         if key not in self._constants:
             self._constants[key] = wp.array(make(*arguments), dtype=dtype, device=self.device)
         return self._constants[key]
+
+    def latest(self, name: str, values: NDArray[Any], dtype: Any) -> wp.array:
+        """Values on the device, read-only; those of a name cross only when they change.
+
+        The last two of a name are kept: a rig also scans its scene without itself. On the CPU, the
+        array may be a view of the values.
+        """
+        kept = [] if self.shares_memory else self._latest.get(name, [])
+        for held in kept:
+            if _is_same(held.values, values):
+                return held.array
+        if values.dtype.names:
+            array = to_device(values, dtype, self.device)
+        else:
+            array = wp.array(values, dtype=dtype, device=self.device, copy=not self.device.is_cpu)
+        if not self.shares_memory:
+            self._latest[name] = [_Latest(values.copy(), array), *kept[:1]]
+        return array
 
     def scratch(self, name: str, shape: int | tuple[int, ...], dtype: Any) -> wp.array:
         """Uninitialised memory; reused, because touching fresh pages costs as much as filling them.

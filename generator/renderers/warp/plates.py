@@ -35,6 +35,7 @@ from gen_data.generator.core.plates import (
 from gen_data.generator.core.scene import Camera, Scene, Weather
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.frame_context import CameraView
+from gen_data.generator.renderers.warp.visibility.kernels import photographs as kernels
 
 _RATIO_MAX = 16.0
 """Headlights on dark ground multiply its light; more is an error of a nearly black ratio."""
@@ -55,14 +56,14 @@ class Backdrop:
         photo: Radiance [cd/m^2], linear RGB, float32 [h, w, 3].
         mask: Share of each pixel that the foreground covers, float32 [h, w]; None = no foreground.
         ground: Pixels that show ground on which things may stand, bool [h, w].
-        unshaded: Radiance of the ground without anything on it, float32 [h, w, 3]; None until it
+        unshaded: Radiance of the ground without anything on it, flat, on the device; None until it
             is rendered.
     """
 
     photo: Float32
     mask: Float32 | None
     ground: NDArray[np.bool_]
-    unshaded: Float32 | None = None
+    unshaded: wp.array | None = None
 
     @property
     def hidden(self) -> NDArray[np.bool_]:
@@ -117,11 +118,11 @@ def show_photo(frame: CameraView, backdrop: Backdrop, radiance: wp.array) -> Non
 
     ``frame`` may be a band of the image's rows.
     """
-    rows, image, is_ground, is_empty = _split(frame, radiance)
-    photo, unshaded = backdrop.photo[rows], _unshaded(backdrop)[rows]
-    shown = np.where(is_ground[..., None], photo * _ratio(image, unshaded), image)
-    shown = np.where(is_empty[..., None], photo, shown)
-    radiance.assign(shown.astype(np.float32).reshape(-1, 3))
+    assert backdrop.unshaded is not None, "the ground is rendered before what stands on it"
+    places = [frame.gbuffer.hits, _kinds(frame), _first_pixel(frame)]
+    limits = [float(_DARKEST_CD_M2), _RATIO_MAX]
+    inputs = [*places, _photo_on_device(frame, backdrop), backdrop.unshaded, *limits]
+    frame.launch(kernels.show_photo, frame.pixels, inputs, [radiance])
 
 
 def mix_photo(frame: CameraView, backdrop: Backdrop, coverage: Float32, radiance: wp.array) -> None:
@@ -150,26 +151,24 @@ def mix_photo(frame: CameraView, backdrop: Backdrop, coverage: Float32, radiance
     radiance.assign(shown.astype(np.float32).reshape(-1, 3))
 
 
-def restore_photo(frame: CameraView, centres: Float32, radiance: wp.array) -> None:
+def restore_photo(frame: CameraView, centres: wp.array, radiance: wp.array) -> None:
     """Undo the anti-aliasing of the photograph itself, in place.
 
     The edge between its ground and its background is no edge in the photograph. ``centres`` is the
-    radiance before, flat, [n, 3].
+    radiance before, flat.
     """
-    near = cv2.dilate(things_in(frame).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    shown = np.where(near.reshape(-1, 1), radiance.numpy(), centres)
-    radiance.assign(shown.astype(np.float32))
+    width, height = int(frame.view.width), int(frame.view.height)
+    inputs = [frame.gbuffer.hits, _kinds(frame), width, height, centres]
+    frame.launch(kernels.restore_photo, (height, width), inputs, [radiance])
 
 
 def cover_by_foreground(frame: CameraView, backdrop: Backdrop, radiance: wp.array) -> None:
     """Show the photograph where its foreground hides everything else, in place."""
     if backdrop.mask is None:
         return
-    rows = _rows(frame)
-    image = radiance.numpy().reshape(frame.view.height, frame.view.width, 3)
-    share = backdrop.mask[rows][..., None]
-    shown = image * (1.0 - share) + backdrop.photo[rows] * share
-    radiance.assign(shown.astype(np.float32).reshape(-1, 3))
+    mask = frame.cache.latest("photo mask", backdrop.mask.reshape(-1), float)
+    inputs = [_first_pixel(frame), mask, _photo_on_device(frame, backdrop)]
+    frame.launch(kernels.cover_by_foreground, frame.pixels, inputs, [radiance])
 
 
 def things_in(frame: CameraView) -> NDArray[np.bool_]:
@@ -179,16 +178,33 @@ def things_in(frame: CameraView) -> NDArray[np.bool_]:
     return np.asarray((body >= 0) & ~np.isin(body, catchers))
 
 
-def hide_labels(frame: CameraView, backdrop: Backdrop, images: dict[Channel, NDArray[Any]]) -> None:
-    """Set labels to nothing where no depth is known or the foreground covers them, in place.
+def hide_labels(frame: CameraView, backdrop: Backdrop, image: wp.array, nothing: Any) -> None:
+    """Set a flat label image to nothing where the foreground covers it or no depth is known.
 
-    The depth of the photograph is known on its ground only.
+    The depth of the photograph is known on its ground only. ``nothing`` is a value of the image.
     """
-    rows = _rows(frame)
-    hidden = backdrop.hidden[rows] | ~(things_in(frame) | backdrop.ground[rows])
-    for channel, image in images.items():
-        nothing = np.inf if channel in (Channel.Z_DEPTH, Channel.RANGE) else 0
-        image[hidden] = nothing
+    shown = np.where(backdrop.ground, int(kernels.STANDING_GROUND), int(kernels.BACKGROUND))
+    shown = np.where(backdrop.hidden, int(kernels.FOREGROUND), shown).astype(np.uint8)
+    places = [frame.gbuffer.hits, _kinds(frame), _first_pixel(frame)]
+    inputs = [*places, frame.cache.latest("photo places", shown.reshape(-1), wp.uint8), nothing]
+    frame.launch(kernels.hide_labels, frame.pixels, inputs, [image])
+
+
+def _kinds(frame: CameraView) -> wp.array:
+    """What the body of each number is to the photograph, beginning with none."""
+    bodies = frame.state.scene.bodies
+    kinds = [kernels.GROUND if is_catcher(body) else kernels.THING for body in bodies]
+    values = np.array([kernels.EMPTY, *kinds], np.int32)
+    return frame.cache.latest("photo kinds", values, int)
+
+
+def _first_pixel(frame: CameraView) -> int:
+    """Pixel of the photograph that the first pixel of a frame shows."""
+    return int(_rows(frame).start * frame.view.width)
+
+
+def _photo_on_device(frame: CameraView, backdrop: Backdrop) -> wp.array:
+    return frame.cache.latest("photo", backdrop.photo.reshape(-1, 3), wp.vec3)
 
 
 def hide_flow(backdrop: Backdrop, images: dict[Channel, NDArray[Any]]) -> None:
@@ -222,7 +238,7 @@ def _rows(frame: CameraView) -> slice:
 
 def _unshaded(backdrop: Backdrop) -> Float32:
     assert backdrop.unshaded is not None, "the ground is rendered before what stands on it"
-    return backdrop.unshaded
+    return np.asarray(backdrop.unshaded.numpy().reshape(backdrop.photo.shape))
 
 
 def _ratio(image: Float32, unshaded: Float32) -> Float32:

@@ -37,6 +37,7 @@ from gen_data.generator.renderers.warp.realtime.realtime_shading import (
 from gen_data.generator.renderers.warp.scene.light_selection import main_lamp_numbers
 from gen_data.generator.renderers.warp.scene.scene_packing import copy_world, repack_moved
 from gen_data.generator.renderers.warp.visibility.amodal import rolling_silhouettes
+from gen_data.generator.renderers.warp.visibility.kernels.exposure import add_rows
 from gen_data.generator.renderers.warp.visibility.optical_flow import FLOW, flow_images
 from gen_data.generator.renderers.warp.visibility.reprojection import (
     BandedGBuffer,
@@ -97,19 +98,18 @@ def _render_images(
     """G-buffer, label images and, if requested, radiance."""
     labels = channels - {Channel.RADIANCE}
     if Channel.RADIANCE not in channels:
-        return render_bands(bands, labels, reference)
+        drawn = render_bands(bands, labels, reference)
+        return drawn.gbuffer, drawn.images
     if sampling.samples > 1:
-        gbuffer, images = render_bands(bands, labels, reference)
+        drawn = render_bands(bands, labels, reference)
         slices = split_slices(reference.state, sampling.samples, sampling.blurred)
-        mean = _average_slices(slices, reference)
+        radiance = _average_slices(slices, reference)
     else:
-        gbuffer, images = render_bands(bands, labels, reference, integrate_light)
-        mean = images[Channel.RADIANCE]
-    device = reference.cache.device
-    radiance = wp.array(mean.reshape(-1, 3), dtype=wp.vec3, device=device)
-    depths = wp.array(gbuffer.z_m.reshape(-1), dtype=float, device=device)
-    add_precipitation(reference, depths, radiance)
-    return gbuffer, images | {Channel.RADIANCE: radiance_image(radiance, reference.view)}
+        drawn = render_bands(bands, labels, reference, integrate_light)
+        radiance = drawn.radiance
+    add_precipitation(reference, drawn.gbuffer.depths, radiance)
+    image = radiance_image(radiance, reference.view)
+    return drawn.gbuffer, drawn.images | {Channel.RADIANCE: image}
 
 
 def split_slices(
@@ -144,26 +144,28 @@ def split_slices(
     return slices
 
 
-def _average_slices(slices: Sequence[Slice], reference: CameraView) -> Float32:
-    """Mean radiance over slices [cd/m^2], float32 [h, w, 3]."""
-    lens = reference.state.camera.intrinsics
-    mean = np.zeros((lens.height_px, lens.width_px, 3), np.float32)
+def _average_slices(slices: Sequence[Slice], reference: CameraView) -> wp.array:
+    """Mean radiance over slices [cd/m^2], flat."""
+    lens, device = reference.state.camera.intrinsics, reference.cache.device
+    mean = wp.zeros(lens.height_px * lens.width_px, dtype=wp.vec3, device=device)
     for part in slices:
         band = part.band
         first, end = add_margin(band, lens.height_px)
         rendered = reference = render_view(band.state, reference.context, (first, end), reference)
-        own = integrate_light(rendered)[band.first - first : band.end - first]
-        mean[band.first : band.end] += part.weights[:, None, None] * own
+        weights = wp.array(part.weights, dtype=float, device=device)
+        places = [lens.width_px, band.first - first, band.first, weights]
+        shape = (band.end - band.first, lens.width_px)
+        rendered.launch(add_rows, shape, [*places, integrate_light(rendered)], [mean])
     return mean
 
 
-def integrate_light(rendered: CameraView) -> Float32:
-    """Radiance of every pixel, anti-aliased; valid until the next call."""
+def integrate_light(rendered: CameraView) -> wp.array:
+    """Radiance of every pixel, anti-aliased, flat; valid until the next call."""
     # Shading changes the world's record, from which other instants start.
     rendered = replace(rendered, world=copy_world(rendered.world))
     radiance = shade_pixels(rendered)
     smooth_edges(rendered, radiance)
-    return np.asarray(radiance.numpy().reshape(rendered.view.height, rendered.view.width, 3))
+    return radiance
 
 
 def _keep_main_lamps(reference: CameraView) -> CameraView:

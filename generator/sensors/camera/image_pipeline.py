@@ -53,7 +53,7 @@ from gen_data.generator.sensors.camera.optics import add_flare, add_glare
 from gen_data.generator.sensors.device_presets import check_preset, preset_path
 
 NONE = Constant(0.0)
-_CONTRASTS = 16
+CONTRASTS = 16
 """Steps of contrast per unit."""
 PRESETS = "gen_data.generator.sensors.camera.presets"
 Row = tuple[float, float, float]
@@ -440,7 +440,7 @@ def _tone(light: Light, shot: Shot) -> NDArray[np.uint8]:
     """Apply sharpening, on display values, and the tone curve."""
     pipeline, scale = shot.pipeline, 1.0 / light.white
     # On a grid, so that tables of bytes are used again.
-    contrast = round(pipeline.contrast.draw(shot.rng) * _CONTRASTS) / _CONTRASTS
+    contrast = round(pipeline.contrast.draw(shot.rng) * CONTRASTS) / CONTRASTS
     curve = pipeline.tone, pipeline.headroom, contrast
     amount = pipeline.sharpening.draw(shot.rng)
     if amount <= 0.0:

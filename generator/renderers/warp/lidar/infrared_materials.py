@@ -102,6 +102,10 @@ def oren_nayar(slope_rad: float) -> tuple[float, float]:
 
 def mean_albedo(cache: DeviceCache, texture_id: str) -> Array:
     """Mean linear colour of a texture: its coarsest level, a single texel."""
-    texels = cache.texture(texture_id).texels.numpy()
-    roots = texels[-1:].view(np.uint8)[:3] / 255.0
+
+    def read() -> NDArray[np.uint32]:
+        texel: NDArray[np.uint32] = cache.texture(texture_id).texels[-1:].numpy()
+        return np.array(texel)
+
+    roots = cache.coarsest.get(texture_id, read).view(np.uint8)[:3] / 255.0
     return np.asarray(roots * roots, dtype=np.float64)

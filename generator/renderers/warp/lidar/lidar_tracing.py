@@ -27,10 +27,10 @@ from gen_data.generator.renderers.warp.device_cache import DeviceCache
 from gen_data.generator.renderers.warp.lidar.infrared_materials import infrared_surfaces
 from gen_data.generator.renderers.warp.lidar.kernels import lidar_rays as kernels
 from gen_data.generator.renderers.warp.lidar.kernels.ray_packets import LISTED_MAX, Boxes
+from gen_data.generator.renderers.warp.readback import Readback
 from gen_data.generator.renderers.warp.scene.bvh import group_boxes
 from gen_data.generator.renderers.warp.scene.material_packing import BodyMaterials, body_materials
 from gen_data.generator.renderers.warp.scene.scene_packing import PackedWorld, pack_world
-from gen_data.generator.renderers.warp.scene.struct_dtypes import to_device
 from gen_data.generator.renderers.warp.visibility.label_images import category_ids
 
 KEYS = 9
@@ -75,8 +75,8 @@ def pack_moving_bodies(
     motion.rows = wp.array(rows, dtype=int, device=device)
     motion.B_mesh_lidar = wp.array(B_mesh_lidar, dtype=wp.mat33, device=device)
     motion.eye_mesh = wp.array(eye_mesh, dtype=wp.vec3, device=device)
-    motion.phases = wp.array(phases, dtype=float, device=device, copy=False)
-    motion.origins_m = wp.array(origins_m, dtype=wp.vec3, device=device, copy=False)
+    motion.phases = cache.latest(f"phases {lidar.name}", phases, float)
+    motion.origins_m = cache.latest(f"origins {lidar.name}", origins_m, wp.vec3)
     return _enclose(world, movers, cache), motion
 
 
@@ -117,7 +117,7 @@ def _enclose(world: PackedWorld, movers: list[Mover], cache: DeviceCache) -> Pac
     """The world with boxes that contain the movers at all keys."""
     if not movers:
         return world
-    low_m, high_m = world.body_records["low_m"].copy(), world.body_records["high_m"].copy()
+    body_records = world.body_records.copy()
     numbers = [mover.number for mover in movers]
     meshes = [cache.mesh(mover.body.asset) for mover in movers]
     scale = np.array([mover.body.scale for mover in movers])[:, None]
@@ -129,12 +129,13 @@ def _enclose(world: PackedWorld, movers: list[Mover], cache: DeviceCache) -> Pac
     centre = t + np.einsum("nkij,nj->nki", R, 0.5 * (low + high) * scale, optimize=False)
     half = 0.5 * (high - low) * scale
     reach = np.einsum("nkij,nj->nki", np.abs(R), half, optimize=False) + SLACK_M
-    low_m[numbers] = (centre - reach).min(axis=1)
-    high_m[numbers] = (centre + reach).max(axis=1)
+    body_records["low_m"][numbers] = (centre - reach).min(axis=1)
+    body_records["high_m"][numbers] = (centre + reach).max(axis=1)
     lows_m, highs_m = (
-        wp.array(corner, dtype=wp.vec3, device=cache.device) for corner in (low_m, high_m)
+        wp.array(np.ascontiguousarray(body_records[name]), dtype=wp.vec3, device=cache.device)
+        for name in ("low_m", "high_m")
     )
-    return replace(world, lows_m=lows_m, highs_m=highs_m)
+    return replace(world, body_records=body_records, lows_m=lows_m, highs_m=highs_m)
 
 
 PUDDLE_MIN = 0.05
@@ -202,11 +203,18 @@ def trace_secondary(
     mirror = np.append(infrared["mirror"] > 0.0, False)[material]
     if first.puddles is not None:
         mirror = mirror | (first.puddles > PUDDLE_MIN)
-    found = []
     panes, mirrors = (_select_rays(which, order) for which in (clear, mirror))
+    selected = np.concatenate([panes, mirrors])
+    if not len(selected):
+        return None
+    found = Readback.allocate(len(selected), _SECONDARY, cache.device)
+    threads = inputs[0].threads
     if len(panes):
         given = [wp.array(panes, dtype=int, device=cache.device), first.ranges_m]
-        found.append(_launch(kernels.trace_behind_panes, [*inputs, *given], panes, labels, cache))
+        outputs = [part[: len(panes)] for part in found.parts]
+        wp.launch(
+            kernels.trace_behind_panes, threads, [*inputs, *given], outputs, device=cache.device
+        )
     if len(mirrors):
         water = np.zeros(len(mirrors), np.float32)
         if first.puddles is not None:
@@ -218,12 +226,18 @@ def trace_secondary(
             first.normals,
             wp.array(water, dtype=float, device=cache.device),
         ]
-        seen = _launch(kernels.trace_mirrors, [*inputs, *given], mirrors, labels, cache)
-        seen[3][:], seen[4][:], seen[5][:] = 0, 0, SURFACES.index("mirrored")
-        found.append(seen)
-    if not found:
-        return None
-    return SecondaryHits(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+        outputs = [part[len(panes) :] for part in found.parts]
+        wp.launch(kernels.trace_mirrors, threads, [*inputs, *given], outputs, device=cache.device)
+    ranges_m, reflectances, hits = found.numpy()
+    there = hits[:, 0] >= 0
+    instances, categories, surfaces = labels.at(hits[there])
+    mirrored = there[: len(panes)].sum()
+    instances[mirrored:], categories[mirrored:] = 0, 0
+    surfaces[mirrored:] = SURFACES.index("mirrored")
+    rays = selected[there].astype(np.int64)
+    return SecondaryHits(
+        rays, ranges_m[there], reflectances[there], instances, categories, surfaces
+    )
 
 
 def _select_rays(which: NDArray[np.bool_], order: NDArray[np.int32] | None) -> NDArray[np.int32]:
@@ -235,24 +249,10 @@ def _select_rays(which: NDArray[np.bool_], order: NDArray[np.int32] | None) -> N
     return rays[which[rays]].astype(np.int32, copy=False)
 
 
-def _launch(
-    kernel: wp.Kernel,
-    inputs: Sequence[Any],
-    selected: NDArray[np.int32],
-    labels: HitLabels,
-    cache: DeviceCache,
-) -> list[NDArray[Any]]:
-    """Fields of SecondaryHits for the selected rays that hit something."""
-    count = len(selected)
-    ranges_m, reflectances = (wp.zeros(count, dtype=float, device=cache.device) for _ in range(2))
-    hits_ = wp.zeros(count, dtype=wp.vec2i, device=cache.device)
-    outputs = [ranges_m, reflectances, hits_]
-    wp.launch(kernel, inputs[0].threads, list(inputs), outputs, device=cache.device)
-    hits = hits_.numpy()
-    there = hits[:, 0] >= 0
-    seen = (ranges_m.numpy()[there], reflectances.numpy()[there])
-    return [selected[there].astype(np.int64), *seen, *labels.at(hits[there])]
-
+_FIRST = (float, float, float, wp.vec2i)
+"""Types of ranges, reflectances, cosines and hits."""
+_SECONDARY = (float, float, wp.vec2i)
+"""Types of ranges, reflectances and hits."""
 
 RING_SHARE = math.sqrt(1.0 / 2.0)
 """Radius of the ring of rays, relative to the beam's: half the light is outside it."""
@@ -277,33 +277,31 @@ def trace_scan(scene: Scene, lidar: Lidar, beams: LidarRays, cache: DeviceCache)
     shape = (len(beams.directions), beams.subrays)
     count = shape[0] * shape[1]
     infrared = infrared_surfaces(per_body, cache)
-    lights = to_device(infrared, kernels.Infrared, device)
-    axes = wp.array(beams.directions, dtype=wp.vec3, device=device, copy=False)
+    lights = cache.latest("infrared", infrared, kernels.Infrared)
+    axes = cache.latest(f"beams {lidar.name}", beams.directions, wp.vec3)
     record = _scan(lidar, beams, cache)
     inputs = [record, world.record, motion, _boxes(world, record.threads, cache), lights, axes]
     order = np.zeros(0, np.int32) if beams.order is None else beams.order
-    images = [cache.scratch(f"scan {k}", count, float) for k in range(3)]
-    hits_ = cache.scratch("scan hits", count, wp.vec2i)
     covered = bool(world.record.ground.covered)
+    found = Readback.allocate(count, [*_FIRST, float] if covered else _FIRST, device)
     mirrors = covered or bool((infrared["mirror"] > 0.0).any())
     normals = cache.scratch("scan normals", count if mirrors else 1, wp.vec3)
-    puddles = cache.scratch("scan puddles", count if covered else 1, float)
+    puddles = found.parts[4] if covered else cache.scratch("no puddles", 1, float)
     wp.launch(
         kernels.scan_beams,
         dim=record.threads,
-        inputs=[*inputs, wp.array(order, dtype=int, device=device, copy=False)],
-        outputs=[*images, hits_, normals, puddles],
+        inputs=[*inputs, cache.latest(f"order {lidar.name}", order, int)],
+        outputs=[*found.parts[:4], normals, puddles],
         device=device,
     )
-    hits = hits_.numpy()
     labels = HitLabels.of(scene, per_body)
-    first = FirstHits(images[0], hits_, normals, hits, puddles.numpy() if covered else None)
-    ranges_m, reflectances, cosines = (image.numpy().reshape(shape).copy() for image in images)
+    ranges_m, reflectances, cosines, hits, *water = found.numpy()
+    first = FirstHits(found.parts[0], found.parts[3], normals, hits, water[0] if covered else None)
     instances, categories, surfaces = labels.at(hits)
     return LidarHits(
-        ranges_m,
-        reflectances,
-        cosines,
+        ranges_m.reshape(shape),
+        reflectances.reshape(shape),
+        cosines.reshape(shape),
         instances.reshape(shape),
         categories.reshape(shape),
         surfaces.reshape(shape),
@@ -314,8 +312,8 @@ def trace_scan(scene: Scene, lidar: Lidar, beams: LidarRays, cache: DeviceCache)
 def _boxes(world: PackedWorld, threads: int, cache: DeviceCache) -> Boxes:
     boxes = Boxes()
     boxes.lows_m, boxes.highs_m = world.lows_m, world.highs_m
-    groups = group_boxes(world.lows_m.numpy(), world.highs_m.numpy())
-    boxes.groups = wp.array(groups, dtype=float, device=cache.device)
+    low_m, high_m = (np.ascontiguousarray(world.body_records[k]) for k in ("low_m", "high_m"))
+    boxes.groups = cache.latest("box groups", group_boxes(low_m, high_m), float)
     shape = (threads, int(LISTED_MAX))
     boxes.listed = cache.scratch("listed bodies", shape, int)
     boxes.enters_m = cache.scratch("listed distances", shape, float)

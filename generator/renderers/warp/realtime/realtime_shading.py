@@ -42,6 +42,7 @@ from gen_data.generator.renderers.warp.scene.light_selection import (
     extract_sky_lights,
     keep_main_lamps,
 )
+from gen_data.generator.renderers.warp.scene.struct_dtypes import take_rows
 from gen_data.generator.renderers.warp.visibility.kernels import (
     distortion,
     edge_antialiasing,
@@ -76,11 +77,11 @@ def shade_pixels(frame: CameraView) -> wp.array:
     return radiance
 
 
-def render_bare_ground(state: CameraState, context: RenderContext) -> Float32:
-    """Radiance of the ground of a photograph without the things on it, float32 [h, w, 3]."""
+def render_bare_ground(state: CameraState, context: RenderContext) -> wp.array:
+    """Radiance of the ground of a photograph without the things on it, flat."""
     bare = CameraState.of(without_things(state.scene), state.camera)
     frame = render_view(bare, replace(context, backdrop=None))
-    return radiance_image(shade_pixels(frame), frame.view)
+    return _copy(shade_pixels(frame))
 
 
 def _shade_world(frame: CameraView) -> wp.array:
@@ -104,7 +105,7 @@ def smooth_edges(frame: CameraView, radiance: wp.array) -> None:
     covers the image.
     """
     samples, backdrop = frame.settings.antialias, frame.context.backdrop
-    centres = None if backdrop is None else radiance.numpy().copy()
+    centres = None if backdrop is None else _copy(radiance)
     if frame.context.paths is None and samples > 1:
         _average_samples(frame, radiance, samples)
     if backdrop is not None and centres is not None:
@@ -148,6 +149,13 @@ def add_precipitation(frame: CameraView, z_m: wp.array, radiance: wp.array) -> N
 def radiance_image(radiance: wp.array, view: records.View) -> Float32:
     """Radiance [cd/m^2], linear RGB, float32 [h, w, 3]; a copy of the flat array."""
     return np.asarray(radiance.numpy().reshape(view.height, view.width, 3).copy())
+
+
+def _copy(radiance: wp.array) -> wp.array:
+    """A copy of scratch memory."""
+    copy = wp.empty_like(radiance)
+    wp.copy(copy, radiance)
+    return copy
 
 
 def darken_outside(view: records.View, radiance: wp.array) -> None:
@@ -295,10 +303,9 @@ def _weigh_lamps(frame: CameraView, lattice: Lattice) -> wp.array:
     frame.launch(soft_shadows.weigh_lamps, points, [world, lattice], [shares, matters])
     kept = np.flatnonzero(matters.numpy())
     if len(kept) < count:
-        lamps = world.lamps.numpy()[kept]
-        world.lamps = wp.array(lamps, dtype=records.LightRecord, device=cache.device)
+        world.lamps = take_rows(world.lamps, kept)
         if len(kept):
-            shares = wp.array(shares.numpy()[kept], dtype=float, device=cache.device)
+            shares = take_rows(shares, kept)
     return shares
 
 

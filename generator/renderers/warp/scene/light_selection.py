@@ -25,6 +25,7 @@ from gen_data.generator.renderers.warp.scene.scene_packing import (
     lamp_records,
     sky_record,
 )
+from gen_data.generator.renderers.warp.scene.struct_dtypes import take_rows, to_device
 from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer
 
 _STRIDE_PX = 11
@@ -38,18 +39,15 @@ def keep_main_lamps(frame: CameraView) -> None:
     """Restrict the world to the lamps that contribute most to the visible surfaces, in place."""
     chosen = main_lamp_numbers(frame)
     if chosen is not None:
-        lamps = frame.world.record.lamps.numpy()[chosen]
-        frame.world.record.lamps = wp.array(
-            lamps, dtype=records.LightRecord, device=frame.cache.device
-        )
+        frame.world.record.lamps = take_rows(frame.world.record.lamps, chosen)
 
 
 def main_lamp_numbers(frame: CameraView) -> NDArray[np.int64] | None:
     """Numbers of the lamps that ``keep_main_lamps`` keeps, ascending; None = all."""
-    lamps, lamps_max = frame.world.record.lamps.numpy(), frame.settings.max_lamps
+    lamps, lamps_max = frame.world.record.lamps, frame.settings.max_lamps
     if len(lamps) <= lamps_max:
         return None
-    return main_lamps(lamps, *_sparse_points(frame.view, frame.gbuffer), lamps_max)
+    return main_lamps(lamps.numpy(), *_sparse_points(frame.view, frame.gbuffer), lamps_max)
 
 
 def main_lamps(
@@ -113,11 +111,10 @@ def _dot(a: Sequence[Array], b: Sequence[Array] | Sequence[float]) -> Array:
 
 def _sparse_points(view: records.View, gbuffer: GBuffer) -> tuple[Array, Array]:
     """Visible points and normals at a sparse grid of pixels, world frame."""
-    shape = (view.height, view.width)
-    z = gbuffer.z_m.numpy().reshape(shape)[::_STRIDE_PX, ::_STRIDE_PX].astype(np.float64)
-    normals = gbuffer.normals.numpy().reshape(*shape, 3)[::_STRIDE_PX, ::_STRIDE_PX]
+    z = _every_few_pixels(view, gbuffer.z_m).astype(np.float64)
+    normals = _every_few_pixels(view, gbuffer.normals)
     rows, columns = np.nonzero(np.isfinite(z))
-    directions = _directions(view, rows * _STRIDE_PX, columns * _STRIDE_PX)
+    directions = _directions(view, rows, columns)
     p_camera = directions * z[rows, columns, None]
     R = np.array(view.R_world_camera, dtype=np.float64).reshape(3, 3)
     eye = np.array(view.eye_m, dtype=np.float64)
@@ -125,13 +122,18 @@ def _sparse_points(view: records.View, gbuffer: GBuffer) -> tuple[Array, Array]:
     return points, normals[rows, columns].astype(np.float64)
 
 
+def _every_few_pixels(view: records.View, image: wp.array) -> NDArray[np.float32]:
+    """A sparse grid of pixels of a flat image, which alone leaves the device."""
+    grid = image.reshape((view.height, view.width))[::_STRIDE_PX, ::_STRIDE_PX]
+    return np.asarray(grid.numpy())
+
+
 def _directions(view: records.View, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> Array:
-    """As kernels.records.pixel_direction, at pixel centres."""
+    """As kernels.records.pixel_direction, at pixel centres of the sparse grid."""
     if view.lens != records.PINHOLE:
-        directions: Array = view.directions.numpy()[rows * view.width + columns, :3]
-        return directions.astype(np.float64)
-    x = (columns + 0.5 - view.cx) * view.inverse_fx
-    y = (rows + 0.5 - view.cy) * view.inverse_fy
+        return _every_few_pixels(view, view.directions)[rows, columns, :3].astype(np.float64)
+    x = (columns * _STRIDE_PX + 0.5 - view.cx) * view.inverse_fx
+    y = (rows * _STRIDE_PX + 0.5 - view.cy) * view.inverse_fy
     return np.stack([x, y, np.ones_like(x)], axis=-1)
 
 
@@ -165,8 +167,8 @@ def extract_sky_lights(frame: CameraView) -> PackedWorld:
     added = lamp_records(suns)
     # Reflected rays hit them in the panorama itself.
     added["shown"] = 1
-    lamps = np.concatenate([world.record.lamps.numpy(), added])
-    lit.record.lamps = wp.array(lamps, dtype=records.LightRecord, device=cache.device)
+    lamps = np.concatenate([lamp_records(scene.lights), added])
+    lit.record.lamps = to_device(lamps, records.LightRecord, cache.device)
     return lit
 
 

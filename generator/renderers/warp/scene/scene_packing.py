@@ -192,14 +192,14 @@ def _pack_bodies(bodies: tuple[Body, ...], cache: DeviceCache) -> _PackedScene:
     body_records["first_material"] = np.cumsum(counts) - counts
     body_records["cutouts"] = cutout_bodies(cutout_slots(surfaces, textures), counts)
     body_meshes = [meshes[place[body.asset]] for body in bodies]
-    device = cache.device
     world = records.World()
     placement = _place_bodies(world, body_records, bodies, body_meshes, cache)
     geometries = stack_records([mesh.record for mesh in meshes], records.Geometry)
     images = stack_records([texture.record for texture in textures.values()], records.TextureRecord)
-    world.geometries = to_device(geometries, records.Geometry, device)
-    world.surfaces = to_device(surfaces, records.MaterialRecord, device)
-    world.textures = to_device(images, records.TextureRecord, device)
+    # Steps of a sequence have other poses and the same assets.
+    world.geometries = cache.latest("geometries", geometries, records.Geometry)
+    world.surfaces = cache.latest("surfaces", surfaces, records.MaterialRecord)
+    world.textures = cache.latest("textures", images, records.TextureRecord)
     world.lobes = cache.lobes
     layered = bool(surfaces["layered"].any())
     return _PackedScene(world, (meshes, textures), placement, layered)

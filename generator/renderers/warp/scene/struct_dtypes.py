@@ -35,6 +35,15 @@ def to_device(records: NDArray[np.void], struct: Any, device: wp.Device) -> wp.a
     return wp.clone(here, device=device)
 
 
+def take_rows(values: wp.array, rows: NDArray[np.integer]) -> wp.array:
+    """Some rows of a contiguous array, copied on its own device."""
+    taken = wp.empty((len(rows), *values.shape[1:]), dtype=values.dtype, device=values.device)
+    width = values.size // max(len(values), 1)
+    for k, row in enumerate(rows.tolist()):
+        wp.copy(taken, values, k * width, row * width, width)
+    return taken
+
+
 def copy_struct(instance: Any, struct: Any) -> Any:
     """A shallow copy of an instance of a Warp struct."""
     copy = struct()

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
@@ -33,10 +33,14 @@ from gen_data.generator.renderers.warp.visibility.distortion_lut import NODE_STR
 from gen_data.generator.renderers.warp.visibility.gbuffer import (
     CORNERS,
     Projected,
+    box_corners,
     canvas_box,
     project_vertices,
 )
-from gen_data.generator.renderers.warp.visibility.kernels.amodal import draw_silhouettes
+from gen_data.generator.renderers.warp.visibility.kernels.amodal import (
+    draw_silhouettes,
+    pack_bits,
+)
 from gen_data.generator.renderers.warp.visibility.kernels.amodal_lens import trace_silhouettes
 from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import Z_NEAR_M, Outline
 from gen_data.generator.renderers.warp.visibility.reprojection import make_bands
@@ -45,6 +49,8 @@ _NOTHING = np.zeros((0, 0), np.bool_)
 _UNSNAPPED = -(2**31)
 _BANDS = 12
 EMPTY = BoxPx(0, 0, 0, 0)
+_EDGES = np.array([(k, k | bit) for bit in (1, 2, 4) for k in range(8) if not k & bit]).T
+"""Corners at the ends of a box's twelve edges, [2, 12], as of CORNERS."""
 
 
 def render_silhouettes(frame: CameraView, seen_ids: NDArray[np.uint16]) -> dict[int, Silhouette]:
@@ -60,48 +66,100 @@ def render_silhouettes(frame: CameraView, seen_ids: NDArray[np.uint16]) -> dict[
     first = 0
     for instance_id, box in boxes.items():
         end = first + box.width_px * box.height_px
-        pixels = drawn[first:end].reshape(box.height_px, box.width_px) > 0
+        pixels = drawn[first:end].reshape(box.height_px, box.width_px)
         _unite(pixels, box, seen_ids, instance_id)
         found[instance_id] = _crop(instance_id, pixels, box)
         first = end
     return found
 
 
-def _rasterize_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.uint8]]:
+def _rasterize_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.bool_]]:
     """A bounding box of each annotated instance's silhouette, and the masks of all boxes."""
     scene, world, view, cache = frame.state.scene, frame.world, frame.view, frame.cache
     projected = frame.gbuffer.projected or project_vertices(world, view, cache)
-    boxes = _boxes_px(scene, view, projected)
+    boxes = _boxes_px(frame, projected)
     whole = {
         number: boxes.get(scene.bodies[number].instance_id, EMPTY)
         for number in projected.reached.tolist()
     }
     outlines, size = _outline_records(scene, boxes, whole)
-    mask = wp.zeros(size + LANES, dtype=wp.uint8, device=cache.device)
+    mask = _Mask.allocate(size + LANES, cache.device)
     listed = wp.array(outlines, dtype=Outline, device=cache.device)
     inputs = [view, world.record, projected.p_camera, projected.xy, listed]
-    frame.launch(draw_silhouettes, len(outlines), inputs, [mask])
-    drawn: NDArray[np.uint8] = mask.numpy()
-    return boxes, drawn
+    frame.launch(draw_silhouettes, len(outlines), inputs, [mask.pixels])
+    return boxes, mask.read()
 
 
-def _boxes_px(scene: Scene, view: records.View, projected: Projected) -> dict[int, BoxPx]:
+@dataclass(frozen=True, eq=False, slots=True)
+class _Mask:
+    """Pixels on the device, 0 or 1, which the host reads as bits.
+
+    Attributes:
+        words: Eight pixels each.
+        pixels: The same memory, one byte per pixel.
+    """
+
+    words: wp.array
+    pixels: wp.array
+
+    @classmethod
+    def allocate(cls, size: int, device: wp.Device) -> _Mask:
+        """At least ``size`` pixels, all 0."""
+        words = wp.zeros(-(-size // 8), dtype=wp.uint64, device=device)
+        pixels = wp.array(ptr=words.ptr, shape=8 * words.size, dtype=wp.uint8, device=device)
+        return cls(words, pixels)
+
+    def read(self) -> NDArray[np.bool_]:
+        """All pixels on the host."""
+        bits = wp.empty(self.words.size, dtype=wp.uint8, device=self.words.device)
+        wp.launch(pack_bits, bits.size, [self.words], [bits], device=bits.device)
+        return np.unpackbits(bits.numpy(), bitorder="little").view(np.bool_)
+
+
+def _boxes_px(frame: CameraView, projected: Projected) -> dict[int, BoxPx]:
     """Pixels of the canvas that each annotated instance's vertices span; may be empty."""
+    scene, view = frame.state.scene, frame.view
     canvas = canvas_box(view)
     annotated = sorted(i.instance_id for i in scene.instances if i.annotated)
     boxes = dict.fromkeys(annotated, EMPTY)
     extents = projected.extents.numpy()
     lows, highs = extents["low"], extents["high"]
     for k in np.flatnonzero(extents["farthest_m"] >= Z_NEAR_M).tolist():
-        instance_id = scene.bodies[projected.reached[k]].instance_id
+        number = projected.reached[k]
+        instance_id = scene.bodies[number].instance_id
         if instance_id in boxes:
-            reached = BoxPx(*(lows[k] >> 8).tolist(), *((highs[k] >> 8) + 1).tolist())
-            # A triangle clipped at the camera's plane may reach anywhere.
-            cut = lows[k, 0] == _UNSNAPPED
-            boxes[instance_id] = boxes[instance_id].union(
-                canvas if cut else reached.intersection(canvas)
-            )
+            if lows[k, 0] == _UNSNAPPED:
+                (corners_m,) = box_corners(frame.world.body_records[[number]], view)
+                reached = clipped_box_px(corners_m, view)
+            else:
+                reached = BoxPx(*(lows[k] >> 8).tolist(), *((highs[k] >> 8) + 1).tolist())
+            boxes[instance_id] = boxes[instance_id].union(reached.intersection(canvas))
     return boxes
+
+
+def clipped_box_px(corners_m: Array, view: records.View) -> BoxPx:
+    """Pixels that a box may cover which reaches behind a pinhole's plane.
+
+    ``corners_m`` are its corners in the camera frame, [3, 8], in the order of CORNERS.
+    """
+    # Slightly nearer than where triangles are clipped: vertices are single precision.
+    near_m = 0.999 * Z_NEAR_M
+    a, b = corners_m[:, _EDGES[0]], corners_m[:, _EDGES[1]]
+    cut = (a[2] < near_m) != (b[2] < near_m)
+    share = (near_m - a[2, cut]) / (b[2, cut] - a[2, cut])
+    crossings_m = a[:, cut] + (b[:, cut] - a[:, cut]) * share
+    front = corners_m[2] >= near_m
+    if not front.any():
+        # Rounding: a vertex that lies in the plane itself.
+        return canvas_box(view)
+    x, y, z = np.concatenate([corners_m[:, front], crossings_m], axis=1)
+    u, v = view.fx * x / z + view.cx, view.fy * y / z + view.cy
+    return BoxPx(
+        math.floor(u.min()) - 1,
+        math.floor(v.min()) - 1,
+        math.ceil(u.max()) + 1,
+        math.ceil(v.max()) + 1,
+    )
 
 
 def _outline_records(
@@ -144,7 +202,7 @@ def _crop(instance_id: int, pixels: NDArray[np.bool_], box: BoxPx) -> Silhouette
     return Silhouette(instance_id, x_px, y_px, pixels[tight.window()])
 
 
-def _trace_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.uint8]]:
+def _trace_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.bool_]]:
     """A bounding box of each annotated instance's silhouette, and the masks of all boxes."""
     scene, camera, cache = frame.state.scene, frame.state.camera, frame.cache
     world, view = frame.world, frame.view
@@ -164,14 +222,13 @@ def _trace_masks(frame: CameraView) -> tuple[dict[int, BoxPx], NDArray[np.uint8]
             of_bodies[number] = _box_around(near, view).intersection(canvas_box(view))
             boxes[body.instance_id] = boxes[body.instance_id].union(of_bodies[number])
     windows, size = _outline_records(scene, boxes, of_bodies)
-    mask = wp.zeros(size, dtype=wp.uint8, device=cache.device)
+    mask = _Mask.allocate(size, cache.device)
     if len(windows):
         shape = (len(windows), int(windows["window"]["height"].max()))
         records_ = wp.array(windows, dtype=Outline, device=cache.device)
         inputs = [view, world.record, optics.nodes_on_device, NODE_STRIDE_PX, Z_NEAR_M, records_]
-        frame.launch(trace_silhouettes, shape, inputs, [mask])
-    pixels: NDArray[np.uint8] = mask.numpy()
-    return boxes, pixels
+        frame.launch(trace_silhouettes, shape, inputs, [mask.pixels])
+    return boxes, mask.read()
 
 
 def bounding_cone(ends_m: Array) -> tuple[Array, float]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,51 +14,94 @@ from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.renderers.warp.frame_context import CameraView
 from gen_data.generator.renderers.warp.plates import hide_labels
+from gen_data.generator.renderers.warp.readback import Readback
 from gen_data.generator.renderers.warp.scene.kernels import records
 from gen_data.generator.renderers.warp.visibility.kernels import label_resolve
 
 
 def label_images(frame: CameraView, channels: frozenset[Channel]) -> dict[Channel, NDArray[Any]]:
     """All requested label channels, as documented at Channel."""
-    scene, view, gbuffer = frame.state.scene, frame.view, frame.gbuffer
-    images: dict[Channel, NDArray[Any]] = {}
-    ids = {
-        Channel.INSTANCE: [body.instance_id for body in scene.bodies],
-        Channel.PART: [body.part_id for body in scene.bodies],
-        Channel.CATEGORY: category_ids(scene),
+    drawn = draw_labels(frame, channels)
+    return read_images(drawn, frame.view.height, frame.view.width)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class DrawnLabels:
+    """Label channels on the device, in the order of the arrays of ``memory``; flat."""
+
+    channels: tuple[Channel, ...]
+    memory: Readback
+
+
+def read_images(drawn: DrawnLabels, height: int, width: int) -> dict[Channel, NDArray[Any]]:
+    """Label channels on the host, [h, w] or [h, w, 3]."""
+    flat = drawn.memory.numpy() if drawn.channels else ()
+    return {
+        channel: values.reshape(height, width, *values.shape[1:])
+        for channel, values in zip(drawn.channels, flat, strict=True)
     }
-    for channel in sorted(channels & ids.keys(), key=lambda c: c.value):
-        listed = np.array([0, *ids[channel]], dtype=np.uint16)
-        table = wp.array(listed, dtype=wp.uint16, device=frame.cache.device)
-        inputs = [gbuffer.hits, table]
-        images[channel] = _launch(frame, label_resolve.label_ids, inputs, wp.uint16)
-    if Channel.Z_DEPTH in channels and view.lens == records.PINHOLE:
-        images[Channel.Z_DEPTH] = gbuffer.z_m.numpy().reshape(view.height, view.width).copy()
-    elif Channel.Z_DEPTH in channels:
-        inputs = [view, gbuffer.z_m]
-        images[Channel.Z_DEPTH] = _launch(frame, label_resolve.label_z_depths, inputs, float)
-    if Channel.RANGE in channels:
-        inputs = [view, gbuffer.z_m]
-        images[Channel.RANGE] = _launch(frame, label_resolve.label_ranges, inputs, float)
-    if Channel.NORMALS in channels:
-        inputs = [view, gbuffer.normals]
-        images[Channel.NORMALS] = _launch(frame, label_resolve.label_normals, inputs, wp.vec3)
-    if Channel.OBJECT_COORDINATES in channels:
-        frames, kernel = box_frames(scene), label_resolve.label_object_coordinates
+
+
+_DTYPES: dict[Channel, Any] = {
+    Channel.CATEGORY: wp.uint16,
+    Channel.INSTANCE: wp.uint16,
+    Channel.PART: wp.uint16,
+    Channel.Z_DEPTH: float,
+    Channel.RANGE: float,
+    Channel.NORMALS: wp.vec3,
+    Channel.OBJECT_COORDINATES: wp.vec3,
+}
+
+
+def empty_labels(channels: frozenset[Channel], pixels: int, device: wp.Device) -> DrawnLabels:
+    """Memory for those channels that are labels."""
+    labels = tuple(channel for channel in _DTYPES if channel in channels)
+    dtypes = [_DTYPES[channel] for channel in labels]
+    return DrawnLabels(labels, Readback.allocate(pixels, dtypes, device))
+
+
+def draw_labels(frame: CameraView, channels: frozenset[Channel]) -> DrawnLabels:
+    """All requested label channels, on the device."""
+    drawn = empty_labels(channels, frame.pixels, frame.cache.device)
+    for channel, image in zip(drawn.channels, drawn.memory.parts, strict=True):
+        _draw_label(frame, channel, image)
+        if frame.context.backdrop is not None:
+            hide_labels(frame, frame.context.backdrop, image, _nothing(channel))
+    return drawn
+
+
+def _nothing(channel: Channel) -> Any:
+    """Value of a pixel that shows nothing."""
+    return math.inf if channel in (Channel.Z_DEPTH, Channel.RANGE) else _DTYPES[channel](0)
+
+
+def _draw_label(frame: CameraView, channel: Channel, image: wp.array) -> None:
+    scene, view, gbuffer = frame.state.scene, frame.view, frame.gbuffer
+    if channel is Channel.Z_DEPTH and view.lens == records.PINHOLE:
+        wp.copy(image, gbuffer.z_m)
+    elif channel is Channel.Z_DEPTH:
+        frame.launch(label_resolve.label_z_depths, frame.pixels, [view, gbuffer.z_m], [image])
+    elif channel is Channel.RANGE:
+        frame.launch(label_resolve.label_ranges, frame.pixels, [view, gbuffer.z_m], [image])
+    elif channel is Channel.NORMALS:
+        frame.launch(label_resolve.label_normals, frame.pixels, [view, gbuffer.normals], [image])
+    elif channel is Channel.OBJECT_COORDINATES:
+        frames = box_frames(scene)
         boxes = wp.array(frames, dtype=label_resolve.BoxFrame, device=frame.cache.device)
         inputs = [frame.world.record, gbuffer.hits, gbuffer.weights, boxes]
-        images[Channel.OBJECT_COORDINATES] = _launch(frame, kernel, inputs, wp.vec3)
-    if frame.context.backdrop is not None:
-        hide_labels(frame, frame.context.backdrop, images)
-    return images
+        frame.launch(label_resolve.label_object_coordinates, frame.pixels, inputs, [image])
+    else:
+        ids = np.array([0, *_body_ids(scene, channel)], dtype=np.uint16)
+        table = wp.array(ids, dtype=wp.uint16, device=frame.cache.device)
+        frame.launch(label_resolve.label_ids, frame.pixels, [gbuffer.hits, table], [image])
 
 
-def _launch(frame: CameraView, kernel: wp.Kernel, inputs: list[Any], dtype: Any) -> NDArray[Any]:
-    """The image that a kernel computes, [h, w] or [h, w, 3]."""
-    image = wp.zeros(frame.pixels, dtype=dtype, device=frame.cache.device)
-    frame.launch(kernel, frame.pixels, inputs, [image])
-    values: NDArray[Any] = image.numpy()
-    return values.reshape(frame.view.height, frame.view.width, *values.shape[1:])
+def _body_ids(scene: Scene, channel: Channel) -> list[int]:
+    """Ids of the bodies in a channel of ids."""
+    if channel is Channel.CATEGORY:
+        return category_ids(scene)
+    name = "instance_id" if channel is Channel.INSTANCE else "part_id"
+    return [getattr(body, name) for body in scene.bodies]
 
 
 def category_ids(scene: Scene) -> list[int]:

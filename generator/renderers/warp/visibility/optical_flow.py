@@ -99,7 +99,7 @@ def _flow_channels(
             seen = frozenset({Channel.RANGE, Channel.NORMALS})
             # Bands four times as high allow one pixel of motion: as accurate as the occlusion test.
             starts = [band.first for band in bands[::4]]
-            _, other = render_bands(make_bands(then, starts), seen, reference)
+            other = render_bands(make_bands(then, starts), seen, reference).images
             if reference.context.backdrop is not None:
                 # The foreground is nearer than everything.
                 other[Channel.RANGE][reference.context.backdrop.hidden] = 0.0

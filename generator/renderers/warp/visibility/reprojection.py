@@ -9,9 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
 from gen_data.generator.core.asset_types import Float32, Int32
@@ -28,29 +30,63 @@ from gen_data.generator.renderers.warp.frame_context import (
     is_moving,
     render_view,
 )
-from gen_data.generator.renderers.warp.visibility.label_images import label_images
+from gen_data.generator.renderers.warp.readback import Readback
+from gen_data.generator.renderers.warp.visibility.label_images import (
+    draw_labels,
+    empty_labels,
+    read_images,
+)
 
-RadianceFunction = Callable[[CameraView], Float32]
-"""Radiance of every pixel of a view [cd/m^2], float32 [h, w, 3]."""
+RadianceFunction = Callable[[CameraView], wp.array]
+"""Radiance of every pixel of a view [cd/m^2], flat, on the device."""
 
 # Spacing of the lattice of realtime shading; period of its sampling pattern; and half width of its
 # smoothing.
 _STRIDE_PX, _PATTERN_PX, _MARGIN_PX = 3, 12, 6
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+_IMAGES = (wp.vec2i, float, wp.vec2)
+"""Types of hits, depths and weights."""
+
+
+@dataclass(frozen=True, eq=False)
 class BandedGBuffer:
-    """G-buffer of an image whose rows may differ in time.
+    """G-buffer of an image whose rows may differ in time; the host reads it on first use.
 
     Attributes:
         bands: Bands in order of rows, covering the image.
-        hits, z_m, weights: As of GBuffer, shapes [h, w, 2], [h, w], [h, w, 2].
+        memory: Hits, depths and, if ``stride`` is 1, weights as of GBuffer, on the device.
+        stride: Distance of its pixels in the image, along rows and columns.
     """
 
     bands: Sequence[RowBand]
-    hits: Int32
-    z_m: Float32
-    weights: Float32
+    memory: Readback
+    stride: int = 1
+
+    @cached_property
+    def _images(self) -> list[NDArray[Any]]:
+        shape = sparse_shape(self.intrinsics, self.stride)
+        return [image.reshape(*shape, *image.shape[1:]) for image in self.memory.numpy()]
+
+    @property
+    def hits(self) -> Int32:
+        """As of GBuffer, [h, w, 2]."""
+        return self._images[0]
+
+    @property
+    def z_m(self) -> Float32:
+        """As of GBuffer, [h, w]."""
+        return self._images[1]
+
+    @property
+    def weights(self) -> Float32:
+        """As of GBuffer, [h, w, 2]."""
+        return self._images[2]
+
+    @property
+    def depths(self) -> wp.array:
+        """As of GBuffer, on the device."""
+        return self.memory.parts[1]
 
     @property
     def intrinsics(self) -> Intrinsics:
@@ -63,16 +99,35 @@ def full_band(state: CameraState) -> RowBand:
     return RowBand(0, state.camera.intrinsics.height_px, state)
 
 
-def copy_gbuffer(rendered: CameraView) -> BandedGBuffer:
-    """Copy of the G-buffer of an image of one instant."""
-    lens = rendered.state.camera.intrinsics
-    shape = (lens.height_px, lens.width_px)
-    return BandedGBuffer(
-        (full_band(rendered.state),),
-        rendered.gbuffer.hits.numpy().reshape(*shape, 2).copy(),
-        rendered.gbuffer.z_m.numpy().reshape(shape).copy(),
-        rendered.gbuffer.weights.numpy().reshape(*shape, 2).copy(),
-    )
+def sparse_shape(lens: Intrinsics, stride: int) -> tuple[int, int]:
+    """Rows and columns of the grid of every ``stride``-th pixel."""
+    return -(-lens.height_px // stride), -(-lens.width_px // stride)
+
+
+def copy_gbuffer(rendered: CameraView, stride: int = 1) -> BandedGBuffer:
+    """Copy of the G-buffer of an image of one instant; without weights if ``stride`` exceeds 1."""
+    lens, gbuffer = rendered.state.camera.intrinsics, rendered.gbuffer
+    whole, shape = sparse_shape(lens, 1), sparse_shape(lens, stride)
+    dtypes = _IMAGES if stride == 1 else _IMAGES[:2]
+    memory = Readback.allocate(shape[0] * shape[1], dtypes, rendered.cache.device)
+    images = (gbuffer.hits, gbuffer.z_m, gbuffer.weights)
+    for copy, image in zip(memory.parts, images, strict=False):
+        wp.copy(copy.reshape(shape), image.reshape(whole)[::stride, ::stride])
+    return BandedGBuffer((full_band(rendered.state),), memory, stride)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RenderedBands:
+    """An image made of bands.
+
+    Attributes:
+        images: Its label channels, on the host.
+        radiance: As of RadianceFunction; None if not requested.
+    """
+
+    gbuffer: BandedGBuffer
+    images: dict[Channel, NDArray[Any]]
+    radiance: wp.array | None
 
 
 def render_bands(
@@ -80,34 +135,33 @@ def render_bands(
     channels: frozenset[Channel],
     reference: CameraView,
     light: RadianceFunction | None = None,
-) -> tuple[BandedGBuffer, dict[Channel, NDArray[Any]]]:
+) -> RenderedBands:
     """Render G-buffer and label images of bands that cover the image, each at its own instant.
 
-    ``reference`` is the world at a nearby instant; ``light`` computes the channel RADIANCE, None =
-    not requested.
+    ``reference`` is the world at a nearby instant; ``light`` computes radiance, None = not
+    requested.
     """
-    lens = reference.state.camera.intrinsics
-    shape = (lens.height_px, lens.width_px)
-    hits, weights = np.zeros((*shape, 2), np.int32), np.zeros((*shape, 2), np.float32)
-    z_m = np.zeros(shape, np.float32)
-    parts: dict[Channel, list[NDArray[Any]]] = {}
+    lens, device = reference.state.camera.intrinsics, reference.cache.device
+    pixels = lens.height_px * lens.width_px
+    memory = Readback.allocate(pixels, _IMAGES, device)
+    labels = empty_labels(channels, pixels, device)
+    radiance = wp.empty(pixels, dtype=wp.vec3, device=device) if light else None
     for band in bands:
-        rows = slice(band.first, band.end)
         first, end = (band.first, band.end) if light is None else add_margin(band, lens.height_px)
         # Neighbouring bands share the most packed data.
         rendered = reference = render_view(band.state, reference.context, (first, end), reference)
-        own = slice(band.first - first, band.end - first)
-        gbuffer, rows_px = rendered.gbuffer, (end - first, lens.width_px)
-        hits[rows] = gbuffer.hits.numpy().reshape(*rows_px, 2)[own]
-        weights[rows] = gbuffer.weights.numpy().reshape(*rows_px, 2)[own]
-        z_m[rows] = gbuffer.z_m.numpy().reshape(rows_px)[own]
-        drawn = label_images(rendered, channels)
+        gbuffer = rendered.gbuffer
+        seen = (gbuffer.hits, gbuffer.z_m, gbuffer.weights)
+        drawn = draw_labels(rendered, channels).memory
+        copies = list(zip(memory.parts, seen, strict=True))
+        copies += zip(labels.memory.parts, drawn.parts, strict=True)
         if light is not None:
-            drawn[Channel.RADIANCE] = light(rendered)
-        for channel, image in drawn.items():
-            parts.setdefault(channel, []).append(image[own].copy())
-    images = {channel: np.concatenate(pieces) for channel, pieces in parts.items()}
-    return BandedGBuffer(tuple(bands), hits, z_m, weights), images
+            copies.append((radiance, light(rendered)))
+        place, begin = band.first * lens.width_px, (band.first - first) * lens.width_px
+        for image, part in copies:
+            wp.copy(image, part, place, begin, (band.end - band.first) * lens.width_px)
+    images = read_images(labels, lens.height_px, lens.width_px)
+    return RenderedBands(BandedGBuffer(tuple(bands), memory), images, radiance)
 
 
 def add_margin(band: RowBand, height_px: int) -> tuple[int, int]:
@@ -153,14 +207,12 @@ def find_carriers(scene: Scene) -> dict[int, int]:
     return {k: number for number, k in enumerate(moving, 1)}
 
 
-def gather_points(
-    gbuffer: BandedGBuffer, carriers: Mapping[int, int], stride: int = 1
-) -> ScenePoints:
-    """The visible points at every few pixels."""
-    hits = gbuffer.hits[::stride, ::stride]
+def gather_points(gbuffer: BandedGBuffer, carriers: Mapping[int, int]) -> ScenePoints:
+    """The visible points at the G-buffer's pixels."""
+    hits, stride = gbuffer.hits, gbuffer.stride
     places = np.zeros((*hits.shape[:2], 4))
     numbers = np.zeros(hits.shape[:2], np.intp)
-    p_camera = _seen_points(gbuffer, stride)
+    p_camera = _seen_points(gbuffer)
     known = np.zeros(int(hits[..., 0].max(initial=-1)) + 2, np.intp)
     for body, number in carriers.items():
         if body + 1 < len(known):
@@ -223,10 +275,10 @@ def deform_points(
     return replace(points, places=places)
 
 
-def _seen_points(gbuffer: BandedGBuffer, stride: int) -> Array:
+def _seen_points(gbuffer: BandedGBuffer) -> Array:
     """Visible points in the camera frame; directions for the background, NaN if not shown."""
-    camera, z_m = gbuffer.intrinsics, gbuffer.z_m[::stride, ::stride].astype(np.float64)
-    depth_m = np.where(gbuffer.hits[::stride, ::stride, 0] >= 0, z_m, 1.0)
+    camera, stride = gbuffer.intrinsics, gbuffer.stride
+    depth_m = np.where(gbuffer.hits[..., 0] >= 0, gbuffer.z_m.astype(np.float64), 1.0)
     if not camera.straight:
         return np.asarray(camera.pixel_rays()[::stride, ::stride] * depth_m[..., None])
     u = np.arange(0, camera.width_px, stride) + 0.5
@@ -280,18 +332,17 @@ class ShutterSampling:
 
 def plan_sampling(rendered: CameraView) -> ShutterSampling:
     """Plan the sampling of an image, given at the middle of the time its shutter is open."""
-    middle, gbuffer = rendered.state, copy_gbuffer(rendered)
+    middle, gbuffer = rendered.state, copy_gbuffer(rendered, _SPARSE_PX)
     shutter = middle.camera.shutter
     ends = [_global_shutter_band(middle.later(side * shutter.open_s)) for side in (-0.5, 0.5)]
     carriers = find_carriers(middle.scene)
-    points = gather_points(gbuffer, carriers, _SPARSE_PX)
+    points = gather_points(gbuffer, carriers)
     before, after = (reproject(points, [end], carriers, _SPARSE_PX).image_px for end in ends)
     way = after - before
     length = np.where(np.isfinite(way).all(axis=-1), np.sqrt((way * way).sum(axis=-1)), 0.0)
     vertical = np.where(length > 0.0, np.abs(way[..., 1]), 0.0)
-    speeds = _dilate_rows(
-        length.max(axis=1) / shutter.open_s, vertical.max(axis=1), len(gbuffer.z_m)
-    )
+    height = middle.camera.intrinsics.height_px
+    speeds = _dilate_rows(length.max(axis=1) / shutter.open_s, vertical.max(axis=1), height)
     wanted = math.ceil(float(speeds.max()) * shutter.exposure_s / BLUR_PX)
     blurred = speeds * shutter.exposure_s > BLUR_PX
     return ShutterSampling(speeds, min(max(wanted, 1), shutter.samples), blurred)

@@ -66,3 +66,11 @@ def draw_silhouettes(
                 e = fan_edges(view, polygon, t, outline.window, 0)
                 if e.covers != 0:
                     draw_coverage(world, e, plane, cutout, outline, mask)
+
+
+@wp.kernel
+def pack_bits(words: wp.array[wp.uint64], bits: wp.array[wp.uint8]):
+    """Pack eight bytes of 0 or 1 each into one, the first byte into the lowest bit."""
+    i = wp.tid()
+    # The product moves the lowest bit of byte k to bit 56 + k.
+    bits[i] = wp.uint8((words[i] * wp.uint64(0x0102040810204080)) >> wp.uint64(56))
