@@ -8,14 +8,17 @@ from functools import cache
 import numpy as np
 import pytest
 
+from gen_data.generator.assets.library import open_library
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.scenery.building_designs import (
     REGIONS,
     STYLES,
+    TEXTURE_ALBEDOS,
     building_materials,
     draw_design,
 )
 from gen_data.generator.assets.scenery.buildings import building, building_facts
+from gen_data.generator.core.colorimetry import luminance, srgb_decode
 from tests.every_value import for_every
 from tests.scenery.rays import cast
 
@@ -195,3 +198,14 @@ def test_a_region_changes_colours_but_no_shape() -> None:
 
     assert (north.mesh.vertices_m == south.mesh.vertices_m).all()
     assert north.mesh.materials != south.mesh.materials
+
+
+@pytest.mark.parametrize("name", sorted(TEXTURE_ALBEDOS))
+def test_palettes_give_the_albedo_of_whole_walls(name: str) -> None:
+    """The tint is divided by the texture's mean luminance, within 12 %."""
+    kinds = {"concrete": (0, 3)}.get(name, (0, 1, 2))
+    library = open_library()
+    textures = [library.texture(f"texture/{name}?seed={seed}") for seed in kinds]
+    means = [float(luminance(srgb_decode(t.albedo / 255.0)).mean()) for t in textures]
+
+    assert np.mean(means) == pytest.approx(TEXTURE_ALBEDOS[name], rel=0.12)

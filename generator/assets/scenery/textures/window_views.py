@@ -21,10 +21,10 @@ from gen_data.generator.assets.procedural.textures.texture_images import color, 
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Float32, TextureData
 
-CELLS = {"home": 4, "office": 4, "shop": 3}
+CELLS = {"home": 4, "office": 4, "shop": 3, "hall": 1}
 """Cells along each side of an atlas."""
 _ATLAS_PX = 512
-_LIT = {"home": 0.4, "office": 0.3, "shop": 0.75}
+_LIT = {"home": 0.4, "office": 0.3, "shop": 0.75, "hall": 0.25}
 """Shares of panes with light behind them in the evening (assumed)."""
 _COLORS = load_table(__package__, "window_views", tuple[str, ...])
 
@@ -34,7 +34,7 @@ def window_view(seed: int, kind: str) -> TextureData:
     check_option("window_view", "kind", kind, CELLS)
     rng = variant_rng(f"window_view/{kind}", seed)
     count = CELLS[kind]
-    draw = {"home": _home, "office": _office, "shop": _shop}[kind]
+    draw = {"home": _home, "office": _office, "shop": _shop, "hall": _hall}[kind]
     edges = [_ATLAS_PX * k // count for k in range(count + 1)]
     sheet = np.zeros((_ATLAS_PX, _ATLAS_PX, 3), dtype=np.float32)
     lamps, lit = variant_rng(f"window_view/{kind}/lamps", seed), np.zeros_like(sheet)
@@ -225,6 +225,13 @@ def _office(view: View, rng: VariantRng) -> None:
         view.paint(view.box(x, 0.6, x + 0.17, 0.73), 0.3 * level * tint)
     if rng.chance(0.45):
         rng.choose((_blind, _slats, _slats))(view, rng)
+
+
+def _hall(view: View, rng: VariantRng) -> None:
+    """A stairwell behind a glazed door, darker towards its floor."""
+    level = rng.between(0.03, 0.07)
+    view.pixels[:] = level * (1.3 - 0.6 * view.y + 0.0 * view.x)[..., None]
+    view.pixels[:] *= color(rng.choose(_COLORS["rooms"]))
 
 
 def _shop(view: View, rng: VariantRng) -> None:
