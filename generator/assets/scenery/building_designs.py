@@ -212,8 +212,8 @@ TEXTURE_ALBEDOS = {
     "wall_boards": 0.76, "weathered_plaster": 0.80,
 }  # fmt: skip
 """Mean luminance of textures that palettes tint. Their colours are those of whole walls and roofs:
-plaster 0.4 to 0.7, stone and concrete 0.2 to 0.4, clay tiles 0.1 to 0.35, slate 0.1 (Oke, "Boundary
-layer climates", 1987, table 1.3 and 8.1); without division the texture darkens them twice."""
+paint 0.2 to 0.9, stone and brick 0.2 to 0.4, concrete and clay tiles 0.1 to 0.35, slate 0.1 (Oke,
+"Boundary layer climates", 1987, table 8.1). Undivided, the texture would darken them twice."""
 
 VIEWS, PRINTS = 8, 24
 """Textures of rooms, and of boards and adverts, that buildings share."""
@@ -230,7 +230,8 @@ def choose_region(style: str, seed: int, region: str) -> str:
 def _wall(plan: Design, tints: Sequence[str], rng: VariantRng) -> Material:
     cladding = plan.cladding
     if cladding == "brick":
-        seed, level = rng.choose((1, 4, 6, 9, 12, 15)), rng.between(0.9, 1.0)
+        # Those with an albedo of 0.20 to 0.32; the darkest of Oke's walls of brick have 0.20.
+        seed, level = rng.choose((0, 2, 4, 6, 9, 12, 13)), rng.between(0.93, 1.0)
         return _textured_material("brick", seed, (level, level, level), 1.1)
     if cladding == "concrete":
         level = rng.between(0.8, 1.0)
@@ -241,9 +242,12 @@ def _wall(plan: Design, tints: Sequence[str], rng: VariantRng) -> Material:
         color = _tint("wall_boards", _COLORS["boards"], 0.1, rng)
         return _textured_material("wall_boards", rng.choose((0, 1, 2, 3)), color, 2.0)
     if cladding in ("sheet", "panels"):
-        name = "profiled_sheet" if cladding == "sheet" else "concrete"
+        # Panels are of the two kinds of concrete whose mean is the table's.
+        name, seeds = ("concrete", (0, 3))
+        if cladding == "sheet":
+            name, seeds = ("profiled_sheet", (0, 1, 2, 3))
         color = _tint(name, _COLORS["sheets"], 0.08, rng)
-        return _textured_material(name, rng.choose((0, 1, 2, 3)), color, 3.0)
+        return _textured_material(name, rng.choose(seeds), color, 3.0)
     oldest = 1 + int(7.0 * plan.age)
     name = f"texture/weathered_plaster?seed={int(rng.random() * (oldest + 0.999))}"
     color = _tint("weathered_plaster", tints, 0.08, rng)
