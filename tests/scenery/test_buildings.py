@@ -209,3 +209,18 @@ def test_palettes_give_the_albedo_of_whole_walls(name: str) -> None:
     means = [float(luminance(srgb_decode(t.albedo / 255.0)).mean()) for t in textures]
 
     assert np.mean(means) == pytest.approx(TEXTURE_ALBEDOS[name], rel=0.12)
+
+
+@pytest.mark.parametrize(("kind", "cells", "share"), [("home", 4, 0.4), ("office", 4, 0.3)])
+def test_windows_are_lit_one_by_one(kind: str, cells: int, share: float) -> None:
+    """Of the panes of eight atlases the stated share shines, within three standard errors."""
+    library = open_library()
+    side = 512 // cells
+    lit = []
+    for seed in range(8):
+        emission = library.texture(f"texture/window_view?seed={seed}&kind={kind}").emission
+        assert emission is not None
+        panes = emission.reshape(cells, side, cells, side, 3).max(axis=(1, 3, 4))
+        lit += list((panes > 0).ravel())
+
+    assert np.mean(lit) == pytest.approx(share, abs=3.0 * np.sqrt(share * (1.0 - share) / len(lit)))
