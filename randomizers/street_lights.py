@@ -21,6 +21,8 @@ from gen_data.randomizers.color_space import Temperature, temperature_to_linear
 from gen_data.randomizers.daylight import is_dark
 
 _WHITE_K = 3400.0
+_EVEN = 0.5
+"""Share of a lamp's cone in which it is uniform: luminaires have no sharp edge on facades."""
 LAMP, WINDOW = "lamp", "window"
 """Roles of material slots, and the keypoint of a lamp's light."""
 
@@ -36,10 +38,10 @@ class StreetLights(RandomizerBase):
             this randomizer. always: also by day.
         flux_lm: Luminous flux of one lamp.
         temperature_k: Colour temperature of all lamps of a scene: 2300 sodium, 3000 to 4000 LED.
-        cone_deg: Half angle of a lamp's downward cone of light.
+        cone_deg: Half angle at which a lamp's light has faded; it does so from half of it on.
         broken: Whether a lamp is dark.
         lamp_luminance_cd_m2: Luminance of a lamp's emitting surface.
-        windows: Whether the windows of a body are lit.
+        windows: Whether windows of a body are lit; its texture says which.
         window_luminance_cd_m2: Luminance of lit windows.
         window_temperature_k: Colour temperature of lit windows.
     """
@@ -48,10 +50,10 @@ class StreetLights(RandomizerBase):
     when: Literal["dark", "always"] = "dark"
     flux_lm: dist.Positive = dist.Uniform(4000.0, 10_000.0)
     temperature_k: Temperature = dist.Choice({2300.0: 2.0, 3000.0: 3.0, 4000.0: 2.0})
-    cone_deg: Annotated[dist.Scalar, dist.Bounds(10, 85)] = dist.Uniform(62.0, 74.0)
+    cone_deg: Annotated[dist.Scalar, dist.Bounds(10, 88)] = dist.Uniform(76.0, 86.0)
     broken: dist.Flag = dist.Probability(0.03)
     lamp_luminance_cd_m2: dist.Positive = dist.LogUniform(8000.0, 30_000.0)
-    windows: dist.Flag = dist.Probability(0.35)
+    windows: dist.Flag = dist.Probability(0.85)
     window_luminance_cd_m2: dist.Positive = dist.LogUniform(2.0, 20.0)
     window_temperature_k: Temperature = dist.Uniform(2400.0, 4500.0)
 
@@ -97,7 +99,7 @@ def white_balanced_color(temperature_k: float) -> Vec3:
 
 def spot_intensity_cd(flux_lm: float, cone_rad: float) -> float:
     """Luminous intensity of a spot with a flux and the half angle of its cone."""
-    return flux_to_intensity_cd(Light("", "spot", cone_rad=cone_rad), flux_lm)
+    return flux_to_intensity_cd(Light("", "spot", cone_rad=cone_rad, even=_EVEN), flux_lm)
 
 
 def _make_lamp(
@@ -115,4 +117,5 @@ def _make_lamp(
         intensity_cd=round(spot_intensity_cd(flux_lm, cone_rad), 3),
         radius_m=0.12,
         cone_rad=round(cone_rad, 6),
+        even=_EVEN,
     )

@@ -197,7 +197,7 @@ def test_spot_sends_out_its_flux() -> None:
     cone = math.radians(70.0)
     theta = (np.arange(20_000) + 0.5) / 20_000 * cone
     t = np.clip(
-        (np.cos(theta) - math.cos(cone)) / (math.cos(0.8 * cone) - math.cos(cone)), 0.0, 1.0
+        (np.cos(theta) - math.cos(cone)) / (math.cos(0.5 * cone) - math.cos(cone)), 0.0, 1.0
     )
     profile = t * t * (3.0 - 2.0 * t)
     solid_angle = (profile * 2.0 * math.pi * np.sin(theta)).sum() * cone / 20_000

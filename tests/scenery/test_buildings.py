@@ -8,14 +8,17 @@ from functools import cache
 import numpy as np
 import pytest
 
+from gen_data.generator.assets.library import open_library
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.scenery.building_designs import (
     REGIONS,
     STYLES,
+    TEXTURE_ALBEDOS,
     building_materials,
     draw_design,
 )
 from gen_data.generator.assets.scenery.buildings import building, building_facts
+from gen_data.generator.core.colorimetry import luminance, srgb_decode
 from tests.every_value import for_every
 from tests.scenery.rays import cast
 
@@ -195,3 +198,29 @@ def test_a_region_changes_colours_but_no_shape() -> None:
 
     assert (north.mesh.vertices_m == south.mesh.vertices_m).all()
     assert north.mesh.materials != south.mesh.materials
+
+
+@pytest.mark.parametrize("name", sorted(TEXTURE_ALBEDOS))
+def test_palettes_give_the_albedo_of_whole_walls(name: str) -> None:
+    """The tint is divided by the texture's mean luminance, within 12 %."""
+    kinds = {"concrete": (0, 3)}.get(name, (0, 1, 2))
+    library = open_library()
+    textures = [library.texture(f"texture/{name}?seed={seed}") for seed in kinds]
+    means = [float(luminance(srgb_decode(t.albedo / 255.0)).mean()) for t in textures]
+
+    assert np.mean(means) == pytest.approx(TEXTURE_ALBEDOS[name], rel=0.12)
+
+
+@pytest.mark.parametrize(("kind", "cells", "share"), [("home", 4, 0.4), ("office", 4, 0.3)])
+def test_windows_are_lit_one_by_one(kind: str, cells: int, share: float) -> None:
+    """Of the panes of eight atlases the stated share shines, within three standard errors."""
+    library = open_library()
+    side = 512 // cells
+    lit = []
+    for seed in range(8):
+        emission = library.texture(f"texture/window_view?seed={seed}&kind={kind}").emission
+        assert emission is not None
+        panes = emission.reshape(cells, side, cells, side, 3).max(axis=(1, 3, 4))
+        lit += list((panes > 0).ravel())
+
+    assert np.mean(lit) == pytest.approx(share, abs=3.0 * np.sqrt(share * (1.0 - share) / len(lit)))

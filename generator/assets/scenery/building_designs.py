@@ -184,7 +184,7 @@ def building_materials(plan: Design, seed: int, region: str = "any") -> tuple[Ma
         _base(plan, wall, rng),
         _plain_material(trim_code, 0.85, "trim"),
         _plain_material(frame, 0.45, "trim"),
-        Material((0.012, 0.016, 0.019), roughness=0.04, specular=1.0, role="window"),
+        _glass_material(f"texture/window_view?seed={views[0]}&kind=hall"),
         _glass_material(f"texture/window_view?seed={views[0]}&kind={kind}"),
         _glass_material(f"texture/window_view?seed={views[1]}&kind={other}"),
         _glass_material(f"texture/window_view?seed={display}&kind=shop"),
@@ -207,6 +207,14 @@ def building_materials(plan: Design, seed: int, region: str = "any") -> tuple[Ma
     )
 
 
+TEXTURE_ALBEDOS = {
+    "ashlar": 0.71, "concrete": 0.36, "profiled_sheet": 0.72, "roof_tiles": 0.53, "slates": 0.66,
+    "wall_boards": 0.76, "weathered_plaster": 0.80,
+}  # fmt: skip
+"""Mean luminance of textures that palettes tint. Their colours are those of whole walls and roofs:
+paint 0.2 to 0.9, stone and brick 0.2 to 0.4, concrete and clay tiles 0.1 to 0.35, slate 0.1 (Oke,
+"Boundary layer climates", 1987, table 8.1). Undivided, the texture would darken them twice."""
+
 VIEWS, PRINTS = 8, 24
 """Textures of rooms, and of boards and adverts, that buildings share."""
 
@@ -222,29 +230,40 @@ def choose_region(style: str, seed: int, region: str) -> str:
 def _wall(plan: Design, tints: Sequence[str], rng: VariantRng) -> Material:
     cladding = plan.cladding
     if cladding == "brick":
-        seed, level = rng.choose((1, 4, 6, 9, 12, 15)), rng.between(0.75, 1.0)
+        # Those with an albedo of 0.20 to 0.32; the darkest of Oke's walls of brick have 0.20.
+        seed, level = rng.choose((0, 2, 4, 6, 9, 12, 13)), rng.between(0.93, 1.0)
         return _textured_material("brick", seed, (level, level, level), 1.1)
     if cladding == "concrete":
         level = rng.between(0.8, 1.0)
         return _textured_material("concrete", rng.choose((0, 3)), (level, level, level), 2.6)
     if cladding == "stone":
-        return _textured_material("ashlar", 0, draw_linear(_COLORS["stones"], 0.06, rng), 2.4)
+        return _textured_material("ashlar", 0, _tint("ashlar", _COLORS["stones"], 0.06, rng), 2.4)
     if cladding == "boards":
-        color = draw_linear(_COLORS["boards"], 0.1, rng)
+        color = _tint("wall_boards", _COLORS["boards"], 0.1, rng)
         return _textured_material("wall_boards", rng.choose((0, 1, 2, 3)), color, 2.0)
     if cladding in ("sheet", "panels"):
-        color = draw_linear(_COLORS["sheets"], 0.08, rng)
-        name = "profiled_sheet" if cladding == "sheet" else "concrete"
-        return _textured_material(name, rng.choose((0, 1, 2, 3)), color, 3.0)
+        # Panels are of the two kinds of concrete whose mean is the table's.
+        name, seeds = ("concrete", (0, 3))
+        if cladding == "sheet":
+            name, seeds = ("profiled_sheet", (0, 1, 2, 3))
+        color = _tint(name, _COLORS["sheets"], 0.08, rng)
+        return _textured_material(name, rng.choose(seeds), color, 3.0)
     oldest = 1 + int(7.0 * plan.age)
     name = f"texture/weathered_plaster?seed={int(rng.random() * (oldest + 0.999))}"
-    color = draw_linear(tints, 0.08, rng)
+    color = _tint("weathered_plaster", tints, 0.08, rng)
     return Material(color, roughness=0.92, texture=name, role="facade")
+
+
+def _tint(texture: str, codes: Sequence[str], amount: float, rng: VariantRng) -> Vec3:
+    """Tint of a texture with which its mean is one of several sRGB colours, jittered."""
+    mean = TEXTURE_ALBEDOS[texture]
+    red, green, blue = (min(1.0, part / mean) for part in draw_linear(codes, amount, rng))
+    return (red, green, blue)
 
 
 def _base(plan: Design, wall: Material, rng: VariantRng) -> Material:
     if plan.trimmed or plan.cladding == "stone":
-        return _textured_material("ashlar", 0, draw_linear(_COLORS["stones"], 0.06, rng), 2.4)
+        return _textured_material("ashlar", 0, _tint("ashlar", _COLORS["stones"], 0.06, rng), 2.4)
     if rng.chance(0.4):
         return _textured_material("concrete", 3, (0.72, 0.71, 0.7), 2.2)
     darker = rng.between(0.5, 0.7)
@@ -254,13 +273,13 @@ def _base(plan: Design, wall: Material, rng: VariantRng) -> Material:
 
 def _roof(place: str, plan: Design, rng: VariantRng) -> Material:
     if plan.cladding == "sheet" or rng.chance(0.08):
-        color = draw_linear(_COLORS["sheets"], 0.08, rng)
+        color = _tint("profiled_sheet", _COLORS["sheets"], 0.08, rng)
         texture = f"texture/profiled_sheet?seed={rng.choose((0, 1, 2, 3))}"
     elif rng.chance(0.25):
-        color = draw_linear(_COLORS["slates"], 0.08, rng)
+        color = _tint("slates", _COLORS["slates"], 0.08, rng)
         texture = f"texture/slates?seed={rng.choose((0, 1, 2))}"
     else:
-        color = draw_linear(_COLORS[f"roofs_{place}"], 0.1, rng)
+        color = _tint("roof_tiles", _COLORS[f"roofs_{place}"], 0.1, rng)
         texture = f"texture/roof_tiles?seed={rng.choose((0, 1, 2, 3))}"
     return Material(color, roughness=0.85, texture=texture, role="roof")
 

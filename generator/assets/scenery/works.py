@@ -274,7 +274,7 @@ def construction_fence(seed: int) -> Solid:
         low = 1.1
         parts.append(block((0.022, -0.3, low), (0.027, 0.3, low + 0.75), 0.0, 2))
         parts.append(facing_rectangle(0.029, (-0.27, 0.27), (low, low + 0.75), 3))
-    color = rng.choose(("#2f6f4a", "#2a5f9a", "#d8d8d2", "#d9571e"))
+    color = rng.choose(("#3f6a50", "#44638a", "#d8d8d2", "#b8836a"))
     concrete = patterned_material("texture/concrete?seed=3", 1.5, 0.9)
     cloth = Material(draw_linear((color,), 0.15, rng), roughness=0.85)
     sign = printed_material(f"texture/poster?seed={seed % 12}", 0.4)

@@ -20,7 +20,11 @@ EV100_RANGE = (1.0, 17.0)
 """Of a camera without limits of its own: from 1/30 s at f/1.4 and ISO 3200 to sunlit snow.
 
 Automatic exposure stops there, so that night scenes stay dark."""
+EV100_DARKEST = -6.0
+"""Of a landscape under a clear sky without the moon: the darkest that a meter tells apart."""
 _METERED_EVERY = 4
+_DIM_EV100 = 5.0
+"""Of a home by lamplight."""
 _EV100_STEPS = 256.0
 """Steps per exposure value: on a grid, as the last bit of a sum differs between processors."""
 
@@ -131,6 +135,21 @@ def meter_mean_ev100(
 
     steps = range(*(round(ev100 * _EV100_STEPS) for ev100 in limits_ev100))
     return (steps.start + bisect_left(steps, True, key=is_dark_enough)) / _EV100_STEPS
+
+
+def dimming_ev(ev100: float) -> float:
+    """Stops by which a dim scene should look darker than one by day; 0 from ``_DIM_EV100`` on.
+
+    The key, the brightness at which a picture shows a scene, is ``1.03 - 2 / (2 + log10(L + 1))``
+    of the scene's luminance L [cd/m^2] (Krawczyk, Myszkowski and Seidel, "Perceptual effects in
+    real-time tone mapping", 2005); it counts relative to that of a home by lamplight.
+    """
+    dim, here = (_key(MIDDLE_GREY * saturation_cd_m2(ev)) for ev in (_DIM_EV100, ev100))
+    return max(0.0, round(math.log2(dim / here) * _EV100_STEPS) / _EV100_STEPS)
+
+
+def _key(luminance_cd_m2: float) -> float:
+    return 1.03 - 2.0 / (2.0 + math.log10(luminance_cd_m2 + 1.0))
 
 
 def exposure_settings(ev100: float, control: ExposureControl) -> ExposureSettings:

@@ -28,10 +28,13 @@ from gen_data.generator.core.scene import Camera, Scene, Weather
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.sensors.camera import isp, optics
+from gen_data.generator.sensors.camera.denoising import denoise, is_noisy
 from gen_data.generator.sensors.camera.exposure import (
+    EV100_DARKEST,
     EV100_RANGE,
     ExposureControl,
     ExposureSettings,
+    dimming_ev,
     exposure_settings,
     meter_ev100,
     meter_mean_ev100,
@@ -93,6 +96,8 @@ class ImagePipeline(Strict):
             middle grey.
         metered_clip: Largest share of the image that automatic exposure with a ``metered_mean``
             lets saturate; 1 = any.
+        low_key: How far automatic exposure follows the eye, which sees dim scenes as dark: 1 leaves
+            a street at night 2 stops below a picture by day, 0 brightens it as far as it can.
         exposure_compensation_ev: Added to the exposure, in stops; positive is brighter.
         exposure_error_ev: Error of metering, in stops; positive is brighter.
         exposure_control: Limits of aperture, time and gain of an image sensor; without a sensor
@@ -105,6 +110,8 @@ class ImagePipeline(Strict):
         white_balance_tint_ev: Largest difference of the estimate from the colours of lamps and
             daylight, between green and magenta, in stops; null = any estimate.
         warmth_ev: Error of the white balance: red over blue, in stops.
+        denoise: Strength of noise reduction, where noise is visible: 1 averages what differs by no
+            more than noise, 0.5 to 0.9 leaves some grain.
         demosaic: Method of demosaicing: ``edge_aware`` as in good cameras, ``bilinear`` as in cheap
             ones, with coloured edges.
         saturation: Factor on saturation.
@@ -128,6 +135,7 @@ class ImagePipeline(Strict):
     vignetting: UnitInterval = NONE
     metered_mean: float | None = Field(None, gt=0, lt=1)
     metered_clip: float = Field(1.0, gt=0, le=1)
+    low_key: float = Field(0.0, ge=0, le=1)
     exposure_compensation_ev: Annotated[Scalar, Bounds(-10, 10)] = NONE
     exposure_error_ev: Annotated[Scalar, Bounds(-8, 8)] = NONE
     exposure_control: ExposureControl = ExposureControl()
@@ -138,6 +146,7 @@ class ImagePipeline(Strict):
     white_balance_tint_ev: float | None = Field(None, ge=0, le=8)
     warmth_ev: Annotated[Scalar, Bounds(-3, 3)] = NONE
     demosaic: isp.Demosaic = "edge_aware"
+    denoise: float = Field(0.0, ge=0, le=4)
     saturation: NonNegative = Constant(1.0)
     contrast: Annotated[Scalar, Bounds(0.25, 4)] = Constant(1.0)
     tone: Tone = "filmic"
@@ -280,12 +289,20 @@ def develop(
 
 def _metered(radiance: Float32, pipeline: ImagePipeline) -> float:
     """The exposure value by the pipeline's meter, within the limits of a camera with a sensor."""
-    mean, limits_ev100 = pipeline.metered_mean, EV100_RANGE
+    low, high = EV100_RANGE
     if pipeline.image_sensor is not None:
-        limits_ev100 = reachable_ev100(pipeline.exposure_control)
-    if mean is None:
+        low, high = reachable_ev100(pipeline.exposure_control)
+    if pipeline.low_key == 0.0:
+        return _meter(radiance, pipeline, (low, high))
+    # What is darker than the camera reaches is not darkened further.
+    ev100 = _meter(radiance, pipeline, (min(low, EV100_DARKEST), high))
+    return min(max(ev100 + pipeline.low_key * dimming_ev(ev100), low), high)
+
+
+def _meter(radiance: Float32, pipeline: ImagePipeline, limits_ev100: tuple[float, float]) -> float:
+    if pipeline.metered_mean is None:
         return meter_ev100(radiance, limits_ev100)
-    return meter_mean_ev100(radiance, mean, pipeline.metered_clip, limits_ev100)
+    return meter_mean_ev100(radiance, pipeline.metered_mean, pipeline.metered_clip, limits_ev100)
 
 
 def _lens_drops(light: Light, shot: Shot) -> Light:
@@ -351,6 +368,19 @@ def _image_sensor(light: Light, shot: Shot) -> Light:
     return Light(isp.transform_colors(image, srgb_from_camera), 1.0)
 
 
+def _denoise(light: Light, shot: Shot) -> Light:
+    """Reduce the noise that an image sensor left visible."""
+    pipeline, sensor = shot.pipeline, shot.pipeline.image_sensor
+    if sensor is None or pipeline.denoise == 0.0:
+        return light
+    white_e = sensor.full_well_e / shot.exposure.gain
+    if not is_noisy(white_e):
+        return light
+    read_noise_e = 0.5 * sum(sensor.read_noise_e.support())
+    values = denoise(light.values, white_e, read_noise_e, pipeline.denoise)
+    return replace(light, values=values)
+
+
 def _white_balance(light: Light, shot: Shot) -> Light:
     """White balance of an ideal sensor, in the camera's colour space."""
     pipeline = shot.pipeline
@@ -400,6 +430,7 @@ STAGES: tuple[Stage, ...] = (
     _vignetting,
     _image_circle,
     _image_sensor,
+    _denoise,
     _effect("saturation", 1.0, isp.scale_saturation),
 )
 """From radiance to linear sRGB, in the order of a real camera; tone and JPEG follow."""

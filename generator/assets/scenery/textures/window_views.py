@@ -3,6 +3,9 @@
 A texture is an atlas of square cells, one per pane. By day a room is far darker than its window's
 surroundings: only what hangs or stands close to the pane gets light. The glass over it is the
 material's specular layer.
+
+Emission shows the same rooms with their lamps on: some panes are dark, and those that are lit
+differ in brightness and colour.
 """
 
 from __future__ import annotations
@@ -18,9 +21,11 @@ from gen_data.generator.assets.procedural.textures.texture_images import color, 
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Float32, TextureData
 
-CELLS = {"home": 4, "office": 4, "shop": 3}
+CELLS = {"home": 4, "office": 4, "shop": 3, "hall": 1}
 """Cells along each side of an atlas."""
 _ATLAS_PX = 512
+_LIT = {"home": 0.4, "office": 0.3, "shop": 0.75, "hall": 0.25}
+"""Shares of panes with light behind them in the evening (assumed)."""
 _COLORS = load_table(__package__, "window_views", tuple[str, ...])
 
 
@@ -29,15 +34,28 @@ def window_view(seed: int, kind: str) -> TextureData:
     check_option("window_view", "kind", kind, CELLS)
     rng = variant_rng(f"window_view/{kind}", seed)
     count = CELLS[kind]
-    draw = {"home": _home, "office": _office, "shop": _shop}[kind]
+    draw = {"home": _home, "office": _office, "shop": _shop, "hall": _hall}[kind]
     edges = [_ATLAS_PX * k // count for k in range(count + 1)]
     sheet = np.zeros((_ATLAS_PX, _ATLAS_PX, 3), dtype=np.float32)
+    lamps, lit = variant_rng(f"window_view/{kind}/lamps", seed), np.zeros_like(sheet)
     haze = 1.0 + 0.05 * fbm((6, 6), 4, rng)
     for row in range(count):
         for column in range(count):
-            cell = sheet[edges[row] : edges[row + 1], edges[column] : edges[column + 1]]
-            draw(View(cell), rng)
-    return TextureData(quantize(sheet * haze[..., None]))
+            place = np.s_[edges[row] : edges[row + 1], edges[column] : edges[column + 1]]
+            draw(View(sheet[place]), rng)
+            if lamps.chance(_LIT[kind]):
+                lit[place] = _by_lamplight(sheet[place], kind, lamps)
+    return TextureData(quantize(sheet * haze[..., None]), emission=quantize(lit))
+
+
+def _by_lamplight(view: Float32, kind: str, rng: VariantRng) -> Float32:
+    """A view as it shines at night, 1 at its bright parts: brightest below the ceiling's lamp."""
+    tint = color(rng.choose(_COLORS[f"lamps_{kind}"]))
+    y = np.linspace(1.0, 0.55, len(view))[:, None, None]
+    bright = float(np.quantile(view, 0.9))
+    level = rng.between(0.2, 1.0) ** 1.5
+    lit: Float32 = np.clip(level * y * tint * view / bright, 0.0, 1.0).astype(np.float32)
+    return lit
 
 
 class View:
@@ -207,6 +225,13 @@ def _office(view: View, rng: VariantRng) -> None:
         view.paint(view.box(x, 0.6, x + 0.17, 0.73), 0.3 * level * tint)
     if rng.chance(0.45):
         rng.choose((_blind, _slats, _slats))(view, rng)
+
+
+def _hall(view: View, rng: VariantRng) -> None:
+    """A stairwell behind a glazed door, darker towards its floor."""
+    level = rng.between(0.03, 0.07)
+    view.pixels[:] = level * (1.3 - 0.6 * view.y + 0.0 * view.x)[..., None]
+    view.pixels[:] *= color(rng.choose(_COLORS["rooms"]))
 
 
 def _shop(view: View, rng: VariantRng) -> None:
