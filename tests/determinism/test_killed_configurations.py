@@ -1,4 +1,4 @@
-"""One configuration of each kind of world, killed and resumed, gives the bytes of an uninterrupted run."""
+"""One configuration of each kind of world, killed and resumed: the bytes of an unbroken run."""
 
 from __future__ import annotations
 
