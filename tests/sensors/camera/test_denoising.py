@@ -33,7 +33,7 @@ def grey(level: float) -> Float32:
 
 @pytest.mark.parametrize("level", [0.05, 0.2, 0.6])
 def test_grain_of_an_even_surface_falls_and_its_mean_stays(level: float) -> None:
-    """A window of 169 pixels leaves at most half of luma's noise; the mean stays within 2 %."""
+    """A window of 81 pixels leaves at most half of luma's noise; the mean stays within 2 %."""
     before = noisy(grey(level))
     after = denoise(before, WHITE_E, READ_NOISE_E, 1.0)
 
@@ -42,12 +42,12 @@ def test_grain_of_an_even_surface_falls_and_its_mean_stays(level: float) -> None
 
 
 def test_strong_filtering_is_the_mean_of_the_window() -> None:
-    """The variance of white noise falls to 1/169: the mean of 13 x 13 independent pixels."""
+    """The variance of white noise falls to 1/81: the mean of 9 x 9 independent pixels."""
     before = luminance(noisy(grey(0.3)))
     after = luminance(denoise(noisy(grey(0.3)), WHITE_E, READ_NOISE_E, 4.0))
 
     inner = np.s_[12:-12, 12:-12]
-    assert np.var(after[inner]) == pytest.approx(np.var(before) / 169.0, rel=0.35)
+    assert np.var(after[inner]) == pytest.approx(np.var(before) / 81.0, rel=0.35)
 
 
 def test_colour_blotches_fall_more_than_grain() -> None:
