@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-torch = pytest.importorskip("torch")
 
-from gen_data.generator.study.detector import CentreLoss, encode  # noqa: E402
-
-
+@pytest.mark.slow
 def test_the_focal_loss_has_the_slope_of_its_formula() -> None:
     """Equation 1 of "Objects as Points", differentiated by torch, in 64 bits."""
+    import torch
+
+    from gen_data.generator.study.detector import CentreLoss, encode
+
     rng = np.random.default_rng(0)
     corners = rng.uniform(0.0, 60.0, (2, 6, 2)).astype(np.float32)
     boxes = np.concatenate([corners, corners + 24.0], axis=2)
