@@ -77,11 +77,10 @@ def test_what_is_compiled_side_by_side_is_all_that_a_photograph_takes() -> None:
 
 @pytest.mark.slow
 def test_a_tabletop_compiles_nothing_that_only_streets_weather_or_path_tracing_use() -> None:
-    """Beside the modules of every frame, the rays of its laser points; no other."""
+    """Only the modules of every frame: its laser points come from the depth image."""
     loaded = {name for name, _ in _loaded_modules(_FIRST_TABLETOP)}
 
-    expected = {*EVERY_FRAME, "lidar.kernels.lidar_rays"}
-    assert loaded == {f"{warp.__name__}.{name}" for name in expected}
+    assert loaded == {f"{warp.__name__}.{name}" for name in EVERY_FRAME}
 
 
 @pytest.mark.slow
