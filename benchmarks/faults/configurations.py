@@ -13,7 +13,7 @@ import traceback
 import warnings
 from collections import Counter
 from collections.abc import Callable
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -121,17 +121,28 @@ def _try_all(scale: Scale, folder: Path, mutate: Callable[[random.Random], bytes
 def _try(
     folder: Path, mutate: Callable[[random.Random], bytes], seed: int
 ) -> tuple[str, str, float, int]:
-    """How reading a mutant ends, what is wrong with that, CPU seconds, memory so far [MB]."""
+    """How reading a mutant ends, what is wrong with that, CPU seconds, memory that it took [MB]."""
     # Beside the shipped files, paths in them would have another meaning.
     path = folder / f"mutant-{os.getpid()}.yaml"
     path.write_bytes(mutate(random.Random(seed)))
+    inherited_mb = _first_peak_mb(os.getpid())
     started_s = time.process_time()
     end, problem = _read(path)
     seconds = time.process_time() - started_s
     if seconds > SECONDS_MAX:
         problem = problem or f"took {seconds:.1f} s"
-    megabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss >> 10
-    return end, problem, seconds, megabytes
+    return end, problem, seconds, _peak_mb() - inherited_mb
+
+
+def _peak_mb() -> int:
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss >> 10
+
+
+@cache
+def _first_peak_mb(process: int) -> int:
+    """Peak memory when this process first asks: what it has from the one it was forked from."""
+    del process
+    return _peak_mb()
 
 
 def _read(path: Path) -> tuple[str, str]:
