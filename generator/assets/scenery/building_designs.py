@@ -243,11 +243,10 @@ def _wall(plan: Design, tints: Sequence[str], rng: VariantRng) -> Material:
         return _textured_material("wall_boards", rng.choose((0, 1, 2, 3)), color, 2.0)
     if cladding in ("sheet", "panels"):
         # Panels are of the two kinds of concrete whose mean is the table's.
-        name, seeds = ("concrete", (0, 3))
-        if cladding == "sheet":
-            name, seeds = ("profiled_sheet", (0, 1, 2, 3))
+        is_sheet = cladding == "sheet"
+        name = "profiled_sheet" if is_sheet else "concrete"
         color = _tint(name, _COLORS["sheets"], 0.08, rng)
-        return _textured_material(name, rng.choose(seeds), color, 3.0)
+        return _textured_material(name, rng.choose((0, 1, 2, 3) if is_sheet else (0, 3)), color, 3.0)
     oldest = 1 + int(7.0 * plan.age)
     name = f"texture/weathered_plaster?seed={int(rng.random() * (oldest + 0.999))}"
     color = _tint("weathered_plaster", tints, 0.08, rng)
