@@ -1,12 +1,15 @@
-"""LeRobot data sets, format v2.1: episodes of a robot arm, for imitation learning.
+"""LeRobot data sets: episodes of a robot arm, for imitation learning.
 
 ::
 
-    <split>/<robot>/                            one data set per split and robot model
-        meta/info.json                          frame rate, features, totals
-        meta/episodes.jsonl, tasks.jsonl        length and task of each episode
-        meta/episodes_stats.jsonl               least, largest, mean value and deviation by feature
-        data/chunk-000/episode_000000.parquet   one row per frame, images embedded as PNG
+    <split>/<robot>/                                  one data set per split and robot model
+        meta/info.json, stats.json                    frame rate, features, totals; statistics
+        meta/tasks.parquet                            sentences
+        meta/episodes/chunk-000/file-000.parquet      place, length, task, statistics of episodes
+        data/chunk-000/file-000.parquet               one row per frame, images embedded as PNG
+
+That is format v3.0. Format v2.1, which LeRobot 0.3 and policies built on it read, has a file per
+episode and JSON lines in ``meta``.
 
 Features: ``observation.state``, the positions of all movable joints [rad or m];
 ``action``, their positions one step later, which a position controller would be given; and
@@ -23,38 +26,24 @@ An episode is a sequence: all instants of one view. Robots of different models h
 joints and hence data sets of their own; so have splits, since training takes all episodes of a data
 set. The task is a sentence made of the arm's goals and the objects that move.
 
-Statistics of images are exact over every ``n``-th pixel, with LeRobot's own ``n``: about 150
-pixels along the longer side. Bytes of Parquet files depend on the release of pyarrow.
-
-Reference: https://github.com/huggingface/lerobot, release 0.3.2, lerobot/datasets (utils.py,
-compute_stats.py).
+Bytes of Parquet files depend on the release of pyarrow.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-import numpy as np
 from pydantic import PrivateAttr
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase, check_installed
 from gen_data.exporters.fragments import fragment_rows
-from gen_data.exporters.image_files import read_pixels
-from gen_data.exporters.parquet_tables import (
-    GROUP_ROWS,
-    IMAGE,
-    list_feature,
-    open_parquet,
-    table_schema,
-    value_feature,
-)
+from gen_data.exporters.lerobot_files import LABELS, LAYOUTS, RobotFiles
+from gen_data.exporters.lerobot_statistics import image_sums
 from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
-from gen_data.exporters.sequences import FRAMES, Frame, frame_facts, write_frames, write_text
+from gen_data.exporters.sequences import FRAMES, Frame, frame_facts, write_frames
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.demonstrations import (
     DemonstrationStep,
@@ -65,28 +54,7 @@ from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Articulation, Scene
-from gen_data.generator.core.serialization import canonical_json
 
-VERSION = "v2.1"
-CHUNK_EPISODES = 1000
-STATISTICS_PX, WHOLE_PX = 150, 300
-"""Longer side of the images in statistics, and the length below which all pixels count [px]."""
-DECIMALS = 9
-EE_POSE = "observation.ee_pose"
-POSE = ["x", "y", "z", "qw", "qx", "qy", "qz"]
-LABELS = {
-    EE_POSE: "float32",
-    "observation.gripper": "float32",
-    "action.gripper": "float32",
-    "annotation.phase": "string",
-    "annotation.held": "string",
-    "annotation.contacts": "string",
-    "annotation.contact_forces_n": "string",
-    "annotation.contact_points_m": "string",
-    "annotation.succeeded": "bool",
-    "annotation.failure": "string",
-}
-"""Features of demonstrations and their types."""
 PHRASES = {
     "joints": "move to a posture",
     "reach": "reach a pose",
@@ -98,11 +66,12 @@ PHRASES = {
 
 
 class LeRobot(ExporterBase):
-    """LeRobot v2.1: joint positions and images of the episodes of one arm.
+    """LeRobot: joint positions and images of the episodes of one arm.
 
     Attributes:
         arm: Name of the arm; empty = the first one.
         cameras: Names of the cameras; empty = all with the rgb channel.
+        version: Format: ``v3.0`` for LeRobot 0.4 and later, ``v2.1`` for earlier releases.
     """
 
     type: Literal["lerobot"] = "lerobot"
@@ -110,6 +79,7 @@ class LeRobot(ExporterBase):
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
     arm: str = ""
     cameras: tuple[str, ...] = ()
+    version: Literal["v3.0", "v2.1"] = "v3.0"
 
     _assets: AssetLibrary | None = PrivateAttr(None)
 
@@ -163,14 +133,14 @@ class LeRobot(ExporterBase):
         """Write the episodes of all shards, then the totals of each data set."""
         lines = fragment_rows(shard_dirs, self.type, FRAMES)
         frames = (Frame(shard_dir, row) for shard_dir, row in lines)
-        folders: dict[tuple[str, str], _RobotFiles] = {}
+        folders: dict[tuple[str, str], RobotFiles] = {}
         for _, group in groupby(frames, key=lambda frame: frame.row["sequence"]):
             episode = list(group)
             first = episode[0].row
             key = (first["split"], first["robot"])
             if key not in folders:
                 folder = dataset_dir / key[0] / key[1].replace("/", "_")
-                folders[key] = _RobotFiles(info, folder, first)
+                folders[key] = LAYOUTS[self.version](info, folder, first)
             folders[key].add_episode(episode)
         for files in folders.values():
             files.close()
@@ -185,7 +155,7 @@ class LeRobot(ExporterBase):
         arm = self._find_arm(sample.scene)
         time_s = sample.scene.time_s
         images = {
-            camera: _image_sums(info.media_path(shard_dir, camera, Channel.RGB, sample.index))
+            camera: image_sums(info.media_path(shard_dir, camera, Channel.RGB, sample.index))
             for camera in self._cameras(info)
         }
         robot = self._assets.robot(arm.asset)
@@ -224,10 +194,6 @@ def _labels(step: DemonstrationStep) -> dict[str, Any]:
     return dict(zip(LABELS, values, strict=True))
 
 
-def _column(dtype: str, length: int) -> dict[str, Any]:
-    return value_feature(dtype) if length == 1 else list_feature(value_feature(dtype), length)
-
-
 def task_sentence(scene: Scene, arm: Articulation) -> str:
     """Task of an arm in words, the same at all instants of a sequence."""
     if arm.assignment is not None:
@@ -246,226 +212,3 @@ def task_sentence(scene: Scene, arm: Articulation) -> str:
     phrases = [PHRASES[goal.kind].format(object=thing) for goal in goals]
     text = ", then ".join(phrase for phrase, _ in groupby(phrases))
     return f"{text[0].upper()}{text[1:]}."
-
-
-def _image_sums(path: Path) -> dict[str, Any]:
-    """Sums over every n-th pixel by channel, whole numbers from 0 to 255."""
-    rgb = read_pixels(path)
-    height, width = rgb.shape[:2]
-    longer = max(width, height)
-    stride = max(1, longer // STATISTICS_PX) if longer >= WHOLE_PX else 1
-    values = np.arange(256)
-    counts = [np.bincount(rgb[::stride, ::stride, k].ravel(), minlength=256) for k in range(3)]
-    present = [np.flatnonzero(count) for count in counts]
-    return {
-        "size_px": [width, height],
-        "count": int(counts[0].sum()),
-        "min": [int(found[0]) for found in present],
-        "max": [int(found[-1]) for found in present],
-        "sum": [int(count @ values) for count in counts],
-        "squares": [int(count @ (values * values)) for count in counts],
-    }
-
-
-@dataclass(eq=False)
-class _RobotFiles:
-    """Data set of one robot and split.
-
-    Attributes:
-        first: Row of its first frame, whose joints and image sizes hold for all.
-    """
-
-    info: DatasetInfo
-    folder: Path
-    first: Mapping[str, Any]
-    _episodes: int = 0
-    _frames: int = 0
-    _tasks: dict[str, int] = field(default_factory=dict)
-
-    def add_episode(self, frames: Sequence[Frame]) -> None:
-        """Write one episode and its lines in ``meta``."""
-        number, task = self._episodes, frames[0].row["task"]
-        task_index = self._tasks.setdefault(task, len(self._tasks))
-        rows = [self._values(frame.row, k, task_index) for k, frame in enumerate(frames)]
-        self._write_rows(frames, rows)
-        length = len(frames)
-        self._append("episodes", {"episode_index": number, "tasks": [task], "length": length})
-        stats = _number_stats(rows) | _image_stats([frame.row["images"] for frame in frames])
-        self._append("episodes_stats", {"episode_index": number, "stats": stats})
-        self._episodes += 1
-        self._frames += length
-
-    def _write_rows(self, frames: Sequence[Frame], rows: Sequence[Mapping[str, Any]]) -> None:
-        """Write the Parquet file of an episode; images of one row group are in memory."""
-        import pyarrow
-
-        chunk = f"chunk-{self._episodes // CHUNK_EPISODES:03d}"
-        path = self.folder / f"data/{chunk}/episode_{self._episodes:06d}.parquet"
-        schema = table_schema(self._columns())
-        with open_parquet(path, schema) as writer:
-            for start in range(0, len(frames), GROUP_ROWS):
-                group = range(start, min(start + GROUP_ROWS, len(frames)))
-                whole = [{**rows[k], **_embedded(self.info, frames[k], k)} for k in group]
-                table = pyarrow.Table.from_pylist(whole, schema)
-                writer.write_table(table, row_group_size=len(whole))
-
-    def close(self) -> None:
-        """Write tasks and totals."""
-        for task, number in self._tasks.items():
-            self._append("tasks", {"task_index": number, "task": task})
-        write_text(self.folder / "meta/info.json", canonical_json(self._facts()) + "\n")
-
-    def _values(self, row: Mapping[str, Any], frame_index: int, task_index: int) -> dict[str, Any]:
-        """Numbers of one frame by feature."""
-        return {
-            "observation.state": row["state"],
-            "action": row["action"],
-            **row["labels"],
-            "timestamp": frame_index / self._rate_hz(),
-            "frame_index": frame_index,
-            "episode_index": self._episodes,
-            "index": self._frames + frame_index,
-            "task_index": task_index,
-        }
-
-    def _append(self, name: str, row: Mapping[str, Any]) -> None:
-        path = self.folder / f"meta/{name}.jsonl"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with path.open("a", encoding="utf-8", newline="\n") as file:
-            file.write(canonical_json(row) + "\n")
-
-    def _rate_hz(self) -> float:
-        rate_hz = round(1.0 / self.info.step_s, 6)
-        return int(rate_hz) if rate_hz.is_integer() else rate_hz
-
-    def _columns(self) -> dict[str, Any]:
-        """Features of the Parquet files, in the form of ``datasets``."""
-        positions = list_feature(value_feature("float32"), len(self.first["joints"]))
-        return {
-            "observation.state": positions,
-            "action": positions,
-            **{
-                name: _column(LABELS[name], len(np.atleast_1d(value)))
-                for name, value in self.first["labels"].items()
-            },
-            **{_image_key(camera): IMAGE for camera in self.first["images"]},
-            "timestamp": value_feature("float32"),
-            **dict.fromkeys(
-                ("frame_index", "episode_index", "index", "task_index"), value_feature("int64")
-            ),
-        }
-
-    def _facts(self) -> dict[str, Any]:
-        """Content of ``info.json``."""
-        joints = self.first["joints"]
-        positions = {"dtype": "float32", "shape": [len(joints)], "names": joints}
-        number = {"shape": [1], "names": None}
-        images = {
-            _image_key(camera): {
-                "dtype": "image",
-                "shape": [*reversed(sums["size_px"]), 3],
-                "names": ["height", "width", "channels"],
-            }
-            for camera, sums in self.first["images"].items()
-        }
-        return {
-            "codebase_version": VERSION,
-            "robot_type": self.first["robot"],
-            "total_episodes": self._episodes,
-            "total_frames": self._frames,
-            "total_tasks": len(self._tasks),
-            "total_videos": 0,
-            "total_chunks": -(-self._episodes // CHUNK_EPISODES),
-            "chunks_size": CHUNK_EPISODES,
-            "fps": self._rate_hz(),
-            "splits": {self.first["split"]: f"0:{self._episodes}"},
-            "data_path": "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
-            "video_path": None,
-            "features": {
-                "observation.state": positions,
-                "action": positions,
-                **{
-                    name: {
-                        "dtype": LABELS[name],
-                        "shape": [len(np.atleast_1d(value))],
-                        "names": POSE if name == EE_POSE else None,
-                    }
-                    for name, value in self.first["labels"].items()
-                },
-                **images,
-                "timestamp": {"dtype": "float32", **number},
-                "frame_index": {"dtype": "int64", **number},
-                "episode_index": {"dtype": "int64", **number},
-                "index": {"dtype": "int64", **number},
-                "task_index": {"dtype": "int64", **number},
-            },
-        }
-
-
-def _image_key(camera: str) -> str:
-    return f"observation.images.{camera}"
-
-
-def _embedded(info: DatasetInfo, frame: Frame, frame_index: int) -> dict[str, Any]:
-    """Images of a frame by feature."""
-    paths = {
-        camera: info.media_path(frame.shard_dir, camera, Channel.RGB, frame.index)
-        for camera in frame.row["images"]
-    }
-    return {
-        _image_key(camera): {
-            "bytes": path.read_bytes(),
-            "path": f"frame_{frame_index:06d}{path.suffix}",
-        }
-        for camera, path in paths.items()
-    }
-
-
-def _number_stats(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Statistics of the numbers of an episode by feature, of the values as stored."""
-    stats = {}
-    for name in rows[0]:
-        if isinstance(rows[0][name], str):
-            continue
-        stored = np.array([row[name] for row in rows])
-        if stored.dtype.kind == "f":
-            stored = stored.astype(np.float32).astype(np.float64)
-        columns = stored.reshape(len(rows), -1).T.tolist()
-        stats[name] = {
-            "min": [min(values) for values in columns],
-            "max": [max(values) for values in columns],
-            # fsum is exact: the result is the same on every machine.
-            "mean": [_mean(values) for values in columns],
-            "std": [_deviation(values) for values in columns],
-            "count": [len(rows)],
-        }
-    return stats
-
-
-def _mean(values: Sequence[float]) -> float:
-    return math.fsum(values) / len(values)
-
-
-def _deviation(values: Sequence[float]) -> float:
-    mean = _mean(values)
-    return round(math.sqrt(math.fsum((v - mean) ** 2 for v in values) / len(values)), DECIMALS)
-
-
-def _image_stats(frames: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Statistics of the images of an episode by feature, [3, 1, 1] each, as fractions of 255."""
-    stats = {}
-    for camera in frames[0]:
-        sums = [frame[camera] for frame in frames]
-        columns: dict[str, list[Any]] = {name: [] for name in ("min", "max", "mean", "std")}
-        for k in range(3):
-            n = sum(one["count"] for one in sums)
-            total = sum(one["sum"][k] for one in sums)
-            squares = sum(one["squares"][k] for one in sums)
-            # Whole numbers: nothing is lost in the difference.
-            deviation = math.sqrt(n * squares - total * total) / n
-            columns["min"].append([[min(one["min"][k] for one in sums) / 255.0]])
-            columns["max"].append([[max(one["max"][k] for one in sums) / 255.0]])
-            columns["mean"].append([[round(total / n / 255.0, DECIMALS)]])
-            columns["std"].append([[round(deviation / 255.0, DECIMALS)]])
-        stats[_image_key(camera)] = {**columns, "count": [len(frames)]}
-    return stats

@@ -60,11 +60,11 @@ def test_lerobot_has_what_the_arm_does_at_every_step(
 ) -> None:
     """At 0, 0.1, 0.2 and 0.3 s; the hand's pose is that of the step's joints."""
     folder = world.export(LeRobot(), drive_info(world), samples, tmp_path) / "train/toys_arm"
-    rows = pyarrow.parquet.read_table(folder / "data/chunk-000/episode_000000.parquet").to_pylist()
+    rows = pyarrow.parquet.read_table(folder / "data/chunk-000/file-000.parquet").to_pylist()
     info = json.loads((folder / "meta/info.json").read_text())
-    (task,) = [json.loads(t) for t in (folder / "meta/tasks.jsonl").read_text().splitlines()]
+    tasks = pyarrow.parquet.read_table(folder / "meta/tasks.parquet")
 
-    assert task["task"] == INSTRUCTION
+    assert tasks["__index_level_0__"].to_pylist() == [INSTRUCTION]
     assert [row["annotation.phase"] for row in rows] == ["pick", "pick", "place", "place"]
     assert [row["annotation.held"] for row in rows] == ["", "crate/0", "crate/0", ""]
     assert [row["annotation.contacts"] for row in rows] == [

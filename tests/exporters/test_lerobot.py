@@ -1,10 +1,13 @@
-"""LeRobot export, read by pyarrow as LeRobot 0.3.2 reads it."""
+"""LeRobot export, read by pyarrow as LeRobot 0.4.4 and 0.3.2 read it, and by LeRobot 0.4.4."""
 
 from __future__ import annotations
 
 import io
 import json
+import os
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,8 +19,9 @@ import pyarrow.parquet
 import pytest
 from PIL import Image
 
-from gen_data.exporters import lerobot
+from gen_data.exporters import lerobot_files
 from gen_data.exporters.lerobot import LeRobot, task_sentence
+from gen_data.exporters.lerobot_statistics import image_sums
 from gen_data.generator.assemble.config import load_config
 from gen_data.generator.assemble.pipeline_factory import PipelineFactory
 from gen_data.generator.core.errors import ConfigError
@@ -31,14 +35,48 @@ def reach(world: Any) -> Any:
     return world.reach()
 
 
-@pytest.fixture(scope="module")
-def dataset(world: Any, reach: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Data sets of both splits."""
-    return world.export(LeRobot(), drive_info(world), reach, tmp_path_factory.mktemp("lerobot"))
+@pytest.fixture(scope="module", params=["v3.0", "v2.1"])
+def dataset(request: Any, world: Any, reach: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Data sets of both splits, in either format."""
+    exporter = LeRobot(version=request.param)
+    return world.export(exporter, drive_info(world), reach, tmp_path_factory.mktemp("lerobot"))
+
+
+@pytest.fixture
+def shared_files(world: Any, tmp_path: Path) -> Path:
+    """Data set of two episodes of the same split, in format v3.0."""
+    samples = [replace(sample, split="train") for sample in world.reach()]
+    return world.export(LeRobot(), drive_info(world), samples, tmp_path) / "train/toys_arm"
 
 
 def lines(path: Path) -> list[Any]:
     return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+def tasks_of(folder: Path) -> dict[int, str]:
+    """Sentences by number; they are the index of the table that pandas reads."""
+    path = folder / "meta/tasks.parquet"
+    if path.exists():
+        table = pyarrow.parquet.read_table(path)
+        (index,) = json.loads(table.schema.metadata[b"pandas"])["index_columns"]
+        return dict(zip(table["task_index"].to_pylist(), table[index].to_pylist(), strict=True))
+    return {row["task_index"]: row["task"] for row in lines(folder / "meta/tasks.jsonl")}
+
+
+def episodes_of(folder: Path) -> list[dict[str, Any]]:
+    """Length, tasks and statistics of all episodes, in order."""
+    path = folder / "meta/episodes/chunk-000/file-000.parquet"
+    if not path.exists():
+        stats = lines(folder / "meta/episodes_stats.jsonl")
+        pairs = zip(lines(folder / "meta/episodes.jsonl"), stats, strict=True)
+        return [episode | line for episode, line in pairs]
+    rows = pyarrow.parquet.read_table(path).to_pylist()
+    for row in rows:
+        row["stats"] = {}
+        for name in [name for name in row if name.startswith("stats/")]:
+            _, feature, key = name.split("/")
+            row["stats"].setdefault(feature, {})[key] = row.pop(name)
+    return rows
 
 
 def rows_of(folder: Path) -> list[dict[str, Any]]:
@@ -53,8 +91,7 @@ def rows_of(folder: Path) -> list[dict[str, Any]]:
 def faults(folder: Path, samples: Any) -> list[str]:
     """Differences between a data set and the samples of its episodes."""
     info = json.loads((folder / "meta/info.json").read_text())
-    episodes = lines(folder / "meta/episodes.jsonl")
-    tasks = {row["task_index"]: row["task"] for row in lines(folder / "meta/tasks.jsonl")}
+    episodes, tasks = episodes_of(folder), tasks_of(folder)
     rows, found = rows_of(folder), []
     if (info["total_episodes"], info["total_frames"]) != (len(episodes), len(rows)):
         found.append("totals")
@@ -91,22 +128,30 @@ def faults(folder: Path, samples: Any) -> list[str]:
 
 
 def stats_faults(folder: Path, rows: list[dict[str, Any]]) -> list[str]:
-    """Differences between the statistics and the values of each episode."""
+    """Differences between the statistics and the values of each episode, and of all."""
     found = []
-    for line in lines(folder / "meta/episodes_stats.jsonl"):
-        mine = [row for row in rows if row["episode_index"] == line["episode_index"]]
-        for name, stats in line["stats"].items():
-            if name.startswith("observation.images"):
-                images = [np.asarray(Image.open(io.BytesIO(row[name]["bytes"]))) for row in mine]
-                values = np.stack(images).reshape(-1, 3) / 255.0
-            else:
-                values = np.array([row[name] for row in mine]).reshape(len(mine), -1)
-            for key in ("min", "max", "mean", "std"):
-                expected = getattr(values, key)(axis=0)
-                if not np.allclose(np.ravel(stats[key]), expected, atol=1e-6):
-                    found.append(f"{key} of {name}")
-            if stats["count"] != [len(mine)]:
-                found.append(f"count of {name}")
+    for episode in episodes_of(folder):
+        mine = [row for row in rows if row["episode_index"] == episode["episode_index"]]
+        found += differences(episode["stats"], mine)
+    whole = folder / "meta/stats.json"
+    return found + (differences(json.loads(whole.read_text()), rows) if whole.exists() else [])
+
+
+def differences(stats: dict[str, Any], rows: list[dict[str, Any]]) -> list[str]:
+    """Statistics of features that are not those of the rows."""
+    found = []
+    for name, one in stats.items():
+        if name.startswith("observation.images"):
+            images = [np.asarray(Image.open(io.BytesIO(row[name]["bytes"]))) for row in rows]
+            values = np.stack(images).reshape(-1, 3) / 255.0
+        else:
+            values = np.array([row[name] for row in rows]).reshape(len(rows), -1)
+        for key in ("min", "max", "mean", "std"):
+            expected = getattr(values, key)(axis=0)
+            if not np.allclose(np.ravel(one[key]), expected, atol=1e-6):
+                found.append(f"{key} of {name}")
+        if one["count"] != [len(rows)]:
+            found.append(f"count of {name}")
     return found
 
 
@@ -122,16 +167,96 @@ def test_joints_and_features_are_named(dataset: Path) -> None:
     """Features of the files, in the forms of LeRobot and of datasets."""
     folder = dataset / "train/toys_arm"
     info = json.loads((folder / "meta/info.json").read_text())
-    path = folder / "data/chunk-000/episode_000000.parquet"
+    (path,) = (folder / "data").rglob("*.parquet")
     described = json.loads(pyarrow.parquet.read_schema(path).metadata[b"huggingface"])
+    action = {"dtype": "float32", "shape": [2], "names": ["shoulder", "elbow"]}
 
-    assert info["features"]["action"] == {
-        "dtype": "float32",
-        "shape": [2],
-        "names": ["shoulder", "elbow"],
-    }
-    assert (info["codebase_version"], info["fps"], info["robot_type"]) == ("v2.1", 10, "toys/arm")
+    assert action.items() <= info["features"]["action"].items()
+    assert (info["fps"], info["robot_type"]) == (10, "toys/arm")
     assert set(described["info"]["features"]) == set(info["features"])
+
+
+def test_episodes_share_files_as_far_as_these_have_room(
+    shared_files: Path, world: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In files of one byte every episode has its own; the rows are the same."""
+    samples = [replace(sample, split="train") for sample in world.reach()]
+    monkeypatch.setattr(lerobot_files, "FILE_BYTES", 1)
+    apart = world.export(LeRobot(), drive_info(world), samples, tmp_path / "apart")
+    apart /= "train/toys_arm"
+
+    def places(folder: Path) -> list[tuple[int, ...]]:
+        names = ("data/file_index", "dataset_from_index", "dataset_to_index")
+        return [tuple(episode[name] for name in names) for episode in episodes_of(folder)]
+
+    assert places(shared_files) == [(0, 0, 4), (0, 4, 8)]
+    assert places(apart) == [(0, 0, 4), (1, 4, 8)]
+    assert rows_of(apart) == rows_of(shared_files)
+    assert stats_faults(shared_files, rows_of(shared_files)) == []
+
+
+def test_quantiles_are_those_of_the_stored_values(shared_files: Path) -> None:
+    """Those of all episodes are means of the episodes', as LeRobot merges them."""
+    rows, whole = rows_of(shared_files), json.loads((shared_files / "meta/stats.json").read_text())
+    states = np.array([row["observation.state"] for row in rows], np.float64).reshape(2, 4, -1)
+
+    for key, share in {"q01": 0.01, "q50": 0.5, "q99": 0.99}.items():
+        expected = np.quantile(states, share, axis=1)
+        found = [one["stats"]["observation.state"][key] for one in episodes_of(shared_files)]
+        assert np.allclose(found, expected, atol=1e-8)
+        assert np.allclose(whole["observation.state"][key], expected.mean(axis=0), atol=1e-8)
+
+
+READ = """
+import json, sys
+import torch
+try:
+    import torchvision
+except RuntimeError:
+    # Its compiled operators do not load beside a build of torch for processors only. LeRobot needs
+    # none of them; once they are declared, the rest can be imported.
+    library = torch.library.Library("torchvision", "DEF")
+    library.define("nms(Tensor dets, Tensor scores, float iou_threshold) -> Tensor")
+    library.define("qnms(Tensor dets, Tensor scores, float iou_threshold) -> Tensor")
+    library.define("roi_align(Tensor input, Tensor rois, float spatial_scale, SymInt pooled_height,"
+                   " SymInt pooled_width, int sampling_ratio, bool aligned) -> Tensor")
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
+data = LeRobotDataset("local/test", root=sys.argv[1], delta_timestamps={"action": [0.0, 0.1]})
+rows = [data[k] for k in range(len(data))]
+print(json.dumps({
+    "episodes": [int(row["episode_index"]) for row in rows],
+    "tasks": sorted({row["task"] for row in rows}),
+    "actions": [row["action"].tolist() for row in rows],
+    "means": [row["observation.images.left"].mean(dim=(1, 2)).tolist() for row in rows],
+    "mean": data.meta.stats["action"]["mean"].tolist(),
+}))
+"""
+
+
+@pytest.mark.slow
+def test_lerobot_reads_what_was_written(shared_files: Path) -> None:
+    """Release 0.4.4: rows, images, tasks, statistics, and windows over time within episodes."""
+    done = subprocess.run(
+        [sys.executable, "-c", READ, shared_files],
+        env=os.environ | {"HF_HUB_OFFLINE": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    read, rows = json.loads(done.stdout), rows_of(shared_files)
+    actions = np.array([row["action"] for row in rows])
+    key = "observation.images.left"
+    images = [np.asarray(Image.open(io.BytesIO(row[key]["bytes"]))) for row in rows]
+
+    assert read["episodes"] == [0] * 4 + [1] * 4
+    assert read["tasks"] == ["Pick up the crate, then put it down."]
+    # The window of an episode's last frame repeats its last action.
+    assert np.allclose(
+        read["actions"], actions[[[k, min(k + 1, k // 4 * 4 + 3)] for k in range(8)]]
+    )
+    assert np.allclose(read["means"], [one.mean(axis=(0, 1)) / 255.0 for one in images], atol=1e-6)
+    assert np.allclose(read["mean"], actions.mean(axis=0), atol=1e-6)
 
 
 def test_images_of_statistics_are_thinned_as_lerobot_does(tmp_path: Path) -> None:
@@ -141,7 +266,7 @@ def test_images_of_statistics_are_thinned_as_lerobot_does(tmp_path: Path) -> Non
     path = tmp_path / "image.png"
     Image.fromarray(pixels).save(path)
 
-    sums = lerobot._image_sums(path)
+    sums = image_sums(path)
 
     n = 160 * 120
     assert sums["count"] == n
@@ -164,25 +289,45 @@ def change_rows(path: Path, change: Callable[[list[dict[str, Any]]], Any]) -> No
     pyarrow.parquet.write_table(pyarrow.Table.from_pylist(rows, table.schema), path)
 
 
-EPISODE = "data/chunk-000/episode_000000.parquet"
+def change_frames(folder: Path, change: Callable[[list[dict[str, Any]]], Any]) -> None:
+    (path,) = (folder / "data").rglob("*.parquet")
+    change_rows(path, change)
+
+
+def change_episode(folder: Path, old: str, new: str, change: Callable[[Any], Any]) -> None:
+    """Change the one episode: a line of v2.1, or a row of v3.0."""
+    table = folder / new
+    if table.exists():
+        change_rows(table, lambda rows: change(rows[0]))
+    else:
+        change_json(folder / old, change)
+
+
+def forget_mean(row: dict[str, Any]) -> None:
+    if "stats" in row:
+        row["stats"]["action"]["mean"] = [0.0, 0.0]
+    else:
+        row["stats/action/mean"] = [0.0, 0.0]
+
+
+EPISODES = "meta/episodes/chunk-000/file-000.parquet"
 
 
 @pytest.mark.damage("lerobot")
 @pytest.mark.parametrize(
     "damage",
     [
-        lambda d: change_rows(d / EPISODE, lambda rows: rows.pop()),
-        lambda d: change_rows(
-            d / EPISODE, lambda rows: [r.update(action=r["observation.state"]) for r in rows]
+        lambda d: change_frames(d, lambda rows: rows.pop()),
+        lambda d: change_frames(
+            d, lambda rows: [r.update(action=r["observation.state"]) for r in rows]
         ),
-        lambda d: change_rows(
-            d / EPISODE, lambda rows: [r.update(timestamp=2 * r["timestamp"]) for r in rows]
+        lambda d: change_frames(
+            d, lambda rows: [r.update(timestamp=2 * r["timestamp"]) for r in rows]
         ),
-        lambda d: change_json(d / "meta/episodes.jsonl", lambda row: row.update(length=5)),
-        lambda d: change_json(
-            d / "meta/episodes_stats.jsonl",
-            lambda row: row["stats"]["action"].update(mean=[0.0, 0.0]),
+        lambda d: change_episode(
+            d, "meta/episodes.jsonl", EPISODES, lambda row: row.update(length=5)
         ),
+        lambda d: change_episode(d, "meta/episodes_stats.jsonl", EPISODES, forget_mean),
     ],
     ids=["row missing", "action is state", "timestamps", "length", "statistics"],
 )
