@@ -296,18 +296,19 @@ def _search_in_turn(real: Array, simulate: Simulate, axes: Sequence[Axis], start
     Together, they would follow a narrow curved valley, in which the scatter of statistics ends the
     search anywhere: late parameters make up for errors of early ones.
     """
-    late = np.array([axis.late for axis in axes])
-    begin = start.copy()
-    if late.all() or not late.any():
+    late = [number for number, axis in enumerate(axes) if axis.late]
+    early = [number for number, axis in enumerate(axes) if not axis.late]
+    begin = np.array(start)
+    if not late or not early:
         return begin
-    for part in (np.flatnonzero(~late), np.flatnonzero(late)):
+    for part in (early, late):
 
-        def simulate_part(at: Array, count: int, part: NDArray[np.int64] = part) -> Array:
+        def simulate_part(at: Array, count: int, part: Sequence[int] = part) -> Array:
             moved = begin.copy()
             moved[part] = at
-            return simulate(moved, count)[:, part]
+            return np.asarray(simulate(moved, count)[:, part])
 
-        own = [axes[k] for k in part]
+        own = [axes[number] for number in part]
         begin[part] = solve(real[:, part], simulate_part, own, start[part]).parameters
     return begin
 
@@ -350,7 +351,7 @@ def _variance_of_mean(values: Array) -> Array:
     if len(values) < 2:
         return np.ones(values.shape[1])
     n = np.maximum(count, 2)
-    squares = np.nansum((limited - np.nanmean(limited, axis=0)) ** 2, axis=0)
+    squares = _squared_deviations(limited, count)
     return np.asarray(squares / (n - 1) / (n * (1.0 - 2.0 * cut / n) ** 2) + _ROUNDING)
 
 
@@ -452,5 +453,13 @@ def _spreads(
 
 def _robust_variance(values: Array) -> Array:
     """Variance [..., k] of statistics [..., n, k], from Winsorised ones."""
-    limited, _, _ = _limited(values, WINSORISED)
-    return np.asarray(np.nanvar(limited, axis=-2) / _WINSORISED_VARIANCE)
+    limited, count, _ = _limited(values, WINSORISED)
+    squares = _squared_deviations(limited, count)
+    return np.where(count > 0, squares / np.maximum(count, 1), np.nan) / _WINSORISED_VARIANCE
+
+
+def _squared_deviations(values: Array, count: NDArray[np.int64]) -> Array:
+    """Sums [..., k] of squared deviations of ``count`` values from their mean; NaN are left out."""
+    known = np.isfinite(values)
+    mean = np.where(known, values, 0.0).sum(axis=-2) / np.maximum(count, 1)
+    return np.asarray(np.where(known, (values - mean[..., None, :]) ** 2, 0.0).sum(axis=-2))
