@@ -330,5 +330,6 @@ def tabulate(made: Round, strength: float) -> Table:
         "header": ["parameter", "declared", "p", "missed by bin [%]", "factors of weights"],
         "rows": rows,
         "note": f"{len(made.dependences)} parameters were tested; p adjusted by Holm; "
-        f"{made.images[0]} of {made.images[1]} images have detections",
+        f"{made.images[0]} of {made.images[1]} images have detections"
+        + ("" if made.changed else "; no weight was changed"),
     }
