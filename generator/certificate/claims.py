@@ -45,6 +45,11 @@ FILES = Claim(
 CLAIMS = (
     FILES,
     Claim(
+        "run log",
+        "Shards and data set are those that the log of the run says were committed and sealed.",
+        "run_log:check_run_log",
+    ),
+    Claim(
         "samples",
         "Every sample can be decoded and obeys the rules that hold before a sample is written.",
         "sample_rules:check_sample_rules",
@@ -61,6 +66,12 @@ CLAIMS = (
         "compares them, classes, splits, boxes and masks are those of the labels, which score an "
         "average precision of 1 as predictions.",
         "exports:check_exports",
+    ),
+    Claim(
+        "written again",
+        "Exports and documents that are written again from the stored samples are the stored ones; "
+        "there is no other file.",
+        "written_again:check_written_again",
     ),
     Claim(
         "pixels",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import errno
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 
 
@@ -171,6 +171,12 @@ class SceneRejected(SampleError):
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle by the constructor's arguments, so that it crosses process borders."""
         return (type(self), (self.scene_index, self.rejections))
+
+
+def list_names(names: Collection[str], most: int = 12) -> str:
+    """Names with commas, and how many there are beyond ``most``."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(list(names)[:most]) + more
 
 
 def did_you_mean(wrong: str, known: Iterable[str]) -> str:

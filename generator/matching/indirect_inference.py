@@ -67,6 +67,8 @@ class Axis:
         enough: Half width of an interval that is narrow enough for most uses.
         varies: Whether the parameter may differ from recording to recording.
         grid: Simulations round the parameter to multiples of this; 0 = they do not.
+        late: Whether the search begins with the parameters that are not late, on whose statistics
+            this one has little effect.
     """
 
     low: float
@@ -76,6 +78,7 @@ class Axis:
     enough: float
     varies: bool = True
     grid: float = 0.0
+    late: bool = False
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -238,7 +241,7 @@ def solve(
         axes: Of the k parameters.
         start: Parameters of the configuration [k], the mean of the prior.
         slopes: Derivatives of the statistics [k, k] where they are known; None = measured.
-        first: Parameters [k] at which the search begins; None = ``start``.
+        first: Parameters [k] at which the search begins; None = those of ``_search_in_turn``.
     """
     from scipy.optimize import least_squares
 
@@ -253,7 +256,8 @@ def solve(
     def place(at: Array) -> Array:
         return np.asarray(1.0 + (at - start) / plausible)
 
-    begin = start if first is None else np.clip(first, low, high)
+    begin = _search_in_turn(real, simulate, axes, start) if first is None else first
+    begin = np.clip(begin, low, high)
     target, known = trimmed_mean(real), dict[bytes, Array]()
 
     def found(at: Array) -> Array:
@@ -284,6 +288,29 @@ def solve(
     last = search.jac[: len(axes)] * error[:, None] / plausible
     gain, determined = _gain(last, real, found(at), axes)
     return Solution(at, last, gain, determined, found(at))
+
+
+def _search_in_turn(real: Array, simulate: Simulate, axes: Sequence[Axis], start: Array) -> Array:
+    """Parameters [k] near the solution: the late ones are found when the others have been.
+
+    Together, they would follow a narrow curved valley, in which the scatter of statistics ends the
+    search anywhere: late parameters make up for errors of early ones.
+    """
+    late = [number for number, axis in enumerate(axes) if axis.late]
+    early = [number for number, axis in enumerate(axes) if not axis.late]
+    begin = np.array(start)
+    if not late or not early:
+        return begin
+    for part in (early, late):
+
+        def simulate_part(at: Array, count: int, part: Sequence[int] = part) -> Array:
+            moved = begin.copy()
+            moved[part] = at
+            return np.asarray(simulate(moved, count)[:, part])
+
+        own = [axes[number] for number in part]
+        begin[part] = solve(real[:, part], simulate_part, own, start[part]).parameters
+    return begin
 
 
 def _derivatives(simulate: Simulate, at: Array, found: Array, axes: Sequence[Axis]) -> Array:
@@ -324,7 +351,7 @@ def _variance_of_mean(values: Array) -> Array:
     if len(values) < 2:
         return np.ones(values.shape[1])
     n = np.maximum(count, 2)
-    squares = np.nansum((limited - np.nanmean(limited, axis=0)) ** 2, axis=0)
+    squares = _squared_deviations(limited, count)
     return np.asarray(squares / (n - 1) / (n * (1.0 - 2.0 * cut / n) ** 2) + _ROUNDING)
 
 
@@ -426,5 +453,13 @@ def _spreads(
 
 def _robust_variance(values: Array) -> Array:
     """Variance [..., k] of statistics [..., n, k], from Winsorised ones."""
-    limited, _, _ = _limited(values, WINSORISED)
-    return np.asarray(np.nanvar(limited, axis=-2) / _WINSORISED_VARIANCE)
+    limited, count, _ = _limited(values, WINSORISED)
+    squares = _squared_deviations(limited, count)
+    return np.where(count > 0, squares / np.maximum(count, 1), np.nan) / _WINSORISED_VARIANCE
+
+
+def _squared_deviations(values: Array, count: NDArray[np.int64]) -> Array:
+    """Sums [..., k] of squared deviations of ``count`` values from their mean; NaN are left out."""
+    known = np.isfinite(values)
+    mean = np.where(known, values, 0.0).sum(axis=-2) / np.maximum(count, 1)
+    return np.asarray(np.where(known, (values - mean[..., None, :]) ** 2, 0.0).sum(axis=-2))

@@ -10,6 +10,7 @@ import numpy as np
 
 from gen_data.generator.assemble.config import Config, load_config
 from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+from gen_data.generator.core.errors import list_names
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.matching.indirect_inference import estimate, solve
 from gen_data.generator.matching.quantities import LABELS, LabelQuantity
@@ -126,8 +127,8 @@ def _of_common_classes(
     theirs = sorted({box[0] for image in labels for box in image.boxes})
     other = [name for name in theirs if name.lower() not in known]
     remark = (
-        f"classes without a counterpart, left out: {', '.join(other)}; the configuration has"
-        f" {', '.join(ours)}"
+        f"classes without a counterpart, left out: {list_names(other)}; the configuration has"
+        f" {list_names(ours)}"
     )
     return [_of_classes(image, known) for image in labels], (remark,) if other else ()
 

@@ -17,7 +17,7 @@ DARK, CLIPPED = 4, 250
 """Bytes up to and from which a channel states no level: black, and saturated."""
 FLOOR = 1.0 / 512.0
 """Added to linear luminance before logarithms: half the first step of eight bits at middle grey."""
-BLOCK_PX = 8
+BLOCK_PX = 4
 """Side of the blocks in which noise is measured."""
 _MASK = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]], np.float32) / 6.0
 _LINEAR: Float32 = srgb_decode(np.arange(256) / 255.0).astype(np.float32)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from gen_data.generator.core.errors import CacheWarning, GenDataError
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.runner.free_space import SpaceCheck
+from gen_data.generator.runner.store import LOG_NAME
 from gen_data.generator.runner.worker_events import (
     Action,
     Event,
@@ -189,7 +190,7 @@ class RunMonitor:
     def log(self, entry: Mapping[str, object]) -> None:
         """Append one line to the run's log."""
         line = canonical_json({"at_s": round(self.seconds, 3), **entry})
-        with self._store.errors(), (self._store.run_dir / "log.jsonl").open("a") as file:
+        with self._store.errors(), (self._store.run_dir / LOG_NAME).open("a") as file:
             file.write(f"{line}\n")
 
     def mean_cpu_s(self) -> dict[str, float]:
@@ -217,6 +218,7 @@ class RunMonitor:
             {
                 "shard": event.shard,
                 "worker": event.worker,
+                "record_sha256": event.record_sha256,
                 "bytes": event.bytes,
                 "rss_bytes": event.rss_bytes,
                 "cpu_s_per_sample": self.mean_cpu_s(),

@@ -57,6 +57,8 @@ MANIFEST_NAME = "manifest.json"
 SUMS_NAME = "SHA256SUMS"
 LICENCES_NAME = "LICENSES-ASSETS.md"
 RUN_NAME = "run"
+LOG_NAME = "log.jsonl"
+"""Log of all runs, in ``run``: committed shards with digests of their records, and summaries."""
 CERTIFICATE_NAME = "CERTIFICATE.json"
 CERTIFICATE_NAMES = (CERTIFICATE_NAME, "CERTIFICATE.html")
 """Statements about a finished data set, beside its manifest; no part of its identity."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import faulthandler
 import gc
+import hashlib
 import os
 import pickle
 import sys
@@ -187,4 +188,5 @@ def done_event(number: int, made: MadeShard) -> ShardDone:
         record.rejections,
         resident_bytes(),
         made.timings_s,
+        hashlib.sha256(record.to_bytes()).hexdigest(),
     )

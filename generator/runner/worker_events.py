@@ -44,6 +44,7 @@ class ShardDone:
 
     Attributes:
         bytes: Size of its files.
+        record_sha256: Of its record; empty = unknown.
         rss_bytes: Memory of the worker's process, 0 if unknown.
         timings_s: CPU seconds of the shard as a whole, by stage.
     """
@@ -55,6 +56,7 @@ class ShardDone:
     rejections: int
     rss_bytes: int = 0
     timings_s: Mapping[str, float] = field(default_factory=dict)
+    record_sha256: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ import hashlib
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,6 +50,7 @@ class Round:
         recall: Share of objects of the judged data set that were found.
         dependences: All tested parameters, the surest first.
         changed: Names of those whose weights were changed.
+        images: Numbers of images with detections, and of all images that were judged.
     """
 
     number: int
@@ -57,6 +58,7 @@ class Round:
     recall: float
     dependences: tuple[Dependence, ...]
     changed: tuple[str, ...]
+    images: tuple[int, int] = (0, 0)
 
 
 def adapt(
@@ -89,7 +91,7 @@ def adapt(
         raise ConfigError("expected either results or a detector")
     if not 0.0 < strength <= 4.0:
         raise ConfigError(f"strength: {strength:g}; expected a number above 0, up to 4")
-    loaded = load_config(config)
+    loaded, kept = load_config(config), StoredSamples(data)
     _check_same(loaded, data)
     with open_dataset(data) as stored:
         has_map = bool((stored.config.get("labels") or {}).get("map"))
@@ -99,8 +101,7 @@ def adapt(
             rows = _detect(detector, samples, truth)
         else:
             assert results is not None
-            rows = _read_checked(results, data, truth)
-    kept = StoredSamples(data)
+            rows = _read_checked(results, kept, truth)
     tallies = _count(truth, rows, len(kept.info.cameras))
     replay = replay_scenes(kept, kept.n)
     if replay.differences:
@@ -108,7 +109,9 @@ def adapt(
             f"{data}: {replay.differences[0]}; expected the version of gen-data that made it"
         )
     dependences = find_dependences(replay.draws, tallies)
-    return _write_round(config, loaded, kept, out, tallies, dependences, strength)
+    images = len({row["image_id"] for row in rows}), len(truth.pictures)
+    made = _write_round(config, loaded, kept, out, tallies, dependences, strength)
+    return replace(made, images=images)
 
 
 def _check_same(loaded: Config, data: Path) -> None:
@@ -151,9 +154,9 @@ def _sides(box: NDArray[np.float32]) -> Box:
     return x0, y0, x1, y1
 
 
-def _read_checked(path: Path, data: Path, truth: RealSet) -> list[dict[str, Any]]:
+def _read_checked(path: Path, judged: StoredSamples, truth: RealSet) -> list[dict[str, Any]]:
     """Results of this data set."""
-    identity = StoredSamples(data).dataset_id
+    identity = judged.dataset_id
     try:
         content = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError) as error:
@@ -162,10 +165,16 @@ def _read_checked(path: Path, data: Path, truth: RealSet) -> list[dict[str, Any]
         if content.get("dataset", identity) != identity:
             raise ConfigError(
                 f"{path}: has results of the data set {content['dataset']}; expected those of "
-                f"{identity} in {data}"
+                f"{identity} in {judged.folder}"
             )
         content = content.get("results")
-    return check_results(content, path, truth)
+    rows = check_results(content, path, truth)
+    if strange := {row["image_id"] for row in rows} - {one.image_id for one in truth.pictures}:
+        raise ConfigError(
+            f"{path}: has results of another data set: the image_id {min(strange, key=str)} is not "
+            f"in {judged.folder}"
+        )
+    return rows
 
 
 def _detect(path: Path, samples: SampleSequence, truth: RealSet) -> list[dict[str, Any]]:
@@ -320,5 +329,7 @@ def tabulate(made: Round, strength: float) -> Table:
         "title": f"round {made.number}: recall {made.recall:.3f}",
         "header": ["parameter", "declared", "p", "missed by bin [%]", "factors of weights"],
         "rows": rows,
-        "note": f"{len(made.dependences)} parameters were tested; p adjusted by Holm",
+        "note": f"{len(made.dependences)} parameters were tested; p adjusted by Holm; "
+        f"{made.images[0]} of {made.images[1]} images have detections"
+        + ("" if made.changed else "; no weight was changed"),
     }

@@ -50,14 +50,17 @@ class Scores:
     Attributes:
         measured: By seed [seeds].
         resampled: By seed and resampled set of pictures [seeds, draws].
+        pictures: Number of pictures; inf = many.
     """
 
     measured: NDArray[np.float64]
     resampled: NDArray[np.float64]
+    pictures: float = math.inf
 
     def __sub__(self, other: Scores) -> Scores:
         """Differences of runs with equal seeds."""
-        return Scores(self.measured - other.measured, self.resampled - other.resampled)
+        measured, resampled = self.measured - other.measured, self.resampled - other.resampled
+        return Scores(measured, resampled, self.pictures)
 
 
 def score(runs: Sequence[Evaluation], draws: int = DRAWS) -> tuple[Scores, Scores]:
@@ -72,13 +75,17 @@ def score(runs: Sequence[Evaluation], draws: int = DRAWS) -> tuple[Scores, Score
     measured = np.array([run.summary() for run in runs])
     resampled = np.array([[run.summary(numbers) for numbers in chosen] for run in runs])
     return (
-        Scores(measured[:, 0], resampled[..., 0]),
-        Scores(measured[:, 1], resampled[..., 1]),
+        Scores(measured[:, 0], resampled[..., 0], count),
+        Scores(measured[:, 1], resampled[..., 1], count),
     )
 
 
 def interval(scores: Scores, confidence: float = CONFIDENCE) -> Interval:
     """Mean over seeds with its interval; with one seed, seeds are taken not to vary.
+
+    Deviations of resampled means are too small by the root of (n - 1) / n for n pictures, which is
+    corrected (Hesterberg, "What teachers should know about the bootstrap", The American
+    Statistician 2015), and they have the degrees of freedom of n values.
 
     Args:
         scores: Of a variant, or differences of two.
@@ -89,9 +96,11 @@ def interval(scores: Scores, confidence: float = CONFIDENCE) -> Interval:
 
     mean = float(np.nanmean(scores.measured))
     seeds, draws = scores.resampled.shape
-    parts = [(float(np.nanvar(np.nanmean(scores.resampled, axis=0), ddof=1)), draws - 1)]
+    variance = float(np.nanvar(np.nanmean(scores.resampled, axis=0), ddof=1))
+    freedom = min(float(draws), scores.pictures) - 1.0
+    parts = [(variance / (1.0 - 1.0 / scores.pictures), freedom)]
     if seeds > 1:
-        parts.append((float(np.nanvar(scores.measured, ddof=1)) / seeds, seeds - 1))
+        parts.append((float(np.nanvar(scores.measured, ddof=1)) / seeds, seeds - 1.0))
 
     def reach(alpha: float) -> float:
         quantiles = [(variance, t.ppf(1.0 - alpha / 2.0, freedom)) for variance, freedom in parts]

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any
 
 import cv2
@@ -18,6 +19,8 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
+
+from gen_data.generator.core.errors import ConfigError
 
 STRIDE = 4
 """Pixels of the network's input per place of its output."""
@@ -106,10 +109,21 @@ class Detector(nn.Module):
 
     @staticmethod
     def load(path: Path) -> Detector:
-        """Read a file of ``save``, ready to detect."""
-        content = torch.load(path, weights_only=True)
-        model = Detector(content["classes"], content["size_px"], content["width"])
-        model.load_state_dict(content["weights"])
+        """Read a file of ``save``, ready to detect.
+
+        Raises:
+            ConfigError: it is no such file.
+        """
+        try:
+            content = torch.load(path, weights_only=True)
+            model = Detector(content["classes"], content["size_px"], content["width"])
+            model.load_state_dict(content["weights"])
+        except (OSError, UnpicklingError, EOFError, LookupError, TypeError, RuntimeError) as error:
+            reason = str(error).partition("\n")[0]
+            raise ConfigError(
+                f"{path}: cannot be read as a detector of gen-data study ({reason}); expected a "
+                "file detector.pt in one of the folders runs/ of a study"
+            ) from error
         model.eval()
         return model
 

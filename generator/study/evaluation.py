@@ -9,6 +9,7 @@ import contextlib
 import copy
 import io
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -135,16 +136,20 @@ def check_results(rows: Any, path: Path, real: RealSet) -> list[dict[str, Any]]:
     Raises:
         ConfigError: it is something else, or results of other pictures or classes.
     """
+    if not isinstance(rows, list):
+        raise ConfigError(f"{path}: not COCO results; expected {_WANTED}")
     try:
         checked = [
             {
                 "image_id": row["image_id"],
                 "category_id": row["category_id"],
-                "bbox": [float(value) for value in row["bbox"]],
-                "score": float(row["score"]),
+                "bbox": [_finite(value) for value in row["bbox"]],
+                "score": _finite(row["score"]),
             }
             for row in rows
         ]
+        if wrong := [row["bbox"] for row in checked if len(row["bbox"]) != 4]:
+            raise ValueError(f"bbox: {wrong[0]}")
     except (ValueError, KeyError, TypeError) as error:
         raise ConfigError(f"{path}: not COCO results ({error!r}); expected {_WANTED}") from error
     pictures = {picture.image_id for picture in real.pictures}
@@ -156,6 +161,13 @@ def check_results(rows: Any, path: Path, real: RealSet) -> list[dict[str, Any]]:
                 f"{strange[0]}, is in {real.source}"
             )
     return checked
+
+
+def _finite(value: Any) -> float:
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(f"{number} is not finite")
+    return number
 
 
 @dataclass(frozen=True, slots=True)

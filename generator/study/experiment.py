@@ -22,13 +22,18 @@ from typing import Any
 from gen_data.generator.api.config import load_config
 from gen_data.generator.api.dataset import Dataset
 from gen_data.generator.api.generate import generate
-from gen_data.generator.core.errors import ConfigError, SampleError, StorageError
+from gen_data.generator.core.errors import ConfigError, SampleError, StorageError, list_names
 from gen_data.generator.core.processes import SINGLE_THREADED, interrupts_blocked, tie
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.core.streams import Streams
 from gen_data.generator.core.system_calls import usable_cores
 from gen_data.generator.runner.durable_files import write_durably
-from gen_data.generator.study.real_pictures import RealPicture, RealSet, read_real
+from gen_data.generator.study.real_pictures import (
+    RealPicture,
+    RealSet,
+    check_judges,
+    read_real,
+)
 
 BASELINE = "baseline"
 PLAN, RESULTS, TASK, LOG = "study.json", "results.json", "task.json", "training.log"
@@ -167,16 +172,18 @@ def prepare(experiment: Experiment) -> Prepared:
         if set(_classes(variant)) - set(classes):
             strange = sorted(set(_classes(variant)) - set(classes))
             raise ConfigError(
-                f"variant '{variant.name}': has the classes {', '.join(strange)}, which the "
+                f"variant '{variant.name}': has the classes {list_names(strange)}, which the "
                 "baseline lacks; expected the same classes: give both the same labels.map"
             )
+    restricted = real.restrict(classes)
+    check_judges(restricted)
     count = experiment.real_count()
     if count and count > len(real.pictures) // 2:
         raise ConfigError(
             f"{experiment.folder}: has {len(real.pictures)} pictures, of which {count} would "
             f"train; expected at most {len(real.pictures) // 2}: the others judge"
         )
-    return Prepared(experiment, classes, real.restrict(classes))
+    return Prepared(experiment, classes, restricted)
 
 
 def list_runs(prepared: Prepared, out: Path) -> list[Run]:

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from gen_data.generator.core.asset_types import UInt8
-from gen_data.generator.core.errors import AssetError, ConfigError, StorageError
+from gen_data.generator.core.errors import AssetError, ConfigError, StorageError, list_names
 from gen_data.generator.matching.label_files import RealObject, read_coco, read_kitti
 from gen_data.generator.matching.real_files import read_rgb
 
+_UNSTATED = (0, 0)
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".webp", ".bmp")
 
 
@@ -73,9 +74,10 @@ class RealSet:
             )
         if not any(not thing.is_ignored for picture in pictures for thing in picture.objects):
             found = sorted({thing.name for p in self.pictures for thing in p.objects if thing.name})
+            wanted, known = list_names(sorted(classes)), list_names(found) or "none"
             raise ConfigError(
-                f"{self.source}: has no object of the classes {', '.join(sorted(classes))}; it has "
-                f"{', '.join(found) or 'none'}: give the configuration a label map with these names"
+                f"{self.source}: has no object of the classes {wanted}; it has {known}: give the "
+                "configuration a label map with these names"
             )
         ids = {
             by_fold[name.casefold()]: number
@@ -146,6 +148,22 @@ def read_real(folder: Path, split: str = "") -> RealSet:
     )
 
 
+def check_judges(real: RealSet) -> None:
+    """Refuse pictures that cannot judge a detector.
+
+    Raises:
+        ConfigError: there are fewer than two pictures, or no object.
+    """
+    if len(real.pictures) < 2:
+        reasons = ", ".join(f"{count} x {reason}" for reason, count in real.skipped.items())
+        raise ConfigError(
+            f"{real.source}: 1 picture can be used; expected at least 2, so that scores have an "
+            f"interval, and better 200 (skipped: {reasons or 'none'})"
+        )
+    if not any(not thing.is_ignored for picture in real.pictures for thing in picture.objects):
+        raise ConfigError(f"{real.source}: has no labelled object; expected some to be found")
+
+
 def read_image(path: Path) -> UInt8:
     """RGB image [h, w, 3]. Raises StorageError if it cannot be read."""
     try:
@@ -181,7 +199,7 @@ def _read_coco(root: Path, path: Path) -> RealSet:
     skipped = Counter({"object with an empty box": labels.empty} if labels.empty else {})
     files = _find_images(root, path, [image.file_name for image in labels.images])
     frames = [
-        (image.image_id, file, image.objects)
+        (image.image_id, file, image.objects, image.size_px)
         for image, file in zip(labels.images, files, strict=True)
     ]
     pictures = sorted(_readable(frames, skipped), key=_by_id)
@@ -220,7 +238,8 @@ def _read_kitti(root: Path) -> RealSet:
     for number, path in enumerate(sorted((root / "label_2").glob("*.txt")), 1):
         objects = read_kitti(path)
         names |= {thing.name for thing in objects if thing.name}
-        frames.append((number, images.get(path.stem, root / f"image_2/{path.stem}.png"), objects))
+        image = images.get(path.stem, root / f"image_2/{path.stem}.png")
+        frames.append((number, image, objects, _UNSTATED))
     ids = {name: number for number, name in enumerate(sorted(names), 1)}
     return _checked(RealSet(root / "label_2", tuple(_readable(frames, skipped)), ids, skipped))
 
@@ -230,10 +249,14 @@ def _is_image(path: Path) -> bool:
 
 
 def _readable(
-    frames: Iterable[tuple[int, Path, tuple[RealObject, ...]]], skipped: Counter[str]
+    frames: Iterable[tuple[int, Path, tuple[RealObject, ...], tuple[int, int]]],
+    skipped: Counter[str],
 ) -> Iterator[RealPicture]:
-    """Pictures of (id, path, objects) whose images exist and can be decoded."""
-    for number, path, objects in frames:
+    """Pictures of (id, path, objects, stated size) whose images exist and can be decoded.
+
+    Boxes do not fit images that were resized since.
+    """
+    for number, path, objects, stated_px in frames:
         if not path.is_file():
             skipped["image that is missing"] += 1
             continue
@@ -241,6 +264,9 @@ def _readable(
             height, width = read_image(path).shape[:2]
         except StorageError:
             skipped["image that cannot be read"] += 1
+            continue
+        if stated_px not in (_UNSTATED, (width, height)):
+            skipped["image of another size than its labels state"] += 1
             continue
         yield RealPicture(number, path, (width, height), objects)
 

@@ -13,7 +13,7 @@ from gen_data.generator.study.evaluation import Evaluation, evaluate, read_resul
 from gen_data.generator.study.experiment import Experiment, perform, prepare, require_torch
 from gen_data.generator.study.findings import Table, describe, tabulate
 from gen_data.generator.study.page import format_page
-from gen_data.generator.study.real_pictures import RealSet, read_real
+from gen_data.generator.study.real_pictures import RealSet, check_judges, read_real
 
 PAGE, FINDINGS = "study.html", "findings.json"
 
@@ -63,6 +63,7 @@ def compare_results(
         ConfigError: a file has no COCO results, or those of other pictures.
     """
     real = read_real(folder, split)
+    check_judges(real)
     runs = {name: [evaluate(real, read_results(path, real))] for name, path in files.items()}
     return _write(runs, real, out)
 

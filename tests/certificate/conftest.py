@@ -22,5 +22,6 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def damaged(dataset: Path, tmp_path: Path) -> Callable[[], Path]:
-    """Makes a copy of the data set, to be damaged."""
-    return lambda: Path(shutil.copytree(dataset, tmp_path / "copy"))
+    """Makes a copy of the data set to be damaged, as somebody else has it: without ``run``."""
+    without_run = shutil.ignore_patterns("run")
+    return lambda: Path(shutil.copytree(dataset, tmp_path / "copy", ignore=without_run))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -37,7 +38,9 @@ def reseal(folder: Path) -> None:
         path = folder / f"shards/{number:06d}.json"
         record = parse_unchecked_record(path.read_bytes())
         assert record is not None
-        files = tuple(_describe(folder / f"shards/{number:06d}", f.path) for f in record.files)
+        shard = folder / f"shards/{number:06d}"
+        paths = sorted(p.relative_to(shard).as_posix() for p in shard.rglob("*") if p.is_file())
+        files = tuple(_describe(shard, p) for p in paths)
         data = replace(record, files=files).to_bytes()
         path.write_bytes(data)
         manifest["shards"][number] = digest(data)
@@ -58,6 +61,15 @@ def reseal(folder: Path) -> None:
     sums["manifest.json"] = digest((folder / "manifest.json").read_bytes())
     lines = (f"{value}  {name}\n" for name, value in sorted(sums.items()))
     (folder / "SHA256SUMS").write_text("".join(lines), encoding="utf-8")
+
+
+def edit_lines(path: Path, change: Callable[[int, dict[str, Any]], None]) -> None:
+    """Change every line of a file of JSON lines."""
+    rows = [json.loads(line) for line in path.read_text().splitlines()]
+    for number, row in enumerate(rows):
+        change(number, row)
+    lines = (json.dumps(r, separators=(",", ":"), sort_keys=True) + "\n" for r in rows)
+    path.write_text("".join(lines))
 
 
 UNSEALED = ("manifest.json", "SHA256SUMS", "CERTIFICATE.json", "CERTIFICATE.html")

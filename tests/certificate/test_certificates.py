@@ -25,7 +25,7 @@ from gen_data.generator.core.errors import (
     VerificationError,
 )
 from gen_data.generator.runner.verify import verify
-from tests.certificate.sealing import SMALL, reseal
+from tests.certificate.sealing import SMALL, edit_lines, reseal
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -56,15 +56,6 @@ def failed(certificate: Certificate) -> set[str]:
     return {claim.name for claim, _ in certificate.findings(Status.FAILED)}
 
 
-def edit_lines(path: Path, change: Callable[[int, dict[str, Any]], None]) -> None:
-    """Change every line of a file of JSON lines."""
-    rows = [json.loads(line) for line in path.read_text().splitlines()]
-    for number, row in enumerate(rows):
-        change(number, row)
-    lines = (json.dumps(r, separators=(",", ":"), sort_keys=True) + "\n" for r in rows)
-    path.write_text("".join(lines))
-
-
 def test_a_good_data_set_passes_every_claim(certified: Path) -> None:
     """Also the one on distributions, whose false-alarm rate is 0.001 for any seed."""
     certificate = json.loads((certified / "CERTIFICATE.json").read_bytes())
@@ -79,9 +70,11 @@ def test_a_good_data_set_passes_every_claim(certified: Path) -> None:
     assert statuses == dict.fromkeys(
         [
             ("files", ""),
+            ("run log", ""),
             ("samples", ""),
             ("boxes and masks", ""),
             ("exports", "coco"),
+            ("written again", ""),
             ("pixels", "color"),
             ("laser points", "pseudo_lidar"),
             ("draws", ""),
@@ -156,7 +149,7 @@ def test_a_shifted_box_of_coco_is_named(damaged: Callable[[], Path]) -> None:
 
     certificate = gen_data.certify(copy, **QUICK)
 
-    assert failed(certificate) == {"exports"}
+    assert failed(certificate) == {"exports", "written again"}
     evidence = findings(certificate)["exports: coco"].evidence
     assert evidence[0].startswith(f"sample {image['sample']}, color: ")
     assert "expected" in evidence[0]
@@ -206,14 +199,13 @@ def test_scaled_depth_is_named(damaged: Callable[[], Path]) -> None:
 
     certificate = gen_data.certify(copy, **QUICK)
 
-    assert failed(certificate) == {"pixels", "generated again"}
+    assert failed(certificate) == {"pixels", "written again", "generated again"}
     evidence = findings(certificate)["pixels: color"].evidence
     assert "a ray does not meet what is stated" in evidence[0]
 
 
-def test_exchanged_photographs_are_named(damaged: Callable[[], Path]) -> None:
-    """In exports, too: nothing but generating them again tells that each is the other's picture."""
-    copy = damaged()
+def exchange_photographs(copy: Path) -> None:
+    """Exchange those of the samples 2 and 9, in exports, too."""
     first, second = (copy / f"shards/000000/color/rgb/{k:09d}.png" for k in (2, 9))
     pictures = first.read_bytes(), second.read_bytes()
     links = [[p for p in copy.rglob("*.png") if p.read_bytes() == data] for data in pictures]
@@ -222,12 +214,53 @@ def test_exchanged_photographs_are_named(damaged: Callable[[], Path]) -> None:
             path.write_bytes(data)
     reseal(copy)
 
+
+def test_exchanged_photographs_are_named(damaged: Callable[[], Path]) -> None:
+    """Without the log of the run, only generating them again tells each is the other's picture."""
+    copy = damaged()
+    exchange_photographs(copy)
+
     certificate = gen_data.certify(copy, samples=64, rays=1, scenes=0)
 
     assert failed(certificate) == {"generated again"}
     evidence = findings(certificate)["generated again"].evidence
     assert [text.split(":")[0] for text in evidence] == ["sample 2", "sample 9"]
     assert "first difference in stage render" in evidence[0]
+
+
+def test_the_log_of_the_run_tells_exchanged_photographs_without_generating(
+    dataset: Path, tmp_path: Path
+) -> None:
+    """All samples are covered; a data set without the log is not checked."""
+    copy = Path(shutil.copytree(dataset, tmp_path / "copy"))
+    exchange_photographs(copy)
+
+    certificate = gen_data.certify(copy, samples=0, scenes=0)
+    shutil.rmtree(copy / "run")
+    without_run = gen_data.certify(copy, samples=0, scenes=0)
+
+    assert failed(certificate) == {"run log"}
+    evidence = findings(certificate)["run log"].evidence
+    assert evidence[0].startswith("shard 0, samples 0 to 15: its record is not the one")
+    assert "which was sealed" in evidence[1]
+    assert findings(without_run)["run log"].status is Status.NOT_CHECKED
+    assert failed(without_run) == set()
+
+
+@pytest.mark.parametrize("name", ["coco/train/extra.png", "kitti/notes.txt", "notes.txt"])
+def test_a_file_that_no_exporter_writes_is_named(damaged: Callable[[], Path], name: str) -> None:
+    """Its checksum is in the manifest, and no reader looks at it."""
+    copy = damaged()
+    (copy / name).parent.mkdir(exist_ok=True)
+    (copy / name).write_bytes(b"extra")
+    reseal(copy)
+
+    certificate = gen_data.certify(copy, samples=0, scenes=0)
+
+    assert failed(certificate) == {"written again"}
+    assert findings(certificate)["written again"].evidence == (
+        f"{name}: is extra: the samples give no such file",
+    )
 
 
 def test_a_picture_that_is_another_one_in_an_export_is_named(damaged: Callable[[], Path]) -> None:
@@ -241,7 +274,7 @@ def test_a_picture_that_is_another_one_in_an_export_is_named(damaged: Callable[[
 
     certificate = gen_data.certify(copy, **QUICK)
 
-    assert failed(certificate) == {"exports"}
+    assert failed(certificate) == {"exports", "written again"}
     assert findings(certificate)["exports: coco"].evidence == (
         "sample 7, color: its picture is not that of the data set",
     )
@@ -290,7 +323,7 @@ def test_a_parameter_that_was_not_drawn_as_declared_is_named(tmp_path: Path) -> 
 
     certificate = gen_data.certify(folder, samples=0, scenes=1)
 
-    assert failed(certificate) == {"draws"}
+    assert failed(certificate) == {"run log", "written again", "draws"}
     assert "cameras[0].intrinsics" in findings(certificate)["draws"].evidence[0]
     assert findings(certificate)["distributions"].status is Status.NOT_CHECKED
 

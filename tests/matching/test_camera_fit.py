@@ -76,7 +76,10 @@ def test_known_parameters_are_recovered(
 
 @pytest.mark.slow
 def test_read_noise_is_recovered() -> None:
-    """From sixty pictures, by 32 scenes, within a factor of two: photons make noise too."""
+    """From sixty pictures, by 32 scenes, within 25 per cent, and within the stated intervals.
+
+    Sets scatter by 20 per cent: contents of pictures look like contrast, and that like noise.
+    """
     truth = {"full_well_e": 3000.0, "read_noise_e": 12.0}
     real = ImagePipeline.model_validate(
         {"preset": "industrial", "focus": None, "image_sensor": truth}
@@ -90,8 +93,10 @@ def test_read_noise_is_recovered() -> None:
     for name, value in (("read noise", 12.0), ("noise", 3000.0)):
         found = row(part, name)
         assert found.is_fitted
-        assert found.mean is not None
-        assert 0.5 * value < found.mean < 2.0 * value
+        assert found.mean == pytest.approx(value, rel=0.25)
+        assert found.low is not None
+        assert found.high is not None
+        assert found.low < value < found.high
     fields = {one.change.field for one in part.fields}
     assert "image_pipeline.image_sensor.read_noise_e" in fields
 

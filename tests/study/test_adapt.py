@@ -11,10 +11,10 @@ import yaml
 
 import gen_data
 from gen_data.generator.assemble.config import load_config
-from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.errors import ConfigError, StorageError
 from gen_data.generator.report.drawn_parameters import replay_scenes
 from gen_data.generator.runner.stored import StoredSamples
-from gen_data.generator.study.adapt import adapt
+from gen_data.generator.study.adapt import adapt, tabulate
 
 CONFIG = """\
 extends: tabletop.yaml
@@ -133,6 +133,48 @@ def test_results_of_another_data_set_are_refused_by_its_id(
         f"{StoredSamples(data).dataset_id} in {data}"
     )
     assert not (tmp_path / "out").exists()
+
+
+def test_results_in_images_that_the_data_set_lacks_are_refused(
+    config: Path, data: Path, results: Path, tmp_path: Path
+) -> None:
+    """A plain list names no data set; forty samples have the images 1 to 40."""
+    rows = json.loads(results.read_text())
+    path = tmp_path / "other.json"
+    path.write_text(json.dumps([*rows, rows[0] | {"image_id": 41}]))
+
+    with pytest.raises(ConfigError, match="of another data set: the image_id 41 is not in"):
+        adapt(str(config), data, tmp_path / "out", results=path)
+
+
+def test_a_round_says_in_how_many_images_something_was_detected(
+    config: Path, data: Path, results: Path, tmp_path: Path
+) -> None:
+    """So that results of a part of the data set, or of another one, show."""
+    made = adapt(str(config), data, tmp_path, results=results)
+
+    images = {row["image_id"] for row in json.loads(results.read_text())}
+    assert made.images == (len(images), 40)
+    assert tabulate(made, 1.0)["note"].endswith(f"{len(images)} of 40 images have detections")
+
+
+@pytest.mark.parametrize("content", [b"[]", b"", b"PK"])
+def test_a_file_that_is_no_detector_is_refused(
+    config: Path, data: Path, tmp_path: Path, content: bytes
+) -> None:
+    """With what was expected, and not with torch's own words alone."""
+    pytest.importorskip("torch")
+    path = tmp_path / "detector.pt"
+    path.write_bytes(content)
+
+    with pytest.raises(ConfigError, match=r"cannot be read as a detector .* expected a file"):
+        adapt(str(config), data, tmp_path / "out", detector=path)
+
+
+def test_a_folder_that_is_no_data_set_is_refused(config: Path, tmp_path: Path) -> None:
+    """It is not looked for among configurations."""
+    with pytest.raises(StorageError, match="is not a gen-data data set"):
+        adapt(str(config), tmp_path / "none", tmp_path, results=tmp_path / "none.json")
 
 
 def test_a_data_set_of_another_configuration_is_refused(data: Path, tmp_path: Path) -> None:

@@ -124,7 +124,20 @@ def test_results_of_other_pictures_are_refused(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize("text", ["", "{}", "[1]", '[{"image_id": 10}]', '[{"bbox": "x"}]'])
+ROW = '[{"image_id": 10, "category_id": 7, "bbox": %s, "score": %s}]'
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        *("", "{}", "[1]", '[{"image_id": 10}]', '[{"bbox": "x"}]'),
+        *(
+            ROW % ("[0, 0, 4]", "0.5"),
+            ROW % ("[0, 0, 4, NaN]", "0.5"),
+            ROW % ("[0, 0, 4, 4]", "NaN"),
+        ),
+    ],
+)
 def test_files_without_results_are_refused(text: str, tmp_path: Path) -> None:
     """With the expected form."""
     write_coco(tmp_path, [[{"bbox": [5, 5, 20, 20]}]])
@@ -132,8 +145,5 @@ def test_files_without_results_are_refused(text: str, tmp_path: Path) -> None:
     path.write_text(text)
     real = read_real(tmp_path)
 
-    if text == "{}":
-        assert read_results(path, real) == []
-        return
     with pytest.raises(ConfigError, match="expected a list of"):
         read_results(path, real)

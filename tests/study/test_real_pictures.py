@@ -8,7 +8,7 @@ import pytest
 
 from gen_data.generator.core.errors import ConfigError, StorageError
 from gen_data.generator.matching.label_files import RealObject
-from gen_data.generator.study.real_pictures import read_real
+from gen_data.generator.study.real_pictures import check_judges, read_real
 from tests.study.conftest import write_coco, write_picture
 
 LABELS = """\
@@ -70,6 +70,29 @@ def test_what_cannot_be_used_is_counted(tmp_path: Path) -> None:
         "image that cannot be read": 1,
         "object with an empty box": 1,
     }
+
+
+def test_an_image_that_was_resized_since_it_was_labelled_is_left_out(tmp_path: Path) -> None:
+    """Its boxes are those of the size that COCO's file states."""
+    write_coco(tmp_path, [[{"bbox": [1, 2, 10, 20]}], [{"bbox": [1, 2, 10, 20]}]])
+    write_picture(tmp_path / "images/1.png", (32, 24))
+
+    real = read_real(tmp_path)
+
+    assert [p.image_id for p in real.pictures] == [10]
+    assert real.skipped == {"image of another size than its labels state": 1}
+
+
+def test_one_picture_and_pictures_without_objects_cannot_judge(tmp_path: Path) -> None:
+    """The reasons for which others were left out are listed."""
+    write_coco(tmp_path, [[{"bbox": [1, 2, 10, 20]}], []])
+    (tmp_path / "images/1.png").unlink()
+    with pytest.raises(ConfigError, match=r"1 picture can be .* \(skipped: 1 x image that is miss"):
+        check_judges(read_real(tmp_path))
+
+    write_coco(tmp_path, [[], [{"bbox": [5, 5, 4, 4], "iscrowd": 1}]])
+    with pytest.raises(ConfigError, match="has no labelled object"):
+        check_judges(read_real(tmp_path))
 
 
 def test_a_folder_without_labels_is_refused(tmp_path: Path) -> None:

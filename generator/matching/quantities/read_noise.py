@@ -1,7 +1,10 @@
 """Read noise: what the readout of each pixel adds, whatever its light.
 
-Statistic: variance in linear light of flat blocks in the dark, where few photons let read noise be
-seen: the intercept of the noise level function, whose slope is that of ``noise``.
+Statistic: variance in linear light of flat dark blocks, where few photons let read noise be seen:
+the intercept of the noise level function, whose slope is that of ``noise``.
+
+Contrast bends that function: an error of 0.1 in contrast is one of a factor of 1.8 in read noise.
+So both kinds of noise are ``late``, after contrast, which hardly depends on them.
 """
 
 from __future__ import annotations
@@ -10,29 +13,20 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from gen_data.generator.config.distributions import Constant
 from gen_data.generator.matching.indirect_inference import Axis
-from gen_data.generator.matching.picture import Picture
 from gen_data.generator.matching.quantities.base import CameraQuantity, typical
-from gen_data.generator.matching.quantities.noise import measure_flat_blocks
+from gen_data.generator.matching.quantities.noise import noise_between
 from gen_data.generator.sensors.camera.image_pipeline import ImagePipeline
 from gen_data.generator.sensors.camera.image_sensor import ImageSensor
 
 DARKEST, BRIGHTEST = 6.0, 64.0
 """Grey values of dark blocks: below, clipping at black takes half of the noise; up to middle tones,
 as most pictures have only few darker blocks."""
-LEAST = 1e-10
-"""Variance added before the logarithm: no noise at all has a value."""
 LEAST_E = 0.25
 """Smallest read noise to be fitted [electrons]: that of the best sensors there are."""
 
-
-def measure(picture: Picture) -> float:
-    """Logarithm, base 2, of the linear variance in flat dark blocks; NaN without any."""
-    found = measure_flat_blocks(picture, DARKEST, BRIGHTEST)
-    return float("nan") if found is None else float(np.log2(np.median(found[1]) + LEAST))
+measure = noise_between(DARKEST, BRIGHTEST)
 
 
 def _start(pipeline: ImagePipeline) -> float:
@@ -60,6 +54,6 @@ READ_NOISE = CameraQuantity(
     "read noise", "electrons", "log2 of linear variance in flat dark blocks",
     "image_pipeline.image_sensor.read_noise_e",
     measure, _start, _apply, _fields,
-    Axis(math.log2(LEAST_E), 8.0, step=0.5, plausible=2.0, enough=0.5, varies=False),
+    Axis(math.log2(LEAST_E), 8.0, step=0.5, plausible=2.0, enough=0.5, varies=False, late=True),
     to_value=to_electrons,
 )  # fmt: skip
