@@ -246,7 +246,9 @@ def _wall(plan: Design, tints: Sequence[str], rng: VariantRng) -> Material:
         is_sheet = cladding == "sheet"
         name = "profiled_sheet" if is_sheet else "concrete"
         color = _tint(name, _COLORS["sheets"], 0.08, rng)
-        return _textured_material(name, rng.choose((0, 1, 2, 3) if is_sheet else (0, 3)), color, 3.0)
+        return _textured_material(
+            name, rng.choose((0, 1, 2, 3) if is_sheet else (0, 3)), color, 3.0
+        )
     oldest = 1 + int(7.0 * plan.age)
     name = f"texture/weathered_plaster?seed={int(rng.random() * (oldest + 0.999))}"
     color = _tint("weathered_plaster", tints, 0.08, rng)
