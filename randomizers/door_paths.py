@@ -76,8 +76,10 @@ class DoorPaths(GroupRandomizer):
                 half_m = 0.5 * lane.width_m
                 ends.append((crossing[0] + half_m, crossing[1] + half_m * lane.bank))
         reach_m, z = min(ends, default=(math.inf, 0.0))
+        if reach_m > self.reach_m:
+            return None
         x, y = (start[:2] + reach_m * ahead).tolist()
-        return (x, y, z) if reach_m <= self.reach_m else None
+        return (x, y, z)
 
 
 def _door(house: Body, door_m: Vec3) -> Vec3:
