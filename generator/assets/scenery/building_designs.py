@@ -212,8 +212,10 @@ TEXTURE_ALBEDOS = {
     "wall_boards": 0.76, "weathered_plaster": 0.80,
 }  # fmt: skip
 """Mean luminance of textures that palettes tint. Their colours are those of whole walls and roofs:
-paint 0.2 to 0.9, stone and brick 0.2 to 0.4, concrete and clay tiles 0.1 to 0.35, slate 0.1 (Oke,
-"Boundary layer climates", 1987, table 8.1). Undivided, the texture would darken them twice."""
+white paint 0.5 to 0.9, brick 0.2 to 0.4, stone 0.2 to 0.35, concrete and roof tiles 0.1 to 0.35
+(Oke, "Boundary layer climates", 1987, and Taha, "Urban climates and heat islands", 1997, as others
+quote them); from memory, coloured paint 0.15 to 0.35, +- 0.1, and slate 0.1, +- 0.05. Undivided,
+the texture would darken them twice."""
 
 VIEWS, PRINTS = 8, 24
 """Textures of rooms, and of boards and adverts, that buildings share."""
