@@ -21,6 +21,7 @@ DOOR = "door"
 """Keypoint of a building where its door meets the ground."""
 _STEP_M = 0.25
 """Lengths are multiples of this, so that paths are used again."""
+_SUNK_M = 0.03
 
 
 class DoorPaths(GroupRandomizer):
@@ -114,7 +115,9 @@ def _lay(style: str, door_m: Vec3, street_m: Vec3) -> tuple[str, SE3]:
     asset = str(AssetId(parsed.name, {**parsed.parameters, "length_m": whole_m}))
     # The rest of the last step lies below the house.
     share = 1.0 - 0.5 * whole_m / length_m
-    middle = (door_m[0] + share * dx, door_m[1] + share * dy, door_m[2] + share * dz)
+    # Half of its height lies in the ground, which is not quite level.
+    z = door_m[2] + share * dz - _SUNK_M
+    middle = (door_m[0] + share * dx, door_m[1] + share * dy, z)
     half_rise = 0.5 * math.atan2(dz, length_m)
     tilt = SE3(quaternion_wxyz=(math.cos(half_rise), 0.0, -math.sin(half_rise), 0.0))
     return asset, SE3.about_z(math.atan2(dy, dx), middle) @ tilt
