@@ -53,10 +53,10 @@ def terrace(seed: int) -> Solid:
 
 
 def garden_path(seed: int, length_m: float) -> Solid:
-    """A path from a street to a door, 1 to 1.6 m wide: slabs with grass between them, or one piece
-    between edging stones.
+    """A path from a street to a door, 1 to 1.6 m wide.
 
-    Slots: pavement.
+    It consists of slabs with grass between them, or of one piece between edging stones. Slots:
+    pavement.
 
     Raises:
         ValueError: the length is not from 0.5 to 60 m.
