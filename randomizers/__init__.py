@@ -21,6 +21,7 @@ TABLE = PluginTable[Randomizer](
         "colors": "gen_data.randomizers.colors:Colors",
         "companions": "gen_data.randomizers.companions:Companions",
         "distractors": "gen_data.randomizers.distractors:Distractors",
+        "door_paths": "gen_data.randomizers.door_paths:DoorPaths",
         "drone_flight": "gen_data.randomizers.drone_flight:DroneFlight",
         "ego_on_lane": "gen_data.randomizers.ego_on_lane:EgoOnLane",
         "environment": "gen_data.randomizers.environment:EnvironmentLight",

@@ -41,9 +41,11 @@ class VehicleLights(SurfaceRandomizer):
         headlights: Whether head and tail lights are on by day; they always are in the dark.
         braking: Whether the brake lights are on.
         indicator: Indicators that are on: none, left, right or both.
-        headlight_cd_m2: Mean luminance of a headlight's lens outside its beam.
+        headlight_cd_m2: Mean luminance of a headlight's lens outside its beam: UN R112 asks for 62
+            to 437 cd there (zone III), and lenses have 40 to 490 cm^2.
         taillight_cd_m2, brakelight_cd_m2, indicator_cd_m2: Luminance of the other lamps. UN R7 and
-            R6 require 4 to 17 cd, 60 to 260 cd and 175 to 1000 cd; lenses have 50 to 100 cm^2.
+            R6 require 4 to 17 cd, 60 to 260 cd and 175 to 1000 cd; lenses have about 340, 100 and
+            100 cm^2.
         beam_cd: Peak luminous intensity of a dipped beam; 9 to 14 kcd conforms to UN R112.
         beams: Whether headlights illuminate the scene in the dark.
     """
@@ -54,8 +56,8 @@ class VehicleLights(SurfaceRandomizer):
     indicator: Annotated[dist.Name, dist.OneOf(INDICATORS)] = dist.Choice(
         {"none": 0.9, "left": 0.05, "right": 0.05}
     )
-    headlight_cd_m2: dist.Positive = dist.Uniform(15_000.0, 40_000.0)
-    taillight_cd_m2: dist.Positive = dist.Uniform(600.0, 1500.0)
+    headlight_cd_m2: dist.Positive = dist.Uniform(5000.0, 14_000.0)
+    taillight_cd_m2: dist.Positive = dist.Uniform(120.0, 500.0)
     brakelight_cd_m2: dist.Positive = dist.Uniform(6000.0, 15_000.0)
     indicator_cd_m2: dist.Positive = dist.Uniform(15_000.0, 40_000.0)
     beam_cd: dist.Positive = dist.Uniform(9000.0, 14_000.0)

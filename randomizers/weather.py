@@ -90,7 +90,7 @@ class Weather(RandomizerBase):
         rain_mm_h: Rain rate.
         snow_mm_h: Snow rate as water equivalent.
         wetness: Wetness of surfaces open to the sky: 0 dry, 1 soaked.
-        puddles: Fraction of level ground under water.
+        puddles: Fraction of level, paved ground under water; higher places and soil have less.
         snow_cover: Fraction of upward-facing surfaces under snow.
         lens_drops: Fraction of the image covered by drops on the lens.
     """

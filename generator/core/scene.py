@@ -488,7 +488,8 @@ class Weather:
         fog_height_m: Scale height: fog thins by a factor of e per this height; 0 = uniform.
         rain_mm_h, snow_mm_h: Rates of precipitation (snow as water equivalent).
         wetness: Wetness of surfaces open to the sky, from 0 = dry to 1 = soaked.
-        puddles: Share of level ground under standing water.
+        puddles: Share of level, paved ground under standing water; higher places and soil have
+            less.
         snow_cover: Share of upward surfaces that lies under snow.
         lens_drops: Share of the image behind drops on the lens.
         seed: Seed of the patterns of puddles, patches, streaks, flakes and drops.

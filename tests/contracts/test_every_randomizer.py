@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import pickle
 from dataclasses import replace
 from functools import cache
@@ -17,6 +18,7 @@ from gen_data.generator.config.schema import json_schema
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex, Stage
 from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.members import Member, add_members
 from gen_data.generator.core.plates import CATCHER
 from gen_data.generator.core.scene import (
     Body,
@@ -56,9 +58,9 @@ GIVEN: dict[str, dict[str, Any]] = {
 """Fields that a randomizer requires, or that ensure that it changes the scene."""
 
 PHYSICS_BOUND = (
-    "arm_configuration", "arm_motion", "arm_task", "companions", "distractors", "ego_on_lane",
-    "furnish", "lane_objects", "objects", "physics_properties", "plate", "reaching_hand",
-    "traffic_flow",
+    "arm_configuration", "arm_motion", "arm_task", "companions", "distractors", "door_paths",
+    "ego_on_lane", "furnish", "lane_objects", "objects", "physics_properties", "plate",
+    "reaching_hand", "traffic_flow",
 )  # fmt: skip
 """Randomizers that must run before physics."""
 
@@ -80,8 +82,27 @@ def furnished_room() -> Scene:
     return made("furnish")(replace(scene, cameras=cameras), library, rng_of("room"))
 
 
+@cache
+def houses_and_garden() -> Scene:
+    """Six houses whose doors look at a garden, and a group of paths."""
+    library = open_library(())
+    house = "building/villa?seed=0"
+    lane = Lane("garden", "garden", ((-30.0, 3.0, 0.0), (180.0, 3.0, 0.0)), 6.0, road="main")
+    houses = ObjectGroup("buildings", (), (house,), 0, "along", lanes=("frontage",))
+    kinds = tuple(f"garden_path?length_m=4&seed={k}" for k in range(8))
+    paths = ObjectGroup("door_paths", (), kinds, 0, "along")
+    lens = Intrinsics.from_hfov(64, 48, 1.0)
+    cameras = tuple(Camera(name, SE3((0.0, 0.0, 1.5)), lens) for name in ("left", "right"))
+    scene = Scene("test", groups=(houses, paths), lanes=(lane,), cameras=cameras)
+    y = -library.bounds_m(house)[1][0]
+    places = (SE3.about_z(0.5 * math.pi, (30.0 * k, y, 0.0)) for k in range(6))
+    return add_members(scene, houses, [Member(house, place) for place in places], library)
+
+
 def world_of(kind: str) -> tuple[Scene, AssetIndex]:
     """A scene that a randomizer can change, and its assets."""
+    if kind == "door_paths":
+        return houses_and_garden(), open_library(())
     if kind in IN_ROOMS:
         return furnished_room(), open_library(())
     return nominal_scene(), FakeAssets()
@@ -205,7 +226,7 @@ def test_names_and_ids_stay_in_order(kind: str) -> None:
         assert min(ids) == 1
         assert {body.instance_id for body in scene.bodies} <= {0, *ids}
         assert [camera.name for camera in scene.cameras] == ["left", "right"]
-        arms = [] if kind in IN_ROOMS else ["arm"]
+        arms = [] if kind in (*IN_ROOMS, "door_paths") else ["arm"]
         assert [arm.name for arm in scene.articulations] == arms
 
 

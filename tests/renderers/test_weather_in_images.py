@@ -202,6 +202,35 @@ def test_snow_covers_its_share_of_the_ground(renderer: WarpRenderer, cover: floa
     assert np.quantile(image, 0.99) == pytest.approx(white, rel=0.08)
 
 
+def flooded_share(renderer: WarpRenderer, puddles: float, road: Body) -> float:
+    """Share of level ground under water, seen from above: wet asphalt is darker."""
+    high = Camera("high", look_at((0.0, 0.0, 80.0), (0.0, 0.0, 0.0)), FINE)
+    shares = []
+    for seed in range(4):
+        scene = flat(Weather(puddles=puddles, seed=seed)).with_bodies(road)
+        image = luminance(renderer.render(scene, high, RADIANCE))
+        inside = image[48:144, 96:192]
+        shares.append(float((inside < 0.6 * inside.max()).mean()))
+    return float(np.mean(shares))
+
+
+def test_water_stands_in_gutters_less_on_crowns_and_seldom_on_soil(renderer: WarpRenderer) -> None:
+    """Level asphalt at z = 0 has the stated share, a crown of 6 cm at most half of it."""
+    soil = (replace(ASPHALT[0], role="grass"),)
+    gutter, crown, turf = (
+        flooded_share(renderer, 0.3, body)
+        for body in (
+            Body("road", "road"),
+            Body("road", "road", SE3((0.0, 0.0, 0.06))),
+            Body("road", "road", materials=soil),
+        )
+    )
+
+    assert gutter == pytest.approx(0.3, abs=0.08)
+    assert 0.03 < crown < 0.5 * gutter
+    assert turf < 0.25 * gutter
+
+
 def test_puddles_mirror_what_stands_behind_them(renderer: WarpRenderer) -> None:
     """The whole road under water: a lit wall appears in it with Fresnel's reflectance."""
     glow = (Material(base_color=(0.0, 0.0, 0.0), roughness=1.0, specular=0.0,

@@ -79,6 +79,14 @@ class Carrier:
         middle: Array = 0.5 * (self.at(f"hand_{side}") + self.at(f"middle_03_{side}"))
         return middle
 
+    def before_palm(self, side: str, away_m: float) -> Array:
+        """Place before the roots of the fingers, at a distance from the bones [m]."""
+        wrist, knuckle = self.at(f"hand_{side}"), self.at(f"middle_01_{side}")
+        across = self.at(f"pinky_01_{side}") - self.at(f"index_01_{side}")
+        palm = np.cross(across, knuckle - wrist) * (1.0 if side == "l" else -1.0)
+        place: Array = 0.2 * wrist + 0.8 * knuckle + away_m * palm / float(np.linalg.norm(palm))
+        return place
+
 
 def make_things(carrier: Carrier) -> list[Sheet]:
     """All that a person wears on the back, holds, pushes or pulls."""
@@ -104,7 +112,7 @@ def _phone(carrier: Carrier) -> list[Sheet]:
 
 
 def _cup(carrier: Carrier) -> list[Sheet]:
-    place = 0.5 * carrier.at("middle_01_r") + 0.5 * carrier.at("thumb_03_r")
+    place = carrier.before_palm("r", 0.045)
     cup = pillow(place, np.array([0.08, 0.08, 0.12]), np.eye(3), _PAPER)
     lid = pillow(_moved(place, z=0.06), np.array([0.086, 0.086, 0.018]), np.eye(3), _RUBBER)
     return [cup, lid]
@@ -194,7 +202,7 @@ def _box(carrier: Carrier) -> list[Sheet]:
 
 
 def _suitcase(carrier: Carrier) -> list[Sheet]:
-    grip = carrier.grip("r")
+    grip = carrier.before_palm("r", 0.02)
     foot = np.array([grip[0] - 0.42, grip[1] - 0.06, carrier.ground_m + 0.03])
     axes = _axes_along(grip - foot)
     length = math.sqrt(float(((grip - foot) ** 2).sum()))
@@ -212,7 +220,7 @@ def _suitcase(carrier: Carrier) -> list[Sheet]:
 
 
 def _pram(carrier: Carrier) -> list[Sheet]:
-    left, right = carrier.grip("l"), carrier.grip("r")
+    left, right = (carrier.before_palm(side, 0.024) for side in "lr")
     hand, ground = 0.5 * (left + right), carrier.ground_m
     middle = np.array([hand[0] + 0.62, hand[1], ground + 0.62])
     cloth = carrier.person.outfit.bag_material
@@ -237,7 +245,7 @@ _OPEN_M, _RISE_M, _DROP_M = 0.5, 0.84, 0.2
 
 def _umbrella(carrier: Carrier) -> list[Sheet]:
     """Eight panels that hang between their ribs, on a shaft that leans back over the shoulder."""
-    grip, rise = carrier.grip("r"), _RISE_M * carrier.scale
+    grip, rise = carrier.before_palm("r", 0.024), _RISE_M * carrier.scale
     axes = _axes_along(np.array([-0.12, 0.1, 1.0]))
     # Rings of ribs and middles of panels by turns; cloth curves in between ribs.
     reach = np.array([0.02, 0.25, 0.5, 0.75, 1.0])[:, None]
@@ -272,7 +280,7 @@ def _umbrella(carrier: Carrier) -> list[Sheet]:
 
 def _closed_umbrella(carrier: Carrier) -> list[Sheet]:
     """A furled umbrella that hangs from the hand, its tip above the ground."""
-    grip = carrier.grip("r")
+    grip = carrier.before_palm("r", 0.024)
     length = min(0.78, float(grip[2]) - carrier.ground_m - 0.06)
     axes = _axes_along(np.array([0.1, 0.02, -1.0]))
     along = np.array([0.1, 0.13, 0.3, 0.6, 0.86, 0.9])[:, None] * length

@@ -22,6 +22,7 @@ from gen_data.generator.assets.people.head_layout import lay_out_eyes, lay_out_h
 from gen_data.generator.assets.people.layer import Field, Layer, Profile
 from gen_data.generator.assets.people.person import Outfit, Person
 from gen_data.generator.assets.people.posing import vertex_normals
+from gen_data.generator.assets.people.shoe_textures import lay_out_shoes
 from gen_data.generator.assets.procedural.variant_rng import VariantRng
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
@@ -209,9 +210,9 @@ _COLLARS = {
 
 
 def _shoes(outfit: Outfit) -> Layer:
-    sole = Material((0.03, 0.03, 0.03), 0.85, role="shoes")
-    zones = (("ankles", outfit.shoe_material), ("shoes", outfit.shoe_material), ("soles", sole))
-    return Layer(zones[0 if outfit.bottom == "trousers" else 1 :], ((-0.8, 0.012), (-0.74, 0.006)))
+    zones = tuple((zone, outfit.shoe_material) for zone in ("ankles", "shoes", "soles"))
+    bare = outfit.bottom != "trousers"
+    return Layer(zones[1 if bare else 0 :], ((-0.8, 0.012), (-0.74, 0.006)), layout=lay_out_shoes)
 
 
 def _smooth(places: Array, faces: Indices, border: Indices, times: int) -> Array:

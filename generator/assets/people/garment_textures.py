@@ -61,15 +61,38 @@ def jersey(seed: int) -> TextureData:
 
 
 def jacket_cloth(seed: int) -> TextureData:
-    """Jackets and coats: stiff folds, a zip or buttons, pockets, hems."""
+    """Jackets and coats: stiff folds, a zip or buttons, pockets, hems, cuffs."""
     rng = variant_rng("jacket_cloth", seed)
     folds = _top_folds(rng, rng.between(1.0, 1.5))
     pocket_z = rng.between(0.07, 0.13)
-    lines = 0.8 * _line(_FROM_FRONT_M, 0.0, 0.007)
     at_pocket = (np.abs(_FROM_FRONT_M - 0.13) < 0.05) & _IS_FRONT
-    lines = lines + 0.7 * _line(_Z_M + 0.5 * (_FROM_FRONT_M - 0.13), pocket_z, 0.005) * at_pocket
+    lines = 0.7 * _line(_Z_M + 0.5 * (_FROM_FRONT_M - 0.13), pocket_z, 0.005) * at_pocket
     lines = lines + 0.4 * _TRUNK * _line(_Z_M, -0.03, 0.005) + 0.35 * _line(_ASIDE_M, 0.19, 0.004)
-    return _shaded(_plain() * (1 - 0.55 * np.clip(lines, 0, 1))[..., None], folds - lines)
+    # Sleeves end half a metre below the shoulder; a strip or a seam lies above their hem.
+    lines = lines + 0.5 * _LIMB * _line(_ROW_M, SHOULDER_ROW_M + 0.44, 0.004)
+    if seed % 3 == 1:
+        buttons = _buttons()
+        lines = lines + 0.6 * _line(_COLUMN_M - FRONT_M, 0.03, 0.004)
+        albedo = _plain() * (1 - 0.5 * np.clip(lines, 0, 1))[..., None]
+        albedo = mix_colors(albedo, color("#2b2724"), buttons)
+        return _shaded(albedo, folds - lines + 2.0 * buttons)
+    flap = _line(_FROM_FRONT_M, 0.026, 0.004)
+    teeth = _line(_FROM_FRONT_M, 0.0, 0.007)
+    notches = 0.5 + 0.5 * np.sin(2.0 * np.pi * _ROW_M / 0.008)
+    lines = lines + 0.8 * teeth + (0.6 * flap if seed % 3 == 2 else 0.0)
+    albedo = _plain() * (1 - 0.55 * np.clip(lines, 0, 1))[..., None]
+    albedo = mix_colors(albedo, color("#9a9a9c"), 0.8 * _line(_FROM_FRONT_M, 0.0, 0.004) * notches)
+    return _shaded(albedo, folds - lines + 1.0 * teeth * notches)
+
+
+def _buttons() -> Float32:
+    """A row of buttons from the neck to the thighs."""
+    pitch_m, radius_m = 0.105, 0.011
+    down = np.abs((_Z_M - 0.3) / pitch_m - np.rint((_Z_M - 0.3) / pitch_m)) * pitch_m
+    away = np.hypot(_COLUMN_M - FRONT_M, down)
+    return np.asarray(
+        smoothstep(radius_m, 0.7 * radius_m, away) * _band(_Z_M, -0.3, 0.5), np.float32
+    )
 
 
 def quilted(seed: int) -> TextureData:

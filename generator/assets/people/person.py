@@ -109,10 +109,22 @@ def draw_outfit(sex: str, child: bool, rng: VariantRng) -> Outfit:
         top_material=outer,
         front_material=draw_top_material("shirt", child, rng) if open_front else outer,
         bottom_material=draw_bottom_material(bottom, rng),
-        shoe_material=_plain_material(_COLORS["shoes"], rng.between(0.35, 0.7), "shoes", rng),
+        shoe_material=_draw_shoes(rng),
         bag_material=_plain_material(_COLORS["bags"], rng.between(0.45, 0.8), "bag", rng),
         hat_material=_plain_material(_COLORS["hats"], 0.95, "hat", rng),
     )
+
+
+def _draw_shoes(rng: VariantRng) -> Material:
+    """Draw shoes; their textures have all colours."""
+    return Material(
+        (1.0, 1.0, 1.0), rng.between(0.35, 0.7), specular=0.35,
+        texture=f"texture/shoe?seed={int(rng.random() * _SHOES)}", role="shoes",
+    )  # fmt: skip
+
+
+_SHOES = 12
+"""Variants of ``texture/shoe``."""
 
 
 # Shares of bags and headwear among people in streets: assumed, +/- half of each.

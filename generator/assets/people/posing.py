@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 
@@ -56,7 +55,7 @@ class Arm:
     out: float = 8.0
     elbow: float = 12.0
     inward: float = 8.0
-    curl: float = 16.0
+    curl: float = 20.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,7 +276,13 @@ def vertex_normals(points_m: Array, faces: Indices) -> Array:
     return normals
 
 
-_FINGERS = ("index", "middle", "ring", "pinky")
+_CASCADE = {"index": 0.8, "middle": 1.0, "ring": 1.15, "pinky": 1.3}
+"""Shares of the fingers in a curl: in a hand at rest flexion rises from index to little finger (the
+"cascade" of hand surgery; shares assumed)."""
+_SPREAD, _THUMB_SPREAD = 0.25, 0.6
+"""What remains of the angles between the template's fingers, and of its thumb's (assumed)."""
+_THUMB = (0.4, 0.6, 0.9)
+"""How far the bones of a thumb turn before and across the palm, per radian of curl (assumed)."""
 _STANCE_IN_DEG = 3.0
 """Thighs lean inward, so that the feet are nearer to each other than the hips."""
 _TOES_OUT_DEG = 6.0
@@ -368,10 +373,30 @@ def _arm(
 def _fingers(
     body: BodyTemplate, heads_m: Array, side: str, curl: float, hand: Array
 ) -> dict[str, Array]:
-    """Fingers bent about the line of the knuckles."""
+    """Fingers gathered side by side and bent about the line of the knuckles; a thumb before them.
+
+    The template spreads them. Bones that a body lacks are left out.
+    """
     across = _direction(body, heads_m, f"index_01_{side}", f"pinky_01_{side}")
-    joints = product(_FINGERS, (1, 2, 3))
-    return {f"{name}_0{k}_{side}": hand @ _about(across, k * curl) for name, k in joints}
+    along = _direction(body, heads_m, f"middle_01_{side}", f"middle_03_{side}")
+    rotations = {}
+    for name, share in _CASCADE.items():
+        if f"{name}_02_{side}" not in body.bones:
+            continue
+        own = _direction(body, heads_m, f"{name}_01_{side}", f"{name}_03_{side}")
+        gathered = _between(own, along + _SPREAD * (own - along))
+        for k in (1, 2, 3):
+            rotations[f"{name}_0{k}_{side}"] = hand @ _about(across, k * share * curl) @ gathered
+    if f"thumb_01_{side}" in body.bones:
+        own = _direction(body, heads_m, f"thumb_01_{side}", f"thumb_03_{side}")
+        palm = math.copysign(1.0, curl) * np.cross(across, along)
+        # Fists close: at a right angle of the fingers, the thumb lies over them.
+        spread = _THUMB_SPREAD * max(0.0, 1.0 - abs(curl) / 90.0)
+        beside = along + spread * (own - along)
+        for k, share in enumerate(_THUMB, start=1):
+            towards = beside + share * math.radians(abs(curl)) * (palm + 0.6 * across)
+            rotations[f"thumb_0{k}_{side}"] = hand @ _between(own, towards)
+    return rotations
 
 
 def _direction(body: BodyTemplate, heads_m: Array, start: str, end: str) -> Array:

@@ -212,8 +212,10 @@ TEXTURE_ALBEDOS = {
     "wall_boards": 0.76, "weathered_plaster": 0.80,
 }  # fmt: skip
 """Mean luminance of textures that palettes tint. Their colours are those of whole walls and roofs:
-paint 0.2 to 0.9, stone and brick 0.2 to 0.4, concrete and clay tiles 0.1 to 0.35, slate 0.1 (Oke,
-"Boundary layer climates", 1987, table 8.1). Undivided, the texture would darken them twice."""
+white paint 0.5 to 0.9, brick 0.2 to 0.4, stone 0.2 to 0.35, concrete and roof tiles 0.1 to 0.35
+(Oke, "Boundary layer climates", 1987, and Taha, "Urban climates and heat islands", 1997, as others
+quote them); from memory, coloured paint 0.15 to 0.35, +- 0.1, and slate 0.1, +- 0.05. Undivided,
+the texture would darken them twice."""
 
 VIEWS, PRINTS = 8, 24
 """Textures of rooms, and of boards and adverts, that buildings share."""
@@ -246,7 +248,9 @@ def _wall(plan: Design, tints: Sequence[str], rng: VariantRng) -> Material:
         is_sheet = cladding == "sheet"
         name = "profiled_sheet" if is_sheet else "concrete"
         color = _tint(name, _COLORS["sheets"], 0.08, rng)
-        return _textured_material(name, rng.choose((0, 1, 2, 3) if is_sheet else (0, 3)), color, 3.0)
+        return _textured_material(
+            name, rng.choose((0, 1, 2, 3) if is_sheet else (0, 3)), color, 3.0
+        )
     oldest = 1 + int(7.0 * plan.age)
     name = f"texture/weathered_plaster?seed={int(rng.random() * (oldest + 0.999))}"
     color = _tint("weathered_plaster", tints, 0.08, rng)

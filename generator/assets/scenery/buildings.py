@@ -27,10 +27,13 @@ from gen_data.generator.assets.scenery.building_designs import (
     choose_region,
     draw_design,
 )
-from gen_data.generator.assets.scenery.facade import BASE, FACADE, METAL
+from gen_data.generator.assets.scenery.facade import BASE, DOOR, FACADE, METAL
 from gen_data.generator.assets.scenery.textures.facade_finish import PLASTER_WIDTH_M
+from gen_data.generator.core.asset_types import Keypoint
 
 _EAVES_M = 0.45
+_LEAF_M = 1.7
+"""Leaves of doors are higher; other parts in their colour are not."""
 
 
 def building(seed: int, style: str, region: str = "any") -> Solid:
@@ -66,7 +69,18 @@ def building(seed: int, style: str, region: str = "any") -> Solid:
     if plan.gate_m > 0.0:
         fence = other_sides.gate(plan, rng).moved(x - rng.between(0.0, 2.0), y)
         parts.append(fence if rng.chance(0.5) else _mirrored(fence))
-    return make_solid(parts, materials, boxes)
+    return make_solid(parts, materials, boxes, _main_door(front, x))
+
+
+def _main_door(front: Patch, x_m: float) -> list[Keypoint]:
+    """Keypoint ``door``: where the middle of the main door meets the ground, if there is one."""
+    leaves = front.corners_m[front.slots == DOOR]
+    tall = leaves[np.ptp(leaves[..., 2], axis=1) > _LEAF_M] if len(leaves) else leaves
+    if not len(tall):
+        return []
+    middles = 0.5 * (tall[..., 1].min(axis=1) + tall[..., 1].max(axis=1))
+    y = float(middles[np.abs(middles).argmin()])
+    return [Keypoint("door", (round(x_m, 4), round(y, 4), 0.0), 0.1)]
 
 
 def building_facts(seed: int, style: str, region: str = "any") -> Facts:

@@ -1,6 +1,6 @@
 """What is paved in gardens: terraces and decks with a table and chairs, paths of slabs.
 
-Pieces run along Y; their origin is on the ground.
+Pieces run along Y, paths to doors along X; their origin is on the ground.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from gen_data.generator.assets.scenery.foliage import merge_meshes
 from gen_data.generator.core.asset_types import ConvexParts, Material
 
 _KINDS = ("terrace", "path", "deck", "path")
+_PATH_M, _SLAB_M = (0.5, 60.0), 0.06
 _JOINT_M = 0.06
 """Grass between the slabs of a path."""
 
@@ -49,6 +50,46 @@ def terrace(seed: int) -> Solid:
         mesh = merge_meshes(mesh, replace(chairs, vertices_m=raised))
     hull = hulls.box((-x, -0.5 * long, 0.0), (x, 0.5 * long, high))
     return Solid(mesh, ConvexParts((np.round(hull, 6),)))
+
+
+def garden_path(seed: int, length_m: float) -> Solid:
+    """A path from a street to a door, 1 to 1.6 m wide.
+
+    It consists of slabs with grass between them, or of one piece between edging stones. Slots:
+    pavement.
+
+    Raises:
+        ValueError: the length is not from 0.5 to 60 m.
+    """
+    if not _PATH_M[0] <= length_m <= _PATH_M[1]:
+        raise ValueError(f"length_m is {length_m:g}; expected a number from 0.5 to 60")
+    rng = variant_rng("garden_path", seed)
+    half, is_slabs = 0.5 * rng.between(1.0, 1.6), _is_slabs(seed)
+    pieces = max(1, round(length_m / 0.7)) if is_slabs else 1
+    joint = _JOINT_M if is_slabs else 0.0
+    edges = np.linspace(-0.5 * length_m, 0.5 * length_m, pieces + 1)
+    slabs = [
+        block((float(start), -half, 0.0), (float(end) - joint, half, _SLAB_M))
+        for start, end in pairwise(edges)
+    ]
+    x = 0.5 * length_m
+    if not is_slabs:
+        # Rows of edging stones, a little higher than what they hold.
+        slabs += [
+            block((-x, side * half - 0.04, 0.0), (x, side * half + 0.04, _SLAB_M + 0.015))
+            for side in (-1.0, 1.0)
+        ]
+    mesh = finish_mesh(join_patches(slabs), (_pavement("path", rng),), 40.0)
+    return Solid(mesh, ConvexParts((np.round(hulls.box((-x, -half, 0.0), (x, half, _SLAB_M)), 6),)))
+
+
+def garden_path_facts(seed: int, **_: object) -> Facts:
+    """Whether it consists of slabs or of one piece."""
+    return Facts("slabs" if _is_slabs(seed) else "paved")
+
+
+def _is_slabs(seed: int) -> bool:
+    return seed % 3 == 0
 
 
 def terrace_facts(seed: int) -> Facts:

@@ -2,7 +2,7 @@
 
 Photon noise grows with the signal; Anscombe's transform makes its standard deviation 1 everywhere
 (with read noise: Foi et al., "Practical Poissonian-Gaussian noise modeling and fitting for
-single-image raw data", 2008). There one strength of non-local means suits lights and shadows
+single-image raw-data", 2008). There one strength of non-local means suits lights and shadows
 (Buades, Coll and Morel, "A non-local algorithm for image denoising", 2005). As in cameras, chroma
 is filtered at half the resolution and more strongly than luma: blotches of colour disturb more
 than grain, and eyes resolve less colour.

@@ -142,7 +142,8 @@ def dimming_ev(ev100: float) -> float:
 
     The key, the brightness at which a picture shows a scene, is ``1.03 - 2 / (2 + log10(L + 1))``
     of the scene's luminance L [cd/m^2] (Krawczyk, Myszkowski and Seidel, "Perceptual effects in
-    real-time tone mapping", 2005); it counts relative to that of a home by lamplight.
+    real-time tone mapping", SCCG 2005, compared with other implementations); it counts relative to
+    that of a home by lamplight.
     """
     dim, here = (_key(MIDDLE_GREY * saturation_cd_m2(ev)) for ev in (_DIM_EV100, ev100))
     return max(0.0, round(math.log2(dim / here) * _EV100_STEPS) / _EV100_STEPS)

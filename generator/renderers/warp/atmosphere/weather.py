@@ -5,6 +5,7 @@ Every function returns at once if the scene's weather does not concern it.
 
 from __future__ import annotations
 
+import math
 from statistics import NormalDist
 from typing import Any
 
@@ -12,13 +13,18 @@ import warp as wp
 
 from gen_data.generator.core.scene import LIGHT_KINDS, Weather
 from gen_data.generator.renderers.warp.atmosphere.kernels import fog as kernels
-from gen_data.generator.renderers.warp.atmosphere.kernels import water_reflections
+from gen_data.generator.renderers.warp.atmosphere.kernels import (
+    ground_weathering,
+    water_reflections,
+)
 from gen_data.generator.renderers.warp.frame_context import CameraView
 from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice
 from gen_data.generator.renderers.warp.scene.kernels import records
 
 # Standard deviation of ground_weathering.fractal_noise, which is nearly normal.
 _PATCH_DEVIATION = 0.513
+# The same of ground_weathering.wet_places; value noise has 0.43.
+_WET_DEVIATION = math.hypot(_PATCH_DEVIATION, 0.43 * ground_weathering.REGION_SHARE)
 
 
 def expose_ground(frame: CameraView, lattice: Lattice) -> None:
@@ -43,8 +49,11 @@ def ground_record(weather: Weather, exposed: wp.array | None = None) -> records.
     ground = records.GroundRecord()
     ground.covered = int(weather.wetness + weather.puddles + weather.snow_cover > 0.0)
     ground.wetness = weather.wetness
-    ground.puddles, ground.puddle_level = weather.puddles, _level(weather.puddles)
-    ground.snow_cover, ground.snow_level = weather.snow_cover, _level(weather.snow_cover)
+    ground.puddles, ground.puddle_level = weather.puddles, _level(weather.puddles, _WET_DEVIATION)
+    ground.snow_cover, ground.snow_level = (
+        weather.snow_cover,
+        _level(weather.snow_cover, _PATCH_DEVIATION),
+    )
     ground.seed = weather.seed % (1 << 30)
     if exposed is not None:
         ground.exposed = exposed
@@ -102,8 +111,8 @@ def fog_record(weather: Weather) -> kernels.Fog:
     return fog
 
 
-def _level(share: float) -> float:
-    """Threshold that the noise exceeds on the given share of the ground."""
+def _level(share: float, deviation: float) -> float:
+    """Threshold that noise of a standard deviation exceeds on the given share of the ground."""
     if share <= 0.0 or share >= 1.0:
         return 9.0 if share <= 0.0 else -9.0
-    return -_PATCH_DEVIATION * NormalDist().inv_cdf(share)
+    return -deviation * NormalDist().inv_cdf(share)

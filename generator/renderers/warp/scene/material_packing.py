@@ -58,6 +58,7 @@ def _pack_materials(materials: tuple[Material, ...]) -> BodyMaterials:
         values["texture"] = [textures.index(m.texture) if m.texture else -1 for m in materials]
         for name in _COLUMNS:
             values[name] = [getattr(m, name) for m in materials]
+        values["soaks"] = [m.role == "grass" for m in materials]
         for k, material in enumerate(materials):
             if any(material.diffuse_transmission):
                 _pack_transmission(material, values[k])

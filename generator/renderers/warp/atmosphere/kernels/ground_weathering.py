@@ -24,6 +24,13 @@ SNOW_GREEN = wp.constant(0.83)
 SNOW_BLUE = wp.constant(0.87)
 # Share of the rain on level ground that walls receive.
 WALL_SHARE = wp.constant(0.4)
+# Size of puddles; of the noise that gathers them in regions, relative to theirs; what drains a
+# place, in units of the noise (standard deviation 0.56): per metre above the gutter, and on soil.
+# Assumed: of the puddles of gutters, crowns of roads (0.06 m) have a third, soil an eighth.
+PUDDLE_M = wp.constant(5.0)
+REGION_SHARE = wp.constant(0.5)
+DRAINS_PER_M = wp.constant(6.0)
+SOAKED = wp.constant(0.6)
 
 
 @wp.func
@@ -98,13 +105,29 @@ def edge_width(footprint_m: float, size_m: float):
 
 
 @wp.func
-def puddle_at(world: World, p: wp.vec3, n: wp.vec3, exposed: float, footprint_m: float):
+def wet_places(world: World, surface: int, p: wp.vec3):
+    """How readily water stands at a point, normal noise less what drains: 0 on a level pavement.
+
+    Water runs from the crowns of roads and from pavements to gutters, the lowest places of streets,
+    which lie at z = 0; on hills and decks the rule fades. Soil and turf let it seep away.
+    """
+    level = fractal_noise(p[0], p[1], PUDDLE_M, world.ground.seed)
+    # Some regions of the ground hold more water than others.
+    level += REGION_SHARE * value_noise(p[0] / 31.0, p[1] / 31.0, world.ground.seed + 48)
+    rise_m = wp.clamp(p[2], 0.0, 0.2) * wp.clamp(2.0 - p[2], 0.0, 1.0)
+    return level - DRAINS_PER_M * rise_m - SOAKED * world.surfaces[surface].soaks
+
+
+@wp.func
+def puddle_at(
+    world: World, surface: int, p: wp.vec3, n: wp.vec3, exposed: float, footprint_m: float
+):
     """Share of standing water at a point, averaged over a footprint."""
     depth = float(0.0)
     # Standing water needs slopes below ten degrees.
     if world.ground.puddles > 0.0 and n[2] > 0.985:
-        level = fractal_noise(p[0], p[1], 5.0, world.ground.seed)
-        wide = edge_width(footprint_m, 5.0)
+        level = wet_places(world, surface, p)
+        wide = edge_width(footprint_m, PUDDLE_M)
         edge = world.ground.puddle_level
         depth = smooth_ramp(edge - wide, edge + 0.12 + wide, level)
         depth *= smooth_ramp(0.985, 0.997, n[2]) * exposed
@@ -153,7 +176,7 @@ def coat_at(world: World, surface: int, p: wp.vec3, n: wp.vec3, exposed: float, 
     """The coat of a footprint at a point; ``n`` is the normal without bumps."""
     coat = Coat()
     porous = estimate_porosity(world, surface)
-    coat.puddle = puddle_at(world, p, n, exposed, footprint_m) * porous
+    coat.puddle = puddle_at(world, surface, p, n, exposed, footprint_m) * porous
     facing = WALL_SHARE + (1.0 - WALL_SHARE) * wp.clamp(n[2], 0.0, 1.0)
     film = world.ground.wetness * facing * exposed * smooth_ramp(-0.5, 0.2, n[2])
     coat.wet = wp.max(film, coat.puddle)

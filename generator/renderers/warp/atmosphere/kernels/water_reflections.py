@@ -99,7 +99,7 @@ def water_at(
     if n[2] < 0.5:
         return wp.vec2(0.0)
     porous = estimate_porosity(world, surface)
-    puddle = puddle_at(world, p, n, exposed, footprint_m) * porous
+    puddle = puddle_at(world, surface, p, n, exposed, footprint_m) * porous
     film = world.ground.wetness * wp.clamp(n[2], 0.0, 1.0) * exposed * porous
     # A film follows the grain of the ground: half of it reflects, and not sharply.
     share = wp.max(puddle, 0.5 * film) * (1.0 - snow_at(world, p, n, exposed, footprint_m))

@@ -123,6 +123,7 @@ class MaterialRecord:
         ior: Refractive index of a transmitting material.
         thin: 1 for a pane that does not refract, 0 for a solid that does.
         opacity: Share of the background that it hides.
+        soaks: 1 for soil and turf, where rain seeps away; 0 for all else.
     """
 
     base_color: wp.vec3
@@ -140,6 +141,7 @@ class MaterialRecord:
     ior: float
     thin: int
     opacity: float
+    soaks: float
 
 
 @wp.struct
