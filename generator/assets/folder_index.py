@@ -267,7 +267,8 @@ class GripperEntry(Strict):
 
     link: str
     grasp_offset_m: float
-    """Distance from the link's origin to the point between the finger tips, along the link's Z."""
+    """Distance from the link's origin to the point between the finger tips, along the link's Z;
+    9 mm behind their ends, as programs of tasks assume."""
     finger_joints: tuple[str, ...]
     """Joints that close the gripper; joints that mimic them may be omitted."""
     stroke_m: Annotated[float, Field(gt=0.0)]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -19,9 +20,11 @@ from gen_data.generator.physics.world import World
 
 _PALM_GAP_M = 0.002
 _PAD_GAP_M = 0.002
-"""Both fingers must come this near to the object between them."""
+"""The links on both sides must come this near to the object between them."""
 _CUP_GAP_M = 0.0005
 """Between the rim of a cup and the object that it holds: they touch without overlapping."""
+_CLOSING_STEPS = 16
+"""Of 5 mm, or less than a finger is thick, so that none passes through a wall between two."""
 _BISECTIONS = 14
 """Halvings of the opening: a stroke of 8 cm is closed to within 5 micrometres."""
 
@@ -85,9 +88,10 @@ class Hand:
         if not self._clear(held, 1.0) or self._touches_palm(held):
             return None
         opening = self._narrowest(held)
+        sides = self._sides
         self._pose_hand(opening)
-        gaps = [self._world.gap_m(self._body(f), held, _PAD_GAP_M) for f in self._fingers]
-        if opening <= 0.0 or any(gap >= _PAD_GAP_M for gap in gaps):
+        gaps_m = [self._side_gap_m(side, held, _PAD_GAP_M) for side in sides]
+        if opening <= 0.0 or max(gaps_m) >= _PAD_GAP_M:
             return None
         return Grasp(opening, pose)
 
@@ -142,26 +146,43 @@ class Hand:
         return None if opening <= 0.0 else Grasp(opening, pose)
 
     def _narrowest(self, held: str) -> float:
-        """The smallest opening at which no finger penetrates the object; 0 if none ever does."""
-        if self._clear(held, 0.0):
+        """The opening at which the closing fingers first meet the object; 0 if they never do.
+
+        Closed fingers may be free of it again, in the hole of a ring.
+        """
+        steps = [k / _CLOSING_STEPS for k in range(_CLOSING_STEPS)]
+        if not self._clear(held, 0.0):
+            steps = [0.0]
+        touching = next((k for k in reversed(steps) if not self._clear(held, k)), None)
+        if touching is None:
             return 0.0
-        touching, free = 0.0, 1.0
+        free = min((k for k in steps if k > touching), default=1.0)
         for _ in range(_BISECTIONS):
             middle = 0.5 * (touching + free)
             touching, free = (touching, middle) if self._clear(held, middle) else (middle, free)
         return free
 
     def _center_pose(self, held: str, pose: SE3) -> SE3:
-        """The pose shifted along Y to the middle between two opposite fingers."""
-        if len(self._fingers) != 2:
-            return pose
-        one, other = sorted(self._fingers, key=lambda link: self._middle(link)[1])
+        """The pose shifted along Y to the middle between the open fingers."""
         limit_m = self._gripper.stroke_m
-        below = self._world.gap_m(self._body(one), held, limit_m)
-        above = self._world.gap_m(self._body(other), held, limit_m)
-        shifted = SE3((0.0, 0.5 * (above - below), 0.0)) @ pose
+        below_m, above_m = (self._side_gap_m(side, held, limit_m) for side in self._sides)
+        shifted = SE3((0.0, 0.5 * (above_m - below_m), 0.0)) @ pose
         self._world.place(held, shifted)
         return shifted
+
+    @cached_property
+    def _sides(self) -> tuple[list[str], list[str]]:
+        """Links of the fingers at negative and at positive Y; opens the hand to find them.
+
+        A finger may have several links: its pad, and bars behind it.
+        """
+        self._pose_hand(1.0)
+        low = [link for link in self._fingers if self._middle(link)[1] < 0.0]
+        return low, [link for link in self._fingers if link not in low]
+
+    def _side_gap_m(self, side: Sequence[str], held: str, limit_m: float) -> float:
+        gaps_m = (self._world.gap_m(self._body(link), held, limit_m) for link in side)
+        return min(gaps_m, default=limit_m)
 
     def _clear(self, held: str, opening: float) -> bool:
         self._pose_hand(opening)

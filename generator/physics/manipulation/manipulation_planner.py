@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from gen_data.generator.core.errors import Rejection
 from gen_data.generator.core.kinematics import (
     all_positions,
@@ -32,7 +34,7 @@ NO_PLACE = "no candidate is a free and stable place for the held object"
 _APPROACH_M = 0.10
 """Length of the straight approach along the fingers, and of the retreat."""
 _YAWS = 12
-_NARROW = 1.15
+_NARROW = 1.08
 """Grasps at most this much wider than the narrowest one are tried."""
 _GRASPS_MAX = 8
 _SPOTS_PER_BATCH = 3
@@ -294,8 +296,12 @@ class TaskPlanner:
         return candidates[:_GRASPS_MAX]
 
     def _find_grasps(self, hand: Hand, body: str) -> list[Grasp]:
-        """Grasps of a resting body from above, the narrowest first."""
+        """Grasps of a resting body from above, the narrowest first.
+
+        Some close along its own axes, flush with the faces of a box.
+        """
         T_world_held = self.resting[body]
+        first = _heading_rad(T_world_held)
         low, high = self._world.bounds_m(body)
         x, y = (float(v) for v in 0.5 * (low + high)[:2])
         bottom, top = float(low[2]), float(high[2])
@@ -303,7 +309,7 @@ class TaskPlanner:
         height = max(height, bottom + hand.tip_depth_m() + _FLOOR_GAP_M)
         grasps = []
         for k in range(_YAWS):
-            yaw = SE3.about_z(math.pi * k / _YAWS, (x, y, height))
+            yaw = SE3.about_z(first + math.pi * k / _YAWS, (x, y, height))
             if hand.sucks:
                 above = SE3((0.0, 0.0, top - height)) @ yaw @ _FLIP
                 grasp = hand.suck_in_place(body, T_world_held, above)
@@ -461,3 +467,10 @@ class TaskPlanner:
             f"arm '{name}', goal {number} of its task: {reason}",
             f"other goals or more candidates for arm '{name}', or fewer objects around it (count)",
         )
+
+
+def _heading_rad(T_world_body: SE3) -> float:
+    """Direction of the more level one of a body's X and Y axes, about the vertical."""
+    one, other = (T_world_body.rotate(axis) for axis in np.eye(3)[:2])
+    x, y, _ = one if abs(one[2]) <= abs(other[2]) else other
+    return round(math.atan2(y, x), 9)
