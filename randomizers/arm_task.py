@@ -300,7 +300,10 @@ def _goals(
             yield ArmGoal("grasp", objects=(bodies[step.at],), phase=step.phase)
             continue
         if step.verb == "grip":
-            yield ArmGoal("grip", gripper_opening=step.opening, phase=step.phase)
+            between = (bodies[step.at],) if step.at else ()
+            yield ArmGoal(
+                "grip", gripper_opening=step.opening, objects=between, phase=step.phase
+            )
             continue
         frame = _frame(step, placed, arm)
         if step.verb == "move":

@@ -68,7 +68,8 @@ class Step(Strict):
         verb: ``grasp`` lifts ``at``. ``place`` puts the held thing down on top of ``at``.
             ``reach`` takes the hand, or with ``carries`` the held thing, to a point above the top
             of ``at``, around all obstacles. ``move`` moves the hand along straight lines or an
-            arc, and may touch and push. ``grip`` opens or closes the fingers.
+            arc, and may touch and push. ``grip`` opens or closes the fingers, with ``at`` until they meet
+            that thing, which they do not hold.
         at: Name of a thing.
         along: Thing that the X axis of the step's frame points to, horizontally; ``own`` = the X
             axis of ``at``; empty = away from the arm. Z is up.

@@ -10,7 +10,7 @@ import numpy as np
 
 from gen_data.generator.core.asset_types import Gripper, RobotModel
 from gen_data.generator.core.kinematics import all_positions, finger_links, link_poses, rigid_group
-from gen_data.generator.core.se3 import SE3, Array, Vec3
+from gen_data.generator.core.se3 import IDENTITY, SE3, Array, Vec3
 from gen_data.generator.physics.manipulation.suction import (
     is_sealed,
     needed_force_n,
@@ -23,6 +23,8 @@ _PAD_GAP_M = 0.002
 """The links on both sides must come this near to the object between them."""
 _CUP_GAP_M = 0.0005
 """Between the rim of a cup and the object that it holds: they touch without overlapping."""
+_PLAY_M = 0.0005
+"""Between each finger and what it pulls or turns, so that rigid fingers do not jam it."""
 _CLOSING_STEPS = 16
 """Of 5 mm, or less than a finger is thick, so that none passes through a wall between two."""
 _BISECTIONS = 14
@@ -118,6 +120,11 @@ class Hand:
             return None
         return Grasp(0.0, T_world_grasp.inverse() @ T_world_held)
 
+    def opening_around(self, body: str, T_world_grasp: SE3) -> float:
+        """Opening of fingers about a body where it is; 0 if they do not meet it."""
+        met = self._narrowest(body, T_world_grasp)
+        return min(1.0, met + 2.0 * _PLAY_M / self._gripper.stroke_m) if met > 0.0 else 0.0
+
     def palm_height_m(self) -> float:
         """Distance from the palm forward to the grasp frame's origin."""
         self._pose_hand(1.0)
@@ -145,21 +152,25 @@ class Hand:
         opening = self._narrowest(held)
         return None if opening <= 0.0 else Grasp(opening, pose)
 
-    def _narrowest(self, held: str) -> float:
+    def _narrowest(self, held: str, T_world_grasp: SE3 = IDENTITY) -> float:
         """The opening at which the closing fingers first meet the object; 0 if they never do.
 
         Closed fingers may be free of it again, in the hole of a ring.
         """
         steps = [k / _CLOSING_STEPS for k in range(_CLOSING_STEPS)]
-        if not self._clear(held, 0.0):
+        if not self._clear(held, 0.0, T_world_grasp):
             steps = [0.0]
-        touching = next((k for k in reversed(steps) if not self._clear(held, k)), None)
+        meets = (k for k in reversed(steps) if not self._clear(held, k, T_world_grasp))
+        touching = next(meets, None)
         if touching is None:
             return 0.0
         free = min((k for k in steps if k > touching), default=1.0)
         for _ in range(_BISECTIONS):
             middle = 0.5 * (touching + free)
-            touching, free = (touching, middle) if self._clear(held, middle) else (middle, free)
+            if self._clear(held, middle, T_world_grasp):
+                free = middle
+            else:
+                touching = middle
         return free
 
     def _center_pose(self, held: str, pose: SE3) -> SE3:
@@ -184,20 +195,20 @@ class Hand:
         gaps_m = (self._world.gap_m(self._body(link), held, limit_m) for link in side)
         return min(gaps_m, default=limit_m)
 
-    def _clear(self, held: str, opening: float) -> bool:
-        self._pose_hand(opening)
+    def _clear(self, held: str, opening: float, T_world_grasp: SE3 = IDENTITY) -> bool:
+        self._pose_hand(opening, T_world_grasp)
         return all(
             self._world.gap_m(self._body(link), held, limit_m=0.0) >= 0.0 for link in self._fingers
         )
 
-    def _pose_hand(self, opening: float) -> None:
-        """Place hand and fingers so that the grasp frame coincides with the world frame."""
+    def _pose_hand(self, opening: float, T_world_grasp: SE3 = IDENTITY) -> None:
+        """Place hand and fingers, by default with the grasp frame in the world frame."""
         gripper = self._gripper
         positions = all_positions(self._robot, self._arm_home, opening)
         poses = link_poses(self._robot, SE3(), positions)
         T_grasp_base = (poses[gripper.link] @ gripper.T_link_grasp).inverse()
         for link in (*self._fingers, *self._palm):
-            self._world.place(self._body(link), T_grasp_base @ poses[link])
+            self._world.place(self._body(link), T_world_grasp @ T_grasp_base @ poses[link])
 
     def _palm_z_m(self) -> float:
         """Largest coordinate of the palm along the grasp frame's Z."""
