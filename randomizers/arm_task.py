@@ -12,6 +12,7 @@ from pydantic.config import JsonDict
 
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.asset_types import WORKSPACE_FROM_M
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.members import Member, add_members, remove_members
@@ -252,7 +253,8 @@ def _draw_place(
         base = SE3.about_z(near.yaw_rad, (near.middle_m[0], near.middle_m[1], foot))
         yaw_rad += near.yaw_rad
     else:
-        base = arm.T_world_base
+        ahead_m = assets.robot(arm.asset).workspace_from_m - WORKSPACE_FROM_M
+        base = arm.T_world_base @ SE3((ahead_m, 0.0, 0.0))
     low, high = assets.bounds_m(asset)
     half = half_extents_m(low, high, 1.0)
     fixed = thing.mass_kg == 0.0 or thing.joint is not None

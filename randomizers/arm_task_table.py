@@ -31,8 +31,8 @@ class Thing(Strict):
     Attributes:
         assets: Its name in instructions, and the id of its asset; an id without parameters is a
             family of variants. One of several is drawn.
-        x_m, y_m: Bounds of its middle: ahead of the arm's base and to its left; from ``near``, if
-            given, along its axes.
+        x_m, y_m: Bounds of its middle: ahead of the arm's base and to its left, for an arm whose
+            workspace begins 0.3 m ahead of it; from ``near``, if given, along its axes.
         yaw_deg: Bounds of its rotation about Z.
         near: Name of another thing that it is placed by, at ``z_m`` from that one's bottom.
         z_m: Height of its bottom above the table, or above the bottom of ``near``.

@@ -30,6 +30,7 @@ from gen_data.generator.config.base_model import Strict
 from gen_data.generator.config.problems import Problems
 from gen_data.generator.config.validation import validate
 from gen_data.generator.config.yaml_tree import Node, find_text, load_yaml
+from gen_data.generator.core.asset_types import WORKSPACE_FROM_M
 from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.scene import LaneKind
 from gen_data.generator.core.se3 import Vec3
@@ -303,6 +304,9 @@ class RobotEntry(Origin):
     gripper: GripperEntry | None = None
     tool: ToolEntry | None = None
     """Instead of a gripper in its URDF."""
+    workspace_from_m: Annotated[float, Field(ge=0.0)] = WORKSPACE_FROM_M
+    """Horizontal distance from the base to where its workspace on a table begins: the things of
+    tasks lie so much nearer or farther."""
     touching: tuple[tuple[str, str], ...] = ()
     """Link pairs in permanent contact, besides neighbours."""
     palette: bool = False

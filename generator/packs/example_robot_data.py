@@ -17,6 +17,7 @@ from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.folder_index import Finish, FolderIndex, RobotEntry, ToolEntry
 from gen_data.generator.assets.installed_packs import TAG, write_index
 from gen_data.generator.config.data_files import load_data
+from gen_data.generator.core.asset_types import WORKSPACE_FROM_M
 from gen_data.generator.core.colorimetry import srgb_encode
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.safe_xml import parse_xml
@@ -34,10 +35,12 @@ class Arm:
 
     Attributes:
         home: Joint positions [rad] at home.
+        workspace_from_m: Where its workspace on a table begins.
     """
 
     name: str
     home: dict[str, float]
+    workspace_from_m: float = WORKSPACE_FROM_M
 
 
 ARMS = tuple(Arm(**arm) for arm in load_data(__package__, "example_robot_data"))
@@ -74,6 +77,7 @@ def _index_entry(arm: Arm) -> RobotEntry:
         tags=("arm", "gripper", TAG),
         home=arm.home,
         tool=_FINGERS,
+        workspace_from_m=arm.workspace_from_m,
         max_faces=6000,
         materials={"*": Finish(roughness=0.4)},
     )
