@@ -263,7 +263,7 @@ class RobotModel:
         home: A nominal, collision-free position per movable joint, in the order of ``joints``.
         gripper: Present when the robot can hold things.
         no_collide: Link pairs that may touch (neighbours, and pairs that touch by design).
-        workspace_from_m: Horizontal distance from the base to where its workspace on a table begins.
+        workspace_from_m: Horizontal distance from the base to where its workspace begins.
     """
 
     links: tuple[str, ...]

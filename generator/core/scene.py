@@ -369,6 +369,11 @@ class Episode:
     held: tuple[Span, ...] = ()
     contacts: tuple[ContactSpan, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Raise ValueError for a success that is labelled as a failure."""
+        if self.succeeded and self.failure:
+            raise ValueError(f"an episode that succeeded has no failure, but '{self.failure}'")
+
 
 @dataclass(frozen=True, slots=True)
 class Articulation:

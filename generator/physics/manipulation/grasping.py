@@ -68,6 +68,11 @@ class Hand:
         self._known: dict[tuple[str, Vec3], Grasp | None] = {}
 
     @property
+    def stroke_m(self) -> float:
+        """Distance between its fingers when they are open."""
+        return self._gripper.stroke_m
+
+    @property
     def sucks(self) -> bool:
         """Whether it holds by a suction cup instead of fingers."""
         return self._gripper.cup is not None

@@ -281,21 +281,24 @@ class TaskPlanner:
         """Legs that grasp and lift one of the goal's objects."""
         if self._hand is None or self._held is not None:
             return self._reject([], NOTHING_TO_GRASP, number)
+        otherwise = NOTHING_TO_SUCK
+        if not self._hand.sucks:
+            otherwise = f"{NOTHING_TO_GRASP}, which open by {1000.0 * self._hand.stroke_m:.0f} mm"
         collisions: list[str] = []
         for body in goal.objects:
             rest = self._rest_on_surface(body)
             if rest is None:
                 continue
-            for candidate in self._grasp_candidates(
-                self._find_grasps(self._hand, body), body, rest
-            ):
+            grasps = self._find_grasps(self._hand, body)
+            if grasps:
+                otherwise = CANNOT_REACH
+            for candidate in self._grasp_candidates(grasps, body, rest):
                 legs = self._plan_lift(*candidate)
                 if not isinstance(legs, str):
                     self._held = candidate[0]
                     del self.resting[body]
                     return legs
                 collisions.append(legs)
-        otherwise = NOTHING_TO_SUCK if self._hand.sucks else NOTHING_TO_GRASP
         return self._reject(collisions, otherwise, number)
 
     def _grasp_candidates(
