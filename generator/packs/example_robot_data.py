@@ -7,6 +7,7 @@ Their visible meshes are COLLADA files, which become OBJ. The arms end at the fl
 from __future__ import annotations
 
 import shutil
+import warnings
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from xml.etree.ElementTree import Element, tostring
@@ -21,6 +22,7 @@ from gen_data.generator.core.asset_types import WORKSPACE_FROM_M
 from gen_data.generator.core.colorimetry import srgb_encode
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.safe_xml import parse_xml
+from gen_data.generator.core.se3 import Array
 
 _ROOT = "cmeel.prefix/share/example-robot-data/robots/ur_description"
 _PACKAGE = "package://example-robot-data/robots/ur_description/"
@@ -104,33 +106,41 @@ def collada_to_obj(source: Path, target: Path) -> None:
     Raises:
         AssetError: if it is malformed.
     """
+    colors: dict[str, str] = {}
+    lines, count = [f"mtllib {target.stem}.mtl"], 0
+    for name, color, corners in _read_collada(source):
+        # Blender, which wrote these files, writes linear values; those of MTL are sRGB.
+        colors[name] = " ".join(f"{c:.4f}" for c in srgb_encode(color))
+        points, numbers = np.unique(corners, axis=0, return_inverse=True)
+        lines += [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points]
+        lines.append(f"usemtl {name}")
+        lines += [f"f {a} {b} {c}" for a, b, c in numbers.reshape(-1, 3) + count + 1]
+        count += len(points)
+    target.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    text = "".join(f"newmtl {name}\nKd {color}\n" for name, color in colors.items())
+    target.with_suffix(".mtl").write_text(text, encoding="utf-8")
+
+
+def _read_collada(path: Path) -> list[tuple[str, Array, Array]]:
+    """Name and diffuse colour of the material, and corners [3 n, 3], of all triangles."""
     from collada import Collada
     from collada.common import DaeError
     from collada.polylist import BoundPolylist
     from collada.triangleset import BoundTriangleSet
 
-    try:
-        scene = Collada(str(source)).scene
-    except DaeError as error:
-        raise AssetError(f"{source}: malformed COLLADA ({error})") from None
-    colors: dict[str, str] = {}
-    lines, count = [f"mtllib {target.stem}.mtl"], 0
-    for geometry in scene.objects("geometry"):
-        for part in geometry.primitives():
+    found = []
+    with warnings.catch_warnings():
+        # It multiplies by numpy.matrix.
+        warnings.simplefilter("ignore", PendingDeprecationWarning)
+        try:
+            geometries = list(Collada(str(path)).scene.objects("geometry"))
+        except DaeError as error:
+            raise AssetError(f"{path}: malformed COLLADA ({error})") from None
+        for part in (part for geometry in geometries for part in geometry.primitives()):
             triangles = part.triangleset() if isinstance(part, BoundPolylist) else part
             # Other primitives are stray lines.
-            if not isinstance(triangles, BoundTriangleSet) or not len(triangles):
-                continue
-            effect = triangles.material.effect
-            # Blender, which wrote these files, writes linear values; those of MTL are sRGB.
-            srgb = srgb_encode(np.array(effect.diffuse[:3], np.float64))
-            colors[effect.id] = " ".join(f"{c:.4f}" for c in srgb)
-            corners = np.asarray(triangles.vertex)[triangles.vertex_index].reshape(-1, 3)
-            points, numbers = np.unique(corners, axis=0, return_inverse=True)
-            lines += [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points]
-            lines.append(f"usemtl {effect.id}")
-            lines += [f"f {a} {b} {c}" for a, b, c in numbers.reshape(-1, 3) + count + 1]
-            count += len(points)
-    target.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    text = "".join(f"newmtl {name}\nKd {color}\n" for name, color in colors.items())
-    target.with_suffix(".mtl").write_text(text, encoding="utf-8")
+            if isinstance(triangles, BoundTriangleSet) and len(triangles):
+                effect = triangles.material.effect
+                corners = np.asarray(triangles.vertex)[triangles.vertex_index].reshape(-1, 3)
+                found.append((effect.id, np.array(effect.diffuse[:3], np.float64), corners))
+    return found
