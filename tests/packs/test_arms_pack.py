@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gen_data.generator.assemble.config import load_config
+from gen_data.generator.assemble.pipeline_factory import open_pipeline
 from gen_data.generator.assets.library import Library, open_library
 from gen_data.generator.core.asset_types import RobotModel
 from gen_data.generator.core.errors import AssetError
@@ -161,3 +163,17 @@ def test_hands_look_down_at_home_ahead_of_the_base(arms: Library, name: str) -> 
     assert abs(y) < 0.03
     assert z > 0.2
     assert pose.rotate(np.array([0.0, 0.0, -1.0]))[2] > math.cos(math.radians(1.0))
+
+
+@NEEDS_ARMS
+@pytest.mark.parametrize("name", sorted(DH))
+def test_arms_of_the_pack_open_drawers(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the shipped configuration, with fingers around the handle; physics confirms it."""
+    monkeypatch.setenv("GEN_DATA_ASSETS", str(PACKS.parent))
+    changes = (f"shared.robot=arms/{name}", "shared.task=open_drawer")
+    with open_pipeline(load_config("arm_tasks.yaml", overrides=changes)) as pipeline:
+        (arm,) = pipeline.accepted_scene(0).scene.articulations
+    assert arm.asset == f"arms/{name}"
+    assert arm.episode is not None
+    assert arm.episode.succeeded
+    assert any("tool_left_finger + things/1" in span.label for span in arm.episode.contacts)

@@ -58,7 +58,7 @@ _BLOWS_MAX = 8
 _BLOW_M = 0.08
 """Distance from a body at which a hand comes down to knock it away; it goes half as far beyond."""
 _PUSH_M_S = 0.15
-"""Fastest empty hand that may touch things: links have no speed in physics, which moves what they
+"""Fastest empty hand that may push things: links have no speed in physics, which moves what they
 overlap out of the way by a fifth of the overlap per step of 1/240 s. At this speed things lag
 behind by 3 mm, half the thickness of a thin finger."""
 _HALF_TURN = SE3(quaternion_wxyz=(0.0, 0.0, 0.0, 1.0))
@@ -128,7 +128,7 @@ class TaskPlanner:
         if isinstance(planned, Rejection):
             return planned
         legs = [time_leg(leg, self._arm.robot, goal.speed) for leg in planned]
-        if goal.touches and self._held is None:
+        if goal.touches and self._held is None and not _only_rises(goal):
             legs = [limit_speed(leg, self._hand_points_m(leg), _PUSH_M_S) for leg in legs]
         self.positions = legs[-1].end
         return legs
@@ -488,6 +488,10 @@ class TaskPlanner:
             f"arm '{name}', goal {number} of its task: {reason}",
             f"other goals or more candidates for arm '{name}', or fewer objects around it (count)",
         )
+
+
+def _only_rises(goal: ArmGoal) -> bool:
+    return all(w == SE3((0.0, 0.0, max(0.0, w.translation_m[2]))) for w in goal.waypoints)
 
 
 def _heading_rad(T_world_body: SE3) -> float:
