@@ -12,8 +12,10 @@ from pydantic.config import JsonDict
 
 from gen_data.generator.config import distributions as dist
 from gen_data.generator.config.base_model import Strict
+from gen_data.generator.core.asset_types import WORKSPACE_FROM_M
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.kinematics import arm_joints
 from gen_data.generator.core.members import Member, add_members, remove_members
 from gen_data.generator.core.scene import (
     HAND,
@@ -43,6 +45,10 @@ _YAWS = 8
 _LIFT_M = 0.0005
 # A file name is replaced by the file's content before validation: see ``load_tasks``.
 _OR_A_FILE: JsonDict = {"type": ["object", "string"]}
+_FREEDOM = {
+    4: "a hand that looks down and turn it about the vertical",
+    6: "a hand and tilt it in any direction",
+}
 _EXAMPLES = {"fingers": "franka_panda", "suction": "franka_panda_suction"}
 
 
@@ -114,7 +120,8 @@ class ArmTask(RandomizerBase):
                     f"'{asset.partition('?')[0]}'; expected it among its assets (ids)"
                 )
         arm = self._find_arm(scene)
-        gripper = assets.robot(arm.asset).gripper
+        robot = assets.robot(arm.asset)
+        gripper, joints = robot.gripper, len(arm_joints(robot))
         if gripper is None:
             raise ConfigError(
                 f"randomizers.{self.name}: arm '{arm.name}' ({arm.asset}) has no gripper; expected "
@@ -122,12 +129,18 @@ class ArmTask(RandomizerBase):
             )
         hand = "fingers" if gripper.cup is None else "suction"
         for name in self._possible_tasks():
-            needed = self._table()[name].hand
-            if needed not in (hand, None):
+            task = self._table()[name]
+            if task.hand not in (hand, None):
                 raise ConfigError(
-                    f"randomizers.{self.name}.task: '{name}' needs {needed}, but arm '{arm.name}' "
-                    f"({arm.asset}) has {hand}; expected another robot, such as "
-                    f"{_EXAMPLES[str(needed)]}"
+                    f"randomizers.{self.name}.task: '{name}' needs {task.hand}, but arm "
+                    f"'{arm.name}' ({arm.asset}) has {hand}; expected another robot, such as "
+                    f"{_EXAMPLES[str(task.hand)]}"
+                )
+            if joints < task.joints_min:
+                raise ConfigError(
+                    f"randomizers.{self.name}.task: '{name}' needs {task.joints_min} joints to "
+                    f"place {_FREEDOM[task.joints_min]}, but arm '{arm.name}' ({arm.asset}) has "
+                    f"{joints}; expected another robot, or another task"
                 )
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
@@ -185,7 +198,12 @@ class ArmTask(RandomizerBase):
         raise ConfigError(f"randomizers.{self.name}.arm: there is no arm; expected {known}")
 
     def _draw_failure(self, task: Task, rng: Rng) -> FailureKind:
-        draw = float(rng.uniform())
+        """Draw a kind of failure once per scene: all attempts at a layout are to fail alike.
+
+        Else a kind that physics refuses more often than others would be rarer than its share.
+        """
+        stream = replace(rng.streams, attempt=0).rng(f"{rng.name}/failure")
+        draw = float(stream.uniform())
         if not any(step.verb == "grasp" for step in task.program):
             return ""
         kinds: tuple[FailureKind, ...] = ("slip", "miss", "collision")
@@ -252,7 +270,8 @@ def _draw_place(
         base = SE3.about_z(near.yaw_rad, (near.middle_m[0], near.middle_m[1], foot))
         yaw_rad += near.yaw_rad
     else:
-        base = arm.T_world_base
+        ahead_m = assets.robot(arm.asset).workspace_from_m - WORKSPACE_FROM_M
+        base = arm.T_world_base @ SE3((ahead_m, 0.0, 0.0))
     low, high = assets.bounds_m(asset)
     half = half_extents_m(low, high, 1.0)
     fixed = thing.mass_kg == 0.0 or thing.joint is not None
@@ -300,7 +319,8 @@ def _goals(
             yield ArmGoal("grasp", objects=(bodies[step.at],), phase=step.phase)
             continue
         if step.verb == "grip":
-            yield ArmGoal("grip", gripper_opening=step.opening, phase=step.phase)
+            between = (bodies[step.at],) if step.at else ()
+            yield ArmGoal("grip", gripper_opening=step.opening, objects=between, phase=step.phase)
             continue
         frame = _frame(step, placed, arm)
         if step.verb == "move":

@@ -31,8 +31,8 @@ class Thing(Strict):
     Attributes:
         assets: Its name in instructions, and the id of its asset; an id without parameters is a
             family of variants. One of several is drawn.
-        x_m, y_m: Bounds of its middle: ahead of the arm's base and to its left; from ``near``, if
-            given, along its axes.
+        x_m, y_m: Bounds of its middle: ahead of the arm's base and to its left, for an arm whose
+            workspace begins 0.3 m ahead of it; from ``near``, if given, along its axes.
         yaw_deg: Bounds of its rotation about Z.
         near: Name of another thing that it is placed by, at ``z_m`` from that one's bottom.
         z_m: Height of its bottom above the table, or above the bottom of ``near``.
@@ -68,7 +68,8 @@ class Step(Strict):
         verb: ``grasp`` lifts ``at``. ``place`` puts the held thing down on top of ``at``.
             ``reach`` takes the hand, or with ``carries`` the held thing, to a point above the top
             of ``at``, around all obstacles. ``move`` moves the hand along straight lines or an
-            arc, and may touch and push. ``grip`` opens or closes the fingers.
+            arc, and may touch and push. ``grip`` opens or closes the fingers, with ``at`` until
+            they meet that thing, which they do not hold.
         at: Name of a thing.
         along: Thing that the X axis of the step's frame points to, horizontally; ``own`` = the X
             axis of ``at``; empty = away from the arm. Z is up.
@@ -135,6 +136,15 @@ class Task(Strict):
     program: tuple[Step, ...] = Field(min_length=1)
     success: tuple[Success, ...] = Field(min_length=1)
     hand: Literal["fingers", "suction"] | None = "fingers"
+
+    @property
+    def joints_min(self) -> int:
+        """Fewest joints of an arm that can do it: one per degree of freedom of the hand.
+
+        A hand that looks down has three of place and one of rotation; one that tilts has six.
+        """
+        tilts = any(step.turn_deg and step.axis[:2] != (0.0, 0.0) for step in self.program)
+        return 6 if tilts else 4
 
     @model_validator(mode="after")
     def _names_its_things(self) -> Task:

@@ -48,6 +48,7 @@ from gen_data.generator.assets.parsing import (
     unpack_value,
 )
 from gen_data.generator.assets.robot_models import robot_model, robot_urdf
+from gen_data.generator.assets.robot_tools import VERSION as TOOLS_VERSION
 from gen_data.generator.assets.sandbox import run_sandboxed
 from gen_data.generator.assets.texture_maps import compose_texture, find_maps
 from gen_data.generator.assets.urdf import Urdf
@@ -324,6 +325,8 @@ class FileLibrary:
                 "entry": one.entry.model_dump(exclude=origin, exclude_defaults=True),
                 "files": self._files(one),
             }
+            if isinstance(one.entry, RobotEntry) and one.entry.tool is not None:
+                content["tools"] = TOOLS_VERSION
             self._keys[one.asset_id] = content_key(content)
         return self._keys[one.asset_id]
 

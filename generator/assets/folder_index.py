@@ -30,6 +30,7 @@ from gen_data.generator.config.base_model import Strict
 from gen_data.generator.config.problems import Problems
 from gen_data.generator.config.validation import validate
 from gen_data.generator.config.yaml_tree import Node, find_text, load_yaml
+from gen_data.generator.core.asset_types import WORKSPACE_FROM_M
 from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.scene import LaneKind
 from gen_data.generator.core.se3 import Vec3
@@ -267,7 +268,8 @@ class GripperEntry(Strict):
 
     link: str
     grasp_offset_m: float
-    """Distance from the link's origin to the point between the finger tips, along the link's Z."""
+    """Distance from the link's origin to the point between the finger tips, along the link's Z;
+    9 mm behind their ends, as programs of tasks assume."""
     finger_joints: tuple[str, ...]
     """Joints that close the gripper; joints that mimic them may be omitted."""
     stroke_m: Annotated[float, Field(gt=0.0)]
@@ -302,6 +304,9 @@ class RobotEntry(Origin):
     gripper: GripperEntry | None = None
     tool: ToolEntry | None = None
     """Instead of a gripper in its URDF."""
+    workspace_from_m: Annotated[float, Field(ge=0.0)] = WORKSPACE_FROM_M
+    """Horizontal distance from the base to where its workspace on a table begins: the things of
+    tasks lie so much nearer or farther."""
     touching: tuple[tuple[str, str], ...] = ()
     """Link pairs in permanent contact, besides neighbours."""
     palette: bool = False

@@ -44,6 +44,7 @@ def robot_model(robot_id: str, urdf: Urdf, entry: RobotEntry, place: str) -> Rob
         home=_home_positions(urdf, entry, place),
         gripper=_make_gripper(entry),
         no_collide=frozenset(),
+        workspace_from_m=entry.workspace_from_m,
     )
     return replace(robot, no_collide=frozenset(_permanent_contacts(robot) | set(entry.touching)))
 

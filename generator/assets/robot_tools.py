@@ -15,6 +15,8 @@ from gen_data.generator.core.asset_types import Gripper, Joint, SuctionCup
 from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.se3 import SE3, Vec3
 
+VERSION = 2
+"""Increased whenever a tool gets another geometry."""
 BASE = "tool"
 FINGERS = ("tool_left_finger", "tool_right_finger")
 STROKE_M = 0.084
@@ -22,15 +24,16 @@ STROKE_M = 0.084
 VACUUM_PA = 60_000.0
 """Below the pressure of the air: usual for airtight surfaces (assumed)."""
 
-_PALM_M: Vec3 = (0.06, 0.11, 0.09)
-_FINGER_M: Vec3 = (0.02, 0.014, 0.05)
+_PALM_M: Vec3 = (0.06, 0.11, 0.05)
+"""So short that a camera beside it sees the fingers."""
+_FINGER_M: Vec3 = (0.02, 0.014, 0.09)
 _TIP_M = 0.009
 """The finger tips are this far beyond the grasp frame's origin."""
 _FINGER_SPEED_M_S = 0.1
 _TUBE_M, _LIP_M = 0.1, 0.02
 """Lengths of the tube of a cup and of its bellows."""
 _CUP_RADIUS_M, _TUBE_RADIUS_M = 0.015, 0.011
-_DARK: Vec3 = (0.2, 0.2, 0.21)
+_DARK: Vec3 = (0.34, 0.34, 0.35)
 _RUBBER: Vec3 = (0.12, 0.16, 0.3)
 
 

@@ -247,6 +247,10 @@ class Gripper:
     cup: SuctionCup | None = None
 
 
+WORKSPACE_FROM_M = 0.3
+"""Of an arm that reaches 0.85 m, such as a Panda."""
+
+
 @dataclass(frozen=True, slots=True)
 class RobotModel:
     """Kinematics of a robot, from its URDF.
@@ -259,6 +263,7 @@ class RobotModel:
         home: A nominal, collision-free position per movable joint, in the order of ``joints``.
         gripper: Present when the robot can hold things.
         no_collide: Link pairs that may touch (neighbours, and pairs that touch by design).
+        workspace_from_m: Horizontal distance from the base to where its workspace begins.
     """
 
     links: tuple[str, ...]
@@ -268,6 +273,7 @@ class RobotModel:
     home: tuple[float, ...]
     gripper: Gripper | None
     no_collide: frozenset[tuple[str, str]]
+    workspace_from_m: float = WORKSPACE_FROM_M
 
     @property
     def movable(self) -> tuple[Joint, ...]:

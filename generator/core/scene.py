@@ -209,7 +209,7 @@ class ArmGoal:
             grasp frame in the world. ``hold``: like reach, with ``grasped_object`` between the
             fingers. In tasks only: ``grasp`` picks up one of ``objects``, ``place`` puts the held
             object down, ``move`` passes ``waypoints`` in straight lines, ``grip`` opens or closes
-            the fingers and lets go of a held object.
+            the fingers, or closes them on the first of ``objects``, and lets go of a held one.
         joint_candidates: One tuple per candidate [rad or m], arm joints in order.
         pose_candidates: ``T_world_grasp`` per candidate; for ``place``, a point on a surface and
             a rotation about Z of the object from its former pose at rest.
@@ -368,6 +368,11 @@ class Episode:
     phases: tuple[Span, ...] = ()
     held: tuple[Span, ...] = ()
     contacts: tuple[ContactSpan, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Raise ValueError for a success that is labelled as a failure."""
+        if self.succeeded and self.failure:
+            raise ValueError(f"an episode that succeeded has no failure, but '{self.failure}'")
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,8 +24,8 @@ _CLOSED_M = 0.01855
 - 0.0047 - 0.004 (pad)."""
 _STROKE_M = 0.078
 """Twice a pad's distance from the middle at the joint's upper limit, 0.020833."""
-_GRASP_M = 0.109
-"""Distance from the hand's origin to robosuite's grip site."""
+_GRASP_M = 0.114
+"""Distance from the hand's origin to 9 mm behind the ends of the finger tips, at 0.1229."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Arm:
     """An arm of the package.
 
     Attributes:
-        home: Initial joint positions [rad] in robosuite.
+        home: Joint positions [rad] at home.
         touching: Link pairs in permanent contact.
     """
 

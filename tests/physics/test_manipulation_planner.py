@@ -249,6 +249,32 @@ def test_an_arm_goes_around_a_wall_between_two_free_poses(engine: Engine) -> Non
         assert overlap_m(bodies, [(link, "wall") for link in links]) == 0.0
 
 
+@pytest.mark.parametrize("yaw_deg", [0.0, 7.5, 20.0, -50.0])
+def test_fingers_are_flush_with_the_faces_of_a_box(engine: Engine, yaw_deg: float) -> None:
+    """The hand's Y is that of the box, or the opposite one, within the tolerance of 0.5 degrees."""
+    it = thing("it", "box 0.05 0.03 0.06", x=0.1, y=0.1, above_m=0.031)
+    turned = SE3.about_z(math.radians(yaw_deg), it.T_world_body.translation_m)
+    scene = table_scene(replace(it, T_world_body=turned), placement="scatter")
+    settled = engine.settle(going(scene, ArmGoal("grasp", objects=("it",)))).scene
+
+    track = settled.articulations[0].joint_track
+    assert track is not None
+    poses = link_poses(ROBOT, settled.articulations[0].T_world_base, track.knots[-1])
+    across = poses["panda_hand"].rotate(np.array([0.0, 1.0, 0.0]))
+    cosine = abs(float(across @ turned.rotate(np.array([0.0, 1.0, 0.0]))))
+    assert cosine > math.cos(math.radians(0.5))
+
+
+def test_what_is_out_of_reach_is_not_called_too_wide(engine: Engine) -> None:
+    """The fingers would fit; the arm is 1.3 m away."""
+    scene = table_scene(thing("it", "box 0.05 0.03 0.06", x=0.57, y=0.37, above_m=0.031),
+                        placement="scatter")  # fmt: skip
+    settled = engine.settle(going(scene, ArmGoal("grasp", objects=("it",))))
+
+    assert settled.rejection is not None
+    assert "out of reach" in settled.rejection.reason
+
+
 def test_what_leans_on_others_is_left_alone(engine: Engine) -> None:
     """A block that carries another cannot be taken; the one on top does not stand on the table."""
     low = thing("low", "box 0.05 0.05 0.05", x=0.1, above_m=0.026)

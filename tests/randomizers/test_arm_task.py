@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
+from scipy import stats
 
 from gen_data.generator.config.distributions import Constant
+from gen_data.generator.core.asset_types import RobotModel
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.scene import HAND, Articulation, ObjectGroup, Scene, SupportSurface
+from gen_data.generator.core.scene import (
+    HAND,
+    Articulation,
+    Episode,
+    ObjectGroup,
+    Scene,
+    SupportSurface,
+)
 from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.streams import Streams
 from gen_data.randomizers.arm_task import ArmTask, Failures
-from gen_data.randomizers.arm_task_table import Task, tasks
+from gen_data.randomizers.arm_task_table import Step, Task, tasks
 from tests.randomizers.doubles import FakeAssets, two_link_arm
 
 ARM = Articulation("arm", "two_link", 1, SE3((-0.5, 0.0, 0.74)), two_link_arm().home)
@@ -88,6 +100,100 @@ def test_a_task_for_suction_is_refused_with_fingers() -> None:
         ConfigError, match=r"'suck' needs suction, but arm 'arm' .* has fingers; .*panda_suction"
     ):
         task.check(scene, FakeAssets())
+
+
+FREE = Task.model_validate_json(
+    """{"instruction": "Lift the {it}.", "hand": null,
+ "things": {"it": {"assets": {"box": "box"}, "yaw_deg": [0, 0]}},
+ "program": [{"verb": "grasp", "at": "it", "phase": "pick"}],
+ "success": [{"measure": "distance", "body": "it", "other": "hand", "at_most": 0.1}]}"""
+)
+TILT = FREE.model_copy(
+    update={
+        "program": (*FREE.program, Step(verb="move", phase="tilt", turn_deg=30, axis=(1, 0, 0)))
+    }
+)
+
+
+def drawn(
+    task: ArmTask, scene: int = 0, attempt: int = 0, assets: FakeAssets | None = None
+) -> Scene:
+    """The scene that an attempt draws."""
+    rng = Streams(seed=7, scene=scene, attempt=attempt, index=scene).rng("things")
+    return task(SCENE, assets or FakeAssets(), rng)
+
+
+def failure_of(task: ArmTask, scene: int, attempt: int = 0) -> str:
+    """The failure that an attempt asks for."""
+    (arm,) = drawn(task, scene, attempt).articulations
+    assert arm.assignment is not None
+    return arm.assignment.failure
+
+
+def test_failures_follow_their_shares() -> None:
+    """Chi-square over 4,000 scenes; its false-alarm rate is 1e-4 over seeds, and the seed fixed."""
+    shares = {"slip": 0.1, "miss": 0.05, "collision": 0.2, "": 0.65}
+    failures = Failures(slip=0.1, miss=0.05, collision=0.2)
+    task = ArmTask(name="things", task=Constant("free"), tasks={"free": FREE}, failures=failures)
+    counts = Counter(failure_of(task, scene) for scene in range(4000))
+    assert set(counts) == set(shares)
+    expected = [4000 * share for share in shares.values()]
+    assert stats.chisquare([counts[kind] for kind in shares], expected).pvalue > 1e-4
+
+
+def test_all_attempts_at_a_scene_ask_for_the_same_failure() -> None:
+    """Else what physics refuses more often would be rarer than its share; places differ."""
+    failures = Failures(slip=0.3, miss=0.3, collision=0.3)
+    task = ArmTask(name="things", task=Constant("free"), tasks={"free": FREE}, failures=failures)
+    for scene in range(40):
+        assert len({failure_of(task, scene, attempt) for attempt in range(5)}) == 1
+    poses = {drawn(task, 0, attempt).bodies[0].T_world_body for attempt in range(5)}
+    assert len(poses) == 5
+
+
+def test_tasks_without_a_grasp_never_fail_on_purpose() -> None:
+    """There is nothing to slip, to miss or to knock away."""
+    reach = FREE.model_copy(update={"program": (Step(verb="reach", at="it", phase="reach"),)})
+    task = ArmTask(
+        name="things", task=Constant("r"), tasks={"r": reach}, failures=Failures(slip=1.0)
+    )
+    assert {failure_of(task, scene) for scene in range(50)} == {""}
+
+
+def test_a_success_cannot_be_labelled_as_a_failure() -> None:
+    """Nor the reverse: what failed may have a reason."""
+    with pytest.raises(ValueError, match="succeeded has no failure, but 'slip'"):
+        Episode(True, "slip")
+    assert Episode(False, "slip").failure == "slip"
+
+
+@pytest.mark.parametrize(
+    ("task", "needed"), [(FREE, "4 joints to place a hand that looks down"), (TILT, "6 joints")]
+)
+def test_an_arm_with_too_few_joints_is_refused(task: Task, needed: str) -> None:
+    """Place and rotation about the vertical are four degrees of freedom, any pose six."""
+    scene = replace(SCENE, groups=(replace(GROUP, assets=("box",)),))
+    randomizer = ArmTask(name="things", task=Constant("free"), tasks={"free": task})
+    with pytest.raises(
+        ConfigError, match=rf"'free' needs {needed} .* \(two_link\) has 2; expected"
+    ):
+        randomizer.check(scene, FakeAssets())
+
+
+@pytest.mark.parametrize("begins_m", [0.1, 0.45])
+def test_things_lie_where_the_workspace_of_the_arm_begins(begins_m: float) -> None:
+    """As much nearer or farther than those of an arm whose workspace begins at 0.3 m."""
+
+    class Reaching(FakeAssets):
+        """Has the arm with another workspace."""
+
+        def robot(self, asset_id: str) -> RobotModel:
+            return replace(super().robot(asset_id), workspace_from_m=begins_m)
+
+    task = ArmTask(name="things", task=Constant("free"), tasks={"free": FREE})
+    usual, moved = (drawn(task, assets=assets).bodies[0] for assets in (None, Reaching()))
+    step = np.subtract(moved.T_world_body.translation_m, usual.T_world_body.translation_m)
+    assert step == pytest.approx([begins_m - 0.3, 0.0, 0.0], abs=1e-6)
 
 
 def test_hands_are_named_in_conditions() -> None:

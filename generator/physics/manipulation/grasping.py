@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from gen_data.generator.core.asset_types import Gripper, RobotModel
 from gen_data.generator.core.kinematics import all_positions, finger_links, link_poses, rigid_group
-from gen_data.generator.core.se3 import SE3, Array, Vec3
+from gen_data.generator.core.se3 import IDENTITY, SE3, Array, Vec3
 from gen_data.generator.physics.manipulation.suction import (
     is_sealed,
     needed_force_n,
@@ -19,9 +20,13 @@ from gen_data.generator.physics.world import World
 
 _PALM_GAP_M = 0.002
 _PAD_GAP_M = 0.002
-"""Both fingers must come this near to the object between them."""
+"""The links on both sides must come this near to the object between them."""
 _CUP_GAP_M = 0.0005
 """Between the rim of a cup and the object that it holds: they touch without overlapping."""
+_PLAY_M = 0.0005
+"""Between each finger and what it pulls or turns, so that rigid fingers do not jam it."""
+_CLOSING_STEPS = 16
+"""Of 5 mm, or less than a finger is thick, so that none passes through a wall between two."""
 _BISECTIONS = 14
 """Halvings of the opening: a stroke of 8 cm is closed to within 5 micrometres."""
 
@@ -63,6 +68,11 @@ class Hand:
         self._known: dict[tuple[str, Vec3], Grasp | None] = {}
 
     @property
+    def stroke_m(self) -> float:
+        """Distance between its fingers when they are open."""
+        return self._gripper.stroke_m
+
+    @property
     def sucks(self) -> bool:
         """Whether it holds by a suction cup instead of fingers."""
         return self._gripper.cup is not None
@@ -85,9 +95,10 @@ class Hand:
         if not self._clear(held, 1.0) or self._touches_palm(held):
             return None
         opening = self._narrowest(held)
+        sides = self._sides
         self._pose_hand(opening)
-        gaps = [self._world.gap_m(self._body(f), held, _PAD_GAP_M) for f in self._fingers]
-        if opening <= 0.0 or any(gap >= _PAD_GAP_M for gap in gaps):
+        gaps_m = [self._side_gap_m(side, held, _PAD_GAP_M) for side in sides]
+        if opening <= 0.0 or max(gaps_m) >= _PAD_GAP_M:
             return None
         return Grasp(opening, pose)
 
@@ -113,6 +124,11 @@ class Hand:
         if not is_sealed(self._world, held, T_world_grasp, cup):
             return None
         return Grasp(0.0, T_world_grasp.inverse() @ T_world_held)
+
+    def opening_around(self, body: str, T_world_grasp: SE3) -> float:
+        """Opening of fingers about a body where it is; 0 if they do not meet it."""
+        met = self._narrowest(body, T_world_grasp)
+        return min(1.0, met + 2.0 * _PLAY_M / self._gripper.stroke_m) if met > 0.0 else 0.0
 
     def palm_height_m(self) -> float:
         """Distance from the palm forward to the grasp frame's origin."""
@@ -141,42 +157,63 @@ class Hand:
         opening = self._narrowest(held)
         return None if opening <= 0.0 else Grasp(opening, pose)
 
-    def _narrowest(self, held: str) -> float:
-        """The smallest opening at which no finger penetrates the object; 0 if none ever does."""
-        if self._clear(held, 0.0):
+    def _narrowest(self, held: str, T_world_grasp: SE3 = IDENTITY) -> float:
+        """The opening at which the closing fingers first meet the object; 0 if they never do.
+
+        Closed fingers may be free of it again, in the hole of a ring.
+        """
+        steps = [k / _CLOSING_STEPS for k in range(_CLOSING_STEPS)]
+        if not self._clear(held, 0.0, T_world_grasp):
+            steps = [0.0]
+        meets = (k for k in reversed(steps) if not self._clear(held, k, T_world_grasp))
+        touching = next(meets, None)
+        if touching is None:
             return 0.0
-        touching, free = 0.0, 1.0
+        free = min((k for k in steps if k > touching), default=1.0)
         for _ in range(_BISECTIONS):
             middle = 0.5 * (touching + free)
-            touching, free = (touching, middle) if self._clear(held, middle) else (middle, free)
+            if self._clear(held, middle, T_world_grasp):
+                free = middle
+            else:
+                touching = middle
         return free
 
     def _center_pose(self, held: str, pose: SE3) -> SE3:
-        """The pose shifted along Y to the middle between two opposite fingers."""
-        if len(self._fingers) != 2:
-            return pose
-        one, other = sorted(self._fingers, key=lambda link: self._middle(link)[1])
+        """The pose shifted along Y to the middle between the open fingers."""
         limit_m = self._gripper.stroke_m
-        below = self._world.gap_m(self._body(one), held, limit_m)
-        above = self._world.gap_m(self._body(other), held, limit_m)
-        shifted = SE3((0.0, 0.5 * (above - below), 0.0)) @ pose
+        below_m, above_m = (self._side_gap_m(side, held, limit_m) for side in self._sides)
+        shifted = SE3((0.0, 0.5 * (above_m - below_m), 0.0)) @ pose
         self._world.place(held, shifted)
         return shifted
 
-    def _clear(self, held: str, opening: float) -> bool:
-        self._pose_hand(opening)
+    @cached_property
+    def _sides(self) -> tuple[list[str], list[str]]:
+        """Links of the fingers at negative and at positive Y; opens the hand to find them.
+
+        A finger may have several links: its pad, and bars behind it.
+        """
+        self._pose_hand(1.0)
+        low = [link for link in self._fingers if self._middle(link)[1] < 0.0]
+        return low, [link for link in self._fingers if link not in low]
+
+    def _side_gap_m(self, side: Sequence[str], held: str, limit_m: float) -> float:
+        gaps_m = (self._world.gap_m(self._body(link), held, limit_m) for link in side)
+        return min(gaps_m, default=limit_m)
+
+    def _clear(self, held: str, opening: float, T_world_grasp: SE3 = IDENTITY) -> bool:
+        self._pose_hand(opening, T_world_grasp)
         return all(
             self._world.gap_m(self._body(link), held, limit_m=0.0) >= 0.0 for link in self._fingers
         )
 
-    def _pose_hand(self, opening: float) -> None:
-        """Place hand and fingers so that the grasp frame coincides with the world frame."""
+    def _pose_hand(self, opening: float, T_world_grasp: SE3 = IDENTITY) -> None:
+        """Place hand and fingers, by default with the grasp frame in the world frame."""
         gripper = self._gripper
         positions = all_positions(self._robot, self._arm_home, opening)
         poses = link_poses(self._robot, SE3(), positions)
         T_grasp_base = (poses[gripper.link] @ gripper.T_link_grasp).inverse()
         for link in (*self._fingers, *self._palm):
-            self._world.place(self._body(link), T_grasp_base @ poses[link])
+            self._world.place(self._body(link), T_world_grasp @ T_grasp_base @ poses[link])
 
     def _palm_z_m(self) -> float:
         """Largest coordinate of the palm along the grasp frame's Z."""

@@ -16,7 +16,7 @@ from itertools import pairwise
 from gen_data.generator.core.asset_types import Joint, RobotModel
 from gen_data.generator.core.kinematics import link_poses, round_positions
 from gen_data.generator.core.motion import JointTrajectory, Trajectory
-from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.physics.manipulation.arm_goals import Arm
 
 STEP_S = 0.05
@@ -113,6 +113,19 @@ def time_leg(leg: Leg, robot: RobotModel, speed: float) -> Leg:
         longest_s = max(longest_s, by_speed_s, math.sqrt(_PEAK_ACCELERATION * change / limit))
     steps = max(_STEPS_MIN, math.ceil(longest_s / STEP_S - 1e-9))
     return replace(leg, duration_s=round(steps * STEP_S, 6))
+
+
+def limit_speed(leg: Leg, points_m: Sequence[Vec3], speed_m_s: float) -> Leg:
+    """The timed leg, made so slow that a point on the arm stays below a speed.
+
+    Args:
+        leg: The leg.
+        points_m: Where the point is at the start, at every via position and at the end.
+        speed_m_s: The speed.
+    """
+    longest_m = len(leg.lines) * max(math.dist(a, b) for a, b in pairwise(points_m))
+    steps = math.ceil(_PEAK_SPEED * longest_m / speed_m_s / STEP_S - 1e-9)
+    return replace(leg, duration_s=max(leg.duration_s, round(steps * STEP_S, 6)))
 
 
 def sample_positions(legs: Sequence[Leg]) -> list[tuple[Leg, tuple[float, ...]]]:

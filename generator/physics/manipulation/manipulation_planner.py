@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from gen_data.generator.core.errors import Rejection
 from gen_data.generator.core.kinematics import (
     all_positions,
@@ -14,11 +16,16 @@ from gen_data.generator.core.kinematics import (
     round_positions,
 )
 from gen_data.generator.core.scene import ArmGoal, SupportSurface
-from gen_data.generator.core.se3 import SE3
+from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.physics.manipulation.arm_goals import Arm, ArmState
 from gen_data.generator.physics.manipulation.continuous_collision import ITSELF, Obstacles
 from gen_data.generator.physics.manipulation.grasping import Grasp, Hand
-from gen_data.generator.physics.manipulation.joint_trajectories import Held, Leg, time_leg
+from gen_data.generator.physics.manipulation.joint_trajectories import (
+    Held,
+    Leg,
+    limit_speed,
+    time_leg,
+)
 from gen_data.generator.physics.manipulation.motion_planner import MotionPlanner, Positions
 from gen_data.generator.physics.settling import home_surface, is_within
 from gen_data.generator.physics.world import World
@@ -32,7 +39,7 @@ NO_PLACE = "no candidate is a free and stable place for the held object"
 _APPROACH_M = 0.10
 """Length of the straight approach along the fingers, and of the retreat."""
 _YAWS = 12
-_NARROW = 1.15
+_NARROW = 1.08
 """Grasps at most this much wider than the narrowest one are tried."""
 _GRASPS_MAX = 8
 _SPOTS_PER_BATCH = 3
@@ -50,6 +57,10 @@ _STABLE_M = 0.002
 _BLOWS_MAX = 8
 _BLOW_M = 0.08
 """Distance from a body at which a hand comes down to knock it away; it goes half as far beyond."""
+_PUSH_M_S = 0.15
+"""Fastest empty hand that may push things: links have no speed in physics, which moves what they
+overlap out of the way by a fifth of the overlap per step of 1/240 s. At this speed things lag
+behind by 3 mm, half the thickness of a thin finger."""
 _HALF_TURN = SE3(quaternion_wxyz=(0.0, 0.0, 0.0, 1.0))
 """The same grasp with the fingers exchanged."""
 _FLIP = SE3(quaternion_wxyz=(0.0, 1.0, 0.0, 0.0))
@@ -117,8 +128,13 @@ class TaskPlanner:
         if isinstance(planned, Rejection):
             return planned
         legs = [time_leg(leg, self._arm.robot, goal.speed) for leg in planned]
+        if goal.touches and self._held is None and not _only_rises(goal):
+            legs = [limit_speed(leg, self._hand_points_m(leg), _PUSH_M_S) for leg in legs]
         self.positions = legs[-1].end
         return legs
+
+    def _hand_points_m(self, leg: Leg) -> list[Vec3]:
+        return [self._arm.grasp_pose(p).translation_m for p in (leg.start, *leg.via, leg.end)]
 
     def observe(self, poses: Mapping[str, SE3]) -> None:
         """Plan from here on with the poses of bodies that physics tells, ``T_world_body``."""
@@ -242,11 +258,15 @@ class TaskPlanner:
 
     def _plan_grip(self, goal: ArmGoal) -> list[Leg]:
         """One leg of the fingers; what they hold rests from then on where it is."""
+        opening = goal.gripper_opening
+        if goal.objects and self._hand is not None:
+            T_world_grasp = self._arm.grasp_pose(self.positions)
+            opening = self._hand.opening_around(goal.objects[0], T_world_grasp)
         if self._held is not None:
             pose = self._arm.grasp_pose(self.positions) @ self._held.T_grasp_held
             self.resting[self._held.body] = pose.rounded()
             self._held = None
-        end = self._motion.with_opening(self.positions, goal.gripper_opening)
+        end = self._motion.with_opening(self.positions, opening)
         return [Leg(self.positions, round_positions(end))]
 
     def _plan_path(self, end: Positions) -> list[Leg] | str:
@@ -261,21 +281,24 @@ class TaskPlanner:
         """Legs that grasp and lift one of the goal's objects."""
         if self._hand is None or self._held is not None:
             return self._reject([], NOTHING_TO_GRASP, number)
+        otherwise = NOTHING_TO_SUCK
+        if not self._hand.sucks:
+            otherwise = f"{NOTHING_TO_GRASP}, which open by {1000.0 * self._hand.stroke_m:.0f} mm"
         collisions: list[str] = []
         for body in goal.objects:
             rest = self._rest_on_surface(body)
             if rest is None:
                 continue
-            for candidate in self._grasp_candidates(
-                self._find_grasps(self._hand, body), body, rest
-            ):
+            grasps = self._find_grasps(self._hand, body)
+            if grasps:
+                otherwise = CANNOT_REACH
+            for candidate in self._grasp_candidates(grasps, body, rest):
                 legs = self._plan_lift(*candidate)
                 if not isinstance(legs, str):
                     self._held = candidate[0]
                     del self.resting[body]
                     return legs
                 collisions.append(legs)
-        otherwise = NOTHING_TO_SUCK if self._hand.sucks else NOTHING_TO_GRASP
         return self._reject(collisions, otherwise, number)
 
     def _grasp_candidates(
@@ -294,8 +317,12 @@ class TaskPlanner:
         return candidates[:_GRASPS_MAX]
 
     def _find_grasps(self, hand: Hand, body: str) -> list[Grasp]:
-        """Grasps of a resting body from above, the narrowest first."""
+        """Grasps of a resting body from above, the narrowest first.
+
+        Some close along its own axes, flush with the faces of a box.
+        """
         T_world_held = self.resting[body]
+        first = _heading_rad(T_world_held)
         low, high = self._world.bounds_m(body)
         x, y = (float(v) for v in 0.5 * (low + high)[:2])
         bottom, top = float(low[2]), float(high[2])
@@ -303,7 +330,7 @@ class TaskPlanner:
         height = max(height, bottom + hand.tip_depth_m() + _FLOOR_GAP_M)
         grasps = []
         for k in range(_YAWS):
-            yaw = SE3.about_z(math.pi * k / _YAWS, (x, y, height))
+            yaw = SE3.about_z(first + math.pi * k / _YAWS, (x, y, height))
             if hand.sucks:
                 above = SE3((0.0, 0.0, top - height)) @ yaw @ _FLIP
                 grasp = hand.suck_in_place(body, T_world_held, above)
@@ -461,3 +488,14 @@ class TaskPlanner:
             f"arm '{name}', goal {number} of its task: {reason}",
             f"other goals or more candidates for arm '{name}', or fewer objects around it (count)",
         )
+
+
+def _only_rises(goal: ArmGoal) -> bool:
+    return all(w == SE3((0.0, 0.0, max(0.0, w.translation_m[2]))) for w in goal.waypoints)
+
+
+def _heading_rad(T_world_body: SE3) -> float:
+    """Direction of the more level one of a body's X and Y axes, about the vertical."""
+    one, other = (T_world_body.rotate(axis) for axis in np.eye(3)[:2])
+    x, y, _ = one if abs(one[2]) <= abs(other[2]) else other
+    return round(math.atan2(y, x), 9)
