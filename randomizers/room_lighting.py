@@ -33,6 +33,9 @@ _SHADE_M2 = 0.35
 _BULB_M = 0.06
 _VIEW_MEAN = 0.7
 """What windows send in, relative to the mean outside: houses hide some sky, and panes reflect."""
+_FRAME_FRONT_M = 0.058
+"""Distance of a panel from a window's outer side, just before its frame."""
+_SILL_GAP_M = 0.03
 _SKIES = 8
 _NIGHT_CD_M2 = 0.2
 """Assumed mean outdoors by night in towns: a lit street has 1 cd/m^2 (EN 13201-2), a sky 0.01."""
@@ -164,12 +167,16 @@ def _lamp_light(name: str, body: Body, at_m: Vec3, flux_lm: float, color: Vec3) 
 def _window_light(
     window: Body, own: Sequence[Body], assets: AssetIndex, luminance_cd_m2: float
 ) -> Light:
-    """A panel in the plane of a window's panes that shines into the room, below its blind."""
+    """A panel before a window's frame that shines into the room, below its blind.
+
+    All of the sill is before it, lit as evenly as by the panes.
+    """
     low, high = assets.bounds_m(window.asset)
     blind = next((b for b in own if b.name == window.name.replace("window_", "blind_")), None)
     drop = -assets.bounds_m(blind.asset)[0][2] if blind else 0.06
-    width, height = round(high[1] - low[1] - 0.2, 4), round(high[2] - 0.06 - drop, 4)
-    x, y, z = window.T_world_body.apply(np.array((0.055, 0.0, 0.06 + 0.5 * height)))
+    width, height = round(high[1] - low[1] - 0.2, 4), round(high[2] - drop - _SILL_GAP_M, 4)
+    at_m = (low[0] + _FRAME_FRONT_M, 0.0, _SILL_GAP_M + 0.5 * height)
+    x, y, z = window.T_world_body.apply(np.array(at_m))
     w, _, _, qz = window.T_world_body.quaternion_wxyz
     c, s = round(1.0 - 2.0 * qz * qz, 6), round(2.0 * w * qz, 6)
     return Light(
