@@ -74,13 +74,12 @@ def nominal(kind: str) -> Scene:
 
 
 @cache
-def furnished(kind: str, seed: int) -> Scene:
-    """A furnished room."""
+def furnished(kind: str, seed: int, assets: Library | None = None) -> Scene:
+    """A furnished room, by default with the assets that come with the package."""
     for attempt in range(4):
         try:
-            return Furnish(name="furniture")(
-                nominal(kind), library(), Streams(3, seed, attempt=attempt).rng("furniture")
-            )
+            rng = Streams(3, seed, attempt=attempt).rng("furniture")
+            return Furnish(name="furniture")(nominal(kind), assets or library(), rng)
         except LayoutRejected:
             continue
     raise AssertionError(f"{kind} {seed}: four attempts were rejected")
@@ -163,8 +162,17 @@ def test_no_two_pieces_overlap(kind: str) -> None:
 
 
 def _is_inside_shelf(a: Body, b: Body) -> bool:
-    """Whether one of two is a shelf or seat, whose box holds what is on its boards or cushions."""
-    shelves = {"armchair", "bookcase", "pallet_rack", "sofa", "steel_rack", "trolley"}
+    """Whether one of two is a shelf or seat, whose box, with back or tap, holds what is on it."""
+    shelves = {
+        "armchair",
+        "bookcase",
+        "chair",
+        "pallet_rack",
+        "sofa",
+        "steel_rack",
+        "trolley",
+        "wash_basin",
+    }
     return bool({family(a), family(b)} & shelves)
 
 
