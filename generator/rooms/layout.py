@@ -684,7 +684,8 @@ def _put_thing(
     family = layout.pick(rule.things)
     asset = layout.pick(options[family])
     s = layout.shape(asset)
-    if s.rest is None or s.high - s.low > support.clearance_m:
+    clearance_m = min(support.clearance_m, layout.room.size_m[2] - height)
+    if s.rest is None or s.high - s.low > clearance_m:
         return None
     for _ in range(_TRIES_ON):
         turn = layout.signed(math.pi if support.is_top else 0.25)

@@ -333,6 +333,14 @@ def test_same_stream_makes_the_same_bytes(kind: str) -> None:
     assert canonical_json(made[0]) == canonical_json(made[1])
 
 
+def test_nothing_on_a_wardrobe_reaches_into_the_ceiling() -> None:
+    """Bedrooms of 2.3 m, whose wardrobes carry boxes and suitcases where they fit."""
+    low = Furnish(name="f", height_m=dist.Constant(2.3), clutter=dist.Constant(3.0))
+    for seed in range(8):
+        scene = low(nominal("bedroom"), library(), Streams(3, seed).rng("furniture"))
+        assert max(heights_m(b)[1] for b in pieces(scene) if family(b) != "ceiling_lamp") < 2.3
+
+
 def test_an_impossible_room_says_what_has_no_place_and_what_to_change() -> None:
     """A bed of two metres does not fit a room of 1.5 m."""
     small = Furnish(name="furniture", length_m=dist.Constant(1.5), width_m=dist.Constant(1.5))
