@@ -33,11 +33,6 @@ _SHADE_M2 = 0.35
 _BULB_M = 0.06
 _VIEW_MEAN = 0.7
 """What windows send in, relative to the mean outside: houses hide some sky, and panes reflect."""
-_FRAME_FRONT_M = 0.058
-"""Distance of a panel from a window's outer side, just before its frame."""
-_REVEAL_M = 0.02
-"""Distance of its edges from sill, reveals and lintel. Panes begin farther away and deeper, which
-lights those as evenly."""
 _SKIES = 8
 _NIGHT_CD_M2 = 0.2
 """Assumed mean outdoors by night in towns: a lit street has 1 cd/m^2 (EN 13201-2), a sky 0.01."""
@@ -169,19 +164,16 @@ def _lamp_light(name: str, body: Body, at_m: Vec3, flux_lm: float, color: Vec3) 
 def _window_light(
     window: Body, own: Sequence[Body], assets: AssetIndex, luminance_cd_m2: float
 ) -> Light:
-    """A panel before a window's frame that shines into the room, below its blind.
+    """A panel before a window's sill that shines into the room, below its blind.
 
-    All of the sill and of the reveals is before it. Its flux is that of the panes.
+    Sill and reveals lie behind it. So near to a panel, light would change several times within a
+    pixel or two: strips of dashes.
     """
     low, high = assets.bounds_m(window.asset)
     blind = next((b for b in own if b.name == window.name.replace("window_", "blind_")), None)
-    drop = -assets.bounds_m(blind.asset)[0][2] if blind else _REVEAL_M
-    opening_m = high[1] - low[1] - 0.08
-    width = round(opening_m - 2.0 * _REVEAL_M, 4)
-    height = round(high[2] - drop - _REVEAL_M, 4)
-    glass_m2 = (opening_m - 0.12) * (high[2] - max(drop, 0.06) - 0.06)
-    at_m = (low[0] + _FRAME_FRONT_M, 0.0, _REVEAL_M + 0.5 * height)
-    x, y, z = window.T_world_body.apply(np.array(at_m))
+    drop = -assets.bounds_m(blind.asset)[0][2] if blind else 0.06
+    width, height = round(high[1] - low[1] - 0.2, 4), round(high[2] - 0.06 - drop, 4)
+    x, y, z = window.T_world_body.apply(np.array((high[0] + 0.002, 0.0, 0.06 + 0.5 * height)))
     w, _, _, qz = window.T_world_body.quaternion_wxyz
     c, s = round(1.0 - 2.0 * qz * qz, 6), round(2.0 * w * qz, 6)
     return Light(
@@ -192,5 +184,5 @@ def _window_light(
         (0.95, 1.0, 1.07),
         size_m=(width, height),
         side=(-s, c, 0.0),
-        intensity_cd=round(luminance_cd_m2 * glass_m2, 3),
+        intensity_cd=round(luminance_cd_m2 * width * height, 3),
     )

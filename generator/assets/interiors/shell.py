@@ -206,7 +206,7 @@ def window(size_m: Vec3 = (1.4, 1.3, 0.12), panes: int = 2) -> Solid:
     ]
     for k in range(1, panes):
         y = w * (k / panes - 0.5)
-        boxes.append(((x0, y - f, f), (x1 + 0.002, y + f, h - f)))
+        boxes.append(((x0, y - f, f), (x1 + 0.008, y + f, h - f)))
     at = w * (1.0 / panes - 0.5) if panes > 1 else 0.5 * w - 0.5 * f
     grip = shapes.block((x1, at - 0.012, 0.42 * h), (x1 + 0.04, at + 0.012, 0.42 * h + 0.12), 0.004)
     sill = ((x1, -0.5 * w - 0.04, -0.025), (0.5 * t + 0.05, 0.5 * w + 0.04, 0.003))
