@@ -55,7 +55,7 @@ AGAINST_WALLS = (
     "washing_machine",
 )
 MAY_STAND_FREE = {"warehouse": {"pallet_rack"}}
-MOVABLE = {"armchair", "chair", "office_chair", "stool"}
+MOVABLE = {"armchair", "chair", "clothes_pile", "office_chair", "stool"}
 STRUCTURE = {"floor", "ceiling", "wall", "door", "window"}
 SHOULDERS_M = 0.4
 CELL_M = 0.1
