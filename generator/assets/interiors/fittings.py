@@ -380,8 +380,8 @@ def house_plant(seed: int = 0) -> Solid:
         # Leaves grow the golden angle apart (Vogel, Mathematical Biosciences 44, 1979): to all
         # sides, so that the plant stands.
         turn = k * math.pi * (3.0 - math.sqrt(5.0)) + rng.between(-0.4, 0.4)
-        leaf = _leaf(rng, length * rng.between(0.6, 1.0)).rotated("z", turn)
-        patches.append(leaf.moved(0.0, 0.0, 0.86 * h))
+        blade = _leaf(rng, length * rng.between(0.6, 1.0)).rotated("z", turn)
+        patches.append(blade.moved(0.0, 0.0, 0.86 * h))
     green = (
         0.06 * rng.between(0.7, 1.2),
         0.16 * rng.between(0.7, 1.2),
