@@ -164,12 +164,16 @@ def _lamp_light(name: str, body: Body, at_m: Vec3, flux_lm: float, color: Vec3) 
 def _window_light(
     window: Body, own: Sequence[Body], assets: AssetIndex, luminance_cd_m2: float
 ) -> Light:
-    """A panel in the plane of a window's panes that shines into the room, below its blind."""
+    """A panel before a window's sill that shines into the room, below its blind.
+
+    Sill and reveals lie behind it. So near to a panel, light would change several times within a
+    pixel or two: strips of dashes.
+    """
     low, high = assets.bounds_m(window.asset)
     blind = next((b for b in own if b.name == window.name.replace("window_", "blind_")), None)
     drop = -assets.bounds_m(blind.asset)[0][2] if blind else 0.06
     width, height = round(high[1] - low[1] - 0.2, 4), round(high[2] - 0.06 - drop, 4)
-    x, y, z = window.T_world_body.apply(np.array((0.055, 0.0, 0.06 + 0.5 * height)))
+    x, y, z = window.T_world_body.apply(np.array((high[0] + 0.002, 0.0, 0.06 + 0.5 * height)))
     w, _, _, qz = window.T_world_body.quaternion_wxyz
     c, s = round(1.0 - 2.0 * qz * qz, 6), round(2.0 * w * qz, 6)
     return Light(

@@ -54,7 +54,7 @@ _EDGES_M = {
 }
 """Width of the border of surfaces that stays free, in depth and width: that of sides and posts.
 Pallets reach over the beams of their racks."""
-_SEATS = frozenset({"armchair", "sofa"})
+_SEATS = frozenset({"armchair", "chair", "sofa"})
 _SQUARE = frozenset({"book_row", "binder_row", "dish_rack", "microwave", "pallet", "spice_rack"})
 """Things that stand square to what carries them."""
 _SQUARE_SHARE = 0.4
@@ -635,7 +635,7 @@ def supports(piece: Piece, assets: AssetIndex) -> list[Support]:
             for a, b, c, d in zip((x0, y0), (x1, y1), low[:2], high[:2], strict=True)
         )
         free = (0.5 * (x1 - x0), 0.5 * (y1 - y0))
-        return [Support(piece.low_m + z, 0.35, (middle[0], middle[1]), free)]
+        return [Support(piece.position_m[2] + z, 0.35, (middle[0], middle[1]), free)]
     if piece.family in _SEATS:
         # Seats of packs do not say where they are level.
         return []
@@ -684,7 +684,8 @@ def _put_thing(
     family = layout.pick(rule.things)
     asset = layout.pick(options[family])
     s = layout.shape(asset)
-    if s.rest is None or s.high - s.low > support.clearance_m:
+    clearance_m = min(support.clearance_m, layout.room.size_m[2] - height)
+    if s.rest is None or s.high - s.low > clearance_m:
         return None
     for _ in range(_TRIES_ON):
         turn = layout.signed(math.pi if support.is_top else 0.25)

@@ -376,12 +376,12 @@ def house_plant(seed: int = 0) -> Solid:
     patches = [pot, soil]
     count = int(rng.between(16, 30)) if big else int(rng.between(9, 16))
     length = rng.between(0.45, 0.8) if big else rng.between(0.12, 0.24)
-    for _ in range(count):
-        patches.append(
-            _leaf(rng, length * rng.between(0.6, 1.0))
-            .rotated("z", rng.between(0.0, 2 * math.pi))
-            .moved(0.0, 0.0, 0.86 * h)
-        )
+    for k in range(count):
+        # Leaves grow the golden angle apart (Vogel, Mathematical Biosciences 44, 1979): to all
+        # sides, so that the plant stands.
+        turn = k * math.pi * (3.0 - math.sqrt(5.0)) + rng.between(-0.4, 0.4)
+        blade = _leaf(rng, length * rng.between(0.6, 1.0)).rotated("z", turn)
+        patches.append(blade.moved(0.0, 0.0, 0.86 * h))
     green = (
         0.06 * rng.between(0.7, 1.2),
         0.16 * rng.between(0.7, 1.2),
@@ -442,31 +442,6 @@ def waste_basket(seed: int = 0) -> Solid:
         else painted_material("#2b2d30", 0.4)
     )
     return solid([body], [paint], [((-0.8 * r, -0.8 * r, 0.0), (0.8 * r, 0.8 * r, h))])
-
-
-def towel(seed: int = 0) -> Solid:
-    """A towel on a rail; origin at the middle below, on the wall. Slots: cloth, rail."""
-    rng = variant_rng("towel", seed)
-    w, h = rng.between(0.35, 0.5), rng.between(0.4, 0.65)
-    folded: Box = ((0.05, -0.5 * w, 0.0), (0.075, 0.5 * w, h))
-    patches = [
-        shapes.block(*folded, 0.011),
-        rod((0.062, -0.5 * w - 0.06, h - 0.008), (0.062, 0.5 * w + 0.06, h - 0.008), 0.009, 1),
-    ]
-    for sy in (-1, 1):
-        patches.append(
-            rod(
-                (0.0, sy * (0.5 * w + 0.05), h - 0.008),
-                (0.066, sy * (0.5 * w + 0.05), h - 0.008),
-                0.009,
-                1,
-            )
-        )
-    return solid(
-        patches,
-        [cloth(rng), metal_material(STAINLESS, 0.2)],
-        [((0.0, -0.5 * w, 0.0), (0.08, 0.5 * w, h))],
-    )
 
 
 def wall_clock(seed: int = 0) -> Solid:

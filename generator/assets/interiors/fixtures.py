@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from gen_data.generator.assets.interiors.parts import (
+    SUPPORT,
     Box,
     board,
     ceramic,
@@ -223,12 +224,12 @@ def wash_basin(seed: int = 0) -> Solid:
     x, y, z = 0.5 * d, 0.5 * w, 0.86
     height = rng.between(0.1, 0.18)
     rim: list[Box] = [
-        ((-x, -y, z - 0.095), (-x + 0.1, y, z)),
+        ((-x, -y, z - 0.095), (-x + 0.13, y, z)),
         ((x - 0.04, -y, z - 0.095), (x, y, z)),
-        ((-x + 0.1, -y, z - 0.095), (x - 0.04, -y + 0.05, z)),
-        ((-x + 0.1, y - 0.05, z - 0.095), (x - 0.04, y, z)),
+        ((-x + 0.13, -y, z - 0.095), (x - 0.04, -y + 0.05, z)),
+        ((-x + 0.13, y - 0.05, z - 0.095), (x - 0.04, y, z)),
     ]
-    low: Box = ((-x + 0.1, -y + 0.05, z - 0.1), (x - 0.04, y - 0.05, z - 0.09))
+    low: Box = ((-x + 0.13, -y + 0.05, z - 0.1), (x - 0.04, y - 0.05, z - 0.09))
     chest: Box = ((-x, -y + 0.02, 0.25), (x - 0.03, y - 0.02, z - 0.095))
     patches = [
         *(shapes.block(*b, 0.012) for b in rim),
@@ -238,10 +239,14 @@ def wash_basin(seed: int = 0) -> Solid:
         board((x - 0.03, 0.002, 0.254), (x - 0.012, y - 0.022, z - 0.1), 1),
         *handle(x - 0.012, -0.05, z - 0.2, 0.12, 2, upright=True),
         *handle(x - 0.012, 0.05, z - 0.2, 0.12, 2, upright=True),
-        *tap(-x + 0.05, 0.0, z, height, 2),
+        *tap(-x + 0.07, 0.0, z, height, 2),
     ]
     made = solid(patches, [ceramic(), front(rng), _CHROME], [((-x, -y, 0.25), (x, y, z))])
-    return _with_water(made, (-x + 0.05, 0.0, z), height, z - 0.09)
+    made = _with_water(made, (-x + 0.07, 0.0, z), height, z - 0.09)
+    # The rim behind the bowl, beside the tap.
+    rim_m = (-x + 0.012, 0.08, z), (-x + 0.12, y - 0.012, z)
+    supports = tuple(Keypoint(SUPPORT, corner) for corner in rim_m)
+    return replace(made, keypoints=(*made.keypoints, *supports))
 
 
 def bathtub(seed: int = 0) -> Solid:

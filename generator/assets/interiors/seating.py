@@ -135,7 +135,10 @@ def chair(seed: int = 0) -> Solid:
     body = upholstery(rng) if soft else (wood(rng) if rng.chance(0.65) else lacquer(rng))
     boxes: list[Box] = [seat, ((x - 0.08, -0.5 * w, z), (x + 0.01, 0.5 * w, back_z))]
     boxes += _legs_under(d, w, z)
-    return solid(patches, [body, wood(rng) if legs and soft else steel if legs else body], boxes)
+    made = solid(patches, [body, wood(rng) if legs and soft else steel if legs else body], boxes)
+    # Before the back, and clear of the round edges of cushions.
+    corners = (-0.5 * d + 0.08, -0.5 * w + 0.03, z), (0.5 * d - 0.03, 0.5 * w - 0.03, z)
+    return replace(made, keypoints=tuple(Keypoint(SUPPORT, corner) for corner in corners))
 
 
 def stool(seed: int = 0) -> Solid:

@@ -299,6 +299,49 @@ def _coat(rng: VariantRng, length_m: float, slot: int) -> Patch:
     return join_patches(patches)
 
 
+def towel(seed: int = 0) -> Solid:
+    """A towel over a rail; origin at the middle below, on the wall. Slots: cloth, rail."""
+    rng = variant_rng("towel", seed)
+    w, h = rng.between(0.35, 0.5), rng.between(0.4, 0.65)
+    rail_x, rail_z, radius = 0.062, h - 0.016, 0.009
+    patches = [
+        _over_rail(rng, w, rail_z, rail_z * rng.between(0.55, 0.95)).moved(rail_x, 0, rail_z)
+    ]
+    half = 0.5 * w + 0.06
+    patches.append(rod((rail_x, -half, rail_z), (rail_x, half, rail_z), radius, 1))
+    for sy in (-1, 1):
+        y = sy * (half - 0.01)
+        patches.append(rod((0.0, y, rail_z), (rail_x + 0.004, y, rail_z), radius, 1))
+    boxes: list[Box] = [((0.0, -half, 0.0), (0.1, half, h))]
+    return solid(patches, [fabric(rng, 0.3), metal_material(STAINLESS, 0.2)], boxes)
+
+
+def _over_rail(rng: VariantRng, w: float, front_m: float, back_m: float) -> Patch:
+    """Thick cloth over a rail along Y through the origin, with folds that open downwards."""
+    bend = np.linspace(0.0, math.pi, 9)
+    levels = np.linspace(1.0, 0.0, 12, endpoint=False)
+    y = np.linspace(-0.5 * w, 0.5 * w, 49)[None, :]
+    waves = 2.0 * math.pi * rng.between(3.0, 5.0) / w
+    wave = np.sin(waves * y + rng.between(0.0, 6.3)) + 0.5 * np.sin(
+        0.47 * waves * y + rng.between(0.0, 6.3)
+    )
+    depth = rng.between(0.003, 0.009)
+
+    def sheet(radius: float) -> Array:
+        """Points over the rail, from the front's hem to the back's."""
+        x = np.concatenate([np.full(12, radius), radius * np.cos(bend), np.full(12, -radius)])
+        z = np.concatenate([-front_m * levels, radius * np.sin(bend), -back_m * levels[::-1]])
+        fall = np.clip(-z / front_m, 0.0, 1.0)[:, None]
+        return np.stack(
+            np.broadcast_arrays(x[:, None] + depth * fall * wave, y, z[:, None]), axis=2
+        )
+
+    outer, inner = sheet(0.016), sheet(0.0095)
+    loop = np.concatenate([outer, inner[::-1], outer[:1]])
+    sides = [np.stack([outer[:, k], inner[:, k]]) for k in (0, -1)]
+    return join_patches([shapes.grid(loop), shapes.grid(sides[0]).flipped(), shapes.grid(sides[1])])
+
+
 def bath_mat(seed: int = 0) -> Solid:
     """A mat of tufted cloth. Slot: pile."""
     rng = variant_rng("bath_mat", seed)

@@ -369,7 +369,9 @@ def _sky_visibility(frame: CameraView, lattice: Lattice, inputs: list[Any]) -> w
     shape, run = _blocks(frame, lattice, 1)
     frame.launch(soft_shadows.probe_ambient, shape, [*inputs, hemisphere, radius_m, run], [probed])
     _smooth(frame, lattice, probed, open_sky)
-    return open_sky
+    inputs = [frame.world.record, lattice, open_sky]
+    frame.launch(soft_shadows.share_with_strips, n, inputs, [probed])
+    return probed
 
 
 def _smooth(frame: CameraView, lattice: Lattice, values: wp.array, smoothed: wp.array) -> None:

@@ -40,6 +40,7 @@ from gen_data.generator.renderers.warp.scene.kernels.alpha_test import OUT_OF_LI
 from gen_data.generator.renderers.warp.scene.kernels.ambient_light import (
     ambient_irradiance,
     ambient_reflection,
+    received_ambience,
     volume_around,
 )
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
@@ -105,6 +106,9 @@ FAINT_SHARE = wp.constant(1.0 / 256.0)
 MOSTLY_CLEAR = wp.constant(0.9)
 # Neighbours on a layered surface with more contrast than this are supersampled.
 CONTRAST = wp.constant(0.15)
+# Pixels with more of it take both further samples: beside a lamp or a window, whose luminance is
+# tens of times larger, neighbours that take different ones would be white and dark in turn.
+STARK_CONTRAST = wp.constant(0.5)
 # Limit on the clear surfaces along one ray.
 SURFACES_MAX = wp.constant(8)
 
@@ -548,11 +552,11 @@ def layers_at(
         gloss = gloss * (1.0 - clear) + mirrored * clear
         layers.behind = passed * clear
     lamps = sum_lamp_light(world, brdf, material.normal, side, p, v, lit, k)
-    ambient = ambient_irradiance(world, p, material.normal) * open_sky
+    ambient = received_ambience(world, p, material.normal, open_sky)
     diffuse = wp.cw_mul(brdf.matte, material.albedo) * (1.0 - clear)
     received = lamps.lux * (1.0 / wp.pi) + ambient
     if wp.dot(side, side) > 0.0:
-        behind = ambient_irradiance(world, p, -material.normal) * open_sky
+        behind = received_ambience(world, p, -material.normal, open_sky)
         behind += lamps.behind * (1.0 / wp.pi)
         received += wp.cw_mul(material.translucency, behind)
     layers.own = wp.cw_mul(diffuse, received) + lamps.shine
@@ -734,6 +738,22 @@ def contrast(a: wp.vec3, b: wp.vec3):
     return wp.abs(light - other) / wp.max(light + other, 1.0e-12)
 
 
+@wp.func
+def contrast_around(view: View, images: GBufferRecord, radiance: wp.array[wp.vec3], i: int):
+    """Largest contrast between a pixel and the four beside it that show the same body."""
+    x = i % view.width
+    y = i / view.width
+    largest = float(0.0)
+    for side in range(4):
+        # Sides 0 to 3 are below, right, above and left.
+        u = wp.clamp(x + (side & 1) * (1 - (side & 2)), 0, view.width - 1)
+        v = wp.clamp(y + (1 - (side & 1)) * (1 - (side & 2)), 0, view.height - 1)
+        j = v * view.width + u
+        if images.hits[j][0] == images.hits[i][0]:
+            largest = wp.max(largest, contrast(radiance[i], radiance[j]))
+    return largest
+
+
 @wp.kernel
 def find_contrasts(
     view: View,
@@ -754,17 +774,7 @@ def find_contrasts(
     i = listed.pixels[k]
     if world.surfaces[surface_index(world, images.hits[i])].layered == 0:
         return
-    x = i % view.width
-    y = i / view.width
-    largest = float(0.0)
-    for side in range(4):
-        # Sides 0 to 3 are below, right, above and left.
-        u = wp.clamp(x + (side & 1) * (1 - (side & 2)), 0, view.width - 1)
-        v = wp.clamp(y + (1 - (side & 1)) * (1 - (side & 2)), 0, view.height - 1)
-        j = v * view.width + u
-        if images.hits[j][0] == images.hits[i][0]:
-            largest = wp.max(largest, contrast(radiance[i], radiance[j]))
-    if largest > CONTRAST:
+    if contrast_around(view, images, radiance, i) > CONTRAST:
         places[wp.atomic_add(count, 0, 1)] = k
 
 
@@ -781,10 +791,11 @@ def shade_contrasts(
     pixels: wp.array[int],
     mixed: wp.array[wp.vec3],
 ):
-    """Radiance of pixels with contrasts: the mean over their centre and one more point.
+    """Radiance of pixels with contrasts: the mean over their centre and one or two more points.
 
     Args:
-        offsets: Two positions within a pixel, [0, 1), which neighbours take in turn.
+        offsets: Two positions within a pixel, [0, 1); neighbours take one of them in turn, or both
+            where contrasts are stark.
         radiance: Of the centres.
         pixels: The pixels.
         mixed: In their order.
@@ -794,17 +805,14 @@ def shade_contrasts(
     i = listed.pixels[k]
     x = i % view.width
     y = i / view.width
-    s = (x + y) & 1
-    c = layered_radiance(
-        view,
-        world,
-        images,
-        float(x) + offsets[s][0],
-        float(y) + offsets[s][1],
-        listed,
-        probe,
-        s,
-        k,
-    )
+    total = radiance[i]
+    count = float(1.0)
+    stark = contrast_around(view, images, radiance, i) > STARK_CONTRAST
+    for s in range(2):
+        if stark or s == ((x + y) & 1):
+            x_px = float(x) + offsets[s][0]
+            y_px = float(y) + offsets[s][1]
+            total += layered_radiance(view, world, images, x_px, y_px, listed, probe, s, k)
+            count += 1.0
     pixels[place] = i
-    mixed[place] = (radiance[i] + c) * 0.5
+    mixed[place] = total / count

@@ -48,6 +48,9 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 # Light of two points may be blended if their normals differ by less than eight degrees.
 SMOOTH_COSINE = wp.constant(0.99)
+# Least continued light, as a share of the nearest point's. It may fall towards a corner but never
+# rises: the edge of a shadow beside a rim must not shine.
+CONTINUED_MIN = wp.constant(0.4)
 
 
 @wp.func
@@ -87,6 +90,8 @@ class Stretch:
         columns: Lattice points per row.
         agrees: Bits of the cell's corners whose light is blended.
         turns: Bits of the corners from which the surface turns too sharply.
+        beyond: Per corner off the surface, the lattice point from which light is continued to it
+            over a corner that agrees; -1 for none.
         texture: -1 for none.
         bumpy: 1 if the texture tilts normals and there is light that depends on them.
         towards: Unit direction towards the lamps.
@@ -99,6 +104,7 @@ class Stretch:
     columns: int
     agrees: int
     turns: int
+    beyond: wp.vec4i
     albedo: wp.vec3
     roughness: float
     texture: int
@@ -107,6 +113,27 @@ class Stretch:
     half: wp.vec3
     lamps: float
     shine: float
+
+
+@wp.func
+def point_beyond(lattice: Lattice, stretch: Stretch, first: int, k: int):
+    """The lattice point behind the agreeing neighbour of a cell's corner off the surface; or -1.
+
+    The neighbour below or above comes first, else that beside the corner.
+    """
+    corners = stretch.agrees | stretch.turns
+    x = first % lattice.width + (k & 1)
+    y = first / lattice.width + k / 2
+    if (corners >> k) & 1 != 0:
+        x = -1
+    elif (stretch.agrees >> (k ^ 2)) & 1 != 0:
+        y += wp.where(k < 2, 2, -2)
+    elif (stretch.agrees >> (k ^ 1)) & 1 != 0:
+        x += wp.where((k & 1) == 0, 2, -2)
+    else:
+        x = -1
+    inside = x >= 0 and y >= 0 and x < lattice.width and y < lattice.height
+    return wp.where(inside, y * lattice.width + x, -1)
 
 
 @wp.func
@@ -150,6 +177,12 @@ def stretch_at(
             found += 1.0
         elif cosine > 0.0:
             stretch.turns |= 1 << k
+    stretch.beyond = wp.vec4i(-1)
+    if stretch.agrees > 0 and stretch.agrees < ALL_CORNERS:
+        for k in range(4):
+            q = point_beyond(lattice, stretch, first, k)
+            if q >= 0 and agreement(images, lattice, surface, i, p, tolerance_m, q) > SMOOTH_COSINE:
+                stretch.beyond[k] = q
     stretch.albedo = world.surfaces[surface].base_color
     stretch.roughness = world.surfaces[surface].roughness
     stretch.texture = world.surfaces[surface].texture
@@ -171,12 +204,26 @@ def stretch_at(
     return stretch, patch, sampler
 
 
+ALL_CORNERS = wp.constant(15)
 # Bits of a cell's pixels: column in the lower two of their numbers, row in the upper two.
 CELL_ROW = wp.constant(4)
+
+_CONTINUED = f"""
+    // Light one step further along a line of two points.
+    auto continued = [](const wp::vec3& near, const wp::vec3& far) {{
+        wp::vec3 light;
+        for (int c = 0; c < 3; ++c) {{
+            const float next = 2.0f * near[c] - far[c], low = {float(CONTINUED_MIN)}f * near[c];
+            light[c] = next < low ? low : next > near[c] ? near[c] : next;
+        }}
+        return light;
+    }};
+"""
 
 _SHADE_STRETCH = (
     SAMPLE_QUAD
     + COAT_QUAD
+    + _CONTINUED
     + """
     const int x1 = x0 + stride < view.width ? x0 + stride : view.width;
     const int y1 = y0 + stride < view.height ? y0 + stride : view.height;
@@ -189,6 +236,23 @@ _SHADE_STRETCH = (
     const int corners[4] = {
         stretch.first, stretch.first + 1,
         stretch.first + stretch.columns, stretch.first + stretch.columns + 1};
+    int sources[4], counted = stretch.agrees;
+    wp::vec3 lit_at[4], rest_at[4];
+    for (int k = 0; k < 4; ++k) {
+        sources[k] = corners[k];
+        const int far = stretch.beyond[k];
+        if (far >= 0) {
+            counted |= 1 << k;
+            sources[k] = corners[stretch.agrees >> (k ^ 2) & 1 ? k ^ 2 : k ^ 1];
+        }
+        const auto& near = lights.data[sources[k]];
+        lit_at[k] = near.diffuse;
+        rest_at[k] = near.rest;
+        if (far >= 0) {
+            lit_at[k] = continued(near.diffuse, lights.data[far].diffuse);
+            rest_at[k] = continued(near.rest, lights.data[far].rest);
+        }
+    }
     const bool textured = stretch.texture >= 0, bumpy = stretch.bumpy != 0;
     int missed = 0;
     for (int rest = mine; rest;) {
@@ -208,7 +272,7 @@ _SHADE_STRETCH = (
         Floats weights[4], total = 0.0f, turned = 0.0f;
         for (int k = 0; k < 4; ++k) {
             const Floats w = (k & 1 ? right : 1.0f - right) * (k & 2 ? lower : 1.0f - lower);
-            weights[k] = stretch.agrees >> k & 1 ? w : zero;
+            weights[k] = counted >> k & 1 ? w : zero;
             total += weights[k];
             turned += stretch.turns >> k & 1 ? w : zero;
         }
@@ -221,7 +285,7 @@ _SHADE_STRETCH = (
             Floats mixable[4] = {zero, zero, zero, zero};
             for (int k = 0; k < 4; ++k)
                 for (int c = 0; c < 4; ++c)
-                    mixable[c] += weights[k] * coats.data[corners[k]][c];
+                    mixable[c] += weights[k] * coats.data[sources[k]][c];
             coat = coat_of(mixable);
         }
 
@@ -321,8 +385,8 @@ _SHADE_STRETCH = (
         for (int c = 0; c < 3; ++c) {
             Floats lit = 0.0f, rest_light = 0.0f;
             for (int k = 0; k < 4; ++k) {
-                lit += weights[k] * lights.data[corners[k]].diffuse[c];
-                rest_light += weights[k] * lights.data[corners[k]].rest[c];
+                lit += weights[k] * lit_at[k][c];
+                rest_light += weights[k] * rest_at[k][c];
             }
             if (covered)
                 color[c] = color[c] * coat.wet + coat.snow * white[c];

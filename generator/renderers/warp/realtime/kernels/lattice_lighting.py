@@ -28,6 +28,7 @@ from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import (
 from gen_data.generator.renderers.warp.scene.kernels.ambient_light import (
     ambient_irradiance,
     ambient_reflection,
+    received_ambience,
     volume_around,
 )
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
@@ -249,7 +250,7 @@ def light_at(
     lamps = sum_lamp_light(world, brdf, n, side, p_world, v, lit, k)
     light = LatticeLight()
     light.towards = lamps.towards
-    ambient = ambient_irradiance(world, p_world, n) * open_sky
+    ambient = received_ambience(world, p_world, n, open_sky)
     mirror = ambient_reflection(world, p_world, n * (2.0 * n_v) - v, brdf.roughness)
     # Lambert: illuminance over pi is luminance per albedo.
     lux = lamps.lux * (1.0 / wp.pi)
@@ -258,7 +259,7 @@ def light_at(
     if wp.dot(side, side) > 0.0:
         # What hides the sky from a leaf hides it from its reflections, at any angle.
         mirrored = wp.min(mirrored, open_sky)
-        behind = lamps.behind * (1.0 / wp.pi) + ambient_irradiance(world, p_world, -n) * open_sky
+        behind = lamps.behind * (1.0 / wp.pi) + received_ambience(world, p_world, -n, open_sky)
         received += wp.cw_mul(material.translucency, behind)
     light.diffuse = wp.cw_mul(brdf.matte, received)
     light.rest = wp.cw_mul(brdf.gloss, mirror) * mirrored + lamps.shine

@@ -676,6 +676,61 @@ def probe_ambient(
         k += 1
 
 
+@wp.func
+def extends_along(lattice: Lattice, i: int, at: int, size: int, step: int):
+    """Whether one of two opposite neighbours lies on a point's surface and is similarly oriented.
+
+    Args:
+        at, size: The point's place in its row or column, and the length of that.
+        step: Index distance of neighbours.
+    """
+    found = bool(False)
+    for k in range(2):
+        way = wp.where(k == 0, -1, 1)
+        if at + way >= 0 and at + way < size:
+            q = i + way * step
+            if lattice.surface[q] == lattice.surface[i]:
+                found = found or wp.dot(lattice.normal[q], lattice.normal[i]) > 0.9
+    return found
+
+
+@wp.func
+def is_on_strip(lattice: Lattice, i: int):
+    """Whether a point's surface is a point wide, in its row or in its column."""
+    x = i % lattice.width
+    y = i / lattice.width
+    wide = extends_along(lattice, i, x, lattice.width, 1)
+    return not (wide and extends_along(lattice, i, y, lattice.height, lattice.width))
+
+
+@wp.kernel
+def share_with_strips(
+    world: World, lattice: Lattice, values: wp.array2d[float], shared: wp.array2d[float]
+):
+    """Give points on strips the mean of their body's points around them that lie on no strip.
+
+    A strip holds too little of a window's pattern of rays: from row to row it would be dark or
+    bright. Leaves keep their values: they are expected to differ.
+    """
+    i = wp.tid()
+    value = values[0, i]
+    if value != UNSEEN and not is_translucent(world, lattice.surface[i]):
+        if is_on_strip(lattice, i):
+            x = i % lattice.width
+            y = i / lattice.width
+            total = float(0.0)
+            found = float(0.0)
+            for v in range(wp.max(y - 1, 0), wp.min(y + 2, lattice.height)):
+                for u in range(wp.max(x - 1, 0), wp.min(x + 2, lattice.width)):
+                    q = v * lattice.width + u
+                    if lattice.body[q] == lattice.body[i] and not is_on_strip(lattice, q):
+                        total += values[0, q]
+                        found += 1.0
+            if found > 0.0:
+                value = total / found
+    shared[0, i] = value
+
+
 @wp.kernel
 def count_free_paths(
     world: World, points: wp.array[wp.vec3], ways: wp.array[wp.vec3], free: wp.array[int]

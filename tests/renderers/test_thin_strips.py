@@ -1,0 +1,99 @@
+"""Light on strips that are narrower than the distance of lattice points, and at rims."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import warp as wp
+
+from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.intrinsics import Intrinsics
+from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
+from gen_data.generator.core.se3 import SE3, Vec3, look_at
+from gen_data.generator.renderers.warp.device import open_device
+from gen_data.generator.renderers.warp.renderer import Images, WarpRenderer
+from gen_data.generator.renderers.warp.scene.kernels.ambient_light import interreflected_share
+from gen_data.generator.renderers.warp.settings import RenderSettings
+from tests.renderers.fake_library import DARK, MATTE, FakeLibrary, box_mesh, plane_mesh
+
+CHANNELS = frozenset({Channel.RADIANCE, Channel.Z_DEPTH, Channel.NORMALS, Channel.INSTANCE})
+
+
+def render(scene: Scene, camera: Camera, library: FakeLibrary, radius_m: float) -> Images:
+    """Images of pixel centres, without anti-aliasing."""
+    settings = RenderSettings(ambient_occlusion_radius_m=radius_m, antialias=1)
+    return WarpRenderer(library, "cpu", settings).render(scene, camera, CHANNELS).channels
+
+
+def camera_rolled(eye_m: Vec3, target_m: Vec3, roll_deg: float) -> Camera:
+    """A camera in which level edges cross rows of pixels."""
+    lens = Intrinsics.from_hfov(240, 120, math.radians(50.0))
+    return Camera("camera", look_at(eye_m, target_m, math.radians(roll_deg)), lens)
+
+
+def points_m(camera: Camera, depth: np.ndarray) -> np.ndarray:
+    """World points of pixel centres, [h, w, 3]."""
+    k = camera.intrinsics
+    v, u = np.mgrid[: k.height_px, : k.width_px] + 0.5
+    ways = np.stack([(u - k.cx_px) / k.fx_px, (v - k.cy_px) / k.fy_px, np.ones_like(u)], axis=-1)
+    return camera.T_world_camera.apply((ways * depth[..., None]).reshape(-1, 3)).reshape(ways.shape)
+
+
+@pytest.mark.parametrize("roll_deg", [0.0, 3.0])
+def test_light_that_falls_towards_a_rim_falls_evenly(roll_deg: float) -> None:
+    """I cos / d^2 in the last rows before the far rim of a floor; there it falls by the row."""
+    lamp = Light("lamp", "sphere", (0.0, 0.0, 0.5), intensity_cd=800.0, radius_m=0.02)
+    scene = Scene("t", (Body("p", "plane", instance_id=1),), lights=(lamp,), environment=DARK)
+    camera = camera_rolled((-2.0, 0.0, 0.5), (2.0, 0.0, 0.0), roll_deg)
+
+    images = render(scene, camera, FakeLibrary({"plane": plane_mesh(4.0, (MATTE,))}), 0.0)
+
+    seen = images[Channel.INSTANCE] > 0
+    p = points_m(camera, np.where(seen, images[Channel.Z_DEPTH], 0.0))
+    d2 = ((p - np.array(lamp.position_m)) ** 2).sum(axis=-1)
+    expected = 800.0 * 0.5 / d2**1.5 * 0.5 / math.pi
+    near_rim = seen & (np.roll(seen, 3, axis=0) != seen)
+    error = np.abs(images[Channel.RADIANCE][..., 1] / expected - 1.0)[near_rim]
+    assert near_rim.sum() > 150
+    assert error.max() < 0.2
+
+
+@pytest.mark.parametrize("roll_deg", [0.0, 2.0, -5.0])
+def test_a_strip_of_a_pixel_is_evenly_lit(roll_deg: float) -> None:
+    """The front of a board on a floor, under an even sky: no pixel differs from the others."""
+    library = FakeLibrary(
+        {"plane": plane_mesh(20.0, (MATTE,)), "board": box_mesh((1.0, 6.0, 0.014), (MATTE,))}
+    )
+    board = Body("b", "board", SE3((0.5, 0.0, 0.007)), instance_id=1)
+    sky = Environment(luminance_cd_m2=100.0, visible=False)
+    scene = Scene("t", (Body("p", "plane"), board), environment=sky)
+    camera = camera_rolled((-2.5, 0.0, 0.6), (0.0, 0.0, 0.0), roll_deg)
+
+    images = render(scene, camera, library, 0.25)
+
+    normals = images[Channel.NORMALS] @ camera.T_world_camera.rotation().T
+    front = (images[Channel.INSTANCE] == 1) & (normals[..., 0] < -0.9)
+    light = images[Channel.RADIANCE][..., 1][front]
+    assert front.sum() > 100
+    assert front.sum(axis=0).max() <= 3
+    assert light.std() / light.mean() < 0.05
+
+
+@wp.kernel
+def share_kernel(shares: wp.array[float], results: wp.array[float]) -> None:
+    """Evaluate ``interreflected_share``."""
+    i = wp.tid()
+    results[i] = interreflected_share(shares[i])
+
+
+def test_the_corner_of_a_room_has_the_light_of_radiosity() -> None:
+    """Two walls of albedo 0.6 that hide half of the room from each other: E = 0.5 + 0.5 * 0.6 E."""
+    device = open_device("cpu")
+    shares = wp.array([0.0, 0.5, 1.0], dtype=float, device=device)
+    results = wp.zeros(3, dtype=float, device=device)
+
+    wp.launch(share_kernel, 3, [shares], [results], device=device)
+
+    assert results.numpy() == pytest.approx([0.0, 0.5 / (1.0 - 0.5 * 0.6), 1.0], abs=0.02)
