@@ -17,7 +17,7 @@ from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.scene import Body, Region, Scene, SupportSurface
-from gen_data.generator.core.se3 import SE3, Array, Vec3, look_at, multiply_quaternions
+from gen_data.generator.core.se3 import VERTICAL, SE3, Array, Vec3, look_at, multiply_quaternions
 
 PRECISION = 1e-6
 """Largest relative error of a share."""
@@ -235,7 +235,8 @@ def _level_pitch(down: float, forward: float, up: float) -> float | None:
         return None
     tilt, rise = math.atan2(down, forward), math.asin(up / length)
     both = (math.remainder(tilt + e, 2.0 * math.pi) for e in (rise, math.pi - rise))
-    return min((p for p in both if abs(p) < 0.5 * math.pi), key=abs, default=None)
+    steepest = math.asin(VERTICAL)
+    return min((p for p in both if abs(p) < steepest), key=abs, default=None)
 
 
 def smallest_and_largest_share(

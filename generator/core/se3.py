@@ -155,6 +155,10 @@ def rotation_to_quaternion(rotation: Array) -> Quaternion:
     return _normalised(q if q[0] >= 0 else [-v for v in q])
 
 
+VERTICAL = 0.999999
+"""Vertical part of a unit vector from which on a camera that looks along it has no level."""
+
+
 def look_at(eye_m: Vec3, target_m: Vec3, roll_rad: float = 0.0) -> SE3:
     """``T_world_camera`` of a camera at ``eye_m`` whose Z axis points at ``target_m``.
 
@@ -170,7 +174,7 @@ def look_at(eye_m: Vec3, target_m: Vec3, roll_rad: float = 0.0) -> SE3:
         raise ValueError("look_at needs a target that differs from the eye")
     forward = forward / length
     # Looking straight up or down leaves "level" undefined: fall back to the world's Y as up.
-    up = np.array([0.0, 0.0, 1.0]) if abs(forward[2]) < 0.999999 else np.array([0.0, 1.0, 0.0])
+    up = np.array([0.0, 0.0, 1.0]) if abs(forward[2]) < VERTICAL else np.array([0.0, 1.0, 0.0])
     right = np.cross(forward, up)
     right = right / math.sqrt(float((right * right).sum()))
     down = np.cross(forward, right)
