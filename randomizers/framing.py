@@ -17,7 +17,7 @@ from gen_data.generator.core.boxes import OrientedBox
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.scene import Body, Region, Scene, SupportSurface
-from gen_data.generator.core.se3 import VERTICAL, SE3, Array, Vec3, look_at, multiply_quaternions
+from gen_data.generator.core.se3 import SE3, VERTICAL, Array, Vec3, look_at, multiply_quaternions
 
 PRECISION = 1e-6
 """Largest relative error of a share."""
