@@ -158,12 +158,12 @@ def test_a_round_says_in_how_many_images_something_was_detected(
     assert tabulate(made, 1.0)["note"].endswith(f"{len(images)} of 40 images have detections")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", [b"[]", b"", b"PK"])
 def test_a_file_that_is_no_detector_is_refused(
     config: Path, data: Path, tmp_path: Path, content: bytes
 ) -> None:
     """With what was expected, and not with torch's own words alone."""
-    pytest.importorskip("torch")
     path = tmp_path / "detector.pt"
     path.write_bytes(content)
 
