@@ -172,11 +172,11 @@ def test_nothing_falls_in_a_room(kind: str) -> None:
 @pytest.mark.slow
 @NEEDS_CATALOGUE
 @pytest.mark.parametrize("kind", KINDS)
-def test_nothing_falls_in_ten_rooms_with_furniture_of_packs(kind: str) -> None:
+def test_nothing_falls_in_five_rooms_with_furniture_of_packs(kind: str) -> None:
     """Models of the catalogue stand, and carry what is on them."""
     assets = open_library((), packs=PACKS)
-    results = [settle(furnished(kind, seed, assets), assets) for seed in range(10)]
-    assert sum(number for number, _ in results) > 20
+    results = [settle(furnished(kind, seed, assets), assets) for seed in range(5)]
+    assert sum(number for number, _ in results) > 10
     assert [fallen for _, fallen in results if fallen] == []
 
 
