@@ -130,8 +130,9 @@ def _read_collada(path: Path) -> list[tuple[str, Array, Array]]:
 
     found = []
     with warnings.catch_warnings():
-        # It multiplies by numpy.matrix.
-        warnings.simplefilter("ignore", PendingDeprecationWarning)
+        # It multiplies by numpy.matrix, and sets the shapes of arrays.
+        for category in (PendingDeprecationWarning, DeprecationWarning):
+            warnings.simplefilter("ignore", category)
         try:
             geometries = list(Collada(str(path)).scene.objects("geometry"))
         except DaeError as error:
