@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -37,7 +37,6 @@ from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.serialization import canonical_json
 
 if TYPE_CHECKING:
-    import pyarrow
     from pyarrow.parquet import ParquetWriter
 
 CHUNK_FILES = 1000
@@ -60,6 +59,23 @@ LABELS = {
 }
 """Features of demonstrations and their types."""
 COUNTERS = ("frame_index", "episode_index", "index", "task_index")
+
+
+@dataclass(frozen=True, slots=True)
+class _Episode:
+    """An episode of a data set.
+
+    Attributes:
+        frames: Its frames, in order.
+        rows: Numbers and texts of each frame by feature.
+        task: Its task in words.
+        stats: Statistics of its frames by feature.
+    """
+
+    frames: Sequence[Frame]
+    rows: Sequence[Mapping[str, Any]]
+    task: str
+    stats: Mapping[str, Any]
 
 
 @dataclass(eq=False)
@@ -86,7 +102,7 @@ class RobotFiles(ABC):
         rows = [self._values(frame.row, k, task_index) for k, frame in enumerate(frames)]
         images = image_statistics([frame.row["images"] for frame in frames])
         stats = number_statistics(rows) | {_image_key(name): one for name, one in images.items()}
-        self._write_episode(frames, rows, task, stats)
+        self._write_episode(_Episode(frames, rows, task, stats))
         self._episodes += 1
         self._frames += len(frames)
 
@@ -95,24 +111,17 @@ class RobotFiles(ABC):
         """Write tasks, statistics and totals."""
 
     @abstractmethod
-    def _write_episode(
-        self,
-        frames: Sequence[Frame],
-        rows: Sequence[Mapping[str, Any]],
-        task: str,
-        stats: Mapping[str, Any],
-    ) -> None: ...
+    def _write_episode(self, episode: _Episode) -> None: ...
 
-    def _tables(
-        self, frames: Sequence[Frame], rows: Sequence[Mapping[str, Any]]
-    ) -> Iterator[pyarrow.Table]:
-        """Rows with images; those of one row group are in memory."""
+    def _write_frames(self, writer: ParquetWriter, episode: _Episode) -> None:
+        """Write the rows of an episode with images; those of one row group are in memory."""
         import pyarrow
 
+        frames = episode.frames
         for start in range(0, len(frames), GROUP_ROWS):
             group = range(start, min(start + GROUP_ROWS, len(frames)))
-            whole = [{**rows[k], **_embedded(self.info, frames[k], k)} for k in group]
-            yield pyarrow.Table.from_pylist(whole, table_schema(self._columns()))
+            whole = [{**episode.rows[k], **_embedded(self.info, frames[k], k)} for k in group]
+            writer.write_table(pyarrow.Table.from_pylist(whole, writer.schema))
 
     def _values(self, row: Mapping[str, Any], frame_index: int, task_index: int) -> dict[str, Any]:
         """Numbers and texts of one frame by feature."""
@@ -210,21 +219,17 @@ class FilesV21(RobotFiles):
         }
         self._write_json("meta/info.json", self._facts() | totals)
 
-    def _write_episode(
-        self,
-        frames: Sequence[Frame],
-        rows: Sequence[Mapping[str, Any]],
-        task: str,
-        stats: Mapping[str, Any],
-    ) -> None:
+    def _write_episode(self, episode: _Episode) -> None:
         number = self._episodes
         chunk = f"chunk-{number // CHUNK_FILES:03d}"
         path = self.folder / f"data/{chunk}/episode_{number:06d}.parquet"
         with open_parquet(path, table_schema(self._columns())) as writer:
-            for table in self._tables(frames, rows):
-                writer.write_table(table, row_group_size=len(table))
-        self._append("episodes", {"episode_index": number, "tasks": [task], "length": len(frames)})
-        self._append("episodes_stats", {"episode_index": number, "stats": stats})
+            self._write_frames(writer, episode)
+        length = len(episode.frames)
+        self._append(
+            "episodes", {"episode_index": number, "tasks": [episode.task], "length": length}
+        )
+        self._append("episodes_stats", {"episode_index": number, "stats": episode.stats})
 
     def _append(self, name: str, row: Mapping[str, Any]) -> None:
         path = self.folder / f"meta/{name}.jsonl"
@@ -242,14 +247,14 @@ class FilesV30(RobotFiles):
     _data: ParquetWriter | None = None
     _file: int = -1
     _file_bytes: int = 0
-    _table: list[dict[str, Any]] = field(default_factory=list)
-    _tables_writer: ParquetWriter | None = None
+    _episode_rows: list[dict[str, Any]] = field(default_factory=list)
+    _episode_writer: ParquetWriter | None = None
     _stats: dict[str, Any] = field(default_factory=dict)
 
     def close(self) -> None:
         """Write the last episodes, tasks, statistics and totals."""
-        self._flush_table()
-        for writer in (self._data, self._tables_writer):
+        self._flush_episodes()
+        for writer in (self._data, self._episode_writer):
             if writer is not None:
                 writer.close()
         _write_tasks(self.folder / "meta/tasks.parquet", self._tasks)
@@ -264,37 +269,31 @@ class FilesV30(RobotFiles):
         }
         self._write_json("meta/info.json", facts | sizes)
 
-    def _write_episode(
-        self,
-        frames: Sequence[Frame],
-        rows: Sequence[Mapping[str, Any]],
-        task: str,
-        stats: Mapping[str, Any],
-    ) -> None:
-        writer = self._open_data(_image_bytes(self.info, frames))
-        for table in self._tables(frames, rows):
-            writer.write_table(table, row_group_size=len(table))
+    def _write_episode(self, episode: _Episode) -> None:
+        length = len(episode.frames)
+        self._write_frames(self._open_data(_image_bytes(self.info, episode.frames)), episode)
         chunk, file = divmod(self._file, CHUNK_FILES)
-        self._table.append(
+        self._episode_rows.append(
             {
                 "episode_index": self._episodes,
                 "data/chunk_index": chunk,
                 "data/file_index": file,
                 "dataset_from_index": self._frames,
-                "dataset_to_index": self._frames + len(frames),
-                "tasks": [task],
-                "length": len(frames),
+                "dataset_to_index": self._frames + length,
+                "tasks": [episode.task],
+                "length": length,
                 "meta/episodes/chunk_index": 0,
                 "meta/episodes/file_index": 0,
                 **{
                     f"stats/{name}/{key}": value
-                    for name, one in stats.items()
+                    for name, one in episode.stats.items()
                     for key, value in one.items()
                 },
             }
         )
-        if len(self._table) == GROUP_ROWS:
-            self._flush_table()
+        if len(self._episode_rows) == GROUP_ROWS:
+            self._flush_episodes()
+        stats = episode.stats
         self._stats = merge_statistics(self._stats, stats) if self._stats else dict(stats)
 
     def _open_data(self, image_bytes: int) -> ParquetWriter:
@@ -309,18 +308,18 @@ class FilesV30(RobotFiles):
         self._file_bytes += image_bytes
         return self._data
 
-    def _flush_table(self) -> None:
+    def _flush_episodes(self) -> None:
         """Write the episodes that are in memory as one row group."""
         import pyarrow
 
-        if not self._table:
+        if not self._episode_rows:
             return
-        schema = table_schema({name: _table_column(name) for name in self._table[0]})
-        if self._tables_writer is None:
+        schema = table_schema({name: _table_column(name) for name in self._episode_rows[0]})
+        if self._episode_writer is None:
             path = self.folder / "meta/episodes/chunk-000/file-000.parquet"
-            self._tables_writer = open_parquet(path, schema)
-        self._tables_writer.write_table(pyarrow.Table.from_pylist(self._table, schema))
-        self._table.clear()
+            self._episode_writer = open_parquet(path, schema)
+        self._episode_writer.write_table(pyarrow.Table.from_pylist(self._episode_rows, schema))
+        self._episode_rows.clear()
 
 
 LAYOUTS: dict[str, type[RobotFiles]] = {layout.version: layout for layout in (FilesV30, FilesV21)}

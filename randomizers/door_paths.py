@@ -56,10 +56,13 @@ class DoorPaths(GroupRandomizer):
             if body.group != self.houses:
                 continue
             for point in assets.keypoints(body.asset):
-                end = self._street_edge(body, point.position_m, gardens)
-                if point.name != DOOR or end is None:
+                if point.name != DOOR:
                     continue
-                asset, pose = _lay(draw_asset(weights, rng), _door(body, point.position_m), end)
+                door_m = _door(body, point.position_m)
+                end_m = self._street_edge(body, door_m, gardens)
+                if end_m is None:
+                    continue
+                asset, pose = _lay(draw_asset(weights, rng), door_m, end_m)
                 footprint = Footprint.of(pose, assets.bounds_m(asset))
                 if ground.is_free(footprint):
                     ground.add(footprint)
@@ -67,8 +70,8 @@ class DoorPaths(GroupRandomizer):
         return add_members(scene, group, members, assets)
 
     def _street_edge(self, house: Body, door_m: Vec3, gardens: list[Lane]) -> Vec3 | None:
-        """Where the way straight ahead from a door leaves the garden [m]; None if none is near."""
-        start, ahead = np.array(_door(house, door_m)), house.T_world_body.rotation()[:2, 0]
+        """Where the way ahead from a door in the world leaves the garden [m]; None if not near."""
+        start, ahead = np.array(door_m), house.T_world_body.rotation()[:2, 0]
         ends: list[tuple[float, float]] = []
         for lane in gardens:
             crossing = _crossing_m(np.array(lane.center_m), start[:2], ahead)
