@@ -19,6 +19,7 @@ from gen_data.generator.core.streams import Rng
 from gen_data.generator.rooms.bodies import OUTSIDE, keypoint_m
 from gen_data.generator.rooms.interreflection import find_interreflection
 from gen_data.generator.rooms.lit_rooms import find_lit_rooms
+from gen_data.generator.rooms.window_niches import find_niches
 from gen_data.randomizers.base import (
     RandomizerBase,
     add_attributes,
@@ -33,6 +34,8 @@ _SHADE_M2 = 0.35
 _BULB_M = 0.06
 _VIEW_MEAN = 0.7
 """What windows send in, relative to the mean outside: houses hide some sky, and panes reflect."""
+_DAYLIGHT: Vec3 = (0.95, 1.0, 1.07)
+"""Colour of what windows send in: between overcast and clear skies."""
 _SKIES = 8
 _NIGHT_CD_M2 = 0.2
 """Assumed mean outdoors by night in towns: a lit street has 1 cd/m^2 (EN 13201-2), a sky 0.01."""
@@ -93,7 +96,10 @@ class RoomLighting(RandomizerBase):
         )
         sun = self._draw_sun(windows, rng, shines=not night)
         lights = (*sun, *panels, *lamps)
-        volumes = find_interreflection(find_lit_rooms(scene, self.room, assets), lights)
+        rooms = find_lit_rooms(scene, self.room, assets)
+        volumes = find_interreflection(rooms, lights)
+        r, g, b = (_VIEW_MEAN * outside * c for c in _DAYLIGHT)
+        volumes += find_niches(rooms, volumes, (r, g, b))
         sky = "night_city" if night else "clear_sky" if sun else "overcast"
         image = f"environment/{sky}?seed={int(rng.random() * _SKIES)}"
         yaw = round(2.0 * math.pi * float(rng.random()), 6)
@@ -181,7 +187,7 @@ def _window_light(
         "rectangle",
         (round(float(x), 5), round(float(y), 5), round(float(z), 5)),
         (c, s, 0.0),
-        (0.95, 1.0, 1.07),
+        _DAYLIGHT,
         size_m=(width, height),
         side=(-s, c, 0.0),
         intensity_cd=round(luminance_cd_m2 * width * height, 3),

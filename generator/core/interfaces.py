@@ -275,15 +275,39 @@ class PhysicsEngine(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class Tones:
+    """Range of what a camera tells apart.
+
+    Attributes:
+        white_cd_m2: Luminance that saturates a single exposure.
+        brightest_cd_m2: Luminance that saturates all exposures that an image is merged from.
+    """
+
+    white_cd_m2: float
+    brightest_cd_m2: float
+
+
+FindTones = Callable[[Float32], Tones]
+"""Finds the tones of an image of radiance [cd/m^2], linear RGB, float32 [h, w, 3]."""
+
+
 class Renderer(Protocol):
     """Renders images and traces rays: a pure function of its arguments, except for caches."""
 
-    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
+    def render(
+        self,
+        scene: Scene,
+        camera: Camera,
+        channels: frozenset[Channel],
+        find_tones: FindTones | None = None,
+    ) -> SensorReading:
         """Render the requested channels of one camera, with types and values as in ``Channel``.
 
         The reading's ``sensor`` is the camera's name. ``AMODAL`` fills its ``silhouettes`` instead
         of its ``channels``. Renderers end at ``RADIANCE``: cameras develop ``RGB`` from it and set
-        ``ev100``.
+        ``ev100``. Cameras whose pixels are means of many photosites give ``find_tones``: the
+        radiance of a pixel on an edge is that whose tone is the mean of its samples' tones.
         """
         ...
 

@@ -443,6 +443,10 @@ class Light:
     body: str = ""
 
 
+VOLUME_REACH_M = 0.12
+"""Reach of irradiance volumes beyond their boxes: of rooms, to frames and leaves of doors."""
+
+
 @dataclass(frozen=True, slots=True)
 class IrradianceVolume:
     """Ambient light inside a box: ambient cubes on a grid of probes.
@@ -472,8 +476,8 @@ class Environment:
         luminance_cd_m2: Mean luminance over the sphere.
         yaw_rad: Rotation about world Z.
         visible: Whether it is visible as background; else the background is black.
-        volumes: Boxes in which other ambient light replaces it, such as rooms; the path-traced tier
-            finds that light itself.
+        volumes: Boxes in which other ambient light replaces it, such as rooms; the last that
+            contains a point counts. The path-traced tier finds that light itself.
     """
 
     image: str = "environment/neutral?seed=0"

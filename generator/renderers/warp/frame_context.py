@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import warp as wp
 
+from gen_data.generator.core.interfaces import FindTones
 from gen_data.generator.core.scene import Camera, Scene
 from gen_data.generator.core.scene_time import scene_at
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
@@ -34,12 +35,14 @@ class RenderContext:
     Attributes:
         paths: The path tracer; None in the realtime tier.
         backdrop: The photograph behind the scene; None if there is none.
+        find_tones: Finds the range in which pixels on edges are means of tones; None = of radiance.
     """
 
     cache: DeviceCache
     settings: RenderSettings
     paths: PathTracer | None = None
     backdrop: Backdrop | None = None
+    find_tones: FindTones | None = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

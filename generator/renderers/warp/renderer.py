@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gen_data.generator.core.capture import Channel, LidarHits, LidarRays, SensorReading
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetLibrary
+from gen_data.generator.core.interfaces import AssetLibrary, FindTones
 from gen_data.generator.core.scene import Camera, Lidar, Scene
 from gen_data.generator.renderers.warp.device import compile_kernels, open_device
 from gen_data.generator.renderers.warp.device_cache import DeviceCache
@@ -75,19 +75,27 @@ class WarpRenderer:
             tracer = PathTracer(self._cache, self._settings)
             self._context = replace(self._context, paths=tracer)
 
-    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
+    def render(
+        self,
+        scene: Scene,
+        camera: Camera,
+        channels: frozenset[Channel],
+        find_tones: FindTones | None = None,
+    ) -> SensorReading:
         """All requested channels of one camera."""
         known = self._labels.of(scene, camera)
         if channels <= known.keys():
             images = {channel: known[channel] for channel in sorted(channels)}
             return SensorReading(camera.name, camera, images, {}, scene.time_s)
-        reading = self._render(scene, camera, channels)
+        reading = self._render(scene, camera, channels, find_tones)
         self._labels.keep(scene, camera, reading)
         return reading
 
-    def _render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
+    def _render(
+        self, scene: Scene, camera: Camera, channels: frozenset[Channel], tones: FindTones | None
+    ) -> SensorReading:
         """As ``render``, in any case."""
-        context = self._with_photo(scene, camera, channels)
+        context = replace(self._with_photo(scene, camera, channels), find_tones=tones)
         reading = expose_shutter(scene, camera, channels, context)
         return reading or self._render_instant(scene, camera, channels, context)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from gen_data.generator.config.distributions import (
 from gen_data.generator.config.yaml_tree import load_yaml
 from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.capture import Channel, SensorReading
-from gen_data.generator.core.interfaces import Renderer
+from gen_data.generator.core.interfaces import FindTones, Renderer, Tones
 from gen_data.generator.core.scene import Camera, Scene, Weather
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.streams import Rng
@@ -44,17 +44,21 @@ from gen_data.generator.sensors.camera.exposure import (
 from gen_data.generator.sensors.camera.image_sensor import (
     ImageSensor,
     expose,
+    expose_colors,
     mosaic,
     scale_filters,
 )
 from gen_data.generator.sensors.camera.isp import Tone, tone_to_bytes, tone_to_display
 from gen_data.generator.sensors.camera.lens_drops import lens_drops, refract_in_drops
+from gen_data.generator.sensors.camera.local_tone import fuse_exposures
 from gen_data.generator.sensors.camera.optics import add_flare, add_glare
 from gen_data.generator.sensors.device_presets import check_preset, preset_path
 
 NONE = Constant(0.0)
 CONTRASTS = 16
 """Steps of contrast per unit."""
+_LEAST_SHARPENED_PX = 0.25
+"""Radius below which unsharp masking changes nothing: a Gaussian spreads a thousandth then."""
 PRESETS = "gen_data.generator.sensors.camera.presets"
 Row = tuple[float, float, float]
 
@@ -79,6 +83,10 @@ class ImagePipeline(Strict):
     Attributes:
         preset: A camera of ``generator/sensors/camera/presets``, which provides defaults for all
             other keys; ``ideal`` has an exposure and a tone curve, and no errors.
+        reduction: Width of the camera's photograph over that of the image: above 1, the image is
+            reduced from a larger photograph. Pixels, photosites and lengths in pixels of all other
+            keys are those of the photograph; each pixel of the image is the mean of
+            ``reduction`` squared of them, after each has its own tone.
         focus: Depth of field; null = everything is sharp.
         flare: Share of the light far beyond white that returns as ghosts.
         glare: Share of all light that the lens scatters around its source; 0.02 suits a clean
@@ -118,13 +126,15 @@ class ImagePipeline(Strict):
         contrast: Slope of the tone at middle grey on logarithmic axes: 1 adds none, 1.3 suits
             most cameras.
         tone: Tone curve, see ``generator/sensors/camera/isp.py``; ``log`` is for sensors with
-            several exposures.
+            several exposures, and so is ``local``, which shows what is dark and what is bright as
+            if each had an exposure of its own, as phones do.
         sharpening: Amount of unsharp masking.
         sharpening_px: Radius of unsharp masking.
         jpeg_quality: Quality of compression, 1 to 100; null = none.
     """
 
     preset: str = "ideal"
+    reduction: float = Field(1.0, ge=1, le=64)
     focus: Focus | None = None
     flare: UnitInterval = NONE
     glare: UnitInterval = NONE
@@ -149,7 +159,7 @@ class ImagePipeline(Strict):
     denoise: float = Field(0.0, ge=0, le=4)
     saturation: NonNegative = Constant(1.0)
     contrast: Annotated[Scalar, Bounds(0.25, 4)] = Constant(1.0)
-    tone: Tone = "filmic"
+    tone: Tone | Literal["local"] = "filmic"
     sharpening: NonNegative = NONE
     sharpening_px: float = Field(1.0, gt=0, le=10)
     jpeg_quality: Annotated[Scalar, Bounds(1, 100)] | None = None
@@ -251,12 +261,23 @@ def capture_photograph(
     depth = Channel.Z_DEPTH if camera.intrinsics.straight else Channel.RANGE
     if pipeline.focus is not None:
         needed = needed | {depth}
-    reading = renderer.render(scene, camera, needed)
+    tones = (_tones_of(camera, pipeline),) if pipeline.reduction > 1.0 else ()
+    reading = renderer.render(scene, camera, needed, *tones)
     radiance = reading.channels[Channel.RADIANCE]
     depth_m = reading.channels.get(depth)
     photo = develop(radiance, depth_m, camera, scene.weather, pipeline, rng, settings_rng)
     images = {k: image for k, image in reading.channels.items() if k in channels}
     return replace(reading, channels={**images, Channel.RGB: photo.rgb}, ev100=photo.ev100)
+
+
+def _tones_of(camera: Camera, pipeline: ImagePipeline) -> FindTones:
+    """Range of the photosites that each pixel is the mean of."""
+
+    def find(radiance: Float32) -> Tones:
+        white = saturation_cd_m2(_set_or_metered(radiance, camera, pipeline))
+        return Tones(white, pipeline.headroom * white)
+
+    return find
 
 
 def develop(
@@ -274,7 +295,7 @@ def develop(
     the noise, and the settings too unless another camera's stream is given for them.
     """
     noise_rng, rng = rng, (settings_rng or rng).of_sequence()
-    ev100 = _metered(radiance, pipeline) if camera.ev100 is None else camera.ev100
+    ev100 = _set_or_metered(radiance, camera, pipeline)
     wanted = ev100 - pipeline.exposure_compensation_ev.draw(rng)
     wanted -= pipeline.exposure_error_ev.draw(rng)
     exposure = ExposureSettings(0.0, 1.0, wanted)
@@ -285,6 +306,10 @@ def develop(
     for stage in STAGES:
         light = stage(light, shot)
     return Photograph(_compress(_tone(light, shot), shot), ev100)
+
+
+def _set_or_metered(radiance: Float32, camera: Camera, pipeline: ImagePipeline) -> float:
+    return _metered(radiance, pipeline) if camera.ev100 is None else camera.ev100
 
 
 def _metered(radiance: Float32, pipeline: ImagePipeline) -> float:
@@ -315,12 +340,13 @@ def _defocus(light: Light, shot: Shot) -> Light:
     if focus is None:
         return light
     assert shot.depth_m is not None, "a camera with a focus renders depth"
-    focal_m = shot.camera.intrinsics.fx_px * focus.pixel_um * 1e-6
+    pitch_m = focus.pixel_um * 1e-6 * shot.pipeline.reduction
+    focal_m = shot.camera.intrinsics.fx_px * pitch_m
     at_m = focus.distance_m
     focus_m = _centre_m(shot.depth_m) if at_m is None else at_m.draw(shot.rng)
     radius_px = optics.blur_radius_px(
         shot.depth_m, max(focus_m, 2.0 * focal_m), focal_m,
-        shot.pipeline.exposure_control.f_number, focus.pixel_um * 1e-6,
+        shot.pipeline.exposure_control.f_number, pitch_m,
     )  # fmt: skip
     return replace(light, values=optics.defocus(light.values, radius_px))
 
@@ -357,15 +383,27 @@ def _image_sensor(light: Light, shot: Shot) -> Light:
         return _white_balance(light, shot)
     camera_from_srgb, srgb_from_camera = _color_matrices(pipeline)
     image = isp.transform_colors(light.values, camera_from_srgb / light.white)
-    received = np.maximum(mosaic(image, sensor.pattern), 0.0)
-    raw = expose(received, shot.exposure.gain, shot.exposure.time_s, sensor, shot.noise_rng)
+    gains = np.ones(3, np.float32)
     share, warmth_ev = pipeline.white_balance.draw(shot.rng), pipeline.warmth_ev.draw(shot.rng)
     if sensor.pattern != "mono":
         gains = isp.white_balance_gains(_illuminant(image, pipeline), share, warmth_ev)
         # No gain is below 1, and the result is clipped: what saturates all channels stays white.
-        raw = scale_filters(raw, sensor.pattern, gains / gains.min())
-    image = isp.demosaic(raw, sensor.pattern, pipeline.demosaic, pipeline.headroom)
+        gains = gains / gains.min()
+    image = _read_sensor(np.maximum(image, 0.0), gains, sensor, shot)
     return Light(isp.transform_colors(image, srgb_from_camera), 1.0)
+
+
+def _read_sensor(image: Float32, gains: Float32, sensor: ImageSensor, shot: Shot) -> Float32:
+    """White-balanced colours [h, w, 3], at most the headroom, from light on photosites."""
+    pipeline, exposure = shot.pipeline, shot.exposure
+    settings = exposure.gain, exposure.time_s, sensor, shot.noise_rng
+    count = pipeline.reduction**2
+    if count > 1.0 and sensor.pattern != "mono":
+        colors = expose_colors(image, *settings, count) * gains
+        return np.minimum(colors, np.float32(pipeline.headroom))
+    raw = expose(mosaic(image, sensor.pattern), *settings, count)
+    raw = scale_filters(raw, sensor.pattern, gains)
+    return isp.demosaic(raw, sensor.pattern, pipeline.demosaic, pipeline.headroom)
 
 
 def _denoise(light: Light, shot: Shot) -> Light:
@@ -373,10 +411,11 @@ def _denoise(light: Light, shot: Shot) -> Light:
     pipeline, sensor = shot.pipeline, shot.pipeline.image_sensor
     if sensor is None or pipeline.denoise == 0.0:
         return light
-    white_e = sensor.full_well_e / shot.exposure.gain
+    count = pipeline.reduction**2
+    white_e = sensor.full_well_e * count / shot.exposure.gain
     if not is_noisy(white_e):
         return light
-    read_noise_e = 0.5 * sum(sensor.read_noise_e.support())
+    read_noise_e = 0.5 * sum(sensor.read_noise_e.support()) * pipeline.reduction
     values = denoise(light.values, white_e, read_noise_e, pipeline.denoise)
     return replace(light, values=values)
 
@@ -411,9 +450,11 @@ Stage = Callable[[Light, Shot], Light]
 
 def _effect(field: str, neutral: float, apply: Callable[[Float32, float], Float32]) -> Stage:
     """A stage that applies a strength, drawn from a field of the pipeline, unless it is neutral."""
+    is_length = field.endswith("_px")
 
     def stage(light: Light, shot: Shot) -> Light:
         drawn = getattr(shot.pipeline, field).draw(shot.rng)
+        drawn = drawn / shot.pipeline.reduction if is_length else drawn
         return light if drawn == neutral else replace(light, values=apply(light.values, drawn))
 
     stage.__name__ = f"_{field.removesuffix('_px')}"
@@ -441,12 +482,18 @@ def _tone(light: Light, shot: Shot) -> NDArray[np.uint8]:
     pipeline, scale = shot.pipeline, 1.0 / light.white
     # On a grid, so that tables of bytes are used again.
     contrast = round(pipeline.contrast.draw(shot.rng) * CONTRASTS) / CONTRASTS
-    curve = pipeline.tone, pipeline.headroom, contrast
     amount = pipeline.sharpening.draw(shot.rng)
-    if amount <= 0.0:
-        return tone_to_bytes(light.values, scale, *curve)
-    display = tone_to_display(light.values, scale, *curve)
-    return isp.sharpen_to_bytes(display, amount, pipeline.sharpening_px)
+    radius_px = pipeline.sharpening_px / pipeline.reduction
+    is_sharpened = amount > 0.0 and radius_px >= _LEAST_SHARPENED_PX
+    if pipeline.tone == "local":
+        display = fuse_exposures(light.values, scale, pipeline.headroom, contrast)
+    elif is_sharpened:
+        display = tone_to_display(light.values, scale, pipeline.tone, pipeline.headroom, contrast)
+    else:
+        return tone_to_bytes(light.values, scale, pipeline.tone, pipeline.headroom, contrast)
+    if is_sharpened:
+        return isp.sharpen_to_bytes(display, amount, radius_px)
+    return isp.to_bytes(display)
 
 
 def _compress(image: NDArray[np.uint8], shot: Shot) -> NDArray[np.uint8]:

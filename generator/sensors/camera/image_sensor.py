@@ -6,6 +6,7 @@ current times time; a gain, read noise and a converter of so many bits follow.
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import Annotated, Literal
 
@@ -81,7 +82,14 @@ def scale_filters(raw: Float32, pattern: Pattern, gains: Float32) -> Float32:
     return scaled
 
 
-def expose(light: Float32, gain: float, time_s: float, sensor: ImageSensor, rng: Rng) -> Float32:
+def expose(
+    light: Float32,
+    gain: float,
+    time_s: float,
+    sensor: ImageSensor,
+    rng: Rng,
+    photosites: float = 1.0,
+) -> Float32:
     """Digital values of an exposure, float32 [h, w], from 0; above 1 only with several exposures.
 
     Args:
@@ -90,31 +98,49 @@ def expose(light: Float32, gain: float, time_s: float, sensor: ImageSensor, rng:
         time_s: Exposure time.
         sensor: Data sheet.
         rng: Draws the noise.
+        photosites: Number of photosites that a pixel is the mean of.
     """
-    merged = _expose_once(light, gain, time_s, sensor, rng)
+    merged = _expose_once(light, gain, time_s, sensor, rng, photosites)
     reach = 1.0
     for _ in range(1, sensor.exposures):
         reach *= sensor.exposure_ratio
-        shorter = _expose_once(light / reach, gain, time_s / reach, sensor, rng)
+        dimmed, short_s = light / reach, time_s / reach
+        shorter = _expose_once(dimmed, gain, short_s, sensor, rng, photosites)
         # Nearly saturated pixels take their value from the next shorter exposure.
         merged = np.where(merged >= 0.95 * reach / sensor.exposure_ratio, shorter * reach, merged)
     return merged.astype(np.float32)
 
 
-def _expose_once(
-    light: Float32, gain: float, time_s: float, sensor: ImageSensor, rng: Rng
+def expose_colors(
+    light: Float32, gain: float, time_s: float, sensor: ImageSensor, rng: Rng, photosites: float
 ) -> Float32:
-    well_e = sensor.full_well_e / gain
-    response, offset_e, dark = _fixed_pattern(light.shape, sensor)
-    dark_e = sensor.dark_current_e_s.draw(rng) * time_s
+    """As ``expose``, of pixels that have photosites behind all filters: float32 [h, w, 3]."""
+    filters = FILTERS[sensor.pattern]
+    shares = [filters.count(k) / len(filters) for k in range(3)]
+    colors = [
+        expose(light[..., k], gain, time_s, sensor, rng, share * photosites)
+        for k, share in enumerate(shares)
+    ]
+    return np.stack(colors, axis=-1)
+
+
+def _expose_once(
+    light: Float32, gain: float, time_s: float, sensor: ImageSensor, rng: Rng, photosites: float
+) -> Float32:
+    """One exposure of means over photosites: their electrons and variances add up."""
+    well_e = sensor.full_well_e * photosites / gain
+    response, offset_e, dark = _fixed_pattern(light.shape, sensor, photosites)
+    dark_e = sensor.dark_current_e_s.draw(rng) * photosites * time_s
     # Beyond eight full wells all pixels saturate: the bound keeps the draw in its range.
     mean_e = np.clip(light, 0.0, 8.0)
     mean_e *= response
     mean_e *= np.float32(well_e)
     mean_e += np.float32(dark_e) * dark
-    level = _read_electrons(mean_e, sensor.read_noise_e.draw(rng), rng)
+    read_noise_e = sensor.read_noise_e.draw(rng) * math.sqrt(photosites)
+    level = _read_electrons(mean_e, read_noise_e, rng)
     level += offset_e - np.float32(dark_e)
-    steps = np.float32((1 << sensor.bits) - 1)
+    # A mean has more levels than its terms.
+    steps = np.float32(((1 << sensor.bits) - 1) * photosites)
     level /= np.float32(well_e)
     level *= steps
     np.clip(np.rint(level, out=level), 0, steps, out=level)
@@ -141,10 +167,15 @@ def _read_electrons(mean_e: Float32, read_noise_e: float, rng: Rng) -> Float32:
 
 
 @lru_cache(maxsize=8)
-def _fixed_pattern(shape: tuple[int, int], sensor: ImageSensor) -> tuple[Float32, Float32, Float32]:
+def _fixed_pattern(
+    shape: tuple[int, int], sensor: ImageSensor, photosites: float
+) -> tuple[Float32, Float32, Float32]:
     """Gain, offset [e] and relative dark current of every pixel of one device, [h, w] each."""
     rng = Streams(seed=sensor.device_seed, scene=0).rng("photosites")
-    response = 1.0 + sensor.prnu * rng.standard_normal(shape, dtype=np.float32)
-    offset_e = sensor.dsnu_e * rng.standard_normal(shape, dtype=np.float32)
-    dark = np.where(rng.random(shape) < sensor.hot_pixels, np.float32(200.0), np.float32(1.0))
+    spread = math.sqrt(photosites)
+    response = 1.0 + sensor.prnu / spread * rng.standard_normal(shape, dtype=np.float32)
+    offset_e = sensor.dsnu_e * spread * rng.standard_normal(shape, dtype=np.float32)
+    is_hot = rng.random(shape) < sensor.hot_pixels
+    # Of a mean, one photosite of many is hot.
+    dark = np.where(is_hot, np.float32(1.0 + 199.0 / photosites), np.float32(1.0))
     return response.astype(np.float32), offset_e.astype(np.float32), dark.astype(np.float32)

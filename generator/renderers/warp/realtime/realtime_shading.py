@@ -13,6 +13,7 @@ import numpy as np
 import warp as wp
 
 from gen_data.generator.core.asset_types import Float32
+from gen_data.generator.core.interfaces import Tones
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.renderers.warp.atmosphere.precipitation import draw_precipitation
 from gen_data.generator.renderers.warp.atmosphere.weather import expose_ground, fill_air
@@ -55,6 +56,8 @@ from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import 
 )
 from gen_data.generator.renderers.warp.visibility.multisampling import draw_samples
 
+RADIANCE = Tones(0.0, 0.0)
+"""No tones: pixels are means of radiance."""
 _PARTS = 2
 """Positions of further samples of pixels on edges in reflections or behind glass."""
 _COVERAGE_SAMPLES = 8
@@ -101,13 +104,15 @@ def _shade_world(frame: CameraView) -> wp.array:
 def smooth_edges(frame: CameraView, radiance: wp.array) -> None:
     """Anti-alias radiance that is not averaged over pixels yet, in place.
 
-    Pixels on edges become the mean of their samples' radiance. Then the foreground of a photograph
-    covers the image.
+    Pixels on edges become the mean of their samples. Then the
+    foreground of a photograph covers the image.
     """
     samples, backdrop = frame.settings.antialias, frame.context.backdrop
     centres = None if backdrop is None else _copy(radiance)
     if frame.context.paths is None and samples > 1:
-        _average_samples(frame, radiance, samples)
+        find = frame.context.find_tones
+        tones = RADIANCE if find is None else find(radiance_image(radiance, frame.view))
+        _average_samples(frame, radiance, samples, tones)
     if backdrop is not None and centres is not None:
         restore_photo(frame, centres, radiance)
         cover_by_foreground(frame, backdrop, radiance)
@@ -121,21 +126,27 @@ def _coverage(frame: CameraView) -> Float32:
     return np.ascontiguousarray(radiance_image(values, frame.view)[..., 0])
 
 
-def _average_samples(frame: CameraView, radiance: wp.array, samples: int) -> None:
-    """Replace the values of pixels on edges by the means of their samples, in place."""
+def _average_samples(
+    frame: CameraView, radiance: wp.array, samples: int, tones: Tones = RADIANCE
+) -> None:
+    """Replace the values of pixels on edges by the means of their samples, in place.
+
+    The means are those of tones in a range, or of radiance.
+    """
     cache, projected = frame.cache, frame.gbuffer.projected
     count = wp.zeros(1, dtype=wp.int32, device=cache.device)
     pixels = cache.scratch("listed pixels", frame.pixels, wp.int32)
     inputs = [frame.view, frame.gbuffer.record]
     frame.launch(find_edges, frame.view.height, inputs, [count, pixels])
     edges = pixels[: int(count.numpy()[0])]
+    limits = tones.white_cd_m2, tones.brightest_cd_m2
     mixed = wp.zeros(max(len(edges), 1), dtype=wp.vec3, device=cache.device)
     inputs = [*frame.inputs, radiance, edges]
     if projected is not None:
         inputs.append(draw_samples(frame, projected, edges, pixel_samples(samples)))
-        frame.launch(mixing.mix_samples, len(edges), inputs, [mixed])
+        frame.launch(mixing.mix_samples, len(edges), [*inputs, *limits], [mixed])
     else:
-        inputs += [cache.constant(wp.vec2, pixel_samples, samples), rasterizer.Z_NEAR_M]
+        inputs += [cache.constant(wp.vec2, pixel_samples, samples), rasterizer.Z_NEAR_M, *limits]
         frame.launch(edge_antialiasing.antialias, len(edges), inputs, [mixed])
     frame.launch(write_mixed, len(edges), [edges, mixed], [radiance])
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import warp as wp
 
+from gen_data.generator.core.scene import VOLUME_REACH_M
 from gen_data.generator.renderers.warp.scene.kernels.environment_lighting import (
     sky_irradiance,
     sky_reflection,
@@ -15,13 +16,12 @@ from gen_data.generator.renderers.warp.scene.kernels.records import World, floor
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
-MARGIN_M = wp.constant(0.12)
-"""Reach of volumes beyond their boxes: reveals of windows, and leaves of doors."""
+MARGIN_M = wp.constant(VOLUME_REACH_M)
 
 
 @wp.func
 def volume_around(world: World, p: wp.vec3):
-    """Number of the volume that contains a point; -1 = none."""
+    """Number of the last volume that reaches a point; -1 = none."""
     found = int(-1)
     for i in range(world.volumes.shape[0]):
         low = p - world.volumes[i].low_m

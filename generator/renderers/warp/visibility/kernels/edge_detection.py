@@ -17,6 +17,8 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 
 # Faces that meet at less than 25 degrees count as one surface.
 CREASE_COSINE = wp.constant(0.9)
+# Share of white below which tones are proportional to radiance.
+DARK = wp.constant(0.05)
 # Pixels that are tested together.
 GROUP_PX = wp.constant(8)
 # Positions in a 3 x 3 block, row by row, as hexadecimal digits from the last: centre, sides,
@@ -134,6 +136,31 @@ def most_similar_normal(
                 best = cosine
                 found = j
     return found
+
+
+@wp.func
+def to_tone(radiance: wp.vec3, white: float, brightest: float):
+    """Value of which a pixel is the mean over its samples; radiance if ``white`` is 0.
+
+    A pixel of an image reduced from a larger one is the mean of tones: they saturate, and below
+    that they are nearly logarithms (as the mu-law of gen_data.generator.sensors.camera.isp).
+    """
+    tone = radiance
+    if white > 0.0:
+        for k in range(3):
+            level = wp.clamp(radiance[k], 0.0, brightest)
+            tone[k] = wp.log(level + DARK * white)
+    return tone
+
+
+@wp.func
+def from_tone(tone: wp.vec3, white: float):
+    """Radiance of a value by ``to_tone``."""
+    radiance = tone
+    if white > 0.0:
+        for k in range(3):
+            radiance[k] = wp.max(wp.exp(tone[k]) - DARK * white, 0.0)
+    return radiance
 
 
 @wp.kernel

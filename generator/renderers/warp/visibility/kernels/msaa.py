@@ -23,7 +23,9 @@ from gen_data.generator.renderers.warp.visibility.kernels.alpha_cutouts import (
 )
 from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import (
     BLOCK,
+    from_tone,
     most_similar_normal,
+    to_tone,
 )
 from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
     SCAN,
@@ -305,6 +307,8 @@ def mix_samples(
     radiance: wp.array[wp.vec3],
     pixels: wp.array[int],
     hits: wp.array2d[wp.vec2i],
+    white: float,
+    brightest: float,
     mixed: wp.array[wp.vec3],
 ):
     """Radiance of listed pixels: the mean over their samples, in the order of the list."""
@@ -322,8 +326,8 @@ def mix_samples(
             source = color_source(view, world, images, x, y, hit)
             last = hit
         if source >= 0:
-            total += radiance[source]
+            total += to_tone(radiance[source], white, brightest)
             lit += 1
     mixed[row] = radiance[i]
     if lit > 0:
-        mixed[row] = total * (1.0 / float(lit))
+        mixed[row] = from_tone(total * (1.0 / float(lit)), white)
