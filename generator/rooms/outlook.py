@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from gen_data.generator.assets.scenery.horizons import FOREST_M, TREE_LINE_M
+from gen_data.generator.assets.scenery.townscapes import TOWN_M
 from gen_data.generator.core.se3 import SE3
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.rooms.floor_plan import Room, between, draw_count, outer_radius_m
@@ -22,6 +24,13 @@ _HOUSES = (
     ("building/house", 96),
     ("building/old_town", 96),
 )
+_FAR = (
+    ("horizon/trees", 8, TREE_LINE_M),
+    ("horizon/town", 8, TOWN_M),
+    ("horizon/forest", 6, FOREST_M),
+)
+"""Families that close the view, numbers of their variants, and lengths of a piece [m]."""
+_FAR_M = 75.0
 _GROUNDS = ("texture/grass", "texture/grass", "texture/paving", "texture/asphalt")
 _VARIANTS = 24
 """Of the variants of each family, so many are used: the first rooms of a data set know them all."""
@@ -46,7 +55,7 @@ def outlook_assets() -> tuple[str, ...]:
     """Ids of everything that may stand outside, and of its ground's textures."""
     things = sorted(
         f"{family}?seed={seed}"
-        for family, variants in {*_NEAR, *_HOUSES}
+        for family, variants, *_ in {*_NEAR, *_HOUSES, *_FAR}
         for seed in range(min(variants, _VARIANTS))
     )
     return (*things, *sorted({f"{ground}?seed={k}" for ground in _GROUNDS for k in range(4)}))
@@ -72,5 +81,19 @@ def draw_outlook(rooms: Sequence[Room], rng: Rng) -> Outlook:
             # Fronts face the building, roughly, as along streets.
             yaw = turn + math.pi + between(rng, (-0.3, 0.3))
             things.append((f"{family}?seed={seed}", SE3.about_z(yaw, at).rounded()))
+    things += _end_of_view(ground_m, rng)
     ground = f"{_GROUNDS[draw_count(rng, (0, len(_GROUNDS) - 1))]}?seed={draw_count(rng, (0, 3))}"
     return Outlook(ground, ground_m, tuple(things))
+
+
+def _end_of_view(ground_m: float, rng: Rng) -> list[tuple[str, SE3]]:
+    """Pieces of a wood all around, which hide where the ground ends."""
+    family, variants, length_m = _FAR[draw_count(rng, (0, len(_FAR) - 1))]
+    count = math.ceil(2.0 * math.pi * _FAR_M / length_m)
+    first, pieces = between(rng, (0.0, 2.0 * math.pi)), []
+    for k in range(count):
+        turn = first + 2.0 * math.pi * k / count
+        at = (_FAR_M * math.cos(turn), _FAR_M * math.sin(turn), -ground_m)
+        seed = draw_count(rng, (0, variants - 1))
+        pieces.append((f"{family}?seed={seed}", SE3.about_z(turn + math.pi, at).rounded()))
+    return pieces

@@ -127,10 +127,10 @@ class WarpRenderer:
             channels = channels | {Channel.INSTANCE}
         images = label_images(frame, channels)
         if Channel.RADIANCE in channels:
-            radiance = shade_pixels(frame)
-            smooth_edges(frame, radiance)
-            add_precipitation(frame, gbuffer.z_m, radiance)
-            images[Channel.RADIANCE] = radiance_image(radiance, view)
+            shading = shade_pixels(frame)
+            smooth_edges(shading)
+            add_precipitation(frame, gbuffer.z_m, shading.radiance)
+            images[Channel.RADIANCE] = radiance_image(shading.radiance, view)
         outlines = {}
         if Channel.AMODAL in channels:
             outlines = render_silhouettes(frame, images[Channel.INSTANCE])

@@ -163,9 +163,9 @@ def integrate_light(rendered: CameraView) -> wp.array:
     """Radiance of every pixel, anti-aliased, flat; valid until the next call."""
     # Shading changes the world's record, from which other instants start.
     rendered = replace(rendered, world=copy_world(rendered.world))
-    radiance = shade_pixels(rendered)
-    smooth_edges(rendered, radiance)
-    return radiance
+    shading = shade_pixels(rendered)
+    smooth_edges(shading)
+    return shading.radiance
 
 
 def _keep_main_lamps(reference: CameraView) -> CameraView:

@@ -20,7 +20,7 @@ from gen_data.generator.core.asset_types import Float32
 from gen_data.generator.core.colorimetry import luminance
 from gen_data.generator.sensors.camera.isp import Tone, display_values, tone_to_display
 
-_LONG = 1.4
+_LONG = 1.3
 """Gain of the bright version: rooms are shown brighter than a single exposure may (assumed)."""
 _CURVE: Tone = "knee"
 _FULL = 0.8

@@ -38,12 +38,13 @@ from gen_data.generator.renderers.warp.realtime.kernels import (
     soft_shadows,
 )
 from gen_data.generator.renderers.warp.realtime.kernels.lattice import Lattice, sample_lattice
-from gen_data.generator.renderers.warp.scene.kernels import records
+from gen_data.generator.renderers.warp.scene.kernels import ray_queries, records
 from gen_data.generator.renderers.warp.scene.light_selection import (
     extract_sky_lights,
     keep_main_lamps,
 )
 from gen_data.generator.renderers.warp.scene.struct_dtypes import take_rows
+from gen_data.generator.renderers.warp.visibility.gbuffer import GBuffer
 from gen_data.generator.renderers.warp.visibility.kernels import (
     distortion,
     edge_antialiasing,
@@ -56,63 +57,96 @@ from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import 
 )
 from gen_data.generator.renderers.warp.visibility.multisampling import draw_samples
 
-RADIANCE = Tones(0.0, 0.0)
-"""No tones: pixels are means of radiance."""
 _PARTS = 2
 """Positions of further samples of pixels on edges in reflections or behind glass."""
 _COVERAGE_SAMPLES = 8
 """Samples per pixel on edges that determine what covers a photograph."""
 
 
-def shade_pixels(frame: CameraView) -> wp.array:
-    """Radiance of all pixels through the air [cd/m^2], linear RGB, flat; scratch memory.
+@dataclass(frozen=True, eq=False, slots=True)
+class LightVisibility:
+    """Visibility of lights from the lattice's points.
+
+    Attributes:
+        lit: Visible fraction of each lamp, [lamps, points]; UNSEEN where it has no effect.
+        open_sky: Visible fraction of the hemisphere, [1, points].
+    """
+
+    lit: wp.array
+    open_sky: wp.array
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Shading:
+    """Shaded pixels, and the light in which more points of their surfaces can be shaded.
+
+    Attributes:
+        frame: The view, with the lights that count.
+        radiance: Of all pixels [cd/m^2], linear RGB, flat; scratch memory.
+        lattice: Points at which light was found; None in the path-traced tier.
+        around: Light there.
+    """
+
+    frame: CameraView
+    radiance: wp.array
+    lattice: Lattice | None = None
+    around: LightVisibility | None = None
+
+
+def shade_pixels(frame: CameraView) -> Shading:
+    """Radiance of all pixels through the air.
 
     The realtime tier shades pixel centres, which ``smooth_edges`` anti-aliases.
     """
-    radiance = _shade_world(frame)
+    shading = _shade_world(frame)
     backdrop = frame.context.backdrop
     if backdrop is None:
-        return radiance
+        return shading
     if frame.context.paths is None:
-        show_photo(frame, backdrop, radiance)
+        show_photo(frame, backdrop, shading.radiance)
     else:
-        mix_photo(frame, backdrop, _coverage(frame), radiance)
-    return radiance
+        mix_photo(frame, backdrop, _coverage(frame), shading.radiance)
+    return shading
 
 
 def render_bare_ground(state: CameraState, context: RenderContext) -> wp.array:
     """Radiance of the ground of a photograph without the things on it, flat."""
     bare = CameraState.of(without_things(state.scene), state.camera)
     frame = render_view(bare, replace(context, backdrop=None))
-    return _copy(shade_pixels(frame))
+    return _copy(shade_pixels(frame).radiance)
 
 
-def _shade_world(frame: CameraView) -> wp.array:
+def _shade_world(frame: CameraView) -> Shading:
     """As ``shade_pixels``, without a photograph."""
     if frame.context.paths is not None:
-        return frame.context.paths.light(frame)
+        return Shading(frame, frame.context.paths.light(frame))
     if frame.settings.environment_shadow == "auto":
         frame = replace(frame, world=extract_sky_lights(frame))
     keep_main_lamps(frame)
     lattice = make_lattice(frame)
-    radiance = _shade(frame, lattice)
+    expose_ground(frame, lattice)
+    around = find_light_visibility(frame, lattice)
+    radiance = _shade(frame, lattice, around)
     fill_air(frame, lattice, radiance)
     darken_outside(frame.view, radiance)
-    return radiance
+    return Shading(frame, radiance, lattice, around)
 
 
-def smooth_edges(frame: CameraView, radiance: wp.array) -> None:
+def smooth_edges(shading: Shading) -> None:
     """Anti-alias radiance that is not averaged over pixels yet, in place.
 
-    Pixels on edges become the mean of their samples. Then the
-    foreground of a photograph covers the image.
+    Pixels on edges become the mean of their samples. Then the foreground of a photograph covers the
+    image.
     """
+    frame, radiance = shading.frame, shading.radiance
     samples, backdrop = frame.settings.antialias, frame.context.backdrop
     centres = None if backdrop is None else _copy(radiance)
     if frame.context.paths is None and samples > 1:
         find = frame.context.find_tones
-        tones = RADIANCE if find is None else find(radiance_image(radiance, frame.view))
-        _average_samples(frame, radiance, samples, tones)
+        if find is None:
+            _average_samples(frame, radiance, samples)
+        else:
+            _average_tones(shading, samples, find(radiance_image(radiance, frame.view)))
     if backdrop is not None and centres is not None:
         restore_photo(frame, centres, radiance)
         cover_by_foreground(frame, backdrop, radiance)
@@ -126,29 +160,81 @@ def _coverage(frame: CameraView) -> Float32:
     return np.ascontiguousarray(radiance_image(values, frame.view)[..., 0])
 
 
-def _average_samples(
-    frame: CameraView, radiance: wp.array, samples: int, tones: Tones = RADIANCE
-) -> None:
-    """Replace the values of pixels on edges by the means of their samples, in place.
-
-    The means are those of tones in a range, or of radiance.
-    """
+def _average_samples(frame: CameraView, radiance: wp.array, samples: int) -> None:
+    """Replace the values of pixels on edges by the means of their samples, in place."""
     cache, projected = frame.cache, frame.gbuffer.projected
+    edges = _find_edges(frame)
+    mixed = wp.zeros(max(len(edges), 1), dtype=wp.vec3, device=cache.device)
+    inputs = [*frame.inputs, radiance, edges]
+    if projected is not None:
+        hits = draw_samples(frame, projected, edges, pixel_samples(samples))
+        nothing = [records.GBufferRecord(), wp.empty(0, dtype=wp.vec3, device=cache.device)]
+        frame.launch(mixing.mix_samples, len(edges), [*inputs, hits, *nothing, 0.0, 0.0], [mixed])
+    else:
+        inputs += [cache.constant(wp.vec2, pixel_samples, samples), rasterizer.Z_NEAR_M]
+        frame.launch(edge_antialiasing.antialias, len(edges), inputs, [mixed])
+    frame.launch(write_mixed, len(edges), [edges, mixed], [radiance])
+
+
+def _average_tones(shading: Shading, samples: int, tones: Tones) -> None:
+    """As ``_average_samples``, for pixels that are means of photosites, each with its own tone.
+
+    Surfaces that no centre nearby shows, such as the rounded edges of boards, are shaded.
+    """
+    frame, radiance, cache = shading.frame, shading.radiance, shading.frame.cache
+    edges = _find_edges(frame)
+    offsets = cache.constant(wp.vec2, pixel_samples, samples)
+    if frame.gbuffer.projected is not None:
+        hits = draw_samples(frame, frame.gbuffer.projected, edges, pixel_samples(samples))
+    else:
+        shape = (max(len(edges), 1), samples)
+        hits = cache.scratch("sample hits", shape, wp.vec2i)
+        inputs = [frame.view, frame.world.record, edges, offsets, rasterizer.Z_NEAR_M]
+        frame.launch(ray_queries.trace_samples, (len(edges), samples), inputs, [hits])
+    thin, thin_radiance = _shade_thin(shading, edges, hits, offsets)
+    mixed = wp.zeros(max(len(edges), 1), dtype=wp.vec3, device=cache.device)
+    inputs = [*frame.inputs, radiance, edges, hits, thin.record, thin_radiance]
+    limits = [tones.white_cd_m2, tones.brightest_cd_m2]
+    frame.launch(mixing.mix_samples, len(edges), [*inputs, *limits], [mixed])
+    frame.launch(write_mixed, len(edges), [edges, mixed], [radiance])
+
+
+def _find_edges(frame: CameraView) -> wp.array:
+    """Numbers of the pixels that edges may cross; scratch memory."""
+    cache = frame.cache
     count = wp.zeros(1, dtype=wp.int32, device=cache.device)
     pixels = cache.scratch("listed pixels", frame.pixels, wp.int32)
     inputs = [frame.view, frame.gbuffer.record]
     frame.launch(find_edges, frame.view.height, inputs, [count, pixels])
-    edges = pixels[: int(count.numpy()[0])]
-    limits = tones.white_cd_m2, tones.brightest_cd_m2
-    mixed = wp.zeros(max(len(edges), 1), dtype=wp.vec3, device=cache.device)
-    inputs = [*frame.inputs, radiance, edges]
-    if projected is not None:
-        inputs.append(draw_samples(frame, projected, edges, pixel_samples(samples)))
-        frame.launch(mixing.mix_samples, len(edges), [*inputs, *limits], [mixed])
-    else:
-        inputs += [cache.constant(wp.vec2, pixel_samples, samples), rasterizer.Z_NEAR_M, *limits]
-        frame.launch(edge_antialiasing.antialias, len(edges), inputs, [mixed])
-    frame.launch(write_mixed, len(edges), [edges, mixed], [radiance])
+    return pixels[: int(count.numpy()[0])]
+
+
+def _shade_thin(
+    shading: Shading, edges: wp.array, hits: wp.array, offsets: wp.array
+) -> tuple[GBuffer, wp.array]:
+    """Surfaces within pixels on edges that no centre nearby shows, and their radiance."""
+    frame, cache, n = shading.frame, shading.frame.cache, shading.frame.pixels
+    thin = GBuffer(
+        cache.scratch("thin hits", n, wp.vec2i),
+        cache.scratch("thin z", n, float),
+        cache.scratch("thin weights", n, wp.vec2),
+        cache.scratch("thin normals", n, wp.vec3),
+        None,
+    )
+    radiance = cache.scratch("thin radiance", n, wp.vec3)
+    count = wp.zeros(1, dtype=wp.int32, device=cache.device)
+    pixels = cache.scratch("thin pixels", n, wp.int32)
+    inputs = [*frame.inputs, edges, hits, offsets, thin.record]
+    frame.launch(mixing.find_thin, len(edges), inputs, [count, pixels])
+    assert shading.lattice is not None, "the realtime tier has a lattice"
+    assert shading.around is not None, "light was found there"
+    view = replace(frame, gbuffer=thin)
+    number = int(count.numpy()[0])
+    listed, probe = _light_listed(view, shading.lattice, shading.around, pixels, number)
+    frame.launch(lattice_lighting.shade_points, number, [*view.inputs, listed], [radiance])
+    if frame.world.layered:
+        _shade_layers(view, number, listed, probe, radiance)
+    return thin, radiance
 
 
 def add_precipitation(frame: CameraView, z_m: wp.array, radiance: wp.array) -> None:
@@ -176,27 +262,39 @@ def darken_outside(view: records.View, radiance: wp.array) -> None:
         wp.launch(distortion.darken_outside, n, [view], [radiance], device=radiance.device)
 
 
-def _shade(frame: CameraView, lattice: Lattice) -> wp.array:
+def _shade(frame: CameraView, lattice: Lattice, around: LightVisibility) -> wp.array:
     """Radiance at all pixel centres [cd/m^2], linear RGB, flat."""
-    cache, settings = frame.cache, frame.settings
-    expose_ground(frame, lattice)
+    cache = frame.cache
     radiance = cache.scratch("radiance", frame.pixels, wp.vec3)
-    around = find_light_visibility(frame, lattice)
     corners = lattice.width * lattice.height
     lights = cache.scratch("lights", corners, lattice_lighting.LatticeLight)
     coats = cache.scratch("coats", corners, wp.vec4)
     seen = [*frame.inputs, lattice, around.lit, around.open_sky]
     frame.launch(lattice_lighting.light_lattice, corners, seen, [lights, coats])
     count = wp.zeros(1, dtype=wp.int32, device=cache.device)
-    listed = lattice_lighting.ListedPixels()
-    listed.pixels = cache.scratch("listed pixels", frame.pixels, wp.int32)
+    pixels = cache.scratch("listed pixels", frame.pixels, wp.int32)
     # One thread per row on the CPU, where threads run one after the other anyway.
     cells = lattice.width - 1
     run = cells if cache.device.is_cpu else 1
     inputs, shape = [*frame.inputs, lattice, lights, coats, run], (lattice.height - 1, cells // run)
-    outputs = [count, listed.pixels, radiance]
-    frame.launch(lattice_interpolation.gather_light, shape, inputs, outputs)
+    frame.launch(lattice_interpolation.gather_light, shape, inputs, [count, pixels, radiance])
     number = int(count.numpy()[0])
+    listed, probe = _light_listed(frame, lattice, around, pixels, number)
+    frame.launch(lattice_lighting.shade_points, number, [*frame.inputs, listed], [radiance])
+    if frame.world.layered:
+        _shade_layers(frame, number, listed, probe, radiance)
+        if frame.settings.antialias > 1:
+            _refine_layers(frame, number, listed, probe, radiance)
+    return radiance
+
+
+def _light_listed(
+    frame: CameraView, lattice: Lattice, around: LightVisibility, pixels: wp.array, number: int
+) -> tuple[lattice_lighting.ListedPixels, lattice_lighting.Probe]:
+    """Light at those ``number`` pixels, and how rays from there find more."""
+    cache, settings = frame.cache, frame.settings
+    listed = lattice_lighting.ListedPixels()
+    listed.pixels = pixels
     # Powers of two, so that scratch memory seldom grows, plus a little: rows of lamps a power of
     # two apart would collide in the processor's cache.
     room = (1 << number.bit_length()) + 48
@@ -209,12 +307,11 @@ def _shade(frame: CameraView, lattice: Lattice) -> wp.array:
     probe.centre = cache.constant(wp.vec2, lamp_samples, 1, "hard")
     probe.few = cache.constant(wp.vec2, _dealt_sunflower, 2, 1)
     probe.radius_m = settings.ambient_occlusion_radius_m
-    frame.launch(lattice_lighting.find_pixel_visibility, number, [*seen, probe, listed])
-    frame.launch(lattice_lighting.shade_points, number, [*frame.inputs, listed], [radiance])
     if frame.world.layered:
         probe.lit = cache.scratch("lit where rays end", listed.lit.shape, float)
-        _shade_layers(frame, number, listed, probe, radiance)
-    return radiance
+    inputs = [*frame.inputs, lattice, around.lit, around.open_sky, probe, listed]
+    frame.launch(lattice_lighting.find_pixel_visibility, number, inputs)
+    return listed, probe
 
 
 def _shade_layers(
@@ -224,17 +321,25 @@ def _shade_layers(
     probe: lattice_lighting.Probe,
     radiance: wp.array,
 ) -> None:
-    """Shade those of ``number`` listed pixels that show layered surfaces, in place.
-
-    Pixels with edges in reflections or behind glass take a second sample.
-    """
+    """Shade those of ``number`` listed pixels that show layered surfaces, in place."""
     # A module of its own: scenes without such surfaces neither compile nor load it.
     from gen_data.generator.renderers.warp.realtime.kernels import clearcoat_glass
 
+    inputs = [*frame.inputs, listed, probe]
+    frame.launch(clearcoat_glass.shade_layers, number, inputs, [radiance])
+
+
+def _refine_layers(
+    frame: CameraView,
+    number: int,
+    listed: lattice_lighting.ListedPixels,
+    probe: lattice_lighting.Probe,
+    radiance: wp.array,
+) -> None:
+    """Take more samples of layered pixels with edges in reflections or behind glass, in place."""
+    from gen_data.generator.renderers.warp.realtime.kernels import clearcoat_glass
+
     cache = frame.cache
-    frame.launch(clearcoat_glass.shade_layers, number, [*frame.inputs, listed, probe], [radiance])
-    if frame.settings.antialias == 1:
-        return
     count = wp.zeros(1, dtype=wp.int32, device=cache.device)
     places = cache.scratch("contrasts", frame.pixels, wp.int32)
     inputs = [*frame.inputs, listed, radiance]
@@ -255,19 +360,6 @@ _BLOCK = int(soft_shadows.BLOCK)
 _LIST_LENGTH = int(shadow_culling.LIST_LENGTH)
 # Column of the sample in each row of a pixel, far from those of neighbouring rows (n-rooks).
 _ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class LightVisibility:
-    """Visibility of lights from the lattice's points.
-
-    Attributes:
-        lit: Visible fraction of each lamp, [lamps, points]; UNSEEN where it has no effect.
-        open_sky: Visible fraction of the hemisphere, [1, points].
-    """
-
-    lit: wp.array
-    open_sky: wp.array
 
 
 def make_lattice(frame: CameraView) -> Lattice:

@@ -30,6 +30,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     is_in_view,
     max_of_two,
     min_of_two,
+    pixel_direction,
     pixel_ray,
     reciprocals,
     slab_interval,
@@ -143,6 +144,27 @@ def trace_pixels(view: View, world: World, t_min: float, hits: wp.array[wp.vec2i
     if is_in_view(view, i):
         hit = closest_hit(world, view.eye_m + d * t_min, d, FARTHEST, HOLES).at
     hits[i] = hit
+
+
+@wp.kernel
+def trace_samples(
+    view: View,
+    world: World,
+    pixels: wp.array[int],
+    offsets: wp.array[wp.vec2],
+    t_min: float,
+    hits: wp.array2d[wp.vec2i],
+):
+    """Nearest (body, face) at sample positions within listed pixels, [0, 1)."""
+    row, s = wp.tid()
+    i = pixels[row]
+    hit = wp.vec2i(-1, -1)
+    if is_in_view(view, i):
+        x_px = float(i % view.width) + offsets[s][0]
+        y_px = float(i / view.width) + offsets[s][1]
+        d = view.R_world_camera @ pixel_direction(view, x_px, y_px)
+        hit = closest_hit(world, view.eye_m + d * t_min, d, FARTHEST, HOLES).at
+    hits[row, s] = hit
 
 
 @wp.struct

@@ -24,10 +24,8 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     to_mesh_vector,
 )
 from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import (
-    from_tone,
     most_similar_normal,
     neighbour_pixel,
-    to_tone,
 )
 from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import make_facet
 
@@ -148,8 +146,6 @@ def antialias(
     pixels: wp.array[int],
     offsets: wp.array[wp.vec2],
     t_min: float,
-    white: float,
-    brightest: float,
     mixed: wp.array[wp.vec3],
 ):
     """Radiance of listed pixels: the mean over their samples, in the order of the list.
@@ -157,8 +153,6 @@ def antialias(
     Args:
         offsets: At most eight sample positions within the pixel, [0, 1).
         t_min: z-depth of the near plane.
-        white: Radiance that saturates one exposure; 0 = the mean is one of radiance.
-        brightest: Radiance that saturates all exposures.
     """
     row = wp.tid()
     i = pixels[row]
@@ -184,7 +178,7 @@ def antialias(
             # No visible face nearby covers the sample: other faces of the same bodies may.
             source = trace_source(view, world, images, x, y, x_px, y_px, t_min)
         if source >= 0:
-            total += to_tone(radiance[source], white, brightest)
+            total += radiance[source]
             lit += 1
     if lit > 0:
-        mixed[row] = from_tone(total * (1.0 / float(lit)), white)
+        mixed[row] = total * (1.0 / float(lit))

@@ -88,6 +88,34 @@ def face_viewer(n: wp.vec3, d_world: wp.vec3):
     return m
 
 
+@wp.struct
+class Point:
+    """A point of a face at a point of the image; fields as ``resolve`` stores them."""
+
+    way: wp.vec3
+    weight: wp.vec2
+    normal: wp.vec3
+
+
+@wp.func
+def point_at(view: View, world: World, hit: wp.vec2i, x_px: float, y_px: float):
+    """Intersection of a pixel's ray with the plane of a face."""
+    facet = make_facet(world, hit)
+    d = pixel_direction(view, x_px, y_px)
+    det = wp.dot(d, facet.across)
+    inverse = 1.0 / wp.where(wp.abs(det) < 1.0e-30, 1.0e-30, det)
+    # Subpixel rays may miss the face: clamped to its edge, whose attributes are defined.
+    u = wp.clamp(wp.dot(d, facet.along_u) * inverse, 0.0, 1.0)
+    v = wp.clamp(wp.dot(d, facet.along_v) * inverse, 0.0, 1.0 - u)
+    side = wp.where(det < 0.0, -1.0, 1.0)
+    d_world = view.R_world_camera @ d
+    point = Point()
+    point.way = d_world * (facet.depth * inverse)
+    point.weight = wp.vec2(u + 1.0 - side, v)
+    point.normal = face_viewer((facet.n + facet.n_u * u + facet.n_v * v) * side, d_world)
+    return point
+
+
 @wp.kernel
 def resolve(
     view: View,

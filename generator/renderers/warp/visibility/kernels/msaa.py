@@ -14,6 +14,7 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     View,
     World,
     flat_normal,
+    pixel_direction,
 )
 from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 from gen_data.generator.renderers.warp.visibility.kernels.alpha_cutouts import (
@@ -23,10 +24,12 @@ from gen_data.generator.renderers.warp.visibility.kernels.alpha_cutouts import (
 )
 from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import (
     BLOCK,
+    CREASE_COSINE,
     from_tone,
     most_similar_normal,
     to_tone,
 )
+from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import point_at
 from gen_data.generator.renderers.warp.visibility.kernels.rasterizer import (
     SCAN,
     UNSNAPPED,
@@ -299,6 +302,65 @@ def color_source(view: View, world: World, images: GBufferRecord, x: int, y: int
     return source
 
 
+@wp.func
+def shows_like(world: World, images: GBufferRecord, source: int, hit: wp.vec2i):
+    """Whether a pixel's colour suits a (body, face): it shows that, or one that faces alike."""
+    alike = bool(False)
+    if source >= 0:
+        shown = images.hits[source]
+        alike = shown[0] == hit[0] and shown[1] == hit[1]
+        if not alike:
+            cosine = wp.dot(images.normals[source], flat_normal(world, hit))
+            alike = wp.abs(cosine) > CREASE_COSINE
+    return alike
+
+
+@wp.kernel
+def find_thin(
+    view: View,
+    world: World,
+    images: GBufferRecord,
+    pixels: wp.array[int],
+    hits: wp.array2d[wp.vec2i],
+    offsets: wp.array[wp.vec2],
+    thin: GBufferRecord,
+    count: wp.array[int],
+    listed: wp.array[int],
+):
+    """Find one surface in each listed pixel whose colour no centre nearby can provide.
+
+    Args:
+        pixels: The pixels.
+        hits: Their samples, which repeat those of ``offsets``.
+        offsets: Sample positions within a pixel, [0, 1).
+        thin: The surfaces; (-1, -1) if there is none, and then nothing else is written.
+        count: Number of pixels with such a surface; 0 at first.
+        listed: The pixels, in any order.
+    """
+    row = wp.tid()
+    i = pixels[row]
+    x = i % view.width
+    y = i / view.width
+    thin.hits[i] = wp.vec2i(-1, -1)
+    last = wp.vec2i(-2, -2)
+    for s in range(hits.shape[1]):
+        hit = hits[row, s]
+        if thin.hits[i][0] < 0 and hit[0] >= 0 and (hit[0] != last[0] or hit[1] != last[1]):
+            last = hit
+            source = color_source(view, world, images, x, y, hit)
+            if not shows_like(world, images, source, hit):
+                offset = offsets[s % offsets.shape[0]]
+                x_px = float(x) + offset[0]
+                y_px = float(y) + offset[1]
+                point = point_at(view, world, hit, x_px, y_px)
+                d = view.R_world_camera @ pixel_direction(view, x_px, y_px)
+                thin.z_m[i] = wp.dot(point.way, d) / wp.dot(d, d)
+                thin.weights[i] = point.weight
+                thin.normals[i] = point.normal
+                thin.hits[i] = hit
+                listed[wp.atomic_add(count, 0, 1)] = i
+
+
 @wp.kernel
 def mix_samples(
     view: View,
@@ -307,11 +369,20 @@ def mix_samples(
     radiance: wp.array[wp.vec3],
     pixels: wp.array[int],
     hits: wp.array2d[wp.vec2i],
+    thin: GBufferRecord,
+    thin_radiance: wp.array[wp.vec3],
     white: float,
     brightest: float,
     mixed: wp.array[wp.vec3],
 ):
-    """Radiance of listed pixels: the mean over their samples, in the order of the list."""
+    """Radiance of listed pixels: the mean over their samples, in the order of the list.
+
+    Args:
+        thin: As by ``find_thin``; empty if surfaces that no centre shows are left out.
+        thin_radiance: Of those surfaces.
+        white: Radiance that saturates one exposure; 0 = the mean is one of radiance.
+        brightest: Radiance that saturates all exposures.
+    """
     row = wp.tid()
     i = pixels[row]
     x = i % view.width
@@ -320,12 +391,20 @@ def mix_samples(
     lit = int(0)
     last = wp.vec2i(-2, -2)
     source = int(-1)
+    own = bool(False)
     for s in range(hits.shape[1]):
         hit = hits[row, s]
         if hit[0] != last[0] or hit[1] != last[1]:
             source = color_source(view, world, images, x, y, hit)
             last = hit
-        if source >= 0:
+            own = False
+            if thin.hits.shape[0] > 0:
+                if thin.hits[i][0] == hit[0]:
+                    own = not shows_like(world, images, source, hit)
+        if own:
+            total += to_tone(thin_radiance[i], white, brightest)
+            lit += 1
+        elif source >= 0:
             total += to_tone(radiance[source], white, brightest)
             lit += 1
     mixed[row] = radiance[i]
