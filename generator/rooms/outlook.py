@@ -25,12 +25,11 @@ _HOUSES = (
     ("building/old_town", 96),
 )
 _FAR = (
-    ("horizon/trees", 8, TREE_LINE_M),
-    ("horizon/town", 8, TOWN_M),
-    ("horizon/forest", 6, FOREST_M),
+    ("horizon/trees", 8, TREE_LINE_M, 75.0),
+    ("horizon/town", 8, TOWN_M, 105.0),
+    ("horizon/forest", 6, FOREST_M, 110.0),
 )
-"""Families that close the view, numbers of their variants, and lengths of a piece [m]."""
-_FAR_M = 75.0
+"""Families that close the view, numbers of their variants, lengths and distances of pieces [m]."""
 _GROUNDS = ("texture/grass", "texture/grass", "texture/paving", "texture/asphalt")
 _VARIANTS = 24
 """Of the variants of each family, so many are used: the first rooms of a data set know them all."""
@@ -53,9 +52,10 @@ class Outlook:
 
 def outlook_assets() -> tuple[str, ...]:
     """Ids of everything that may stand outside, and of its ground's textures."""
+    families = {*_NEAR, *_HOUSES, *((family, variants) for family, variants, *_ in _FAR)}
     things = sorted(
         f"{family}?seed={seed}"
-        for family, variants, *_ in {*_NEAR, *_HOUSES, *_FAR}
+        for family, variants in families
         for seed in range(min(variants, _VARIANTS))
     )
     return (*things, *sorted({f"{ground}?seed={k}" for ground in _GROUNDS for k in range(4)}))
@@ -88,12 +88,12 @@ def draw_outlook(rooms: Sequence[Room], rng: Rng) -> Outlook:
 
 def _end_of_view(ground_m: float, rng: Rng) -> list[tuple[str, SE3]]:
     """Pieces of a wood all around, which hide where the ground ends."""
-    family, variants, length_m = _FAR[draw_count(rng, (0, len(_FAR) - 1))]
-    count = math.ceil(2.0 * math.pi * _FAR_M / length_m)
+    family, variants, length_m, far_m = _FAR[draw_count(rng, (0, len(_FAR) - 1))]
+    count = math.ceil(2.0 * math.pi * far_m / length_m)
     first, pieces = between(rng, (0.0, 2.0 * math.pi)), []
     for k in range(count):
         turn = first + 2.0 * math.pi * k / count
-        at = (_FAR_M * math.cos(turn), _FAR_M * math.sin(turn), -ground_m)
+        at = (far_m * math.cos(turn), far_m * math.sin(turn), -ground_m)
         seed = draw_count(rng, (0, variants - 1))
         pieces.append((f"{family}?seed={seed}", SE3.about_z(turn + math.pi, at).rounded()))
     return pieces

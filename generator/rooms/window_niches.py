@@ -49,5 +49,9 @@ def _niche(hole: Hole, room_cd_m2: Array, outside_cd_m2: Vec3) -> IrradianceVolu
     share = np.where(facing == 0.0, _ASIDE, np.maximum(facing, 0.0))
     light = share[:, None] * np.array(outside_cd_m2) + (1.0 - share)[:, None] * room_cd_m2
     values = tuple(float(f"{v:.3g}") for v in light.ravel().tolist())
-    corners = [tuple(round(float(v), 5) for v in corner) for corner in (low, high)]
-    return IrradianceVolume(corners[0], corners[1], (1, 1, 1), values)
+    return IrradianceVolume(_rounded(low), _rounded(high), (1, 1, 1), values)
+
+
+def _rounded(corner: Array) -> Vec3:
+    x, y, z = (round(float(v), 5) for v in corner)
+    return (x, y, z)

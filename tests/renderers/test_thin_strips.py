@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 import warp as wp
 
+from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import FindTones, Tones
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
 from gen_data.generator.core.se3 import SE3, Vec3, look_at
@@ -97,3 +99,32 @@ def test_the_corner_of_a_room_has_the_light_of_radiosity() -> None:
     wp.launch(share_kernel, 3, [shares], [results], device=device)
 
     assert results.numpy() == pytest.approx([0.0, 0.5 / (1.0 - 0.5 * 0.6), 1.0], abs=0.02)
+
+
+def test_the_rim_of_a_board_is_seen_between_pixel_centres_by_cameras_with_many_photosites() -> None:
+    """A glowing rim of 0.4 px that rises by a row in 20 columns: each has 0.4 of its light."""
+    width_m = 0.4 * 2.0 / Intrinsics.from_hfov(240, 120, math.radians(50.0)).fx_px
+    glow = Material((0.0, 0.0, 0.0), 1.0, specular=0.0, emission_cd_m2=(100.0,) * 3)
+    library = FakeLibrary(
+        {
+            "rim": box_mesh((0.1, 9.0, width_m), (glow,)),
+            "board": box_mesh((0.1, 9.0, 0.4), (MATTE,)),
+        }
+    )
+    board = Body("b", "board", SE3((0.0, 0.0, -0.2 - 0.5 * width_m)), instance_id=1)
+    scene = Scene("t", (board, Body("r", "rim", instance_id=2)), environment=DARK)
+    camera = camera_rolled((-2.05, 0.0, 0.0), (0.0, 0.0, 0.0), math.degrees(1.0 / 20.0))
+    renderer = WarpRenderer(library, "cpu", RenderSettings(antialias=8))
+    radiance = frozenset({Channel.RADIANCE})
+
+    def columns(find_tones: FindTones | None) -> np.ndarray:
+        """Share of the rim's light in each column."""
+        image = renderer.render(scene, camera, radiance, find_tones).channels[Channel.RADIANCE]
+        return image[..., 1].sum(axis=0)[20:-20] / 100.0
+
+    # Far below white, the mean of tones is that of radiance.
+    seen = columns(lambda _: Tones(1e6, 1e6))
+
+    assert seen.mean() == pytest.approx(0.4, rel=0.05)
+    assert seen.std() < 0.12
+    assert columns(None).std() > 0.2

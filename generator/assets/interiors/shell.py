@@ -219,7 +219,7 @@ def window(size_m: Vec3 = (1.4, 1.3, 0.12), panes: int = 2) -> Solid:
     return solid(patches, materials, [*boxes, sill])
 
 
-def outside(radius_m: float = 80.0) -> Solid:
+def outside(radius_m: float = 130.0) -> Solid:
     """The ground around a building, at z = 0, from its middle to a horizon. Slot: ground.
 
     Args:

@@ -25,7 +25,10 @@ _LONG = 1.3
 _CURVE: Tone = "knee"
 _FULL = 0.8
 """Level up to which the bright version counts alone."""
-_LEVELS = 6
+_PALE = 0.15
+"""Share of the largest value from which colours become pale: one channel after the other saturates
+there, and processors hide what their ratio would be (assumed)."""
+_LEVELS = 4
 _STEPS = 4095
 
 
@@ -45,6 +48,8 @@ def fuse_exposures(image: Float32, scale: float, white: float, contrast: float) 
     shown = np.take(_values_of(contrast), _to_steps(np.clip(fused, 0.0, 1.0)))
     # Noise of nearly black pixels is not enhanced.
     gain = np.minimum(shown / (level * np.float32(scale)), np.float32(2.0 * _LONG))
+    pale = np.clip(level * np.float32(scale / (_PALE * white)) - np.float32(1.0), 0.0, 1.0)
+    image = image + (level[..., None] - image) * pale[..., None]
     return tone_to_display(image * gain[..., None], scale, _CURVE, contrast=contrast)
 
 

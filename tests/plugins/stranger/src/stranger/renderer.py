@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.capture import Channel, LidarHits, LidarRays, SensorReading, Silhouette
 from gen_data.generator.core.errors import ConfigError
-from gen_data.generator.core.interfaces import AssetLibrary, Renderer, RendererSettings
+from gen_data.generator.core.interfaces import AssetLibrary, FindTones, Renderer, RendererSettings
 from gen_data.generator.core.scene import Camera, Instance, Lidar, Scene
 from gen_data.generator.core.se3 import SE3
 
@@ -40,8 +40,18 @@ class Boxes:
     def __init__(self, luminance_cd_m2: float) -> None:
         self._luminance = luminance_cd_m2
 
-    def render(self, scene: Scene, camera: Camera, channels: frozenset[Channel]) -> SensorReading:
-        """Return the requested channels, from the nearest box on the ray of each pixel."""
+    def render(
+        self,
+        scene: Scene,
+        camera: Camera,
+        channels: frozenset[Channel],
+        find_tones: FindTones | None = None,
+    ) -> SensorReading:
+        """Return the requested channels, from the nearest box on the ray of each pixel.
+
+        Each pixel shows one box: there are no samples to take the mean of.
+        """
+        del find_tones
         pinhole = camera.intrinsics
         if not pinhole.straight:
             raise ConfigError("renderer 'stranger_boxes': pinholes only")
