@@ -18,6 +18,7 @@ from gen_data.generator.assets.interiors.parts import (
     solid,
     wood,
 )
+from gen_data.generator.assets.interiors.wall_art import MOTIFS, PHOTOGRAPHS, is_upright
 from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.furniture import rectangle
@@ -191,35 +192,50 @@ def rug(seed: int = 0) -> Solid:
     return solid([shapes.block(*whole, 0.004, 1), shapes.block(*inner)], [pile, edge], [whole])
 
 
+def photograph(seed: int, *, upright: bool) -> str:
+    """Id of a photographic print."""
+    kind = PHOTOGRAPHS[seed % len(PHOTOGRAPHS)]
+    return f"texture/wall_art?seed={kind + MOTIFS * (2 * (seed // 4 % 3) + (not upright))}"
+
+
 def picture(seed: int = 0) -> Solid:
     """A framed picture; origin at the middle below, on the wall. Slots: frame, mount, print."""
     rng = variant_rng("picture", seed)
-    w, h = rng.between(0.25, 0.75), rng.between(0.25, 0.7)
-    f, mount = rng.between(0.012, 0.035), rng.between(0.0, 0.07)
-    frame = _frame(w, h, f, 0.025)
-    y, a = 0.5 * w - f - mount, f + mount
-    image = rectangle((0.011, -y, a), (0.0, 2 * y, 0.0), (0.0, 0.0, h - 2 * a)).painted(2)
+    # From postcards to large prints; the small ones are common.
+    long = rng.choose((rng.between(0.13, 0.24), rng.between(0.26, 0.45), rng.between(0.45, 0.92)))
+    if seed % 9 == 8:
+        image, short, upright = f"texture/poster?seed={seed % 12}", long / math.sqrt(2.0), True
+    else:
+        image, short, upright = f"texture/wall_art?seed={seed}", 0.75 * long, is_upright(seed)
+    wide, high = (short, long) if upright else (long, short)
+    f = rng.between(0.01, 0.018 + 0.012 * long)
+    mount = rng.choose((0.0, rng.between(0.1, 0.2) * long, rng.between(0.15, 0.3) * short))
+    w, h = wide + 2.0 * (f + mount), high + 2.0 * (f + mount)
+    deep = rng.between(0.014, 0.03)
+    patches = _frame(w, h, f, deep, 0.002)
+    y, a = 0.5 * wide, f + mount
+    patches.append(rectangle((0.0112, -y, a), (0.0, wide, 0.0), (0.0, 0.0, high)).painted(2))
     back: Box = ((0.0, -0.5 * w + 0.004, 0.004), (0.01, 0.5 * w - 0.004, h - 0.004))
-    patches = [*frame, shapes.block(*back, 0.0, 1), image]
-    printed = rng.choose(
-        (
-            f"texture/poster?seed={seed % 12}",
-            f"texture/wide_poster?seed={seed % 12}",
-            f"texture/marble?seed={seed % 16}",
-            f"texture/book_cover?seed={seed}",
-        )
-    )
+    patches.append(shapes.block(*back, 0.0, 1))
+    if mount > 0.0:
+        # The mount is a card with a window: its bevelled edge catches light.
+        patches += [
+            p.painted(1)
+            for p in _frame(wide + 0.016, high + 0.016, 0.008, 0.0025, 0.0008, (0.01, a - 0.008))
+        ]
     edge = rng.choose(
         (
             painted_material("#1f1f20", 0.4),
             wood(rng),
+            wood(rng),
             metal_material((0.8, 0.66, 0.38), 0.35),
+            metal_material(ALUMINIUM, 0.4),
             painted_material("#f0efeb", 0.5),
         )
     )
-    return solid(
-        patches, [edge, painted_material("#f3f1ea", 0.8), printed_material(printed, 0.25)], [back]
-    )
+    card = painted_material(rng.choose(("#f3f1ea", "#f7f6f2", "#e6e0d2", "#3a3b3d")), 0.85)
+    gloss = 0.12 if rng.chance(0.6) else 0.7
+    return solid(patches, [edge, card, printed_material(image, gloss)], [back])
 
 
 def mirror(seed: int = 0) -> Solid:
@@ -237,15 +253,23 @@ def mirror(seed: int = 0) -> Solid:
     )
 
 
-def _frame(w: float, h: float, f: float, depth_m: float) -> list[Patch]:
-    y = 0.5 * w
+def _frame(
+    w: float,
+    h: float,
+    f: float,
+    depth_m: float,
+    radius_m: float = 0.003,
+    at_m: tuple[float, float] = (0.0, 0.0),
+) -> list[Patch]:
+    """Four bars around an opening; ``at_m``: back and lower edge."""
+    y, (x, z) = 0.5 * w, at_m
     parts: list[Box] = [
-        ((0.0, -y, 0.0), (depth_m, y, f)),
-        ((0.0, -y, h - f), (depth_m, y, h)),
-        ((0.0, -y, f), (depth_m, -y + f, h - f)),
-        ((0.0, y - f, f), (depth_m, y, h - f)),
+        ((x, -y, z), (x + depth_m, y, z + f)),
+        ((x, -y, z + h - f), (x + depth_m, y, z + h)),
+        ((x, -y, z + f), (x + depth_m, -y + f, z + h - f)),
+        ((x, y - f, z + f), (x + depth_m, y, z + h - f)),
     ]
-    return [board(*p, 0, 0.003) for p in parts]
+    return [board(*p, 0, radius_m) for p in parts]
 
 
 def radiator(seed: int = 0) -> Solid:
@@ -521,6 +545,6 @@ def picture_frame(seed: int = 0) -> Solid:
     ]
     leaning = [patch.rotated("y", -0.22) for patch in patches]
     stand = board((-0.055, -0.015, 0.0), (-0.05, 0.015, 0.45 * h), 1)
-    look = printed_material(f"texture/book_cover?seed={seed}", 0.15)
+    look = printed_material(photograph(seed, upright=True), 0.15)
     boxes: list[Box] = [((-0.22 * h, -0.5 * w, 0.0), (0.014, 0.5 * w, h))]
     return solid([*leaning, stand], [front(rng), painted_material("#4a4038", 0.8), look], boxes)

@@ -23,6 +23,10 @@ from gen_data.generator.core.se3 import Vec3
 Box = tuple[Vec3, Vec3]
 SUPPORT = "support"
 """Keypoints at two opposite corners of a level surface that carries things and is not a top."""
+INSIDE = "inside"
+"""Keypoints at the lowest and the highest corner of the room above a board behind doors."""
+BACKREST = "backrest"
+"""Keypoint in the middle of the upper edge of a back."""
 LACQUERS = ("#f1efea", "#e8e6e0", "#d9d6cf", "#3a3d40", "#b9c2bd", "#5c6b73", "#8d9a86")
 """Lacquers of furniture, sRGB."""
 _WOODS = 18
