@@ -149,19 +149,41 @@ def curtain(seed: int = 0) -> Solid:
     """A curtain on a piece of rail; origin at the middle below. Slots: cloth, rail."""
     rng = variant_rng("curtain", seed)
     w, h = rng.between(0.4, 0.7), rng.between(2.1, 2.35)
-    folds = round(w / 0.085)
-    y = np.linspace(-0.5 * w, 0.5 * w, folds * 8 + 1)
-    turn = 2.0 * math.pi * folds * (y / w + 0.5)
-    z = np.linspace(0.02, h, 7)
-    sway = 0.5 + 0.5 * (1.0 - z / h)
-    x = 0.03 * np.sin(turn)[None, :] * (0.55 + 0.45 * sway[:, None])
-    points = np.stack(np.broadcast_arrays(x, y[None, :], z[:, None]), axis=2)
+    count = round(w / 0.095)
+    y = np.linspace(-0.5 * w, 0.5 * w, count * 10 + 1)[None, :]
+    z = np.linspace(0.0, h, 24)[:, None]
+    down = 1.0 - z / h
+    # Pleats are even at the rail; below they open, lean and join, each in its own way.
+    turn = 2.0 * math.pi * count * (y / w + 0.5)
+    drift = np.zeros_like(y * z)
+    for k in range(1, 4):
+        phase, way = rng.between(0.0, 6.3), rng.between(-1.0, 1.0)
+        drift = drift + way * np.sin(2.0 * math.pi * k * (y / w) + phase) / k
+    sway = turn + 1.4 * down * drift
+    depth = 0.017 + 0.016 * down**0.7 + 0.008 * down * np.sin(0.5 * turn + 2.0 * drift)
+    x = depth * np.sin(sway) + 0.006 * down * np.sin(2.0 * sway + 1.0)
+    # Towards the rail pleats are pinched: narrow ridges between flat cloth.
+    pinch = np.clip(1.0 - (h - z) / 0.16, 0.0, 1.0)
+    x = x * (1.0 - pinch) + pinch * 0.02 * np.clip(np.sin(turn), -0.3, 1.0)
+    gather = 1.0 - rng.choose((0.0, 0.05, 0.12)) * np.sin(math.pi * np.clip(down * 1.1, 0.0, 1.0))
+    hem = 0.012 + 0.008 * np.sin(sway[:1] * 0.5)
+    points = np.stack(np.broadcast_arrays(x, y * gather, hem + z * (h - 0.012) / h), axis=2)
     sheet = shapes.grid(points)
+    low = points[:3] + np.array([0.0035, 0.0, 0.0])
     patches = [
         sheet,
         sheet.flipped(),
+        shapes.grid(low),
         rod((0.0, -0.5 * w - 0.04, h + 0.015), (0.0, 0.5 * w + 0.04, h + 0.015), 0.012, 1),
     ]
+    for k in range(count + 1):
+        at = (k / count - 0.5) * 0.98 * w
+        ring = shapes.lathe(
+            [(0.014, -0.002), (0.018, -0.002), (0.018, 0.002), (0.014, 0.002), (0.014, -0.002)],
+            16,
+            1,
+        )
+        patches.append(ring.rotated("x", 0.5 * math.pi).moved(0.0, at, h + 0.011))
     light = cloth(rng)
     made = replace(light, diffuse_transmission=_scaled(light.base_color, 0.3))
     return solid(
@@ -337,6 +359,23 @@ def _screen(w: float, lift_m: float, name: str) -> Solid:
                     0.002,
                 )
             )
+    drop = np.array(
+        [
+            (-0.022, 0.12 * w, lift_m + 0.35 * h),
+            (-0.05, 0.12 * w, lift_m + 0.12 * h),
+            (-0.07, 0.1 * w, 0.02),
+            (-0.085, 0.02 * w, 0.0045),
+            (-0.09, -0.12 * w, 0.0045),
+        ]
+    )
+    line = shapes.spline(drop.tolist(), 24)
+    line[:, 2] = np.maximum(line[:, 2], 0.0042)
+    patches.append(shapes.sweep(line, shapes.circle(0.0038, 7), up=(0.0, 1.0, 0.0)))
+    patches.append(
+        shapes.block(
+            (-0.045, -0.3 * w, lift_m + 0.15 * h), (-0.02, 0.3 * w, lift_m + 0.6 * h), 0.006
+        )
+    )
     dark = Material((0.01, 0.01, 0.011), 0.12, role="screen")
     foot: Box = ((-0.1, -0.4 * w, 0.0), (0.1, 0.4 * w, 0.012))
     return solid(patches, [painted_material("#17181a", 0.35), dark], [panel, foot])
@@ -504,31 +543,72 @@ def book_row(seed: int = 0) -> Solid:
     """Books that stand side by side, spines towards +X. Slots: one per cloth, pages last."""
     rng = variant_rng("book_row", seed)
     covers = [
-        Material(draw_linear(PALETTES["cloth"], 0.15, rng), rng.between(0.4, 0.8)) for _ in range(6)
+        Material(draw_linear((*PALETTES["cloth"], *_JACKETS), 0.15, rng), rng.between(0.3, 0.8))
+        for _ in range(9)
     ]
+    band = Material(draw_linear(("#d9b45a", "#f4f0e6", "#1c1c1d"), 0.05, rng), 0.4)
     patches: list[Patch] = []
-    y, count = 0.0, int(rng.between(4, 15))
-    tallest = 0.0
-    for _ in range(count):
-        thick, h, d = rng.between(0.012, 0.045), rng.between(0.17, 0.27), rng.between(0.12, 0.19)
-        x1 = 0.09 - rng.between(0.0, 0.012)
-        slot = min(int(rng.random() * 6), 5)
-        book = [
-            shapes.block((x1 - d, y, 0.0), (x1, y + 0.002, h), 0.0, slot),
-            shapes.block((x1 - d, y + thick - 0.002, 0.0), (x1, y + thick, h), 0.0, slot),
-            shapes.block((x1 - 0.003, y, 0.0), (x1, y + thick, h), 0.001, slot),
-            shapes.block(
-                (x1 - d + 0.004, y + 0.002, 0.004),
-                (x1 - 0.003, y + thick - 0.002, h - 0.004),
-                0.0,
-                6,
-            ),
-        ]
-        patches += book
-        y, tallest = y + thick + 0.0008, max(tallest, h)
+    y, tallest, end = 0.0, 0.0, rng.between(0.16, 0.4)
+    while y < end:
+        # Series are alike; single books are not.
+        thick, h, d = rng.between(0.01, 0.045), rng.between(0.165, 0.285), rng.between(0.12, 0.19)
+        slot = int(rng.random() * 9)
+        alike = rng.choose((1, 1, 1, 2, 3, 5))
+        for _ in range(alike):
+            x1 = 0.09 - rng.between(0.0, 0.014)
+            patches += _standing_book((x1 - d, y, x1), thick, h, slot, rng)
+            y, tallest = y + thick + 0.0008, max(tallest, h)
+            if y > end:
+                break
+    if rng.chance(0.5):
+        # The last ones lean against the row.
+        for _ in range(int(rng.between(1, 3))):
+            thick, h, lean = (
+                rng.between(0.012, 0.03),
+                rng.between(0.17, 0.24),
+                rng.between(0.1, 0.22),
+            )
+            book = _standing_book((-0.06, 0.0, 0.08), thick, h, int(rng.random() * 9), rng)
+            # About its lower edge on the outer side, towards the row.
+            turned = [p.moved(0.0, -thick, 0.0).rotated("x", lean) for p in book]
+            reach = min(float(p.bounds_m()[0][1]) for p in turned)
+            patches += [p.moved(0.0, y - reach + 0.0005, 0.0) for p in turned]
+            y -= reach
+    low = min(float(p.bounds_m()[0][2]) for p in patches)
+    patches = [p.moved(0.0, 0.0, -min(low, 0.0)) for p in patches]
     moved = [patch.moved(0.0, -0.5 * y, 0.0) for patch in patches]
-    looks = [*covers, painted_material("#e9e2d0", 0.9)]
+    looks = [*covers, painted_material("#e9e2d0", 0.9), band]
     return solid(moved, looks, [((-0.1, -0.5 * y, 0.0), (0.09, 0.5 * y, tallest))])
+
+
+_JACKETS = ("#f2efe6", "#e8dcc0", "#1c1d20", "#c0392b", "#e0a526", "#2c6e8f", "#3f6b4f", "#f7f7f4")
+"""Colours of books' jackets, sRGB."""
+
+
+def _standing_book(
+    span: tuple[float, float, float], thick: float, h: float, slot: int, rng: VariantRng
+) -> list[Patch]:
+    """A book with its spine at +X; span: back, side and front. Pages in slot 9, print in 10."""
+    x0, y, x1 = span
+    made = [
+        shapes.block((x0, y, 0.0), (x1, y + 0.002, h), 0.0, slot),
+        shapes.block((x0, y + thick - 0.002, 0.0), (x1, y + thick, h), 0.0, slot),
+        shapes.block((x1 - 0.003, y, 0.0), (x1, y + thick, h), 0.001, slot),
+        shapes.block(
+            (x0 + 0.004, y + 0.002, 0.004), (x1 - 0.003, y + thick - 0.002, h - 0.004), 0.0, 9
+        ),
+    ]
+    # A title, an author and a publisher's mark on the spine.
+    wide = 0.5 * thick
+    for low, high in ((0.45, rng.between(0.6, 0.85)), (0.2, 0.38), (0.06, 0.1)):
+        if rng.chance(0.75):
+            side = 0.5 * (thick - wide)
+            print_ = rectangle(
+                (x1 + 0.0003, y + side, low * h), (0.0, wide, 0.0), (0.0, 0.0, (high - low) * h)
+            )
+            made.append(print_.painted(10))
+            wide *= 0.6
+    return made
 
 
 def picture_frame(seed: int = 0) -> Solid:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from gen_data.generator.assets.procedural.material_presets import (
 from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.se3 import Array
+from gen_data.generator.core.se3 import Array, Vec3
 
 _LINEN = ("#f3f1ec", "#e8ebee", "#efe6da", "#dfe6e3", "#e9dedd")
 
@@ -73,6 +74,42 @@ def rumple(x: Array, y: Array, rng: VariantRng, wave_m: float) -> Array:
     return total
 
 
+def padding(
+    low: Vec3,
+    high: Vec3,
+    rng: VariantRng,
+    slot: int = 0,
+    power: float = 5.0,
+    crease_m: float = 0.004,
+) -> Patch:
+    """An upholstered block whose faces bulge: a superellipsoid with creases.
+
+    Args:
+        low, high: Its corners.
+        rng: Draws.
+        slot: Material.
+        power: Exponent: 2 is an ellipsoid, large ones are boxes.
+        crease_m: Size of its creases.
+    """
+    half = 0.5 * (np.array(high) - np.array(low))
+    middle = 0.5 * (np.array(high) + np.array(low))
+
+    def shape(d: Array) -> Array:
+        # Spread towards the edges, where a box bends.
+        spread = np.sign(d) * np.abs(d) ** 0.6
+        size = (np.abs(spread) ** power).sum(axis=2, keepdims=True) ** (1.0 / power)
+        points: Array = half * spread / size
+        return points
+
+    patch = shapes.ball(shape, 22, 44)
+    p = patch.corners_m
+    bump = rumple(p[..., 0] + p[..., 2], p[..., 1], rng, 0.24) * crease_m
+    inwards = np.abs(p[..., 2] / half[2]) ** 3
+    moved = p.copy()
+    moved[..., 2] += np.minimum(bump, 0.0) * inwards * np.sign(p[..., 2])
+    return replace(patch, corners_m=moved + middle).painted(slot)
+
+
 def pillow(
     half_x_m: float, half_y_m: float, height_m: float, rng: VariantRng, slot: int = 0
 ) -> Patch:
@@ -103,7 +140,7 @@ def _over_edge(t: Array, edge_m: float, radius_m: float) -> tuple[Array, Array]:
     return np.sign(t) * out, -radius_m * (1.0 - np.cos(turn)) - rest
 
 
-def _duvet(
+def drape(
     ends_x: tuple[float, float],
     half_y: float,
     z: float,
@@ -192,8 +229,8 @@ def bed(seed: int = 0) -> Solid:
     patches.append(cushion(*mattress, 1, 0.05))
     fold, hang = rng.between(0.5, 0.75), rng.between(0.16, 0.26)
     start = -0.5 * length + fold
-    patches.append(_duvet((start, 0.5 * length), 0.5 * w, top + 0.02, hang, rng, 2))
-    back = _duvet(
+    patches.append(drape((start, 0.5 * length), 0.5 * w, top + 0.02, hang, rng, 2))
+    back = drape(
         (start - 0.03, start + 0.24), 0.5 * w + 0.012, top + 0.085, 0.8 * hang, rng, 1, 0.006
     )
     patches.append(back)
@@ -206,9 +243,7 @@ def bed(seed: int = 0) -> Solid:
             patches.append(small.moved(-0.5 * length + 0.5, y + rng.between(-0.1, 0.1), top + 0.07))
     if rng.chance(0.5):
         throw_at = rng.between(0.05, 0.25) * length
-        throw = _duvet(
-            (throw_at, throw_at + 0.55), 0.5 * w + 0.035, top + 0.11, hang, rng, 5, 0.007
-        )
+        throw = drape((throw_at, throw_at + 0.55), 0.5 * w + 0.035, top + 0.11, hang, rng, 5, 0.007)
         patches.append(throw)
     linen = painted_material(rng.choose(_LINEN), 0.95)
     looks = [front(rng), linen, fabric(rng), linen, fabric(rng), fabric(rng)]

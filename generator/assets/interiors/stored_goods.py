@@ -101,7 +101,8 @@ def crockery(seed: int = 0) -> Solid:
     rng = variant_rng("crockery", seed)
     patches: list[Patch] = []
     y, half = -0.25, 0.25
-    kinds = rng.shuffled(["plates", "bowls", "cups", "glasses", "small plates", "cups", "packets"])
+    common = ["plates", "bowls", "cups", "glasses", "small plates", "cups", "packets"]
+    kinds = [*rng.shuffled(common), *rng.shuffled(common)]
     for kind in kinds:
         slot = int(rng.random() * 3)
         if kind in ("plates", "small plates"):
