@@ -25,6 +25,7 @@ _HIDDEN_MAX, _HIDDEN_MIDDLE_MAX = 0.15, 0.02
 _MIDDLE = 0.55
 """Half of the middle's width and height, as shares of the image's."""
 _FAR_M = 12.0
+_LARGE_M, _RAYS_EACH = 0.45, 8
 
 
 class RoomCamera(RandomizerBase):
@@ -42,7 +43,7 @@ class RoomCamera(RandomizerBase):
             seventh of the image, and nothing in its middle.
         min_pieces: Smallest number of pieces whose origins are in the image; half of
             all pieces if that is fewer.
-        choices: Number of places to choose from: the one from which most pieces are in view.
+        choices: Number of places to choose from: the one from which most furniture is seen well.
     """
 
     type: Literal["room_camera"] = "room_camera"
@@ -82,7 +83,7 @@ class RoomCamera(RandomizerBase):
         """The camera at the best of several places. Raises LayoutRejected if there is none."""
         origins_m = np.array([body.T_world_body.translation_m for body in pieces])
         least = min(self.min_pieces, len(pieces) // 2)
-        names = {body.name for body in pieces}
+        large = {body.name for body in pieces if _is_large(body, assets)}
         found: list[tuple[int, Camera]] = []
         for _ in range(TRIES):
             drawn = self._draw_pose(scene, floors, pieces, assets, rng)
@@ -95,8 +96,7 @@ class RoomCamera(RandomizerBase):
             sight = look_around(moved, scene, assets, _FAR_M)
             if _is_hidden(sight, self.near_m):
                 continue
-            seen = {sight.bodies[k].name for k in sight.hits.tolist() if k >= 0}
-            found.append((len(seen & names), moved))
+            found.append((_count_furniture(sight, large), moved))
             if len(found) == self.choices:
                 break
         if not found:
@@ -153,6 +153,22 @@ def _is_hidden(sight: Sight, near_m: float) -> bool:
     near = (sight.distances_m <= near_m) & ~np.array([*flat, True])[sight.hits]
     middle = (np.abs(sight.places) < _MIDDLE).all(axis=1)
     return bool(near.mean() > _HIDDEN_MAX or near[middle].mean() > _HIDDEN_MIDDLE_MAX)
+
+
+def _is_large(body: Body, assets: AssetIndex) -> bool:
+    """Whether a piece is furniture rather than a small thing."""
+    low, high = assets.bounds_m(body.asset)
+    return max(b - a for a, b in zip(low, high, strict=True)) > _LARGE_M
+
+
+def _count_furniture(sight: Sight, names: set[str]) -> int:
+    """Rays that meet pieces of these names; no more than a few count for each of them."""
+    each = np.bincount(sight.hits[sight.hits >= 0], minlength=len(sight.bodies))
+    return sum(
+        min(int(rays), _RAYS_EACH)
+        for body, rays in zip(sight.bodies, each, strict=True)
+        if body.name in names
+    )
 
 
 def _count_in_view(camera: Camera, points_m: Array) -> int:

@@ -44,6 +44,8 @@ _CROWDED = 0.25
 """Distance within which a piece before a window hides it."""
 _SILL_M = 0.026
 """Height of sills below the openings of windows."""
+_FREE_ABOVE_M = {"wall_shelf": 0.32}
+"""Height above pieces that others leave free."""
 _HANGS_M = 0.3
 """What begins higher than this above the floor hangs on a wall."""
 _FLAT = frozenset({"rug"})
@@ -279,7 +281,7 @@ class Layout:
             if k == carrier or flat != (other.family in _FLAT):
                 continue
             if (
-                low_m < other.high_m - 1e-6
+                low_m < other.high_m + _FREE_ABOVE_M.get(other.family, 0.0) - 1e-6
                 and other.low_m < high_m - 1e-6
                 and overlap_of(footprint, other.footprint)
             ):

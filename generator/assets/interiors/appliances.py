@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from gen_data.generator.assets.interiors.parts import (
+    HOUSEHOLD,
     LACQUERS,
     Box,
     board,
@@ -25,7 +26,6 @@ from gen_data.generator.assets.interiors.soft_goods import fabric, hang_garment,
 from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
-    PLASTICS,
     STAINLESS,
     STEEL,
     draw_linear,
@@ -47,7 +47,7 @@ def _case(rng: VariantRng) -> Material:
         return _STEEL
     if kind < 0.75:
         return painted_material(rng.choose(("#f1f0ec", "#1d1e20", "#c9c7c0")), 0.3)
-    return Material(draw_linear(PLASTICS, 0.1, rng), 0.3)
+    return Material(draw_linear(HOUSEHOLD, 0.1, rng), 0.3)
 
 
 def microwave(seed: int = 0) -> Solid:
@@ -146,7 +146,7 @@ def cooking_pot(seed: int = 0) -> Solid:
             rod((0.03, a, 0.8 * h), (0.03, b, 0.8 * h), 0.005, 1),
             rod((-0.034, b, 0.8 * h), (0.034, b, 0.8 * h), 0.006, 1),
         ]
-    body = _STEEL if rng.chance(0.6) else Material(draw_linear(PLASTICS, 0.1, rng), 0.2)
+    body = _STEEL if rng.chance(0.6) else Material(draw_linear(HOUSEHOLD, 0.1, rng), 0.2)
     return solid(patches, [body, _DARK], [((-0.75 * r, -r, 0.0), (0.75 * r, r, h))])
 
 
@@ -358,7 +358,7 @@ def bucket(seed: int = 0) -> Solid:
         patches.append(rod(start, end, 0.003, 1, 6))
     return solid(
         patches,
-        [Material(draw_linear(PLASTICS, 0.1, rng), 0.4), metal_material(STEEL, 0.4)],
+        [Material(draw_linear(HOUSEHOLD, 0.1, rng), 0.4), metal_material(STEEL, 0.4)],
         [((-0.75 * r, -0.75 * r, 0.0), (0.75 * r, 0.75 * r, h))],
     )
 
@@ -411,7 +411,9 @@ def tissue_box(seed: int = 0) -> Solid:
     h = body[1][2]
     sheet = cushion((-0.015, -0.05, h - 0.01), (0.015, 0.05, h + 0.06), 1, 0.014)
     return solid(
-        [shapes.block(*body, 0.002), sheet], [cloth(rng), painted_material("#f7f6f2", 1.0)], [body]
+        [shapes.block(*body, 0.002), sheet],
+        [painted_material(rng.choose(HOUSEHOLD[:11]), 0.6), painted_material("#f7f6f2", 1.0)],
+        [body],
     )
 
 

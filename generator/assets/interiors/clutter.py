@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from gen_data.generator.assets.interiors.parts import (
+    HOUSEHOLD,
     LACQUERS,
     SUPPORT,
     Box,
@@ -28,7 +29,6 @@ from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     GLAZES,
     PALETTES,
-    PLASTICS,
     STAINLESS,
     STEEL,
     draw_linear,
@@ -46,7 +46,7 @@ _DARK = painted_material("#1d1e20", 0.5)
 
 
 def _plastic(rng: VariantRng) -> Material:
-    return Material(draw_linear(PLASTICS, 0.1, rng), 0.4)
+    return Material(draw_linear(HOUSEHOLD, 0.1, rng), 0.4)
 
 
 def book_stack(seed: int = 0) -> Solid:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gen_data.generator.assets.interiors.parts import (
+    HOUSEHOLD,
     Box,
     board,
     cloth,
@@ -25,7 +26,6 @@ from gen_data.generator.assets.procedural.furniture import rectangle
 from gen_data.generator.assets.procedural.material_presets import (
     ALUMINIUM,
     PALETTES,
-    PLASTICS,
     STAINLESS,
     draw_linear,
     metal_material,
@@ -500,7 +500,7 @@ def waste_basket(seed: int = 0) -> Solid:
         36,
     )
     paint = (
-        Material(draw_linear(PLASTICS, 0.1, rng), 0.4)
+        Material(draw_linear(HOUSEHOLD, 0.1, rng), 0.4)
         if rng.chance(0.5)
         else painted_material("#2b2d30", 0.4)
     )
@@ -534,9 +534,15 @@ def whiteboard(seed: int = 0) -> Solid:
     back: Box = ((0.0, -0.5 * w + 0.004, 0.004), (0.012, 0.5 * w - 0.004, h - 0.004))
     tray: Box = ((0.0, -0.3 * w, -0.01), (0.06, 0.3 * w, 0.0))
     patches = [*_frame(w, h, 0.02, 0.022), shapes.block(*back, 0.0, 1), shapes.block(*tray, 0.003)]
-    return solid(
-        patches, [metal_material(ALUMINIUM, 0.4), painted_material("#f5f6f5", 0.15)], [back]
-    )
+    face = rectangle((0.0125, -0.5 * w + 0.02, 0.02), (0.0, w - 0.04, 0.0), (0.0, 0.0, h - 0.04))
+    patches.append(face.painted(2))
+    for k in range(int(rng.between(1, 5))):
+        y = rng.between(-0.25, 0.2) * w
+        patches.append(rod((0.03, y, 0.009), (0.03, y + 0.13, 0.009), 0.009, 3 + k % 3, 12))
+    inks = [painted_material(ink, 0.4) for ink in ("#1f2a5a", "#a3261d", "#1f1f20")]
+    written = printed_material(f"texture/whiteboard_notes?seed={seed}", 0.15)
+    looks = [metal_material(ALUMINIUM, 0.4), painted_material("#f5f6f5", 0.15), written, *inks]
+    return solid(patches, looks, [back])
 
 
 def book_row(seed: int = 0) -> Solid:
@@ -546,7 +552,7 @@ def book_row(seed: int = 0) -> Solid:
         Material(draw_linear((*PALETTES["cloth"], *_JACKETS), 0.15, rng), rng.between(0.3, 0.8))
         for _ in range(9)
     ]
-    band = Material(draw_linear(("#d9b45a", "#f4f0e6", "#1c1c1d"), 0.05, rng), 0.4)
+    band = Material(draw_linear(("#a08a55", "#bdb8aa", "#35353a"), 0.1, rng), 0.5)
     patches: list[Patch] = []
     y, tallest, end = 0.0, 0.0, rng.between(0.16, 0.4)
     while y < end:
@@ -599,15 +605,15 @@ def _standing_book(
         ),
     ]
     # A title, an author and a publisher's mark on the spine.
-    wide = 0.5 * thick
-    for low, high in ((0.45, rng.between(0.6, 0.85)), (0.2, 0.38), (0.06, 0.1)):
-        if rng.chance(0.75):
+    wide = 0.34 * thick
+    for low, high in ((0.5, rng.between(0.62, 0.85)), (0.24, 0.4), (0.06, 0.085)):
+        if rng.chance(0.6):
             side = 0.5 * (thick - wide)
             print_ = rectangle(
                 (x1 + 0.0003, y + side, low * h), (0.0, wide, 0.0), (0.0, 0.0, (high - low) * h)
             )
             made.append(print_.painted(10))
-            wide *= 0.6
+            wide *= 0.7
     return made
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from gen_data.generator.assets.interiors.parts import (
     BACKREST,
+    INSIDE,
     SUPPORT,
     Box,
     board,
@@ -328,11 +329,15 @@ def workbench(seed: int = 0) -> Solid:
     low: Box = ((-0.5 * d + 0.06, -0.5 * w + 0.06, 0.18), (0.5 * d - 0.08, 0.5 * w - 0.06, 0.21))
     patches = [board(*top, 0, 0.005), board(*low, 0), *four_legs(d, w, z - 0.05, 0.07, 1, 0.06)]
     legs = painted_material(rng.choose(("#2f5d7c", "#3b4046", "#6b7074", "#8a2f26")), 0.45)
-    return solid(
-        patches,
-        [wood(rng, 0.6), legs if rng.chance(0.6) else wood(rng)],
-        [top, low, *_legs_under(d, w, z)],
-    )
+    looks = [wood(rng, 0.6), legs if rng.chance(0.6) else wood(rng)]
+    made = solid(patches, looks, [top, low, *_legs_under(d, w, z)])
+    # Three places side by side on the lower board.
+    third, inside = (w - 0.26) / 3.0, []
+    for k in range(3):
+        y = -0.5 * w + 0.13 + k * third
+        inside.append(Keypoint(INSIDE, (-0.5 * d + 0.13, y, 0.21)))
+        inside.append(Keypoint(INSIDE, (0.5 * d - 0.13, y + third, z - 0.08)))
+    return replace(made, keypoints=tuple(inside))
 
 
 def _rectangular_table(

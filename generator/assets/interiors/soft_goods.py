@@ -331,17 +331,20 @@ def laundry_basket(seed: int = 0) -> Solid:
     wall = shapes.lathe(
         [(0.0, 0.0), (0.85 * r, 0.0), (r, h), (r - 0.012, h), (0.84 * r, 0.02), (0.0, 0.02)], 28
     )
-    ring = np.linspace(0.0, 1.0, 9)[:, None]
-    turn = np.linspace(0.0, 2.0 * math.pi, 33)[None, :]
+    ring = np.linspace(0.0, 1.0, 20)[:, None]
+    turn = np.linspace(0.0, 2.0 * math.pi, 61)[None, :]
     x, y = 0.96 * r * ring * np.cos(turn), 0.96 * r * ring * np.sin(turn)
-    z = 0.86 * h + 0.07 * (1.0 - ring**2) + folds(x, y, rng, 0.14, 0.06) * (1.0 - ring**4)
+    z = 0.86 * h + 0.06 * (1.0 - ring**2) + 0.016 * rumple(x, y, rng, 0.17) * (1.0 - ring**6)
     z[:, -1] = z[:, 0]
-    heap = shapes.grid(np.stack(np.broadcast_arrays(x, y, z), axis=2), slot=1).flipped()
+    heap = shapes.grid(np.stack(np.broadcast_arrays(x, y, z), axis=2)).flipped()
+    # Several garments: regions that bend about each other.
+    middle = heap.corners_m.mean(axis=1)
+    bent = np.arctan2(middle[:, 1], middle[:, 0]) + 9.0 * np.hypot(middle[:, 0], middle[:, 1])
+    heap = replace(heap, slots=1 + np.floor((bent % (2.0 * math.pi)) / 2.1).astype(np.int64) % 3)
     look = patterned_material(f"texture/fabric?seed={int(rng.between(0, 16))}", 0.12, 0.9)
     shell = look if rng.chance(0.5) else painted_material(rng.choose(("#f0efeb", "#8a8d90")), 0.5)
-    return solid(
-        [wall, heap], [shell, fabric(rng)], [((-0.8 * r, -0.8 * r, 0.0), (0.8 * r, 0.8 * r, h))]
-    )
+    looks = [shell, painted_material(rng.choose(_LINEN), 0.95), fabric(rng, 0.3), fabric(rng, 0.3)]
+    return solid([wall, heap], looks, [((-0.8 * r, -0.8 * r, 0.0), (0.8 * r, 0.8 * r, h))])
 
 
 def coat_hooks(seed: int = 0) -> Solid:
@@ -480,7 +483,7 @@ def _jacket(rng: VariantRng) -> list[Patch]:
     c, sn = np.cos(turn), np.sin(turn)
     fall = short + (back - short) * (0.5 - 0.5 * c) ** 1.5
     slope = np.sin(0.5 * math.pi * np.clip(s / 0.12, 0.0, 1.0))
-    half = 0.16 + 0.105 * slope + 0.015 * s
+    half = 0.13 + 0.115 * slope + 0.03 * s
     deep = 0.012 + 0.04 * slope + 0.012 * s
     wave = np.zeros(np.broadcast_shapes(s.shape, turn.shape))
     for number in (3, 5, 7, 11):
@@ -491,27 +494,27 @@ def _jacket(rng: VariantRng) -> list[Patch]:
     flat = np.sign(c) * np.abs(c) ** 0.55
     x = flat * (deep + np.maximum(fold, 0.0))
     y = np.sign(sn) * np.abs(sn) ** 0.55 * half + sn * np.maximum(fold, 0.0)
-    z = 0.03 - 0.05 * (np.abs(y) / 0.27) ** 2 * (1.0 - s) - fall * s
+    z = 0.035 - 0.085 * (np.abs(y) / 0.27) ** 2.2 * (1.0 - s) ** 0.5 - fall * s
     points = np.stack(np.broadcast_arrays(x, y, z), axis=2)
     points[:, -1] = points[:, 0]
     points[0, :, 0] *= 0.2
     outer = shapes.grid(points).flipped()
     patches = [outer, shapes.grid(points * np.array([0.93, 0.985, 1.0]))]
-    collar = np.array([(0.0, -0.075, 0.02), (-0.022, -0.04, 0.045), (-0.03, 0.0, 0.05),
-                       (-0.022, 0.04, 0.045), (0.0, 0.075, 0.02)])  # fmt: skip
-    patches.append(
-        shapes.sweep(
-            shapes.spline(collar.tolist(), 16), shapes.circle(0.016, 10), up=(1.0, 0.0, 0.0)
-        )
-    )
+    collar = [(0.03, -0.06, 0.012), (-0.004, -0.07, 0.036), (-0.026, -0.035, 0.05), (-0.03, 0.0, 0.053),
+              (-0.026, 0.035, 0.05), (-0.004, 0.07, 0.036), (0.03, 0.06, 0.012)]  # fmt: skip
+    line = shapes.spline(collar, 25)
+    width = np.sin(np.linspace(0.12, math.pi - 0.12, 25)) ** 0.5
+    flat = np.stack([0.009 + 0.0 * width, 0.032 * width], axis=1)
+    patches.append(shapes.sweep(line, shapes.circle(1.0, 12), up=(1.0, 0.0, 0.2), scale=flat))
     for sy in (-1, 1):
         way = rng.between(-0.025, 0.01)
         arm = rng.between(0.42, 0.54)
         path = [
-            (0.0, sy * 0.225, -0.01),
-            (way, sy * 0.275, -0.06),
-            (1.5 * way, sy * 0.292, -0.25),
-            (2.2 * way, sy * 0.285, -arm),
+            (0.0, sy * 0.17, -0.075),
+            (0.3 * way, sy * 0.235, -0.1),
+            (way, sy * 0.272, -0.19),
+            (1.5 * way, sy * 0.285, -0.32),
+            (2.2 * way, sy * 0.28, -arm),
         ]
         t = np.linspace(0.0, 1.0, 26)
         crease = 1.0 + 0.12 * np.sin(36.0 * t) * np.exp(-(((t - 0.5) / 0.25) ** 2))

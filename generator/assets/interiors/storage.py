@@ -566,11 +566,8 @@ def _sacks(rng: VariantRng) -> tuple[list[Patch], list[Material], float]:
             patches.append(
                 sack.rotated("z", rng.between(-0.04, 0.04)).moved(x + shift, y + shift, row * t)
             )
-            band = shapes.block((-0.1, -0.14, 0.0), (0.1, 0.14, 0.002), 0.0, 2)
-            del band
-    paper = rng.choose(("#c8a878", "#e9e6de", "#d9d2c3", "#3d5a7a"))
-    looks = [painted_material(paper, 0.75), painted_material("#1f4e8c", 0.7)]
-    return patches, looks, rows * t + 0.03
+    paper = rng.choose(("#c8a878", "#e9e6de", "#d9d2c3", "#b9a58a"))
+    return patches, [painted_material(paper, 0.75)], rows * t + 0.03
 
 
 def _drums(rng: VariantRng) -> tuple[list[Patch], list[Material], float]:

@@ -51,6 +51,54 @@ def wall_art(seed: int) -> TextureData:
     return TextureData(in_turn(_MOTIFS, seed)(w, h, rng))
 
 
+def whiteboard_notes(seed: int) -> TextureData:
+    """Writing with markers on a whiteboard: lists, boxes with arrows, a curve; 512 x 384."""
+    rng = variant_rng("whiteboard_notes", seed)
+    image = art.canvas(2 * LONG_PX, 2 * SHORT_PX, (245, 246, 245))
+    draw = art.pen(image)
+    inks = ((31, 42, 90), (163, 38, 29), (30, 30, 32), (30, 98, 62))
+
+    def write(x: float, y: float, wide: float, high: float, ink: art.Color) -> None:
+        # Letters are loops of a pen that moves on; words end where it lifts.
+        while wide > 0.0:
+            word = min(wide, rng.between(2.0, 5.5) * high)
+            t = np.linspace(0.0, 1.0, max(6, int(word / high * 9)))
+            phase = rng.between(0.0, 6.3)
+            up = 0.35 * high * np.sin(55.0 * t * word / (9.0 * high) + phase)
+            up = up * (0.7 + 0.3 * np.sin(7.0 * t + phase))
+            along = x + word * t + 0.12 * high * np.cos(55.0 * t * word / (9.0 * high))
+            draw.line(list(zip(along.tolist(), (y + up).tolist(), strict=True)), fill=ink, width=3)
+            x, wide = x + word + 0.6 * high, wide - word - 0.6 * high
+
+    for k in range(int(rng.between(1, 4))):
+        x, y, ink = 60.0 + 320.0 * k, rng.between(60.0, 130.0), inks[int(rng.random() * 4)]
+        kind = rng.random()
+        if kind < 0.5:
+            write(x, y, 180.0, 30.0, ink)
+            for row in range(int(rng.between(3, 9))):
+                at = y + 60.0 + 48.0 * row
+                draw.ellipse([x, at - 4, x + 8, at + 4], fill=ink)
+                write(x + 24.0, at, rng.between(90.0, 250.0), 20.0, inks[int(rng.random() * 4)])
+        elif kind < 0.8:
+            for row in range(int(rng.between(2, 5))):
+                at = y + 130.0 * row
+                draw.rectangle([x, at, x + 190, at + 76], outline=ink, width=4)
+                write(x + 24.0, at + 38.0, 130.0, 22.0, inks[2])
+                if row:
+                    draw.line([x + 95, at - 54, x + 95, at], fill=inks[1], width=4)
+                    draw.line(
+                        [x + 85, at - 14, x + 95, at, x + 105, at - 14], fill=inks[1], width=4
+                    )
+        else:
+            draw.line([x, y, x, y + 260, x + 260, y + 260], fill=inks[2], width=4)
+            t = np.linspace(0.0, 1.0, 40)
+            bow = y + 240.0 - 200.0 * t ** rng.between(0.5, 2.2) + 14.0 * np.sin(9.0 * t)
+            points = list(zip((x + 10 + 240 * t).tolist(), bow.tolist(), strict=True))
+            draw.line(points, fill=inks[1], width=5)
+            write(x + 40.0, y + 300.0, 180.0, 20.0, inks[0])
+    return art.resize_texture(image, LONG_PX, SHORT_PX)
+
+
 def _axes(w: int, h: int) -> tuple[Float32, Float32]:
     """Columns to the right and rows upwards, in [0, 1]."""
     x = ((np.arange(w) + 0.5) / w).astype(np.float32)[None, :]

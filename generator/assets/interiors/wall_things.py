@@ -9,6 +9,7 @@ import math
 
 from gen_data.generator.assets.interiors.fittings import photograph
 from gen_data.generator.assets.interiors.parts import (
+    TOOLS,
     Box,
     board,
     cloth,
@@ -21,7 +22,6 @@ from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.furniture import rectangle
 from gen_data.generator.assets.procedural.material_presets import (
-    PLASTICS,
     STAINLESS,
     STEEL,
     draw_linear,
@@ -277,7 +277,7 @@ def parts_bins(seed: int = 0) -> Solid:
     looks = [
         metal_material(STEEL, 0.5),
         painted_material("#1f5fa8", 0.4),
-        Material(draw_linear(PLASTICS, 0.1, rng), 0.4),
+        Material(draw_linear(TOOLS, 0.1, rng), 0.4),
         metal_material(STEEL, 0.55),
     ]
     return solid(patches, looks, [((0.0, -0.5 * w, 0.0), (0.16, 0.5 * w, rows * pitch))])
