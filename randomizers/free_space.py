@@ -7,11 +7,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gen_data.generator.core.boxes import Rectangle, overlap_of
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Body, Camera, Scene
-from gen_data.generator.core.se3 import SE3, Vec3, rotate_by_quaternion
+from gen_data.generator.core.se3 import SE3, Array, Vec3, rotate_by_quaternion
 
 _GRID = (16, 9)
 """Columns and rows of the rays that test a view."""
@@ -146,32 +147,67 @@ def is_in_the_open(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: fl
     return is_inside(point_m, *scene.interior_m) and is_clear(point_m, scene, assets, margin_m)
 
 
-def hidden_share(camera: Camera, scene: Scene, assets: AssetIndex, near_m: float) -> float:
-    """Share of a camera's image, in [0, 1], that bodies nearer than ``near_m`` may hide.
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What rays through the middles of a grid of an image's cells meet first.
 
-    Rays through the middles of a grid of cells are tested with the bounding boxes of the bodies
-    that ``is_clear`` tests; parts of the image without a ray show nothing.
+    Attributes:
+        bodies: Bodies that were tested, by their bounding boxes.
+        distances_m: Per ray; infinite if it meets nothing within reach.
+        hits: Per ray, index of the body; -1 = none.
+        places: Per ray, its place in the image, from -1 to 1 to the right and down, [n, 2].
     """
+
+    bodies: tuple[Body, ...]
+    distances_m: Array
+    hits: NDArray[np.int64]
+    places: Array
+
+
+def look_around(camera: Camera, scene: Scene, assets: AssetIndex, reach_m: float) -> Sight:
+    """What a camera sees within a reach; parts of the image without a ray show nothing."""
     k = camera.intrinsics
-    u, v = (np.arange(count) + 0.5 for count in _GRID)
-    cells = np.stack(np.meshgrid(u / _GRID[0] * k.width_px, v / _GRID[1] * k.height_px), axis=-1)
-    rays = k.rays(cells.reshape(-1, 2))
-    rays = camera.T_world_camera.rotate(rays[np.isfinite(rays).all(axis=1)])
+    u, v = ((np.arange(count) + 0.5) / count for count in _GRID)
+    shares = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+    rays = k.rays(shares * (k.width_px, k.height_px))
+    usable = np.isfinite(rays).all(axis=1)
+    rays = camera.T_world_camera.rotate(rays[usable])
+    places = 2.0 * shares[usable] - 1.0
     eye_m = camera.T_world_camera.translation_m
-    hidden = np.zeros(len(rays), np.bool_)
+    near, edges, starts, turns = [], [], [], []
     for body in _solid_bodies(scene):
         low, high = (body.scale * np.array(edge) for edge in standing_bounds_m(assets, body.asset))
         T_body_world = body.T_world_body.inverse()
         start = np.array((T_body_world @ SE3(eye_m)).translation_m)
-        if (np.maximum(low - start, start - high) > near_m).any():
+        if (np.maximum(low - start, start - high) > reach_m).any():
             continue
-        # Distances at which rays cross the planes of the faces (Kay and Kajiya 1986).
-        along = T_body_world.rotate(rays)
-        along = np.where(np.abs(along) < _PARALLEL, _PARALLEL, along)
-        one, other = (low - start) / along, (high - start) / along
-        enter, leave = np.minimum(one, other).max(axis=1), np.maximum(one, other).min(axis=1)
-        hidden |= (enter <= np.minimum(leave, near_m)) & (leave >= 0.0)
-    return float(hidden.mean()) if len(hidden) else 0.0
+        near.append(body)
+        edges.append((low, high))
+        starts.append(start)
+        turns.append(T_body_world.rotation())
+    if not near or not len(rays):
+        nothing = np.full(len(rays), np.inf), np.full(len(rays), -1, np.int64)
+        return Sight((), *nothing, places)
+    # Distances at which rays cross the planes of the faces (Kay and Kajiya 1986).
+    along = rays @ np.array(turns).transpose(0, 2, 1)
+    along = np.where(np.abs(along) < _PARALLEL, _PARALLEL, along)
+    corners, start = np.array(edges), np.array(starts)[:, None]
+    one, other = ((corners[:, i, None] - start) / along for i in (0, 1))
+    enter = np.maximum(np.minimum(one, other).max(axis=2), 0.0)
+    leave = np.maximum(one, other).min(axis=2)
+    distances = np.where((enter <= leave) & (enter <= reach_m), enter, np.inf)
+    first = distances.argmin(axis=0)
+    nearest = distances.min(axis=0)
+    return Sight(tuple(near), nearest, np.where(np.isfinite(nearest), first, -1), places)
+
+
+def hidden_share(camera: Camera, scene: Scene, assets: AssetIndex, near_m: float) -> float:
+    """Share of a camera's image, in [0, 1], that bodies nearer than ``near_m`` may hide.
+
+    Bodies are those that ``is_clear`` tests.
+    """
+    distances_m = look_around(camera, scene, assets, near_m).distances_m
+    return float((distances_m <= near_m).mean()) if len(distances_m) else 0.0
 
 
 def is_clear(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: float) -> bool:

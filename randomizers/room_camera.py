@@ -15,12 +15,17 @@ from gen_data.generator.core.scene import Body, Camera, Scene
 from gen_data.generator.core.se3 import Array, Vec3, look_at
 from gen_data.generator.core.streams import Rng
 from gen_data.randomizers.base import RandomizerBase
-from gen_data.randomizers.free_space import hidden_share, is_clear
+from gen_data.randomizers.free_space import Sight, is_clear, look_around
 
 TRIES = 96
 _WALL_M = 0.3
 """Smallest distance of a camera from walls."""
-_HIDDEN_MAX = 0.2
+_HIDDEN_MAX, _HIDDEN_MIDDLE_MAX = 0.15, 0.02
+"""Largest shares of the image, and of its middle, that near bodies may hide."""
+_MIDDLE = 0.55
+"""Half of the middle's width and height, as shares of the image's."""
+_FAR_M = 12.0
+_LARGE_M, _RAYS_EACH = 0.45, 8
 
 
 class RoomCamera(RandomizerBase):
@@ -34,10 +39,11 @@ class RoomCamera(RandomizerBase):
         roll_deg: Clockwise rotation about the viewing direction.
         away_m: Smallest distance from that piece.
         clearance_m: Smallest distance to any body.
-        near_m: Distance within which bodies may hide a fifth of the image at most.
+        near_m: Distance within which bodies, but floors and ceilings, may hide no more than a
+            seventh of the image, and nothing in its middle.
         min_pieces: Smallest number of pieces whose origins are in the image; half of
             all pieces if that is fewer.
-        choices: Number of places to choose from: the one from which most of the room is in view.
+        choices: Number of places to choose from: the one from which most furniture is seen well.
     """
 
     type: Literal["room_camera"] = "room_camera"
@@ -45,15 +51,15 @@ class RoomCamera(RandomizerBase):
     room: str = "room"
     height_m: dist.Positive = dist.Uniform(1.0, 1.75)
     pitch_deg: Annotated[dist.Scalar, dist.Bounds(-89, 89)] = dist.Normal(
-        -10.0, 7.0, clip=(-35.0, 12.0)
+        -9.0, 4.5, clip=(-20.0, 4.0)
     )
     yaw_deg: dist.Scalar = dist.Normal(0.0, 12.0, clip=(-30.0, 30.0))
-    roll_deg: dist.Scalar = dist.Normal(0.0, 1.5, clip=(-6.0, 6.0))
+    roll_deg: dist.Scalar = dist.Normal(0.0, 0.8, clip=(-3.0, 3.0))
     away_m: float = Field(1.3, ge=0)
     clearance_m: float = Field(0.25, ge=0)
-    near_m: float = Field(0.7, ge=0)
+    near_m: float = Field(0.9, ge=0)
     min_pieces: int = Field(7, ge=0, le=100)
-    choices: int = Field(4, ge=1, le=32)
+    choices: int = Field(5, ge=1, le=32)
 
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with its cameras moved. Raises LayoutRejected if no place is free."""
@@ -77,18 +83,20 @@ class RoomCamera(RandomizerBase):
         """The camera at the best of several places. Raises LayoutRejected if there is none."""
         origins_m = np.array([body.T_world_body.translation_m for body in pieces])
         least = min(self.min_pieces, len(pieces) // 2)
+        large = {body.name for body in pieces if _is_large(body, assets)}
         found: list[tuple[int, Camera]] = []
         for _ in range(TRIES):
             drawn = self._draw_pose(scene, floors, pieces, assets, rng)
             if drawn is None:
                 continue
-            floor, eye, target, roll = drawn
+            eye, target, roll = drawn
             moved = replace(camera, T_world_camera=look_at(eye, target, roll).rounded())
             if _count_in_view(moved, origins_m) < least:
                 continue
-            if hidden_share(moved, scene, assets, self.near_m) > _HIDDEN_MAX:
+            sight = look_around(moved, scene, assets, _FAR_M)
+            if _is_hidden(sight, self.near_m):
                 continue
-            found.append((_count_in_view(moved, _points_in(floor, scene, assets)), moved))
+            found.append((_count_furniture(sight, large), moved))
             if len(found) == self.choices:
                 break
         if not found:
@@ -104,8 +112,8 @@ class RoomCamera(RandomizerBase):
 
     def _draw_pose(
         self, scene: Scene, floors: list[Body], pieces: list[Body], assets: AssetIndex, rng: Rng
-    ) -> tuple[Body, Vec3, Vec3, float] | None:
-        """Draw floor, eye, target and roll; None if the place is taken or too near."""
+    ) -> tuple[Vec3, Vec3, float] | None:
+        """Draw eye, target and roll; None if the place is taken or too near."""
         floor = floors[min(int(rng.random() * len(floors)), len(floors) - 1)]
         (x0, y0, _), (x1, y1, _) = assets.bounds_m(floor.asset)
         mx, my, _ = floor.T_world_body.translation_m
@@ -136,18 +144,31 @@ class RoomCamera(RandomizerBase):
             y + math.cos(pitch) * math.sin(yaw),
             eye[2] + math.sin(pitch),
         )
-        return floor, eye, target, roll
+        return eye, target, roll
 
 
-def _points_in(floor: Body, scene: Scene, assets: AssetIndex) -> Array:
-    """Points spread over a room between knees and eyes, [n, 3]."""
-    (x0, y0, _), (x1, y1, _) = assets.bounds_m(floor.asset)
-    mx, my, _ = floor.T_world_body.translation_m
-    x, y = (np.linspace(0.1, 0.9, 6) * (b - a) + a for a, b in ((x0, x1), (y0, y1)))
-    z = np.array([0.3, 1.0, min(1.7, scene.interior_m[1][2])])
-    grid = np.meshgrid(x + mx, y + my, z, indexing="ij")
-    points: Array = np.stack(grid, axis=-1).reshape(-1, 3)
-    return points
+def _is_hidden(sight: Sight, near_m: float) -> bool:
+    """Whether what is near, but floors and ceilings, hides too much of an image."""
+    flat = [body.name.endswith(("/floor", "/ceiling")) for body in sight.bodies]
+    near = (sight.distances_m <= near_m) & ~np.array([*flat, True])[sight.hits]
+    middle = (np.abs(sight.places) < _MIDDLE).all(axis=1)
+    return bool(near.mean() > _HIDDEN_MAX or near[middle].mean() > _HIDDEN_MIDDLE_MAX)
+
+
+def _is_large(body: Body, assets: AssetIndex) -> bool:
+    """Whether a piece is furniture rather than a small thing."""
+    low, high = assets.bounds_m(body.asset)
+    return max(b - a for a, b in zip(low, high, strict=True)) > _LARGE_M
+
+
+def _count_furniture(sight: Sight, names: set[str]) -> int:
+    """Rays that meet pieces of these names; no more than a few count for each of them."""
+    each = np.bincount(sight.hits[sight.hits >= 0], minlength=len(sight.bodies))
+    return sum(
+        min(int(rays), _RAYS_EACH)
+        for body, rays in zip(sight.bodies, each, strict=True)
+        if body.name in names
+    )
 
 
 def _count_in_view(camera: Camera, points_m: Array) -> int:

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.assets.interiors.parts import SUPPORT
+from gen_data.generator.assets.interiors.parts import BACKREST, INSIDE, SUPPORT
 from gen_data.generator.assets.interiors.storage import (
     PALLET_PITCH_M,
     VARIANTS_PER_LOOK,
@@ -44,6 +44,10 @@ _CROWDED = 0.25
 """Distance within which a piece before a window hides it."""
 _SILL_M = 0.026
 """Height of sills below the openings of windows."""
+_FREE_ABOVE_M = {"wall_shelf": 0.32}
+"""Height above pieces that others leave free."""
+_HANGS_M = 0.3
+"""What begins higher than this above the floor hangs on a wall."""
 _FLAT = frozenset({"rug"})
 _BOARDS = frozenset({"bookcase", "steel_rack"})
 _EDGES_M = {
@@ -55,11 +59,24 @@ _EDGES_M = {
 """Width of the border of surfaces that stays free, in depth and width: that of sides and posts.
 Pallets reach over the beams of their racks."""
 _SEATS = frozenset({"armchair", "chair", "sofa"})
-_SQUARE = frozenset({"book_row", "binder_row", "dish_rack", "microwave", "pallet", "spice_rack"})
+_SQUARE = frozenset(
+    {
+        "book_row",
+        "binder_row",
+        "crockery",
+        "dish_rack",
+        "hanging_clothes",
+        "microwave",
+        "pallet",
+        "spice_rack",
+    }
+)
 """Things that stand square to what carries them."""
 _SQUARE_SHARE = 0.4
 """Share of things on tables that lie square to them."""
 _TRIES_ON = 6
+_FULL = 0.97
+"""Largest share of a board that things cover."""
 _TOP_M = 0.003
 """Depth of the rounded border of tops."""
 _EDGE_OF_TOP_M = 0.008
@@ -217,13 +234,14 @@ class Layout:
         footprint: Rectangle = (at[0], at[1], c, sn, s.half_x, s.half_y)
         high_m = low_m + s.high - s.low
         zone = _before(footprint, rule.clearance_m) if rule.clearance_m > 0.0 else None
-        reason = self.refuse(footprint, low_m, high_m, zone, ignore, flat=family in _FLAT)
+        carrier = ignore if rule.place == "over" else -2
+        reason = self.refuse(footprint, low_m, high_m, zone, ignore, carrier, flat=family in _FLAT)
         if reason:
             self.refused[reason] += 1
             return False
         x, y = at[0] - c * s.x + sn * s.y, at[1] - sn * s.x - c * s.y
         position = (round(x, 5), round(y, 5), round(low_m - s.low, 5))
-        on = ignore if rule.place == "on" else -1
+        on = ignore if rule.place in ("on", "over") else -1
         self.pieces.append(
             Piece(
                 rule.piece, family, asset, position, yaw_rad, footprint, low_m, high_m, on, s.rest
@@ -240,19 +258,30 @@ class Layout:
         high_m: float,
         zone: Rectangle | None,
         ignore: int,
+        carrier: int,
         *,
         flat: bool,
     ) -> str:
-        """Why something cannot be there; empty = it can."""
+        """Why something cannot be there; empty = it can.
+
+        Args:
+            footprint: Rectangle that it covers.
+            low_m: Height of its lowest point.
+            high_m: Height of its highest point.
+            zone: Floor that it keeps free.
+            ignore: Index of the piece whose floor it may take.
+            carrier: Index of the piece that it hangs around.
+            flat: Whether it lies under others.
+        """
         if not self.holds(footprint):
             return "no room between the walls"
         if high_m > self.room.size_m[2] + 1e-6:
             return "higher than the room"
-        for other in self.pieces:
-            if flat != (other.family in _FLAT):
+        for k, other in enumerate(self.pieces):
+            if k == carrier or flat != (other.family in _FLAT):
                 continue
             if (
-                low_m < other.high_m - 1e-6
+                low_m < other.high_m + _FREE_ABOVE_M.get(other.family, 0.0) - 1e-6
                 and other.low_m < high_m - 1e-6
                 and overlap_of(footprint, other.footprint)
             ):
@@ -351,7 +380,7 @@ def furnish(
             wanted = round(wanted * larger)
         placed = _PLACES[rule.place](layout, rule, options, wanted)
         related = not rule.of or any(p.role in rule.of for p in layout.pieces)
-        required = not rule.optional and rule.place not in ("on", "around", "front")
+        required = not rule.optional and rule.place not in ("on", "over", "around", "front")
         if placed < low and related and required:
             reason = layout.refused.most_common(1)
             raise Conflict(rule.piece, reason[0][0] if reason else "no place")
@@ -359,7 +388,7 @@ def furnish(
     if unreachable:
         raise Conflict(unreachable, "cannot be reached from a door")
     for rule in rules.pieces:
-        if rule.things and rule.how_many[1]:
+        if rule.things or rule.inside:
             _put_things(layout, rule, options, clutter)
     return layout.pieces
 
@@ -389,11 +418,18 @@ def _at_wall(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
             gap = 0.0005 if rule.place == "hang" else WALL_GAP_M
             at = layout.room.at_wall(wall, along, s.half_x + gap)
             # Basins on walls begin above the floor.
-            low = between(layout.rng, rule.height_m) if rule.place == "hang" else max(s.low, 0.0)
+            low = _hanging_m(layout, rule, s) if rule.place == "hang" else max(s.low, 0.0)
             if layout.put(rule, family, asset, at, wall * 0.5 * math.pi, low):
                 placed += 1
                 break
     return placed
+
+
+def _hanging_m(layout: Layout, rule: Rule, s: _Shape) -> float:
+    """Height of the lowest point of what hangs on a wall."""
+    if rule.middle_m[1]:
+        return between(layout.rng, rule.middle_m) - 0.5 * (s.high - s.low)
+    return between(layout.rng, rule.height_m)
 
 
 def _weighted(weights: Sequence[float], draw: float) -> int:
@@ -466,8 +502,9 @@ def _put_relative(layout: Layout, rule: Rule, family: str, asset: str, k: int) -
         case "beside":
             dx = s.half_x - a
             dy = (b + gap + s.half_y) * (1 if layout.rng.random() < 0.5 else -1)
-            if ref.role == rule.piece or gap == 0.0:
-                dx = s.half_x - a
+            # Beside what hangs, at the same height.
+            if ref.low_m > _HANGS_M:
+                low = 0.5 * (ref.low_m + ref.high_m) - 0.5 * (s.high - s.low)
         case "around":
             side = draw_count(layout.rng, (0, 3))
             sc, ss = direction(side)
@@ -513,6 +550,25 @@ def _on(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
         at = (x + c * dx - sn * dy, y + sn * dx + c * dy)
         if s.half_x <= a + 0.03 and s.half_y <= b + 0.03:
             placed += layout.put(rule, family, asset, at, ref.yaw_rad, ref.high_m, ignore=k)
+    return placed
+
+
+def _over(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:
+    """Over the backs of seats, which say where their upper edge is."""
+    placed = 0
+    found = [k for k in _relatives(layout, rule) if layout.pieces[k].on < 0]
+    for _ in range(min(wanted, len(found))):
+        k = found.pop(min(int(layout.rng.random() * len(found)), len(found) - 1))
+        ref = layout.pieces[k]
+        edges = [p.position_m for p in layout.assets.keypoints(ref.asset) if p.name == BACKREST]
+        if not edges:
+            continue
+        family, asset = _draw_asset(layout, rule, options)
+        s = layout.shape(asset)
+        x, y, z = ref.pose.apply(np.array([edges[0]]))[0].tolist()
+        c, sn = _cos_sin(ref.yaw_rad)
+        at = (x + c * s.x - sn * s.y, y + sn * s.x + c * s.y)
+        placed += layout.put(rule, family, asset, at, ref.yaw_rad, z + s.low, ignore=k)
     return placed
 
 
@@ -602,6 +658,7 @@ _PLACES = {
     "below": _below_windows,
     "ceiling": _at_ceiling,
     "door": _at_doors,
+    "over": _over,
 }
 
 
@@ -652,6 +709,18 @@ def supports(piece: Piece, assets: AssetIndex) -> list[Support]:
     return [Support(piece.high_m, 0.6, (0.0, 0.0), inner, is_top=True)]
 
 
+def _insides(piece: Piece, assets: AssetIndex) -> list[Support]:
+    """Boards of a piece behind its doors."""
+    corners = [k.position_m for k in assets.keypoints(piece.asset) if k.name == INSIDE]
+    low, high = assets.bounds_m(piece.asset)
+    made = []
+    for (x0, y0, z0), (x1, y1, z1) in zip(corners[::2], corners[1::2], strict=True):
+        middle = (0.5 * (x0 + x1 - low[0] - high[0]), 0.5 * (y0 + y1 - low[1] - high[1]))
+        half = (0.5 * (x1 - x0), 0.5 * (y1 - y0))
+        made.append(Support(piece.position_m[2] + z0, z1 - z0, middle, half))
+    return made
+
+
 def _put_things(layout: Layout, rule: Rule, options: Options, clutter: float) -> None:
     """Small things on the surfaces of all pieces of a rule, apart from one another."""
     for k, piece in enumerate(list(layout.pieces)):
@@ -662,9 +731,16 @@ def _put_things(layout: Layout, rule: Rule, options: Options, clutter: float) ->
             for n, p in enumerate(layout.pieces)
             if n != k and overlap_of(p.footprint, piece.footprint)
         ]
-        for support in supports(piece, layout.assets):
+        for board in _insides(piece, layout.assets) if rule.inside else ():
+            stored = _put_thing(layout, rule.inside, options, k, board, near)
+            if stored is not None:
+                layout.pieces.append(stored)
+        for support in supports(piece, layout.assets) if rule.things else ():
+            if rule.filled[1]:
+                _fill_board(layout, rule, options, k, support, near, clutter)
+                continue
             for _ in range(round(draw_count(layout.rng, rule.how_many) * clutter)):
-                placed = _put_thing(layout, rule, options, k, support, near)
+                placed = _put_thing(layout, rule.things, options, k, support, near)
                 if placed is not None:
                     layout.pieces.append(placed)
                     near.append(placed)
@@ -672,47 +748,115 @@ def _put_things(layout: Layout, rule: Rule, options: Options, clutter: float) ->
 
 def _put_thing(
     layout: Layout,
-    rule: Rule,
+    things: Sequence[str],
     options: Options,
     k: int,
     support: Support,
     near: Sequence[Piece],
 ) -> Piece | None:
     """A thing on a surface of piece k; None if there is no place for it."""
-    carrier, height = layout.pieces[k], support.height_m
-    x, y, c, sn, _, _ = carrier.footprint
-    family = layout.pick(rule.things)
+    family = layout.pick(things)
     asset = layout.pick(options[family])
     s = layout.shape(asset)
-    clearance_m = min(support.clearance_m, layout.room.size_m[2] - height)
-    if s.rest is None or s.high - s.low > clearance_m:
+    if not _fits(layout, s, support):
         return None
     for _ in range(_TRIES_ON):
         turn = layout.signed(math.pi if support.is_top else 0.25)
         if family in _SQUARE or (support.is_top and layout.rng.random() < _SQUARE_SHARE):
             turn = 0.0
-        tc, ts = abs(math.cos(turn)), abs(math.sin(turn))
-        reach = (s.half_x * tc + s.half_y * ts, s.half_x * ts + s.half_y * tc)
+        reach = _reach(s, turn)
         free = support.half_m[0] - reach[0], support.half_m[1] - reach[1]
         if min(free) < 0.0:
             continue
-        dx = support.middle_m[0] + layout.signed(free[0])
-        dy = support.middle_m[1] + layout.signed(free[1])
-        at = (x + c * dx - sn * dy, y + sn * dx + c * dy)
-        yaw = carrier.yaw_rad + turn
-        c2, s2 = _cos_sin(yaw)
-        footprint: Rectangle = (at[0], at[1], c2, s2, s.half_x, s.half_y)
-        top = height + s.high - s.low
-        taken = any(
-            p.low_m < top and height < p.high_m - 1e-6 and overlap_of(footprint, p.footprint)
-            for p in near
-        )
-        if taken or (support.is_top and not layout.is_on_top(footprint, carrier)):
-            continue
-        px, py = at[0] - c2 * s.x + s2 * s.y, at[1] - s2 * s.x - c2 * s.y
-        position = (round(px, 5), round(py, 5), round(height - s.low, 5))
-        return Piece("thing", family, asset, position, yaw, footprint, height, top, k, s.rest)
+        dx, dy = layout.signed(free[0]), layout.signed(free[1])
+        placed = _thing_at(layout, family, asset, k, support, (dx, dy), turn)
+        if not _is_taken(placed, near) and (
+            not support.is_top or layout.is_on_top(placed.footprint, layout.pieces[k])
+        ):
+            return placed
     return None
+
+
+def _fill_board(
+    layout: Layout,
+    rule: Rule,
+    options: Options,
+    k: int,
+    support: Support,
+    near: list[Piece],
+    clutter: float,
+) -> None:
+    """Things side by side on a board, from one end on, near its front edge."""
+    share = min(between(layout.rng, rule.filled) * clutter, _FULL)
+    end = support.half_m[1] * (2.0 * share - 1.0)
+    side = 1.0 if layout.rng.random() < 0.5 else -1.0
+    at, failed = -support.half_m[1], 0
+    while at < end and failed < _TRIES_ON:
+        family = layout.pick(rule.things)
+        asset = layout.pick(options[family])
+        s = layout.shape(asset)
+        turn = 0.0 if family in _SQUARE else layout.signed(0.12)
+        reach = _reach(s, turn)
+        free = support.half_m[0] - reach[0]
+        if free < 0.0 or at + 2.0 * reach[1] > support.half_m[1] or not _fits(layout, s, support):
+            failed += 1
+            continue
+        back = min(2.0 * free, 0.01 + 0.03 * float(layout.rng.random()))
+        place = (free - back, side * (at + reach[1]))
+        placed = _thing_at(layout, family, asset, k, support, place, turn)
+        at += 2.0 * reach[1] + 0.003 + 0.05 * float(layout.rng.random()) ** 3
+        if _is_taken(placed, near):
+            failed += 1
+            continue
+        layout.pieces.append(placed)
+        near.append(placed)
+
+
+def _fits(layout: Layout, s: _Shape, support: Support) -> bool:
+    """Whether a thing stands and is low enough for what is above a surface."""
+    clearance_m = min(support.clearance_m, layout.room.size_m[2] - support.height_m)
+    return s.rest is not None and s.high - s.low <= clearance_m
+
+
+def _reach(s: _Shape, turn_rad: float) -> tuple[float, float]:
+    """Half extents of a turned thing along depth and width of its surface [m]."""
+    c, sn = abs(math.cos(turn_rad)), abs(math.sin(turn_rad))
+    return s.half_x * c + s.half_y * sn, s.half_x * sn + s.half_y * c
+
+
+def _thing_at(
+    layout: Layout,
+    family: str,
+    asset: str,
+    k: int,
+    support: Support,
+    at_m: tuple[float, float],
+    turn_rad: float,
+) -> Piece:
+    """A thing on a surface of piece k, ``at_m`` from the surface's middle."""
+    carrier, height = layout.pieces[k], support.height_m
+    x, y, c, sn, _, _ = carrier.footprint
+    s = layout.shape(asset)
+    dx, dy = support.middle_m[0] + at_m[0], support.middle_m[1] + at_m[1]
+    mx, my = x + c * dx - sn * dy, y + sn * dx + c * dy
+    yaw = carrier.yaw_rad + turn_rad
+    c2, s2 = _cos_sin(yaw)
+    footprint: Rectangle = (mx, my, c2, s2, s.half_x, s.half_y)
+    px, py = mx - c2 * s.x + s2 * s.y, my - s2 * s.x - c2 * s.y
+    position = (round(px, 5), round(py, 5), round(height - s.low, 5))
+    rest = UPRIGHT if s.rest is None else s.rest
+    top = height + s.high - s.low
+    return Piece("thing", family, asset, position, yaw, footprint, height, top, k, rest)
+
+
+def _is_taken(thing: Piece, near: Sequence[Piece]) -> bool:
+    """Whether something is where a thing would be."""
+    return any(
+        p.low_m < thing.high_m
+        and thing.low_m < p.high_m - 1e-6
+        and overlap_of(thing.footprint, p.footprint)
+        for p in near
+    )
 
 
 def free_floor(

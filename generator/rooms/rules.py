@@ -27,6 +27,7 @@ Place = Literal[
     "below",
     "ceiling",
     "door",
+    "over",
 ]
 APARTMENT = "apartment"
 """Type of several joined rooms."""
@@ -45,11 +46,14 @@ class Rule:
         gap_m: Distance from that piece [m].
         clearance_m: Depth of free floor before its front [m].
         height_m: Height of its lowest point, for what hangs [m].
+        middle_m: Height of its middle, instead of ``height_m`` [m].
         at: Place on the top that carries it, from -1 to 1 along depth and width.
         matching: Whether all matching pieces of a room have one look.
         optional: Whether a room may do without it, whatever ``count`` says.
         things: Families of small things on it.
         how_many: Smallest and largest number of them per surface.
+        filled: Share of its boards that things cover, side by side; 0 = ``how_many`` lie about.
+        inside: Families of things on the boards behind its doors, at most one per board.
     """
 
     piece: str
@@ -60,11 +64,14 @@ class Rule:
     gap_m: Range = (0.0, 0.0)
     clearance_m: float = 0.0
     height_m: Range = (0.0, 0.0)
+    middle_m: Range = (0.0, 0.0)
     at: tuple[float, float] = (0.0, 0.0)
     matching: bool = False
     optional: bool = False
     things: tuple[str, ...] = ()
     how_many: tuple[int, int] = (0, 0)
+    filled: Range = (0.0, 0.0)
+    inside: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +100,9 @@ class RoomType:
     @property
     def families(self) -> frozenset[str]:
         """Families of everything that may be in such a room."""
-        return frozenset(name for rule in self.pieces for name in (*rule.assets, *rule.things))
+        return frozenset(
+            name for rule in self.pieces for name in (*rule.assets, *rule.things, *rule.inside)
+        )
 
 
 @cache

@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
+import numpy as np
+
 from gen_data.generator.assets.interiors.parts import (
+    HOUSEHOLD,
     LACQUERS,
     Box,
     board,
@@ -19,10 +22,10 @@ from gen_data.generator.assets.interiors.parts import (
     solid,
     wood,
 )
+from gen_data.generator.assets.interiors.soft_goods import fabric, hang_garment, rumple, wool
 from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
-    PLASTICS,
     STAINLESS,
     STEEL,
     draw_linear,
@@ -44,7 +47,7 @@ def _case(rng: VariantRng) -> Material:
         return _STEEL
     if kind < 0.75:
         return painted_material(rng.choose(("#f1f0ec", "#1d1e20", "#c9c7c0")), 0.3)
-    return Material(draw_linear(PLASTICS, 0.1, rng), 0.3)
+    return Material(draw_linear(HOUSEHOLD, 0.1, rng), 0.3)
 
 
 def microwave(seed: int = 0) -> Solid:
@@ -143,7 +146,7 @@ def cooking_pot(seed: int = 0) -> Solid:
             rod((0.03, a, 0.8 * h), (0.03, b, 0.8 * h), 0.005, 1),
             rod((-0.034, b, 0.8 * h), (0.034, b, 0.8 * h), 0.006, 1),
         ]
-    body = _STEEL if rng.chance(0.6) else Material(draw_linear(PLASTICS, 0.1, rng), 0.2)
+    body = _STEEL if rng.chance(0.6) else Material(draw_linear(HOUSEHOLD, 0.1, rng), 0.2)
     return solid(patches, [body, _DARK], [((-0.75 * r, -r, 0.0), (0.75 * r, r, h))])
 
 
@@ -250,29 +253,35 @@ def game_console(seed: int = 0) -> Solid:
 
 
 def basket(seed: int = 0) -> Solid:
-    """A laundry basket, some full. Slots: body, cloth."""
+    """A woven basket, some with a blanket in it. Slots: body, cloth."""
     rng = variant_rng("basket", seed)
-    r, h = rng.between(0.18, 0.24), rng.between(0.3, 0.55)
-    profile = [
-        (0.0, 0.0),
-        (0.85 * r, 0.0),
-        (r, h),
-        (r - 0.01, h),
-        (0.85 * r - 0.01, 0.02),
-        (0.0, 0.02),
-    ]
-    patches = [shapes.lathe(profile, 40)]
+    r, h = rng.between(0.14, 0.21), rng.between(0.2, 0.38)
+    rows, columns = 40, 81
+    s = np.linspace(0.0, 1.0, rows)[:, None]
+    turn = np.linspace(0.0, 2.0 * math.pi, columns)[None, :]
+    # Strands run around and pass before and behind the upright ones in turn.
+    weave = np.sin(10.0 * turn) * np.cos(math.pi * (rows - 1) / 3.0 * s)
+    reach = r * (0.82 + 0.2 * s - 0.04 * s * s) + 0.0035 * weave
+    x, y = reach * np.cos(turn), reach * np.sin(turn)
+    points = np.stack(np.broadcast_arrays(x, y, h * s), axis=2)
+    points[:, -1] = points[:, 0]
+    inner = points * np.array([0.94, 0.94, 1.0])
+    ring = np.stack([r * np.cos(turn[0]), r * np.sin(turn[0]), np.full(columns, h)], axis=1)
+    edge = shapes.sweep(0.96 * ring * (1, 1, 1 / 0.96), shapes.circle(0.011, 8), capped=False)
+    patches: list[Patch] = [shapes.grid(points), shapes.grid(inner).flipped(), edge]
+    patches.append(disc(0.0, 0.0, 0.0, 0.012, 0.81 * r, 0, 32))
     if rng.chance(0.6):
-        for _ in range(5):
-            a = rng.between(0.0, 2 * math.pi)
-            lump = cushion((-0.11, -0.09, -0.06), (0.11, 0.09, 0.06), 1, 0.055).rotated("z", a)
-            patches.append(
-                lump.moved(
-                    0.35 * r * math.cos(a), 0.35 * r * math.sin(a), h - rng.between(0.0, 0.06)
-                )
-            )
-    body = Material(draw_linear(("#c9a87a", "#e9e5dc", "#8b8f90", "#5d6b70"), 0.1, rng), 0.8)
-    return solid(patches, [body, cloth(rng)], [((-0.8 * r, -0.8 * r, 0.0), (0.8 * r, 0.8 * r, h))])
+        inside = 0.9 * np.linspace(0.0, 1.0, 18)[:, None]
+        hx, hy = r * inside * np.cos(turn), r * inside * np.sin(turn)
+        z = rng.between(0.6, 0.85) * h + 0.35 * r * (1.0 - inside**2)
+        z = z + 0.014 * rumple(hx, hy, rng, 0.13) * (1.0 - inside**6)
+        z[:, -1] = z[:, 0]
+        heap = shapes.grid(np.stack(np.broadcast_arrays(hx, hy, z), axis=2), slot=1)
+        patches.append(heap.flipped())
+    straw = ("#c9a87a", "#b58f5c", "#e0cfae", "#8b6a45", "#8b8f90")
+    body = Material(draw_linear(straw, 0.1, rng), 0.85)
+    soft = fabric(rng, 0.3)
+    return solid(patches, [body, soft], [((-0.8 * r, -0.8 * r, 0.0), (0.8 * r, 0.8 * r, h))])
 
 
 def ottoman(seed: int = 0) -> Solid:
@@ -300,9 +309,9 @@ def coat_rack(seed: int = 0) -> Solid:
         patches.append(rod((0.0, 0.0, 0.1), (0.22 * c, 0.22 * s, 0.012), 0.014, 0))
         patches.append(rod((0.0, 0.0, h - 0.12), (0.15 * c, 0.15 * s, h - 0.02), 0.01, 0))
         if rng.chance(0.4):
-            coat = cushion((-0.05, -0.16, -0.8), (0.05, 0.16, 0.0), 1, 0.045)
-            patches.append(coat.rotated("z", a).moved(0.14 * c, 0.14 * s, h - 0.05))
-    return solid(patches, [wood(rng), cloth(rng)], [((-0.2, -0.2, 0.0), (0.2, 0.2, h))])
+            coat = hang_garment(rng, rng.between(0.7, 1.0), 1)
+            patches.append(coat.rotated("z", a).moved(0.13 * c, 0.13 * s, h - 0.05))
+    return solid(patches, [wood(rng), wool(rng)], [((-0.2, -0.2, 0.0), (0.2, 0.2, h))])
 
 
 def ladder(seed: int = 0) -> Solid:
@@ -349,7 +358,7 @@ def bucket(seed: int = 0) -> Solid:
         patches.append(rod(start, end, 0.003, 1, 6))
     return solid(
         patches,
-        [Material(draw_linear(PLASTICS, 0.1, rng), 0.4), metal_material(STEEL, 0.4)],
+        [Material(draw_linear(HOUSEHOLD, 0.1, rng), 0.4), metal_material(STEEL, 0.4)],
         [((-0.75 * r, -0.75 * r, 0.0), (0.75 * r, 0.75 * r, h))],
     )
 
@@ -402,7 +411,9 @@ def tissue_box(seed: int = 0) -> Solid:
     h = body[1][2]
     sheet = cushion((-0.015, -0.05, h - 0.01), (0.015, 0.05, h + 0.06), 1, 0.014)
     return solid(
-        [shapes.block(*body, 0.002), sheet], [cloth(rng), painted_material("#f7f6f2", 1.0)], [body]
+        [shapes.block(*body, 0.002), sheet],
+        [painted_material(rng.choose(HOUSEHOLD[:11]), 0.6), painted_material("#f7f6f2", 1.0)],
+        [body],
     )
 
 

@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from gen_data.generator.assets.interiors.parts import (
+    HOUSEHOLD,
     LACQUERS,
     SUPPORT,
     Box,
@@ -23,11 +24,11 @@ from gen_data.generator.assets.interiors.parts import (
 )
 from gen_data.generator.assets.interiors.soft_goods import fabric
 from gen_data.generator.assets.procedural import surface_shapes as shapes
+from gen_data.generator.assets.procedural.books import COVER_ATLAS
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
     GLAZES,
     PALETTES,
-    PLASTICS,
     STAINLESS,
     STEEL,
     draw_linear,
@@ -45,7 +46,7 @@ _DARK = painted_material("#1d1e20", 0.5)
 
 
 def _plastic(rng: VariantRng) -> Material:
-    return Material(draw_linear(PLASTICS, 0.1, rng), 0.4)
+    return Material(draw_linear(HOUSEHOLD, 0.1, rng), 0.4)
 
 
 def book_stack(seed: int = 0) -> Solid:
@@ -79,9 +80,10 @@ def magazine(seed: int = 0) -> Solid:
     rng = variant_rng("magazine", seed)
     x, y, t = 0.14, 0.105, rng.between(0.003, 0.007)
     body: Box = ((-x, -y, 0.0), (x, y, t))
-    face = shapes.grid(
-        np.array([[(x, -y, t + 2e-4), (x, y, t + 2e-4)], [(-x, -y, t + 2e-4), (-x, y, t + 2e-4)]])
-    )
+    # The front of a cover's sheet.
+    u0, v0, u1, v1 = COVER_ATLAS["front"]
+    corners = [[(x, -y, t + 2e-4), (x, y, t + 2e-4)], [(-x, -y, t + 2e-4), (-x, y, t + 2e-4)]]
+    face = shapes.grid(np.array(corners), np.array([u0, u1]), np.array([v0, v1]))
     look = printed_material(f"texture/book_cover?seed={seed}", 0.3)
     return solid([shapes.block(*body), face.painted(1)], [_PAPER, look], [body])
 

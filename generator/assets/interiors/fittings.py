@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from gen_data.generator.assets.interiors.parts import (
+    HOUSEHOLD,
     Box,
     board,
     cloth,
@@ -18,13 +19,13 @@ from gen_data.generator.assets.interiors.parts import (
     solid,
     wood,
 )
+from gen_data.generator.assets.interiors.wall_art import MOTIFS, PHOTOGRAPHS, is_upright
 from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.furniture import rectangle
 from gen_data.generator.assets.procedural.material_presets import (
     ALUMINIUM,
     PALETTES,
-    PLASTICS,
     STAINLESS,
     draw_linear,
     metal_material,
@@ -148,19 +149,41 @@ def curtain(seed: int = 0) -> Solid:
     """A curtain on a piece of rail; origin at the middle below. Slots: cloth, rail."""
     rng = variant_rng("curtain", seed)
     w, h = rng.between(0.4, 0.7), rng.between(2.1, 2.35)
-    folds = round(w / 0.085)
-    y = np.linspace(-0.5 * w, 0.5 * w, folds * 8 + 1)
-    turn = 2.0 * math.pi * folds * (y / w + 0.5)
-    z = np.linspace(0.02, h, 7)
-    sway = 0.5 + 0.5 * (1.0 - z / h)
-    x = 0.03 * np.sin(turn)[None, :] * (0.55 + 0.45 * sway[:, None])
-    points = np.stack(np.broadcast_arrays(x, y[None, :], z[:, None]), axis=2)
+    count = round(w / 0.095)
+    y = np.linspace(-0.5 * w, 0.5 * w, count * 10 + 1)[None, :]
+    z = np.linspace(0.0, h, 24)[:, None]
+    down = 1.0 - z / h
+    # Pleats are even at the rail; below they open, lean and join, each in its own way.
+    turn = 2.0 * math.pi * count * (y / w + 0.5)
+    drift = np.zeros_like(y * z)
+    for k in range(1, 4):
+        phase, way = rng.between(0.0, 6.3), rng.between(-1.0, 1.0)
+        drift = drift + way * np.sin(2.0 * math.pi * k * (y / w) + phase) / k
+    sway = turn + 1.4 * down * drift
+    depth = 0.017 + 0.016 * down**0.7 + 0.008 * down * np.sin(0.5 * turn + 2.0 * drift)
+    x = depth * np.sin(sway) + 0.006 * down * np.sin(2.0 * sway + 1.0)
+    # Towards the rail pleats are pinched: narrow ridges between flat cloth.
+    pinch = np.clip(1.0 - (h - z) / 0.16, 0.0, 1.0)
+    x = x * (1.0 - pinch) + pinch * 0.02 * np.clip(np.sin(turn), -0.3, 1.0)
+    gather = 1.0 - rng.choose((0.0, 0.05, 0.12)) * np.sin(math.pi * np.clip(down * 1.1, 0.0, 1.0))
+    hem = 0.012 + 0.008 * np.sin(sway[:1] * 0.5)
+    points = np.stack(np.broadcast_arrays(x, y * gather, hem + z * (h - 0.012) / h), axis=2)
     sheet = shapes.grid(points)
+    low = points[:3] + np.array([0.0035, 0.0, 0.0])
     patches = [
         sheet,
         sheet.flipped(),
+        shapes.grid(low),
         rod((0.0, -0.5 * w - 0.04, h + 0.015), (0.0, 0.5 * w + 0.04, h + 0.015), 0.012, 1),
     ]
+    for k in range(count + 1):
+        at = (k / count - 0.5) * 0.98 * w
+        ring = shapes.lathe(
+            [(0.014, -0.002), (0.018, -0.002), (0.018, 0.002), (0.014, 0.002), (0.014, -0.002)],
+            16,
+            1,
+        )
+        patches.append(ring.rotated("x", 0.5 * math.pi).moved(0.0, at, h + 0.011))
     light = cloth(rng)
     made = replace(light, diffuse_transmission=_scaled(light.base_color, 0.3))
     return solid(
@@ -191,35 +214,50 @@ def rug(seed: int = 0) -> Solid:
     return solid([shapes.block(*whole, 0.004, 1), shapes.block(*inner)], [pile, edge], [whole])
 
 
+def photograph(seed: int, *, upright: bool) -> str:
+    """Id of a photographic print."""
+    kind = PHOTOGRAPHS[seed % len(PHOTOGRAPHS)]
+    return f"texture/wall_art?seed={kind + MOTIFS * (2 * (seed // 4 % 3) + (not upright))}"
+
+
 def picture(seed: int = 0) -> Solid:
     """A framed picture; origin at the middle below, on the wall. Slots: frame, mount, print."""
     rng = variant_rng("picture", seed)
-    w, h = rng.between(0.25, 0.75), rng.between(0.25, 0.7)
-    f, mount = rng.between(0.012, 0.035), rng.between(0.0, 0.07)
-    frame = _frame(w, h, f, 0.025)
-    y, a = 0.5 * w - f - mount, f + mount
-    image = rectangle((0.011, -y, a), (0.0, 2 * y, 0.0), (0.0, 0.0, h - 2 * a)).painted(2)
+    # From postcards to large prints; the small ones are common.
+    long = rng.choose((rng.between(0.13, 0.24), rng.between(0.26, 0.45), rng.between(0.45, 0.92)))
+    if seed % 9 == 8:
+        image, short, upright = f"texture/poster?seed={seed % 12}", long / math.sqrt(2.0), True
+    else:
+        image, short, upright = f"texture/wall_art?seed={seed}", 0.75 * long, is_upright(seed)
+    wide, high = (short, long) if upright else (long, short)
+    f = rng.between(0.01, 0.018 + 0.012 * long)
+    mount = rng.choose((0.0, rng.between(0.1, 0.2) * long, rng.between(0.15, 0.3) * short))
+    w, h = wide + 2.0 * (f + mount), high + 2.0 * (f + mount)
+    deep = rng.between(0.014, 0.03)
+    patches = _frame(w, h, f, deep, 0.002)
+    y, a = 0.5 * wide, f + mount
+    patches.append(rectangle((0.0112, -y, a), (0.0, wide, 0.0), (0.0, 0.0, high)).painted(2))
     back: Box = ((0.0, -0.5 * w + 0.004, 0.004), (0.01, 0.5 * w - 0.004, h - 0.004))
-    patches = [*frame, shapes.block(*back, 0.0, 1), image]
-    printed = rng.choose(
-        (
-            f"texture/poster?seed={seed % 12}",
-            f"texture/wide_poster?seed={seed % 12}",
-            f"texture/marble?seed={seed % 16}",
-            f"texture/book_cover?seed={seed}",
-        )
-    )
+    patches.append(shapes.block(*back, 0.0, 1))
+    if mount > 0.0:
+        # The mount is a card with a window: its bevelled edge catches light.
+        patches += [
+            p.painted(1)
+            for p in _frame(wide + 0.016, high + 0.016, 0.008, 0.0025, 0.0008, (0.01, a - 0.008))
+        ]
     edge = rng.choose(
         (
             painted_material("#1f1f20", 0.4),
             wood(rng),
+            wood(rng),
             metal_material((0.8, 0.66, 0.38), 0.35),
+            metal_material(ALUMINIUM, 0.4),
             painted_material("#f0efeb", 0.5),
         )
     )
-    return solid(
-        patches, [edge, painted_material("#f3f1ea", 0.8), printed_material(printed, 0.25)], [back]
-    )
+    card = painted_material(rng.choose(("#f3f1ea", "#f7f6f2", "#e6e0d2", "#3a3b3d")), 0.85)
+    gloss = 0.12 if rng.chance(0.6) else 0.7
+    return solid(patches, [edge, card, printed_material(image, gloss)], [back])
 
 
 def mirror(seed: int = 0) -> Solid:
@@ -237,15 +275,23 @@ def mirror(seed: int = 0) -> Solid:
     )
 
 
-def _frame(w: float, h: float, f: float, depth_m: float) -> list[Patch]:
-    y = 0.5 * w
+def _frame(
+    w: float,
+    h: float,
+    f: float,
+    depth_m: float,
+    radius_m: float = 0.003,
+    at_m: tuple[float, float] = (0.0, 0.0),
+) -> list[Patch]:
+    """Four bars around an opening; ``at_m``: back and lower edge."""
+    y, (x, z) = 0.5 * w, at_m
     parts: list[Box] = [
-        ((0.0, -y, 0.0), (depth_m, y, f)),
-        ((0.0, -y, h - f), (depth_m, y, h)),
-        ((0.0, -y, f), (depth_m, -y + f, h - f)),
-        ((0.0, y - f, f), (depth_m, y, h - f)),
+        ((x, -y, z), (x + depth_m, y, z + f)),
+        ((x, -y, z + h - f), (x + depth_m, y, z + h)),
+        ((x, -y, z + f), (x + depth_m, -y + f, z + h - f)),
+        ((x, y - f, z + f), (x + depth_m, y, z + h - f)),
     ]
-    return [board(*p, 0, 0.003) for p in parts]
+    return [board(*p, 0, radius_m) for p in parts]
 
 
 def radiator(seed: int = 0) -> Solid:
@@ -313,6 +359,23 @@ def _screen(w: float, lift_m: float, name: str) -> Solid:
                     0.002,
                 )
             )
+    drop = np.array(
+        [
+            (-0.022, 0.12 * w, lift_m + 0.35 * h),
+            (-0.05, 0.12 * w, lift_m + 0.12 * h),
+            (-0.07, 0.1 * w, 0.02),
+            (-0.085, 0.02 * w, 0.0045),
+            (-0.09, -0.12 * w, 0.0045),
+        ]
+    )
+    line = shapes.spline(drop.tolist(), 24)
+    line[:, 2] = np.maximum(line[:, 2], 0.0042)
+    patches.append(shapes.sweep(line, shapes.circle(0.0038, 7), up=(0.0, 1.0, 0.0)))
+    patches.append(
+        shapes.block(
+            (-0.045, -0.3 * w, lift_m + 0.15 * h), (-0.02, 0.3 * w, lift_m + 0.6 * h), 0.006
+        )
+    )
     dark = Material((0.01, 0.01, 0.011), 0.12, role="screen")
     foot: Box = ((-0.1, -0.4 * w, 0.0), (0.1, 0.4 * w, 0.012))
     return solid(patches, [painted_material("#17181a", 0.35), dark], [panel, foot])
@@ -437,7 +500,7 @@ def waste_basket(seed: int = 0) -> Solid:
         36,
     )
     paint = (
-        Material(draw_linear(PLASTICS, 0.1, rng), 0.4)
+        Material(draw_linear(HOUSEHOLD, 0.1, rng), 0.4)
         if rng.chance(0.5)
         else painted_material("#2b2d30", 0.4)
     )
@@ -471,40 +534,87 @@ def whiteboard(seed: int = 0) -> Solid:
     back: Box = ((0.0, -0.5 * w + 0.004, 0.004), (0.012, 0.5 * w - 0.004, h - 0.004))
     tray: Box = ((0.0, -0.3 * w, -0.01), (0.06, 0.3 * w, 0.0))
     patches = [*_frame(w, h, 0.02, 0.022), shapes.block(*back, 0.0, 1), shapes.block(*tray, 0.003)]
-    return solid(
-        patches, [metal_material(ALUMINIUM, 0.4), painted_material("#f5f6f5", 0.15)], [back]
-    )
+    face = rectangle((0.0125, -0.5 * w + 0.02, 0.02), (0.0, w - 0.04, 0.0), (0.0, 0.0, h - 0.04))
+    patches.append(face.painted(2))
+    for k in range(int(rng.between(1, 5))):
+        y = rng.between(-0.25, 0.2) * w
+        patches.append(rod((0.03, y, 0.009), (0.03, y + 0.13, 0.009), 0.009, 3 + k % 3, 12))
+    inks = [painted_material(ink, 0.4) for ink in ("#1f2a5a", "#a3261d", "#1f1f20")]
+    written = printed_material(f"texture/whiteboard_notes?seed={seed}", 0.15)
+    looks = [metal_material(ALUMINIUM, 0.4), painted_material("#f5f6f5", 0.15), written, *inks]
+    return solid(patches, looks, [back])
 
 
 def book_row(seed: int = 0) -> Solid:
     """Books that stand side by side, spines towards +X. Slots: one per cloth, pages last."""
     rng = variant_rng("book_row", seed)
     covers = [
-        Material(draw_linear(PALETTES["cloth"], 0.15, rng), rng.between(0.4, 0.8)) for _ in range(6)
+        Material(draw_linear((*PALETTES["cloth"], *_JACKETS), 0.15, rng), rng.between(0.3, 0.8))
+        for _ in range(9)
     ]
+    band = Material(draw_linear(("#a08a55", "#bdb8aa", "#35353a"), 0.1, rng), 0.5)
     patches: list[Patch] = []
-    y, count = 0.0, int(rng.between(4, 15))
-    tallest = 0.0
-    for _ in range(count):
-        thick, h, d = rng.between(0.012, 0.045), rng.between(0.17, 0.27), rng.between(0.12, 0.19)
-        x1 = 0.09 - rng.between(0.0, 0.012)
-        slot = min(int(rng.random() * 6), 5)
-        book = [
-            shapes.block((x1 - d, y, 0.0), (x1, y + 0.002, h), 0.0, slot),
-            shapes.block((x1 - d, y + thick - 0.002, 0.0), (x1, y + thick, h), 0.0, slot),
-            shapes.block((x1 - 0.003, y, 0.0), (x1, y + thick, h), 0.001, slot),
-            shapes.block(
-                (x1 - d + 0.004, y + 0.002, 0.004),
-                (x1 - 0.003, y + thick - 0.002, h - 0.004),
-                0.0,
-                6,
-            ),
-        ]
-        patches += book
-        y, tallest = y + thick + 0.0008, max(tallest, h)
+    y, tallest, end = 0.0, 0.0, rng.between(0.16, 0.4)
+    while y < end:
+        # Series are alike; single books are not.
+        thick, h, d = rng.between(0.01, 0.045), rng.between(0.165, 0.285), rng.between(0.12, 0.19)
+        slot = int(rng.random() * 9)
+        alike = rng.choose((1, 1, 1, 2, 3, 5))
+        for _ in range(alike):
+            x1 = 0.09 - rng.between(0.0, 0.014)
+            patches += _standing_book((x1 - d, y, x1), thick, h, slot, rng)
+            y, tallest = y + thick + 0.0008, max(tallest, h)
+            if y > end:
+                break
+    if rng.chance(0.5):
+        # The last ones lean against the row.
+        for _ in range(int(rng.between(1, 3))):
+            thick, h, lean = (
+                rng.between(0.012, 0.03),
+                rng.between(0.17, 0.24),
+                rng.between(0.1, 0.22),
+            )
+            book = _standing_book((-0.06, 0.0, 0.08), thick, h, int(rng.random() * 9), rng)
+            # About its lower edge on the outer side, towards the row.
+            turned = [p.moved(0.0, -thick, 0.0).rotated("x", lean) for p in book]
+            reach = min(float(p.bounds_m()[0][1]) for p in turned)
+            patches += [p.moved(0.0, y - reach + 0.0005, 0.0) for p in turned]
+            y -= reach
+    low = min(float(p.bounds_m()[0][2]) for p in patches)
+    patches = [p.moved(0.0, 0.0, -min(low, 0.0)) for p in patches]
     moved = [patch.moved(0.0, -0.5 * y, 0.0) for patch in patches]
-    looks = [*covers, painted_material("#e9e2d0", 0.9)]
+    looks = [*covers, painted_material("#e9e2d0", 0.9), band]
     return solid(moved, looks, [((-0.1, -0.5 * y, 0.0), (0.09, 0.5 * y, tallest))])
+
+
+_JACKETS = ("#f2efe6", "#e8dcc0", "#1c1d20", "#c0392b", "#e0a526", "#2c6e8f", "#3f6b4f", "#f7f7f4")
+"""Colours of books' jackets, sRGB."""
+
+
+def _standing_book(
+    span: tuple[float, float, float], thick: float, h: float, slot: int, rng: VariantRng
+) -> list[Patch]:
+    """A book with its spine at +X; span: back, side and front. Pages in slot 9, print in 10."""
+    x0, y, x1 = span
+    made = [
+        shapes.block((x0, y, 0.0), (x1, y + 0.002, h), 0.0, slot),
+        shapes.block((x0, y + thick - 0.002, 0.0), (x1, y + thick, h), 0.0, slot),
+        shapes.block((x1 - 0.003, y, 0.0), (x1, y + thick, h), 0.001, slot),
+        shapes.block(
+            (x0 + 0.004, y + 0.002, 0.004), (x1 - 0.003, y + thick - 0.002, h - 0.004), 0.0, 9
+        ),
+    ]
+    # A title, an author and a publisher's mark on the spine.
+    wide = 0.34 * thick
+    for low, high in ((0.5, rng.between(0.62, 0.85)), (0.24, 0.4), (0.06, 0.085)):
+        if rng.chance(0.6):
+            side = 0.5 * (thick - wide)
+            print_ = rectangle(
+                (x1 + 0.0003, y + side, low * h), (0.0, wide, 0.0), (0.0, 0.0, (high - low) * h)
+            )
+            made.append(print_.painted(10))
+            wide *= 0.7
+    return made
 
 
 def picture_frame(seed: int = 0) -> Solid:
@@ -521,6 +631,6 @@ def picture_frame(seed: int = 0) -> Solid:
     ]
     leaning = [patch.rotated("y", -0.22) for patch in patches]
     stand = board((-0.055, -0.015, 0.0), (-0.05, 0.015, 0.45 * h), 1)
-    look = printed_material(f"texture/book_cover?seed={seed}", 0.15)
+    look = printed_material(photograph(seed, upright=True), 0.15)
     boxes: list[Box] = [((-0.22 * h, -0.5 * w, 0.0), (0.014, 0.5 * w, h))]
     return solid([*leaning, stand], [front(rng), painted_material("#4a4038", 0.8), look], boxes)

@@ -48,6 +48,18 @@ def kitchen_sink(seed: int = 0) -> Solid:
         ((-0.16, 0.19, 0.726), (0.18, 0.2, 0.902)),
     ]
     patches += [shapes.block(*b, 0.002, 2) for b in basin]
+    drain = [(0.0, 0.7255), (0.02, 0.7255), (0.026, 0.7275), (0.042, 0.7285), (0.045, 0.726)]
+    patches.append(shapes.lathe(drain[::-1], 28, 2).moved(-0.06))
+    patches += [
+        shapes.block(
+            (-0.18 + 0.001, s * 0.205 - 0.008, 0.9), (0.2, s * 0.205 + 0.008, 0.9035), 0.0015, 2
+        )
+        for s in (-1, 1)
+    ]
+    patches += [
+        shapes.block((x - 0.008, -0.213, 0.9), (x + 0.008, 0.213, 0.9035), 0.0015, 2)
+        for x in (-0.172, 0.194)
+    ]
     height = rng.between(0.2, 0.32)
     patches += tap(-0.22, 0.0, 0.9, height, 2)
     patches += [
@@ -64,14 +76,24 @@ def kitchen_sink(seed: int = 0) -> Solid:
 
 def tap(x: float, y: float, z: float, height_m: float, slot: int) -> list[Patch]:
     """A tap whose spout points to +X."""
+    rise = max(height_m - 0.07, 0.4 * height_m)
+    bow = [
+        (x, y, z),
+        (x, y, z + 0.6 * rise),
+        (x, y, z + rise),
+        (x + 0.045, y, z + height_m + 0.005),
+        (x + 0.12, y, z + height_m + 0.005),
+        (x + 0.16, y, z + height_m - 0.04),
+    ]
+    spout = shapes.sweep(
+        shapes.spline(bow, 28), shapes.circle(0.0105, 12), up=(0.0, 1.0, 0.0), slot=slot
+    )
     return [
-        disc(x, y, z, z + 0.04, 0.024, slot),
-        rod((x, y, z), (x, y, z + height_m), 0.011, slot, 12),
-        rod((x - 0.008, y, z + height_m), (x + 0.17, y, z + height_m), 0.011, slot, 12),
-        rod(
-            (x + 0.16, y, z + height_m + 0.008), (x + 0.16, y, z + height_m - 0.04), 0.012, slot, 12
-        ),
-        rod((x, y + 0.01, z + 0.06), (x, y + 0.07, z + 0.1), 0.007, slot),
+        disc(x, y, z, z + 0.006, 0.03, slot),
+        disc(x, y, z, z + 0.07, 0.021, slot),
+        spout,
+        rod((x, y + 0.015, z + 0.05), (x, y + 0.034, z + 0.05), 0.014, slot, 14),
+        rod((x, y + 0.03, z + 0.05), (x + 0.01, y + 0.05, z + 0.13), 0.006, slot),
     ]
 
 
@@ -117,27 +139,54 @@ def cooker(seed: int = 0) -> Solid:
             (r - 0.004, 0.9062),
         ]
         patches.append(shapes.lathe(ring, 36, 5).moved(x, y))
+    # Panel with knobs, door with a window and a bar, drawer below; gaps between them are dark.
+    x = _X + 0.02
+    glassy = seed % 2 == 0
     patches += [
-        shapes.block((_X, -0.297, 0.105), (_X + 0.02, 0.297, 0.855), 0.004, 2),
-        shapes.block((_X + 0.02, -0.24, 0.25), (_X + 0.024, 0.24, 0.62), 0.002, 4),
-        *handle(_X + 0.02, 0.0, 0.67, 0.46, 2, upright=False),
+        shapes.block((_X - 0.01, -0.296, 0.1), (_X + 0.004, 0.296, 0.858), 0.0, 4),
+        shapes.block((_X, -0.297, 0.742), (x, 0.297, 0.856), 0.004, 2),
+        shapes.block((_X, -0.297, 0.262), (x, 0.297, 0.737), 0.005, 4 if glassy else 2),
+        shapes.block((_X, -0.297, 0.105), (x, 0.297, 0.257), 0.004, 2),
+        shapes.block((x, -0.245, 0.335), (x + 0.003, 0.245, 0.625), 0.0015, 4),
+        *(shapes.block(low, high, 0.001, 2) for low, high in _rim(x, 0.25, 0.33, 0.63)),
+        rod((x + 0.034, -0.26, 0.69), (x + 0.034, 0.26, 0.69), 0.009, 2, 14),
+        *(rod((x, s * 0.235, 0.69), (x + 0.034, s * 0.235, 0.69), 0.007, 2, 10) for s in (-1, 1)),
+        # A clock between the knobs.
+        shapes.block((x, -0.05, 0.785), (x + 0.001, 0.05, 0.815), 0.0, 4),
     ]
-    for k in range(5):
-        patches.append(
-            rod(
-                (_X + 0.018, -0.22 + 0.11 * k, 0.78),
-                (_X + 0.045, -0.22 + 0.11 * k, 0.78),
-                0.02,
-                4,
-                18,
-            )
-        )
+    for k in (-3, -2, -1, 1, 2, 3):
+        y = 0.075 * k + (0.02 if k > 0 else -0.02)
+        knob = [
+            (0.0, 0.0),
+            (0.021, 0.0),
+            (0.021, 0.003),
+            (0.017, 0.004),
+            (0.0155, 0.022),
+            (0.013, 0.025),
+            (0.0, 0.025),
+        ]
+        turned = shapes.lathe(knob, 24, 4 if not glassy else 2)
+        patches.append(turned.rotated("y", 0.5 * np.pi).moved(x, y, 0.8))
+        mark = shapes.block((0.0245, -0.001, 0.0), (0.0258, 0.001, 0.013), 0.0, 5)
+        turn = rng.between(-2.4, 2.4) if rng.chance(0.25) else 0.0
+        patches.append(mark.rotated("x", turn).moved(x, y, 0.8))
     looks = [
         *_looks("kitchen_unit", rng, seed),
         Material((0.012, 0.012, 0.013), 0.06),
         painted_material("#9a9a98", 0.4),
     ]
     return solid(patches, looks, [((-_X, -0.3, 0.0), (_X, 0.3, 0.906))])
+
+
+def _rim(x: float, half_y: float, z0: float, z1: float) -> list[Box]:
+    """Four thin bars around a window before a front at ``x``."""
+    t, d = 0.006, 0.0045
+    return [
+        ((x, -half_y, z0), (x + d, half_y, z0 + t)),
+        ((x, -half_y, z1 - t), (x + d, half_y, z1)),
+        ((x, -half_y, z0 + t), (x + d, -half_y + t, z1 - t)),
+        ((x, half_y - t, z0 + t), (x + d, half_y, z1 - t)),
+    ]
 
 
 def _base(*, hole: bool) -> list[Patch]:

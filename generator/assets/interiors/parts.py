@@ -23,8 +23,29 @@ from gen_data.generator.core.se3 import Vec3
 Box = tuple[Vec3, Vec3]
 SUPPORT = "support"
 """Keypoints at two opposite corners of a level surface that carries things and is not a top."""
+INSIDE = "inside"
+"""Keypoints at the lowest and the highest corner of the room above a board behind doors."""
+BACKREST = "backrest"
+"""Keypoint in the middle of the upper edge of a back."""
 LACQUERS = ("#f1efea", "#e8e6e0", "#d9d6cf", "#3a3d40", "#b9c2bd", "#5c6b73", "#8d9a86")
 """Lacquers of furniture, sRGB."""
+HOUSEHOLD = (
+    "#f2f0ea", "#e6e2d8", "#d9d2c3", "#b8b5ad", "#2b2d30", "#5b6670", "#7d8a86", "#3f5d73", "#8a5a4a",
+    "#c7b299", "#a3b1a6", "#6e7f5f", "#b98a3e", "#9c3d33",
+)  # fmt: skip
+"""Plastics in homes and offices, sRGB: most are pale, grey or dull."""
+TOOLS = (
+    "#2b2d30",
+    "#3b4046",
+    "#c9a227",
+    "#a3261d",
+    "#1f4e79",
+    "#2f6f4f",
+    "#d9641e",
+    "#8d9093",
+    "#d9d6cf",
+)
+"""Plastics and paints of tools and containers, sRGB."""
 _WOODS = 18
 _FABRICS = 16
 

@@ -6,11 +6,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from gen_data.generator.assets.interiors.parts import (
+    BACKREST,
+    INSIDE,
     SUPPORT,
     Box,
     board,
-    cloth,
     cushion,
     disc,
     four_legs,
@@ -21,6 +24,7 @@ from gen_data.generator.assets.interiors.parts import (
     upholstery,
     wood,
 )
+from gen_data.generator.assets.interiors.soft_goods import drape, fabric, padding, pillow
 from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
@@ -29,8 +33,10 @@ from gen_data.generator.assets.procedural.material_presets import (
     metal_material,
     painted_material,
 )
+from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Keypoint
+from gen_data.generator.core.se3 import Vec3
 
 
 def sofa(seed: int = 0) -> Solid:
@@ -58,40 +64,94 @@ def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
         ((x0 + 0.02, y0, leg), (x1, y0 + arm, arm_z)),
         ((x0 + 0.02, y1 - arm, leg), (x1, y1, arm_z)),
     ]
-    patches = [cushion(*b, 0, soft) for b in (base, back, *arms)]
-    each = seat_m / places
+    patches = [cushion(*b, 0, soft) for b in (base, back)]
+    patches += [padding(*b, rng, 0, 9.0, 0.002) for b in arms]
+    each, piped = seat_m / places, rng.chance(0.45)
+    loose, bulge = rng.chance(0.5), rng.between(4.5, 8.0)
     for k in range(places):
         a = y0 + arm + k * each
-        patches.append(
-            cushion(
-                (x0 + 0.17, a + 0.004, seat_z - 0.16),
-                (x1 + 0.01, a + each - 0.004, seat_z),
-                0,
-                soft,
-            )
+        low, high = (x0 + 0.17, a + 0.002, seat_z - 0.16), (x1 + 0.01, a + each - 0.002, seat_z)
+        sat_on = _sagged(padding(low, high, rng, 0, 7.0, 0.006), rng.between(0.0, 0.022))
+        patches.append(sat_on)
+        if piped:
+            patches += _piping(low, high, 7.0)
+        rest = padding(
+            (-0.1, -0.5 * each + 0.006, -0.5 * (back_z + 0.08 - seat_z)),
+            (0.1, 0.5 * each - 0.006, 0.5 * (back_z + 0.08 - seat_z)),
+            rng,
+            0,
+            bulge,
+            0.008,
         )
-        patches.append(
-            cushion(
-                (x0 + 0.13, a + 0.01, seat_z - 0.02),
-                (x0 + 0.31, a + each - 0.01, back_z + 0.06),
-                0,
-                0.08,
-            )
-        )
-    for _ in range(int(rng.between(0, places + 1))):
+        # Loose cushions lean, each in its own way.
+        lean = -rng.between(0.12, 0.24) if loose else -0.12
+        aside = rng.between(-0.03, 0.03) if loose else 0.0
+        turned = rest.rotated("x", aside).rotated("y", lean)
+        patches.append(turned.moved(x0 + 0.24, a + 0.5 * each, 0.5 * (seat_z + back_z + 0.06)))
+    for _ in range(int(rng.between(0, places + 1.6))):
         y = rng.between(y0 + arm + 0.2, y1 - arm - 0.2) if places > 1 else 0.0
-        pillow = cushion((-0.07, -0.21, -0.2), (0.07, 0.21, 0.2), 2, 0.068)
-        patches.append(pillow.rotated("y", -0.35).moved(x0 + 0.38, y, seat_z + 0.2))
+        size = rng.between(0.19, 0.25)
+        made = pillow(size, size * rng.between(0.75, 1.0), 0.15, rng, 2).rotated(
+            "z", rng.between(-0.3, 0.3)
+        )
+        standing = made.moved(0.0, 0.0, -0.05).rotated("y", rng.between(0.95, 1.25))
+        turned = standing.rotated("z", rng.between(-0.35, 0.35))
+        patches.append(turned.moved(x0 + 0.4, y, seat_z + 0.72 * size))
+    if rng.chance(0.35):
+        side = rng.choose((-1, 1))
+        at = rng.between(-0.3, 0.05) * depth
+        throw = drape(
+            (at, at + rng.between(0.3, 0.5)), 0.5 * arm + 0.006, arm_z + 0.022, 0.13, rng, 3, 0.006
+        )
+        patches.append(throw.moved(0.0, side * (0.5 * w - 0.5 * arm), 0.0))
     patches += [
         disc(sx * (0.5 * depth - 0.09), sy * (0.5 * w - 0.09), 0.0, leg + 0.02, 0.02, 1)
         for sx in (-1, 1)
         for sy in (-1, 1)
     ]
     seat: Box = ((x0 + 0.17, y0 + arm, leg), (x1, y1 - arm, seat_z))
-    made = solid(patches, [upholstery(rng), wood(rng), cloth(rng)], [base, back, *arms, seat])
+    looks = [upholstery(rng), wood(rng), fabric(rng, 0.3), fabric(rng, 0.4)]
+    made = solid(patches, looks, [base, back, *arms, seat])
     # Before the pillows, and clear of the round edges of the cushions.
     corners = (x0 + 0.52, y0 + arm + soft, seat_z), (x1 - soft, y1 - arm - soft, seat_z)
     return replace(made, keypoints=tuple(Keypoint(SUPPORT, corner) for corner in corners))
+
+
+def _sagged(patch: Patch, depth_m: float) -> Patch:
+    """A cushion whose middle has been sat on."""
+    p = patch.corners_m.copy()
+    low, high = patch.bounds_m()
+    u, v, w = (2.0 * (p[..., i] - low[i]) / (high[i] - low[i]) - 1.0 for i in range(3))
+    hollow = np.exp(-2.5 * (u * u + v * v)) - 0.1
+    p[..., 2] -= depth_m * np.maximum(hollow, 0.0) * (w > 0.0)
+    return replace(patch, corners_m=p)
+
+
+def _piping(low: Vec3, high: Vec3, power: float) -> list[Patch]:
+    """A cord along the upper edge of a cushion made by ``padding``."""
+    turn = np.linspace(0.0, 2.0 * math.pi, 73)
+    c, s = np.cos(turn), np.sin(turn)
+    size = (np.abs(c) ** power + np.abs(s) ** power + 0.6**power) ** (1.0 / power)
+    half = [0.5 * (b - a) for a, b in zip(low, high, strict=True)]
+    middle = [0.5 * (b + a) for a, b in zip(low, high, strict=True)]
+    path = np.stack(
+        [
+            middle[0] + half[0] * c / size,
+            middle[1] + half[1] * s / size,
+            middle[2] + half[2] * 0.6 / size * 1.45,
+        ],
+        axis=1,
+    )
+    return [shapes.sweep(path, shapes.circle(0.0055, 6), capped=False)]
+
+
+def _bent(patch: Patch, wrap_per_m: float, lumbar_m: float) -> Patch:
+    """A back along Y and Z, its sides and the small of its back brought forward."""
+    p = patch.corners_m.copy()
+    low, high = patch.bounds_m()
+    v = (p[..., 2] - low[2]) / (high[2] - low[2])
+    p[..., 0] += wrap_per_m * p[..., 1] ** 2 + lumbar_m * np.exp(-(((v - 0.3) / 0.22) ** 2))
+    return replace(patch, corners_m=p)
 
 
 def chair(seed: int = 0) -> Solid:
@@ -101,7 +161,7 @@ def chair(seed: int = 0) -> Solid:
     back_z = rng.between(0.8, 0.98)
     soft = seed % 3 == 1
     seat: Box = ((-0.5 * d, -0.5 * w, z - (0.06 if soft else 0.025)), (0.5 * d, 0.5 * w, z))
-    patches = [cushion(*seat, 0, 0.025) if soft else board(*seat, 0, 0.008)]
+    patches = [padding(*seat, rng, 0, 6.0, 0.003) if soft else board(*seat, 0, 0.008)]
     x = -0.5 * d + 0.02
     legs = 1 if seed % 3 else 0
     for sy in (-1, 1):
@@ -114,8 +174,9 @@ def chair(seed: int = 0) -> Solid:
             (-0.02, -0.5 * w, -0.5 * (back_z - z) + 0.1),
             (0.02, 0.5 * w, 0.5 * (back_z - z)),
         )
+        made = padding(*rest, rng, 0, 6.0, 0.003) if soft else cushion(*rest, 0, 0.02)
         patches.append(
-            cushion(*rest, 0, 0.02)
+            _bent(made, 0.5, 0.012)
             .rotated("y", -0.14)
             .moved(x - 0.045, 0.0, 0.5 * (z + back_z) + 0.02)
         )
@@ -136,9 +197,11 @@ def chair(seed: int = 0) -> Solid:
     boxes: list[Box] = [seat, ((x - 0.08, -0.5 * w, z), (x + 0.01, 0.5 * w, back_z))]
     boxes += _legs_under(d, w, z)
     made = solid(patches, [body, wood(rng) if legs and soft else steel if legs else body], boxes)
+    edge = (x - 0.075, 0.0, back_z + (0.015 if soft or seed % 3 == 2 else 0.0))
     # Before the back, and clear of the round edges of cushions.
     corners = (-0.5 * d + 0.08, -0.5 * w + 0.03, z), (0.5 * d - 0.03, 0.5 * w - 0.03, z)
-    return replace(made, keypoints=tuple(Keypoint(SUPPORT, corner) for corner in corners))
+    supports = tuple(Keypoint(SUPPORT, corner) for corner in corners)
+    return replace(made, keypoints=(*supports, Keypoint(BACKREST, edge)))
 
 
 def stool(seed: int = 0) -> Solid:
@@ -162,19 +225,39 @@ def office_chair(seed: int = 0) -> Solid:
     rng = variant_rng("office_chair", seed)
     w, z = rng.between(0.46, 0.52), rng.between(0.44, 0.52)
     top = z + rng.between(0.48, 0.7)
+    high, half = top - z - 0.08, 0.46 * w
+    seat = padding((-0.24, -0.5 * w, z - 0.075), (0.27, 0.5 * w, z), rng, 0, 5.0, 0.003)
+    mesh = rng.chance(0.4)
+    thin = 0.014 if mesh else 0.034
+    rest = padding((-thin, -half, 0.0), (thin, half, high), rng, 0, 5.0, 0.003)
+    bend = rng.between(0.7, 1.3), rng.between(0.025, 0.045)
+    shell = padding(
+        (-thin - 0.016, -0.9 * half, 0.02), (-0.4 * thin, 0.9 * half, 0.9 * high), rng, 1, 5.0, 0.0
+    )
     patches = [
-        cushion((-0.22, -0.5 * w, z - 0.08), (0.26, 0.5 * w, z), 0, 0.035),
-        cushion((-0.035, -0.46 * w, 0.0), (0.035, 0.46 * w, top - z - 0.08), 0, 0.033)
-        .rotated("y", -0.12)
-        .moved(-0.24, 0.0, z + 0.08),
+        _sagged(seat, 0.012),
+        *(
+            _bent(part, *bend).rotated("y", -0.14).moved(-0.25, 0.0, z + 0.08)
+            for part in ((rest,) if mesh else (rest, shell))
+        ),
         rod((0.0, 0.0, 0.1), (0.0, 0.0, z - 0.07), 0.026, 1),
-        rod((-0.1, 0.0, z - 0.09), (-0.27, 0.0, z + 0.25), 0.02, 1),
+        rod((-0.1, 0.0, z - 0.09), (-0.27, 0.0, z - 0.03), 0.022, 1),
+        rod((-0.27, 0.0, z - 0.03), (-0.33, 0.0, z + 0.3), 0.02, 1),
+        shapes.block((-0.17, -0.1, z - 0.1), (0.14, 0.1, z - 0.06), 0.012, 1),
+        rod((0.0, 0.0, 0.09), (0.0, 0.0, 0.26), 0.036, 1, 16),
     ]
     for k in range(5):
         a = 2.0 * math.pi * k / 5 + 0.3
         c, s = 0.29 * math.cos(a), 0.29 * math.sin(a)
-        patches.append(rod((0.0, 0.0, 0.11), (c, s, 0.075), 0.018, 1))
-        patches.append(rod((c, s - 0.022, 0.03), (c, s + 0.022, 0.03), 0.03, 1, 14))
+        arm = np.array([(0.0, 0.0, 0.115), (0.5 * c, 0.5 * s, 0.105), (c, s, 0.07)])
+        taper = np.linspace(1.25, 0.8, 8)
+        patches.append(
+            shapes.sweep(
+                shapes.spline(arm.tolist(), 8), shapes.circle(0.018, 10), scale=taper, slot=1
+            )
+        )
+        for wheel in (-0.02, 0.008):
+            patches.append(rod((c, s + wheel, 0.028), (c, s + wheel + 0.014, 0.028), 0.028, 1, 16))
     if rng.chance(0.7):
         for sy in (-1, 1):
             y = sy * (0.5 * w + 0.03)
@@ -188,7 +271,9 @@ def office_chair(seed: int = 0) -> Solid:
         ((-0.28, -0.28, 0.0), (0.28, 0.28, z)),
         ((-0.32, -0.23, z), (-0.2, 0.23, top)),
     ]
-    return solid(patches, [upholstery(rng), dark], boxes)
+    made = solid(patches, [upholstery(rng), dark], boxes)
+    edge = (-0.25 - 0.14 * high, 0.0, z + 0.08 + 0.99 * high)
+    return replace(made, keypoints=(Keypoint(BACKREST, edge),))
 
 
 def dining_table(seed: int = 0) -> Solid:
@@ -226,6 +311,7 @@ def desk(seed: int = 0) -> Solid:
         rng.between(1.2, 1.8),
         rng.between(0.72, 0.76),
         drawers=seed % 2 == 1,
+        cables=True,
     )
 
 
@@ -243,15 +329,25 @@ def workbench(seed: int = 0) -> Solid:
     low: Box = ((-0.5 * d + 0.06, -0.5 * w + 0.06, 0.18), (0.5 * d - 0.08, 0.5 * w - 0.06, 0.21))
     patches = [board(*top, 0, 0.005), board(*low, 0), *four_legs(d, w, z - 0.05, 0.07, 1, 0.06)]
     legs = painted_material(rng.choose(("#2f5d7c", "#3b4046", "#6b7074", "#8a2f26")), 0.45)
-    return solid(
-        patches,
-        [wood(rng, 0.6), legs if rng.chance(0.6) else wood(rng)],
-        [top, low, *_legs_under(d, w, z)],
-    )
+    looks = [wood(rng, 0.6), legs if rng.chance(0.6) else wood(rng)]
+    made = solid(patches, looks, [top, low, *_legs_under(d, w, z)])
+    # Three places side by side on the lower board.
+    third, inside = (w - 0.26) / 3.0, []
+    for k in range(3):
+        y = -0.5 * w + 0.13 + k * third
+        inside.append(Keypoint(INSIDE, (-0.5 * d + 0.13, y, 0.21)))
+        inside.append(Keypoint(INSIDE, (0.5 * d - 0.13, y + third, z - 0.08)))
+    return replace(made, keypoints=tuple(inside))
 
 
 def _rectangular_table(
-    rng: VariantRng, depth_m: float, width_m: float, height_m: float, *, drawers: bool = False
+    rng: VariantRng,
+    depth_m: float,
+    width_m: float,
+    height_m: float,
+    *,
+    drawers: bool = False,
+    cables: bool = False,
 ) -> Solid:
     d, w, z = depth_m, width_m, height_m
     thick = rng.between(0.02, 0.04)
@@ -288,7 +384,31 @@ def _rectangular_table(
     legs = (
         painted_material(rng.choose(("#26282b", "#d9d8d4")), 0.4) if rng.chance(0.4) else wood(rng)
     )
-    return solid(patches, [front(rng), legs], boxes)
+    looks = [front(rng), legs]
+    if cables:
+        patches += _cables(rng, -0.5 * d + 0.025, w, z - thick)
+        looks.append(painted_material(rng.choose(("#17181a", "#17181a", "#d9d8d4")), 0.5))
+    return solid(patches, looks, boxes)
+
+
+def _cables(rng: VariantRng, x: float, w: float, z: float) -> list[Patch]:
+    """Cables that fall behind a desk and run along the floor, in slot 2."""
+    made = []
+    for _ in range(int(rng.between(1, 4))):
+        y = rng.between(-0.35, 0.35) * w
+        aside = rng.between(-0.3, 0.3) * w
+        path = [
+            (x, y, z - 0.005),
+            (x + 0.012, y + 0.1 * aside, 0.62 * z),
+            (x + rng.between(0.0, 0.05), y + 0.35 * aside, 0.25 * z),
+            (x + 0.06, y + 0.6 * aside, 0.02),
+            (x + rng.between(0.03, 0.16), y + 0.85 * aside, 0.0045),
+            (x + 0.01, y + aside, 0.0045),
+        ]
+        line = shapes.spline(path, 36)
+        line[:, 2] = np.maximum(line[:, 2], 0.0042)
+        made.append(shapes.sweep(line, shapes.circle(0.0035, 7), up=(1.0, 0.0, 0.0), slot=2))
+    return made
 
 
 def _round_table(rng: VariantRng, radius_m: float, height_m: float) -> Solid:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from gen_data.generator.assets.procedural.material_presets import (
 from gen_data.generator.assets.procedural.patches import Patch, join_patches
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
 from gen_data.generator.core.asset_types import Material
-from gen_data.generator.core.se3 import Array
+from gen_data.generator.core.se3 import Array, Vec3
 
 _LINEN = ("#f3f1ec", "#e8ebee", "#efe6da", "#dfe6e3", "#e9dedd")
 
@@ -55,17 +56,75 @@ def folds(x: Array, y: Array, rng: VariantRng, wave_m: float, height_m: float) -
     return total * (height_m / 1.5)
 
 
+def rumple(x: Array, y: Array, rng: VariantRng, wave_m: float) -> Array:
+    """Height, about 0 with a standard deviation near 1, of soft cloth that lies loosely.
+
+    Bumps of many directions and sizes, bent by one another, with narrow creases between them.
+    """
+    total = np.zeros(np.broadcast_shapes(x.shape, y.shape))
+    bend_x = 0.35 * wave_m * np.sin(2.0 * math.pi * y / (2.3 * wave_m) + rng.between(0.0, 6.3))
+    bend_y = 0.35 * wave_m * np.sin(2.0 * math.pi * x / (1.9 * wave_m) + rng.between(0.0, 6.3))
+    for k in range(9):
+        turn = rng.between(0.0, math.pi)
+        wave = wave_m * (1.0, 1.4, 0.8, 0.55, 0.4, 0.7, 0.3, 0.5, 0.24)[k]
+        along = (x + bend_x) * math.cos(turn) + (y + bend_y) * math.sin(turn)
+        phase = 2.0 * math.pi * along / wave + rng.between(0.0, 6.3)
+        # Creases are narrower than the bumps between them.
+        total = total + (wave / wave_m) ** 0.8 * (np.abs(np.sin(0.5 * phase)) - 0.64)
+    return total
+
+
+def padding(
+    low: Vec3,
+    high: Vec3,
+    rng: VariantRng,
+    slot: int = 0,
+    power: float = 5.0,
+    crease_m: float = 0.004,
+) -> Patch:
+    """An upholstered block whose faces bulge: a superellipsoid with creases.
+
+    Args:
+        low, high: Its corners.
+        rng: Draws.
+        slot: Material.
+        power: Exponent: 2 is an ellipsoid, large ones are boxes.
+        crease_m: Size of its creases.
+    """
+    half = 0.5 * (np.array(high) - np.array(low))
+    middle = 0.5 * (np.array(high) + np.array(low))
+
+    def shape(d: Array) -> Array:
+        # Spread towards the edges, where a box bends.
+        spread = np.sign(d) * np.abs(d) ** 0.6
+        size = (np.abs(spread) ** power).sum(axis=2, keepdims=True) ** (1.0 / power)
+        points: Array = half * spread / size
+        return points
+
+    patch = shapes.ball(shape, 22, 44)
+    p = patch.corners_m
+    bump = rumple(p[..., 0] + p[..., 2], p[..., 1], rng, 0.24) * crease_m
+    inwards = np.abs(p[..., 2] / half[2]) ** 3
+    moved = p.copy()
+    moved[..., 2] += np.minimum(bump, 0.0) * inwards * np.sign(p[..., 2])
+    return replace(patch, corners_m=moved + middle).painted(slot)
+
+
 def pillow(
     half_x_m: float, half_y_m: float, height_m: float, rng: VariantRng, slot: int = 0
 ) -> Patch:
     """A filled cover that lies flat on z = 0, with drawn-in sides and creases at its corners."""
-    t = np.sin(np.linspace(-0.5 * math.pi, 0.5 * math.pi, 15))
+    t = np.sin(np.linspace(-0.5 * math.pi, 0.5 * math.pi, 23))
     u, v = t[:, None], t[None, :]
     x = half_x_m * u * (1.0 - 0.07 * (1.0 - v * v) * np.abs(u))
     y = half_y_m * v * (1.0 - 0.07 * (1.0 - u * u) * np.abs(v))
     full = np.clip((1.0 - u * u) * (1.0 - v * v), 0.0, 1.0) ** 0.42
-    crease = folds(x, y, rng, 0.16, 0.012) * full
-    high = 0.35 * height_m + 0.65 * height_m * full + crease - 0.012 * full
+    crease = rumple(x, y, rng, 0.2) * 0.006 * full
+    # A head has lain on it.
+    dent_x, dent_y = rng.between(-0.3, 0.3) * half_x_m, rng.between(-0.3, 0.3) * half_y_m
+    far = np.hypot((x - dent_x) / (0.75 * half_x_m), (y - dent_y) / (0.6 * half_y_m))
+    dent = rng.between(0.0, 0.3) * height_m * np.exp(-(far**2))
+    high = 0.35 * height_m + (0.65 * height_m - dent) * full + crease - 0.012 * full
     low = 0.35 * height_m * (1.0 - np.minimum(3.0 * full, 1.0))
     top = np.stack(np.broadcast_arrays(x, y, high), axis=2)
     base = np.stack(np.broadcast_arrays(x, y, low), axis=2)
@@ -81,32 +140,72 @@ def _over_edge(t: Array, edge_m: float, radius_m: float) -> tuple[Array, Array]:
     return np.sign(t) * out, -radius_m * (1.0 - np.cos(turn)) - rest
 
 
-def _duvet(
+def drape(
     ends_x: tuple[float, float],
     half_y: float,
     z: float,
     hang_m: float,
     rng: VariantRng,
     slot: int,
-    crease_m: float = 0.035,
+    crease_m: float = 0.016,
+    thick_m: float = 0.02,
 ) -> Patch:
-    """A cover over a mattress, from the head's end on: it hangs over both sides and the foot."""
+    """A cover over a mattress, from the head's end on: it hangs over both sides and the foot.
+
+    Args:
+        ends_x: Where it begins and ends.
+        half_y: Half of the mattress's width.
+        z: Height of the mattress.
+        hang_m: How far it falls beside the mattress.
+        rng: Draws.
+        slot: Material.
+        crease_m: Size of its folds.
+        thick_m: Thickness of its hem.
+    """
     x0, x1 = ends_x
-    s = np.linspace(x0, x1 + 0.06, 44)[:, None]
-    t = np.linspace(-half_y - hang_m, half_y + hang_m, 56)[None, :]
+    rows, columns = max(14, round((x1 - x0) / 0.027)), 84
+    s = np.linspace(x0, x1 + 0.06, rows)[:, None]
+    uneven = [hang_m * rng.between(0.75, 1.2) for _ in range(2)]
+    t = np.linspace(-half_y - uneven[0], half_y + uneven[1], columns)[None, :]
+    # Hems are not straight: cloth is drawn up here and there.
+    drawn = 1.0 + 0.05 * np.sin(5.0 * s + rng.between(0.0, 6.3)) + 0.03 * np.sin(13.0 * s)
+    t = np.where(np.abs(t) > half_y, np.sign(t) * (half_y + (np.abs(t) - half_y) * drawn), t)
     y, down = _over_edge(t, half_y, 0.05)
     x, fall = _over_edge(s - x0, x1 - x0 - 0.02, 0.05)
-    crease = folds(s, t, rng, 0.42, crease_m) * np.clip((s - x0) / 0.4, 0.1, 1.0)
-    swell = 0.035 * np.minimum(np.abs(half_y - np.abs(t)) / 0.2, 1.0) * (np.abs(t) < half_y)
-    hem = 1.0 + 0.16 * np.sin(t * 0.0 + s * 9.0 + np.sign(t)) * (np.abs(t) > half_y)
+    lift = rumple(s, t, rng, 0.42) * crease_m
+    lift = lift - min(float(lift.min()), 0.0)
+    flat = np.clip((s - x0) / 0.25, 0.25, 1.0)
+    lift = lift * flat
+    swell = 0.03 * np.minimum(np.abs(half_y - np.abs(t)) / 0.2, 1.0) * (np.abs(t) < half_y)
+    # What hangs is pushed outwards by its folds, which run downwards.
+    hung = np.clip(-down / 0.12, 0.0, 1.0)
+    pleat = 0.012 * (1.0 + np.sin(2.0 * math.pi * s / 0.19 + 2.0 * np.sin(3.0 * s) + np.sign(t)))
+    out = np.sign(t) * hung * (0.4 * lift + pleat)
+    skew = rng.between(-0.02, 0.02) * (s - x0)
     points = np.stack(
         np.broadcast_arrays(
-            x0 + x, y + np.sign(t) * crease * (down < -0.04), z + down * hem + fall + crease + swell
+            x0 + x, y + out + skew, z + down + fall + (lift + swell) * (1.0 - 0.7 * hung)
         ),
         axis=2,
     )
-    sheet = shapes.grid(points, slot=slot).flipped()
-    return join_patches([sheet, sheet.flipped().moved(0.0, 0.0, -0.004)])
+    # The under side, nearer to the mattress; both meet at a round hem.
+    inward = np.stack(
+        np.broadcast_arrays(0.0 * s, -np.sign(t) * hung * thick_m, (hung - 1.0) * thick_m), axis=2
+    )
+    under = points + inward
+    rim = [
+        np.stack([points[0], under[0]]),
+        np.stack([under[-1], points[-1]]),
+        np.stack([under[:, 0], points[:, 0]]),
+        np.stack([points[:, -1], under[:, -1]]),
+    ]
+    return join_patches(
+        [
+            shapes.grid(points, slot=slot).flipped(),
+            shapes.grid(under, slot=slot),
+            *(shapes.grid(edge, slot=slot) for edge in rim),
+        ]
+    )
 
 
 def bed(seed: int = 0) -> Solid:
@@ -130,9 +229,9 @@ def bed(seed: int = 0) -> Solid:
     patches.append(cushion(*mattress, 1, 0.05))
     fold, hang = rng.between(0.5, 0.75), rng.between(0.16, 0.26)
     start = -0.5 * length + fold
-    patches.append(_duvet((start, 0.5 * length), 0.5 * w, top + 0.02, hang, rng, 2))
-    back = _duvet(
-        (start - 0.03, start + 0.24), 0.5 * w + 0.02, top + 0.085, 0.9 * hang, rng, 1, 0.012
+    patches.append(drape((start, 0.5 * length), 0.5 * w, top + 0.02, hang, rng, 2))
+    back = drape(
+        (start - 0.03, start + 0.24), 0.5 * w + 0.012, top + 0.085, 0.8 * hang, rng, 1, 0.006
     )
     patches.append(back)
     for y in (0.0,) if w < 1.2 else (-0.25 * w, 0.25 * w):
@@ -144,7 +243,7 @@ def bed(seed: int = 0) -> Solid:
             patches.append(small.moved(-0.5 * length + 0.5, y + rng.between(-0.1, 0.1), top + 0.07))
     if rng.chance(0.5):
         throw_at = rng.between(0.05, 0.25) * length
-        throw = _duvet((throw_at, throw_at + 0.55), 0.5 * w + 0.04, top + 0.11, hang, rng, 5, 0.012)
+        throw = drape((throw_at, throw_at + 0.55), 0.5 * w + 0.035, top + 0.11, hang, rng, 5, 0.007)
         patches.append(throw)
     linen = painted_material(rng.choose(_LINEN), 0.95)
     looks = [front(rng), linen, fabric(rng), linen, fabric(rng), fabric(rng)]
@@ -232,17 +331,20 @@ def laundry_basket(seed: int = 0) -> Solid:
     wall = shapes.lathe(
         [(0.0, 0.0), (0.85 * r, 0.0), (r, h), (r - 0.012, h), (0.84 * r, 0.02), (0.0, 0.02)], 28
     )
-    ring = np.linspace(0.0, 1.0, 9)[:, None]
-    turn = np.linspace(0.0, 2.0 * math.pi, 33)[None, :]
+    ring = np.linspace(0.0, 1.0, 20)[:, None]
+    turn = np.linspace(0.0, 2.0 * math.pi, 61)[None, :]
     x, y = 0.96 * r * ring * np.cos(turn), 0.96 * r * ring * np.sin(turn)
-    z = 0.86 * h + 0.07 * (1.0 - ring**2) + folds(x, y, rng, 0.14, 0.06) * (1.0 - ring**4)
+    z = 0.86 * h + 0.06 * (1.0 - ring**2) + 0.016 * rumple(x, y, rng, 0.17) * (1.0 - ring**6)
     z[:, -1] = z[:, 0]
-    heap = shapes.grid(np.stack(np.broadcast_arrays(x, y, z), axis=2), slot=1).flipped()
+    heap = shapes.grid(np.stack(np.broadcast_arrays(x, y, z), axis=2)).flipped()
+    # Several garments: regions that bend about each other.
+    middle = heap.corners_m.mean(axis=1)
+    bent = np.arctan2(middle[:, 1], middle[:, 0]) + 9.0 * np.hypot(middle[:, 0], middle[:, 1])
+    heap = replace(heap, slots=1 + np.floor((bent % (2.0 * math.pi)) / 2.1).astype(np.int64) % 3)
     look = patterned_material(f"texture/fabric?seed={int(rng.between(0, 16))}", 0.12, 0.9)
     shell = look if rng.chance(0.5) else painted_material(rng.choose(("#f0efeb", "#8a8d90")), 0.5)
-    return solid(
-        [wall, heap], [shell, fabric(rng)], [((-0.8 * r, -0.8 * r, 0.0), (0.8 * r, 0.8 * r, h))]
-    )
+    looks = [shell, painted_material(rng.choose(_LINEN), 0.95), fabric(rng, 0.3), fabric(rng, 0.3)]
+    return solid([wall, heap], looks, [((-0.8 * r, -0.8 * r, 0.0), (0.8 * r, 0.8 * r, h))])
 
 
 def coat_hooks(seed: int = 0) -> Solid:
@@ -261,42 +363,168 @@ def coat_hooks(seed: int = 0) -> Solid:
         if rng.chance(0.72):
             length = rng.between(0.6, 1.0)
             lowest = min(lowest, drop - length + 0.05)
-            patches.append(_coat(rng, length, 2 + k % 3).moved(0.05, y, drop + 0.05))
-    looks = [front(rng), metal_material(STAINLESS, 0.3), *(_wool(rng) for _ in range(3))]
+            coat = hang_garment(rng, length, 2 + k % 3).rotated("z", rng.between(-0.15, 0.15))
+            patches.append(coat.moved(0.06, y, drop + 0.05))
+    looks = [front(rng), metal_material(STAINLESS, 0.3), *(wool(rng) for _ in range(3))]
     moved = [patch.moved(0.0, 0.0, -lowest) for patch in patches]
     top = drop + 0.09 - lowest
     return solid(moved, looks, [((0.0, -0.5 * w, 0.0), (0.16, 0.5 * w, top))])
 
 
-def _wool(rng: VariantRng) -> Material:
-    dark = ("#2b2f36", "#3d2f28", "#5b6157", "#1f2a3c", "#7a2f33", "#8b7558", "#46505e")
+def wool(rng: VariantRng) -> Material:
+    """Plain cloth of coats."""
+    dark = ("#2b2f36", "#3d2f28", "#5b6157", "#1f2a3c", "#7a2f33", "#8b7558", "#46505e", "#6b705c")
     return Material(draw_linear(dark, 0.15, rng), 0.95)
 
 
-def _coat(rng: VariantRng, length_m: float, slot: int) -> Patch:
-    """A coat that hangs from its collar at the origin, with two sleeves."""
-    s = np.linspace(0.0, 1.0, 18)[:, None]
-    turn = np.linspace(0.0, 2.0 * math.pi, 33)[None, :]
-    wide = 0.05 + 0.1 * np.minimum(5.0 * s, 1.0) + 0.06 * s
-    deep = 0.025 + 0.03 * np.minimum(4.0 * s, 1.0) + 0.012 * s
-    wave = 1.0 + (0.05 + 0.14 * s) * np.sin(6.0 * turn + rng.between(0.0, 6.3))
-    x, y = deep * np.cos(turn) * wave + 0.012, wide * np.sin(turn) * wave
-    x = np.maximum(x, -0.045)
-    points = np.stack(np.broadcast_arrays(x, y, -length_m * s), axis=2)
-    patches = [shapes.grid(points, slot=slot).flipped()]
+def hang_garment(rng: VariantRng, length_m: float, slot: int, *, thin: bool = False) -> Patch:
+    """A coat or shirt that hangs from its collar at the origin, with two sleeves; wide along Y.
+
+    Args:
+        rng: Draws.
+        length_m: From collar to hem.
+        slot: Material.
+        thin: Whether it hangs among others, pressed flat.
+    """
+    s = np.linspace(0.0, 1.0, 12 if thin else 26)[:, None]
+    turn = np.linspace(0.0, 2.0 * math.pi, 41 if thin else 65)[None, :]
+    shoulder = rng.between(0.17, 0.2) if thin else rng.between(0.14, 0.17)
+    slope = np.clip(s / 0.14, 0.0, 1.0)
+    wide = 0.045 + (shoulder - 0.045) * np.sin(0.5 * math.pi * slope) + 0.035 * s
+    deep = (0.015 if thin else 0.035) + (0.006 if thin else 0.03) * slope
+    # Folds run down and open towards the hem; each garment has its own.
+    wave = np.zeros(np.broadcast_shapes(s.shape, turn.shape))
+    for number in (3, 5, 8, 11):
+        start = rng.between(0.0, 6.3)
+        sway = rng.between(-1.2, 1.2) * s
+        wave = wave + np.sin(number * turn + start + sway) / number**0.6
+    amount = (0.1 if thin else 0.2) * np.clip((s - 0.06) / 0.5, 0.0, 1.0)
+    x = deep * np.cos(turn) * (1.0 + 1.4 * amount * wave)
+    y = wide * np.sin(turn) * (1.0 + 0.35 * amount * wave)
+    if not thin:
+        x = np.maximum(x + 0.012, -0.04)
+    hem = 1.0 + 0.02 * np.sin(2.0 * turn + rng.between(0.0, 6.3))
+    points = np.stack(np.broadcast_arrays(x, y, -length_m * s * hem), axis=2)
+    points[:, -1] = points[:, 0]
+    body = shapes.grid(points, slot=slot).flipped()
+    patches = [body]
+    if not thin:
+        patches.append(shapes.grid(points * np.array([0.93, 0.97, 1.0]), slot=slot))
+    count, sides = (9, 8) if thin else (30, 14)
+    arm, deep_m = min(0.62, 0.85 * length_m), 0.02 if thin else 0.045
     for sy in (-1, 1):
-        path = np.array(
-            [
-                (0.012, sy * 0.1, -0.12 * length_m),
-                (0.02, sy * 0.17, -0.35 * length_m),
-                (0.025, sy * 0.18, -0.72 * length_m),
-            ]
+        way = rng.between(-0.02, 0.02)
+        path = [
+            (0.0, sy * 0.8 * shoulder, -0.05),
+            (0.008, sy * (shoulder + 0.022), -0.12),
+            (0.02 + way, sy * (shoulder + 0.045), -0.3 * arm - 0.08),
+            (0.03 + 2 * way, sy * (shoulder + 0.03), -0.65 * arm - 0.06),
+            (0.045 + 3 * way, sy * (shoulder + 0.01), -arm - 0.04),
+        ]
+        line = shapes.spline(path, count)
+        t = np.linspace(0.0, 1.0, count)
+        # Sleeves are flat tubes with creases at the elbow.
+        crease = 1.0 + 0.1 * np.sin(34.0 * t + rng.between(0.0, 6.3)) * np.exp(
+            -(((t - 0.5) / 0.2) ** 2)
         )
+        size = np.stack([deep_m * crease, 0.05 * (1.0 - 0.25 * t) * crease], axis=1)
         tube = shapes.sweep(
-            shapes.spline(path.tolist(), 8), shapes.circle(0.045, 12), up=(1.0, 0.0, 0.0), slot=slot
+            line, shapes.circle(1.0, sides), up=(1.0, 0.0, 0.0), scale=size, slot=slot
         )
         patches.append(tube)
+    if not thin:
+        ring = np.linspace(0.0, 2.0 * math.pi, 19)
+        collar = np.stack(
+            [0.03 * np.cos(ring) + 0.012, 0.06 * np.sin(ring), 0.012 * np.cos(ring)], axis=1
+        )
+        roll = shapes.sweep(
+            collar, shapes.circle(0.013, 8), up=(0.0, 0.0, 1.0), capped=False, slot=slot
+        )
+        # Lapels: the open edge of the front.
+        edge = np.array(
+            [(0.045, 0.0, -0.02), (0.068, 0.012, -0.3 * length_m), (0.074, 0.016, -0.98 * length_m)]
+        )
+        lapel = shapes.sweep(
+            shapes.spline(edge.tolist(), 14), shapes.circle(0.007, 6), up=(1.0, 0.0, 0.0), slot=slot
+        )
+        patches += [roll, lapel]
     return join_patches(patches)
+
+
+def draped_clothes(seed: int = 0) -> Solid:
+    """A jacket, shirt or blanket over the back of a chair; origin at the back's upper edge.
+
+    Slot: cloth.
+    """
+    rng = variant_rng("draped_clothes", seed)
+    if seed % 4 == 3:
+        wide = rng.between(0.34, 0.44)
+        loop = _over_rail(rng, wide, rng.between(0.25, 0.36), rng.between(0.3, 0.5), 0.047)
+        patches = [loop.moved(0.0, rng.between(-0.03, 0.03), 0.002)]
+    else:
+        patches = _jacket(rng)
+    leaned = [patch.rotated("y", -LEAN_RAD) for patch in patches]
+    low = np.min([p.bounds_m()[0] for p in leaned], axis=0).tolist()
+    high = np.max([p.bounds_m()[1] for p in leaned], axis=0).tolist()
+    look = fabric(rng, 0.3) if rng.chance(0.5) else wool(rng)
+    box: Box = ((low[0], low[1], -0.02), (high[0], high[1], high[2]))
+    return solid(leaned, [look], [box])
+
+
+LEAN_RAD = 0.14
+"""Lean of the backs of chairs."""
+
+
+def _jacket(rng: VariantRng) -> list[Patch]:
+    """A jacket around an upright back along Y, open below, its front shorter than its back."""
+    back, short = rng.between(0.42, 0.6), rng.between(0.28, 0.36)
+    s = np.linspace(0.0, 1.0, 24)[:, None]
+    turn = np.linspace(0.0, 2.0 * math.pi, 65)[None, :]
+    c, sn = np.cos(turn), np.sin(turn)
+    fall = short + (back - short) * (0.5 - 0.5 * c) ** 1.5
+    slope = np.sin(0.5 * math.pi * np.clip(s / 0.12, 0.0, 1.0))
+    half = 0.13 + 0.115 * slope + 0.03 * s
+    deep = 0.012 + 0.04 * slope + 0.012 * s
+    wave = np.zeros(np.broadcast_shapes(s.shape, turn.shape))
+    for number in (3, 5, 7, 11):
+        sway = rng.between(-1.5, 1.5) * s
+        wave = wave + np.sin(number * turn + rng.between(0.0, 6.3) + sway) / number**0.6
+    fold = 0.011 * np.clip((s - 0.05) / 0.4, 0.0, 1.0) * (wave + 1.0)
+    # A flat ring: the back of the chair is broad.
+    flat = np.sign(c) * np.abs(c) ** 0.55
+    x = flat * (deep + np.maximum(fold, 0.0))
+    y = np.sign(sn) * np.abs(sn) ** 0.55 * half + sn * np.maximum(fold, 0.0)
+    z = 0.035 - 0.085 * (np.abs(y) / 0.27) ** 2.2 * (1.0 - s) ** 0.5 - fall * s
+    points = np.stack(np.broadcast_arrays(x, y, z), axis=2)
+    points[:, -1] = points[:, 0]
+    points[0, :, 0] *= 0.2
+    outer = shapes.grid(points).flipped()
+    patches = [outer, shapes.grid(points * np.array([0.93, 0.985, 1.0]))]
+    collar = [(0.03, -0.06, 0.012), (-0.004, -0.07, 0.036), (-0.026, -0.035, 0.05), (-0.03, 0.0, 0.053),
+              (-0.026, 0.035, 0.05), (-0.004, 0.07, 0.036), (0.03, 0.06, 0.012)]  # fmt: skip
+    line = shapes.spline(collar, 25)
+    width = np.sin(np.linspace(0.12, math.pi - 0.12, 25)) ** 0.5
+    flat = np.stack([0.009 + 0.0 * width, 0.032 * width], axis=1)
+    patches.append(shapes.sweep(line, shapes.circle(1.0, 12), up=(1.0, 0.0, 0.2), scale=flat))
+    for sy in (-1, 1):
+        way = rng.between(-0.025, 0.01)
+        arm = rng.between(0.42, 0.54)
+        path = [
+            (0.0, sy * 0.17, -0.075),
+            (0.3 * way, sy * 0.235, -0.1),
+            (way, sy * 0.272, -0.19),
+            (1.5 * way, sy * 0.285, -0.32),
+            (2.2 * way, sy * 0.28, -arm),
+        ]
+        t = np.linspace(0.0, 1.0, 26)
+        crease = 1.0 + 0.12 * np.sin(36.0 * t) * np.exp(-(((t - 0.5) / 0.25) ** 2))
+        size = np.stack([0.055 * (1.0 - 0.2 * t) * crease, 0.028 * crease], axis=1)
+        patches.append(
+            shapes.sweep(
+                shapes.spline(path, 26), shapes.circle(1.0, 14), up=(1.0, 0.0, 0.0), scale=size
+            )
+        )
+    return patches
 
 
 def towel(seed: int = 0) -> Solid:
@@ -316,7 +544,9 @@ def towel(seed: int = 0) -> Solid:
     return solid(patches, [fabric(rng, 0.3), metal_material(STAINLESS, 0.2)], boxes)
 
 
-def _over_rail(rng: VariantRng, w: float, front_m: float, back_m: float) -> Patch:
+def _over_rail(
+    rng: VariantRng, w: float, front_m: float, back_m: float, radius_m: float = 0.0095
+) -> Patch:
     """Thick cloth over a rail along Y through the origin, with folds that open downwards."""
     bend = np.linspace(0.0, math.pi, 9)
     levels = np.linspace(1.0, 0.0, 12, endpoint=False)
@@ -326,6 +556,8 @@ def _over_rail(rng: VariantRng, w: float, front_m: float, back_m: float) -> Patc
         0.47 * waves * y + rng.between(0.0, 6.3)
     )
     depth = rng.between(0.003, 0.009)
+    # One corner hangs lower than the other.
+    tilt = rng.between(-0.06, 0.06) * y
 
     def sheet(radius: float) -> Array:
         """Points over the rail, from the front's hem to the back's."""
@@ -333,10 +565,13 @@ def _over_rail(rng: VariantRng, w: float, front_m: float, back_m: float) -> Patc
         z = np.concatenate([-front_m * levels, radius * np.sin(bend), -back_m * levels[::-1]])
         fall = np.clip(-z / front_m, 0.0, 1.0)[:, None]
         return np.stack(
-            np.broadcast_arrays(x[:, None] + depth * fall * wave, y, z[:, None]), axis=2
+            np.broadcast_arrays(
+                x[:, None] + depth * fall * wave, y, z[:, None] + fall * tilt * np.sign(x)[:, None]
+            ),
+            axis=2,
         )
 
-    outer, inner = sheet(0.016), sheet(0.0095)
+    outer, inner = sheet(radius_m + 0.0065), sheet(radius_m)
     loop = np.concatenate([outer, inner[::-1], outer[:1]])
     sides = [np.stack([outer[:, k], inner[:, k]]) for k in (0, -1)]
     return join_patches([shapes.grid(loop), shapes.grid(sides[0]).flipped(), shapes.grid(sides[1])])

@@ -6,9 +6,14 @@ A part hangs at its origin: the hinge of a door, the closed place of a drawer. T
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
+import numpy as np
+
+from gen_data.generator.assets.interiors.cartons import carton_looks, tape_carton
 from gen_data.generator.assets.interiors.parts import (
+    INSIDE,
     LACQUERS,
     Box,
     board,
@@ -19,15 +24,17 @@ from gen_data.generator.assets.interiors.parts import (
     solid,
     wood,
 )
+from gen_data.generator.assets.interiors.soft_goods import pillow
 from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.family import Solid
-from gen_data.generator.assets.procedural.furniture import shelf_levels_m
+from gen_data.generator.assets.procedural.furniture import rectangle, shelf_levels_m
 from gen_data.generator.assets.procedural.material_presets import (
     STAINLESS,
     ZINC,
     metal_material,
     painted_material,
     patterned_material,
+    printed_material,
 )
 from gen_data.generator.assets.procedural.patches import Patch
 from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant_rng
@@ -141,11 +148,14 @@ def _looks(family: str, rng: VariantRng, seed: int) -> list[Material]:
 
 def _cupboard(family: str, seed: int) -> Solid:
     rng, d, w, low, high, doors = _measures(family, seed)
-    boards = carcass(d, w, low, high, 2 if high - low > 1.0 else 1)
+    levels = _levels_m(family, low, high)
+    x, half = 0.5 * d, 0.5 * w
+    boards = carcass(d, w, low, high)
     if family == "wardrobe":
-        boards = [*carcass(d, w, low, high, 1), ((-0.5 * d, -0.009, low), (0.5 * d, 0.009, high))]
+        boards.append(((-x, -0.5 * _T, low), (x, 0.5 * _T, high)))
+    for z in levels[1:]:
+        boards.append(((-x + 0.006, -half + _T, z - _T), (x - 0.01, half - _T, z)))
     patches = [board(*b) for b in boards]
-    x = 0.5 * d
     outer: list[Box] = [*boards]
     if low > 0.0 and family != "refrigerator":
         plinth: Box = ((-x + 0.02, -0.5 * w, 0.0), (x - 0.05, 0.5 * w, low))
@@ -164,13 +174,35 @@ def _cupboard(family: str, seed: int) -> Solid:
     if family == "kitchen_unit":
         top: Box = ((-x - 0.0, -0.5 * w, high), (x + 0.03, 0.5 * w, 0.9))
         patches.append(shapes.block(*top, 0.003, 3))
+        # Behind the gaps between fronts it is dark.
+        patches.append(
+            board((x - 0.012, -0.5 * w + _T, high - 0.03), (x - 0.002, 0.5 * w - _T, high), 0)
+        )
         outer.append(top)
     if family == "wardrobe":
-        rail = high - 0.12
+        rail = levels[1] + RAIL_M
         patches.append(rod((0.0, -0.5 * w + 0.02, rail), (0.0, 0.5 * w - 0.02, rail), 0.012, 2))
     made = solid(patches, _looks(family, rng, seed), outer)
+    # Behind the door: the left half of what has two.
+    right = (0.0 if doors == 2 and family == "wardrobe" else half) - _T
+    inside = []
+    for z, above in zip(levels, (*levels[1:], high), strict=True):
+        inside.append(Keypoint(INSIDE, (-x + 0.02, -half + _T + 0.004, z)))
+        inside.append(Keypoint(INSIDE, (x - 0.035, right - 0.004, above - _T - 0.004)))
     hinge = Keypoint("hinge", (x, -0.5 * w, low), 0.05)
-    return replace(made, keypoints=(hinge,))
+    return replace(made, keypoints=(hinge, *inside))
+
+
+RAIL_M = 1.2
+"""Height of the rail of a wardrobe above the board below it."""
+
+
+def _levels_m(family: str, low_m: float, high_m: float) -> tuple[float, ...]:
+    """Heights of the boards of a cupboard, the lowest first."""
+    if family == "wardrobe":
+        return (low_m + _T, low_m + 0.44)
+    count = 3 if family == "refrigerator" else 2
+    return tuple(low_m + _T + k * (high_m - low_m - _T) / count for k in range(count))
 
 
 def _cupboard_door(family: str, seed: int) -> Solid:
@@ -183,7 +215,40 @@ def _cupboard_door(family: str, seed: int) -> Solid:
     bar = handle(
         thick, width - 0.05, grip, 0.25 if family == "refrigerator" else 0.16, 2, upright=True
     )
-    return solid([patch, *bar], _looks(family, rng, seed), [leaf])
+    looks = _looks(family, rng, seed)
+    notes: list[Patch] = []
+    if family == "refrigerator":
+        notes = _notes(thick, width, h, variant_rng("notes", seed))
+        looks += [
+            painted_material("#f6f4ee", 0.8),
+            painted_material("#f2e37a", 0.8),
+            printed_material(f"texture/wall_art?seed={13 + 28 * (seed % 3)}", 0.6),
+            printed_material(f"texture/wall_art?seed={11 + 28 * (seed % 3)}", 0.25),
+            painted_material(LACQUERS[seed % len(LACQUERS)], 0.3),
+            painted_material("#b3261e", 0.35),
+        ]
+    return solid([patch, *bar, *notes], looks, [leaf])
+
+
+def _notes(x: float, w: float, h: float, rng: VariantRng) -> list[Patch]:
+    """Notes, photographs and a child's drawing under magnets, in slots 3 to 8."""
+    made: list[Patch] = []
+    for k in range(int(rng.between(0, 7))):
+        a, b = rng.choose(((0.076, 0.076), (0.105, 0.148), (0.075, 0.1), (0.1, 0.21), (0.15, 0.2)))
+        y, z = rng.between(0.05, w - 0.12 - a), rng.between(0.42 * h, 0.95 * h - b)
+        slot = 3 + int(rng.random() * 4)
+        at = x + 0.0006 * (k + 1)
+        sheet = rectangle((at, 0.0, 0.0), (0.0, a, 0.0), (0.0, 0.0, b)).painted(slot)
+        made.append(sheet.rotated("x", rng.between(-0.09, 0.09)).moved(0.0, y, z))
+        pin = rod(
+            (x, y + 0.5 * a, z + b - 0.012),
+            (x + 0.008, y + 0.5 * a, z + b - 0.012),
+            0.011,
+            7 + k % 2,
+            14,
+        )
+        made.append(pin)
+    return made
 
 
 def _grip(low: float, high: float) -> float:
@@ -420,27 +485,183 @@ def pallet(seed: int = 0) -> Solid:
         y = -0.3275 + k * 0.16375
         patches.append(board((-0.6, y - 0.06, 0.122), (0.6, y + 0.06, 0.144)))
     boxes: list[Box] = [((-0.6, -0.4, 0.0), (0.6, 0.4, 0.144))]
-    rows = 0 if seed % 6 == 5 else int(rng.between(1, 4))
-    nx, ny, h = *rng.choose(((3, 2), (2, 2), (4, 2), (2, 1))), rng.between(0.22, 0.36)
+    goods, looks, high = _goods(seed, rng)
+    patches += [patch.moved(0.0, 0.0, 0.144) for patch in goods]
+    if high > 0.0:
+        boxes.append(((-0.59, -0.39, 0.144), (0.59, 0.39, 0.144 + high)))
+    return solid(patches, [wood(rng, 0.8), *looks], boxes)
+
+
+def _goods(seed: int, rng: VariantRng) -> tuple[list[Patch], list[Material], float]:
+    """What is on a pallet, above z = 0 from slot 1 on; its materials and height [m]."""
+    match seed % 9:
+        case 0 | 1 | 2 | 3:
+            return _cartons(seed, rng, wrapped=seed % 9 in (1, 3))
+        case 4:
+            return _sacks(rng)
+        case 5:
+            return _drums(rng)
+        case 6:
+            return _crates(rng)
+        case 7:
+            return _mixed(seed, rng)
+        case _:
+            return [], [], 0.0
+
+
+def _cartons(
+    seed: int, rng: VariantRng, *, wrapped: bool
+) -> tuple[list[Patch], list[Material], float]:
+    """Layers of equal cartons, some wrapped in film."""
+    patches: list[Patch] = []
+    rows = int(rng.between(1, 5))
+    nx, ny = rng.choose(((3, 2), (2, 2), (4, 2), (4, 3), (2, 1)))
+    h = rng.between(0.2, 0.3) if rows > 2 else rng.between(0.22, 0.36)
+    a, b = 1.16 / nx, 0.76 / ny
     for row in range(rows):
         for i in range(nx):
             for j in range(ny):
-                if row == rows - 1 and rows > 1 and rng.chance(0.2):
+                if row == rows - 1 and rows > 1 and not wrapped and rng.chance(0.25):
                     continue
-                a, b = 1.18 / nx, 0.78 / ny
-                x, y, z = -0.59 + i * a, -0.39 + j * b, 0.144 + row * h
+                # Nobody stacks to the millimetre.
+                x, y = (rng.between(-0.006, 0.006) for _ in range(2))
+                x, y, z = x - 0.58 + i * a, y - 0.38 + j * b, row * h
+                low, top = (x + 0.003, y + 0.003, z), (x + a - 0.003, y + b - 0.003, z + h - 0.001)
+                tape_carton(patches, low, top, rng, (1, 2, 3, 4))
+    looks = carton_looks(rng, seed)
+    if wrapped:
+        patches += _film(rows * h, rng)
+        looks = [*looks, _FILM]
+    return patches, looks, rows * h
+
+
+_FILM = Material((0.93, 0.95, 0.96), 0.16, transmission=0.82, thin=True)
+"""Film that packages are wrapped in: clear, with a bluish shine."""
+
+
+def _film(high_m: float, rng: VariantRng) -> list[Patch]:
+    """Film around goods of a height, with folds, in slot 5."""
+    turn = np.linspace(0.0, 2.0 * math.pi, 97)[None, :]
+    z = np.linspace(-0.03, high_m - 0.01, 15)[:, None]
+    c, s = np.cos(turn), np.sin(turn)
+    flat_x, flat_y = np.sign(c) * np.abs(c) ** 0.16, np.sign(s) * np.abs(s) ** 0.16
+    fold = 0.004 * np.sin(9.0 * turn + 21.0 * z) + 0.004 * np.sin(
+        4.0 * turn - 34.0 * z + rng.between(0.0, 6.3)
+    )
+    x, y = flat_x * (0.597 + fold), flat_y * (0.397 + fold)
+    points = np.stack(np.broadcast_arrays(x, y, z), axis=2)
+    points[:, -1] = points[:, 0]
+    return [shapes.grid(points, slot=5).flipped()]
+
+
+def _sacks(rng: VariantRng) -> tuple[list[Patch], list[Material], float]:
+    """Paper or plastic sacks in layers, lying across each other."""
+    patches: list[Patch] = []
+    rows, t = int(rng.between(2, 6)), 0.12
+    for row in range(rows):
+        for k in range(3):
+            x, y = -0.39 + 0.39 * k, 0.0
+            sack = pillow(0.185, 0.37, 0.15, rng, 1)
+            shift = rng.between(-0.012, 0.012)
+            patches.append(
+                sack.rotated("z", rng.between(-0.04, 0.04)).moved(x + shift, y + shift, row * t)
+            )
+    paper = rng.choose(("#c8a878", "#e9e6de", "#d9d2c3", "#b9a58a"))
+    return patches, [painted_material(paper, 0.75)], rows * t + 0.03
+
+
+def _drums(rng: VariantRng) -> tuple[list[Patch], list[Material], float]:
+    """Six drums or canisters."""
+    r, h = 0.185, rng.between(0.45, 0.62)
+    patches: list[Patch] = []
+    profile = [(0.0, 0.0), (r, 0.0), (r, 0.3 * h), (r + 0.006, 0.33 * h), (r, 0.36 * h),
+               (r, 0.64 * h), (r + 0.006, 0.67 * h), (r, 0.7 * h), (r, h), (r - 0.012, h),
+               (r - 0.014, h - 0.014), (0.0, h - 0.014)]  # fmt: skip
+    for i in range(3):
+        for j in range(2):
+            x, y = -0.39 + 0.39 * i, -0.195 + 0.39 * j
+            patches.append(shapes.lathe(profile, 36, 1).moved(x, y))
+            patches.append(rod((x + 0.1, y, h - 0.02), (x + 0.1, y, h - 0.002), 0.025, 2, 14))
+            label = shapes.lathe([(r + 0.001, 0.4 * h), (r + 0.001, 0.6 * h)], 36, 3)
+            keep = label.corners_m[:, :, 0].min(axis=1) > 0.35 * r
+            patches.append(
+                replace(
+                    label,
+                    corners_m=label.corners_m[keep],
+                    uvs=label.uvs[keep],
+                    slots=label.slots[keep],
+                ).moved(x, y)
+            )
+    paint = rng.choose(("#1f5fa8", "#2b2d30", "#a3261d", "#2f6f4f", "#d9d6cf"))
+    return (
+        patches,
+        [
+            painted_material(paint, 0.35),
+            painted_material("#1d1e20", 0.4),
+            painted_material("#f3f1ea", 0.6),
+        ],
+        h,
+    )
+
+
+def _crates(rng: VariantRng) -> tuple[list[Patch], list[Material], float]:
+    """Plastic crates in stacks of different heights."""
+    patches: list[Patch] = []
+    h, top = 0.22, 0.0
+    for i in range(2):
+        for j in range(2):
+            rows = int(rng.between(2, 5))
+            top = max(top, rows * h)
+            for row in range(rows):
+                x0, y0, z0 = -0.585 + 0.59 * i, -0.385 + 0.39 * j, row * h
+                x1, y1, z1 = x0 + 0.58, y0 + 0.38, z0 + h - 0.004
+                slot = 1 + int(rng.random() * 2)
                 patches.append(
                     shapes.block(
-                        (x + 0.001, y + 0.001, z),
-                        (x + a - 0.001, y + b - 0.001, z + h - 0.0005),
-                        0.006,
-                        1,
+                        (x0 + 0.012, y0 + 0.012, z0),
+                        (x1 - 0.012, y1 - 0.012, z1 - 0.03),
+                        0.004,
+                        slot,
                     )
                 )
-    if rows:
-        boxes.append(((-0.59, -0.39, 0.144), (0.59, 0.39, 0.144 + rows * h)))
-    card = patterned_material(f"texture/cardboard?seed={seed % 16}", 0.6, 0.85)
-    return solid(patches, [wood(rng, 0.8), card], boxes)
+                for z in (z0, z1 - 0.03, z0 + 0.45 * h):
+                    patches.append(shapes.block((x0, y0, z), (x1, y1, z + 0.022), 0.004, slot))
+                for k in range(6):
+                    a = x0 + (k + 0.5) * 0.58 / 6
+                    patches.append(
+                        shapes.block((a - 0.006, y0, z0), (a + 0.006, y1, z1), 0.0, slot)
+                    )
+                for k in range(4):
+                    a = y0 + (k + 0.5) * 0.38 / 4
+                    patches.append(
+                        shapes.block((x0, a - 0.006, z0), (x1, a + 0.006, z1), 0.0, slot)
+                    )
+    colors = rng.choose(
+        (
+            ("#1f5fa8", "#1f5fa8"),
+            ("#a3261d", "#5b5f64"),
+            ("#2f6f4f", "#2f6f4f"),
+            ("#5b5f64", "#e6c229"),
+        )
+    )
+    return patches, [painted_material(c, 0.45) for c in colors], top
+
+
+def _mixed(seed: int, rng: VariantRng) -> tuple[list[Patch], list[Material], float]:
+    """Cartons of different sizes, as for one customer, in film."""
+    patches: list[Patch] = []
+    top = 0.0
+    for i in range(2):
+        for j in range(2):
+            z = 0.0
+            for _ in range(int(rng.between(1, 4))):
+                h = rng.between(0.18, 0.42)
+                x0, y0 = -0.58 + 0.585 * i, -0.38 + 0.385 * j
+                a, b = rng.between(0.44, 0.57), rng.between(0.28, 0.375)
+                tape_carton(patches, (x0, y0, z), (x0 + a, y0 + b, z + h), rng, (1, 2, 3, 4))
+                z += h + 0.001
+            top = max(top, z)
+    return [*patches, *_film(0.8 * top, rng)], [*carton_looks(rng, seed), _FILM], top
 
 
 def storage_box(seed: int = 0) -> Solid:
@@ -454,6 +675,10 @@ def storage_box(seed: int = 0) -> Solid:
     else:
         looks = [painted_material(rng.choose((*LACQUERS, "#2f6f9f", "#7a8f5a")), 0.4)] * 2
     whole: Box = (low[0], (x, y, z))
+    if seed % 2:
+        carton: list[Patch] = []
+        tape_carton(carton, low[0], (x, y, z), rng, (0, 1, 2, 3))
+        return solid(carton, carton_looks(rng, seed), [whole])
     return solid([shapes.block(*low, 0.008), shapes.block(*lid, 0.006, 1)], looks, [whole])
 
 

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from gen_data.generator.assets.interiors.parts import (
+    TOOLS,
     Box,
     board,
     cushion,
@@ -20,7 +21,6 @@ from gen_data.generator.assets.interiors.parts import (
 from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.material_presets import (
-    PLASTICS,
     STAINLESS,
     STEEL,
     draw_linear,
@@ -36,7 +36,7 @@ _STEEL = metal_material(STEEL, 0.35)
 
 
 def _plastic(rng: VariantRng) -> Material:
-    return Material(draw_linear(PLASTICS, 0.1, rng), 0.4)
+    return Material(draw_linear(TOOLS, 0.1, rng), 0.4)
 
 
 def toolbox(seed: int = 0) -> Solid:

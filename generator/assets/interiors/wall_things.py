@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import math
 
+from gen_data.generator.assets.interiors.fittings import photograph
 from gen_data.generator.assets.interiors.parts import (
+    TOOLS,
     Box,
     board,
     cloth,
@@ -20,7 +22,6 @@ from gen_data.generator.assets.procedural import surface_shapes as shapes
 from gen_data.generator.assets.procedural.family import Solid
 from gen_data.generator.assets.procedural.furniture import rectangle
 from gen_data.generator.assets.procedural.material_presets import (
-    PLASTICS,
     STAINLESS,
     STEEL,
     draw_linear,
@@ -192,7 +193,7 @@ def notice_board(seed: int = 0) -> Solid:
         wood(rng),
         patterned_material(f"texture/cardboard?seed={seed % 16}", 0.15, 0.95),
         painted_material("#f6f5f1", 0.8),
-        printed_material(f"texture/book_cover?seed={seed + 3}", 0.7),
+        printed_material(f"texture/wall_art?seed={13 + 14 * (2 * (seed % 3))}", 0.7),
         painted_material(rng.choose(("#f2e37a", "#e9a6b2", "#a9d3e8")), 0.8),
     ]
     return solid(patches, looks, [back])
@@ -231,7 +232,7 @@ def wall_calendar(seed: int = 0) -> Solid:
             patches.append(mark.painted(2))
     looks = [
         painted_material("#f7f6f2", 0.8),
-        printed_material(f"texture/poster?seed={seed % 12}", 0.5),
+        printed_material(photograph(seed, upright=False), 0.5),
         painted_material("#3a3d42", 0.8),
     ]
     return solid(patches, looks, [sheet])
@@ -276,7 +277,7 @@ def parts_bins(seed: int = 0) -> Solid:
     looks = [
         metal_material(STEEL, 0.5),
         painted_material("#1f5fa8", 0.4),
-        Material(draw_linear(PLASTICS, 0.1, rng), 0.4),
+        Material(draw_linear(TOOLS, 0.1, rng), 0.4),
         metal_material(STEEL, 0.55),
     ]
     return solid(patches, looks, [((0.0, -0.5 * w, 0.0), (0.16, 0.5 * w, rows * pitch))])
