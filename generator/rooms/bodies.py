@@ -56,6 +56,7 @@ class Looks:
     """Materials of a shell.
 
     Attributes:
+        accent: Material of the wall of number ``accent_wall``; None = that of the others.
         blind_drops: Share of each opening that a blind covers; 0, or none given, = no blind.
     """
 
@@ -65,6 +66,12 @@ class Looks:
     door_style: int = 0
     blind_style: int = 0
     blind_drops: tuple[float, ...] = ()
+    accent: Material | None = None
+    accent_wall: int = 0
+
+    def of_wall(self, wall: int) -> Material:
+        """Material of one of the walls."""
+        return self.accent if self.accent is not None and wall == self.accent_wall else self.walls
 
 
 def part_pose(T_world_piece: SE3, at_m: Vec3, joint: Joint, opening: float) -> SE3:
@@ -220,15 +227,15 @@ class Builder:
             parameters["openings"] = (*holes, *NO_OPENINGS[len(holes) :])
         pose = SE3.about_z(0.5 * math.pi * (wall - 1), (*room.at_wall(wall, 0.0, 0.0), 0.0))
         asset = _id("wall", **parameters)
-        skirting = self._assets.materials(asset)[1]
+        surface, skirting = looks.of_wall(wall), self._assets.materials(asset)[1]
         if room.kind in ("bathroom", "warehouse", "workshop"):
-            skirting = looks.walls
+            skirting = surface
         self.add(
             f"{room.name}/wall_{wall}",
             asset,
             pose,
             room.kind,
-            materials=(looks.walls, skirting),
+            materials=(surface, skirting),
         )
 
     def _add_opening(self, room: Room, k: int, opening: Opening, looks: Looks) -> None:

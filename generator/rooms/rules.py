@@ -74,7 +74,8 @@ class RoomType:
     Attributes:
         size_m: Ranges of length, width and height [m].
         windows: Smallest and largest number of windows.
-        floor, walls: Families of textures; ``paint`` is a plain colour.
+        floor, walls: Families of textures; ``paint`` is tinted.
+        accent: Those of a single wall that stands out; in a share of the rooms.
         pieces: Rules in the order of placing.
     """
 
@@ -83,6 +84,7 @@ class RoomType:
     floor: tuple[str, ...]
     walls: tuple[str, ...]
     pieces: tuple[Rule, ...]
+    accent: tuple[str, ...] = ()
 
     @property
     def usual_area_m2(self) -> float:

@@ -23,15 +23,18 @@ from gen_data.generator.core.se3 import Vec3
 Box = tuple[Vec3, Vec3]
 SUPPORT = "support"
 """Keypoints at two opposite corners of a level surface that carries things and is not a top."""
-LACQUERS = ("#f1efea", "#e8e6e0", "#d9d6cf", "#3a3d40", "#b9c2bd", "#5c6b73", "#8d9a86")
-"""Lacquers of furniture, sRGB."""
+LACQUERS = (
+    *("#f1f0ec", "#f1f0ec", "#eceae5", "#e6e4de", "#d9d7d1", "#b7b6b2", "#8b8c8c", "#3b3d3f"),
+    *("#b9c2bd", "#66737a", "#939d8d"),
+)
+"""Lacquers of furniture, sRGB: seven in ten are white or grey."""
 _WOODS = 18
 _FABRICS = 16
 
 
 def board(low: Vec3, high: Vec3, slot: int = 0, radius_m: float = 0.002) -> Patch:
     """A board whose grain runs along its longest side."""
-    return shapes.map_along_grain(shapes.block(low, high, radius_m, slot), 0.7)
+    return shapes.map_along_grain(shapes.block(low, high, radius_m, slot), 0.5)
 
 
 def cushion(low: Vec3, high: Vec3, slot: int = 0, radius_m: float = 0.05) -> Patch:
@@ -126,8 +129,8 @@ def front(rng: VariantRng) -> Material:
 def upholstery(rng: VariantRng) -> Material:
     """Fabric or leather."""
     if rng.chance(0.25):
-        return patterned_material(f"texture/leather?seed={int(rng.between(0, 16))}", 0.45, 0.5)
-    return patterned_material(f"texture/fabric?seed={int(rng.between(0, _FABRICS))}", 0.3, 0.95)
+        return patterned_material(f"texture/leather?seed={int(rng.between(0, 16))}", 0.2, 0.55)
+    return patterned_material(f"texture/fabric?seed={int(rng.between(0, _FABRICS))}", 0.15, 0.95)
 
 
 def cloth(rng: VariantRng) -> Material:

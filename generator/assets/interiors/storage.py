@@ -35,7 +35,7 @@ from gen_data.generator.core.asset_types import Keypoint, Material
 
 _T = 0.018
 """Thickness of boards."""
-_WORKTOPS = ("marble", "wood_grain", "terrazzo", "concrete")
+_WORKTOPS = ("granite", "granite", "wood_grain", "wood_grain", "marble", "concrete")
 VARIANTS_PER_LOOK = 2
 """Kitchen units of consecutive seeds that look alike."""
 PITCH_M = 0.36
@@ -131,7 +131,7 @@ def _looks(family: str, rng: VariantRng, seed: int) -> list[Material]:
         facing = front(shared)
         worktop = patterned_material(
             f"texture/{shared.choose(_WORKTOPS)}?seed={int(shared.between(0, 16))}",
-            0.8,
+            0.5,
             0.3,
         )
         return [painted_material("#eeede9", 0.5), facing, steel, worktop]
