@@ -48,6 +48,7 @@ _FLOORS: Mapping[str, tuple[Range, Range]] = {
 _WALLS: Mapping[str, tuple[float, float]] = {
     "brick": (1.0, 1.0),
     "concrete": (2.0, 0.9),
+    "granite": (0.4, 0.3),
     "marble": (1.2, 0.25),
     "paint": (1.2, 0.85),
     "plaster": (1.5, 1.0),
@@ -97,8 +98,9 @@ class Furnish(RandomizerBase):
         rooms, pieces = self._draw_layout(kind, options, assets, rng)
         scene = remove_room(scene, self.room)
         builder = Builder(scene, assets, self.room, annotated=annotated)
+        looks = {room.name: self._draw_looks(room, assets, rng) for room in rooms}
         builder.add_shells(
-            rooms, {room.name: self._draw_looks(room, assets, rng) for room in rooms}
+            rooms, looks, {room.name: placed for room, placed in zip(rooms, pieces, strict=True)}
         )
         builder.add_outlook(draw_outlook(rooms, rng))
         parts = _moving_parts(assets)
@@ -176,7 +178,8 @@ class Furnish(RandomizerBase):
         )
         pale = room.kind in _WORKPLACES or rng.random() < _PALE_WALLS
         tint = _draw_pale(rng) if pale else _draw_muted(rng, 0.04, 0.12, (0.74, 0.9))
-        walls = self._draw_wall(choose(rules.walls, rng), tint, assets, rng)
+        wall = choose(rules.walls, rng)
+        walls = self._draw_wall(wall, tint, assets, rng)
         white = 0.78 + 0.1 * float(rng.random())
         door, blind = int(rng.random() * _DOOR_STYLES), int(rng.random() * 2.0)
         looks = Looks(
@@ -187,6 +190,9 @@ class Furnish(RandomizerBase):
             blind,
             _draw_blinds(room, rng),
         )
+        if rules.splashback and wall != "tiles":
+            behind = self._draw_wall(choose(rules.splashback, rng), tint, assets, rng)
+            looks = replace(looks, splashback=behind)
         if not rules.accent or rng.random() >= _ACCENTS:
             return looks
         strong = _draw_muted(rng, 0.12, 0.4, (0.3, 0.75))

@@ -76,6 +76,7 @@ class RoomType:
         windows: Smallest and largest number of windows.
         floor, walls: Families of textures; ``paint`` is tinted.
         accent: Those of a single wall that stands out; in a share of the rooms.
+        splashback: Those behind worktops.
         pieces: Rules in the order of placing.
     """
 
@@ -85,6 +86,7 @@ class RoomType:
     walls: tuple[str, ...]
     pieces: tuple[Rule, ...]
     accent: tuple[str, ...] = ()
+    splashback: tuple[str, ...] = ()
 
     @property
     def usual_area_m2(self) -> float:

@@ -28,13 +28,15 @@ LACQUERS = (
     *("#b9c2bd", "#66737a", "#939d8d"),
 )
 """Lacquers of furniture, sRGB: seven in ten are white or grey."""
+GRAIN_M = 0.5
+"""Length across the grain of a repeat of ``texture/wood_grain``."""
 _WOODS = 18
 _FABRICS = 16
 
 
 def board(low: Vec3, high: Vec3, slot: int = 0, radius_m: float = 0.002) -> Patch:
     """A board whose grain runs along its longest side."""
-    return shapes.map_along_grain(shapes.block(low, high, radius_m, slot), 0.5)
+    return shapes.map_along_grain(shapes.block(low, high, radius_m, slot), GRAIN_M)
 
 
 def cushion(low: Vec3, high: Vec3, slot: int = 0, radius_m: float = 0.05) -> Patch:
@@ -57,7 +59,7 @@ def rod(a: Vec3, b: Vec3, radius_m: float, slot: int = 0, sides: int = 10) -> Pa
 def disc(
     x: float, y: float, z0: float, z1: float, radius_m: float, slot: int = 0, sides: int = 24
 ) -> Patch:
-    """An upright cylinder with slightly rounded edges."""
+    """An upright cylinder with slightly rounded edges, its grain straight across."""
     r = min(0.004, 0.3 * (z1 - z0), 0.3 * radius_m)
     profile = [
         (0.0, z0),
@@ -67,7 +69,7 @@ def disc(
         (radius_m - r, z1),
         (0.0, z1),
     ]
-    return shapes.lathe(profile, sides, slot).moved(x, y)
+    return shapes.map_along_grain(shapes.lathe(profile, sides, slot).moved(x, y), GRAIN_M)
 
 
 def four_legs(

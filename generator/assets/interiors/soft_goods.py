@@ -32,7 +32,7 @@ from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Array
 
-_LINEN = ("#f3f1ec", "#e8ebee", "#efe6da", "#dfe6e3", "#e9dedd")
+_LINEN = ("#f3f1ec", "#f1f1ef", "#e8e9ea", "#e6e0d6", "#cfd3d5", "#dfe3e3", "#b9c3cb", "#a9aaa9")
 
 
 def fabric(rng: VariantRng, repeat_m: float = 0.15) -> Material:

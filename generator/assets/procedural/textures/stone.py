@@ -133,22 +133,23 @@ def screed(seed: int) -> TextureData:
     cells = worley((2, 2), rng, 0.9)
     bend = 0.02 * fbm((12, 12), 4, rng, 0.65)
     edge = np.abs(cells.second - cells.nearest + bend)
-    crack = smoothstep(0.009, 0.002, edge) * smoothstep(0.1, 0.4, fbm((3, 3), 2, rng))
+    crack = smoothstep(0.008, 0.002, edge) * smoothstep(-0.2, 0.3, fbm((2, 2), 2, rng))
+    crack *= rng.choose((0.0, 0.06, 0.1))
     shade = 1 + rng.between(0.03, 0.07) * clouds + rng.between(0.015, 0.035) * mottling
-    shade -= rng.between(0.0, 0.08) * stains + 0.2 * crack
+    shade -= rng.between(0.0, 0.08) * stains + crack
     rough = 0.92 + 0.08 * mottling - 0.12 * stains
-    return texture(base * shade[..., None], rough, 0.08 * mottling - 0.3 * crack)
+    return texture(base * shade[..., None], rough, 0.08 * mottling - crack)
 
 
 def plaster(seed: int) -> TextureData:
     """Painted wall plaster, floated smooth to sanded; 1.5 m per repeat."""
     rng = variant_rng("plaster", seed)
     base = draw_color(PALETTES["plasters"], 0.03, rng)
-    grain = fbm((64, 64), 3, rng, 0.8)
+    grain = fbm((128, 128), 2, rng, 0.8)
     strokes = fbm((6, 9), 5, rng, 0.6)
     rough = rng.between(0.1, 0.6)
     shade = 1 + 0.012 * strokes + 0.03 * rough * grain
-    return texture(base * shade[..., None], None, rough * 0.8 * grain + 0.35 * strokes)
+    return texture(base * shade[..., None], None, 0.4 * rough * grain + 0.35 * strokes)
 
 
 def paint(seed: int) -> TextureData:
@@ -158,8 +159,8 @@ def paint(seed: int) -> TextureData:
     """
     rng = variant_rng("paint", seed)
     stipple, wide = fbm((160, 160), 2, rng, 0.7), fbm((3, 3), 5, rng, 0.6)
-    shade = 0.965 + rng.between(0.004, 0.012) * wide + 0.004 * stipple
-    height = rng.between(0.03, 0.1) * stipple + rng.between(0.1, 0.3) * fbm((10, 10), 3, rng)
+    shade = 0.965 + rng.between(0.002, 0.007) * wide + 0.004 * stipple
+    height = rng.between(0.03, 0.1) * stipple + rng.between(0.05, 0.15) * fbm((10, 10), 3, rng)
     if seed % 8 == 7:
         chips = worley((110, 90), rng)
         raised = chips.of_each((uniform(chips.count, rng) < 0.35).astype(np.float64))
@@ -180,10 +181,10 @@ def brick(seed: int) -> TextureData:
     base = draw_color(PALETTES["bricks"], 0.08, rng)
     other = draw_color(PALETTES["bricks"], 0.08, rng)
     pick_other = (uniform(bricks, rng) < rng.between(0.0, 0.35)).astype(np.float64)
-    tone = 0.72 + 0.33 * uniform(bricks, rng)
+    tone = 0.8 + 0.17 * uniform(bricks, rng)
     tints = (base + (other - base) * pick_other[:, None]) * tone[:, None]
     grit = fbm((48, 48), 4, rng, 0.7)
-    shade = 1 + 0.13 * grit + 0.1 * fbm((5, 5), 3, rng)
+    shade = 1 + 0.1 * grit + 0.08 * fbm((5, 5), 3, rng)
     albedo = tints.astype(np.float32)[number] * shade[..., None]
     mortar = draw_color(("#b9b2a6", "#cfcabf", "#8d8a85", "#d9d3c5"), 0.06, rng)
     mortar_image = mortar * (1 + 0.08 * fbm((64, 64), 3, rng))[..., None]

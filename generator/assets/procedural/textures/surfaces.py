@@ -88,7 +88,7 @@ def leather(seed: int) -> TextureData:
 def cardboard(seed: int) -> TextureData:
     """Brown corrugated board; 0.5 m per repeat."""
     rng = variant_rng("cardboard", seed)
-    base = draw_color(("#b08a5e", "#a67f55", "#bd9a6d", "#c7a57b", "#9c774e"), 0.05, rng)
+    base = draw_color(("#b39470", "#a98a66", "#bc9f7b", "#c4a988", "#a2825f"), 0.04, rng)
     _, x = rows_and_columns()
     flutes = np.sin(2 * np.pi * rng.choose((64, 80)) * x) + 0 * x.T
     clouds, fine = fbm((4, 4), 4, rng), fbm((128, 128), 2, rng)
@@ -96,7 +96,7 @@ def cardboard(seed: int) -> TextureData:
     specks = smoothstep(0.62, 0.8, perlin((120, 120), rng))
     shade = 1 + 0.012 * flutes + 0.04 * clouds + 0.03 * fine + 0.05 * (fibres - 0.5)
     albedo = base * shade[..., None] * (1 - 0.18 * specks)[..., None]
-    return texture(albedo.astype(np.float32), None, (0.5 * flutes + 0.6 * fine).astype(np.float32))
+    return texture(albedo.astype(np.float32), None, (0.12 * flutes + 0.4 * fine).astype(np.float32))
 
 
 def _yarn_colors(yarns: int, rng: VariantRng) -> tuple[Float32, Float32]:
