@@ -177,7 +177,7 @@ class Furnish(RandomizerBase):
             texture_scale_m=between(rng, scales),
         )
         pale = room.kind in _WORKPLACES or rng.random() < _PALE_WALLS
-        tint = _draw_pale(rng) if pale else _draw_muted(rng, 0.04, 0.12, (0.74, 0.9))
+        tint = _draw_pale(rng) if pale else _draw_muted(rng, 0.03, 0.09, (0.76, 0.92))
         wall = choose(rules.walls, rng)
         walls = self._draw_wall(wall, tint, assets, rng)
         white = 0.78 + 0.1 * float(rng.random())
@@ -195,7 +195,7 @@ class Furnish(RandomizerBase):
             looks = replace(looks, splashback=behind)
         if not rules.accent or rng.random() >= _ACCENTS:
             return looks
-        strong = _draw_muted(rng, 0.12, 0.4, (0.3, 0.75))
+        strong = _draw_muted(rng, 0.1, 0.32, (0.32, 0.75))
         accent = self._draw_wall(choose(rules.accent, rng), strong, assets, rng)
         return replace(looks, accent=accent, accent_wall=int(rng.random() * 4.0))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from gen_data.generator.assets.procedural.material_presets import (
     patterned_material,
 )
 from gen_data.generator.assets.procedural.patches import Patch, make_solid_in_place
-from gen_data.generator.assets.procedural.variant_rng import VariantRng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
 
@@ -32,6 +33,8 @@ GRAIN_M = 0.5
 """Length across the grain of a repeat of ``texture/wood_grain``."""
 _WOODS = 18
 _FABRICS = 16
+_STEEL_SHEETS = (7, 13, 14)
+"""Seeds of ``texture/brushed_metal`` that are neutral and bright."""
 
 
 def board(low: Vec3, high: Vec3, slot: int = 0, radius_m: float = 0.002) -> Patch:
@@ -138,6 +141,12 @@ def upholstery(rng: VariantRng) -> Material:
 def cloth(rng: VariantRng) -> Material:
     """Plain cloth."""
     return Material(draw_linear(PALETTES["cloth"], 0.08, rng), 0.95)
+
+
+def brushed_steel(seed: int) -> Material:
+    """Sheet of stainless steel as on kitchen appliances, brushed along Y."""
+    texture = f"texture/brushed_metal?seed={in_turn(_STEEL_SHEETS, seed)}"
+    return replace(patterned_material(texture, 0.15, 0.42), metallic=1.0)
 
 
 def ceramic(roughness: float = 0.12) -> Material:

@@ -12,6 +12,7 @@ from gen_data.generator.assets.interiors.parts import (
     LACQUERS,
     Box,
     board,
+    brushed_steel,
     front,
     handle,
     lacquer,
@@ -121,9 +122,9 @@ def _measures(family: str, seed: int) -> tuple[VariantRng, float, float, float, 
 
 
 def _looks(family: str, rng: VariantRng, seed: int) -> list[Material]:
-    steel = metal_material(STAINLESS, 0.3)
+    steel = brushed_steel(seed)
     if family == "refrigerator":
-        shell = rng.choose((painted_material("#f2f2f0", 0.3), metal_material(STAINLESS, 0.35)))
+        shell = rng.choose((painted_material("#f2f2f0", 0.3), steel))
         return [shell, shell, steel]
     if family in ("kitchen_unit", "wall_unit"):
         # One kitchen has one look: variants of the same number match.

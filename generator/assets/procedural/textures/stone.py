@@ -32,6 +32,7 @@ def marble(seed: int) -> TextureData:
     """Polished marble; 0.8 m per repeat."""
     rng = variant_rng("marble", seed)
     ground, vein_color = colors_in_turn("marbles", seed)
+    strength = rng.between(0.3, 0.65)
     clouds = fbm((3, 3), 5, rng)
     veins = np.zeros_like(clouds)
     for cells, width, weight in (((2, 2), 0.06, 1.0), ((4, 3), 0.045, 0.6), ((8, 8), 0.03, 0.35)):
@@ -39,7 +40,7 @@ def marble(seed: int) -> TextureData:
         presence = smoothstep(-0.25, 0.5, fbm((2, 2), 2, rng))
         thickness = width * rng.between(0.6, 1.6)
         veins = np.maximum(veins, weight * presence / (1 + (ridge / thickness) ** 2))
-    albedo = mix_colors(ground, vein_color, 0.28 * smoothstep(-0.3, 0.9, clouds) + 0.75 * veins)
+    albedo = mix_colors(ground, vein_color, 0.25 * smoothstep(-0.3, 0.9, clouds) + strength * veins)
     return texture(albedo + 0.012 * fbm((64, 64), 2, rng)[..., None], 0.9 + 0.1 * veins)
 
 
@@ -116,7 +117,7 @@ def _formwork(rng: VariantRng) -> Float32:
     joint = smoothstep(1.2, 0.4, np.minimum(down, across)).astype(np.float32)
     if panels_down > 2:
         # Boards leave a faint seam only.
-        return 0.5 * joint
+        return 0.35 * joint
     apart_y = np.abs(y * 2 - np.floor(y * 2) - 0.5) * (SIZE_PX / 2)
     apart_x = np.abs(x * 2 - np.floor(x * 2) - 0.5) * (SIZE_PX / 2)
     rim = np.abs(np.sqrt(apart_x**2 + apart_y**2) - 3.0)
@@ -149,7 +150,7 @@ def plaster(seed: int) -> TextureData:
     strokes = fbm((6, 9), 5, rng, 0.6)
     rough = rng.between(0.1, 0.6)
     shade = 1 + 0.012 * strokes + 0.03 * rough * grain
-    return texture(base * shade[..., None], None, 0.4 * rough * grain + 0.35 * strokes)
+    return texture(base * shade[..., None], None, 0.25 * rough * grain + 0.15 * strokes)
 
 
 def paint(seed: int) -> TextureData:
