@@ -160,7 +160,7 @@ def paint(seed: int) -> TextureData:
     """
     rng = variant_rng("paint", seed)
     stipple, wide = fbm((160, 160), 2, rng, 0.7), fbm((3, 3), 5, rng, 0.6)
-    shade = 0.965 + rng.between(0.002, 0.007) * wide + 0.004 * stipple
+    shade = 0.96 + rng.between(0.006, 0.012) * wide + 0.009 * stipple
     height = rng.between(0.03, 0.1) * stipple + rng.between(0.05, 0.15) * fbm((10, 10), 3, rng)
     if seed % 8 == 7:
         chips = worley((110, 90), rng)
