@@ -32,7 +32,7 @@ from gen_data.randomizers.color_space import hsv_to_linear
 TRIES, TRIES_PER_ROOM = 12, 3
 """Floor plans tried before the scene is rejected, and layouts of each of their rooms."""
 _DOOR_STYLES = 4
-_PALE_WALLS, _ACCENTS = 0.85, 0.15
+_PALE_WALLS, _ACCENTS = 0.87, 0.15
 """Shares of rooms whose walls are near white, and of those where one wall stands out."""
 _WORKPLACES = frozenset({"office", "warehouse", "workshop"})
 """Rooms that are always pale."""
@@ -177,7 +177,7 @@ class Furnish(RandomizerBase):
             texture_scale_m=between(rng, scales),
         )
         pale = room.kind in _WORKPLACES or rng.random() < _PALE_WALLS
-        tint = _draw_pale(rng) if pale else _draw_muted(rng, 0.03, 0.09, (0.76, 0.92))
+        tint = _draw_pale(rng) if pale else _draw_muted(rng, 0.02, 0.07, (0.82, 0.94))
         wall = choose(rules.walls, rng)
         walls = self._draw_wall(wall, tint, assets, rng)
         white = 0.78 + 0.1 * float(rng.random())

@@ -126,8 +126,8 @@ def brushed_metal(seed: int) -> TextureData:
         strokes += weight * perlin(cells, rng)
     clouds = fbm((2, 3), 4, rng)
     base = draw_color(PALETTES["bare_metals"], 0.05, rng)
-    shade = 1 + rng.between(0.03, 0.07) * strokes + 0.02 * clouds
-    return texture(base * shade[..., None], 0.75 + 0.2 * strokes + 0.08 * clouds, 0.2 * strokes)
+    shade = 1 + rng.between(0.03, 0.06) * strokes + 0.01 * clouds
+    return texture(base * shade[..., None], 0.75 + 0.1 * strokes + 0.04 * clouds, 0.1 * strokes)
 
 
 def painted_metal(seed: int) -> TextureData:

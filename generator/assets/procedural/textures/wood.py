@@ -169,24 +169,26 @@ def _rings(laid: _Laid, texel_mm: float, rng: VariantRng) -> Float32:
     heart_mm = np.where(flat, 0.5 * draw[0], 1.5 + 3.0 * draw[0]) * half_mm * np.where(side, 1, -1)
     depth_mm = np.where(flat, 10.0 + 80.0 * draw[1], 40.0)
     ring_mm = 2.0 + 2.5 * draw[2]
-    taper = np.where(flat, np.floor(4.0 + 7.0 * draw[3]), 1.0)
+    # Trees taper: a face cuts three to eight rings per metre.
+    length_m = 0.001 * texel_mm * laid.length_px
+    peaks = np.where(flat, np.ceil((3.0 + 5.0 * draw[3]) * length_m), 1.0)
 
     def of_each(values: NDArray[np.float64]) -> Float32:
         image: Float32 = values.astype(np.float32)[laid.number]
         return image
 
-    x, width, peaks = laid.across_mm - of_each(heart_mm), of_each(ring_mm), of_each(taper)
+    x, width, cut = laid.across_mm - of_each(heart_mm), of_each(ring_mm), of_each(peaks)
     away = np.sqrt(x * x + of_each(depth_mm**2))
     wander = 1.2 * fbm((6, 3), 2, rng) + 0.12 * perlin((48, 6), rng)
-    phase = away / width + peaks * laid.along + wander
+    phase = away / width + cut * laid.along + wander
     ring = np.floor(phase)
     part = phase - ring
     # Late wood is a thin dark line that ends abruptly.
     late = part * part * (1 - smoothstep(0.85, 1.0, part))
     strength = (0.5 + uniform(64, rng)).astype(np.float32)
-    late *= strength[np.mod(ring, np.maximum(peaks, 1)).astype(np.int64)]
-    # Rings narrower than two texels show as their mean.
-    shown = smoothstep(1.5, 4.0, width * away / (np.maximum(np.abs(x), 1.0) * texel_mm))
+    late *= strength[np.mod(ring, cut).astype(np.int64)]
+    # Rings of few texels show as their mean.
+    shown = smoothstep(2.5, 6.0, width * away / (np.maximum(np.abs(x), 1.0) * texel_mm))
     rings: Float32 = _MEAN_RING + (late - _MEAN_RING) * shown
     return rings
 
