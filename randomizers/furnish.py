@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Annotated, Literal
 
@@ -15,7 +16,7 @@ from gen_data.generator.core.scene import Region, Scene
 from gen_data.generator.core.se3 import Vec3
 from gen_data.generator.core.streams import Rng
 from gen_data.generator.rooms.bodies import JOINTS, Builder, Looks, remove_room
-from gen_data.generator.rooms.floor_plan import Room, draw_plan
+from gen_data.generator.rooms.floor_plan import Room, between, draw_plan
 from gen_data.generator.rooms.layout import Conflict, Piece, furnish
 from gen_data.generator.rooms.options import families_of, find_options
 from gen_data.generator.rooms.outlook import draw_outlook, outlook_assets
@@ -31,7 +32,29 @@ from gen_data.randomizers.color_space import hsv_to_linear
 TRIES, TRIES_PER_ROOM = 12, 3
 """Floor plans tried before the scene is rejected, and layouts of each of their rooms."""
 _DOOR_STYLES = 4
-_PALE_WALLS = 0.75
+_PALE_WALLS, _ACCENTS = 0.87, 0.15
+"""Shares of rooms whose walls are near white, and of those where one wall stands out."""
+_WORKPLACES = frozenset({"office", "warehouse", "workshop"})
+"""Rooms that are always pale."""
+_FLOORS: Mapping[str, tuple[Range, Range]] = {
+    "carpet": ((0.45, 0.55), (1.0, 1.0)),
+    "floor_tiles": ((1.1, 1.3), (0.9, 1.0)),
+    "marble": ((0.8, 1.4), (0.15, 0.35)),
+    "screed": ((2.2, 3.0), (0.55, 0.9)),
+    "terrazzo": ((0.5, 0.7), (0.25, 0.5)),
+    "wood_planks": ((1.4, 1.8), (0.35, 0.65)),
+}
+"""Length of a repeat [m] and roughness of floors, by family."""
+_WALLS: Mapping[str, tuple[float, float]] = {
+    "brick": (1.0, 1.0),
+    "concrete": (2.0, 0.9),
+    "granite": (0.4, 0.3),
+    "marble": (1.2, 0.25),
+    "paint": (1.2, 0.85),
+    "plaster": (1.5, 1.0),
+    "tiles": (1.2, 1.0),
+}
+"""Length of a repeat [m] and roughness of walls, by family."""
 _BLINDS = 0.45
 """Share of rooms with blinds."""
 
@@ -75,8 +98,9 @@ class Furnish(RandomizerBase):
         rooms, pieces = self._draw_layout(kind, options, assets, rng)
         scene = remove_room(scene, self.room)
         builder = Builder(scene, assets, self.room, annotated=annotated)
+        looks = {room.name: self._draw_looks(room, assets, rng) for room in rooms}
         builder.add_shells(
-            rooms, {room.name: self._draw_looks(room, assets, rng) for room in rooms}
+            rooms, looks, {room.name: placed for room, placed in zip(rooms, pieces, strict=True)}
         )
         builder.add_outlook(draw_outlook(rooms, rng))
         parts = _moving_parts(assets)
@@ -144,40 +168,56 @@ class Furnish(RandomizerBase):
     def _draw_looks(self, room: Room, assets: AssetIndex, rng: Rng) -> Looks:
         rules = find_room_type(room.kind, "")
         field = f"randomizers.{self.name}"
-        floor = choose(find_textures(assets, (choose(rules.floor, rng),), field), rng)
+        ground = choose(rules.floor, rng)
+        scales, roughness = _FLOORS.get(ground, ((1.0, 1.6), (0.8, 1.0)))
+        floor = Material(
+            (1.0, 1.0, 1.0),
+            between(rng, roughness),
+            texture=choose(find_textures(assets, (ground,), field), rng),
+            texture_scale_m=between(rng, scales),
+        )
+        pale = room.kind in _WORKPLACES or rng.random() < _PALE_WALLS
+        tint = _draw_pale(rng) if pale else _draw_muted(rng, 0.02, 0.07, (0.82, 0.94))
         wall = choose(rules.walls, rng)
-        tint = _draw_paint(rng)
-        if wall == "paint":
-            walls = Material(tint, 0.9)
-        else:
-            scale = {"tiles": 0.8, "brick": 0.9}.get(wall, 1.4)
-            walls = Material(
-                (1.0, 1.0, 1.0),
-                1.0,
-                texture=choose(find_textures(assets, (wall,), field), rng),
-                texture_scale_m=scale,
-            )
-        scale = round(0.9 + 0.9 * float(rng.random()), 3)
-        ground = Material((1.0, 1.0, 1.0), 1.0, texture=floor, texture_scale_m=scale)
+        walls = self._draw_wall(wall, tint, assets, rng)
         white = 0.78 + 0.1 * float(rng.random())
         door, blind = int(rng.random() * _DOOR_STYLES), int(rng.random() * 2.0)
-        return Looks(
-            ground,
+        looks = Looks(
+            floor,
             walls,
             Material((white, white, white), 0.95),
             door,
             blind,
             _draw_blinds(room, rng),
         )
+        if rules.splashback and wall != "tiles":
+            behind = self._draw_wall(choose(rules.splashback, rng), tint, assets, rng)
+            looks = replace(looks, splashback=behind)
+        if not rules.accent or rng.random() >= _ACCENTS:
+            return looks
+        strong = _draw_muted(rng, 0.1, 0.32, (0.32, 0.75))
+        accent = self._draw_wall(choose(rules.accent, rng), strong, assets, rng)
+        return replace(looks, accent=accent, accent_wall=int(rng.random() * 4.0))
+
+    def _draw_wall(self, family: str, tint: Vec3, assets: AssetIndex, rng: Rng) -> Material:
+        """A wall covered by a drawn texture of a family; paint takes the tint."""
+        options = find_textures(assets, (family,), f"randomizers.{self.name}")
+        scale_m, roughness = _WALLS.get(family, (1.4, 1.0))
+        color = tint if family == "paint" else (1.0, 1.0, 1.0)
+        return Material(color, roughness, texture=choose(options, rng), texture_scale_m=scale_m)
 
 
-def _draw_paint(rng: Rng) -> Vec3:
-    """Colour of a wall: three in four are near white, warm or cool; the others are muted."""
-    strong, hue = float(rng.random()), float(rng.random())
-    amount, value = float(rng.random()), float(rng.random())
-    if strong < _PALE_WALLS:
-        return hsv_to_linear(0.07 + 0.08 * hue, 0.1 * amount, 0.84 + 0.11 * value)
-    return hsv_to_linear(hue, 0.08 + 0.2 * amount, 0.68 + 0.2 * value)
+def _draw_pale(rng: Rng) -> Vec3:
+    """White, off-white, greige or pale grey: the darker, the more tinted."""
+    hue, depth, cool = (float(rng.random()) for _ in range(3))
+    saturation = (0.01 + 0.07 * depth) * (0.4 if cool < 0.25 else 1.0)
+    hue = 0.55 + 0.08 * hue if cool < 0.25 else 0.08 + 0.07 * hue
+    return hsv_to_linear(hue, saturation, 0.96 - 0.15 * depth * depth)
+
+
+def _draw_muted(rng: Rng, low: float, high: float, values: Range) -> Vec3:
+    """Any hue with a saturation in the given range."""
+    return hsv_to_linear(float(rng.random()), between(rng, (low, high)), between(rng, values))
 
 
 def _draw_blinds(room: Room, rng: Rng) -> tuple[float, ...]:

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from gen_data.generator.assets.asset_ids import AssetId, ParameterValue
-from gen_data.generator.assets.interiors.shell import NO_OPENINGS
+from gen_data.generator.assets.interiors.shell import NO_OPENINGS, NO_SPLASHBACK
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.members import free_instance_ids
 from gen_data.generator.core.scene import Body, Instance, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
-from gen_data.generator.rooms.floor_plan import WALL_M, Opening, Room, walls_of
+from gen_data.generator.rooms.floor_plan import WALL_M, Opening, Room, direction, walls_of
 from gen_data.generator.rooms.layout import Piece
 from gen_data.generator.rooms.outlook import Outlook
 
@@ -22,6 +22,10 @@ OUTSIDE = "outside"
 LEADS_OUT = "leads_out"
 """Attribute of doors without a room behind them."""
 _VESSELS = frozenset({"bowl", "cup", "mug", "tumbler", "wine_glass"})
+_WITH_WORKTOPS = frozenset({"cooker", "kitchen_sink", "kitchen_unit"})
+_SPLASHBACK_M = (0.86, 1.45)
+"""Edges of splashbacks: from behind worktops to the usual height of wall units."""
+_BELOW_SILL_M = 0.03
 _BLIND_M = 0.03
 """Depth of blinds, which hang in the reveals of windows."""
 
@@ -56,6 +60,8 @@ class Looks:
     """Materials of a shell.
 
     Attributes:
+        accent: Material of the wall of number ``accent_wall``; None = that of the others.
+        splashback: Material behind worktops; None = that of the wall.
         blind_drops: Share of each opening that a blind covers; 0, or none given, = no blind.
     """
 
@@ -65,6 +71,13 @@ class Looks:
     door_style: int = 0
     blind_style: int = 0
     blind_drops: tuple[float, ...] = ()
+    accent: Material | None = None
+    accent_wall: int = 0
+    splashback: Material | None = None
+
+    def of_wall(self, wall: int) -> Material:
+        """Material of one of the walls."""
+        return self.accent if self.accent is not None and wall == self.accent_wall else self.walls
 
 
 def part_pose(T_world_piece: SE3, at_m: Vec3, joint: Joint, opening: float) -> SE3:
@@ -80,6 +93,34 @@ def part_pose(T_world_piece: SE3, at_m: Vec3, joint: Joint, opening: float) -> S
 def keypoint_m(assets: AssetIndex, asset: str, name: str) -> Vec3 | None:
     """A keypoint of an asset; None if it has none of that name."""
     return next((k.position_m for k in assets.keypoints(asset) if k.name == name), None)
+
+
+def find_splashback(room: Room, wall: int, pieces: Sequence[Piece]) -> tuple[float, ...]:
+    """The place of a wall's ``splashback``: behind its worktops, up to the lowest window there."""
+    c, s = direction(wall)
+    x, y = room.center_m
+    spans = []
+    for piece in pieces:
+        if piece.family in _WITH_WORKTOPS and round(piece.yaw_rad / (0.5 * math.pi)) % 4 == wall:
+            px, py, *_, half = piece.footprint
+            # The wall's own X axis runs to the right of what faces into the room.
+            right = (px - x) * s - (py - y) * c
+            spans.append((right - half, right + half))
+    if not spans:
+        return NO_SPLASHBACK
+    low, high = min(a for a, _ in spans), max(b for _, b in spans)
+    top = min(
+        (
+            o.low_m - _BELOW_SILL_M
+            for o in room.openings
+            if o.wall == wall
+            and low < -o.along_m + 0.5 * o.width_m
+            and -o.along_m - 0.5 * o.width_m < high
+        ),
+        default=_SPLASHBACK_M[1],
+    )
+    edges = (low, high, _SPLASHBACK_M[0], min(top, _SPLASHBACK_M[1]))
+    return tuple(round(edge, 4) for edge in edges)
 
 
 def remove_room(scene: Scene, name: str) -> Scene:
@@ -172,10 +213,21 @@ class Builder:
             )
         )
 
-    def add_shells(self, rooms: Sequence[Room], looks: Mapping[str, Looks]) -> None:
-        """Add floors, ceilings, walls, doors, windows and blinds."""
+    def add_shells(
+        self,
+        rooms: Sequence[Room],
+        looks: Mapping[str, Looks],
+        pieces: Mapping[str, Sequence[Piece]] | None = None,
+    ) -> None:
+        """Add floors, ceilings, walls, doors, windows and blinds.
+
+        Args:
+            rooms: The rooms.
+            looks: Materials by name of the room.
+            pieces: Furniture by name of the room; there are splashbacks behind worktops.
+        """
         for room in rooms:
-            self._add_shell(room, looks[room.name])
+            self._add_shell(room, looks[room.name], (pieces or {}).get(room.name, ()))
 
     def add_outlook(self, outlook: Outlook) -> None:
         """Add what windows show; it has no labels."""
@@ -186,7 +238,7 @@ class Builder:
         for k, (asset, pose) in enumerate(outlook.things):
             self._bodies.append(Body(f"{name}_{k}", asset, pose, collides=False))
 
-    def _add_shell(self, room: Room, looks: Looks) -> None:
+    def _add_shell(self, room: Room, looks: Looks, pieces: Sequence[Piece]) -> None:
         x, y, z = room.size_m
         at, kind = room.center_m, room.kind
         base = room.name
@@ -206,29 +258,38 @@ class Builder:
             materials=(looks.ceiling,),
         )
         for wall, openings in walls_of(room):
-            self._add_wall(room, wall, openings, looks)
+            self._add_wall(room, wall, openings, looks, find_splashback(room, wall, pieces))
         for k, opening in enumerate(room.openings):
             if opening.framed:
                 self._add_opening(room, k, opening, looks)
 
-    def _add_wall(self, room: Room, wall: int, openings: tuple[Opening, ...], looks: Looks) -> None:
+    def _add_wall(
+        self,
+        room: Room,
+        wall: int,
+        openings: tuple[Opening, ...],
+        looks: Looks,
+        splashback: tuple[float, ...],
+    ) -> None:
         # A wall's own X axis runs to the right of what faces into the room.
         holes = [v for o in openings for v in (-o.along_m, o.width_m, o.low_m, o.high_m)]
         length = round(room.wall_length_m(wall) + 2 * WALL_M * (wall % 2), 4)
         parameters: dict[str, ParameterValue] = {"size_m": (length, room.size_m[2], WALL_M)}
         if holes:
             parameters["openings"] = (*holes, *NO_OPENINGS[len(holes) :])
+        if looks.splashback is not None and splashback != NO_SPLASHBACK:
+            parameters["splashback"] = splashback
         pose = SE3.about_z(0.5 * math.pi * (wall - 1), (*room.at_wall(wall, 0.0, 0.0), 0.0))
         asset = _id("wall", **parameters)
-        skirting = self._assets.materials(asset)[1]
+        surface, skirting = looks.of_wall(wall), self._assets.materials(asset)[1]
         if room.kind in ("bathroom", "warehouse", "workshop"):
-            skirting = looks.walls
+            skirting = surface
         self.add(
             f"{room.name}/wall_{wall}",
             asset,
             pose,
             room.kind,
-            materials=(looks.walls, skirting),
+            materials=(surface, skirting, looks.splashback or surface),
         )
 
     def _add_opening(self, room: Room, k: int, opening: Opening, looks: Looks) -> None:

@@ -81,7 +81,9 @@ class RoomType:
     Attributes:
         size_m: Ranges of length, width and height [m].
         windows: Smallest and largest number of windows.
-        floor, walls: Families of textures; ``paint`` is a plain colour.
+        floor, walls: Families of textures; ``paint`` is tinted.
+        accent: Those of a single wall that stands out; in a share of the rooms.
+        splashback: Those behind worktops.
         pieces: Rules in the order of placing.
     """
 
@@ -90,6 +92,8 @@ class RoomType:
     floor: tuple[str, ...]
     walls: tuple[str, ...]
     pieces: tuple[Rule, ...]
+    accent: tuple[str, ...] = ()
+    splashback: tuple[str, ...] = ()
 
     @property
     def usual_area_m2(self) -> float:

@@ -27,9 +27,12 @@ RELIEF = (
     "citrus_peel",
     "concrete",
     "fabric",
+    "floor_tiles",
     "leather",
+    "paint",
     "painted_metal",
     "plaster",
+    "screed",
     "tiles",
     "wood_grain",
     "wood_planks",
@@ -101,6 +104,61 @@ def test_equal_seeds_make_equal_images_and_others_differ(name: str) -> None:
 
     assert images[0] == images[1]
     assert len(set(images)) == 3
+
+
+def median_wavelength_mm(slope: np.ndarray, repeat_m: float) -> float:
+    """Of variation down an image: half of the power spectrum belongs to longer waves."""
+    power = (np.abs(np.fft.rfft(slope - slope.mean(), axis=0)) ** 2).sum(axis=1)[1:]
+    middle = int(np.searchsorted(np.cumsum(power), 0.5 * power.sum()))
+    return 1000.0 * repeat_m / (middle + 1)
+
+
+@pytest.mark.parametrize(
+    ("name", "repeat_m", "most_mm"),
+    [("leather", 0.2, 3.0), ("fabric", 0.15, 1.5), ("carpet", 0.5, 7.5)],
+)
+def test_relief_is_as_fine_as_that_of_the_real_surface(
+    name: str, repeat_m: float, most_mm: float
+) -> None:
+    """Slopes change with pebbles and yarns of 1 to 2 mm, tufts of 3 to 5 mm."""
+    for seed in range(4):
+        normal = texture(name, seed).normal
+        assert normal is not None
+        assert median_wavelength_mm(normal[..., 1].astype(np.float64), repeat_m) < most_mm
+
+
+@pytest.mark.parametrize(
+    ("name", "repeat_m", "most_mm"), [("wood_grain", 0.5, 20.0), ("terrazzo", 0.6, 40.0)]
+)
+def test_figure_is_as_fine_as_that_of_the_real_surface(
+    name: str, repeat_m: float, most_mm: float
+) -> None:
+    """Rings are 2 to 5 mm apart, 5 to 25 mm in cathedrals; chips are 3 to 20 mm wide."""
+    greys = [texture(name, seed).albedo.astype(np.float64).mean(axis=2) for seed in range(16)]
+    found = [median_wavelength_mm(grey, repeat_m) for grey in greys]
+
+    assert np.median(found) < most_mm
+
+
+@pytest.mark.parametrize("name", ["concrete", "screed"])
+@pytest.mark.parametrize("seed", range(16))
+def test_concrete_is_grey_and_even(name: str, seed: int) -> None:
+    """Channels agree within 4 %; tones vary by a few percent, holes and joints are few."""
+    albedo = texture(name, seed).albedo.astype(np.float64)
+    grey = albedo.mean(axis=2)
+    channels = albedo.mean(axis=(0, 1))
+
+    assert np.ptp(channels) < 0.04 * channels.mean()
+    assert grey.std() < 0.06 * grey.mean()
+    assert (grey < 0.8 * grey.mean()).mean() < 0.02
+
+
+@pytest.mark.parametrize("name", ["tiles", "floor_tiles"])
+def test_two_in_three_tiles_are_white_grey_or_beige(name: str) -> None:
+    """Mean colours whose channels differ by less than 30 of 255."""
+    means = [texture(name, seed).albedo.mean(axis=(0, 1)) for seed in range(16)]
+
+    assert sum(np.ptp(mean) < 30.0 for mean in means) >= 11
 
 
 @pytest.mark.parametrize("name", sorted(PRINTED))

@@ -197,7 +197,7 @@ def rug(seed: int = 0) -> Solid:
     """A rug, rectangular or round. Slots: pile, border."""
     rng = variant_rng("rug", seed)
     pile = patterned_material(
-        f"texture/carpet?seed={int(rng.between(0, 16))}", rng.between(0.5, 1.2), 1.0
+        f"texture/carpet?seed={int(rng.between(0, 16))}", rng.between(0.4, 0.6), 1.0
     )
     edge = replace(pile, texture=f"texture/carpet?seed={int(rng.between(0, 16))}")
     t = 0.012

@@ -10,6 +10,7 @@ from gen_data.generator.assets.interiors.parts import (
     SUPPORT,
     Box,
     board,
+    brushed_steel,
     ceramic,
     disc,
     front,
@@ -223,7 +224,7 @@ def range_hood(seed: int = 0) -> Solid:
     d, h = rng.between(0.44, 0.5), rng.between(0.5, 0.7)
     low: Box = ((-0.5 * d, -0.3, 0.0), (0.5 * d, 0.3, 0.06))
     duct: Box = ((-0.5 * d, -0.14, 0.06), (-0.5 * d + 0.26, 0.14, h))
-    paint = metal_material(STAINLESS, 0.3) if rng.chance(0.7) else painted_material("#1f2022", 0.25)
+    paint = brushed_steel(seed) if rng.chance(0.7) else painted_material("#1f2022", 0.25)
     return solid([shapes.block(*low, 0.006), shapes.block(*duct, 0.004)], [paint], [low, duct])
 
 

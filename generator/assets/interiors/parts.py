@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from gen_data.generator.assets.procedural.material_presets import (
     patterned_material,
 )
 from gen_data.generator.assets.procedural.patches import Patch, make_solid_in_place
-from gen_data.generator.assets.procedural.variant_rng import VariantRng
+from gen_data.generator.assets.procedural.variant_rng import VariantRng, in_turn
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Vec3
 
@@ -27,8 +28,13 @@ INSIDE = "inside"
 """Keypoints at the lowest and the highest corner of the room above a board behind doors."""
 BACKREST = "backrest"
 """Keypoint in the middle of the upper edge of a back."""
-LACQUERS = ("#f1efea", "#e8e6e0", "#d9d6cf", "#3a3d40", "#b9c2bd", "#5c6b73", "#8d9a86")
-"""Lacquers of furniture, sRGB."""
+LACQUERS = (
+    *("#f1f0ec", "#f1f0ec", "#eceae5", "#e6e4de", "#d9d7d1", "#b7b6b2", "#8b8c8c", "#3b3d3f"),
+    *("#b9c2bd", "#66737a", "#939d8d"),
+)
+"""Lacquers of furniture, sRGB: seven in ten are white or grey."""
+GRAIN_M = 0.5
+"""Length across the grain of a repeat of ``texture/wood_grain``."""
 HOUSEHOLD = (
     "#f2f0ea", "#e6e2d8", "#d9d2c3", "#b8b5ad", "#2b2d30", "#5b6670", "#7d8a86", "#3f5d73", "#8a5a4a",
     "#c7b299", "#a3b1a6", "#6e7f5f", "#b98a3e", "#9c3d33",
@@ -48,11 +54,13 @@ TOOLS = (
 """Plastics and paints of tools and containers, sRGB."""
 _WOODS = 18
 _FABRICS = 16
+_STEEL_SHEETS = (7, 13, 14)
+"""Seeds of ``texture/brushed_metal`` that are neutral and bright."""
 
 
 def board(low: Vec3, high: Vec3, slot: int = 0, radius_m: float = 0.002) -> Patch:
     """A board whose grain runs along its longest side."""
-    return shapes.map_along_grain(shapes.block(low, high, radius_m, slot), 0.7)
+    return shapes.map_along_grain(shapes.block(low, high, radius_m, slot), GRAIN_M)
 
 
 def cushion(low: Vec3, high: Vec3, slot: int = 0, radius_m: float = 0.05) -> Patch:
@@ -75,7 +83,7 @@ def rod(a: Vec3, b: Vec3, radius_m: float, slot: int = 0, sides: int = 10) -> Pa
 def disc(
     x: float, y: float, z0: float, z1: float, radius_m: float, slot: int = 0, sides: int = 24
 ) -> Patch:
-    """An upright cylinder with slightly rounded edges."""
+    """An upright cylinder with slightly rounded edges, its grain straight across."""
     r = min(0.004, 0.3 * (z1 - z0), 0.3 * radius_m)
     profile = [
         (0.0, z0),
@@ -85,7 +93,7 @@ def disc(
         (radius_m - r, z1),
         (0.0, z1),
     ]
-    return shapes.lathe(profile, sides, slot).moved(x, y)
+    return shapes.map_along_grain(shapes.lathe(profile, sides, slot).moved(x, y), GRAIN_M)
 
 
 def four_legs(
@@ -147,13 +155,19 @@ def front(rng: VariantRng) -> Material:
 def upholstery(rng: VariantRng) -> Material:
     """Fabric or leather."""
     if rng.chance(0.25):
-        return patterned_material(f"texture/leather?seed={int(rng.between(0, 16))}", 0.45, 0.5)
-    return patterned_material(f"texture/fabric?seed={int(rng.between(0, _FABRICS))}", 0.3, 0.95)
+        return patterned_material(f"texture/leather?seed={int(rng.between(0, 16))}", 0.2, 0.55)
+    return patterned_material(f"texture/fabric?seed={int(rng.between(0, _FABRICS))}", 0.15, 0.95)
 
 
 def cloth(rng: VariantRng) -> Material:
     """Plain cloth."""
     return Material(draw_linear(PALETTES["cloth"], 0.08, rng), 0.95)
+
+
+def brushed_steel(seed: int) -> Material:
+    """Sheet of stainless steel as on kitchen appliances, brushed along Y."""
+    texture = f"texture/brushed_metal?seed={in_turn(_STEEL_SHEETS, seed)}"
+    return replace(patterned_material(texture, 0.15, 0.42), metallic=1.0)
 
 
 def ceramic(roughness: float = 0.12) -> Material:

@@ -25,9 +25,12 @@ from gen_data.generator.core.se3 import Vec3
 OPENINGS_MAX = 3
 """Openings of one wall."""
 NO_OPENINGS = (0.0,) * (4 * OPENINGS_MAX)
+NO_SPLASHBACK = (0.0, 0.0, 0.0, 0.0)
 SKIRTING_M = (0.07, 0.012)
 """Height and thickness of skirting boards."""
 _FRAME_M = 0.06
+_TILE_M = 0.008
+"""Thickness of tiles with their bed: less than the gap behind furniture."""
 
 
 def floor(size_m: tuple[float, float] = (4.0, 4.0)) -> Solid:
@@ -57,13 +60,18 @@ def ceiling(size_m: tuple[float, float] = (4.0, 4.0)) -> Solid:
     )
 
 
-def wall(size_m: Vec3 = (4.0, 2.6, 0.12), openings: tuple[float, ...] = NO_OPENINGS) -> Solid:
-    """A wall along X whose inner side, at y = 0, faces +Y. Slots: wall, skirting.
+def wall(
+    size_m: Vec3 = (4.0, 2.6, 0.12),
+    openings: tuple[float, ...] = NO_OPENINGS,
+    splashback: tuple[float, ...] = NO_SPLASHBACK,
+) -> Solid:
+    """A wall along X whose inner side, at y = 0, faces +Y. Slots: wall, skirting, splashback.
 
     Args:
         size_m: Length, height, thickness.
         openings: Per opening the place of its middle along X, its width, and its lower and upper
             edge; width 0 = none.
+        splashback: Ends along X and lower and upper edge of a covering; without extent = none.
 
     Raises:
         AssetError: if a size is not usable.
@@ -89,8 +97,12 @@ def wall(size_m: Vec3 = (4.0, 2.6, 0.12), openings: tuple[float, ...] = NO_OPENI
             boxes.append(((a, -thick, high), (b, 0.0, height)))
     boards = [_skirting(a[0], b[0]) for a, b in boxes if a[2] == 0.0]
     patches = [*(shapes.block(*box) for box in boxes), *boards]
+    x0, x1, z0, z1 = splashback
+    if x1 > x0 and z1 > z0:
+        patches.append(shapes.block((x0, 0.0, z0), (x1, _TILE_M, z1), 0.0, 2))
     paint = patterned_material("texture/plaster?seed=3", 1.5, 0.9)
-    return solid(patches, [paint, painted_material("#eceae4", 0.5)], boxes)
+    glaze = painted_material("#f1f0ec", 0.25)
+    return solid(patches, [paint, painted_material("#eceae4", 0.5), glaze], boxes)
 
 
 def _skirting(x0: float, x1: float) -> Patch:

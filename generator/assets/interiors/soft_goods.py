@@ -33,10 +33,10 @@ from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant
 from gen_data.generator.core.asset_types import Material
 from gen_data.generator.core.se3 import Array, Vec3
 
-_LINEN = ("#f3f1ec", "#e8ebee", "#efe6da", "#dfe6e3", "#e9dedd")
+_LINEN = ("#f3f1ec", "#f1f1ef", "#e8e9ea", "#e6e0d6", "#cfd3d5", "#dfe3e3", "#b9c3cb", "#a9aaa9")
 
 
-def fabric(rng: VariantRng, repeat_m: float = 0.45) -> Material:
+def fabric(rng: VariantRng, repeat_m: float = 0.15) -> Material:
     """Plain or patterned cloth."""
     if rng.chance(0.45):
         return cloth(rng)
@@ -262,7 +262,7 @@ def blanket(seed: int = 0) -> Solid:
     """A folded blanket. Slot: cloth."""
     rng = variant_rng("blanket", seed)
     x, y, layers = rng.between(0.16, 0.22), rng.between(0.2, 0.3), int(rng.between(2, 5))
-    return _folded(rng, [(x, y, rng.between(0.022, 0.035))] * layers, [fabric(rng, 0.3)])
+    return _folded(rng, [(x, y, rng.between(0.022, 0.035))] * layers, [fabric(rng)])
 
 
 def towel_stack(seed: int = 0) -> Solid:
@@ -280,7 +280,7 @@ def folded_clothes(seed: int = 0) -> Solid:
         (rng.between(0.13, 0.16), rng.between(0.12, 0.16), rng.between(0.025, 0.05))
         for _ in range(int(rng.between(1, 6)))
     ]
-    return _folded(rng, sizes, [fabric(rng, 0.3) for _ in range(3)])
+    return _folded(rng, sizes, [fabric(rng) for _ in range(3)])
 
 
 def _folded(
@@ -318,7 +318,7 @@ def clothes_pile(seed: int = 0) -> Solid:
         points = np.stack(np.broadcast_arrays(x, y, z), axis=2)
         patches.append(shapes.grid(points, slot=k).flipped().moved(dx, dy, 0.012 * k))
         reach, top = max(reach, 1.3 * r), max(top, float(z.max()) + 0.012 * k)
-    looks = [fabric(rng, 0.3) for _ in range(3)]
+    looks = [fabric(rng) for _ in range(3)]
     return solid(
         patches, looks, [((-0.5 * reach, -0.5 * reach, 0.0), (0.5 * reach, 0.5 * reach, top))]
     )
@@ -541,7 +541,7 @@ def towel(seed: int = 0) -> Solid:
         y = sy * (half - 0.01)
         patches.append(rod((0.0, y, rail_z), (rail_x + 0.004, y, rail_z), radius, 1))
     boxes: list[Box] = [((0.0, -half, 0.0), (0.1, half, h))]
-    return solid(patches, [fabric(rng, 0.3), metal_material(STAINLESS, 0.2)], boxes)
+    return solid(patches, [fabric(rng), metal_material(STAINLESS, 0.2)], boxes)
 
 
 def _over_rail(
@@ -604,7 +604,7 @@ def drying_rack(seed: int = 0) -> Solid:
         patches.append(rod((x, -0.5 * w, h), (x, 0.5 * w, h), 0.004, 0, 6))
         if k % 2 == 0 and rng.chance(0.85):
             patches.append(_hung(rng, x, w, h, 1 + k // 2 % 3))
-    looks = [painted_material("#e6e6e3", 0.4), *(fabric(rng, 0.3) for _ in range(3))]
+    looks = [painted_material("#e6e6e3", 0.4), *(fabric(rng) for _ in range(3))]
     return solid(patches, looks, [((-0.5 * d, -0.5 * w, 0.0), (0.5 * d, 0.5 * w, h))])
 
 

@@ -17,6 +17,7 @@ from gen_data.generator.assets.interiors.parts import (
     LACQUERS,
     Box,
     board,
+    brushed_steel,
     front,
     handle,
     lacquer,
@@ -42,7 +43,7 @@ from gen_data.generator.core.asset_types import Keypoint, Material
 
 _T = 0.018
 """Thickness of boards."""
-_WORKTOPS = ("marble", "wood_grain", "terrazzo", "concrete")
+_WORKTOPS = ("granite", "granite", "wood_grain", "wood_grain", "marble", "concrete")
 VARIANTS_PER_LOOK = 2
 """Kitchen units of consecutive seeds that look alike."""
 PITCH_M = 0.36
@@ -128,9 +129,9 @@ def _measures(family: str, seed: int) -> tuple[VariantRng, float, float, float, 
 
 
 def _looks(family: str, rng: VariantRng, seed: int) -> list[Material]:
-    steel = metal_material(STAINLESS, 0.3)
+    steel = brushed_steel(seed)
     if family == "refrigerator":
-        shell = rng.choose((painted_material("#f2f2f0", 0.3), metal_material(STAINLESS, 0.35)))
+        shell = rng.choose((painted_material("#f2f2f0", 0.3), steel))
         return [shell, shell, steel]
     if family in ("kitchen_unit", "wall_unit"):
         # One kitchen has one look: variants of the same number match.
@@ -138,7 +139,7 @@ def _looks(family: str, rng: VariantRng, seed: int) -> list[Material]:
         facing = front(shared)
         worktop = patterned_material(
             f"texture/{shared.choose(_WORKTOPS)}?seed={int(shared.between(0, 16))}",
-            0.8,
+            0.5,
             0.3,
         )
         return [painted_material("#eeede9", 0.5), facing, steel, worktop]

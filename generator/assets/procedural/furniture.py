@@ -61,7 +61,7 @@ def table(size_m: Vec3 = (1.2, 0.8, 0.74), style: str = "legs") -> Solid:
     top = (-x / 2, -y / 2, z - thick), (x / 2, y / 2, z)
     frame = {"legs": _four_legs, "trestle": _trestles, "bench": _bench}[style](x, y, z - thick)
     patches = [
-        shapes.map_along_grain(shapes.block(*top, 0.003), 0.9),
+        shapes.map_along_grain(shapes.block(*top, 0.003), 0.5),
         *(shapes.map_along_grain(shapes.block(low, high, 0.002, 1), 0.5) for low, high in frame),
     ]
     wood = patterned_material("texture/wood_grain?seed=1", 0.0, 0.45)
@@ -93,8 +93,8 @@ def shelf(size_m: Vec3 = (0.9, 0.32, 1.6), levels: int = 4, style: str = "bookca
             ((-x / 2 + t, y / 2 - 0.008, _PLINTH_M - t), (x / 2 - t, y / 2 - 0.002, z)),
         ]
     patches = [
-        *(shapes.map_along_grain(shapes.block(*b, 0.0015), 0.6) for b in boards),
-        *(shapes.map_along_grain(shapes.block(*f, 0.0015, 1), 0.6) for f in frame),
+        *(shapes.map_along_grain(shapes.block(*b, 0.0015), 0.5) for b in boards),
+        *(shapes.map_along_grain(shapes.block(*f, 0.0015, 1), 0.5) for f in frame),
     ]
     wood = patterned_material("texture/wood_grain?seed=8", 0.0, 0.45)
     posts = painted_material("#2f3338", 0.4) if style == "rack" else wood

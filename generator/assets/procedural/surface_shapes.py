@@ -275,9 +275,10 @@ def space_evenly(path: Array, count: int) -> Array:
 
 
 def map_along_grain(patch: Patch, repeat_m: float) -> Patch:
-    """The patch with a texture's horizontal along its longest side, one repeat per ``repeat_m``.
+    """The patch with a texture's horizontal along its longest side, stretched to twice its length.
 
-    Each piece starts at another place of the image, like boards cut from different logs.
+    It repeats every ``repeat_m`` across the grain. Each piece starts at another place of the image,
+    like boards cut from different logs.
     """
     low, high = patch.bounds_m()
     axes = np.argsort(-np.round(high - low, 6), kind="stable")
@@ -288,7 +289,7 @@ def map_along_grain(patch: Patch, repeat_m: float) -> Patch:
     place = corners - low + 1.618 * (low + high)
     rows = np.arange(len(corners))
     uv = np.stack([place[rows, :, u_axis], place[rows, :, v_axis]], axis=2) / repeat_m
-    return replace(patch, uvs=uv)
+    return replace(patch, uvs=uv * [0.5, 1.0])
 
 
 def _quads(points: Array) -> Array:
