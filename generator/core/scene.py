@@ -476,8 +476,9 @@ class Environment:
         luminance_cd_m2: Mean luminance over the sphere.
         yaw_rad: Rotation about world Z.
         visible: Whether it is visible as background; else the background is black.
-        volumes: Boxes in which other ambient light replaces it, such as rooms; the last that
-            contains a point counts. The path-traced tier finds that light itself.
+        volumes: Boxes in which other ambient light replaces it, such as rooms; where they overlap,
+            light passes evenly from one to the other, and small ones prevail. The path-traced tier
+            finds that light itself.
     """
 
     image: str = "environment/neutral?seed=0"

@@ -10,8 +10,8 @@ from gen_data.generator.core.scene import VOLUME_REACH_M, IrradianceVolume
 from gen_data.generator.core.se3 import Array, Vec3
 from gen_data.generator.rooms.interreflection import AXES, Hole, LitRoom
 
-_SILL_M = 0.05
-"""How far sills stand out of the wall."""
+_SILL_M = 0.06
+"""Reach into the room: sills stand out of the wall by 0.05 m."""
 _REVEAL_M = 0.005
 """Beyond the hole, so that its own sides count."""
 _ASIDE = 0.3

@@ -40,8 +40,8 @@ from gen_data.generator.renderers.warp.scene.kernels.alpha_test import OUT_OF_LI
 from gen_data.generator.renderers.warp.scene.kernels.ambient_light import (
     ambient_irradiance,
     ambient_reflection,
+    is_indoors,
     received_ambience,
-    volume_around,
 )
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import SUN, beam_from
 from gen_data.generator.renderers.warp.scene.kernels.brdf import (
@@ -296,7 +296,7 @@ def light_at_hit(
     surface = surface_index(world, m.hit)
     side = sheet_normal(world, surface, m.hit, m.weight)
     faint_lux = FAINT_SHARE * wp.pi * wp.max(ambient_irradiance(world, p, m.normal))
-    indoors = volume_around(world, p) >= 0
+    indoors = is_indoors(world, p)
     for j in range(world.lamps.shape[0]):
         # As in soft_shadows.weigh_lamps.
         if indoors and world.lamps[j].kind == SUN:

@@ -28,8 +28,8 @@ from gen_data.generator.renderers.warp.realtime.kernels.soft_shadows import (
 from gen_data.generator.renderers.warp.scene.kernels.ambient_light import (
     ambient_irradiance,
     ambient_reflection,
+    is_indoors,
     received_ambience,
-    volume_around,
 )
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     SUN,
@@ -488,7 +488,7 @@ def find_pixel_visibility(
         )
         # As by weigh_lamps: of faint lamps the lattice has no light either.
         total = wp.max(wp.max(ambient_irradiance(world, p, n)) * wp.pi, 1.0e-9)
-        indoors = volume_around(world, p) >= 0
+        indoors = is_indoors(world, p)
         for j in range(world.lamps.shape[0]):
             listed.lit[j, k] = lamp_weight(world.lamps[j], origin, n, side)
             if not indoors or world.lamps[j].kind != SUN:

@@ -24,7 +24,7 @@ from gen_data.generator.renderers.warp.realtime.kernels.lattice import (
 from gen_data.generator.renderers.warp.realtime.kernels.shadow_culling import FAINT_SHARE, TILE
 from gen_data.generator.renderers.warp.scene.kernels.ambient_light import (
     ambient_irradiance,
-    volume_around,
+    is_indoors,
 )
 from gen_data.generator.renderers.warp.scene.kernels.analytic_lights import (
     DISK,
@@ -211,7 +211,7 @@ def weigh_lamps(world: World, lattice: Lattice, shares: wp.array2d[float], matte
     side = sheet_side(world, lattice, i)
     p = lattice.p_m[i]
     total = wp.max(wp.max(ambient_irradiance(world, p, n)) * wp.pi, 1.0e-9)
-    indoors = volume_around(world, p) >= 0
+    indoors = is_indoors(world, p)
     for j in range(world.lamps.shape[0]):
         shares[j, i] = lamp_weight(world.lamps[j], lattice.origin_m[i], n, side)
         # A sun that is nearly always behind walls hides no lamp.

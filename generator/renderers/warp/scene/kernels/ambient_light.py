@@ -20,14 +20,23 @@ MARGIN_M = wp.constant(VOLUME_REACH_M)
 
 
 @wp.func
-def volume_around(world: World, p: wp.vec3):
-    """Number of the last volume that reaches a point; -1 = none."""
-    found = int(-1)
-    for i in range(world.volumes.shape[0]):
-        low = p - world.volumes[i].low_m
-        high = world.volumes[i].high_m - p
-        if wp.min(wp.min(low), wp.min(high)) > -MARGIN_M:
-            found = i
+def depth_in_volume(world: World, v: int, p: wp.vec3):
+    """How deep a point is in a volume: 1 in its middle, 0 or less where it does not reach."""
+    low = p - world.volumes[v].low_m
+    high = world.volumes[v].high_m - p
+    depth = float(1.0)
+    for k in range(3):
+        half = 0.5 * (low[k] + high[k]) + MARGIN_M
+        depth = wp.min(depth, (wp.min(low[k], high[k]) + MARGIN_M) / half)
+    return depth
+
+
+@wp.func
+def is_indoors(world: World, p: wp.vec3):
+    """Whether any volume reaches a point."""
+    found = bool(False)
+    for v in range(world.volumes.shape[0]):
+        found = found or depth_in_volume(world, v, p) > 0.0
     return found
 
 
@@ -68,13 +77,31 @@ def volume_light(world: World, v: int, p: wp.vec3, n: wp.vec3):
 
 
 @wp.func
+def light_of_volumes(world: World, p: wp.vec3, n: wp.vec3):
+    """Irradiance over pi by the volumes that reach a point, and the sum of their weights.
+
+    Weights are squares of depths: light passes evenly from one room to the other within a wall, and
+    small volumes such as niches prevail over the large ones that they are in.
+    """
+    total = wp.vec3(0.0)
+    weight = float(0.0)
+    for v in range(world.volumes.shape[0]):
+        depth = depth_in_volume(world, v, p)
+        if depth > 0.0:
+            total += volume_light(world, v, p, n) * (depth * depth)
+            weight += depth * depth
+    if weight > 0.0:
+        total = total / weight
+    return total, weight
+
+
+@wp.func
 def ambient_irradiance(world: World, p: wp.vec3, n: wp.vec3):
     """Irradiance over pi from the hemisphere around a normal [cd/m^2]."""
-    if world.volumes.shape[0] > 0:
-        v = volume_around(world, p)
-        if v >= 0:
-            return volume_light(world, v, p, n)
-    return sky_irradiance(world.sky, n)
+    light, weight = light_of_volumes(world, p, n)
+    if weight == 0.0:
+        light = sky_irradiance(world.sky, n)
+    return light
 
 
 @wp.func
@@ -93,19 +120,17 @@ def interreflected_share(open_share: float):
 @wp.func
 def received_ambience(world: World, p: wp.vec3, n: wp.vec3, open_share: float):
     """As ``ambient_irradiance``, where surfaces nearby leave a share of the hemisphere open."""
-    if world.volumes.shape[0] > 0:
-        v = volume_around(world, p)
-        if v >= 0:
-            return volume_light(world, v, p, n) * interreflected_share(open_share)
+    light, weight = light_of_volumes(world, p, n)
+    if weight > 0.0:
+        return light * interreflected_share(open_share)
     return sky_irradiance(world.sky, n) * open_share
 
 
 @wp.func
 def ambient_reflection(world: World, p: wp.vec3, d: wp.vec3, roughness: float):
     """Radiance averaged over the lobe of a roughness around a mirrored direction."""
-    if world.volumes.shape[0] > 0:
-        v = volume_around(world, p)
-        if v >= 0:
-            # Walls are near and even: what a hemisphere of them sends stands for any lobe.
-            return volume_light(world, v, p, d)
-    return sky_reflection(world.sky, d, roughness)
+    # Walls are near and even: what a hemisphere of them sends stands for any lobe.
+    light, weight = light_of_volumes(world, p, d)
+    if weight == 0.0:
+        light = sky_reflection(world.sky, d, roughness)
+    return light
