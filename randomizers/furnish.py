@@ -210,7 +210,7 @@ class Furnish(RandomizerBase):
 def _draw_pale(rng: Rng) -> Vec3:
     """White, off-white, greige or pale grey: the darker, the more tinted."""
     hue, depth, cool = (float(rng.random()) for _ in range(3))
-    saturation = (0.01 + 0.07 * depth) * (0.4 if cool < 0.25 else 1.0)
+    saturation = (0.01 + 0.07 * depth) * (0.25 if cool < 0.25 else 1.0)
     hue = 0.55 + 0.08 * hue if cool < 0.25 else 0.08 + 0.07 * hue
     return hsv_to_linear(hue, saturation, 0.96 - 0.15 * depth * depth)
 
