@@ -216,8 +216,10 @@ def _draw_pale(rng: Rng) -> Vec3:
 
 
 def _draw_muted(rng: Rng, low: float, high: float, values: Range) -> Vec3:
-    """Any hue with a saturation in the given range."""
-    return hsv_to_linear(float(rng.random()), between(rng, (low, high)), between(rng, values))
+    """Any hue from orange to blue with a saturation in the given range; purples are rare."""
+    return hsv_to_linear(
+        between(rng, (0.05, 0.68)), between(rng, (low, high)), between(rng, values)
+    )
 
 
 def _draw_blinds(room: Room, rng: Rng) -> tuple[float, ...]:

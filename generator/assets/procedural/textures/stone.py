@@ -239,7 +239,7 @@ def _tiled(
         albedo = mix_colors(albedo, other, rng.choose((0.0, 0.0, 0.9)) * odd)
     albedo = albedo * tone[..., None] + 0.006 * fbm((24, 24), 2, rng)[..., None]
     # Grout is paler than dark tiles and darker than white ones.
-    grout = mix_colors(np.array(albedo), color("#a9a59c"), np.full(edge.shape, 0.45))
+    grout = mix_colors(np.array(albedo), color("#a9a59c"), np.full(edge.shape, 0.6))
     grout *= np.float32(rng.choose((0.92, 0.92, 0.8)))
     # Tiles lie a little out of the plane, so that each reflects another place.
     tilt = ((uniform((2, count), rng) - 0.5) * 0.02).astype(np.float32)[:, number]

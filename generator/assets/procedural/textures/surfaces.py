@@ -101,7 +101,7 @@ def cardboard(seed: int) -> TextureData:
 
 def _yarn_colors(yarns: int, rng: VariantRng) -> tuple[Float32, Float32]:
     """Colour of each warp and each weft yarn, shape [yarns, 3]."""
-    first, second = (draw_color(PALETTES["cloth"], 0.06, rng) for _ in range(2))
+    first, second = (draw_color(PALETTES["cloth"], 0.03, rng) for _ in range(2))
     kind = rng.choose(("plain", "plain", "plain", "melange", "melange", "stripes", "check"))
     # Colours of one cloth go together.
     second = (0.65 * second + 0.35 * first).astype(np.float32)
