@@ -133,7 +133,7 @@ def test_relief_is_as_fine_as_that_of_the_real_surface(
 def test_figure_is_as_fine_as_that_of_the_real_surface(
     name: str, repeat_m: float, most_mm: float
 ) -> None:
-    """Rings are 2 to 5 mm apart, 5 to 25 mm in cathedrals; chips are 3 to 20 mm wide."""
+    """Rings are 2 to 5 mm apart, 5 to 25 mm in cathedrals; chips are 3 to 16 mm wide."""
     greys = [texture(name, seed).albedo.astype(np.float64).mean(axis=2) for seed in range(16)]
     found = [median_wavelength_mm(grey, repeat_m) for grey in greys]
 

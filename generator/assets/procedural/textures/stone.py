@@ -45,9 +45,9 @@ def marble(seed: int) -> TextureData:
 
 
 def terrazzo(seed: int) -> TextureData:
-    """Stone chips of 3 to 20 mm in cement, ground flat; 0.6 m per repeat.
+    """Stone chips of 3 to 16 mm in cement, ground flat; 0.6 m per repeat.
 
-    Sizes are those of chips No. 0 to 4 (NTMA, "Terrazzo specifications").
+    Sizes are those of chips No. 1 to 4 of the trade (NTMA; from memory).
     """
     rng = variant_rng("terrazzo", seed)
     ground = draw_color(PALETTES["cements"], 0.04, rng)
@@ -91,9 +91,9 @@ def granite(seed: int) -> TextureData:
 def concrete(seed: int) -> TextureData:
     """Cast concrete: clouds, few bug holes, joints of the formwork; 2 m per repeat.
 
-    Fair-faced concrete varies by a few percent and has bug holes of at most 15 mm, most of them
-    below 5 mm, on less than 1 % of its surface (CEB bulletin 24, "Tolerances on blemishes of
-    concrete"); a texel is 4 mm. Grey cement is nearly neutral.
+    Tones of fair-faced concrete vary by a few percent, pores of 2 to 15 mm cover 0.3 to 1.2 % of it
+    (DBV and VDZ, "Sichtbeton", classes P4 to P1; from memory), most of them below 6 mm; a texel is
+    4 mm. Grey cement is nearly neutral.
     """
     rng = variant_rng("concrete", seed)
     base = color(in_turn(PALETTES["concretes"], seed))
@@ -217,8 +217,8 @@ def _tiled(
 ) -> TextureData:
     """Tiles of one size and palette; ``gloss`` is the roughness of their faces.
 
-    Joints are 2 to 5 mm wide (DIN 18157-1), in the tone of the tiles or a little darker; a texel
-    is 2.3 mm.
+    Joints are 2 to 5 mm wide (DIN 18157-1 allows 1 to 8 mm; from memory), in the tone of the tiles
+    or a little darker; a texel is 2.3 mm.
     """
     courses, per_course = round(120 / tall_cm), round(120 / wide_cm)
     bond = rng.choose((0.0, 0.5)) if wide_cm == 2 * tall_cm and courses % 2 == 0 else 0.0

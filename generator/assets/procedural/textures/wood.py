@@ -2,8 +2,8 @@
 
 Growth rings are cones about the pith. A face of a board cuts them in hyperbolas: the cathedrals of
 flat-sawn boards, whose pith is under the face, and the straight lines of quarter-sawn ones, whose
-pith is beside it. Rings are 1 to 4 mm wide in timber of temperate climates (Hoadley,
-"Understanding wood", 2000).
+pith is beside it (Hoadley, "Understanding wood", 2000). Rings of timber from temperate climates
+are 1 to 5 mm wide.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def wood_grain(seed: int) -> TextureData:
 def wood_planks(seed: int) -> TextureData:
     """A floor of planks with staggered ends, or of blocks in herringbone; 1.6 m per repeat.
 
-    Parquet and planks are 70 to 200 mm wide and 0.4 to 2 m long (EN 13226, EN 13489).
+    Parquet and planks are 70 to 200 mm wide and 0.4 to 2 m long: usual sizes in shops.
     """
     rng = variant_rng("wood_planks", seed)
     light, dark = colors_in_turn("timber", seed)
