@@ -28,19 +28,19 @@ from gen_data.generator.rooms.rules import room_types
 from tests.rooms.test_layouts import KINDS, family, furnished, library
 
 HUNG = {
-    "bathroom_cabinet", "ceiling_lamp", "coat_hooks", "curtain", "light_switch", "mirror",
-    "notice_board", "parts_bins", "pegboard", "picture", "radiator", "range_hood", "roll_holder",
+    "bathroom_cabinet", "ceiling_lamp", "coat_hooks", "curtain", "draped_clothes", "light_switch",
+    "mirror", "notice_board", "parts_bins", "pegboard", "picture", "radiator", "range_hood", "roll_holder",
     "socket", "towel", "tube_lamp", "utensil_rail", "wall_calendar", "wall_clock", "wall_shelf",
-    "wall_unit", "whiteboard",
+    "timber", "wall_unit", "whiteboard",
 }  # fmt: skip
-"""On walls and ceilings."""
+"""On walls, ceilings and the backs of chairs, or leaning against walls."""
 FIXED = {
     "bathtub", "cooker", "kitchen_sink", "kitchen_unit", "shower", "toilet", "vise", "wash_basin",
 }  # fmt: skip
 """Screwed to walls, floors and benches."""
 HOLLOW = {
     "armchair", "bed", "bedside_table", "bookcase", "chair", "coffee_table", "desk", "dining_table",
-    "dresser", "filing_cabinet", "meeting_table", "pallet_rack", "refrigerator", "side_table",
+    "dresser", "filing_cabinet", "meeting_table", "office_chair", "pallet_rack", "refrigerator", "side_table",
     "sofa", "steel_rack", "tool_cabinet", "trolley", "tv_stand", "wardrobe", "washing_machine",
     "workbench",
 }  # fmt: skip

@@ -200,11 +200,11 @@ def hanging_clothes(seed: int = 0) -> Solid:
     """Clothes on hangers under a rail 1.2 m high, over folded ones. Slots: cloths, hangers."""
     rng = variant_rng("hanging_clothes", seed)
     patches: list[Patch] = []
-    wide = 0.36
+    wide = 0.3
     y = -0.5 * wide + 0.02
     while y < 0.5 * wide - 0.02:
         long, slot = rng.between(0.55, 0.98), int(rng.random() * 5)
-        garment = hang_garment(rng, long, slot, thin=True)
+        garment = hang_garment(rng, long, slot, thin=True).scaled(1.0, 0.8, 1.0)
         patches.append(
             garment.rotated("z", 0.5 * math.pi + rng.between(-0.12, 0.12)).moved(
                 0.0, y, RAIL_M - 0.09
