@@ -71,10 +71,10 @@ def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
     for k in range(places):
         a = y0 + arm + k * each
         low, high = (x0 + 0.17, a + 0.002, seat_z - 0.16), (x1 + 0.01, a + each - 0.002, seat_z)
-        sat_on = _sagged(padding(low, high, rng, 0, 12.0, 0.003), rng.between(0.0, 0.006))
+        sat_on = _sagged(padding(low, high, rng, 0, 18.0, 0.001), rng.between(0.0, 0.003))
         patches.append(sat_on)
         if piped:
-            patches += _piping(low, high, 12.0)
+            patches += _piping(low, high, 18.0)
         rest = padding(
             (-0.1, -0.5 * each + 0.006, -0.5 * (back_z + 0.08 - seat_z)),
             (0.1, 0.5 * each - 0.006, 0.5 * (back_z + 0.08 - seat_z)),

@@ -50,11 +50,10 @@ PITCH_M = 0.36
 
 
 def carcass(
-    depth_m: float, width_m: float, low_m: float, high_m: float, boards: int = 0, slot: int = 0
+    depth_m: float, width_m: float, low_m: float, high_m: float, boards: int = 0
 ) -> list[Box]:
     """Sides, back, bottom, top and inner boards of an open box of boards."""
     x0, x1, y0, y1, t = -0.5 * depth_m, 0.5 * depth_m, -0.5 * width_m, 0.5 * width_m, _T
-    del slot
     made: list[Box] = [
         ((x0, y0, low_m), (x1, y0 + t, high_m)),
         ((x0, y1 - t, low_m), (x1, y1, high_m)),
