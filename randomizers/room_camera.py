@@ -18,7 +18,7 @@ from gen_data.randomizers.base import RandomizerBase
 from gen_data.randomizers.free_space import Sight, is_clear, look_around
 
 TRIES = 96
-_WALL_M = 0.3
+_WALL_M = 0.4
 """Smallest distance of a camera from walls."""
 _HIDDEN_MAX, _HIDDEN_MIDDLE_MAX = 0.15, 0.02
 """Largest shares of the image, and of its middle, that near bodies may hide."""

@@ -75,6 +75,8 @@ _SQUARE = frozenset(
 _SQUARE_SHARE = 0.4
 """Share of things on tables that lie square to them."""
 _TRIES_ON = 6
+_LONG_LIST = 6
+"""Number of families from which on a rule means different things, not many of a kind."""
 _FULL = 0.97
 """Largest share of a board that things cover."""
 _TOP_M = 0.003
@@ -394,13 +396,22 @@ def furnish(
 
 
 def _draw_asset(layout: Layout, rule: Rule, options: Options) -> tuple[str, str]:
-    family = layout.pick(rule.assets)
+    family = layout.pick(_unused(layout, rule))
     found = options[family]
     if rule.matching:
         look = int(layout.look * (len(found) // VARIANTS_PER_LOOK))
         seeds = range(VARIANTS_PER_LOOK * look, VARIANTS_PER_LOOK * (look + 1))
         found = [f"{family}?seed={seed}" for seed in seeds]
     return family, layout.pick(found)
+
+
+def _unused(layout: Layout, rule: Rule) -> Sequence[str]:
+    """Families to draw from: of long lists, none more often than it is listed."""
+    if len(set(rule.assets)) < _LONG_LIST:
+        return rule.assets
+    used = Counter(p.family for p in layout.pieces if p.role == rule.piece)
+    left = [f for f in rule.assets if used[f] < rule.assets.count(f)]
+    return left or rule.assets
 
 
 def _at_wall(layout: Layout, rule: Rule, options: Options, wanted: int) -> int:

@@ -28,21 +28,21 @@ from gen_data.generator.rooms.rules import room_types
 from tests.rooms.test_layouts import KINDS, family, furnished, library
 
 HUNG = {
-    "bathroom_cabinet", "ceiling_lamp", "coat_hooks", "curtain", "light_switch", "mirror",
-    "notice_board", "parts_bins", "pegboard", "picture", "radiator", "range_hood", "roll_holder",
-    "socket", "towel", "tube_lamp", "utensil_rail", "wall_calendar", "wall_clock", "wall_shelf",
-    "wall_unit", "whiteboard",
+    "bathroom_cabinet", "ceiling_lamp", "coat_hooks", "curtain", "draped_clothes",
+    "hanging_clothes", "light_switch", "mirror", "notice_board", "parts_bins", "pegboard",
+    "picture", "radiator", "range_hood", "roll_holder", "socket", "timber", "towel", "tube_lamp",
+    "utensil_rail", "wall_calendar", "wall_clock", "wall_shelf", "wall_unit", "whiteboard",
 }  # fmt: skip
-"""On walls and ceilings."""
+"""On walls, ceilings, rails and the backs of chairs, or leaning against walls."""
 FIXED = {
     "bathtub", "cooker", "kitchen_sink", "kitchen_unit", "shower", "toilet", "vise", "wash_basin",
 }  # fmt: skip
 """Screwed to walls, floors and benches."""
 HOLLOW = {
     "armchair", "bed", "bedside_table", "bookcase", "chair", "coffee_table", "desk", "dining_table",
-    "dresser", "filing_cabinet", "meeting_table", "pallet_rack", "refrigerator", "side_table",
-    "sofa", "steel_rack", "tool_cabinet", "trolley", "tv_stand", "wardrobe", "washing_machine",
-    "workbench",
+    "dresser", "filing_cabinet", "meeting_table", "office_chair", "pallet_rack", "refrigerator",
+    "side_table", "sofa", "steel_rack", "tool_cabinet", "trolley", "tv_stand", "wardrobe",
+    "washing_machine", "workbench",
 }  # fmt: skip
 """What may carry or contain others, for which a convex hull has no room; simulated by itself."""
 SOFT = {"rug"}

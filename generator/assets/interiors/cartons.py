@@ -25,7 +25,8 @@ def tape_carton(
 
     Args:
         patches: Where to add it.
-        low, high: Its corners.
+        low: Its lower corner.
+        high: Its upper corner.
         rng: Draws.
         slots: Of card, tape, label and print.
     """
@@ -54,13 +55,12 @@ def tape_carton(
             w, h = min(0.16, 0.45 * long), min(0.105, 0.4 * high_m)
             a = a0 + rng.between(0.08, 0.45) * long
             z = z0 + rng.between(0.2, 0.5) * high_m
-            patches.append(_sticker(axis, sign, face, (a, a + w), (z, z + h), label))
+            patches.append(_sticker(axis, face, (a, a + w), (z, z + h), label))
             for k in range(6):
                 b = a + 0.1 * w + 0.13 * w * k
                 patches.append(
                     _sticker(
                         axis,
-                        sign,
                         face + 2e-4 * sign,
                         (b, b + (0.02 + 0.02 * (k % 3)) * w),
                         (z + 0.12 * h, z + 0.5 * h),
@@ -70,7 +70,6 @@ def tape_carton(
             patches.append(
                 _sticker(
                     axis,
-                    sign,
                     face + 2e-4 * sign,
                     (a + 0.1 * w, a + 0.7 * w),
                     (z + 0.68 * h, z + 0.76 * h),
@@ -82,17 +81,14 @@ def tape_carton(
             a, z, s = a0 + 0.8 * long, z0 + 0.55 * high_m, min(0.05, 0.2 * high_m)
             for k in range(2):
                 b = a + 0.06 * long * k
-                patches.append(_sticker(axis, sign, face, (b, b + 0.2 * s), (z, z + s), ink))
+                patches.append(_sticker(axis, face, (b, b + 0.2 * s), (z, z + s), ink))
                 patches.append(
-                    _sticker(
-                        axis, sign, face, (b - 0.15 * s, b + 0.35 * s), (z + s, z + 1.15 * s), ink
-                    )
+                    _sticker(axis, face, (b - 0.15 * s, b + 0.35 * s), (z + s, z + 1.15 * s), ink)
                 )
 
 
 def _sticker(
     axis: int,
-    sign: int,
     face: float,
     across: tuple[float, float],
     up: tuple[float, float],
@@ -104,7 +100,6 @@ def _sticker(
         low, high = (face - t, across[0], up[0]), (face + t, across[1], up[1])
     else:
         low, high = (across[0], face - t, up[0]), (across[1], face + t, up[1])
-    del sign
     return shapes.block(low, high, 0.0, slot)
 
 

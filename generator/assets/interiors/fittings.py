@@ -604,16 +604,17 @@ def _standing_book(
             (x0 + 0.004, y + 0.002, 0.004), (x1 - 0.003, y + thick - 0.002, h - 0.004), 0.0, 9
         ),
     ]
-    # A title, an author and a publisher's mark on the spine.
-    wide = 0.34 * thick
-    for low, high in ((0.5, rng.between(0.62, 0.85)), (0.24, 0.4), (0.06, 0.085)):
-        if rng.chance(0.6):
-            side = 0.5 * (thick - wide)
-            print_ = rectangle(
-                (x1 + 0.0003, y + side, low * h), (0.0, wide, 0.0), (0.0, 0.0, (high - low) * h)
-            )
-            made.append(print_.painted(10))
-            wide *= 0.7
+    # A title and an author on the spine: lines of small letters.
+    for low, high in ((0.48, rng.between(0.62, 0.85)), (0.2, 0.38)):
+        for line in range(1 if rng.chance(0.6) else 2):
+            if rng.chance(0.7):
+                side, wide = thick * (0.42 + 0.16 * line), 0.09 * thick
+                print_ = rectangle(
+                    (x1 + 0.0003, y + side, low * h),
+                    (0.0, wide, 0.0),
+                    (0.0, 0.0, (high - low) * h),
+                )
+                made.append(print_.painted(10))
     return made
 
 

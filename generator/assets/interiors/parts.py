@@ -36,8 +36,8 @@ LACQUERS = (
 GRAIN_M = 0.5
 """Length across the grain of a repeat of ``texture/wood_grain``."""
 HOUSEHOLD = (
-    "#f2f0ea", "#e6e2d8", "#d9d2c3", "#b8b5ad", "#2b2d30", "#5b6670", "#7d8a86", "#3f5d73", "#8a5a4a",
-    "#c7b299", "#a3b1a6", "#6e7f5f", "#b98a3e", "#9c3d33",
+    "#f2f0ea", "#e6e2d8", "#d9d2c3", "#b8b5ad", "#2b2d30", "#5b6670", "#7d8a86", "#3f5d73",
+    "#8a5a4a", "#c7b299", "#a3b1a6", "#6e7f5f", "#b98a3e", "#9c3d33",
 )  # fmt: skip
 """Plastics in homes and offices, sRGB: most are pale, grey or dull."""
 TOOLS = (

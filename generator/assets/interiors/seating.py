@@ -71,10 +71,10 @@ def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
     for k in range(places):
         a = y0 + arm + k * each
         low, high = (x0 + 0.17, a + 0.002, seat_z - 0.16), (x1 + 0.01, a + each - 0.002, seat_z)
-        sat_on = _sagged(padding(low, high, rng, 0, 7.0, 0.006), rng.between(0.0, 0.022))
+        sat_on = _sagged(padding(low, high, rng, 0, 18.0, 0.001), rng.between(0.0, 0.003))
         patches.append(sat_on)
         if piped:
-            patches += _piping(low, high, 7.0)
+            patches += _piping(low, high, 18.0)
         rest = padding(
             (-0.1, -0.5 * each + 0.006, -0.5 * (back_z + 0.08 - seat_z)),
             (0.1, 0.5 * each - 0.006, 0.5 * (back_z + 0.08 - seat_z)),
@@ -94,9 +94,9 @@ def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
         made = pillow(size, size * rng.between(0.75, 1.0), 0.15, rng, 2).rotated(
             "z", rng.between(-0.3, 0.3)
         )
-        standing = made.moved(0.0, 0.0, -0.05).rotated("y", rng.between(0.95, 1.25))
+        standing = made.moved(0.0, 0.0, -0.05).rotated("y", rng.between(1.25, 1.42))
         turned = standing.rotated("z", rng.between(-0.35, 0.35))
-        patches.append(turned.moved(x0 + 0.4, y, seat_z + 0.72 * size))
+        patches.append(turned.moved(x0 + 0.37, y, seat_z + 0.9 * size))
     if rng.chance(0.35):
         side = rng.choose((-1, 1))
         at = rng.between(-0.3, 0.05) * depth
@@ -113,7 +113,7 @@ def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
     looks = [upholstery(rng), wood(rng), fabric(rng, 0.3), fabric(rng, 0.4)]
     made = solid(patches, looks, [base, back, *arms, seat])
     # Before the pillows, and clear of the round edges of the cushions.
-    corners = (x0 + 0.52, y0 + arm + soft, seat_z), (x1 - soft, y1 - arm - soft, seat_z)
+    corners = (x0 + 0.54, y0 + arm + soft, seat_z), (x1 - soft, y1 - arm - soft, seat_z)
     return replace(made, keypoints=tuple(Keypoint(SUPPORT, corner) for corner in corners))
 
 

@@ -56,6 +56,10 @@ def folds(x: Array, y: Array, rng: VariantRng, wave_m: float, height_m: float) -
     return total * (height_m / 1.5)
 
 
+_HEM_M = 0.02
+"""Thickness of covers and throws at their hem."""
+
+
 def rumple(x: Array, y: Array, rng: VariantRng, wave_m: float) -> Array:
     """Height, about 0 with a standard deviation near 1, of soft cloth that lies loosely.
 
@@ -85,7 +89,8 @@ def padding(
     """An upholstered block whose faces bulge: a superellipsoid with creases.
 
     Args:
-        low, high: Its corners.
+        low: Its lower corner.
+        high: Its upper corner.
         rng: Draws.
         slot: Material.
         power: Exponent: 2 is an ellipsoid, large ones are boxes.
@@ -148,7 +153,6 @@ def drape(
     rng: VariantRng,
     slot: int,
     crease_m: float = 0.016,
-    thick_m: float = 0.02,
 ) -> Patch:
     """A cover over a mattress, from the head's end on: it hangs over both sides and the foot.
 
@@ -160,7 +164,6 @@ def drape(
         rng: Draws.
         slot: Material.
         crease_m: Size of its folds.
-        thick_m: Thickness of its hem.
     """
     x0, x1 = ends_x
     rows, columns = max(14, round((x1 - x0) / 0.027)), 84
@@ -190,7 +193,7 @@ def drape(
     )
     # The under side, nearer to the mattress; both meet at a round hem.
     inward = np.stack(
-        np.broadcast_arrays(0.0 * s, -np.sign(t) * hung * thick_m, (hung - 1.0) * thick_m), axis=2
+        np.broadcast_arrays(0.0 * s, -np.sign(t) * hung * _HEM_M, (hung - 1.0) * _HEM_M), axis=2
     )
     under = points + inward
     rim = [
@@ -500,8 +503,8 @@ def _jacket(rng: VariantRng) -> list[Patch]:
     points[0, :, 0] *= 0.2
     outer = shapes.grid(points).flipped()
     patches = [outer, shapes.grid(points * np.array([0.93, 0.985, 1.0]))]
-    collar = [(0.03, -0.06, 0.012), (-0.004, -0.07, 0.036), (-0.026, -0.035, 0.05), (-0.03, 0.0, 0.053),
-              (-0.026, 0.035, 0.05), (-0.004, 0.07, 0.036), (0.03, 0.06, 0.012)]  # fmt: skip
+    side = [(0.03, -0.06, 0.012), (-0.004, -0.07, 0.036), (-0.026, -0.035, 0.05)]
+    collar = [*side, (-0.03, 0.0, 0.053), *((a, -b, c) for a, b, c in side[::-1])]
     line = shapes.spline(collar, 25)
     width = np.sin(np.linspace(0.12, math.pi - 0.12, 25)) ** 0.5
     flat = np.stack([0.009 + 0.0 * width, 0.032 * width], axis=1)

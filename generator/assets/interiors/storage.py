@@ -51,11 +51,10 @@ PITCH_M = 0.36
 
 
 def carcass(
-    depth_m: float, width_m: float, low_m: float, high_m: float, boards: int = 0, slot: int = 0
+    depth_m: float, width_m: float, low_m: float, high_m: float, boards: int = 0
 ) -> list[Box]:
     """Sides, back, bottom, top and inner boards of an open box of boards."""
     x0, x1, y0, y1, t = -0.5 * depth_m, 0.5 * depth_m, -0.5 * width_m, 0.5 * width_m, _T
-    del slot
     made: list[Box] = [
         ((x0, y0, low_m), (x1, y0 + t, high_m)),
         ((x0, y1 - t, low_m), (x1, y1, high_m)),
@@ -542,14 +541,23 @@ _FILM = Material((0.93, 0.95, 0.96), 0.16, transmission=0.82, thin=True)
 
 def _film(high_m: float, rng: VariantRng) -> list[Patch]:
     """Film around goods of a height, with folds, in slot 5."""
-    turn = np.linspace(0.0, 2.0 * math.pi, 97)[None, :]
+    a, b, r = 0.594, 0.394, 0.012
+    bend = np.linspace(0.0, 0.5 * math.pi, 4)
+    corners = [
+        (sx * (a - r) + r * np.cos(bend + start), sy * (b - r) + r * np.sin(bend + start))
+        for sx, sy, start in (
+            (1, 1, 0.0), (-1, 1, 0.5 * math.pi), (-1, -1, math.pi), (1, -1, 1.5 * math.pi),
+        )
+    ]  # fmt: skip
+    outline = np.concatenate([np.stack(corner, axis=1) for corner in corners])
+    ring = shapes.space_evenly(np.concatenate([outline, outline[:1]]), 145)
+    x, y = ring[None, :, 0], ring[None, :, 1]
     z = np.linspace(-0.03, high_m - 0.01, 15)[:, None]
-    c, s = np.cos(turn), np.sin(turn)
-    flat_x, flat_y = np.sign(c) * np.abs(c) ** 0.16, np.sign(s) * np.abs(s) ** 0.16
-    fold = 0.004 * np.sin(9.0 * turn + 21.0 * z) + 0.004 * np.sin(
-        4.0 * turn - 34.0 * z + rng.between(0.0, 6.3)
-    )
-    x, y = flat_x * (0.597 + fold), flat_y * (0.397 + fold)
+    turn = np.linspace(0.0, 2.0 * math.pi, 145)[None, :]
+    # Folds run aslant and only outwards: film lies on what it wraps.
+    wave = np.sin(9.0 * turn + 21.0 * z) + np.sin(4.0 * turn - 34.0 * z + rng.between(0.0, 6.3))
+    fold = 1.0 + 0.006 * np.maximum(wave, 0.0)
+    x, y = x * fold, y * fold
     points = np.stack(np.broadcast_arrays(x, y, z), axis=2)
     points[:, -1] = points[:, 0]
     return [shapes.grid(points, slot=5).flipped()]

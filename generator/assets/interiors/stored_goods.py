@@ -1,4 +1,4 @@
-"""What stands behind doors, on racks and at the walls of workshops. Sizes are assumed: usual ones."""
+"""What stands behind doors, on racks and in workshops. Sizes are assumed: usual ones."""
 
 from __future__ import annotations
 
@@ -72,8 +72,8 @@ def _plates(rng: VariantRng, radius_m: float, count: int, slot: int) -> list[Pat
 def _bowls(radius_m: float, count: int, slot: int) -> list[Patch]:
     """Bowls in one another."""
     r, made = radius_m, []
-    profile = [(0.0, 0.0), (0.5 * r, 0.0), (0.85 * r, 0.3 * r), (r, 0.62 * r),
-               (0.96 * r, 0.62 * r), (0.8 * r, 0.32 * r), (0.45 * r, 0.03), (0.0, 0.03)]  # fmt: skip
+    outer = [(0.0, 0.0), (0.5 * r, 0.0), (0.85 * r, 0.3 * r), (r, 0.62 * r)]
+    profile = [*outer, (0.96 * r, 0.62 * r), (0.8 * r, 0.32 * r), (0.45 * r, 0.03), (0.0, 0.03)]
     for k in range(count):
         made.append(shapes.lathe(profile, 28, slot).moved(0.0, 0.0, 0.02 * k))
     return made
@@ -200,11 +200,11 @@ def hanging_clothes(seed: int = 0) -> Solid:
     """Clothes on hangers under a rail 1.2 m high, over folded ones. Slots: cloths, hangers."""
     rng = variant_rng("hanging_clothes", seed)
     patches: list[Patch] = []
-    wide = 0.36
+    wide = 0.3
     y = -0.5 * wide + 0.02
     while y < 0.5 * wide - 0.02:
         long, slot = rng.between(0.55, 0.98), int(rng.random() * 5)
-        garment = hang_garment(rng, long, slot, thin=True)
+        garment = hang_garment(rng, long, slot, thin=True).scaled(1.0, 0.8, 1.0)
         patches.append(
             garment.rotated("z", 0.5 * math.pi + rng.between(-0.12, 0.12)).moved(
                 0.0, y, RAIL_M - 0.09
