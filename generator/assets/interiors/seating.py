@@ -91,10 +91,10 @@ def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
     for _ in range(int(rng.between(0, places + 1.6))):
         y = rng.between(y0 + arm + 0.2, y1 - arm - 0.2) if places > 1 else 0.0
         size = rng.between(0.19, 0.25)
-        made = pillow(size, size * rng.between(0.75, 1.0), 0.15, rng, 2).rotated(
+        loose_one = pillow(size, size * rng.between(0.75, 1.0), 0.15, rng, 2).rotated(
             "z", rng.between(-0.3, 0.3)
         )
-        standing = made.moved(0.0, 0.0, -0.05).rotated("y", rng.between(1.25, 1.42))
+        standing = loose_one.moved(0.0, 0.0, -0.05).rotated("y", rng.between(1.25, 1.42))
         turned = standing.rotated("z", rng.between(-0.35, 0.35))
         patches.append(turned.moved(x0 + 0.37, y, seat_z + 0.9 * size))
     if rng.chance(0.35):
@@ -174,9 +174,9 @@ def chair(seed: int = 0) -> Solid:
             (-0.02, -0.5 * w, -0.5 * (back_z - z) + 0.1),
             (0.02, 0.5 * w, 0.5 * (back_z - z)),
         )
-        made = padding(*rest, rng, 0, 6.0, 0.003) if soft else cushion(*rest, 0, 0.02)
+        panel = padding(*rest, rng, 0, 6.0, 0.003) if soft else cushion(*rest, 0, 0.02)
         patches.append(
-            _bent(made, 0.5, 0.012)
+            _bent(panel, 0.5, 0.012)
             .rotated("y", -0.14)
             .moved(x - 0.045, 0.0, 0.5 * (z + back_z) + 0.02)
         )

@@ -184,11 +184,11 @@ def _cupboard(family: str, seed: int) -> Solid:
         patches.append(rod((0.0, -0.5 * w + 0.02, rail), (0.0, 0.5 * w - 0.02, rail), 0.012, 2))
     made = solid(patches, _looks(family, rng, seed), outer)
     # Behind the door: the left half of what has two.
-    right = (0.0 if doors == 2 and family == "wardrobe" else half) - _T
+    end = (0.0 if doors == 2 and family == "wardrobe" else half) - _T
     inside = []
     for z, above in zip(levels, (*levels[1:], high), strict=True):
         inside.append(Keypoint(INSIDE, (-x + 0.02, -half + _T + 0.004, z)))
-        inside.append(Keypoint(INSIDE, (x - 0.035, right - 0.004, above - _T - 0.004)))
+        inside.append(Keypoint(INSIDE, (x - 0.035, end - 0.004, above - _T - 0.004)))
     hinge = Keypoint("hinge", (x, -0.5 * w, low), 0.05)
     return replace(made, keypoints=(hinge, *inside))
 

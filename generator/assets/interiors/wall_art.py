@@ -162,7 +162,8 @@ def _brushed(w: int, h: int, rng: VariantRng) -> UInt8:
         bristle = 0.02 * _noise(w, h, (6, 60), 3, rng) * (1.0 + 2.0 * np.abs(along))
         half = rng.between(0.02, 0.11)
         inside = np.minimum(half - np.abs(across), rng.between(0.15, 0.5) - np.abs(along))
-        _over(image, shades[1 + k % 4], smoothstep(0.0, 0.012, inside + bristle))
+        cover = smoothstep(0.0, 0.012, np.asarray(inside + bristle, np.float32))
+        _over(image, shades[1 + k % 4], cover)
     return _canvas_weave(image, rng, 0.08)
 
 
@@ -401,14 +402,14 @@ def _line_drawing(w: int, h: int, rng: VariantRng) -> UInt8:
         draw.ellipse([x - r, y - r, x + r, y + r], fill=art.blend(shades[k], (240, 235, 225), 0.35))
     t = np.linspace(0.0, 2.0 * math.pi, 400)
     for _ in range(1 + int(rng.random() * 2)):
-        x, y = np.zeros_like(t), np.zeros_like(t)
+        across, up = np.zeros_like(t), np.zeros_like(t)
         for wave in range(1, 5):
-            x += rng.between(-1.0, 1.0) / wave * np.cos(wave * t + rng.between(0.0, 6.3))
-            y += rng.between(-1.0, 1.0) / wave * np.sin(wave * t + rng.between(0.0, 6.3))
-        reach = max(float(np.abs(x).max()), float(np.abs(y).max()), 0.1)
+            across += rng.between(-1.0, 1.0) / wave * np.cos(wave * t + rng.between(0.0, 6.3))
+            up += rng.between(-1.0, 1.0) / wave * np.sin(wave * t + rng.between(0.0, 6.3))
+        reach = max(float(np.abs(across).max()), float(np.abs(up).max()), 0.1)
         points = [
             (w + 0.72 * w * a / reach, h + 0.72 * h * b / reach)
-            for a, b in zip(x.tolist(), y.tolist(), strict=True)
+            for a, b in zip(across.tolist(), up.tolist(), strict=True)
         ]
         draw.line(points, fill=(30, 28, 28), width=int(rng.between(5, 10)), joint="curve")
     return art.resize_texture(image, w, h).albedo
