@@ -88,7 +88,8 @@ def test_running_taps_are_stated_and_seen(kind: str, piece: str) -> None:
     assert dict(off.instance(sink.instance_id).attributes)["state"] == "off"
     assert not any(family(b) == "tap_stream" for b in off.bodies)
     bottom, mouth = heights_m(water[0])
-    assert mouth == pytest.approx(heights_m(sink)[1], abs=0.06)
+    # Spouts bend down by up to 8 cm.
+    assert heights_m(sink)[1] - 0.08 < mouth < heights_m(sink)[1]
     assert 0.7 < bottom < 0.9
 
 
