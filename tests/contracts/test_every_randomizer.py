@@ -73,9 +73,9 @@ IN_ROOMS = (
 
 @cache
 def furnished_room() -> Scene:
-    """A bedroom with two cameras; ``furnish`` draws another one in its place."""
+    """An office with two cameras; ``furnish`` draws another one in its place."""
     library = open_library(())
-    elements = (RoomLayout(name="room", kind="bedroom"), Carrier(name="carrier"))
+    elements = (RoomLayout(name="room", kind="office"), Carrier(name="carrier"))
     scene = build_scene("test", elements, library)
     lens = Intrinsics.from_hfov(64, 48, 1.0)
     cameras = tuple(Camera(name, SE3((0.0, 0.0, 1.5)), lens) for name in ("left", "right"))
