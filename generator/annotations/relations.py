@@ -151,6 +151,12 @@ class Shape:
         except QhullError:
             return None
 
+    @cached_property
+    def heights_m(self) -> tuple[float, float]:
+        """The lowest and the highest point; boxes of tilted things reach farther."""
+        z_m = self.triangles_m[..., 2]
+        return float(z_m.min()), float(z_m.max())
+
     def is_around(self, other: Shape) -> bool:
         """Whether it contains another shape, as ``Relations`` defines it."""
         center = other.center_m
@@ -261,8 +267,8 @@ def _may_carry(below: Shape, above: Shape, contact_m: float) -> bool:
         return True
     if above.thing.shell or below.thing.motion == "dynamic":
         return False
-    low_m = above.low_m[2]
-    return bool(low_m > below.low_m[2] + contact_m or low_m >= below.high_m[2] - contact_m)
+    low_m, _ = above.heights_m
+    return low_m > below.heights_m[0] + contact_m or low_m >= below.heights_m[1] - contact_m
 
 
 def _lies_over(above: Shape, below: Shape, contacts: Contacts, contact_m: float) -> bool:
