@@ -101,30 +101,62 @@ def test_the_corner_of_a_room_has_the_light_of_radiosity() -> None:
     assert results.numpy() == pytest.approx([0.0, 0.5 / (1.0 - 0.5 * 0.6), 1.0], abs=0.02)
 
 
-def test_the_rim_of_a_board_is_seen_between_pixel_centres_by_cameras_with_many_photosites() -> None:
-    """A glowing rim of 0.4 px that rises by a row in 20 columns: each has 0.4 of its light."""
-    width_m = 0.4 * 2.0 / Intrinsics.from_hfov(240, 120, math.radians(50.0)).fx_px
+RIM_PX = 0.4
+RADIANCE = frozenset({Channel.RADIANCE})
+
+
+def rim_library() -> FakeLibrary:
+    """A glowing rim of RIM_PX pixels, as ``rim_camera`` sees it, and a board."""
+    width_m = RIM_PX * 2.0 / Intrinsics.from_hfov(240, 120, math.radians(50.0)).fx_px
     glow = Material((0.0, 0.0, 0.0), 1.0, specular=0.0, emission_cd_m2=(100.0,) * 3)
-    library = FakeLibrary(
+    return FakeLibrary(
         {
             "rim": box_mesh((0.1, 9.0, width_m), (glow,)),
             "board": box_mesh((0.1, 9.0, 0.4), (MATTE,)),
         }
     )
-    board = Body("b", "board", SE3((0.0, 0.0, -0.2 - 0.5 * width_m)), instance_id=1)
-    scene = Scene("t", (board, Body("r", "rim", instance_id=2)), environment=DARK)
-    camera = camera_rolled((-2.05, 0.0, 0.0), (0.0, 0.0, 0.0), math.degrees(1.0 / 20.0))
-    renderer = WarpRenderer(library, "cpu", RenderSettings(antialias=8))
-    radiance = frozenset({Channel.RADIANCE})
+
+
+def rim_camera() -> Camera:
+    """The rim rises by a row in 20 columns."""
+    return camera_rolled((-2.05, 0.0, 0.0), (0.0, 0.0, 0.0), math.degrees(1.0 / 20.0))
+
+
+def board(name: str, z_m: float) -> Body:
+    """A board whose rim towards z = 0 is half a rim away from it, above or below."""
+    width_m = RIM_PX * 2.0 / Intrinsics.from_hfov(240, 120, math.radians(50.0)).fx_px
+    return Body(name, "board", SE3((0.0, 0.0, z_m + math.copysign(0.5 * width_m, z_m))))
+
+
+def test_the_rim_of_a_board_is_seen_between_pixel_centres_by_cameras_with_many_photosites() -> None:
+    """A glowing rim of 0.4 px that rises by a row in 20 columns: each has 0.4 of its light."""
+    scene = Scene("t", (board("b", -0.2), Body("r", "rim", instance_id=2)), environment=DARK)
+    renderer = WarpRenderer(rim_library(), "cpu", RenderSettings(antialias=8))
 
     def columns(find_tones: FindTones | None) -> np.ndarray:
         """Share of the rim's light in each column."""
-        image = renderer.render(scene, camera, radiance, find_tones).channels[Channel.RADIANCE]
-        return image[..., 1].sum(axis=0)[20:-20] / 100.0
+        reading = renderer.render(scene, rim_camera(), RADIANCE, find_tones)
+        return reading.channels[Channel.RADIANCE][..., 1].sum(axis=0)[20:-20] / 100.0
 
     # Far below white, the mean of tones is that of radiance.
     seen = columns(lambda _: Tones(1e6, 1e6))
 
-    assert seen.mean() == pytest.approx(0.4, rel=0.05)
+    assert seen.mean() == pytest.approx(RIM_PX, rel=0.05)
     assert seen.std() < 0.12
     assert columns(None).std() > 0.2
+
+
+def test_a_gap_between_boards_does_not_show_what_an_earlier_picture_had_there() -> None:
+    """The sky in a gap that no pixel centre shows: light of a rim there must not be left over."""
+    glowing = Scene("t", (board("b", -0.2), Body("r", "rim")), environment=DARK)
+    gap = Scene("t", (board("b", -0.2), board("c", 0.2)), environment=DARK)
+    used, fresh = (WarpRenderer(rim_library(), "cpu", RenderSettings(antialias=8)) for _ in "ab")
+
+    def radiance(renderer: WarpRenderer, scene: Scene) -> np.ndarray:
+        """Radiance, averaged by tones."""
+        reading = renderer.render(scene, rim_camera(), RADIANCE, lambda _: Tones(1e6, 1e6))
+        return reading.channels[Channel.RADIANCE]
+
+    assert radiance(used, glowing).max() > 10.0
+
+    np.testing.assert_array_equal(radiance(used, gap), radiance(fresh, gap))

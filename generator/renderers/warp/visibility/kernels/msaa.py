@@ -398,7 +398,8 @@ def mix_samples(
             source = color_source(view, world, images, x, y, hit)
             last = hit
             own = False
-            if thin.hits.shape[0] > 0:
+            # Scratch memory holds older radiance where nothing is thin: the sky never is.
+            if thin.hits.shape[0] > 0 and hit[0] >= 0:
                 if thin.hits[i][0] == hit[0]:
                     own = not shows_like(world, images, source, hit)
         if own:
