@@ -38,6 +38,9 @@ from gen_data.generator.assets.procedural.variant_rng import VariantRng, variant
 from gen_data.generator.core.asset_types import Keypoint
 from gen_data.generator.core.se3 import Vec3
 
+PIPING_HEIGHT = 0.9
+"""Of a cushion's half height: below its top, so that things lie flat."""
+
 
 def sofa(seed: int = 0) -> Solid:
     """A sofa for two to four. Slots: cover, legs, pillows."""
@@ -88,17 +91,12 @@ def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
         aside = rng.between(-0.03, 0.03) if loose else 0.0
         turned = rest.rotated("x", aside).rotated("y", lean)
         patches.append(turned.moved(x0 + 0.24, a + 0.5 * each, 0.5 * (seat_z + back_z + 0.06)))
-    for _ in range(int(rng.between(0, places + 1.6))):
-        y = rng.between(y0 + arm + 0.2, y1 - arm - 0.2) if places > 1 else 0.0
-        size = rng.between(0.19, 0.25)
-        loose_one = pillow(size, size * rng.between(0.75, 1.0), 0.15, rng, 2).rotated(
-            "z", rng.between(-0.3, 0.3)
-        )
-        standing = loose_one.moved(0.0, 0.0, -0.05).rotated("y", rng.between(1.25, 1.42))
-        turned = standing.rotated("z", rng.between(-0.35, 0.35))
-        patches.append(turned.moved(x0 + 0.37, y, seat_z + 0.9 * size))
+    patches += _pillows(rng, places, (x0 + 0.37, y0 + arm + 0.2, seat_z))
+    beside = arm + soft
     if rng.chance(0.35):
         side = rng.choose((-1, 1))
+        # Its folds reach over the seat.
+        beside += 0.06
         at = rng.between(-0.3, 0.05) * depth
         throw = drape(
             (at, at + rng.between(0.3, 0.5)), 0.5 * arm + 0.006, arm_z + 0.022, 0.13, rng, 3, 0.006
@@ -113,8 +111,22 @@ def _upholstered(rng: VariantRng, places: int, seat_m: float) -> Solid:
     looks = [upholstery(rng), wood(rng), fabric(rng, 0.3), fabric(rng, 0.4)]
     made = solid(patches, looks, [base, back, *arms, seat])
     # Before the pillows, and clear of the round edges of the cushions.
-    corners = (x0 + 0.54, y0 + arm + soft, seat_z), (x1 - soft, y1 - arm - soft, seat_z)
+    corners = (x0 + 0.54, y0 + beside, seat_z), (x1 - soft, y1 - beside, seat_z)
     return replace(made, keypoints=tuple(Keypoint(SUPPORT, corner) for corner in corners))
+
+
+def _pillows(rng: VariantRng, places: int, corner: Vec3) -> list[Patch]:
+    """Loose pillows that lean on the backs of seats, from ``corner`` to its mirror image."""
+    x, y0, seat_z = corner
+    pillows = []
+    for _ in range(int(rng.between(0, places + 1.6))):
+        y = rng.between(y0, -y0) if places > 1 else 0.0
+        size = rng.between(0.19, 0.25)
+        lying = pillow(size, size * rng.between(0.75, 1.0), 0.15, rng, 2)
+        skew = lying.rotated("z", rng.between(-0.3, 0.3)).moved(0.0, 0.0, -0.05)
+        standing = skew.rotated("y", rng.between(1.25, 1.42)).rotated("z", rng.between(-0.35, 0.35))
+        pillows.append(standing.moved(x, y, seat_z + 0.9 * size))
+    return pillows
 
 
 def _sagged(patch: Patch, depth_m: float) -> Patch:
@@ -128,21 +140,15 @@ def _sagged(patch: Patch, depth_m: float) -> Patch:
 
 
 def _piping(low: Vec3, high: Vec3, power: float) -> list[Patch]:
-    """A cord along the upper edge of a cushion made by ``padding``."""
+    """A cord along the upper edge of a cushion made by ``padding``, on its superellipsoid."""
     turn = np.linspace(0.0, 2.0 * math.pi, 73)
     c, s = np.cos(turn), np.sin(turn)
-    size = (np.abs(c) ** power + np.abs(s) ** power + 0.6**power) ** (1.0 / power)
-    half = [0.5 * (b - a) for a, b in zip(low, high, strict=True)]
-    middle = [0.5 * (b + a) for a, b in zip(low, high, strict=True)]
-    path = np.stack(
-        [
-            middle[0] + half[0] * c / size,
-            middle[1] + half[1] * s / size,
-            middle[2] + half[2] * 0.6 / size * 1.45,
-        ],
-        axis=1,
+    around = ((1.0 - PIPING_HEIGHT**power) / (np.abs(c) ** power + np.abs(s) ** power)) ** (
+        1.0 / power
     )
-    return [shapes.sweep(path, shapes.circle(0.0055, 6), capped=False)]
+    unit = np.stack([around * c, around * s, np.full_like(turn, PIPING_HEIGHT)], axis=1)
+    middle, half = 0.5 * np.add(high, low), 0.5 * np.subtract(high, low)
+    return [shapes.sweep(middle + half * unit, shapes.circle(0.0055, 6), capped=False)]
 
 
 def _bent(patch: Patch, wrap_per_m: float, lumbar_m: float) -> Patch:
