@@ -552,7 +552,7 @@ def book_row(seed: int = 0) -> Solid:
         Material(draw_linear((*PALETTES["cloth"], *_JACKETS), 0.15, rng), rng.between(0.3, 0.8))
         for _ in range(9)
     ]
-    band = Material(draw_linear(("#a08a55", "#bdb8aa", "#35353a"), 0.1, rng), 0.5)
+    band = Material(draw_linear(("#a08a55", "#a39e92", "#77757a"), 0.1, rng), 0.5)
     patches: list[Patch] = []
     y, tallest, end = 0.0, 0.0, rng.between(0.16, 0.4)
     while y < end:

@@ -6,10 +6,7 @@ A part hangs at its origin: the hinge of a door, the closed place of a drawer. T
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
-
-import numpy as np
 
 from gen_data.generator.assets.interiors.cartons import carton_looks, tape_carton
 from gen_data.generator.assets.interiors.parts import (
@@ -168,7 +165,7 @@ def _cupboard(family: str, seed: int) -> Solid:
         outer.append(((-x, -0.5 * w, 0.0), freezer[1]))
     if doors == 2:
         right: Box = ((x, 0.002, low + 0.003), (x + 0.018, 0.5 * w - 0.002, high - 0.003))
-        patches.append(board(*right, 1))
+        patches.append(_leaf(right, 0.31 * seed))
         patches += handle(x + 0.018, 0.04, _grip(low, high), 0.18, 2, upright=True)
         outer.append(right)
     if family == "kitchen_unit":
@@ -210,7 +207,11 @@ def _cupboard_door(family: str, seed: int) -> Solid:
     h, width = high - low, w / doors
     thick = 0.045 if family == "refrigerator" else 0.018
     leaf: Box = ((0.0, 0.002, 0.003), (thick, width - 0.002, h - 0.003))
-    patch = shapes.block(*leaf, 0.01, 1) if family == "refrigerator" else board(*leaf, 1)
+    patch = (
+        shapes.block(*leaf, 0.01, 1)
+        if family == "refrigerator"
+        else _leaf(leaf, 0.31 * seed + 0.13)
+    )
     grip = 0.28 if family == "refrigerator" else _grip(low, high) - low
     bar = handle(
         thick, width - 0.05, grip, 0.25 if family == "refrigerator" else 0.16, 2, upright=True
@@ -228,6 +229,12 @@ def _cupboard_door(family: str, seed: int) -> Solid:
             painted_material("#b3261e", 0.35),
         ]
     return solid([patch, *bar, *notes], looks, [leaf])
+
+
+def _leaf(box: Box, log_m: float) -> Patch:
+    """A door's board, cut at ``log_m`` from a log: those of one look differ, as veneers do."""
+    low, high = ((x, y + log_m, z) for x, y, z in box)
+    return board(low, high, 1).moved(0.0, -log_m, 0.0)
 
 
 def _notes(x: float, w: float, h: float, rng: VariantRng) -> list[Patch]:
@@ -529,38 +536,15 @@ def _cartons(
                 low, top = (x + 0.003, y + 0.003, z), (x + a - 0.003, y + b - 0.003, z + h - 0.001)
                 tape_carton(patches, low, top, rng, (1, 2, 3, 4))
     looks = carton_looks(rng, seed)
-    if wrapped:
-        patches += _film(rows * h, rng)
-        looks = [*looks, _FILM]
-    return patches, looks, rows * h
+    return patches, _in_film(looks) if wrapped else looks, rows * h
 
 
-_FILM = Material((0.93, 0.95, 0.96), 0.16, transmission=0.82, thin=True)
-"""Film that packages are wrapped in: clear, with a bluish shine."""
+def _in_film(looks: list[Material]) -> list[Material]:
+    """What stretch film makes of materials: they shine. The film itself lies close on them."""
+    return [replace(look, roughness=_FILM_ROUGHNESS) for look in looks]
 
 
-def _film(high_m: float, rng: VariantRng) -> list[Patch]:
-    """Film around goods of a height, with folds, in slot 5."""
-    a, b, r = 0.594, 0.394, 0.012
-    bend = np.linspace(0.0, 0.5 * math.pi, 4)
-    corners = [
-        (sx * (a - r) + r * np.cos(bend + start), sy * (b - r) + r * np.sin(bend + start))
-        for sx, sy, start in (
-            (1, 1, 0.0), (-1, 1, 0.5 * math.pi), (-1, -1, math.pi), (1, -1, 1.5 * math.pi),
-        )
-    ]  # fmt: skip
-    outline = np.concatenate([np.stack(corner, axis=1) for corner in corners])
-    ring = shapes.space_evenly(np.concatenate([outline, outline[:1]]), 145)
-    x, y = ring[None, :, 0], ring[None, :, 1]
-    z = np.linspace(-0.03, high_m - 0.01, 15)[:, None]
-    turn = np.linspace(0.0, 2.0 * math.pi, 145)[None, :]
-    # Folds run aslant and only outwards: film lies on what it wraps.
-    wave = np.sin(9.0 * turn + 21.0 * z) + np.sin(4.0 * turn - 34.0 * z + rng.between(0.0, 6.3))
-    fold = 1.0 + 0.006 * np.maximum(wave, 0.0)
-    x, y = x * fold, y * fold
-    points = np.stack(np.broadcast_arrays(x, y, z), axis=2)
-    points[:, -1] = points[:, 0]
-    return [shapes.grid(points, slot=5).flipped()]
+_FILM_ROUGHNESS = 0.3
 
 
 def _sacks(rng: VariantRng) -> tuple[list[Patch], list[Material], float]:
@@ -670,7 +654,7 @@ def _mixed(seed: int, rng: VariantRng) -> tuple[list[Patch], list[Material], flo
                 tape_carton(patches, (x0, y0, z), (x0 + a, y0 + b, z + h), rng, (1, 2, 3, 4))
                 z += h + 0.001
             top = max(top, z)
-    return [*patches, *_film(0.8 * top, rng)], [*carton_looks(rng, seed), _FILM], top
+    return patches, _in_film(carton_looks(rng, seed)), top
 
 
 def storage_box(seed: int = 0) -> Solid:

@@ -59,6 +59,8 @@ from gen_data.generator.renderers.warp.visibility.multisampling import draw_samp
 
 _PARTS = 2
 """Positions of further samples of pixels on edges in reflections or behind glass."""
+_THIN_LAYERS = 3
+"""Surfaces that no pixel centre nearby shows, in one pixel: both rims of a gap, and its ground."""
 _COVERAGE_SAMPLES = 8
 """Samples per pixel on edges that determine what covers a photograph."""
 
@@ -168,7 +170,7 @@ def _average_samples(frame: CameraView, radiance: wp.array, samples: int) -> Non
     inputs = [*frame.inputs, radiance, edges]
     if projected is not None:
         hits = draw_samples(frame, projected, edges, pixel_samples(samples))
-        nothing = [records.GBufferRecord(), wp.empty(0, dtype=wp.vec3, device=cache.device)]
+        nothing = [wp.empty((0, 0), dtype=t, device=cache.device) for t in (wp.vec2i, wp.vec3)]
         frame.launch(mixing.mix_samples, len(edges), [*inputs, hits, *nothing, 0.0, 0.0], [mixed])
     else:
         inputs += [cache.constant(wp.vec2, pixel_samples, samples), rasterizer.Z_NEAR_M]
@@ -193,7 +195,7 @@ def _average_tones(shading: Shading, samples: int, tones: Tones) -> None:
         frame.launch(ray_queries.trace_samples, (len(edges), samples), inputs, [hits])
     thin, thin_radiance = _shade_thin(shading, edges, hits, offsets)
     mixed = wp.zeros(max(len(edges), 1), dtype=wp.vec3, device=cache.device)
-    inputs = [*frame.inputs, radiance, edges, hits, thin.record, thin_radiance]
+    inputs = [*frame.inputs, radiance, edges, hits, thin, thin_radiance]
     limits = [tones.white_cd_m2, tones.brightest_cd_m2]
     frame.launch(mixing.mix_samples, len(edges), [*inputs, *limits], [mixed])
     frame.launch(write_mixed, len(edges), [edges, mixed], [radiance])
@@ -211,9 +213,16 @@ def _find_edges(frame: CameraView) -> wp.array:
 
 def _shade_thin(
     shading: Shading, edges: wp.array, hits: wp.array, offsets: wp.array
-) -> tuple[GBuffer, wp.array]:
-    """Surfaces within pixels on edges that no centre nearby shows, and their radiance."""
+) -> tuple[wp.array, wp.array]:
+    """Surfaces within pixels on edges that no centre nearby shows, and their radiance.
+
+    Returns:
+        (body, face) and radiance, [layers, pixels], written for the edges; (-1, -1) if there is no
+        further surface.
+    """
     frame, cache, n = shading.frame, shading.frame.cache, shading.frame.pixels
+    layers = cache.scratch("thin layers", (_THIN_LAYERS, n), wp.vec2i)
+    radiance = cache.scratch("thin radiance", (_THIN_LAYERS, n), wp.vec3)
     thin = GBuffer(
         cache.scratch("thin hits", n, wp.vec2i),
         cache.scratch("thin z", n, float),
@@ -221,20 +230,28 @@ def _shade_thin(
         cache.scratch("thin normals", n, wp.vec3),
         None,
     )
-    radiance = cache.scratch("thin radiance", n, wp.vec3)
-    count = wp.zeros(1, dtype=wp.int32, device=cache.device)
     pixels = cache.scratch("thin pixels", n, wp.int32)
-    inputs = [*frame.inputs, edges, hits, offsets, thin.record]
-    frame.launch(mixing.find_thin, len(edges), inputs, [count, pixels])
+    view = replace(frame, gbuffer=thin)
+    for layer in range(_THIN_LAYERS):
+        count = wp.zeros(1, dtype=wp.int32, device=cache.device)
+        inputs = [*frame.inputs, edges, hits, offsets, layer, layers, thin.record]
+        frame.launch(mixing.find_thin, len(edges), inputs, [count, pixels])
+        number = int(count.numpy()[0])
+        if number:
+            _shade_listed(view, shading, pixels, number, radiance[layer])
+    return layers, radiance
+
+
+def _shade_listed(
+    view: CameraView, shading: Shading, pixels: wp.array, number: int, radiance: wp.array
+) -> None:
+    """Shade surfaces at ``number`` listed pixels individually, into an image."""
     assert shading.lattice is not None, "the realtime tier has a lattice"
     assert shading.around is not None, "light was found there"
-    view = replace(frame, gbuffer=thin)
-    number = int(count.numpy()[0])
     listed, probe = _light_listed(view, shading.lattice, shading.around, pixels, number)
-    frame.launch(lattice_lighting.shade_points, number, [*view.inputs, listed], [radiance])
-    if frame.world.layered:
+    view.launch(lattice_lighting.shade_points, number, [*view.inputs, listed], [radiance])
+    if view.world.layered:
         _shade_layers(view, number, listed, probe, radiance)
-    return thin, radiance
 
 
 def add_precipitation(frame: CameraView, z_m: wp.array, radiance: wp.array) -> None:
@@ -464,17 +481,18 @@ def _lamp_visibility(
 def _sky_visibility(frame: CameraView, lattice: Lattice, inputs: list[Any]) -> wp.array:
     cache, radius_m = frame.cache, frame.settings.ambient_occlusion_radius_m
     n = lattice.width * lattice.height
-    probed, open_sky = (cache.scratch(name, (1, n), float) for name in ("probed sky", "open sky"))
+    names = ("probed sky", "smoothed sky", "open sky")
+    probed, smoothed, open_sky = (cache.scratch(name, (1, n), float) for name in names)
     if radius_m == 0.0:
         open_sky.fill_(1.0)
         return open_sky
     hemisphere = cache.constant(wp.vec3, cosine_hemisphere, 16)
     shape, run = _blocks(frame, lattice, 1)
     frame.launch(soft_shadows.probe_ambient, shape, [*inputs, hemisphere, radius_m, run], [probed])
-    _smooth(frame, lattice, probed, open_sky)
-    inputs = [frame.world.record, lattice, open_sky]
-    frame.launch(soft_shadows.share_with_strips, n, inputs, [probed])
-    return probed
+    _smooth(frame, lattice, probed, smoothed)
+    inputs = [frame.view, frame.world.record, lattice, probed, smoothed]
+    frame.launch(soft_shadows.average_strips, n, inputs, [open_sky])
+    return open_sky
 
 
 def _smooth(frame: CameraView, lattice: Lattice, values: wp.array, smoothed: wp.array) -> None:

@@ -61,6 +61,11 @@ UNSEEN = wp.constant(-1.0)
 SMOOTHED_SHARE = wp.constant(0.08)
 # Neighbours within three pixels' width of a point's tangent plane are on its surface.
 SAME_SURFACE_PX = wp.constant(3.0)
+# Surfaces of fewer points across are strips: rays are averaged over so many points to either side,
+# enough for a pattern of sixteen on a strip of two.
+STRIP_POINTS = wp.constant(3)
+ALONG = wp.constant(6)
+PATTERN = wp.constant(16.0)
 # Leaves of one body hide the sky from one another up to this distance, the less the farther they
 # are, since they scatter light themselves [m]. With it, crowns are as bright as path-traced ones.
 CROWN_M = wp.constant(18.0)
@@ -541,7 +546,7 @@ _SMOOTH_COLUMN = (
     };
     Floats total, count, wide_total, wide_count;
     sum_column(2, total, count);
-    const Floats value = values_at(values.data + j * points, x, y), enough = 8.0f;
+    const Floats value = values_at(values.data + j * points, x, y), enough = 20.0f;
     const auto lacks = (value != UNSEEN) & (count < enough);
     if (bits(lacks)) {
         // At the end of a surface a window holds part of the pattern only: take a larger one.
@@ -677,58 +682,107 @@ def probe_ambient(
 
 
 @wp.func
-def extends_along(lattice: Lattice, i: int, at: int, size: int, step: int):
-    """Whether one of two opposite neighbours lies on a point's surface and is similarly oriented.
+def run_length(lattice: Lattice, i: int, at: int, size: int, step: int):
+    """Number of points, up to five, around a point in its row or column that continue its surface.
 
     Args:
         at, size: The point's place in its row or column, and the length of that.
         step: Index distance of neighbours.
     """
-    found = bool(False)
-    for k in range(2):
-        way = wp.where(k == 0, -1, 1)
+    found = int(0)
+    for way in range(-2, 3):
         if at + way >= 0 and at + way < size:
             q = i + way * step
             if lattice.surface[q] == lattice.surface[i]:
-                found = found or wp.dot(lattice.normal[q], lattice.normal[i]) > 0.9
+                if wp.dot(lattice.normal[q], lattice.normal[i]) > 0.9:
+                    found += 1
     return found
 
 
 @wp.func
-def is_on_strip(lattice: Lattice, i: int):
-    """Whether a point's surface is a point wide, in its row or in its column."""
+def strip_width(lattice: Lattice, i: int):
+    """Width of a point's surface in points, along its row or its column; at most 5."""
     x = i % lattice.width
     y = i / lattice.width
-    wide = extends_along(lattice, i, x, lattice.width, 1)
-    return not (wide and extends_along(lattice, i, y, lattice.height, lattice.width))
+    along = run_length(lattice, i, x, lattice.width, 1)
+    return wp.min(along, run_length(lattice, i, y, lattice.height, lattice.width))
+
+
+@wp.func
+def sum_on_strip(
+    world: World, lattice: Lattice, probed: wp.array2d[float], i: int, tolerance_m: float
+):
+    """Sum of single rays over the points around in the plane of i, and their number.
+
+    They may be of other bodies: baseboards and plinths continue one another.
+
+    Args:
+        tolerance_m: Largest distance from the tangent plane of i.
+    """
+    x = i % lattice.width
+    y = i / lattice.width
+    total = float(0.0)
+    found = float(0.0)
+    for v in range(wp.max(y - ALONG, 0), wp.min(y + ALONG + 1, lattice.height)):
+        for u in range(wp.max(x - ALONG, 0), wp.min(x + ALONG + 1, lattice.width)):
+            q = v * lattice.width + u
+            if probed[0, q] != UNSEEN and not is_translucent(world, lattice.surface[q]):
+                n = lattice.normal[i]
+                if wp.dot(lattice.normal[q], n) > 0.9:
+                    if wp.abs(wp.dot(n, lattice.p_m[q] - lattice.p_m[i])) < tolerance_m:
+                        total += probed[0, q]
+                        found += 1.0
+    return total, found
+
+
+@wp.func
+def sum_beside_strip(lattice: Lattice, smoothed: wp.array2d[float], i: int):
+    """Sum over the body's points next to i that lie on no strip, and their number."""
+    x = i % lattice.width
+    y = i / lattice.width
+    total = float(0.0)
+    found = float(0.0)
+    for v in range(wp.max(y - 1, 0), wp.min(y + 2, lattice.height)):
+        for u in range(wp.max(x - 1, 0), wp.min(x + 2, lattice.width)):
+            q = v * lattice.width + u
+            if lattice.body[q] == lattice.body[i]:
+                if strip_width(lattice, q) > 1:
+                    total += smoothed[0, q]
+                    found += 1.0
+    return total, found
 
 
 @wp.kernel
-def share_with_strips(
-    world: World, lattice: Lattice, values: wp.array2d[float], shared: wp.array2d[float]
+def average_strips(
+    view: View,
+    world: World,
+    lattice: Lattice,
+    probed: wp.array2d[float],
+    smoothed: wp.array2d[float],
+    averaged: wp.array2d[float],
 ):
-    """Give points on strips the mean of their body's points around them that lie on no strip.
+    """Average ambient occlusion on strips along them; all other points keep their value.
 
-    A strip holds too little of a window's pattern of rays: from row to row it would be dark or
-    bright. Leaves keep their values: they are expected to differ.
+    A strip holds too little of a window's pattern of rays: from point to point it would be dark or
+    bright. Where it is short besides, its body's other points around it stand for it. Leaves keep
+    their values: they are expected to differ.
+
+    Args:
+        probed: Single rays, as by ``probe_ambient``.
+        smoothed: Their means over windows.
     """
     i = wp.tid()
-    value = values[0, i]
+    value = smoothed[0, i]
     if value != UNSEEN and not is_translucent(world, lattice.surface[i]):
-        if is_on_strip(lattice, i):
-            x = i % lattice.width
-            y = i / lattice.width
-            total = float(0.0)
-            found = float(0.0)
-            for v in range(wp.max(y - 1, 0), wp.min(y + 2, lattice.height)):
-                for u in range(wp.max(x - 1, 0), wp.min(x + 2, lattice.width)):
-                    q = v * lattice.width + u
-                    if lattice.body[q] == lattice.body[i] and not is_on_strip(lattice, q):
-                        total += values[0, q]
-                        found += 1.0
+        width = strip_width(lattice, i)
+        if width < STRIP_POINTS:
+            tolerance_m = surface_tolerance(view, lattice.p_m[i])
+            total, found = sum_on_strip(world, lattice, probed, i, tolerance_m)
+            if found < PATTERN and width < 2:
+                total, found = sum_beside_strip(lattice, smoothed, i)
             if found > 0.0:
                 value = total / found
-    shared[0, i] = value
+    averaged[0, i] = value
 
 
 @wp.kernel

@@ -13,8 +13,13 @@ from gen_data.generator.renderers.warp.scene.kernels.records import (
     GBufferRecord,
     View,
     World,
+    face_vertices,
     flat_normal,
     pixel_direction,
+    pixel_ray,
+    pixel_width,
+    surface_index,
+    vertex_at,
 )
 from gen_data.generator.renderers.warp.scene.kernels.simd import SIMD
 from gen_data.generator.renderers.warp.visibility.kernels.alpha_cutouts import (
@@ -56,6 +61,8 @@ wp.set_module_options({"enable_backward": False, "max_unroll": 3})
 UNLISTED = wp.constant(1.0e30)
 # Half a pixel [1/256 px].
 HALF = wp.constant(128)
+# Distance of parallel surfaces that count as one, in widths of a pixel.
+PLANE_PX = wp.constant(2.0)
 
 
 @wp.func_native(
@@ -303,16 +310,47 @@ def color_source(view: View, world: World, images: GBufferRecord, x: int, y: int
 
 
 @wp.func
-def shows_like(world: World, images: GBufferRecord, source: int, hit: wp.vec2i):
-    """Whether a pixel's colour suits a (body, face): it shows that, or one that faces alike."""
+def shows_like(view: View, world: World, images: GBufferRecord, source: int, hit: wp.vec2i):
+    """Whether a pixel's colour suits a (body, face): it shows that, or a like continuation of it.
+
+    That is of one material, faces alike and lies in one plane: the front of a door does not
+    stand for the frame in the gap beside it.
+    """
     alike = bool(False)
     if source >= 0:
         shown = images.hits[source]
         alike = shown[0] == hit[0] and shown[1] == hit[1]
-        if not alike:
-            cosine = wp.dot(images.normals[source], flat_normal(world, hit))
-            alike = wp.abs(cosine) > CREASE_COSINE
+        if not alike and shown[0] == hit[0]:
+            n = flat_normal(world, hit)
+            if (
+                surface_index(world, shown) == surface_index(world, hit)
+                and wp.abs(wp.dot(images.normals[source], n)) > CREASE_COSINE
+            ):
+                b = hit[0]
+                g = world.bodies[b].geometry
+                corner = vertex_at(world, g, face_vertices(world, g, hit[1])[0])
+                corner = world.bodies[b].R_world_mesh @ (corner * world.bodies[b].scale)
+                z = images.z_m[source]
+                point = view.eye_m + pixel_ray(view, source) * z - world.bodies[b].t_world_mesh
+                apart_m = wp.abs(wp.dot(n, point - corner))
+                alike = apart_m < PLANE_PX * pixel_width(view, source, z)
     return alike
+
+
+@wp.func
+def thin_layer(world: World, thin: wp.array2d[wp.vec2i], layers: int, i: int, hit: wp.vec2i):
+    """The first of the layers of thin surfaces whose colour suits a (body, face); -1 for none."""
+    found = int(-1)
+    for layer in range(layers):
+        at = thin[layer, i]
+        if found < 0 and at[0] == hit[0]:
+            alike = at[1] == hit[1]
+            if not alike:
+                cosine = wp.dot(flat_normal(world, at), flat_normal(world, hit))
+                alike = wp.abs(cosine) > CREASE_COSINE
+            if alike:
+                found = layer
+    return found
 
 
 @wp.kernel
@@ -323,17 +361,21 @@ def find_thin(
     pixels: wp.array[int],
     hits: wp.array2d[wp.vec2i],
     offsets: wp.array[wp.vec2],
+    layer: int,
+    layers: wp.array2d[wp.vec2i],
     thin: GBufferRecord,
     count: wp.array[int],
     listed: wp.array[int],
 ):
-    """Find one surface in each listed pixel whose colour no centre nearby can provide.
+    """Find a further surface in each listed pixel whose colour no centre nearby can provide.
 
     Args:
         pixels: The pixels.
         hits: Their samples, which repeat those of ``offsets``.
         offsets: Sample positions within a pixel, [0, 1).
-        thin: The surfaces; (-1, -1) if there is none, and then nothing else is written.
+        layer: Number of surfaces found before, at most.
+        layers: The (body, face) of all layers; (-1, -1) if there is none in ``layer``.
+        thin: The surfaces of this layer; written where there is one.
         count: Number of pixels with such a surface; 0 at first.
         listed: The pixels, in any order.
     """
@@ -341,24 +383,30 @@ def find_thin(
     i = pixels[row]
     x = i % view.width
     y = i / view.width
-    thin.hits[i] = wp.vec2i(-1, -1)
+    layers[layer, i] = wp.vec2i(-1, -1)
+    if layer > 0:
+        # The layer before is the last: there is nothing more to be found.
+        if layers[layer - 1, i][0] < 0:
+            return
     last = wp.vec2i(-2, -2)
     for s in range(hits.shape[1]):
         hit = hits[row, s]
-        if thin.hits[i][0] < 0 and hit[0] >= 0 and (hit[0] != last[0] or hit[1] != last[1]):
+        if layers[layer, i][0] < 0 and hit[0] >= 0 and (hit[0] != last[0] or hit[1] != last[1]):
             last = hit
-            source = color_source(view, world, images, x, y, hit)
-            if not shows_like(world, images, source, hit):
-                offset = offsets[s % offsets.shape[0]]
-                x_px = float(x) + offset[0]
-                y_px = float(y) + offset[1]
-                point = point_at(view, world, hit, x_px, y_px)
-                d = view.R_world_camera @ pixel_direction(view, x_px, y_px)
-                thin.z_m[i] = wp.dot(point.way, d) / wp.dot(d, d)
-                thin.weights[i] = point.weight
-                thin.normals[i] = point.normal
-                thin.hits[i] = hit
-                listed[wp.atomic_add(count, 0, 1)] = i
+            if thin_layer(world, layers, layer, i, hit) < 0:
+                source = color_source(view, world, images, x, y, hit)
+                if not shows_like(view, world, images, source, hit):
+                    offset = offsets[s % offsets.shape[0]]
+                    x_px = float(x) + offset[0]
+                    y_px = float(y) + offset[1]
+                    point = point_at(view, world, hit, x_px, y_px)
+                    d = view.R_world_camera @ pixel_direction(view, x_px, y_px)
+                    thin.hits[i] = hit
+                    thin.z_m[i] = wp.dot(point.way, d) / wp.dot(d, d)
+                    thin.weights[i] = point.weight
+                    thin.normals[i] = point.normal
+                    layers[layer, i] = hit
+                    listed[wp.atomic_add(count, 0, 1)] = i
 
 
 @wp.kernel
@@ -369,8 +417,8 @@ def mix_samples(
     radiance: wp.array[wp.vec3],
     pixels: wp.array[int],
     hits: wp.array2d[wp.vec2i],
-    thin: GBufferRecord,
-    thin_radiance: wp.array[wp.vec3],
+    thin: wp.array2d[wp.vec2i],
+    thin_radiance: wp.array2d[wp.vec3],
     white: float,
     brightest: float,
     mixed: wp.array[wp.vec3],
@@ -378,7 +426,7 @@ def mix_samples(
     """Radiance of listed pixels: the mean over their samples, in the order of the list.
 
     Args:
-        thin: As by ``find_thin``; empty if surfaces that no centre shows are left out.
+        thin: Layers of surfaces by ``find_thin``; none if what no centre shows is left out.
         thin_radiance: Of those surfaces.
         white: Radiance that saturates one exposure; 0 = the mean is one of radiance.
         brightest: Radiance that saturates all exposures.
@@ -391,19 +439,19 @@ def mix_samples(
     lit = int(0)
     last = wp.vec2i(-2, -2)
     source = int(-1)
-    own = bool(False)
+    layer = int(-1)
     for s in range(hits.shape[1]):
         hit = hits[row, s]
         if hit[0] != last[0] or hit[1] != last[1]:
             source = color_source(view, world, images, x, y, hit)
             last = hit
-            own = False
-            # Scratch memory holds older radiance where nothing is thin: the sky never is.
-            if thin.hits.shape[0] > 0 and hit[0] >= 0:
-                if thin.hits[i][0] == hit[0]:
-                    own = not shows_like(world, images, source, hit)
-        if own:
-            total += to_tone(thin_radiance[i], white, brightest)
+            layer = -1
+            # The sky is never thin.
+            if thin.shape[0] > 0 and hit[0] >= 0:
+                if not shows_like(view, world, images, source, hit):
+                    layer = thin_layer(world, thin, thin.shape[0], i, hit)
+        if layer >= 0:
+            total += to_tone(thin_radiance[layer, i], white, brightest)
             lit += 1
         elif source >= 0:
             total += to_tone(radiance[source], white, brightest)
