@@ -375,6 +375,8 @@ _STRIDE_PX = 3
 _TILE = int(shadow_culling.TILE)
 _BLOCK = int(soft_shadows.BLOCK)
 _LIST_LENGTH = int(shadow_culling.LIST_LENGTH)
+_ENOUGH_FOR_LAMPS, _ENOUGH_FOR_SKY = 8.0, 20.0
+"""Points of a window of 25 below which a higher one is averaged: shadows keep their edges."""
 # Column of the sample in each row of a pixel, far from those of neighbouring rows (n-rooks).
 _ROOKS = {1: (0,), 2: (1, 0), 4: (1, 3, 0, 2), 8: (1, 4, 7, 2, 5, 0, 3, 6)}
 
@@ -474,35 +476,36 @@ def _lamp_visibility(
         frame.launch(soft_shadows.probe_lamps, shape, [*inputs, parity], [probed])
     classes = _classify(frame, lattice, probed)
     frame.launch(soft_shadows.refine_lamps, shape, [*inputs, classes, probed], [lit])
-    _smooth(frame, lattice, lit, probed)
+    _smooth(frame, lattice, lit, _ENOUGH_FOR_LAMPS, probed)
     return probed
 
 
 def _sky_visibility(frame: CameraView, lattice: Lattice, inputs: list[Any]) -> wp.array:
     cache, radius_m = frame.cache, frame.settings.ambient_occlusion_radius_m
     n = lattice.width * lattice.height
-    names = ("probed sky", "smoothed sky", "open sky")
-    probed, smoothed, open_sky = (cache.scratch(name, (1, n), float) for name in names)
+    probed, open_sky = (cache.scratch(name, (1, n), float) for name in ("probed sky", "open sky"))
     if radius_m == 0.0:
         open_sky.fill_(1.0)
         return open_sky
     hemisphere = cache.constant(wp.vec3, cosine_hemisphere, 16)
     shape, run = _blocks(frame, lattice, 1)
     frame.launch(soft_shadows.probe_ambient, shape, [*inputs, hemisphere, radius_m, run], [probed])
-    _smooth(frame, lattice, probed, smoothed)
-    inputs = [frame.view, frame.world.record, lattice, probed, smoothed]
-    frame.launch(soft_shadows.average_strips, n, inputs, [open_sky])
+    _smooth(frame, lattice, probed, _ENOUGH_FOR_SKY, open_sky)
+    inputs = [frame.world.record, lattice, probed]
+    frame.launch(soft_shadows.restore_strips, n, inputs, [open_sky])
     return open_sky
 
 
-def _smooth(frame: CameraView, lattice: Lattice, values: wp.array, smoothed: wp.array) -> None:
+def _smooth(
+    frame: CameraView, lattice: Lattice, values: wp.array, enough: float, smoothed: wp.array
+) -> None:
     lights, points = values.shape
     sums = frame.cache.scratch("row sums", (lights, 2, points), float)
     lanes = 8 if frame.cache.device.is_cpu else 1
     shape = (lattice.height, -(-lattice.width // lanes), lights)
     inputs = [frame.view, lattice, lanes, _classify(frame, lattice, values), values]
     frame.launch(soft_shadows.sum_rows, shape, inputs, [sums])
-    frame.launch(soft_shadows.smooth_lattice, shape, [*inputs, sums], [smoothed])
+    frame.launch(soft_shadows.smooth_lattice, shape, [*inputs, enough, sums], [smoothed])
 
 
 def _classify(frame: CameraView, lattice: Lattice, values: wp.array) -> wp.array:

@@ -61,11 +61,8 @@ UNSEEN = wp.constant(-1.0)
 SMOOTHED_SHARE = wp.constant(0.08)
 # Neighbours within three pixels' width of a point's tangent plane are on its surface.
 SAME_SURFACE_PX = wp.constant(3.0)
-# Surfaces of fewer points across are strips: rays are averaged over so many points to either side,
-# enough for a pattern of sixteen on a strip of two.
-STRIP_POINTS = wp.constant(3)
-ALONG = wp.constant(6)
-PATTERN = wp.constant(16.0)
+# Surfaces of fewer points across are strips.
+STRIP_POINTS = wp.constant(4)
 # Leaves of one body hide the sky from one another up to this distance, the less the farther they
 # are, since they scatter light themselves [m]. With it, crowns are as bright as path-traced ones.
 CROWN_M = wp.constant(18.0)
@@ -546,8 +543,8 @@ _SMOOTH_COLUMN = (
     };
     Floats total, count, wide_total, wide_count;
     sum_column(2, total, count);
-    const Floats value = values_at(values.data + j * points, x, y), enough = 20.0f;
-    const auto lacks = (value != UNSEEN) & (count < enough);
+    const Floats value = values_at(values.data + j * points, x, y), limit = enough;
+    const auto lacks = (value != UNSEEN) & (count < limit);
     if (bits(lacks)) {
         // At the end of a surface a window holds part of the pattern only: take a larger one.
         sum_column(4, wide_total, wide_count);
@@ -565,6 +562,7 @@ def smooth_column(
     lattice: Lattice,
     eye_m: wp.vec3,
     tolerance: float,
+    enough: float,
     values: wp.array2d[wp.float32],
     x: int,
     y: int,
@@ -572,7 +570,11 @@ def smooth_column(
     sums: wp.array3d[wp.float32],
     smoothed: wp.array2d[wp.float32],
 ):
-    """Mean of row sums above and below points on their own surface; arguments as for sum_row."""
+    """Mean of row sums above and below points on their own surface; arguments as for sum_row.
+
+    Args:
+        enough: Number of points below which the window is higher.
+    """
     ...
 
 
@@ -609,10 +611,11 @@ def smooth_lattice(
     lanes: int,
     classes: wp.array3d[int],
     values: wp.array2d[float],
+    enough: float,
     sums: wp.array3d[float],
     smoothed: wp.array2d[float],
 ):
-    """Average differing values over neighbours on one surface."""
+    """Average differing values over neighbours on one surface; ``enough`` as of smooth_column."""
     y, group, j = wp.tid()
     x = group * lanes
     if is_uniform(classes_near(classes, x, x + lanes - 1, y, j)):
@@ -622,63 +625,7 @@ def smooth_lattice(
             smoothed[j, i] = values[j, i]
     else:
         tolerance = SAME_SURFACE_PX * view.pixel_rad
-        smooth_column(lattice, view.eye_m, tolerance, values, x, y, j, sums, smoothed)
-
-
-@wp.kernel
-def probe_ambient(
-    world: World,
-    lattice: Lattice,
-    tile_columns: int,
-    lists: wp.array3d[int],
-    hemisphere: wp.array[wp.vec3],
-    radius_m: float,
-    run: int,
-    open_sky: wp.array2d[float],
-):
-    """Ambient occlusion by one short ray per point: 1 if free, less the nearer the obstacle.
-
-    On a translucent surface, half of the points look to the other side, and the body itself hides
-    the sky up to CROWN_M: leaves see little of it from inside of a crown.
-
-    Args:
-        hemisphere: Sixteen directions about +Z, distributed by the cosine.
-        run: As for probe_lamps.
-    """
-    row, column, _, part = wp.tid()
-    tile = block_tile(row, column, tile_columns)
-    shaded = lists[tile, world.lamps.shape[0], 0] != 0
-    k = int(part * run)
-    while k < (part + 1) * run:
-        i = block_point(lattice, row, column, k)
-        if i >= 0:
-            value = float(UNSEEN)
-            if lattice.body[i] >= 0:
-                value = 1.0
-                if shaded:
-                    n = lattice.normal[i]
-                    x, y = make_frame(n)
-                    rank = bayer(k % BLOCK, k / BLOCK)
-                    h = hemisphere[rank]
-                    way = x * h[0] + y * h[1] + n * h[2]
-                    start = Departure()
-                    start.origin_m = lattice.origin_m[i]
-                    start.skip = lattice.skip[i]
-                    within = float(1.0)
-                    if is_translucent(world, lattice.surface[i]):
-                        way = way * wp.where((rank & 2) != 0, 1.0, -1.0)
-                        start = departure_to(world, lattice, i, way)
-                        start.skip = lattice.body[i]
-                        within = free_path_before(
-                            world, lattice.body[i], path_along(start.origin_m, way * CROWN_M), 1.0
-                        )
-                    path = path_along(start.origin_m, way * radius_m)
-                    t = free_path_of_listed(world, lists, tile, start.skip, path)
-                    # Full occlusion on contact, fading with zero slope at the radius: no visible
-                    # boundary.
-                    value = wp.min(t * (2.0 - t), wp.max(within, CROWN_GLOW))
-            open_sky[0, i] = value
-        k += 1
+        smooth_column(lattice, view.eye_m, tolerance, enough, values, x, y, j, sums, smoothed)
 
 
 @wp.func
@@ -709,80 +656,125 @@ def strip_width(lattice: Lattice, i: int):
 
 
 @wp.func
-def sum_on_strip(
-    world: World, lattice: Lattice, probed: wp.array2d[float], i: int, tolerance_m: float
+def open_path(
+    world: World,
+    lattice: Lattice,
+    lists: wp.array3d[int],
+    tile: int,
+    i: int,
+    h: wp.vec3,
+    other_side: bool,
+    radius_m: float,
 ):
-    """Sum of single rays over the points around in the plane of i, and their number.
-
-    They may be of other bodies: baseboards and plinths continue one another.
+    """1 if a short ray from a point is free, less the nearer the obstacle.
 
     Args:
-        tolerance_m: Largest distance from the tangent plane of i.
+        h: Its direction about the normal as +Z.
+        other_side: Whether the ray leaves a translucent surface on its other side.
     """
-    x = i % lattice.width
-    y = i / lattice.width
-    total = float(0.0)
-    found = float(0.0)
-    for v in range(wp.max(y - ALONG, 0), wp.min(y + ALONG + 1, lattice.height)):
-        for u in range(wp.max(x - ALONG, 0), wp.min(x + ALONG + 1, lattice.width)):
-            q = v * lattice.width + u
-            if probed[0, q] != UNSEEN and not is_translucent(world, lattice.surface[q]):
-                n = lattice.normal[i]
-                if wp.dot(lattice.normal[q], n) > 0.9:
-                    if wp.abs(wp.dot(n, lattice.p_m[q] - lattice.p_m[i])) < tolerance_m:
-                        total += probed[0, q]
-                        found += 1.0
-    return total, found
-
-
-@wp.func
-def sum_beside_strip(lattice: Lattice, smoothed: wp.array2d[float], i: int):
-    """Sum over the body's points next to i that lie on no strip, and their number."""
-    x = i % lattice.width
-    y = i / lattice.width
-    total = float(0.0)
-    found = float(0.0)
-    for v in range(wp.max(y - 1, 0), wp.min(y + 2, lattice.height)):
-        for u in range(wp.max(x - 1, 0), wp.min(x + 2, lattice.width)):
-            q = v * lattice.width + u
-            if lattice.body[q] == lattice.body[i]:
-                if strip_width(lattice, q) > 1:
-                    total += smoothed[0, q]
-                    found += 1.0
-    return total, found
+    n = lattice.normal[i]
+    x, y = make_frame(n)
+    way = x * h[0] + y * h[1] + n * h[2]
+    start = Departure()
+    start.origin_m = lattice.origin_m[i]
+    start.skip = lattice.skip[i]
+    within = float(1.0)
+    if is_translucent(world, lattice.surface[i]):
+        way = way * wp.where(other_side, -1.0, 1.0)
+        start = departure_to(world, lattice, i, way)
+        start.skip = lattice.body[i]
+        within = free_path_before(
+            world, lattice.body[i], path_along(start.origin_m, way * CROWN_M), 1.0
+        )
+    path = path_along(start.origin_m, way * radius_m)
+    t = free_path_of_listed(world, lists, tile, start.skip, path)
+    # Full occlusion on contact, fading with zero slope at the radius: no visible boundary.
+    return wp.min(t * (2.0 - t), wp.max(within, CROWN_GLOW))
 
 
 @wp.kernel
-def average_strips(
-    view: View,
+def probe_ambient(
     world: World,
     lattice: Lattice,
-    probed: wp.array2d[float],
-    smoothed: wp.array2d[float],
-    averaged: wp.array2d[float],
+    tile_columns: int,
+    lists: wp.array3d[int],
+    hemisphere: wp.array[wp.vec3],
+    radius_m: float,
+    run: int,
+    open_sky: wp.array2d[float],
 ):
-    """Average ambient occlusion on strips along them; all other points keep their value.
+    """Ambient occlusion by one short ray per point, by all rays on strips.
 
-    A strip holds too little of a window's pattern of rays: from point to point it would be dark or
-    bright. Where it is short besides, its body's other points around it stand for it. Leaves keep
-    their values: they are expected to differ.
+    A strip holds a part of the pattern of rays only: from point to point it would be dark or
+    bright. On a translucent surface, half of the points look to the other side, and the body itself
+    hides the sky up to CROWN_M: leaves see little of it from inside of a crown.
 
     Args:
-        probed: Single rays, as by ``probe_ambient``.
-        smoothed: Their means over windows.
+        hemisphere: Sixteen directions about +Z, distributed by the cosine.
+        run: As for probe_lamps.
+    """
+    row, column, _, part = wp.tid()
+    tile = block_tile(row, column, tile_columns)
+    shaded = lists[tile, world.lamps.shape[0], 0] != 0
+    k = int(part * run)
+    while k < (part + 1) * run:
+        i = block_point(lattice, row, column, k)
+        if i >= 0:
+            value = float(UNSEEN)
+            if lattice.body[i] >= 0:
+                value = 1.0
+                if shaded:
+                    first = bayer(k % BLOCK, k / BLOCK)
+                    rays = int(1)
+                    if not is_translucent(world, lattice.surface[i]):
+                        if strip_width(lattice, i) < STRIP_POINTS:
+                            rays = hemisphere.shape[0]
+                    total = float(0.0)
+                    for m in range(rays):
+                        rank = (first + m) % hemisphere.shape[0]
+                        total += open_path(
+                            world, lattice, lists, tile, i, hemisphere[rank], (rank & 2) == 0,
+                            radius_m,
+                        )  # fmt: skip
+                    value = total / float(rays)
+            open_sky[0, i] = value
+        k += 1
+
+
+@wp.kernel
+def restore_strips(
+    world: World, lattice: Lattice, probed: wp.array2d[float], smoothed: wp.array2d[float]
+):
+    """Undo the smoothing of values of ``probe_ambient`` where they are means of all rays already.
+
+    Strips a point wide have points in some columns only, each at another height. They get the mean
+    of their body's points around them that lie on no such strip, as pixels between points do.
+    Leaves keep their values: they are expected to differ.
     """
     i = wp.tid()
-    value = smoothed[0, i]
-    if value != UNSEEN and not is_translucent(world, lattice.surface[i]):
-        width = strip_width(lattice, i)
-        if width < STRIP_POINTS:
-            tolerance_m = surface_tolerance(view, lattice.p_m[i])
-            total, found = sum_on_strip(world, lattice, probed, i, tolerance_m)
-            if found < PATTERN and width < 2:
-                total, found = sum_beside_strip(lattice, smoothed, i)
+    if probed[0, i] == UNSEEN or is_translucent(world, lattice.surface[i]):
+        return
+    width = strip_width(lattice, i)
+    if width < STRIP_POINTS:
+        value = probed[0, i]
+        if width == 1:
+            x = i % lattice.width
+            y = i / lattice.width
+            total = float(0.0)
+            found = float(0.0)
+            for v in range(wp.max(y - 1, 0), wp.min(y + 2, lattice.height)):
+                for u in range(wp.max(x - 1, 0), wp.min(x + 2, lattice.width)):
+                    q = v * lattice.width + u
+                    if lattice.body[q] == lattice.body[i]:
+                        beside = strip_width(lattice, q)
+                        if beside > 1:
+                            # This kernel changes the other array on strips.
+                            wide = beside >= STRIP_POINTS
+                            total += wp.where(wide, smoothed[0, q], probed[0, q])
+                            found += 1.0
             if found > 0.0:
                 value = total / found
-    averaged[0, i] = value
+        smoothed[0, i] = value
 
 
 @wp.kernel
