@@ -62,7 +62,7 @@ SMOOTHED_SHARE = wp.constant(0.08)
 # Neighbours within three pixels' width of a point's tangent plane are on its surface.
 SAME_SURFACE_PX = wp.constant(3.0)
 # Surfaces of fewer points across are strips.
-STRIP_POINTS = wp.constant(4)
+STRIP_POINTS = wp.constant(3)
 # Leaves of one body hide the sky from one another up to this distance, the less the farther they
 # are, since they scatter light themselves [m]. With it, crowns are as bright as path-traced ones.
 CROWN_M = wp.constant(18.0)
@@ -728,15 +728,20 @@ def probe_ambient(
                     rays = int(1)
                     if not is_translucent(world, lattice.surface[i]):
                         if strip_width(lattice, i) < STRIP_POINTS:
-                            rays = hemisphere.shape[0]
+                            rays = 16
                     total = float(0.0)
+                    cast = float(0.0)
                     for m in range(rays):
-                        rank = (first + m) % hemisphere.shape[0]
-                        total += open_path(
-                            world, lattice, lists, tile, i, hemisphere[rank], (rank & 2) == 0,
-                            radius_m,
-                        )  # fmt: skip
-                    value = total / float(rays)
+                        # Where the first four, a quarter of the pattern apart, are free, so is the
+                        # rest.
+                        if m < 4 or total < cast:
+                            rank = (first + 4 * m + m / 4) % 16
+                            total += open_path(
+                                world, lattice, lists, tile, i, hemisphere[rank], (rank & 2) == 0,
+                                radius_m,
+                            )  # fmt: skip
+                            cast += 1.0
+                    value = total / cast
             open_sky[0, i] = value
         k += 1
 
