@@ -173,32 +173,56 @@ def look_around(camera: Camera, scene: Scene, assets: AssetIndex, reach_m: float
     usable = np.isfinite(rays).all(axis=1)
     rays = camera.T_world_camera.rotate(rays[usable])
     places = 2.0 * shares[usable] - 1.0
-    eye_m = camera.T_world_camera.translation_m
-    near, edges, starts, turns = [], [], [], []
-    for body in _solid_bodies(scene):
-        low, high = (body.scale * np.array(edge) for edge in standing_bounds_m(assets, body.asset))
-        T_body_world = body.T_world_body.inverse()
-        start = np.array((T_body_world @ SE3(eye_m)).translation_m)
-        if (np.maximum(low - start, start - high) > reach_m).any():
-            continue
-        near.append(body)
-        edges.append((low, high))
-        starts.append(start)
-        turns.append(T_body_world.rotation())
-    if not near or not len(rays):
+    bodies = list(_solid_bodies(scene))
+    seen = _Boxes.of(bodies, assets, camera.T_world_camera.translation_m)
+    near = np.flatnonzero((np.maximum(seen.low_m, seen.high_m * -1.0) <= reach_m).all(axis=0))
+    if not len(near) or not len(rays):
         nothing = np.full(len(rays), np.inf), np.full(len(rays), -1, np.int64)
         return Sight((), *nothing, places)
     # Distances at which rays cross the planes of the faces (Kay and Kajiya 1986).
-    along = rays @ np.array(turns).transpose(0, 2, 1)
+    w, x, y, z = seen.inverse[:, near, None]
+    rx, ry, rz = rays.T
+    along: Array = np.array(rotate_by_quaternion((w, x, y, z), (rx, ry, rz)))
     along = np.where(np.abs(along) < _PARALLEL, _PARALLEL, along)
-    corners, start = np.array(edges), np.array(starts)[:, None]
-    one, other = ((corners[:, i, None] - start) / along for i in (0, 1))
-    enter = np.maximum(np.minimum(one, other).max(axis=2), 0.0)
-    leave = np.maximum(one, other).min(axis=2)
+    one, other = (edge_m[:, near, None] / along for edge_m in (seen.low_m, seen.high_m))
+    enter = np.maximum(np.minimum(one, other).max(axis=0), 0.0)
+    leave = np.maximum(one, other).min(axis=0)
     distances = np.where((enter <= leave) & (enter <= reach_m), enter, np.inf)
     first = distances.argmin(axis=0)
     nearest = distances.min(axis=0)
-    return Sight(tuple(near), nearest, np.where(np.isfinite(nearest), first, -1), places)
+    hits = np.where(np.isfinite(nearest), first, -1)
+    return Sight(tuple(bodies[k] for k in near), nearest, hits, places)
+
+
+@dataclass(frozen=True, eq=False)
+class _Boxes:
+    """Bounding boxes of bodies in their own frames, from a point on.
+
+    Attributes:
+        low_m: From the point to the lowest corners, [3, n].
+        high_m: From the point to the highest corners, [3, n].
+        inverse: Rotations from the world to the bodies (w, x, y, z), [4, n].
+    """
+
+    low_m: Array
+    high_m: Array
+    inverse: Array
+
+    @classmethod
+    def of(cls, bodies: list[Body], assets: AssetIndex, point_m: Vec3) -> _Boxes:
+        """Collect the boxes of bodies."""
+        bounds_m = {name: standing_bounds_m(assets, name) for name in {b.asset for b in bodies}}
+        scales = np.array([body.scale for body in bodies])
+        boxes_m = np.array([bounds_m[body.asset] for body in bodies]).reshape(-1, 2, 3)
+        low, high = (boxes_m * scales[:, None, None]).transpose(1, 2, 0)
+        w, x, y, z = np.array([b.T_world_body.quaternion_wxyz for b in bodies]).reshape(-1, 4).T
+        sx, sy, sz = -np.array([b.T_world_body.translation_m for b in bodies]).reshape(-1, 3).T
+        # The products and sums of ``SE3.inverse() @ SE3(point_m)``, for all bodies at once.
+        inverse = (w, -x, -y, -z)
+        local_m = np.array(rotate_by_quaternion(inverse, (sx, sy, sz))) + np.array(
+            rotate_by_quaternion(inverse, point_m)
+        )
+        return cls(low - local_m, high - local_m, np.array(inverse))
 
 
 def hidden_share(camera: Camera, scene: Scene, assets: AssetIndex, near_m: float) -> float:
@@ -216,21 +240,8 @@ def is_clear(point_m: Vec3, scene: Scene, assets: AssetIndex, margin_m: float) -
     Bodies are tested by their bounding boxes. The background (the room itself) is ignored, except
     for the fixtures of lights.
     """
-    bodies = list(_solid_bodies(scene))
-    if not bodies:
-        return True
-    bounds_m = {name: standing_bounds_m(assets, name) for name in {b.asset for b in bodies}}
-    scales = np.array([body.scale for body in bodies])
-    boxes_m = np.array([bounds_m[body.asset] for body in bodies]) * scales[:, None, None]
-    w, x, y, z = np.array([body.T_world_body.quaternion_wxyz for body in bodies]).T
-    shift_m = tuple(-np.array([body.T_world_body.translation_m for body in bodies]).T)
-    # The products and sums of ``SE3.inverse() @ SE3(point_m)``, for all bodies at once.
-    inverse = (w, -x, -y, -z)
-    local_m = np.array(rotate_by_quaternion(inverse, shift_m)) + np.array(
-        rotate_by_quaternion(inverse, point_m)
-    )
-    low, high = boxes_m[:, 0].T - margin_m, boxes_m[:, 1].T + margin_m
-    return not ((low <= local_m) & (local_m <= high)).all(axis=0).any()
+    boxes = _Boxes.of(list(_solid_bodies(scene)), assets, point_m)
+    return not ((boxes.low_m <= margin_m) & (boxes.high_m >= -margin_m)).all(axis=0).any()
 
 
 def _solid_bodies(scene: Scene) -> Iterator[Body]:
