@@ -11,6 +11,7 @@ import warp as wp
 
 from gen_data.generator.core.asset_types import Material, TextureData
 from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.interfaces import Tones
 from gen_data.generator.core.scene import Body, Camera, Environment, Light, Scene
 from gen_data.generator.core.se3 import SE3, Vec3
 from gen_data.generator.renderers.warp.device import open_device
@@ -276,6 +277,35 @@ def test_a_mirror_shows_the_mirrored_scene() -> None:
 
     assert (behind[..., 1] > 50.0).sum() > 500
     assert (np.abs(mirrored - behind).max(axis=-1) > 0.02 * behind.max()).mean() < 0.01
+
+
+def test_an_edge_in_a_mirror_is_the_mean_of_tones_of_a_camera_with_many_photosites() -> None:
+    """Two of three samples see a ceiling of 2000 cd/m^2, one the half of 50; no row differs."""
+    mirror = Material((1, 1, 1), 0.0, 1.0)
+    meshes = {
+        "mirror": plane_mesh(8.0, (mirror,)),
+        "bright": box_mesh((20.0, 40.0, 0.1), (glowing(2000.0),)),
+        "dim": box_mesh((20.0, 40.0, 0.1), (glowing(50.0),)),
+    }
+    # From 3 m above the mirror the ceiling is 13 m away.
+    pixel_m = 13.0 * 2.0 * math.tan(math.radians(10.0)) / 64
+    edge_m = 0.35 * pixel_m
+    bodies = (
+        Body("mirror", "mirror"),
+        Body("bright", "bright", SE3((10.0 + edge_m, 0.0, 10.05))),
+        Body("dim", "dim", SE3((-10.0 + edge_m, 0.0, 10.05))),
+    )
+    white, brightest = 100.0, 1000.0
+    renderer = WarpRenderer(FakeLibrary(meshes), "cpu", RenderSettings(antialias=8))
+    scene = Scene("t", bodies, environment=DARK)
+
+    reading = renderer.render(scene, FROM_ABOVE, RADIANCE, lambda _: Tones(white, brightest))
+
+    seen = reading.channels[Channel.RADIANCE][..., 1]
+    between = seen[:, np.flatnonzero((seen[24] > 60.0) & (seen[24] < 1900.0))]
+    log_mean = (2.0 * math.log(brightest + 0.05 * white) + math.log(50.0 + 0.05 * white)) / 3.0
+    assert between.shape == (48, 1)
+    assert between.ravel() == pytest.approx(np.full(48, math.exp(log_mean) - 5.0), rel=0.03)
 
 
 def test_what_is_seen_in_a_mirror_is_as_far_as_the_whole_way() -> None:

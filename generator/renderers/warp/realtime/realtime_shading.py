@@ -362,11 +362,16 @@ def _refine_layers(
     inputs = [*frame.inputs, listed, radiance]
     frame.launch(clearcoat_glass.find_contrasts, number, inputs, [count, places])
     found = int(count.numpy()[0])
+    if not found:
+        return
     pixels = cache.scratch("contrast pixels", frame.pixels, wp.int32)
     mixed = cache.scratch("contrast colours", frame.pixels, wp.vec3)
     offsets = cache.constant(wp.vec2, pixel_samples, _PARTS)
     probe.few = cache.constant(wp.vec2, _dealt_sunflower, _PARTS, _PARTS)
-    inputs = [*frame.inputs, places, listed, probe, offsets, radiance]
+    find = frame.context.find_tones
+    tones = Tones(0.0, 0.0) if find is None else find(radiance_image(radiance, frame.view))
+    limits = [tones.white_cd_m2, tones.brightest_cd_m2]
+    inputs = [*frame.inputs, places, listed, probe, offsets, *limits, radiance]
     frame.launch(clearcoat_glass.shade_contrasts, found, inputs, [pixels, mixed])
     frame.launch(write_mixed, found, [pixels, mixed], [radiance])
 

@@ -88,6 +88,7 @@ from gen_data.generator.renderers.warp.scene.kernels.texture_sampling import (
     mix_texels,
     taps_at,
 )
+from gen_data.generator.renderers.warp.visibility.kernels.edge_detection import from_tone, to_tone
 from gen_data.generator.renderers.warp.visibility.kernels.label_resolve import (
     face_viewer,
     point_at,
@@ -758,6 +759,8 @@ def shade_contrasts(
     listed: ListedPixels,
     probe: Probe,
     offsets: wp.array[wp.vec2],
+    white: float,
+    brightest: float,
     radiance: wp.array[wp.vec3],
     pixels: wp.array[int],
     mixed: wp.array[wp.vec3],
@@ -767,6 +770,7 @@ def shade_contrasts(
     Args:
         offsets: Two positions within a pixel, [0, 1); neighbours take one of them in turn, or both
             where contrasts are stark.
+        white, brightest: As for msaa.mix_samples.
         radiance: Of the centres.
         pixels: The pixels.
         mixed: In their order.
@@ -776,14 +780,15 @@ def shade_contrasts(
     i = listed.pixels[k]
     x = i % view.width
     y = i / view.width
-    total = radiance[i]
+    total = to_tone(radiance[i], white, brightest)
     count = float(1.0)
-    stark = contrast_around(view, images, radiance, i) > STARK_CONTRAST
+    stark = white > 0.0 or contrast_around(view, images, radiance, i) > STARK_CONTRAST
     for s in range(2):
         if stark or s == ((x + y) & 1):
             x_px = float(x) + offsets[s][0]
             y_px = float(y) + offsets[s][1]
-            total += layered_radiance(view, world, images, x_px, y_px, listed, probe, s, k)
+            sample = layered_radiance(view, world, images, x_px, y_px, listed, probe, s, k)
+            total += to_tone(sample, white, brightest)
             count += 1.0
     pixels[place] = i
-    mixed[place] = total / count
+    mixed[place] = from_tone(total / count, white)
