@@ -44,6 +44,8 @@ _CROWDED = 0.25
 """Distance within which a piece before a window hides it."""
 _SILL_M = 0.026
 """Height of sills below the openings of windows."""
+_SILL_REACH_M, _SILL_BESIDE_M = 0.055, 0.045
+"""Reach of sills into the room, and beside the openings; half a centimetre more than theirs."""
 _FREE_ABOVE_M = {"wall_shelf": 0.32}
 """Height above pieces that others leave free."""
 _HANGS_M = 0.3
@@ -237,7 +239,11 @@ class Layout:
         high_m = low_m + s.high - s.low
         zone = _before(footprint, rule.clearance_m) if rule.clearance_m > 0.0 else None
         carrier = ignore if rule.place == "over" else -2
+        # With what it will carry.
+        top_m = high_m + _FREE_ABOVE_M.get(family, 0.0)
         reason = self.refuse(footprint, low_m, high_m, zone, ignore, carrier, flat=family in _FLAT)
+        if not reason and self.meets_sill(footprint, low_m, top_m):
+            reason = "meets a sill"
         if reason:
             self.refused[reason] += 1
             return False
@@ -328,11 +334,23 @@ class Layout:
             for opening in self.room.openings
         )
 
-    def before_opening(self, opening: Opening) -> Rectangle:
-        """The floor just before an opening."""
-        x, y = self.room.at_wall(opening.wall, opening.along_m, 0.5 * _CROWDED)
+    def meets_sill(self, footprint: Rectangle, low_m: float, high_m: float) -> bool:
+        """Whether something touches the sill of a window, which is wider than the opening."""
+        return any(
+            opening.kind == "window"
+            and low_m < opening.low_m
+            and high_m > opening.low_m - _SILL_M
+            and overlap_of(footprint, self.before_opening(opening, _SILL_REACH_M, _SILL_BESIDE_M))
+            for opening in self.room.openings
+        )
+
+    def before_opening(
+        self, opening: Opening, reach_m: float = _CROWDED, beside_m: float = 0.0
+    ) -> Rectangle:
+        """The floor just before an opening, and beside that."""
+        x, y = self.room.at_wall(opening.wall, opening.along_m, 0.5 * reach_m)
         c, s = direction(opening.wall)
-        return (x, y, c, s, 0.5 * _CROWDED, 0.5 * opening.width_m)
+        return (x, y, c, s, 0.5 * reach_m, 0.5 * opening.width_m + beside_m)
 
 
 def _cos_sin(yaw_rad: float) -> tuple[float, float]:

@@ -450,3 +450,25 @@ def test_no_two_of_two_hundred_rooms_are_nearly_alike_and_many_categories_occur(
 
     assert max(alike) < 0.25
     assert len(categories) >= 140
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed"), [("living_room", 20), ("workshop", 11), ("office", 2), ("kitchen", 3)]
+)
+def test_things_keep_clear_of_the_sills_of_windows(kind: str, seed: int) -> None:
+    """Sills stand out of walls, and are wider than their windows. Walls are along the axes."""
+    scene = furnished(kind, seed)
+    sills = []
+    for body in scene.bodies:
+        if family(body) == "window":
+            mesh = library().mesh(body.asset)
+            corners = mesh.vertices_m[mesh.faces[mesh.face_slots == 1].ravel()]
+            world = body.T_world_body.apply(corners.astype(np.float64))
+            sills.append((world.min(axis=0) + 0.002, world.max(axis=0) - 0.002))
+
+    assert sills
+    for body in scene.bodies:
+        if body.collides and family(body) not in {"window", "wall"}:
+            points = world_vertices(body)
+            for low, high in sills:
+                assert not ((points > low) & (points < high)).all(axis=1).any(), body.name
