@@ -175,7 +175,7 @@ def look_around(camera: Camera, scene: Scene, assets: AssetIndex, reach_m: float
     places = 2.0 * shares[usable] - 1.0
     bodies = list(_solid_bodies(scene))
     seen = _Boxes.of(bodies, assets, camera.T_world_camera.translation_m)
-    near = np.flatnonzero((np.maximum(seen.low_m, seen.high_m * -1.0) <= reach_m).all(axis=0))
+    near = np.flatnonzero((np.maximum(seen.low_m, -seen.high_m) <= reach_m).all(axis=0))
     if not len(near) or not len(rays):
         nothing = np.full(len(rays), np.inf), np.full(len(rays), -1, np.int64)
         return Sight((), *nothing, places)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gen_data.generator.assets.interiors.parts import BACKREST, INSIDE, SUPPORT
+from gen_data.generator.assets.interiors.shell import SILL_BESIDE_M, SILL_REACH_M
 from gen_data.generator.assets.interiors.storage import (
     PALLET_PITCH_M,
     VARIANTS_PER_LOOK,
@@ -44,8 +45,8 @@ _CROWDED = 0.25
 """Distance within which a piece before a window hides it."""
 _SILL_M = 0.026
 """Height of sills below the openings of windows."""
-_SILL_REACH_M, _SILL_BESIDE_M = 0.055, 0.045
-"""Reach of sills into the room, and beside the openings; half a centimetre more than theirs."""
+_NEAR_SILL_M = (SILL_REACH_M + 0.005, SILL_BESIDE_M + 0.005)
+"""Reach and overhang of sills, and what things keep away from them."""
 _FREE_ABOVE_M = {"wall_shelf": 0.32}
 """Height above pieces that others leave free."""
 _HANGS_M = 0.3
@@ -340,7 +341,7 @@ class Layout:
             opening.kind == "window"
             and low_m < opening.low_m
             and high_m > opening.low_m - _SILL_M
-            and overlap_of(footprint, self.before_opening(opening, _SILL_REACH_M, _SILL_BESIDE_M))
+            and overlap_of(footprint, self.before_opening(opening, *_NEAR_SILL_M))
             for opening in self.room.openings
         )
 

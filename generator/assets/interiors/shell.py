@@ -33,6 +33,10 @@ _TILE_M = 0.008
 """Thickness of tiles with their bed: less than the gap behind furniture."""
 
 
+SILL_REACH_M, SILL_BESIDE_M = 0.05, 0.04
+"""How far sills of windows stand out of the wall, and beside the opening."""
+
+
 def floor(size_m: tuple[float, float] = (4.0, 4.0)) -> Solid:
     """A floor, its upper side at z = 0. Slot: floor.
 
@@ -221,7 +225,10 @@ def window(size_m: Vec3 = (1.4, 1.3, 0.12), panes: int = 2) -> Solid:
         boxes.append(((x0, y - f, f), (x1 + 0.008, y + f, h - f)))
     at = w * (1.0 / panes - 0.5) if panes > 1 else 0.5 * w - 0.5 * f
     grip = shapes.block((x1, at - 0.012, 0.42 * h), (x1 + 0.04, at + 0.012, 0.42 * h + 0.12), 0.004)
-    sill = ((x1, -0.5 * w - 0.04, -0.025), (0.5 * t + 0.05, 0.5 * w + 0.04, 0.003))
+    sill = (
+        (x1, -0.5 * w - SILL_BESIDE_M, -0.025),
+        (0.5 * t + SILL_REACH_M, 0.5 * w + SILL_BESIDE_M, 0.003),
+    )
     patches = [*(shapes.block(*b, 0.006) for b in boxes), grip, shapes.block(*sill, 0.004, 1)]
     glass = Material((0.95, 0.97, 0.96), 0.02, transmission=1.0, role="glass")
     x = 0.5 * (x0 + x1)

@@ -232,26 +232,16 @@ def _shade_thin(
     )
     pixels = cache.scratch("thin pixels", n, wp.int32)
     view = replace(frame, gbuffer=thin)
+    assert shading.lattice is not None, "the realtime tier has a lattice"
+    assert shading.around is not None, "light was found there"
     for layer in range(_THIN_LAYERS):
         count = wp.zeros(1, dtype=wp.int32, device=cache.device)
         inputs = [*frame.inputs, edges, hits, offsets, layer, layers, thin.record]
         frame.launch(mixing.find_thin, len(edges), inputs, [count, pixels])
         number = int(count.numpy()[0])
         if number:
-            _shade_listed(view, shading, pixels, number, radiance[layer])
+            _shade_listed(view, shading.lattice, shading.around, pixels, number, radiance[layer])
     return layers, radiance
-
-
-def _shade_listed(
-    view: CameraView, shading: Shading, pixels: wp.array, number: int, radiance: wp.array
-) -> None:
-    """Shade surfaces at ``number`` listed pixels individually, into an image."""
-    assert shading.lattice is not None, "the realtime tier has a lattice"
-    assert shading.around is not None, "light was found there"
-    listed, probe = _light_listed(view, shading.lattice, shading.around, pixels, number)
-    view.launch(lattice_lighting.shade_points, number, [*view.inputs, listed], [radiance])
-    if view.world.layered:
-        _shade_layers(view, number, listed, probe, radiance)
 
 
 def add_precipitation(frame: CameraView, z_m: wp.array, radiance: wp.array) -> None:
@@ -296,13 +286,26 @@ def _shade(frame: CameraView, lattice: Lattice, around: LightVisibility) -> wp.a
     inputs, shape = [*frame.inputs, lattice, lights, coats, run], (lattice.height - 1, cells // run)
     frame.launch(lattice_interpolation.gather_light, shape, inputs, [count, pixels, radiance])
     number = int(count.numpy()[0])
+    listed, probe = _shade_listed(frame, lattice, around, pixels, number, radiance)
+    if frame.world.layered and frame.settings.antialias > 1:
+        _refine_layers(frame, number, listed, probe, radiance)
+    return radiance
+
+
+def _shade_listed(
+    frame: CameraView,
+    lattice: Lattice,
+    around: LightVisibility,
+    pixels: wp.array,
+    number: int,
+    radiance: wp.array,
+) -> tuple[lattice_lighting.ListedPixels, lattice_lighting.Probe]:
+    """Shade ``number`` listed pixels individually, into an image; as ``_light_listed``."""
     listed, probe = _light_listed(frame, lattice, around, pixels, number)
     frame.launch(lattice_lighting.shade_points, number, [*frame.inputs, listed], [radiance])
     if frame.world.layered:
         _shade_layers(frame, number, listed, probe, radiance)
-        if frame.settings.antialias > 1:
-            _refine_layers(frame, number, listed, probe, radiance)
-    return radiance
+    return listed, probe
 
 
 def _light_listed(

@@ -769,7 +769,7 @@ def shade_contrasts(
 
     Args:
         offsets: Two positions within a pixel, [0, 1); neighbours take one of them in turn, or both
-            where contrasts are stark.
+            where contrasts are stark, and in means of tones.
         white, brightest: As for msaa.mix_samples.
         radiance: Of the centres.
         pixels: The pixels.
@@ -782,9 +782,9 @@ def shade_contrasts(
     y = i / view.width
     total = to_tone(radiance[i], white, brightest)
     count = float(1.0)
-    stark = white > 0.0 or contrast_around(view, images, radiance, i) > STARK_CONTRAST
+    both = white > 0.0 or contrast_around(view, images, radiance, i) > STARK_CONTRAST
     for s in range(2):
-        if stark or s == ((x + y) & 1):
+        if both or s == ((x + y) & 1):
             x_px = float(x) + offsets[s][0]
             y_px = float(y) + offsets[s][1]
             sample = layered_radiance(view, world, images, x_px, y_px, listed, probe, s, k)
