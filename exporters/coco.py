@@ -12,9 +12,15 @@ file, such as COCO's ``person_keypoints_train.json``. It lists all images and th
 category, with ``keypoints`` and ``num_keypoints`` (0 if an object has no keypoints); the category
 has ``keypoints`` and the 1-based ``skeleton``.
 
-Masks are run lengths, or polygons along the edges of pixels (``segmentation: polygon``), of which
-pycocotools draws exactly the mask; torchvision's reference recipe for detection reads polygons
-only. Regions that a label map ignores have ``iscrowd`` 1, and run lengths in either case.
+Masks are polygons, 0.02 px inside the edges of pixels, of which pycocotools, OpenCV and PIL draw
+exactly the mask, or run lengths (``segmentation: rle``), which torchvision's reference recipe for
+detection, SAHI and DETR's processor in transformers do not read. Regions that a label map ignores
+have ``iscrowd`` 1, and run lengths in either case. As COCOeval ignores regions class by class, a
+region whose class the label map leaves out is listed once under each class, with ids that count
+down from ``LABEL_IDS_MAX`` in place of the instance id.
+
+Boxes are whole numbers of pixels, written as floats: torchvision makes integers of integers, and
+then cuts the boxes of resized or rotated images.
 
 Every annotation has COCO's own keys, and ``attributes``: the object's name, asset, subcategory and
 the attributes of its asset. Images have ``attributes`` too, the shared values of their scene, and
@@ -79,13 +85,15 @@ from typing import Any, ClassVar, Literal
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, image_splits, write_fragment
+from gen_data.exporters.ignored_regions import each_class
 from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.mask_polygons import mask_polygons
+from gen_data.exporters.mask_polygons import drawable_polygons
 from gen_data.exporters.rle import encode_rle
 from gen_data.exporters.sensor_selection import check_channels, instant_s, rgb_cameras
 from gen_data.exporters.sequences import sequence_number
 from gen_data.generator.core.boxes import BoxPx, OrientedBox
 from gen_data.generator.core.capture import Channel
+from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.intrinsics import Intrinsics
 from gen_data.generator.core.lens import COEFFICIENTS, Lens
@@ -99,7 +107,7 @@ from gen_data.generator.core.sample import (
     Sample,
     both_ways,
 )
-from gen_data.generator.core.scene import Instance, Scene, Weather
+from gen_data.generator.core.scene import LABEL_IDS_MAX, Instance, Scene, Weather
 from gen_data.generator.core.se3 import Array
 from gen_data.generator.core.serialization import canonical_json
 from gen_data.generator.core.shutter import Shutter
@@ -115,8 +123,9 @@ class Coco(ExporterBase):
     type: Literal["coco"] = "coco"
 
     image_formats: ClassVar[frozenset[str]] = ANY_FORMAT
-    segmentation: Literal["rle", "polygon", "none"] = "rle"
-    """Visible masks as run lengths, as polygons along the edges of their pixels, or none."""
+    segmentation: Literal["polygon", "rle", "none"] = "polygon"
+    """Visible masks as polygons, of which readers draw exactly the mask, as run lengths, which are
+    shorter and which some trainers do not read, or none."""
     bbox: Literal["visible", "amodal"] = "visible"
     """Boxes around the visible pixels, or around the whole silhouette within the image."""
     amodal: bool = True
@@ -152,12 +161,12 @@ class Coco(ExporterBase):
                 images = rows.setdefault(f"{sample.split}.images", [])
                 annotations = rows.setdefault(f"{sample.split}.annotations", [])
                 images.append(_image(info, sample, sensor))
-                for thing in truth.objects:
-                    if thing.box is None:
-                        continue
+                visible = [thing for thing in truth.objects if thing.box is not None]
+                for thing, number in _numbered(info, visible):
                     row = self._annotation(info, sample, sensor, thing)
+                    row["id"] = sample.annotation_id(sensor, number)
                     annotations.append(row)
-                    if thing.keypoints is not None:
+                    if thing.keypoints is not None and number == thing.instance.instance_id:
                         stem = f"{sample.split}.keypoints.{thing.instance.category_id}"
                         rows.setdefault(stem, []).append(row | _named_points(thing.keypoints))
         folder = shard_dir / self.type
@@ -210,7 +219,7 @@ class Coco(ExporterBase):
             assert thing.mask is not None, "the annotation instance_masks is in `needs`"
             # COCO's crowds have run lengths in either case.
             if self.segmentation == "polygon" and not thing.ignored:
-                row["segmentation"] = [p.ravel().tolist() for p in mask_polygons(thing.mask)]
+                row["segmentation"] = [p.ravel().tolist() for p in drawable_polygons(thing.mask)]
             else:
                 row["segmentation"] = encode_rle(thing.mask, camera.height_px, camera.width_px)
         if self.amodal and thing.amodal_box is not None:
@@ -227,6 +236,30 @@ class Coco(ExporterBase):
         return thing.amodal_box.clipped(camera.width_px, camera.height_px)
 
 
+def _numbered(
+    info: DatasetInfo, objects: Sequence[ObjectTruth]
+) -> Iterator[tuple[ObjectTruth, int]]:
+    """Objects, each under every class that it counts for, with numbers unique in the image.
+
+    Raises:
+        ConfigError: there are more regions without a class than numbers.
+    """
+    last = max((thing.instance.instance_id for thing in objects), default=0)
+    free = iter(range(LABEL_IDS_MAX, last, -1))
+    for thing in objects:
+        if thing.instance.category_id:
+            yield thing, thing.instance.instance_id
+            continue
+        for region in each_class(info, [thing]):
+            number = next(free, None)
+            if number is None:
+                raise ConfigError(
+                    f"exporter 'coco': more than {LABEL_IDS_MAX - last} ignored regions in an "
+                    "image; expected `others: drop` in labels.map, or fewer classes"
+                )
+            yield region, number
+
+
 def image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Any]:
     """Labels of one image, without paths: the row of ``images`` and its ``annotations``.
 
@@ -235,7 +268,7 @@ def image_labels(info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, An
     """
     row = _image(info, sample, sensor)
     visible = (thing for thing in sample.truth[sensor].objects if thing.box is not None)
-    style = Coco()
+    style = Coco(segmentation="rle")
     annotations = [
         style._annotation(info, sample, sensor, thing) | {"category": thing.instance.category}
         for thing in visible
@@ -462,9 +495,9 @@ def _link_images(
         link_or_copy(source, dataset_dir / target)
 
 
-def box_xywh(box: BoxPx) -> list[int]:
-    """COCO's box: left, top, width, height [px]."""
-    return [box.x_min, box.y_min, box.width_px, box.height_px]
+def box_xywh(box: BoxPx) -> list[float]:
+    """COCO's box: left, top, width, height [px]; floats in JSON, see the top of this module."""
+    return [float(box.x_min), float(box.y_min), float(box.width_px), float(box.height_px)]
 
 
 def _box3d(box: OrientedBox) -> dict[str, list[float]]:

@@ -7,7 +7,7 @@
     <split>/000000012_color.png                             images{file_name}, as in ``coco``
 
 * **Things** are the annotated objects with a visible pixel: one segment each, with the categories
-  and ids of ``coco``.
+  of ``coco``; ``instance_id`` and ``annotation_id`` name its annotation there.
 * **Stuff** is one segment per category and image: scenery that has an instance and no annotation
   (``building``, ``tree``, ``table``, ...), by its category; where images of depth are written, also
   ``road``, ``pavement``, ``grass`` and ``sky`` (see ``background_surfaces``). Categories of stuff
@@ -154,6 +154,8 @@ def _write_segments(
         "things": [
             {
                 "id": segment_id(thing.instance.instance_id),
+                "instance_id": thing.instance.instance_id,
+                "annotation_id": sample.annotation_id(sensor, thing.instance.instance_id),
                 "category_id": thing.instance.category_id,
                 "area": thing.visible_px,
                 "bbox": box_xywh(thing.box),

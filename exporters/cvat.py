@@ -30,7 +30,7 @@ from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.label_colors import voc_palette
-from gen_data.exporters.mask_polygons import mask_polygons
+from gen_data.exporters.mask_polygons import drawable_polygons
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo
 from gen_data.generator.core.sample import MaskPx, ObjectTruth, Sample
@@ -113,7 +113,7 @@ def shape_elements(
         place = f'left="{box.x_min}" top="{box.y_min}"'
         size = f'width="{box.width_px}" height="{box.height_px}"'
         return [f'<mask {common} rle="{rle}" {place} {size}/>']
-    outlines = (";".join(f"{x},{y}" for x, y in p.tolist()) for p in mask_polygons(thing.mask))
+    outlines = (";".join(f"{x},{y}" for x, y in p.tolist()) for p in drawable_polygons(thing.mask))
     return [f'<polygon {common} points="{points}"/>' for points in outlines]
 
 

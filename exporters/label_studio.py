@@ -6,10 +6,12 @@
     <split>/tasks.json           a task per image; the file to import
     <split>/images/000000012_color.png
 
-Every visible object is a brush mask, one polygon per part, or a box; its keypoints belong to its
-first region (``parentID``). Ids of regions begin with the instance id. Coordinates are percent of
-the image's width and height; polygons run along the edges of pixels, and one line leads to each
-hole and back. A brush mask is the run lengths of its image, all four channels of a pixel alike.
+Every visible object is one region, a brush mask, a polygon or a box, so that converters find as many
+objects; its keypoints belong to it (``parentID``). The id of a region is the instance id.
+Coordinates are percent of the image's width and height; polygons run 0.02 px inside the edges of
+pixels, and lines without area join an object's parts and lead to its holes. A brush mask is the run
+lengths of its image, all four channels of a pixel alike; Label Studio's converter to COCO leaves
+brush masks out. Ids of tasks, which the converters need, are the image ids of ``coco``.
 
 Images are referred to as ``url_prefix`` with their path in the data set; the default is Label
 Studio's address of local files. Ignored objects are left out.
@@ -22,7 +24,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 from urllib.parse import quote
@@ -36,7 +37,7 @@ from gen_data.exporters.fragments import fragment_rows, image_splits
 from gen_data.exporters.image_files import link_or_copy
 from gen_data.exporters.image_rows import ImageRowsExporter
 from gen_data.exporters.label_colors import voc_palette
-from gen_data.exporters.mask_polygons import mask_polygons
+from gen_data.exporters.mask_polygons import drawable_polygons, join_polygons
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo
@@ -125,20 +126,22 @@ class LabelStudio(ImageRowsExporter):
             "file_name": name,
             "keypoints": sorted(_keypoint_names(regions)),
             # As text, which merging copies: regions have thousands of numbers.
-            "task": json.dumps({"data": data, self.kind: [facts]}, separators=(",", ":")),
+            "task": json.dumps(
+                {"id": sample.image_id(sensor), "data": data, self.kind: [facts]},
+                separators=(",", ":"),
+            ),
         }
 
 
 def object_regions(
     thing: ObjectTruth, info: DatasetInfo, camera: Intrinsics, shapes: Shape
 ) -> Iterator[dict[str, Any]]:
-    """Regions of a visible object: its shapes, then its keypoints."""
+    """Regions of a visible object: its shape, then its keypoints."""
     instance = thing.instance
     first = f"{instance.instance_id}"
     label = info.categories[instance.category_id - 1]
-    for k, value in enumerate(_shape_values(thing, camera, shapes)):
-        name = first if k == 0 else f"{first}.{k}"
-        yield _region(name, first, CONTROLS[shapes], label, value, camera)
+    value = _shape_value(thing, camera, shapes)
+    yield _region(first, first, CONTROLS[shapes], label, value, camera)
     for point in thing.keypoints or ():
         if point.visibility:
             x_px, y_px = point.image_px
@@ -151,28 +154,23 @@ def object_regions(
             yield _region(name, first, "KeyPointLabels", point.name, place, camera)
 
 
-def _shape_values(
-    thing: ObjectTruth, camera: Intrinsics, shapes: Shape
-) -> Iterator[dict[str, Any]]:
-    """Coordinates of the shapes of an object."""
+def _shape_value(thing: ObjectTruth, camera: Intrinsics, shapes: Shape) -> dict[str, Any]:
+    """Coordinates of the shape of an object."""
     width, height, box = camera.width_px, camera.height_px, thing.box
     assert box is not None, "invisible objects are not listed"
     assert thing.mask is not None, "the annotation instance_masks is in `needs`"
     if shapes == "box":
-        yield {
+        return {
             "x": _percent(box.x_min, width),
             "y": _percent(box.y_min, height),
             "width": _percent(box.width_px, width),
             "height": _percent(box.height_px, height),
             "rotation": 0,
         }
-    elif shapes == "mask":
-        yield {"format": "rle", "rle": brush_rle(thing.mask, height, width)}
-    else:
-        for polygon in mask_polygons(thing.mask):
-            x_of, y_of = _percents(width), _percents(height)
-            points = [[x_of[x], y_of[y]] for x, y in polygon.tolist()]
-            yield {"points": points, "closed": True}
+    if shapes == "mask":
+        return {"format": "rle", "rle": brush_rle(thing.mask, height, width)}
+    outline = join_polygons(drawable_polygons(thing.mask))
+    return {"points": np.round(100.0 * outline / (width, height), 9).tolist(), "closed": True}
 
 
 def _region(
@@ -194,12 +192,6 @@ def _region(
 
 def _percent(length_px: float, size_px: int) -> float:
     return round(100.0 * length_px / size_px, 9)
-
-
-@lru_cache(maxsize=16)
-def _percents(size_px: int) -> list[float]:
-    """Percentages of all borders of pixels along a side, from 0."""
-    return [_percent(k, size_px) for k in range(size_px + 1)]
 
 
 def brush_rle(mask: MaskPx, height_px: int, width_px: int) -> list[int]:

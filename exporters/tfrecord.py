@@ -41,6 +41,7 @@ from pydantic import Field
 
 from gen_data.exporters.base import PNG_OR_JPEG, ExporterBase, check_installed
 from gen_data.exporters.fragments import fragment_rows, numbered_stem, write_fragment
+from gen_data.exporters.ignored_regions import each_class
 from gen_data.exporters.png import RowFilter, encode_png
 from gen_data.exporters.sensor_selection import rgb_camera, rgb_cameras
 from gen_data.exporters.sequences import write_bytes, write_text
@@ -144,7 +145,8 @@ class TfRecord(ExporterBase):
     def _labels(self, info: DatasetInfo, sample: Sample, sensor: str) -> dict[str, Feature]:
         """Labels of one image by key, without its pixels."""
         truth = sample.truth[sensor]
-        things = [thing for thing in truth.objects if thing.box is not None]
+        visible = [thing for thing in truth.objects if thing.box is not None]
+        things = list(each_class(info, visible))
         labels = _image_labels(info, sample, sensor) | _object_labels(truth, things)
         if self.masks == "png":
             labels["image/object/mask"] = [_mask_png(truth, thing) for thing in things]

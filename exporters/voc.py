@@ -2,6 +2,7 @@
 
 ::
 
+    VOCdevkit/VOC2012/labelmap.txt           name:r,g,b:parts:actions of each class, for converters
     VOCdevkit/VOC2012/JPEGImages/000000012_color.jpg
     VOCdevkit/VOC2012/Annotations/000000012_color.xml
     VOCdevkit/VOC2012/SegmentationClass/000000012_color.png    class; 0 background, 255 void
@@ -15,7 +16,8 @@
   colours. There are no void borders around objects.
 * ``truncated`` is 1 if more than 15 % of the silhouette are outside the image, ``occluded`` if more
   than 5 % inside it are hidden, as in VOC's annotation guidelines. ``difficult`` is 1 for ignored
-  objects, which come last and are void in label images.
+  objects, which come last and are void in label images; those without a class are listed under
+  every class.
 * **Images** are JPEG of quality 95, as VOC's readers append ``.jpg`` to names; ``images: png``
   links the lossless originals instead, for readers that use the name in the XML file.
 
@@ -37,11 +39,12 @@ import numpy as np
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.fragments import fragment_rows, write_fragment
+from gen_data.exporters.ignored_regions import each_class
 from gen_data.exporters.image_files import link_or_copy, read_pixels
 from gen_data.exporters.label_colors import voc_palette
 from gen_data.exporters.label_png import UInt16, encode_label_png, number_masks
 from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
-from gen_data.exporters.sequences import write_bytes
+from gen_data.exporters.sequences import write_bytes, write_text
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import DatasetInfo
@@ -113,6 +116,7 @@ class Voc(ExporterBase):
         root = dataset_dir / YEAR
         for folder in ("Main", "Segmentation"):
             (root / "ImageSets" / folder).mkdir(parents=True, exist_ok=True)
+        write_text(root / "labelmap.txt", labelmap_text(info.categories))
         with ExitStack() as stack:
             files: dict[str, Any] = {}
             for shard_dir, row in fragment_rows(shard_dirs, self.type, "images"):
@@ -145,7 +149,7 @@ class Voc(ExporterBase):
             "sensor": sensor,
             "sample": sample.index,
             "split": sample.split,
-            "shown": _shown(listed),
+            "shown": _shown(each_class(info, listed)),
         }
         folder = shard_dir / self.type
         text = annotation_text(info, truth, listed, file_name)
@@ -172,12 +176,19 @@ class Voc(ExporterBase):
         return info.media_path(shard_dir, row["sensor"], Channel.RGB, row["sample"])
 
 
+def labelmap_text(categories: Sequence[str]) -> str:
+    """Classes and colours of label images, as CVAT and Datumaro read them."""
+    names = {0: "background", **dict(enumerate(categories, 1)), VOID: "ignored"}
+    rows = (f"{names[k]}:{','.join(map(str, voc_palette()[k]))}::\n" for k in sorted(names))
+    return "# label:color_rgb:parts:actions\n" + "".join(rows)
+
+
 def annotation_text(
     info: DatasetInfo, truth: ImageTruth, listed: Sequence[ObjectTruth], file_name: str
 ) -> str:
     """Text of an XML file."""
     camera = truth.camera.intrinsics
-    objects = "".join(_object_text(info, thing) for thing in listed)
+    objects = "".join(_object_text(info, thing) for thing in each_class(info, listed))
     return (
         "<annotation>\n"
         f"\t<folder>VOC2012</folder>\n\t<filename>{escape(file_name)}</filename>\n"
@@ -238,7 +249,7 @@ def _object_text(info: DatasetInfo, thing: ObjectTruth) -> str:
     )
 
 
-def _shown(listed: Sequence[ObjectTruth]) -> dict[str, int]:
+def _shown(listed: Iterable[ObjectTruth]) -> dict[str, int]:
     """By category id: 1 if an object counts, 0 if all of them are ignored."""
     shown: dict[str, int] = {}
     for thing in listed:

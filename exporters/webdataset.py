@@ -5,14 +5,17 @@
     train/street-000000.tar, train/street-000001.tar, ...    val/..., test/...
         000000012.json              labels of the sample
         000000012.color.rgb.png     images: <camera>.<channel>.png
-        000000012.top.points.npy    laser scans: <lidar>.points.npy, records of ``POINT``
+        000000012.top.points.npy    laser scans: <lidar>.points.npy, the columns of ``POINT``
         000000012.imu.rows.npy      rows of other devices: <device>.rows.npy
 
 The key of a sample is its index; everything after the first dot is the name of a field, in lower
 case. A sensor that does not read at a sample has no field there.
 
+Arrays are matrices [rows, columns] of float32, or float64 where a column needs it: Hugging Face's
+reader of these files refuses records.
+
 ``json`` has ``index``, ``scene``, ``view``, ``step``, ``split``, ``time_s``, ``categories``,
-``depth_scale_m``, ``cameras`` and ``lidars``. A camera's entry is COCO's row of its image
+``depth_scale_m``, ``cameras``, ``lidars`` and ``columns``: names of the columns by field. A camera's entry is COCO's row of its image
 (``gen_data.exporters.coco``) with the rows of its objects under ``annotations``; a scanner's is its
 ``T_world_lidar`` and the instant of its sweep.
 
@@ -25,11 +28,14 @@ Reference: https://github.com/webdataset/webdataset, ``WebDataset`` and ``base_p
 from __future__ import annotations
 
 import io
+import math
 import tarfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
+import numpy as np
+from numpy.lib.recfunctions import structured_to_unstructured
 from pydantic import Field
 
 from gen_data.exporters.base import ANY_FORMAT, ExporterBase
@@ -142,9 +148,32 @@ def _fields(
         path = table_path(shard_dir, device, index)
         if path.exists():
             paths[f"{device}.rows.npy"] = path
-    for name in sorted({"json", *paths}):
-        data = paths[name].read_bytes() if name in paths else canonical_json(labels).encode()
-        yield name.lower(), data
+    columns: dict[str, list[str]] = {}
+    fields: dict[str, bytes] = {}
+    for name, path in paths.items():
+        if path.suffix == ".npy":
+            columns[name.lower()], fields[name] = _plain_npy(path)
+        else:
+            fields[name] = path.read_bytes()
+    fields["json"] = canonical_json({**labels, "columns": columns}).encode()
+    for name in sorted(fields):
+        yield name.lower(), fields[name]
+
+
+def _plain_npy(path: Path) -> tuple[list[str], bytes]:
+    """Names of the columns of an array of records, and the matrix as a file."""
+    records = np.load(path, allow_pickle=False)
+    columns = [
+        name if not shape else f"{name}[{k}]"
+        for name in records.dtype.names
+        for shape in (records.dtype[name].shape,)
+        for k in range(math.prod(shape))
+    ]
+    exact = all(np.can_cast(records.dtype[name].base, np.float32) for name in records.dtype.names)
+    matrix = structured_to_unstructured(records, np.float32 if exact else np.float64)
+    file = io.BytesIO()
+    np.save(file, matrix, allow_pickle=False)
+    return columns, file.getvalue()
 
 
 class _TarFiles:

@@ -10,8 +10,8 @@ Rows are ``class x y ...``, all coordinates divided by the width or height of th
 without objects has an empty file.
 
 * ``detect``: centre, width and height of the box around the visible pixels.
-* ``segment``: one polygon around the visible pixels, along their edges; lines without area join
-  its parts and lead to its holes.
+* ``segment``: one polygon around the visible pixels, 0.02 px inside their edges, which OpenCV draws
+  exactly; lines without area join its parts and lead to its holes.
 * ``obb``: four corners of the smallest rotated rectangle around the visible pixels that lies inside
   the image.
 * ``pose``: the box, then ``x y visibility`` of every keypoint of one category (0 = not in the
@@ -29,7 +29,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -41,7 +41,7 @@ from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.mask_polygons import Polygon, join_polygons, mask_polygons
+from gen_data.exporters.mask_polygons import drawable_polygons, join_polygons, mask_polygons
 from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.boxes import BoxPx
@@ -103,7 +103,7 @@ class Yolo(ExporterBase):
                     continue
                 row = self._image_row(info, sample, sensor)
                 rows.setdefault(f"{sample.split}.images", []).append(row)
-                for thing in sample.truth[sensor].objects:
+                for thing in (t for t in sample.truth[sensor].objects if not t.ignored):
                     listed = names.setdefault(thing.instance.category_id, {})
                     listed.update((p.name, None) for p in thing.keypoints or ())
         folder = shard_dir / self.type
@@ -260,20 +260,8 @@ def _detect_row(size: Array, thing: ObjectTruth) -> str:
 
 def _segment_row(size: Array, thing: ObjectTruth) -> str:
     assert thing.mask is not None, "the annotation instance_masks is in `needs`"
-    polygon = join_polygons(mask_polygons(thing.mask))
-    return f"{thing.instance.category_id - 1} {_vertices(polygon, int(size[0]), int(size[1]))}"
-
-
-def _vertices(polygon: Polygon, width_px: int, height_px: int) -> str:
-    """Whole-numbered vertices as fractions of the image, whose few values are formatted once."""
-    across, down = _fractions(width_px), _fractions(height_px)
-    return " ".join([f"{across[x]} {down[y]}" for x, y in polygon.tolist()])
-
-
-@lru_cache(8)
-def _fractions(length_px: int) -> list[str]:
-    """Texts of ``k / length_px``, for k from 0 to the length."""
-    return [f"{k / length_px:.7f}" for k in range(length_px + 1)]
+    outline = join_polygons(drawable_polygons(thing.mask))
+    return f"{thing.instance.category_id - 1} {_coordinates(outline / size)}"
 
 
 def _obb_row(size: Array, thing: ObjectTruth) -> str:

@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image, ImageDraw
-from pycocotools import mask as coco_mask
 
 from gen_data.exporters.cityscapes import Cityscapes
 from gen_data.exporters.cityscapes_classes import city_classes
 from gen_data.exporters.coco import Coco
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
+from tests.exporters.coco_masks import drawn_mask
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -94,7 +94,7 @@ def problems(root: Path, dataset: Path) -> list[str]:
         for row in coco["annotations"]:
             if row["image_id"] != image["id"]:
                 continue
-            mask = coco_mask.decode(row["segmentation"]).astype(bool)
+            mask = drawn_mask(row, coco)
             number = CLASS_OF[names[row["category_id"]]]
             code = number
             if number >= 24:

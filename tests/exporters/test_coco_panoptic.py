@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image
-from pycocotools import mask as coco_mask
 
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.coco_panoptic import CocoPanoptic
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError
+from tests.exporters.coco_masks import drawn_mask
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -209,9 +209,11 @@ def test_things_are_the_instances_of_coco(dataset: Path) -> None:
         listed = [s for s in annotation["segments_info"] if s["category_id"] in things]
         assert len(listed) == len(rows)
         for segment, row in zip(listed, rows, strict=True):
-            mask = coco_mask.decode(row["segmentation"]).astype(bool)
+            mask = drawn_mask(row, instances)
             np.testing.assert_array_equal(ids == segment["id"], mask)
             assert (segment["category_id"], segment["bbox"]) == (row["category_id"], row["bbox"])
+            named = segment["instance_id"], segment["annotation_id"]
+            assert named == (row["instance_id"], row["id"])
             count += 1
     assert count > 10
 

@@ -18,6 +18,7 @@ from pycocotools import mask as coco_mask
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.cvat import Cvat, row_runs
 from gen_data.generator.core.sample import MaskPx
+from tests.exporters.coco_masks import drawn_mask
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -80,9 +81,9 @@ def problems(root: Path, dataset: Path, shapes: str) -> list[str]:
                 found.append("class")
             if {e.get("occluded") for e in elements} != {str(int(row["occlusion"] > 0.05))}:
                 found.append("occluded")
-            mask = coco_mask.decode(row["segmentation"]).astype(bool)
+            mask = drawn_mask(row, coco)
             if shapes == "box":
-                x, y, w, h = row["bbox"]
+                x, y, w, h = map(int, row["bbox"])
                 mask[y : y + h, x : x + w] = True
             if not np.array_equal(drawn(elements, *mask.shape), mask):
                 found.append("shape")
@@ -108,7 +109,7 @@ def _change(pattern: str, new: Any) -> Callable[[Path], None]:
     ("shapes", "damage", "named"),
     [
         ("box", _change(r'xbr="(\d+)"', lambda m: f'xbr="{int(m[1]) - 1}"'), "shape"),
-        ("polygon", _change(r'points="\d+,', 'points="0,'), "shape"),
+        ("polygon", _change(r'points="[\d.]+,', 'points="0,'), "shape"),
         ("mask", _change('label="car"', 'label="crate"'), "class"),
         ("mask", _change('group_id="4"', 'group_id="5"'), "objects"),
         ("mask", _change('image id="0"', 'image id="1"'), "numbers"),

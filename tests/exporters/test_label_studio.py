@@ -22,6 +22,7 @@ from pycocotools import mask as coco_mask
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.label_studio import LOCAL_FILES, LabelStudio, brush_rle
 from gen_data.generator.core.sample import MaskPx
+from tests.exporters.coco_masks import drawn_mask
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -97,6 +98,8 @@ def problems(root: Path, dataset: Path, shapes: str) -> list[str]:
     files = [unquote(t["data"]["image"]).removeprefix(f"{LOCAL_FILES}label_studio/") for t in tasks]
     if files != sorted(str(p.relative_to(root)) for p in (root / "train/images").iterdir()):
         found.append("files")
+    if [task["id"] for task in tasks] != [image["id"] for image in coco["images"]]:
+        found.append("ids")
     for task, image in zip(tasks, coco["images"], strict=True):
         expected = [a for a in coco["annotations"] if a["image_id"] == image["id"]]
         objects: dict[str, list[dict[str, Any]]] = {}
@@ -109,20 +112,22 @@ def problems(root: Path, dataset: Path, shapes: str) -> list[str]:
             continue
         for row, regions in zip(expected, objects.values(), strict=True):
             row["keypoints"] = points.get(row["id"], [])
-            found += _object_problems(row, regions, names[row["category_id"]], shapes)
+            found += _object_problems(row, regions, names[row["category_id"]], shapes, coco)
     return found
 
 
 def _object_problems(
-    row: dict[str, Any], regions: list[dict[str, Any]], name: str, shapes: str
+    row: dict[str, Any], regions: list[dict[str, Any]], name: str, shapes: str, coco: dict[str, Any]
 ) -> list[str]:
     found = []
     outlines = [r for r in regions if r["type"] != "keypointlabels"]
     if {label for r in outlines for label in r["value"][r["type"]]} != {name}:
         found.append("class")
-    mask = coco_mask.decode(row["segmentation"]).astype(bool)
+    if len(outlines) != 1:
+        found.append("parts")
+    mask = drawn_mask(row, coco)
     if shapes == "box":
-        x, y, w, h = row["bbox"]
+        x, y, w, h = map(int, row["bbox"])
         mask[y : y + h, x : x + w] = True
     if not np.array_equal(drawn(outlines), mask):
         found.append("shape")

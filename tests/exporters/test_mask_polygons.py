@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
+from PIL import Image, ImageDraw
 from pycocotools import mask as coco_mask
 
-from gen_data.exporters.mask_polygons import join_polygons, mask_polygons
+from gen_data.exporters.mask_polygons import drawable_polygons, join_polygons, mask_polygons
 from gen_data.generator.core.sample import MaskPx
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
@@ -65,6 +69,68 @@ def test_a_joined_polygon_covers_the_same_pixels(pixels: NDArray[np.bool_]) -> N
     joined = join_polygons(polygons)
 
     assert area(joined) == pixels.sum()
+
+
+def drawn_by_opencv(polygons: list[NDArray[np.float64]], h: int, w: int) -> NDArray[np.bool_]:
+    """Union as Ultralytics, supervision and CVAT draw polygons: vertices cut to whole numbers."""
+    picture = np.zeros((h, w), np.uint8)
+    for polygon in polygons:
+        cv2.fillPoly(picture, [polygon.astype(np.int32)], 1)
+    return picture.astype(bool)
+
+
+def drawn_by_pillow(polygons: list[NDArray[np.float64]], h: int, w: int) -> NDArray[np.bool_]:
+    """Union as PIL draws polygons."""
+    picture = Image.new("1", (w, h))
+    for polygon in polygons:
+        ImageDraw.Draw(picture).polygon(polygon.astype(int).ravel().tolist(), fill=1)
+    return np.array(picture, bool)
+
+
+@settings(deadline=None)
+@given(masks)
+def test_pycocotools_draws_exactly_the_mask_of_drawable_polygons(pixels: NDArray[np.bool_]) -> None:
+    """Also at borders of the image, with holes, and where pixels touch at corners."""
+    polygons = drawable_polygons(MaskPx(0, 0, pixels))
+
+    np.testing.assert_array_equal(drawn(polygons, *pixels.shape), pixels)
+
+
+@pytest.mark.parametrize("draw", [drawn_by_opencv, drawn_by_pillow])
+@settings(deadline=None)
+@given(widths=st.lists(st.tuples(st.integers(0, 9), st.integers(2, 9)), min_size=2, max_size=12))
+def test_other_rasterisers_draw_exactly_the_mask(
+    draw: Callable[..., NDArray[np.bool_]], widths: list[tuple[int, int]]
+) -> None:
+    """Which include the last pixel of an edge; along the edges of pixels they draw one too many."""
+    pixels = np.zeros((2 * len(widths), 20), bool)
+    for row, (first, width) in enumerate(widths):
+        pixels[2 * row : 2 * row + 2, first : first + width] = True
+    (solid, *_) = cv2.connectedComponents(pixels.astype(np.uint8), connectivity=4)
+    polygons = drawable_polygons(MaskPx(0, 0, pixels))
+
+    assert len(polygons) == solid - 1
+    np.testing.assert_array_equal(draw(polygons, *pixels.shape), pixels)
+
+
+def test_vertices_of_a_drawable_square_lie_inside_its_edges() -> None:
+    """By 0.02 px: pycocotools, OpenCV and PIL draw 100 pixels; edge to edge, the last two 121."""
+    pixels = MaskPx(0, 0, np.ones((10, 10), bool))
+    (polygon,), (exact,) = drawable_polygons(pixels), mask_polygons(pixels)
+
+    assert polygon.tolist() == [[0.02, 0.02], [9.98, 0.02], [9.98, 9.98], [0.02, 9.98]]
+    for draw in (drawn, drawn_by_opencv, drawn_by_pillow):
+        assert draw([polygon], 12, 12).sum() == 100
+    assert [d([exact], 12, 12).sum() for d in (drawn_by_opencv, drawn_by_pillow)] == [121, 121]
+
+
+def test_a_joined_drawable_polygon_covers_the_pixels() -> None:
+    """Parts and holes; OpenCV also draws the pixels of the lines that join parts."""
+    pixels = np.ones((9, 9), bool)
+    pixels[3:6, 3:6] = pixels[:, 7] = False
+    joined = join_polygons(drawable_polygons(MaskPx(0, 0, pixels)))
+
+    np.testing.assert_array_equal(drawn([joined], 9, 9), pixels)
 
 
 def test_a_rectangle_has_its_four_corners() -> None:

@@ -17,6 +17,7 @@ from PIL import Image
 from tfrecord.reader import tfrecord_iterator
 
 from gen_data.exporters import tfrecord
+from gen_data.exporters.label_map import LabelMap, MappedExporter
 from gen_data.exporters.tfrecord import TfRecord, encode_features, frame_record, label_map
 from gen_data.generator.core import optional_packages
 from gen_data.generator.core.capture import Channel, ImageEncoding
@@ -212,3 +213,20 @@ def test_jpeg_files_are_embedded(world: Any, tmp_path: Path) -> None:
     assert image.format == "JPEG"
     rendered = world.samples[0].capture.readings["color"].channels[Channel.RGB]
     assert np.abs(np.asarray(image, int) - rendered).mean() < 4
+
+
+def test_an_ignored_region_without_a_class_is_a_crowd_of_every_class(
+    world: Any, tmp_path: Path
+) -> None:
+    """Label 0 is the background of TensorFlow's readers."""
+    mapped = LabelMap(classes={"box": ("crate",), "walker": ("pedestrian",)}, others="ignore")
+    car = world.instance(1, "car", 9.0, 2.5, 0.0)
+    sample = world.sample(0, (car,), [world.camera()])
+
+    folder = world.export(MappedExporter(TfRecord(), mapped), world.info(1), [sample], tmp_path)
+
+    (path,) = folder.glob("train*.tfrecord")
+    (record,) = [features(bytes(r)) for r in tfrecord_iterator(str(path))]
+    assert record["image/object/class/label"][1] == [1, 2]
+    assert record["image/object/class/text"][1] == [b"box", b"walker"]
+    assert record["image/object/is_crowd"][1] == [1, 1]

@@ -16,6 +16,7 @@ from PIL import Image
 
 from gen_data.exporters.coco import Coco
 from gen_data.exporters.label_colors import voc_palette
+from gen_data.exporters.label_map import LabelMap, MappedExporter
 from gen_data.exporters.voc import YEAR, Voc
 from gen_data.generator.core.errors import ConfigError
 
@@ -222,3 +223,36 @@ def test_too_many_categories_are_refused(world: Any) -> None:
 
     with pytest.raises(ConfigError, match="room for 254 categories, but there are 255"):
         Voc().check(info)
+
+
+def test_the_label_map_file_names_classes_by_their_colours(dataset: Path) -> None:
+    """Rows ``name:r,g,b:parts:actions``, as CVAT and Datumaro read them; void is "ignored"."""
+    root = dataset / "voc/dataset" / YEAR
+    rows = [line.split(":") for line in (root / "labelmap.txt").read_text().splitlines()[1:]]
+    color_of = {name: tuple(map(int, color.split(","))) for name, color, *_ in rows}
+    with Image.open(next((root / "SegmentationClass").iterdir())) as image:
+        palette = np.array(image.getpalette()).reshape(-1, 3).tolist()
+
+    assert list(color_of) == ["background", "car", "crate", "pedestrian", "ignored"]
+    assert [list(c) for c in color_of.values()] == [palette[k] for k in (0, 1, 2, 3, 255)]
+
+
+def test_an_ignored_object_without_a_class_is_difficult_in_every_class(
+    world: Any, tmp_path: Path
+) -> None:
+    """VOC's evaluation leaves out difficult objects class by class."""
+    exporter = MappedExporter(
+        Voc(), LabelMap(classes={"box": ("crate",), "walker": ("pedestrian",)}, others="ignore")
+    )
+    objects = (
+        world.instance(1, "car", 9.0, 2.5, 0.0),
+        world.instance(2, "crate", 8.0, -1.0, 0.0),
+    )
+    sample = world.sample(0, objects, [world.camera()])
+
+    root = world.export(exporter, world.info(1), [sample], tmp_path) / YEAR
+
+    rows = objects_of(root / "Annotations/000000000_color.xml")
+    listed = [(row["name"], row["difficult"]) for row in rows]
+    assert listed == [("box", "0"), ("box", "1"), ("walker", "1")]
+    assert (root / "ImageSets/Main/walker_train.txt").read_text() == "000000000_color  0\n"

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import webdataset
+from numpy.typing import NDArray
 from pycocotools import mask as coco_mask
 
 from gen_data.exporters.webdataset import WebDataset
@@ -50,6 +51,18 @@ def read(folder: Path) -> list[dict[str, Any]]:
     return samples
 
 
+def same_columns(matrix: NDArray[Any], columns: list[str], truth: Any) -> bool:
+    """Whether a matrix of float32 has every number of the records of a scan under its name."""
+    points = truth.capture.clouds["top"].points
+    named = {f"position_m[{k}]": points["position_m"][:, k] for k in range(3)}
+    named |= {name: points[name] for name in POINT.names or () if name != "position_m"}
+    return (
+        matrix.dtype == np.float32
+        and columns == list(named)
+        and all(np.array_equal(matrix[:, k], named[name]) for k, name in enumerate(columns))
+    )
+
+
 def faults(folder: Path, world: Any) -> list[str]:
     """Differences between the tar files of a split and the samples."""
     found = []
@@ -75,7 +88,7 @@ def faults(folder: Path, world: Any) -> list[str]:
             # The world paints instance k in green 20 k.
             if not np.array_equal(mask, image[..., 1] == 20 * row["instance_id"]):
                 found.append(f"mask {row['id']}")
-        if sample["top.points.npy"].dtype != POINT:
+        if not same_columns(sample["top.points.npy"], labels["columns"]["top.points.npy"], truth):
             found.append("points")
     return found
 
@@ -119,6 +132,20 @@ def test_sensors_that_do_not_read_have_no_field(world: Any, slow: Any, tmp_path:
 
     whole, less = {"left.rgb.png", "right.rgb.png", "top.points.npy"}, {"left.rgb.png"}
     assert fields == [whole, less, whole, less]
+
+
+@pytest.mark.slow
+def test_hugging_face_reads_scans_and_rows(dataset: Path, world: Any) -> None:
+    """Its reader refuses arrays of records."""
+    datasets = pytest.importorskip("datasets")
+    files = sorted(map(str, (dataset / "train").glob("*.tar")))
+
+    loaded = datasets.load_dataset("webdataset", data_files=files, split="train", streaming=True)
+
+    expected = [s for s in world.samples if s.split == "train"]
+    for row, sample in zip(loaded, expected, strict=True):
+        columns = row["json"]["columns"]["top.points.npy"]
+        assert same_columns(np.array(row["top.points.npy"], np.float32), columns, sample)
 
 
 def renamed(members: Members, old: str, new: str) -> Members:

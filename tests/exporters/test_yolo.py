@@ -20,6 +20,7 @@ from gen_data.exporters.coco import Coco
 from gen_data.exporters.yolo import Yolo, inner_rectangle
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.se3 import SE3
+from tests.exporters.coco_masks import drawn_mask
 
 # pycocotools' decoder predates numpy 2's __array__(copy=...).
 pytestmark = pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
@@ -89,7 +90,8 @@ def problems(task_folder: Path, dataset: Path) -> list[str]:
                     box = [cx - bw / 2, cy - bh / 2, bw, bh]
                 else:
                     points = np.array(row[1:]).reshape(-1, 2) * [w, h]
-                    box = [*points.min(axis=0), *np.ptp(points, axis=0)]
+                    # Polygons lie 0.02 px inside the edges of their pixels.
+                    box = [*points.min(axis=0) - 0.02, *np.ptp(points, axis=0) + 0.04]
                 if np.abs(np.array(box) - [x, y, width, height]).max() > 0.01:
                     found.append("box")
     return found
@@ -153,14 +155,11 @@ def masks_of(dataset: Path, split: str) -> list[tuple[str, Any, Any]]:
     """Name of the image, COCO's row and its mask for every object, in order."""
     coco = coco_of(dataset, split)
     names = {i["id"]: Path(i["file_name"]).stem for i in coco["images"]}
-    return [
-        (names[a["image_id"]], a, coco_mask.decode(a["segmentation"]).astype(bool))
-        for a in coco["annotations"]
-    ]
+    return [(names[a["image_id"]], a, drawn_mask(a, coco)) for a in coco["annotations"]]
 
 
 def test_a_segment_is_the_outline_of_the_mask(dataset: Path) -> None:
-    """Drawn by pycocotools, every polygon gives the mask back, also of objects in two parts."""
+    """Drawn by pycocotools and OpenCV, every polygon gives the mask back, also of two parts."""
     folder = dataset / "yolo/dataset/segment"
     places: dict[str, int] = {}
     parts = 0
@@ -168,13 +167,15 @@ def test_a_segment_is_the_outline_of_the_mask(dataset: Path) -> None:
         place = places[stem] = places.get(stem, -1) + 1
         h, w = mask.shape
         points = np.array(rows_of(folder, "train", stem)[place][1:]).reshape(-1, 2) * [w, h]
-        (rle,) = coco_mask.frPyObjects([np.rint(points).ravel().tolist()], h, w)
+        (rle,) = coco_mask.frPyObjects([points.ravel().tolist()], h, w)
         drawn = coco_mask.decode(rle).astype(bool)
+        filled = cv2.fillPoly(np.zeros((h, w), np.uint8), [points.astype(np.int32)], 1)
         count, *_ = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
         parts = max(parts, count - 1)
         # A line between parts may round to pixels of its own.
         assert (drawn != mask).sum() <= (0 if count == 2 else 60), row["id"]
-        np.testing.assert_allclose(points, np.rint(points), atol=1e-4)
+        assert (filled.astype(bool) != mask).sum() <= (0 if count == 2 else 60), row["id"]
+        np.testing.assert_allclose(np.abs(points - np.rint(points)), 0.02, atol=1e-4)
     assert parts >= 2
 
 
