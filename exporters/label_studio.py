@@ -6,8 +6,8 @@
     <split>/tasks.json           a task per image; the file to import
     <split>/images/000000012_color.png
 
-Every visible object is one region, a brush mask, a polygon or a box, so that converters find as many
-objects; its keypoints belong to it (``parentID``). The id of a region is the instance id.
+Every visible object is one region, a brush mask, a polygon or a box: converters make one object of
+each region. Its keypoints belong to it (``parentID``). The id of a region is the instance id.
 Coordinates are percent of the image's width and height; polygons run 0.02 px inside the edges of
 pixels, and lines without area join an object's parts and lead to its holes. A brush mask is the run
 lengths of its image, all four channels of a pixel alike; Label Studio's converter to COCO leaves
@@ -122,14 +122,12 @@ class LabelStudio(ImageRowsExporter):
             facts["ground_truth"] = True
         else:
             facts.update(model_version="gen-data", score=1.0)
+        task = {"id": sample.image_id(sensor), "data": data, self.kind: [facts]}
         return {
             "file_name": name,
             "keypoints": sorted(_keypoint_names(regions)),
             # As text, which merging copies: regions have thousands of numbers.
-            "task": json.dumps(
-                {"id": sample.image_id(sensor), "data": data, self.kind: [facts]},
-                separators=(",", ":"),
-            ),
+            "task": json.dumps(task, separators=(",", ":")),
         }
 
 

@@ -15,9 +15,9 @@ Arrays are matrices [rows, columns] of float32, or float64 where a column needs 
 reader of these files refuses records.
 
 ``json`` has ``index``, ``scene``, ``view``, ``step``, ``split``, ``time_s``, ``categories``,
-``depth_scale_m``, ``cameras``, ``lidars`` and ``columns``: names of the columns by field. A camera's entry is COCO's row of its image
-(``gen_data.exporters.coco``) with the rows of its objects under ``annotations``; a scanner's is its
-``T_world_lidar`` and the instant of its sweep.
+``depth_scale_m``, ``cameras``, ``lidars`` and ``columns``: names of the columns by field. A
+camera's entry is COCO's row of its image (``gen_data.exporters.coco``) with the rows of its objects
+under ``annotations``; a scanner's is its ``T_world_lidar`` and the instant of its sweep.
 
 Tar files hold a fixed number of samples and no time, user or mode of the machine; images are the
 shards' PNG files, ``gen_data.exporters.image_files`` states their units.

@@ -41,7 +41,12 @@ from gen_data.exporters.base import ANY_FORMAT, ExporterBase
 from gen_data.exporters.coco import image_name
 from gen_data.exporters.fragments import fragment_lines, fragment_rows, write_fragment
 from gen_data.exporters.image_files import link_or_copy
-from gen_data.exporters.mask_polygons import drawable_polygons, join_polygons, mask_polygons
+from gen_data.exporters.mask_polygons import (
+    Polygon,
+    drawable_polygons,
+    join_polygons,
+    mask_polygons,
+)
 from gen_data.exporters.sensor_selection import check_channels, rgb_cameras
 from gen_data.exporters.sequences import write_text
 from gen_data.generator.core.boxes import BoxPx
