@@ -21,10 +21,10 @@ from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.errors import ConfigError, ConfigWarning, did_you_mean
 from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, Exporter
+from gen_data.generator.core.path_names import CATEGORY_MAX, check_name
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
 from gen_data.generator.core.scene import Instance, Scene
 
-CLASS_NAME_MAX = 60
 PublicList = Literal["coco80", "kitti", "nuscenes", "cityscapes", "nyu40", "ade20k"]
 Sources = tuple[str, ...]
 """Categories of the data set."""
@@ -74,11 +74,10 @@ class LabelMap(Strict):
     def _has_each_category_once(self) -> LabelMap:
         seen: dict[str, str] = {}
         for name, categories in self.classes_of.items():
-            if not name.strip() or not name.isprintable() or len(name) > CLASS_NAME_MAX:
-                raise ValueError(
-                    f"class {name[:CLASS_NAME_MAX]!r}: expected a name of 1 to {CLASS_NAME_MAX} "
-                    "printable characters"
-                )
+            try:
+                check_name(name, CATEGORY_MAX)
+            except ValueError as error:
+                raise ValueError(f"class {error}") from None
             for category in categories:
                 if category in seen:
                     raise ValueError(

@@ -31,6 +31,7 @@ from gen_data.generator.core.interfaces import (
     Sensor,
     SensorInfo,
 )
+from gen_data.generator.core.path_names import CATEGORY_MAX, check_name
 from gen_data.generator.core.plates import has_plate
 from gen_data.generator.core.scene import LABEL_IDS_MAX, Scene, SharedValue
 from gen_data.generator.physics import missing_engine, open_engine
@@ -116,7 +117,11 @@ class PipelineFactory:
 
     @cached_property
     def categories(self) -> tuple[str, ...]:
-        """Sorted names of all categories that a sample may contain."""
+        """Sorted names of all categories that a sample may contain.
+
+        Raises:
+            ConfigError: a category, which names files, cannot name one.
+        """
         if self.known_categories is not None:
             return self.known_categories
         return collect_categories(self.nominal, self.library)
@@ -326,6 +331,11 @@ def collect_categories(scenes: Sequence[Scene], assets: AssetIndex) -> tuple[str
         if group.annotated
         for asset_id in group.assets
     }
+    for category in sorted(placed | possible):
+        try:
+            check_name(category, CATEGORY_MAX)
+        except ValueError as error:
+            raise ConfigError(f"category {error}") from None
     return tuple(sorted(placed | possible))
 
 

@@ -10,10 +10,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Annotated, Literal, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from gen_data.generator.assets.asset_folder import (
     Folder,
@@ -32,6 +33,7 @@ from gen_data.generator.config.validation import validate
 from gen_data.generator.config.yaml_tree import Node, find_text, load_yaml
 from gen_data.generator.core.asset_types import WORKSPACE_FROM_M
 from gen_data.generator.core.errors import AssetError, did_you_mean
+from gen_data.generator.core.path_names import CATEGORY_MAX, check_name
 from gen_data.generator.core.scene import LaneKind
 from gen_data.generator.core.se3 import Vec3
 
@@ -48,7 +50,7 @@ Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 Luminance = Annotated[float, Field(ge=0.0)]
 Id = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*(/[A-Za-z0-9_][A-Za-z0-9_.\-]*)*$",
                           max_length=120)]  # fmt: skip
-Category = Annotated[str, Field(min_length=1, max_length=60)]
+Category = Annotated[str, AfterValidator(partial(check_name, longest=CATEGORY_MAX))]
 Axis = Literal["x", "-x", "y", "-y", "z", "-z"]
 Word = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_\-]*$", max_length=60)]
 

@@ -27,6 +27,7 @@ from gen_data.generator.config.data_files import load_data
 from gen_data.generator.config.yaml_scalars import to_flow_yaml
 from gen_data.generator.core.capture import Channel
 from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo
+from gen_data.generator.core.markdown import plain
 from gen_data.generator.runner.labels import LABELS_NAME
 from gen_data.generator.runner.licence_table import licences_in
 from gen_data.generator.runner.plan import PLAN_NAME, Plan, plan_bytes
@@ -140,8 +141,8 @@ def data_card(facts: DatasetFacts) -> str:
     names = [count.split for count in facts.splits]
     objects = [sum(count.objects.values()) for count in facts.splits]
     return _CARD.format(
-        title=title_of(info),
-        description=describe_dataset(info),
+        title=plain(title_of(info)),
+        description=plain(describe_dataset(info)),
         samples=info.n,
         scenes=facts.scenes,
         views=info.views_per_scene,
@@ -200,12 +201,7 @@ def _steps(info: DatasetInfo) -> str:
 
 
 def _table(rows: Iterator[tuple[Any, ...]]) -> str:
-    return "\n".join("| " + " | ".join(_cell(value) for value in row) + " |" for row in rows)
-
-
-def _cell(value: Any) -> str:
-    """Text of a table's cell; a vertical bar would end it."""
-    return str(value).replace("|", r"\|").replace("\n", " ")
+    return "\n".join("| " + " | ".join(map(plain, row)) + " |" for row in rows)
 
 
 def _sensor_rows(info: DatasetInfo) -> Iterator[tuple[Any, ...]]:
@@ -266,9 +262,11 @@ def _item_name(item: Any) -> str:
 
 def _licence_text(facts: DatasetFacts) -> str:
     own = facts.info.publication.license
-    lines = [f"The data set: {own}." if own else "The publisher has stated no licence of its own."]
+    lines = [
+        f"The data set: {plain(own)}." if own else "The publisher has stated no licence of its own."
+    ]
     if facts.asset_licences is not None:
-        names = ", ".join(facts.licences) or "none"
+        names = plain(", ".join(facts.licences)) or "none"
         lines.append(
             f"Licences of the assets in its scenes: {names}. "
             "[LICENSES-ASSETS.md](LICENSES-ASSETS.md) lists their sources and authors."
@@ -280,10 +278,10 @@ def _citation(info: DatasetInfo) -> str:
     """Section on creators, page and citation; empty without any."""
     facts = info.publication
     lines = [
-        f"Creators: {', '.join(facts.creators)}." if facts.creators else "",
+        f"Creators: {plain(', '.join(facts.creators))}." if facts.creators else "",
         f"Published: {facts.date_published}." if facts.date_published else "",
-        f"Web page: <{facts.url}>." if facts.url else "",
-        f"```\n{facts.cite_as.strip()}\n```" if facts.cite_as else "",
+        f"Web page: <{plain(facts.url)}>." if facts.url else "",
+        f"```\n{facts.cite_as.strip().replace('```', '')}\n```" if facts.cite_as else "",
     ]
     text = "\n\n".join(line for line in lines if line)
     return f"\n## Publication\n\n{text}\n" if text else ""

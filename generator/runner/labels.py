@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from gen_data.generator.core.path_names import check_name
 from gen_data.generator.core.sample import EgoTruth, ImageTruth, ObjectTruth, Sample
 from gen_data.generator.core.scene import Device, Instance, Lidar
 from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
@@ -100,7 +101,11 @@ def parse_labels(line: bytes | str) -> Labels:
         for item in image["objects"]:
             if isinstance(item["instance"], int):
                 item["instance"] = instances[item["instance"]]
-    return from_plain(Labels, plain)
+    labels = from_plain(Labels, plain)
+    # They become parts of paths.
+    for name in (labels.split, *labels.images, *labels.scans, *labels.tables):
+        check_name(name)
+    return labels
 
 
 def _plain_image(truth: ImageTruth, instances: Mapping[int, Instance]) -> dict[str, Any]:

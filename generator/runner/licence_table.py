@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import html
+import re
 from collections.abc import Iterable
 
 from gen_data.generator.core.asset_types import Asset
+from gen_data.generator.core.markdown import plain
 
+_BAR = re.compile(r"(?<!\\)\|")
 _HEADER = ("source", "licence", "author", "assets")
 
 
@@ -24,9 +28,10 @@ def licence_table(assets: Iterable[Asset]) -> str:
 
 def licences_in(table: str) -> list[str]:
     """Names of the licences in a table of ``licence_table``, sorted; empty for other texts."""
-    rows = [line.strip("|").split("|") for line in table.splitlines() if line.startswith("|")]
-    return sorted({row[1].strip() for row in rows[2:] if len(row) == len(_HEADER)})
+    rows = [_BAR.split(line.strip("|")) for line in table.splitlines() if line.startswith("|")]
+    cells = {row[1].strip() for row in rows[2:] if len(row) == len(_HEADER)}
+    return sorted(html.unescape(cell.replace(r"\|", "|")) for cell in cells)
 
 
 def _row(*cells: str) -> str:
-    return f"| {' | '.join(cells)} |"
+    return f"| {' | '.join(map(plain, cells))} |"

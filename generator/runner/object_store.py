@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from gen_data.generator.core.errors import ConfigError, GenDataError, StorageError
+from gen_data.generator.core.path_names import check_inner_path
 from gen_data.generator.core.urls import is_url
 from gen_data.generator.runner.durable_files import (
     Inode,
@@ -130,7 +131,21 @@ class ObjectFolder:
         with self.errors() as system:
             system.invalidate_cache()
             found = system.find(self.path(inner).rstrip("/"), detail=True)
-        return {path[start:]: int(entry["size"]) for path, entry in sorted(found.items())}
+        sizes = {path[start:]: int(entry["size"]) for path, entry in sorted(found.items())}
+        for name in sizes:
+            self.check_name(name)
+        return sizes
+
+    def check_name(self, name: str) -> str:
+        """Return a name that is that of a file in a folder.
+
+        Raises:
+            StorageError: as a path, it would lead out of the folder.
+        """
+        try:
+            return check_inner_path(name)
+        except ValueError as error:
+            raise StorageError(f"{self.url}: {error}; the data set is not read") from None
 
     def read(self, names: Iterable[str]) -> dict[str, bytes]:
         """``{name: bytes}`` of the objects that exist."""
@@ -431,7 +446,7 @@ def copy_outline(objects: ObjectFolder, folder: Path) -> None:
                 (folder / name.removesuffix(".json") / inner).mkdir(parents=True)
     manifest = parse_object(found.get(MANIFEST_NAME, b"")) or {}
     for inner in manifest.get("empty_folders", []):
-        (folder / inner).mkdir(parents=True, exist_ok=True)
+        (folder / objects.check_name(str(inner))).mkdir(parents=True, exist_ok=True)
 
 
 def _has_sizes(record: ShardRecord, sizes: dict[str, int]) -> bool:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from gen_data.generator.core.bounded_cache import ObjectCache
+from gen_data.generator.core.path_names import check_name
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import canonical_json, fields_from_plain, from_plain
@@ -90,6 +91,7 @@ def parse_scene(line: bytes | str, scene_of: Callable[[int], Scene]) -> KeptScen
     """
     row = json.loads(line)
     base, own = row.pop("base"), row.pop("scene")
+    check_name(row["split"])
     if base is None:
         return KeptScene(**row, scene=from_plain(Scene, own))
     scene = dataclasses.replace(scene_of(base), **fields_from_plain(Scene, own))

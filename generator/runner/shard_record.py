@@ -15,6 +15,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from gen_data.generator.core.errors import StorageError
+from gen_data.generator.core.path_names import check_inner_path
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene_assets import assets_in
 from gen_data.generator.core.serialization import canonical_json, from_plain, to_plain
@@ -35,6 +36,10 @@ class FileRecord:
     path: str
     bytes: int
     sha256: str
+
+    def __post_init__(self) -> None:
+        """Refuse a path that leaves the shard's folder: records may come from elsewhere."""
+        check_inner_path(self.path)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +75,11 @@ class ShardRecord:
     files: tuple[FileRecord, ...]
     empty_folders: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Refuse folders outside the shard's folder."""
+        for folder in self.empty_folders:
+            check_inner_path(folder)
+
     @property
     def size_bytes(self) -> int:
         """Size of all its files."""
@@ -92,6 +102,8 @@ def parse_record(data: bytes) -> ShardRecord | None:
 
 def parse_unchecked_record(data: bytes) -> ShardRecord | None:
     """Parse the bytes of a record whose digest is known otherwise; None if they are no record.
+
+    A record with a path outside its shard's folder is none.
 
     Records of format version 1 have no checksum; the manifest of a finished data set has their
     digests.
@@ -133,9 +145,12 @@ def describe_shard(
         raise StorageError(
             f"shard {shard}: {irregular[0]} is not a regular file; exporters must write files"
         )
-    files = tuple(
-        FileRecord(path, size, _digest(folder / path, known)) for path, size in sizes.items()
-    )
+    try:
+        files = tuple(
+            FileRecord(path, size, _digest(folder / path, known)) for path, size in sizes.items()
+        )
+    except ValueError as error:
+        raise StorageError(f"shard {shard}: {error}; exporters must write such files") from None
     return ShardRecord(
         shard,
         indices.start,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -23,6 +24,7 @@ from gen_data.generator.core.capture import (
 )
 from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.interfaces import DatasetInfo, cloud_path, table_path
+from gen_data.generator.core.path_names import check_name
 from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import from_plain
@@ -202,7 +204,11 @@ class StoredSamples:
         path = self.folder / MANIFEST_NAME
         try:
             manifest = json.loads(path.read_bytes())
-            return from_plain(DatasetInfo, manifest["info"]), str(manifest["dataset_id"])
+            info = from_plain(DatasetInfo, manifest["info"])
+            check_name(info.name)
+            for name in (*info.categories, *(sensor.name for sensor in info.sensors)):
+                check_name(name)
+            return info, parse_dataset_id(manifest, path)
         except FileNotFoundError:
             raise StorageError(
                 f"{path}: missing; the data set is unfinished: run the command that began it again"
@@ -220,6 +226,20 @@ class StoredSamples:
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Open the folder."""
         self.__init__(state["folder"])  # type: ignore[misc]
+
+
+def parse_dataset_id(manifest: Mapping[str, Any], place: object) -> str:
+    """The id in a manifest, which names a folder.
+
+    Raises:
+        StorageError: it is not the sha256 of a data set.
+    """
+    identity = manifest.get("dataset_id")
+    if not isinstance(identity, str) or not re.fullmatch(r"[0-9a-f]{64}", identity):
+        raise StorageError(
+            f"{place}: damaged (dataset_id is no sha256); expected the manifest of a data set"
+        )
+    return identity
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
@@ -16,7 +17,7 @@ from gen_data.generator.runner.plan import PLAN_NAME
 from gen_data.generator.runner.seal import parse_object
 from gen_data.generator.runner.shard_record import parse_unchecked_record
 from gen_data.generator.runner.store import MANIFEST_NAME, SHARDS_NAME
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.generator.runner.stored import StoredSamples, parse_dataset_id
 
 
 def open_stored(place: str | os.PathLike[str]) -> StoredSamples:
@@ -50,9 +51,9 @@ class StoredObjects(StoredSamples):
                 f"{self.url}: no finished data set: {PLAN_NAME} or {MANIFEST_NAME} is missing; "
                 "run the command that began it again"
             )
-        self._record_digests: list[str] = manifest.get("shards", [])
+        self._record_digests: Sequence[str] = manifest.get("shards", [])
         cache = url_cache_dir()
-        folder = cache / str(manifest["dataset_id"])
+        folder = cache / parse_dataset_id(manifest, self.url)
         (folder / SHARDS_NAME).mkdir(parents=True, exist_ok=True)
         for name, data in documents.items():
             unfinished = Path(mkdtemp(dir=cache)) / name
@@ -72,7 +73,8 @@ class StoredObjects(StoredSamples):
         name = f"{SHARDS_NAME}/{shard:06d}.json"
         data = self._objects.read([name]).get(name, b"")
         record = parse_unchecked_record(data)
-        if record is None or hashlib.sha256(data).hexdigest() != self._record_digests[shard]:
+        expected = self._record_digests[shard : shard + 1]
+        if record is None or [hashlib.sha256(data).hexdigest()] != list(expected):
             raise StorageError(
                 f"{self.url}/{name}: missing, or its sha256 is not the one in the manifest; check "
                 f"the data set with:\n    gen-data verify {self.url}"

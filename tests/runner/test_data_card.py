@@ -14,9 +14,10 @@ from typing import Any
 
 import pytest
 
+from gen_data.generator.core.asset_types import Asset
 from gen_data.generator.core.interfaces import DatasetInfo, Publication
 from gen_data.generator.runner.data_card import DatasetFacts, croissant_json, data_card
-from gen_data.generator.runner.licence_table import licences_in
+from gen_data.generator.runner.licence_table import licence_table, licences_in
 from gen_data.generator.runner.run import Settings
 from gen_data.generator.runner.shard_record import SplitCount
 from tests.runner.doubles import FakePipeline, Trouble, fake_plan, make
@@ -59,6 +60,24 @@ def test_the_card_counts_and_states_the_publication() -> None:
         "@misc{mugs}",
     ):
         assert line in card
+
+
+def test_texts_of_users_are_no_html_in_the_card_and_the_table_of_licences() -> None:
+    """Pages that show Markdown run HTML in it; a bar would begin another cell."""
+    tag = "<img src=x>"
+    mug = Asset("user/mug", "object", "mug", (), f"{tag}|A", tag, f"{tag}\n# b", "")
+    table = licence_table([mug])
+    named = replace(
+        PUBLICATION, title=tag, description=tag, license=tag, creators=(tag,), cite_as="```" + tag
+    )
+    card = data_card(replace(facts(named), asset_licences=table))
+
+    assert licences_in(table) == [f"{tag}|A"]
+    assert len(table.splitlines()) == 5
+    assert tag not in table
+    before, quoted, after = card.partition("```\n" + tag + "\n```")
+    assert quoted
+    assert tag not in before + after
 
 
 @pytest.mark.parametrize(
