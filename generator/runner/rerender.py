@@ -6,6 +6,7 @@ two data sets are pairs: they differ in nothing but what was changed (counterfac
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,7 +15,8 @@ from pathlib import Path
 from gen_data.generator.assemble.config import Config
 from gen_data.generator.assemble.pipeline_factory import PipelineFactory
 from gen_data.generator.assemble.size_estimate import estimate_sample_bytes
-from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.config.shared_values import REFERENCE
+from gen_data.generator.core.errors import ConfigError, ConfigWarning, did_you_mean
 from gen_data.generator.core.interfaces import DatasetInfo, Exporter, Randomizer, Sensor, Stage
 from gen_data.generator.core.sample import Sample
 from gen_data.generator.core.scene import Scene
@@ -40,12 +42,14 @@ class RerenderFactory:
         factory: Of the changed configuration.
         changed_sensors: Names of the sensors that are not those of the data set.
         redrawn: Names of the randomizers to draw again, on top of the stored scenes.
+        detached: Names of the shared values that no longer state what the scenes show.
     """
 
     stored: StoredSamples
     factory: PipelineFactory
     changed_sensors: frozenset[str]
     redrawn: frozenset[str]
+    detached: frozenset[str] = frozenset()
 
     def __call__(self) -> RerenderedScenes:
         """Make the pipeline of a process."""
@@ -117,7 +121,7 @@ class RerenderedScenes:
         )
 
     def _with_sensors(self, scene: Scene, nominal: Scene, sensors: Sequence[Sensor]) -> Scene:
-        """The scene with the sensors of the new configuration.
+        """The scene with the sensors and shared values of the new configuration.
 
         Unchanged sensors stay as they are. A changed camera without a rig keeps its pose; a new one
         has the pose of the first camera without a rig.
@@ -138,6 +142,7 @@ class RerenderedScenes:
         devices = {device.name: device for device in scene.devices}
         return replace(
             scene,
+            shared=tuple(pair for pair in nominal.shared if pair[0] not in self.plan.detached),
             cameras=tuple(cameras),
             lidars=tuple(lidars[n.name] if n.name in kept else n for n in nominal.lidars),
             devices=tuple(devices[n.name] if n.name in kept else n for n in nominal.devices),
@@ -233,8 +238,17 @@ def rerender_plan(
     """
     changes = Changes(was, now)
     changes.check(redraw)
+    for name in sorted(changes.detached):
+        warnings.warn(
+            f"shared.{name}: a randomizer that referred to it has a value of its own now, so that "
+            f"images no longer have the attribute '{name}'; to change it: --set shared.{name}=...",
+            ConfigWarning,
+            stacklevel=2,
+        )
     factory = PipelineFactory(now, stored.n, known_categories=stored.categories)
-    maker = RerenderFactory(stored, factory, changes.sensors, changes.randomizers | set(redraw))
+    maker = RerenderFactory(
+        stored, factory, changes.sensors, changes.randomizers | set(redraw), changes.detached
+    )
     plan = replace(
         make_plan(factory), name=stored.plan.name, scenes_of=f"{stored.dataset_id} {sorted(redraw)}"
     )
@@ -272,10 +286,24 @@ class Changes:
     def randomizers(self) -> frozenset[str]:
         """Names of randomizers that are new, changed, or refer to a changed shared value."""
         before, after = (c.resolved.get("shared") or {} for c in (self.was, self.now))
-        values = {f'"$shared.{k}"' for k, v in after.items() if before.get(k) != v}
+        values = {f'"{REFERENCE}{k}"' for k, v in after.items() if before.get(k) != v}
         entries = _randomizers(self.now)
         referring = {k for k, v in entries.items() if any(text in v for text in values)}
         return _changed_entries(_randomizers(self.was), entries) | referring
+
+    @cached_property
+    def detached(self) -> frozenset[str]:
+        """Names of shared values to which a randomizer of the same name refers no longer.
+
+        Attributes of images are shared values: they would state what the scene does not show.
+        """
+        before, after = _randomizers(self.was), _randomizers(self.now)
+        return frozenset(
+            name
+            for name in self.was.resolved.get("shared") or {}
+            for text in (f'"{REFERENCE}{name}"',)
+            if any(text in entry and text not in after.get(k, "") for k, entry in before.items())
+        )
 
     def check(self, redraw: Sequence[str]) -> None:
         """Reject changes that would change the scenes.

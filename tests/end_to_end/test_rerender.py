@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 
 import gen_data as package
 from gen_data.generator.api.repair import repair
-from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.errors import ConfigError, ConfigWarning
 from tests.end_to_end.running import digest, gen_data
 
 
@@ -120,3 +121,26 @@ def test_a_single_sample_has_the_bytes_that_it_has_in_the_data_set(
     again = gen_data("sample", str(dataset), "--index", "7", "--out", "one", cwd=tmp_path)
     assert again.returncode == 4
     assert "one: is not empty" in again.stderr
+
+
+def test_attributes_state_what_the_new_scenes_show(tmp_path: Path) -> None:
+    """A changed shared value is the new one; one that no longer holds is no attribute."""
+    config = tmp_path / "lit.yaml"
+    config.write_text(
+        "extends: tabletop.yaml\nshared: {lux: {choice: [300, 400]}}\n"
+        "randomizers: [{type: lighting, name: lamps, illuminance_lux: $shared.lux}]\n"
+        "sensors: [{type: rgb_camera, name: color, size_px: [64, 48]}]\n"
+        "exporters: [{type: coco}]\nsplits: {val: 0.0, test: 0.0, train: 1.0}\n"
+    )
+    source = tmp_path / "lit"
+    package.generate(config, n=2, out=source, workers=0)
+    assert dict(package.open(source)[0].scene.shared)["lux"] in (300, 400)
+
+    package.rerender(source, tmp_path / "dim", overrides=["shared.lux=40"], workers=0)
+    with pytest.warns(ConfigWarning, match=r"shared\.lux: .* --set shared\.lux="):
+        package.rerender(source, tmp_path / "own", overrides=["lamps.illuminance_lux=40"], workers=0)
+
+    for name, lux in (("dim", 40), ("own", None)):
+        assert dict(package.open(tmp_path / name)[0].scene.shared).get("lux") == lux
+        rows = json.loads((tmp_path / name / "coco/annotations/instances_train.json").read_text())
+        assert rows["images"][0]["attributes"].get("lux") == lux
