@@ -8,12 +8,14 @@ generation with these exporters gives.
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gen_data.exporters.image_files import link_or_copy
+from gen_data.generator.core.errors import StorageError
 from gen_data.generator.core.interfaces import (
     DatasetInfo,
     Exporter,
@@ -21,14 +23,16 @@ from gen_data.generator.core.interfaces import (
     table_path,
 )
 from gen_data.generator.core.sample import Sample
-from gen_data.generator.runner.durable_files import Inode, get_inode
+from gen_data.generator.runner.durable_files import Inode, get_inode, hash_file
 from gen_data.generator.runner.labels import LABELS_NAME
 from gen_data.generator.runner.plan import FORMAT_VERSION
 from gen_data.generator.runner.progress import RunProgress, Summary
 from gen_data.generator.runner.provenance import SCENES_NAME
 from gen_data.generator.runner.run import Settings, run
+from gen_data.generator.runner.shard_record import FileRecord
 from gen_data.generator.runner.store import LICENCES_NAME, LocalStore
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.generator.runner.stored import CheckedSamples, StoredSamples
+from gen_data.generator.runner.verify import check_source
 
 if TYPE_CHECKING:
     from gen_data.generator.assemble.config import Config
@@ -113,14 +117,23 @@ class LinkedFiles:
                 link_or_copy(self._source_dir(sample.index) / name, shard_dir / name)
 
     def digests(self, shard: int) -> Mapping[Inode, str]:
-        """Digests of the files of a shard by inode, as its record states them.
+        """Digests by inode of the files of a shard that exports link.
 
-        A file that changed since keeps its old digest, with which a full check finds it.
+        Raises:
+            StorageError: a file does not have the digest of the shard's record: what exporters
+                made of it is wrong.
         """
-        record = LocalStore(self.stored.folder).record(shard)
+        found = {}
         folder = self.stored.shard_dir(shard)
-        files = () if record is None else record.files
-        return {get_inode(folder / file.path): file.sha256 for file in files}
+        for file in _linked_files(self.stored, shard):
+            path = folder / file.path
+            if hash_file(path) != file.sha256:
+                raise StorageError(
+                    f"{path}: its sha256 is not that of the shard's record.\n  Repair: "
+                    f"gen-data repair {shlex.quote(str(self.stored.folder))}"
+                )
+            found[get_inode(path)] = file.sha256
+        return found
 
     def _source_dir(self, index: int) -> Path:
         return self.stored.shard_dir(index // self.stored.plan.shard_size)
@@ -128,16 +141,18 @@ class LinkedFiles:
 
 def _linked_sample_bytes(stored: StoredSamples) -> float:
     """Mean size of the files of a sample that exports link, in the first shard."""
-    record = LocalStore(stored.folder).record(0)
-    if record is None:
-        return 0.0
+    sizes = [file.bytes for file in _linked_files(stored, 0)]
+    return sum(sizes) / len(stored.plan.samples_of(0))
+
+
+def _linked_files(stored: StoredSamples, shard: int) -> list[FileRecord]:
+    record = LocalStore(stored.folder).record(shard)
     sensors = {sensor.name for sensor in stored.info.sensors}
-    sizes = [
-        file.bytes
-        for file in record.files
+    return [
+        file
+        for file in (record.files if record else ())
         if file.path in (SCENES_NAME, LABELS_NAME) or file.path.partition("/")[0] in sensors
     ]
-    return sum(sizes) / (record.end - record.first)
 
 
 def _is_same_disk(one: Path, other: Path) -> bool:
@@ -174,6 +189,8 @@ def export(  # noqa: PLR0913  (keywords of one front door)
     Raises:
         GenDataError: see ``run``.
     """
+    check_source(stored.folder)
+    stored = CheckedSamples(stored.folder)
     licences = stored.folder / LICENCES_NAME
     text = licences.read_text("utf-8") if licences.exists() else None
     files = LinkedFiles(stored)

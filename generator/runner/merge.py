@@ -55,6 +55,9 @@ def _gather(plan: Plan, part: LocalStore, store: LocalStore) -> None:
         record = part.record(shard)
         if record is None:
             continue
+        if not all((part.shard_dir(shard) / file.path).exists() for file in record.files):
+            # A shard that is not whole is generated, as one that no part has.
+            continue
         with store.errors():
             folder = store.scratch_dir()
             for file in record.files:

@@ -30,7 +30,8 @@ from gen_data.generator.runner.identity import format_licences, make_plan
 from gen_data.generator.runner.plan import Plan
 from gen_data.generator.runner.progress import RunProgress, Summary
 from gen_data.generator.runner.run import Settings, run
-from gen_data.generator.runner.stored import StoredSamples
+from gen_data.generator.runner.stored import CheckedSamples, StoredSamples
+from gen_data.generator.runner.verify import check_source
 
 
 @dataclass(frozen=True)
@@ -236,6 +237,7 @@ def rerender_plan(
     Raises:
         ConfigError: see ``rerender``.
     """
+    check_source(stored.folder)
     changes = Changes(was, now)
     changes.check(redraw)
     for name in sorted(changes.detached):
@@ -247,7 +249,11 @@ def rerender_plan(
         )
     factory = PipelineFactory(now, stored.n, known_categories=stored.categories)
     maker = RerenderFactory(
-        stored, factory, changes.sensors, changes.randomizers | set(redraw), changes.detached
+        CheckedSamples(stored.folder),
+        factory,
+        changes.sensors,
+        changes.randomizers | set(redraw),
+        changes.detached,
     )
     plan = replace(
         make_plan(factory), name=stored.plan.name, scenes_of=f"{stored.dataset_id} {sorted(redraw)}"

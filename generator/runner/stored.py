@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -29,10 +30,11 @@ from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
 from gen_data.generator.core.scene import Scene
 from gen_data.generator.core.serialization import from_plain
 from gen_data.generator.core.urls import is_url, needs_folder
+from gen_data.generator.runner.durable_files import hash_file
 from gen_data.generator.runner.labels import LABELS_NAME, Labels, parse_labels
 from gen_data.generator.runner.plan import DAMAGE, load_plan
 from gen_data.generator.runner.provenance import SCENES_NAME, KeptScene, parse_scene
-from gen_data.generator.runner.store import MANIFEST_NAME, SHARDS_NAME
+from gen_data.generator.runner.store import MANIFEST_NAME, SHARDS_NAME, LocalStore
 
 T = TypeVar("T")
 
@@ -80,7 +82,7 @@ class StoredSamples:
         manifest = self._read_manifest()
         self.info: DatasetInfo = manifest[0]
         self.dataset_id: str = manifest[1]
-        self._lines = lru_cache(2 * SHARDS_KEPT)(JsonLines)
+        self._lines = lru_cache(2 * SHARDS_KEPT)(self._open_lines)
         # Views of one scene follow each other, and share most of it.
         self._base_scene = lru_cache(BASE_SCENES_KEPT)(self._read_base_scene)
 
@@ -149,6 +151,9 @@ class StoredSamples:
         """Forget the positions of lines."""
         self._lines.cache_clear()
         self._base_scene.cache_clear()
+
+    def _open_lines(self, path: Path) -> JsonLines:
+        return JsonLines(path)
 
     def _line(self, name: str, index: int) -> bytes:
         lines = self._lines(self._folder_of(index) / name)
@@ -226,6 +231,23 @@ class StoredSamples:
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Open the folder."""
         self.__init__(state["folder"])  # type: ignore[misc]
+
+
+class CheckedSamples(StoredSamples):
+    """Samples whose scenes and labels are held against the records of their shards.
+
+    What is made of them gets checksums of its own, which damage in the source would pass.
+    """
+
+    def _open_lines(self, path: Path) -> JsonLines:
+        record = LocalStore(self.folder).record(int(path.parent.name))
+        expected = {file.path: file.sha256 for file in record.files} if record else {}
+        if expected.get(path.name) != hash_file(path):
+            raise StorageError(
+                f"{path}: its sha256 is not that of the shard's record.\n  Repair: "
+                f"gen-data repair {shlex.quote(str(self.folder))}"
+            )
+        return super()._open_lines(path)
 
 
 def parse_dataset_id(manifest: Mapping[str, Any], place: object) -> str:

@@ -101,6 +101,19 @@ def verify(folder: Path, full: bool = False) -> Report:
     return report
 
 
+def check_source(folder: Path) -> None:
+    """Refuse a data set whose plan, records, sums or sizes disagree, before another is made of it.
+
+    Files that do not belong to it do no harm.
+
+    Raises:
+        StorageError: the deviations, with the command that repairs them.
+    """
+    found = [finding for finding in find_deviations(folder) if finding.kind != "extra"]
+    if found:
+        raise StorageError(describe_findings(folder, found))
+
+
 def scan_finished(folder: Path) -> Contents:
     """Files and empty folders of a data set, without ``run`` and certificates.
 

@@ -6,6 +6,7 @@ import json
 import os
 import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -91,7 +92,73 @@ def test_a_foreign_or_damaged_folder_is_named(dataset: Path, tmp_path: Path) -> 
 
     assert foreign.returncode == broken.returncode == 4
     assert "is not a gen-data data set" in foreign.stderr
-    assert "000001/labels.jsonl: cannot be read" in broken.stderr
+    assert "shards/000001/labels.jsonl (samples 5 to 9)" in broken.stderr
+    assert f"gen-data repair {damaged}" in broken.stderr
+
+
+def _digit(path: Path, before: str, after: str) -> None:
+    """Change a text of a file, which keeps its size."""
+    text = path.read_text("utf-8")
+    assert before in text
+    assert len(before) == len(after)
+    path.unlink()
+    path.write_text(text.replace(before, after, 1), "utf-8")
+
+
+def _flip(path: Path) -> None:
+    """Flip a bit in the middle of a file."""
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.unlink()
+    path.write_bytes(data)
+
+
+DAMAGES: dict[str, Callable[[Path], None]] = {
+    "plan.json": lambda root: _digit(root / "plan.json", '"seed":1', '"seed":2'),
+    "labels.jsonl": lambda root: _digit(
+        root / "shards/000001/labels.jsonl", '"split":"train"', '"split":"trail"'
+    ),
+    "000000007.png": lambda root: _flip(root / "shards/000001/color/rgb/000000007.png"),
+}
+"""Damages that change no size, by the file that is named."""
+
+
+@pytest.fixture(params=DAMAGES)
+def damaged(request: pytest.FixtureRequest, dataset: Path, tmp_path: Path) -> tuple[Path, str]:
+    """A copy with one damage, and the name of its file."""
+    folder = tmp_path / "damaged"
+    shutil.copytree(dataset, folder, copy_function=os.link)
+    DAMAGES[request.param](folder)
+    return folder, request.param
+
+
+def test_nothing_is_made_of_a_damaged_data_set(damaged: tuple[Path, str], tmp_path: Path) -> None:
+    """Its export would have right checksums of wrong contents."""
+    folder, name = damaged
+
+    with pytest.raises(StorageError, match=rf"(?s){name}.*gen-data repair"):
+        package.export(folder, ["yolo"], tmp_path / "out", workers=0)
+    if name != "000000007.png":  # Images are rendered anew.
+        with pytest.raises(StorageError, match=rf"(?s){name}.*gen-data repair"):
+            package.rerender(folder, tmp_path / "again", workers=0)
+
+    assert not (tmp_path / "out/manifest.json").exists()
+    assert not (tmp_path / "again/manifest.json").exists()
+
+
+def test_a_damaged_copy_differs_from_its_original(damaged: tuple[Path, str], dataset: Path) -> None:
+    """Although the records and checksums of both are equal."""
+    folder, name = damaged
+
+    done = gen_data("diff", str(dataset), str(folder), cwd=folder.parent)
+
+    said = {
+        "plan.json": "seed: was 1, now 2",
+        "labels.jsonl": 'split: was "train", now "trail"',
+        "000000007.png": "000000007.png: cannot be decoded",
+    }
+    assert said[name] in done.stdout + done.stderr
+    assert (done.returncode == 0) == (name == "plan.json")  # Which both plans say openly.
 
 
 DEEP = "[" * 100_000

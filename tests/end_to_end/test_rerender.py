@@ -137,8 +137,9 @@ def test_attributes_state_what_the_new_scenes_show(tmp_path: Path) -> None:
     assert dict(package.open(source)[0].scene.shared)["lux"] in (300, 400)
 
     package.rerender(source, tmp_path / "dim", overrides=["shared.lux=40"], workers=0)
+    own = ["lamps.illuminance_lux=40"]
     with pytest.warns(ConfigWarning, match=r"shared\.lux: .* --set shared\.lux="):
-        package.rerender(source, tmp_path / "own", overrides=["lamps.illuminance_lux=40"], workers=0)
+        package.rerender(source, tmp_path / "own", overrides=own, workers=0)
 
     for name, lux in (("dim", 40), ("own", None)):
         assert dict(package.open(tmp_path / name)[0].scene.shared).get("lux") == lux

@@ -153,3 +153,16 @@ def test_ranges_are_checked() -> None:
     for shards in ((6, 8), (3, 3), (4, 2), (-1, 2)):
         with pytest.raises(ConfigError, match=r"none of the 6 shards; expected FIRST:END"):
             check_shards(shards, 6)
+
+
+def test_a_shard_with_a_missing_file_counts_as_missing(tmp_path: Path) -> None:
+    """It is generated, and the parts stay as they are."""
+    part = make_part(tmp_path / "part", range(2))
+    lost = next((part / "shards/000001").rglob("*.png"))
+    lost.unlink()
+
+    gather([part], tmp_path / "out")
+
+    assert LocalStore(tmp_path / "out").record(0) is not None
+    assert LocalStore(tmp_path / "out").record(1) is None
+    assert (part / "shards/000001.json").exists()
