@@ -62,7 +62,8 @@ class Channel(str, Enum):
                                                   image a step later [px]; NaN
     FLOW_BACKWARD         float32 [h, w, 2]       the same a step earlier; NaN
     FLOW_OCCLUDED_...     uint8 [h, w]            1 where that point cannot be seen then: it is
-                                                  hidden, or not in the image; 1
+                                                  not in the image, or the pixel that it lies in
+                                                  shows a nearer surface; 1
     SCENE_FLOW            float32 [h, w, 3]       where the seen point is a step later, in the
                                                   camera frame of then, minus where it is now, in
                                                   that of now [m]; NaN

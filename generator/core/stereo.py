@@ -14,8 +14,9 @@ from gen_data.generator.core.scene import Camera
 
 ALIGNED = 1e-6
 """Largest deviation, in metres and as a sine, of cameras that look the same way."""
-NEARER_PX = 1.0
-"""Occluders are nearer by more than this disparity, as in left-right checks of stereo matching."""
+NEARER_PX = 0.5
+"""Occluders are nearer by more than this disparity: on a surface that both cameras see, disparity
+changes by no more than that between a point and the centre of its column."""
 
 
 def baseline_m(left: Camera, right: Camera) -> float:
@@ -52,20 +53,14 @@ def is_seen_by_both(
 ) -> NDArray[np.bool_]:
     """Whether the other camera sees what this one does, bool [h, w].
 
-    It does if the point is in its image and nothing there is nearer by more than a pixel, in at
-    least one of the two columns between which the point lies. Disparities of both images have the
-    same sign; 0 = nothing.
+    It does if the point is in its image and the column that the point lies in shows nothing nearer.
+    Disparities of both images have the same sign; 0 = nothing.
 
     ``beyond``: the other one, such as a projector, also sees points beside its image.
     """
     height, width = here_px.shape
-    at_px = np.arange(width, dtype=np.float32) - here_px
-    left = np.floor(at_px).astype(np.int64)
-    seen = np.zeros((height, width), bool)
-    rows = np.arange(height)[:, None]
-    for column in (left, left + 1):
-        inside = (column >= 0) & (column < width)
-        other_px = there_px[rows, np.clip(column, 0, width - 1)]
-        open_ = np.abs(other_px) <= np.abs(here_px) + NEARER_PX
-        seen |= np.where(inside, open_, beyond)
-    return np.asarray(seen & (here_px != 0.0))
+    column = np.floor(np.arange(width, dtype=np.float32) + 0.5 - here_px).astype(np.int64)
+    inside = (column >= 0) & (column < width)
+    other_px = there_px[np.arange(height)[:, None], np.clip(column, 0, width - 1)]
+    is_free = np.abs(other_px) <= np.abs(here_px) + NEARER_PX
+    return np.asarray(np.where(inside, is_free, beyond) & (here_px != 0.0))

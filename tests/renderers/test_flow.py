@@ -269,3 +269,20 @@ def test_a_rolling_shutter_makes_flow_longer_or_shorter(
     np.testing.assert_allclose(flow[..., 1], expected, atol=0.26)
     assert flow[..., 1].mean() == pytest.approx(expected, abs=0.03)
     np.testing.assert_allclose(flow[..., 0], 0.0, atol=1e-4)
+
+
+def test_a_pixel_that_a_moving_thing_covers_is_occluded(renderer: WarpRenderer) -> None:
+    """Before a camera at rest, the wall has no flow: the same pixel of the next image decides."""
+    start = SE3((-0.6, 0.0, 3.0))
+    box = Body("box", "box", start, instance_id=1)
+    scene = world(WALL, box, tracks=(even_track("box", start, (4.0, 1.0, 0.0)),))
+    now = images(renderer, scene)
+    later = scene_at(scene, scene.time_s + STEP_S)
+    then = images(renderer, later)
+
+    wall = (now[Channel.INSTANCE] == 0) & (now[Channel.FLOW_FORWARD] == 0.0).all(axis=-1)
+    covered = wall & (then[Channel.INSTANCE] == 1)
+
+    assert covered.sum() > 100
+    hidden = now[Channel.FLOW_OCCLUDED_FORWARD] == 1
+    np.testing.assert_array_equal(hidden[wall], covered[wall])

@@ -126,30 +126,23 @@ def find_occluded(
 ) -> NDArray[np.uint8]:
     """Occlusion of points in another image, uint8 [h, w]: 1 if hidden or outside it.
 
-    A point is visible if any of the four pixels around it shows no nearer surface; surfaces are
-    extrapolated from pixel centres along their tangent planes. ``found`` are the points, ``then``
-    range and normals of the image at the other instant.
+    A point is visible if the pixel that it lies in shows no nearer surface; surfaces are
+    extrapolated from the centre of the pixel along their tangent plane. ``found`` are the points,
+    ``then`` range and normals of the image at the other instant.
     """
-    range_m, normals = then[Channel.RANGE], then[Channel.NORMALS]
     u, v = found.image_px[..., 0], found.image_px[..., 1]
     inside = (u >= 0) & (u < camera.width_px) & (v >= 0) & (v < camera.height_px)
+    column, row = (np.where(inside, x, 0.0).astype(np.intp) for x in (u, v))
     distance = np.sqrt((found.p_camera * found.p_camera).sum(axis=-1))
     towards = found.p_camera / np.where(distance > 0.0, distance, 1.0)[..., None]
     limit = np.where(points.places[..., 3] > 0.0, distance * (1.0 - _NEARER), np.inf)
-    left, top = (np.floor(np.where(inside, x, 0.5) - 0.5).astype(np.intp) for x in (u, v))
-    rays = camera.pixel_rays()
-    seen = np.zeros(inside.shape, bool)
-    for across in (0, 1):
-        for down in (0, 1):
-            column = np.clip(left + across, 0, camera.width_px - 1)
-            row = np.clip(top + down, 0, camera.height_px - 1)
-            normal = normals[row, column]
-            steep = _dot(normal, rays[row, column])
-            tilt = _dot(normal, towards)
-            # Tangent planes seen edge-on cannot be extrapolated: use the depth itself.
-            usable = (tilt < -0.02) & (steep < -0.02)
-            factor = np.where(usable, steep / np.where(usable, tilt, 1.0), 1.0)
-            seen |= range_m[row, column] * np.clip(factor, 0.8, 1.25) >= limit
+    normal = then[Channel.NORMALS][row, column]
+    steep = _dot(normal, camera.pixel_rays()[row, column])
+    tilt = _dot(normal, towards)
+    # Tangent planes seen edge-on cannot be extrapolated: use the depth itself.
+    usable = (tilt < -0.02) & (steep < -0.02)
+    factor = np.clip(np.where(usable, steep / np.where(usable, tilt, 1.0), 1.0), 0.8, 1.25)
+    seen = then[Channel.RANGE][row, column] * factor >= limit
     return np.asarray(~(seen & inside), np.uint8)
 
 
