@@ -173,10 +173,12 @@ def _make_factory(loaded: Config, n: int) -> PipelineFactory:
     """A checked factory of pipelines; warns of splits that stay empty."""
     from gen_data.generator.assemble.pipeline_factory import PipelineFactory
     from gen_data.generator.pipeline.splits import warn_of_empty_splits
+    from gen_data.generator.sensors.mounting import warn_of_early_readings
 
     general = loaded.general
     scenes = -(-n // (general.views_per_scene * general.steps_per_scene))
     warn_of_empty_splits(scenes, loaded.split_shares, general.splits.assign, general.seed)
+    warn_of_early_readings(loaded.sensors, general.steps_per_scene)
     factory = PipelineFactory(loaded, n)
     factory.check()
     return factory

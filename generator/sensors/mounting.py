@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import warnings
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -10,8 +12,8 @@ import numpy as np
 from pydantic import Field
 
 from gen_data.generator.config.base_model import NAME_PATTERN, Strict
-from gen_data.generator.core.errors import ConfigError, did_you_mean
-from gen_data.generator.core.interfaces import AssetIndex, Modality, SensorInfo
+from gen_data.generator.core.errors import ConfigError, ConfigWarning, did_you_mean
+from gen_data.generator.core.interfaces import AssetIndex, Modality, Sensor, SensorInfo
 from gen_data.generator.core.measurement_dtypes import TABLE_COLUMNS, TIME_DECIMALS
 from gen_data.generator.core.motion import STILL, Trajectory, Twist
 from gen_data.generator.core.scene import Camera, Device, Lidar, Scene
@@ -184,6 +186,27 @@ def find_mounting(scene: Scene, name: str) -> tuple[str, SE3]:
     known |= {lidar.name: (lidar.rig, lidar.T_rig_lidar) for lidar in scene.lidars}
     known |= {c.name: (c.rig, c.T_rig_camera @ RIG_AXES) for c in scene.cameras}
     return known[name]
+
+
+def warn_of_early_readings(sensors: Iterable[Sensor], steps_per_scene: int) -> None:
+    """Warn of sensors that read before the first step of a sequence, when nothing moves.
+
+    Warns:
+        ConfigWarning: a sensor has a negative ``time_offset_s``.
+    """
+    early = {
+        sensor.name: sensor.time_offset_s
+        for sensor in sensors
+        if isinstance(sensor, Mounted) and sensor.time_offset_s < 0.0
+    }
+    if early and steps_per_scene > 1:
+        warnings.warn(
+            f"sensors {', '.join(early)}: at the first step they read before anything moves, so that "
+            "all velocities are 0; expected time_offset_s of 0 or more: add "
+            f"{-min(early.values()):g} to that of every sensor",
+            ConfigWarning,
+            stacklevel=2,
+        )
 
 
 def stride(sensor: str, rate_hz: float | None, step_s: float) -> int:

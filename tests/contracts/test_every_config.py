@@ -69,3 +69,12 @@ def test_one_sample_is_rendered_exported_and_verified(name: str, tmp_path: Path)
             assert list((tmp_path / "out").glob(pattern)), pattern
     changed = find_change(name, tmp_path / "out")
     assert not changed, f"{name}: the first stage with other contents is: {changed}"
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_no_sensor_of_a_sequence_reads_before_its_first_instant(name: str) -> None:
+    """Nothing moves before it: velocities of moving things would be 0."""
+    config = load_config(f"{name}.yaml")
+    offsets_s = [getattr(sensor, "time_offset_s", 0.0) for sensor in config.sensors]
+
+    assert config.general.steps_per_scene == 1 or min(offsets_s) >= 0.0

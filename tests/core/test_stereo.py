@@ -96,7 +96,7 @@ def test_what_the_other_camera_sees_agrees_with_lines_of_sight(sign: float) -> N
 
 
 def test_a_projector_may_reach_beyond_the_image() -> None:
-    """What lies beside its image is seen if one says so; column 4 shows a point half a pixel beside."""
+    """Points beside its image are seen if one says so; column 4 has one half a pixel outside."""
     flat = np.full((2, 20), 5.0, np.float32)
 
     assert is_seen_by_both(flat, flat)[0].tolist() == [False] * 5 + [True] * 15

@@ -12,7 +12,7 @@ import pytest
 
 from gen_data.generator.assets.library import open_library
 from gen_data.generator.core.capture import POINT, PointCloud, SensorReading
-from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.errors import ConfigError, ConfigWarning
 from gen_data.generator.core.interfaces import DatasetInfo, Modality, SensorInfo, Settled
 from gen_data.generator.core.motion import StateChange, Trajectory
 from gen_data.generator.core.sample import EgoTruth, ImageTruth, Sample
@@ -24,7 +24,7 @@ from gen_data.generator.pipeline.finalize_scene import Timeline
 from gen_data.generator.pipeline.pipeline import PipelineConfig
 from gen_data.generator.sensors.camera.rgb_camera import RgbCamera
 from gen_data.generator.sensors.lidar.lidar_sensor import LidarSensor
-from gen_data.generator.sensors.mounting import stride
+from gen_data.generator.sensors.mounting import stride, warn_of_early_readings
 from gen_data.randomizers.camera_on_lane import CameraOnLane
 from gen_data.randomizers.camera_pose import CameraPose
 from gen_data.scene_templates.robot import Robot
@@ -273,3 +273,14 @@ def test_a_wrist_camera_follows_the_arm() -> None:
     assert np.subtract(after.translation_m, before.translation_m) == pytest.approx(
         (0.0, 0.0, 0.1), abs=1e-6
     )
+
+
+def test_sensors_that_read_before_anything_moves_are_named(recwarn: Any) -> None:
+    """Velocities of moving things would be 0 in the first image of each sequence."""
+    early, late = RgbCamera(name="early", time_offset_s=-0.02), RgbCamera(time_offset_s=0.02)
+
+    warn_of_early_readings([late], 4)
+    warn_of_early_readings([early], 1)
+    assert not recwarn
+    with pytest.warns(ConfigWarning, match=r"sensors early: .*add 0\.02 to that of every sensor"):
+        warn_of_early_readings([late, early], 4)
