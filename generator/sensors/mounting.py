@@ -201,7 +201,7 @@ def warn_of_early_readings(sensors: Iterable[Sensor], steps_per_scene: int) -> N
     }
     if early and steps_per_scene > 1:
         warnings.warn(
-            f"sensors {', '.join(early)}: at the first step they read before anything moves, so that "
+            f"sensors {', '.join(early)}: at the first step they read before anything moves and "
             "all velocities are 0; expected time_offset_s of 0 or more: add "
             f"{-min(early.values()):g} to that of every sensor",
             ConfigWarning,
