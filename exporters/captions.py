@@ -27,7 +27,7 @@ NIGHT_RAD = math.radians(-6.0)
 NIGHT_CD_M2 = 1.0
 """Mean luminance of a sky below which it is night, for skies without a known sun."""
 
-STEEP_RAD, LEVEL_RAD = math.radians(35.0), math.radians(10.0)
+STEEP_RAD, LEVEL_RAD = math.radians(35.0), math.radians(15.0)
 WIDE_RAD, NARROW_RAD = math.radians(85.0), math.radians(30.0)
 
 
