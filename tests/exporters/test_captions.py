@@ -101,7 +101,8 @@ def test_light(scene: Scene, words: str) -> None:
 
 @pytest.mark.parametrize(
     ("target", "hfov_deg", "words"),
-    [((1.0, 0.0, 1.6), 60, "seen at eye level"), ((1.0, 0.0, 1.42), 60, "seen at eye level"), ((1.0, 0.0, 1.0), 60, "seen from above"),
+    [((1.0, 0.0, 1.6), 60, "seen at eye level"), ((1.0, 0.0, 1.42), 60, "seen at eye level"),
+     ((1.0, 0.0, 1.0), 60, "seen from above"),
      ((0.1, 0.0, 0.6), 60, "seen steeply from above"), ((1.0, 0.0, 3.0), 60, "seen from below"),
      ((1.0, 0.0, 1.6), 100, "seen at eye level through a wide-angle lens"),
      ((1.0, 0.0, 1.6), 20, "seen at eye level through a long lens")],
