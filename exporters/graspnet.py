@@ -11,7 +11,9 @@ opening), translation, object id; ``GraspGroup().from_npy`` of graspnetAPI reads
 suctions are score, direction (out of the surface), translation, object id, as ``SuctionGroup`` of
 suctionnetAPI has them. All are in the camera frame [m], of the objects that are annotated in the
 image; object ids are instance ids. Height and depth are those of the fingers: ``finger_m`` and
-``reach_m`` of the annotation ``grasps``.
+``reach_m`` of the annotation ``grasps``. Width is the opening of the hand before it closes: the
+distance of the contacts, with ``clearance_m`` on both sides. Fingers so far apart are free of
+everything, as those of graspnetAPI's collision test must be.
 """
 
 from __future__ import annotations
@@ -40,12 +42,15 @@ class GraspNet(ImageRowsExporter):
     Attributes:
         height_m: Height of the fingers, as the annotation has it.
         depth_m: Reach of the fingers beyond the contacts, as the annotation has it.
+        clearance_m: Distance between fingers and contacts before they close, as the annotation has
+            it.
     """
 
     type: Literal["graspnet"] = "graspnet"
 
     height_m: float = Field(0.02, gt=0)
     depth_m: float = Field(0.015, ge=0)
+    clearance_m: float = Field(0.003, ge=0)
 
     @property
     def needs(self) -> frozenset[str]:
@@ -81,7 +86,8 @@ class GraspNet(ImageRowsExporter):
         for grasp in (frame.grasps if frame else None) or ():
             if grasp.instance_id in shown:
                 pose = T_camera_world @ grasp.T_world_grasp
-                size = [grasp.score, grasp.width_m, self.height_m, self.depth_m]
+                opening_m = grasp.width_m + 2.0 * self.clearance_m
+                size = [grasp.score, opening_m, self.height_m, self.depth_m]
                 place = [*pose.rotation().ravel().tolist(), *pose.translation_m]
                 rows.append([*size, *place, grasp.instance_id])
         return rows
