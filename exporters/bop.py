@@ -27,8 +27,8 @@ Where BOP's conventions differ from ours:
 * ``px_count_valid`` counts pixels of the silhouette inside the image with a depth.
 
 Objects are numbered from 1 in the sorted order of their assets and scales. A person's phases of a
-walk are several geometries. Symmetries are those that the assets state. Articulated robots and
-ignored objects are left out.
+walk are several geometries. Symmetries are those that the assets state, or else those that surface
+and colours show (``symmetry_search``). Articulated robots and ignored objects are left out.
 
 References: Hodan et al., "BOP: Benchmark for 6D Object Pose Estimation", ECCV 2018, and the
 documentation of bop_toolkit.
@@ -474,8 +474,8 @@ _DATASET_INFO = """\
 Synthetic images of the camera `{camera}`; {models} models in millimetres.
 
 * `objects.json` maps each obj_id to its asset, scale and category.
-* `models_info.json` has the symmetries that assets state, by shape and own materials; an object
-  without the keys may still look symmetric.
+* `models_info.json` has symmetries of shape and own materials: those that assets state, or else
+  those that surface and colours show to within a hundredth of the diameter.
 * `cam_K` has pixel centres at i + 0.5.
 * Vertex colours are those of the asset; images may show the object in other materials.
 """

@@ -12,13 +12,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gen_data.exporters.symmetry_search import (
+    POINTS,
+    PROBES,
+    Samples,
+    find_symmetries,
+    sample_triangles,
+)
 from gen_data.generator.core.asset_types import Material, MeshData, Symmetry
 from gen_data.generator.core.colorimetry import srgb_decode, srgb_encode
 from gen_data.generator.core.errors import AssetError
@@ -28,6 +35,7 @@ from gen_data.generator.core.se3 import IDENTITY, SE3, Array, Vec3
 from gen_data.generator.core.serialization import canonical_json
 
 MM_PER_M = 1000.0
+_SHARES = ((POINTS, 0.5), (PROBES, 0.25))
 
 VERTEX = np.dtype(
     [(name, "<f4") for name in ("x", "y", "z", "nx", "ny", "nz")]
@@ -113,10 +121,37 @@ def build_model(pieces: Sequence[Piece], assets: AssetLibrary) -> Model:
         rows[f"n{axis}"] = normals[:, k]
     for k, name in enumerate(("red", "green", "blue")):
         rows[name] = colors[:, k]
-    symmetries = assets.get(pieces[0].asset).symmetries if len(pieces) == 1 else ()
-    info = _size_info(rows) | _symmetry_info(symmetries, pieces[0], center_m)
+    stated = assets.get(pieces[0].asset).symmetries if len(pieces) == 1 else ()
+    symmetries = [
+        replace(s, offset_m=tuple(pieces[0].scale * x for x in s.offset_m)) for s in stated
+    ] or find_symmetries(*(_samples(pieces, assets, *share) for share in _SHARES))
+    info = _size_info(rows) | _symmetry_info(symmetries, pieces[0].asset, center_m)
     x, y, z = (float(value) for value in center_m)
     return Model((x, y, z), rows, np.concatenate(faces).astype(np.int32), info)
+
+
+def _samples(pieces: Sequence[Piece], assets: AssetLibrary, count: int, shift: float) -> Samples:
+    """Points in the instance frame [m] on all pieces, with their colours."""
+    meshes = [assets.mesh(piece.asset) for piece in pieces]
+    placed = [
+        p.T_instance_body.apply(m.vertices_m.astype(np.float64) * p.scale)[m.faces]
+        for p, m in zip(pieces, meshes, strict=True)
+    ]
+    chosen, weights = sample_triangles(np.concatenate(placed), count, shift)
+    points = np.einsum("nk,nkc->nc", weights, np.concatenate(placed)[chosen])
+    colors = np.zeros((len(chosen), 3))
+    first = 0
+    for mesh, corners in zip(meshes, placed, strict=True):
+        own = (chosen >= first) & (chosen < first + len(corners))
+        faces = chosen[own] - first
+        uvs = np.einsum("nk,nkc->nc", weights[own], mesh.uvs[mesh.faces[faces]]).astype(np.float32)
+        found = np.zeros((len(faces), 3))
+        for slot, material in enumerate(mesh.materials):
+            here = mesh.face_slots[faces] == slot
+            found[here] = _colors(material, uvs[here], assets)
+        colors[own] = found
+        first += len(corners)
+    return Samples(points, colors)
 
 
 def ply_bytes(model: Model) -> bytes:
@@ -218,19 +253,19 @@ def _hull_points(points: Array) -> Array:
 
 
 def _symmetry_info(
-    symmetries: Sequence[Symmetry], piece: Piece, center_m: Array
+    symmetries: Sequence[Symmetry], asset: str, center_m: Array
 ) -> dict[str, list[Any]]:
-    """The symmetries in the object frame [mm]; no key without one."""
+    """Symmetries in the instance frame [m], in the object frame [mm]; no key without one."""
     continuous, generators = [], []
     for symmetry in symmetries:
-        offset = (np.asarray(symmetry.offset_m) * piece.scale - center_m) * MM_PER_M
+        offset = (np.asarray(symmetry.offset_m) - center_m) * MM_PER_M
         if symmetry.fold == 0:
             row = {"axis": list(symmetry.axis), "offset": np.round(offset, 6).tolist()}
             continuous.append(row)
         else:
             generators.append(_turn(symmetry.axis, 2.0 * math.pi / symmetry.fold, offset))
     info: dict[str, list[Any]] = {}
-    group = _closure(generators, piece.asset)
+    group = _closure(generators, asset)
     if group:
         info["symmetries_discrete"] = [(np.round(m, 9) + 0.0).ravel().tolist() for m in group]
     if continuous:
