@@ -122,9 +122,9 @@ def build_model(pieces: Sequence[Piece], assets: AssetLibrary) -> Model:
     for k, name in enumerate(("red", "green", "blue")):
         rows[name] = colors[:, k]
     stated = assets.get(pieces[0].asset).symmetries if len(pieces) == 1 else ()
-    symmetries = [
-        replace(s, offset_m=tuple(pieces[0].scale * x for x in s.offset_m)) for s in stated
-    ] or find_symmetries(*(_samples(pieces, assets, *share) for share in _SHARES))
+    symmetries = [_scaled(symmetry, pieces[0].scale) for symmetry in stated]
+    if not symmetries:
+        symmetries += find_symmetries(*(_samples(pieces, assets, *share) for share in _SHARES))
     info = _size_info(rows) | _symmetry_info(symmetries, pieces[0].asset, center_m)
     x, y, z = (float(value) for value in center_m)
     return Model((x, y, z), rows, np.concatenate(faces).astype(np.int32), info)
