@@ -25,6 +25,9 @@ from gen_data.randomizers.arm_task_table import load_tasks
 LISTS = ("randomizers", "sensors", "annotations", "exporters")
 """Lists of plug-ins of a configuration, besides its elements."""
 
+OUTPUTS = ("annotations", "exporters")
+"""Lists of what is computed and written; unlike plug-ins with names, a new one replaces another."""
+
 NAMED = (*LISTS, "elements", "shared")
 """Sections whose entries have names, by which ``without`` leaves them out."""
 
@@ -127,6 +130,7 @@ def _complete(document: Node, chain: tuple[Path, ...]) -> Node:
 
 def _merge_into_base(base: Node, document: Node) -> Node:
     """Merge a configuration into the one that it extends."""
+    _check_outputs(document)
     content = dict(_mapping_of(_without(base, document.get("without"))))
     for key, node in _mapping_of(document).items():
         if key in ("extends", "without"):
@@ -134,12 +138,23 @@ def _merge_into_base(base: Node, document: Node) -> Node:
         inherited = content.get(key)
         if inherited is None:
             content[key] = node
-        elif key in (*LISTS, "elements"):
+        elif key in (*LISTS, "elements") and key not in OUTPUTS:
             content[key] = _merge_items(inherited, node)
         else:
             content[key] = merge_nodes(inherited, node)
     positions = {**base.key_positions, **document.key_positions}
     return Node(document.position, content, positions)
+
+
+def _check_outputs(document: Node) -> None:
+    """Refuse names to leave out of an inherited list that the document replaces."""
+    problems = Problems()
+    for key in OUTPUTS:
+        names = document.get("without", key)
+        if document.get(key) is not None and names is not None and names.content != ALL:
+            fact = f"the list '{key}' replaces all inherited ones; expected one of the two"
+            problems.add(names.position, f"without.{key}", fact)
+    problems.raise_if_any()
 
 
 def _merge_items(base: Node, override: Node) -> Node:
