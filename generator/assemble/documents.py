@@ -19,6 +19,7 @@ from gen_data.generator.config.renamed_keys import refuse_moved_keys, replace_ol
 from gen_data.generator.config.yaml_scalars import quote_value
 from gen_data.generator.config.yaml_tree import Node, load_yaml, parse_yaml, with_override
 from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.pipeline.splits import SHARES
 from gen_data.generator.sensors.lidar.datasheets import load_sheets
 from gen_data.randomizers.arm_task_table import load_tasks
 
@@ -141,9 +142,17 @@ def _merge_into_base(base: Node, document: Node) -> Node:
         elif key in (*LISTS, "elements") and key not in OUTPUTS:
             content[key] = _merge_items(inherited, node)
         else:
-            content[key] = merge_nodes(inherited, node)
+            content[key] = merge_nodes(_without_shares(key, inherited, node), node)
     positions = {**base.key_positions, **document.key_positions}
     return Node(document.position, content, positions)
+
+
+def _without_shares(section: str, base: Node, override: Node) -> Node:
+    """Drop inherited shares of splits where new ones are given: together they are one value."""
+    if section != "splits" or override.entries.keys().isdisjoint(SHARES):
+        return base
+    kept = {key: node for key, node in base.entries.items() if key not in SHARES}
+    return replace(base, content=kept)
 
 
 def _check_outputs(document: Node) -> None:
