@@ -13,12 +13,13 @@ from gen_data.exporters.label_map import MappedExporter
 from gen_data.generator.annotations.annotate import annotate_ego, annotate_reading
 from gen_data.generator.assemble.config import Config, SceneConfig
 from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, default_plugin
+from gen_data.generator.assemble.preflight import unrectified_pairs
 from gen_data.generator.assets.library import Library, open_library
 from gen_data.generator.config.error_positions import located_errors
 from gen_data.generator.config.problems import Problems, refuse
 from gen_data.generator.config.yaml_tree import find_text
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, UnknownAsset
+from gen_data.generator.core.errors import ConfigError, Refusals, UnknownAsset
 from gen_data.generator.core.interfaces import (
     AnyAnnotator,
     AssetIndex,
@@ -101,14 +102,26 @@ class PipelineFactory:
         """Refuse what no sample could be generated or exported with, before any engine starts.
 
         Raises:
-            ConfigError: a sequence is too long, the physics engine is not installed, or a format
-                cannot hold the data set.
+            ConfigError: a sequence is too long, the physics engine is not installed, cameras form
+                no rectified pair, or a format cannot hold the data set; all of it at once.
         """
-        _check_durations(self.config)
-        _check_engine(self.config)
-        ready_exporters(self.config, self.info, self.library)
-        for scene in self.nominal:
-            check_scene(self.config, scene)
+        refused, config = Refusals(), self.config
+        for check in (_check_durations, _check_engine):
+            with refused.collected():
+                check(config)
+        with refused.collected():
+            _ = self.nominal
+        if "nominal" not in self.__dict__:  # The other checks need the scenes.
+            refused.raise_if_any()
+        with refused.collected():
+            ready_exporters(config, self.info, self.library)
+        for probe, scene in zip(config.probes, self.nominal, strict=True):
+            with refused.collected():
+                check_scene(config, scene)
+            for error in unrectified_pairs(probe, scene, self.library):
+                with refused.collected(), located_errors(config.document):
+                    raise error
+        refused.raise_if_any()
 
     @property
     def info(self) -> DatasetInfo:
@@ -282,8 +295,9 @@ def nominal_scene(config: Config, scene_config: SceneConfig, assets: AssetIndex)
         step_s=config.general.step_s,
         box3d=config.general.labels.box3d,
     )
-    with located_errors(config.document):
-        for sensor in scene_config.sensors:
+    refused = Refusals()
+    for sensor in scene_config.sensors:
+        with refused.collected(), located_errors(config.document):
             scene = sensor.mount(scene)
             info = sensor.describe()
             _check_mounted(scene, info)
@@ -291,6 +305,7 @@ def nominal_scene(config: Config, scene_config: SceneConfig, assets: AssetIndex)
                 _check_on_plate(sensor)
             if info.needs_clear_view:
                 check_not_buried(scene, info.name, assets)
+    refused.raise_if_any()
     return scene
 
 
@@ -355,26 +370,31 @@ def check_scene(config: Config, scene: Scene) -> None:
     Raises:
         ConfigError: the text names exporter and remedy.
     """
+    refused = Refusals()
     for exporter in config.exporters:
         if isinstance(exporter, ExporterBase):
-            with located_errors(config.document):
+            with refused.collected(), located_errors(config.document):
                 exporter.check_scene(scene)
+    refused.raise_if_any()
 
 
 def ready_exporters(config: Config, info: DatasetInfo, library: Library) -> dict[str, Exporter]:
     """Exporters of a configuration by name, with its label map and the library.
 
     Raises:
-        ConfigError: a format cannot hold the data set, or is listed twice.
+        ConfigError: formats cannot hold the data set, or one is listed twice.
     """
+    refused = Refusals()
     exporters: dict[str, Exporter] = {}
     label_map = config.general.labels.map
     for own in config.exporters:
         exporter = own if label_map.is_identity else MappedExporter(own, label_map)
         if exporter.type in exporters:
             raise ConfigError(f"exporters: '{exporter.type}' is listed twice")
-        with located_errors(config.document):
+        with refused.collected(), located_errors(config.document):
             check_image_formats(own, info)
+        with refused.collected(), located_errors(config.document):
             exporter.check(info)
         exporters[exporter.type] = exporter.with_assets(library)
+    refused.raise_if_any()
     return exporters

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from gen_data.generator.runner.durable_files import format_bytes
+
 
 @dataclass(frozen=True)
 class Prices:
@@ -45,7 +47,8 @@ def estimate_rows(probe: Probe, n: int, cores: int, prices: Prices) -> Iterator[
     cpu_s = sum(probe.cpu_s.values())
     cpu_h, gpu_h = cpu_s * n / 3600.0, probe.wall_s * n / 3600.0
     size_gb = probe.bytes * n / 1e9
-    yield "size, measured", f"{size_gb:,.2f} GB ({probe.bytes / 1e3:.0f} kB per sample)"
+    size = format_bytes(probe.bytes * n)
+    yield "size, measured", f"{size} ({probe.bytes / 1e3:.0f} kB per sample)"
     yield "files, measured", f"{probe.files * n:,.0f} ({probe.files:.1f} per sample)"
     yield "CPU, measured", f"{cpu_h:,.2f} h ({cpu_s:.3f} s per sample)"
     stages = ", ".join(f"{name} {seconds:.3f}" for name, seconds in probe.cpu_s.items())

@@ -66,26 +66,20 @@ def plan(
 
 
 def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
-    from gen_data.generator.assemble.pipeline_factory import (
-        PipelineFactory,
-        dataset_info,
-        ready_exporters,
-    )
+    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
     from gen_data.generator.assemble.size_estimate import estimate_image_bytes
-    from gen_data.generator.assets.library import open_library
     from gen_data.generator.config.schema import docstring_summary
     from gen_data.generator.pipeline.splits import split_of
+    from gen_data.generator.runner.durable_files import format_bytes
 
     general = config.general
     per_scene = general.views_per_scene * general.steps_per_scene
     scenes = -(-n // per_scene)
-    info = dataset_info(config, n, PipelineFactory(config, n).categories)
-    # Refused here as in a run: formats that cannot hold the data set.
-    exporters = ready_exporters(config, info, open_library(config.asset_folders))
-    yield (
-        "scenes",
-        f"{scenes} of {general.views_per_scene} views, {general.steps_per_scene} instants",
-    )
+    factory = PipelineFactory(config, n)
+    factory.check()
+    info = factory.info
+    exporters = {exporter.type: exporter for exporter in config.exporters}
+    yield "scenes", _product(scenes, general.views_per_scene, general.steps_per_scene)
     yield "shards", f"{-(-n // general.shard_size)} of {general.shard_size} samples"
     counted = min(scenes, 10_000)
     splits = Counter(
@@ -101,9 +95,14 @@ def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
         yield f"sensor {sensor.name}", f"{sensor.modality.value}: {channels}"
     yield "categories", f"{len(info.categories)}: {', '.join(info.categories)}"
     for name, exporter in exporters.items():
-        own = next(e for e in config.exporters if e.type == exporter.type)
-        yield f"export {name}", docstring_summary(type(own))
-    yield "size, estimated", f"{estimate_image_bytes(config, info) * n / 1e9:.2f} GB of images"
+        yield f"export {name}", docstring_summary(type(exporter))
+    yield "size, estimated", f"{format_bytes(estimate_image_bytes(config, info) * n)} of images"
+
+
+def _product(scenes: int, views: int, steps: int) -> str:
+    """Factors of the number of samples: ``4 scenes x 3 views x 1 instant``."""
+    counts = ((scenes, "scene"), (views, "view"), (steps, "instant"))
+    return " x ".join(f"{count:,} {noun}{'' if count == 1 else 's'}" for count, noun in counts)
 
 
 def _measure(choice: ConfigurationOptions, count: int) -> Probe:

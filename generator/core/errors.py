@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import errno
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 
@@ -171,6 +172,32 @@ class SceneRejected(SampleError):
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle by the constructor's arguments, so that it crosses process borders."""
         return (type(self), (self.scene_index, self.rejections))
+
+
+class Refusals:
+    """Errors of several checks, so that a user can correct all of them at once."""
+
+    def __init__(self) -> None:
+        self._errors: dict[str, ConfigError] = {}
+
+    def add(self, error: ConfigError) -> None:
+        """Add an error, unless there is one with the same text."""
+        self._errors.setdefault(str(error), error)
+
+    @contextmanager
+    def collected(self) -> Iterator[None]:
+        """Add the ConfigError of a block."""
+        try:
+            yield
+        except ConfigError as error:
+            self.add(error)
+
+    def raise_if_any(self) -> None:
+        """Raise the only error, or a ConfigError with the texts of all."""
+        if len(self._errors) > 1:
+            raise ConfigError("\n".join(self._errors))
+        for error in self._errors.values():
+            raise error
 
 
 def list_names(names: Collection[str], most: int = 12) -> str:
