@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gen_data.generator.api.config import count_workers
+from gen_data.generator.api.label_gaps import check_label_gaps
 from gen_data.generator.core.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
         StorageError: the folder holds no finished data set, or ``out`` cannot be written.
         ConfigError: the change is invalid, or would change the scenes.
         Interrupted: Ctrl-C or SIGTERM; the same call goes on.
+        NoLabels: the data set is finished, and no sample has a label.
     """
     from gen_data.generator.runner.store import LocalStore
 
@@ -68,7 +70,7 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
     if sensors is not None:
         texts.insert(0, _sensors_override(Path(sensors)))
     with threadpool_limits(limits=1):
-        return render_again(
+        summary = render_again(
             stored,
             was,
             load_config(source, overrides=texts),
@@ -79,6 +81,7 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
             progress=on_progress,
             force=force,
         )
+    return check_label_gaps(summary)
 
 
 def _complete(override: str, randomizers: set[str]) -> str:

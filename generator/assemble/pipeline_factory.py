@@ -378,6 +378,16 @@ def check_scene(config: Config, scene: Scene) -> None:
     refused.raise_if_any()
 
 
+def _check_label_map(config: Config, categories: Sequence[str]) -> None:
+    """Refuse classes that no object can have, at their places; warn of unknown categories."""
+    problems, label_map = Problems(), config.general.labels.map
+    classes = config.document.get("labels", "map", "classes") or config.document
+    for name, fact in label_map.faults(categories).items():
+        problems.add(classes.key_position(name), f"labels.map.classes.{name}", fact)
+    problems.raise_if_any()
+    label_map.check(categories)
+
+
 def ready_exporters(config: Config, info: DatasetInfo, library: Library) -> dict[str, Exporter]:
     """Exporters of a configuration by name, with its label map and the library.
 
@@ -387,6 +397,8 @@ def ready_exporters(config: Config, info: DatasetInfo, library: Library) -> dict
     refused = Refusals()
     exporters: dict[str, Exporter] = {}
     label_map = config.general.labels.map
+    with refused.collected():
+        _check_label_map(config, info.categories)
     for own in config.exporters:
         exporter = own if label_map.is_identity else MappedExporter(own, label_map)
         if exporter.type in exporters:

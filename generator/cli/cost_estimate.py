@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from gen_data.generator.runner.durable_files import format_bytes
 
@@ -33,6 +33,7 @@ class Probe:
         bytes: Size of its files; hard links count once.
         files: Number of files.
         has_gpu: Whether a GPU rendered.
+        objects: Visible labelled objects by exported class, or by category without a label map.
     """
 
     cpu_s: Mapping[str, float]
@@ -40,6 +41,7 @@ class Probe:
     bytes: float
     files: float
     has_gpu: bool
+    objects: Mapping[str, float] = field(default_factory=dict)
 
 
 def estimate_rows(probe: Probe, n: int, cores: int, prices: Prices) -> Iterator[tuple[str, str]]:
@@ -55,6 +57,10 @@ def estimate_rows(probe: Probe, n: int, cores: int, prices: Prices) -> Iterator[
     if stages:
         yield "CPU s per sample", stages
     yield f"time on {cores} cores", f"{cpu_h / cores:,.2f} h"
+    most = sorted(probe.objects.items(), key=lambda item: -item[1])
+    total = sum(probe.objects.values())
+    shown = ", ".join(f"{name} {number:.2g}" for name, number in most if number)
+    yield "labels, measured", f"{total:.2g} per sample{': ' if shown else ''}{shown}"
     if probe.has_gpu and probe.wall_s:
         yield "GPU, measured", f"{gpu_h:,.2f} h ({probe.wall_s:.3f} s per sample, one worker each)"
     if prices.cpu_hour is not None:

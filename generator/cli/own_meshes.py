@@ -230,5 +230,7 @@ def yaml_text(text: str) -> str:
     import yaml
 
     first: str = yaml.safe_dump(text, allow_unicode=True, width=10_000).splitlines()[0]
+    if first[0] in "'\"" or not set(first) & set(",[]{}"):
+        return first
     # Plain scalars with these would end inside a flow list.
-    return first if not set(first) & set(",[]{}") or first[0] in "'\"" else json.dumps(text, ensure_ascii=False)
+    return json.dumps(text, ensure_ascii=False)

@@ -11,11 +11,12 @@ import click
 
 from gen_data.generator.cli.cost_estimate import Prices, Probe, estimate_rows
 from gen_data.generator.cli.options import ConfigurationOptions, configuration_options
-from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.errors import ConfigError, NoLabels
 from gen_data.generator.core.system_calls import usable_cores
 
 if TYPE_CHECKING:
     from gen_data.generator.assemble.config import Config
+    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
     from gen_data.generator.runner.progress import RunProgress
 
 
@@ -94,9 +95,21 @@ def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
         channels = ", ".join(c.value for c in sensor.channels) or sensor.kind or "points"
         yield f"sensor {sensor.name}", f"{sensor.modality.value}: {channels}"
     yield "categories", f"{len(info.categories)}: {', '.join(info.categories)}"
+    yield from _class_rows(config, factory)
     for name, exporter in exporters.items():
         yield f"export {name}", docstring_summary(type(exporter))
     yield "size, estimated", f"{format_bytes(estimate_image_bytes(config, info) * n)} of images"
+
+
+def _class_rows(config: Config, factory: PipelineFactory) -> Iterator[tuple[str, str]]:
+    """Classes of the label map, and how many assets each has in the groups of objects."""
+    assets = {a for scene in factory.nominal for g in scene.groups if g.annotated for a in g.assets}
+    counts = Counter(factory.library.get(asset).category for asset in assets)
+    for name, own in config.general.labels.map.classes_of.items():
+        used = [category for category in own if category in factory.categories]
+        drawn = sum(counts[category] for category in used)
+        text = ", ".join(used) or "no category: it stays empty"
+        yield f"class {name}", f"{text}; {drawn} of {len(assets)} assets to draw from"
 
 
 def _product(scenes: int, views: int, steps: int) -> str:
@@ -110,6 +123,8 @@ def _measure(choice: ConfigurationOptions, count: int) -> Probe:
     from gen_data.generator.api.generate import generate
     from gen_data.generator.core.temporary_folders import temporary_folder
     from gen_data.generator.renderers.warp.device import open_device
+    from gen_data.generator.report.label_gaps import count_objects
+    from gen_data.generator.runner.stored import StoredSamples
 
     done_s: dict[int, float] = {}
 
@@ -117,16 +132,20 @@ def _measure(choice: ConfigurationOptions, count: int) -> Probe:
         done_s.setdefault(progress.done, time.monotonic())
 
     with temporary_folder("plan") as folder:
-        summary = generate(
-            choice.source,
-            count,
-            out=folder / "probe",
-            workers=0,
-            seed=choice.seed,
-            overrides=(*choice.overrides, "splits={train: 1, val: 0, test: 0}"),
-            without=choice.without,
-            on_progress=note,
-        )
+        try:
+            summary = generate(
+                choice.source,
+                count,
+                out=folder / "probe",
+                workers=0,
+                seed=choice.seed,
+                overrides=(*choice.overrides, "splits={train: 1, val: 0, test: 0}"),
+                without=choice.without,
+                on_progress=note,
+            )
+        except NoLabels as error:
+            summary = error.summary
+        objects = count_objects(StoredSamples(folder / "probe"))
         files = [p for p in (folder / "probe").rglob("*") if p.is_file() and "run" not in p.parts]
         # Hard links of exports take no space.
         size = sum({p.stat().st_ino: p.stat().st_size for p in files}.values())
@@ -137,4 +156,5 @@ def _measure(choice: ConfigurationOptions, count: int) -> Probe:
         size / count,
         len(files) / count,
         open_device("auto").is_cuda,
+        {name: number / count for name, number in objects.items()},
     )

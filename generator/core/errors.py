@@ -7,6 +7,7 @@ import errno
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 
 class GenDataError(Exception):
@@ -119,6 +120,20 @@ class CertificationError(GenDataError):
     """A claim about a data set does not hold."""
 
     exit_code = 8
+
+
+class NoLabels(GenDataError):
+    """A finished data set was to have labels, and has none.
+
+    Attributes:
+        summary: Of the run that finished it; see ``generate``.
+    """
+
+    exit_code = 9
+
+    def __init__(self, message: str, summary: Any = None) -> None:
+        self.summary = summary
+        super().__init__(message)
 
 
 class Interrupted(GenDataError):
