@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
@@ -13,13 +14,17 @@ from gen_data.exporters.label_map import MappedExporter
 from gen_data.generator.annotations.annotate import annotate_ego, annotate_reading
 from gen_data.generator.assemble.config import Config, SceneConfig
 from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, default_plugin
-from gen_data.generator.assemble.preflight import unrectified_pairs
+from gen_data.generator.assemble.preflight import (
+    cameras_that_look_away,
+    doubtful_lengths,
+    unrectified_pairs,
+)
 from gen_data.generator.assets.library import Library, open_library
 from gen_data.generator.config.error_positions import located_errors
 from gen_data.generator.config.problems import Problems, refuse
 from gen_data.generator.config.yaml_tree import find_text
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, Refusals, UnknownAsset
+from gen_data.generator.core.errors import ConfigError, ConfigWarning, Refusals, UnknownAsset
 from gen_data.generator.core.interfaces import (
     AnyAnnotator,
     AssetIndex,
@@ -122,6 +127,16 @@ class PipelineFactory:
                 with refused.collected(), located_errors(config.document):
                     raise error
         refused.raise_if_any()
+        self._warn_of_doubtful_scenes()
+
+    def _warn_of_doubtful_scenes(self) -> None:
+        """Warn with a ConfigWarning of lengths in another unit, and of cameras that look away."""
+        texts: dict[str, None] = {}
+        for probe, scene in zip(self.config.probes, self.nominal, strict=True):
+            for find in (doubtful_lengths, cameras_that_look_away):
+                texts |= dict.fromkeys(find(probe, scene))
+        for text in texts:
+            warnings.warn(text, ConfigWarning, stacklevel=3)
 
     @property
     def info(self) -> DatasetInfo:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+from pydantic import BaseModel
 
 from gen_data.generator.assemble.config import SceneConfig
+from gen_data.generator.config.distributions.base import Distribution
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Camera, Scene
@@ -12,6 +17,8 @@ from gen_data.generator.core.scene_time import place_sensors
 from gen_data.generator.core.stereo import baseline_m
 from gen_data.generator.core.streams import Streams
 from gen_data.randomizers.rig_calibration import RigCalibration
+from gen_data.randomizers.room_path import RoomPath
+from gen_data.scene_templates.carrier import Carrier
 
 PAIR_REMEDY = (
     "mount them on one rig with the same size, field of view, lens and angles, the right one "
@@ -58,3 +65,84 @@ def _fault_of_pair(left: Camera, right: Camera) -> str:
     except ValueError as error:
         return str(error)
     return ""
+
+
+FAR = 2.0
+"""Lengths above this multiple of a scene's diagonal are probably in another unit."""
+
+REACHES = ("range_m", "far_m", "max_m", "visibility_m")
+"""Ends of names of lengths that may exceed any scene: what a device could measure."""
+
+
+def doubtful_lengths(config: SceneConfig, scene: Scene) -> Iterator[str]:
+    """Lengths of a configuration that are larger than its scene, as with millimetres for metres."""
+    low, high = scene.interior_m
+    inside_m = [b - a for a, b in zip(low, high, strict=True)]
+    limit_m = FAR * math.hypot(*inside_m)
+    lists: dict[str, Sequence[object]] = {
+        "elements": config.elements,
+        "randomizers": config.randomizers,
+        "sensors": config.sensors,
+    }
+    for key, plugins in lists.items():
+        for plugin in plugins:
+            name = getattr(plugin, "name", getattr(plugin, "type", ""))
+            for field, least_m in _lengths(plugin):
+                if least_m > limit_m:
+                    yield (
+                        f"{key}.{name}.{field}: {least_m:g} m or more, but the scene is only "
+                        f"{' x '.join(f'{side:.3g}' for side in inside_m)} m; expected metres"
+                    )
+
+
+def _lengths(plugin: object) -> Iterator[tuple[str, float]]:
+    """Fields in metres and the least absolute value of each."""
+    if not isinstance(plugin, BaseModel):
+        return
+    for field in plugin.model_fields_set:
+        if not field.endswith("_m") or field.endswith(REACHES):
+            continue
+        value = getattr(plugin, field)
+        if isinstance(value, Distribution):
+            try:
+                low, high = value.support()
+            except (AttributeError, TypeError, ValueError):
+                continue
+            yield field, min(abs(low), abs(high)) if low * high > 0 else 0.0
+        elif isinstance(value, (int, float)):
+            yield field, abs(value)
+        elif isinstance(value, tuple) and all(isinstance(side, (int, float)) for side in value):
+            yield field, max(map(abs, value), default=0.0)
+
+
+def cameras_that_look_away(config: SceneConfig, scene: Scene) -> Iterator[str]:
+    """Cameras on carriers that stand still, which do not have the scene's focus in their image."""
+    if any(isinstance(randomizer, RoomPath) for randomizer in config.randomizers):
+        return
+    carriers = {element.name for element in config.elements if isinstance(element, Carrier)}
+    rigs = {rig.name for rig in scene.rigs if rig.body in carriers}
+    center, size = np.array(scene.focus.center_m), np.array(scene.focus.size_m)
+    steps = np.linspace(-0.5, 0.5, 5)
+    points_m = center + size * np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
+    for camera in place_sensors(scene).cameras:
+        if camera.rig not in rigs:
+            continue
+        T_world_camera = camera.T_world_camera
+        rotation = np.array(T_world_camera.rotation())
+        eye_m = np.array(T_world_camera.translation_m)
+        lens = camera.intrinsics
+        u, v = lens.project((points_m - eye_m) @ rotation).T
+        with np.errstate(invalid="ignore"):
+            is_seen = (u >= 0) & (u < lens.width_px) & (v >= 0) & (v < lens.height_px)
+        if not is_seen.any():
+            yield (
+                f"sensors.{camera.name}: its image shows nothing of the scene's focus, "
+                f"{_meters(size)} around ({_meters(center, ', ')}): it is at "
+                f"({_meters(eye_m, ', ')}) and looks along ({_meters(rotation[:, 2], ', ')}). The "
+                f"origin of the rig '{camera.rig}' is on the floor below the carrier, X forward, Z "
+                "up; expected another offset_m, yaw_deg or pitch_deg"
+            )
+
+
+def _meters(values: Iterable[float], separator: str = " x ") -> str:
+    return separator.join(f"{value:.3g}" for value in values)

@@ -147,3 +147,61 @@ def test_plan_and_generate_refuse_all_faults_with_the_same_message(tmp_path: Pat
     assert "exporter 'bop': camera 'left' has a lens" in str(generated.value)
     assert str(planned.exception) == str(generated.value)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_distance_beyond_the_scene_is_refused_with_the_numbers() -> None:
+    """Millimetres for metres: no camera is a kilometre away in a room of 5 m."""
+    far = [{"name": "orbit", "distance_m": {"uniform": [800, 1300]}}]
+    message = refusal(table({**CAMERA, "name": "color"}, randomizers=far))
+
+    assert "distance_m: at least 800 m, but the scene is 5 x 4 x 2.8 m inside, 7 m from" in message
+    near = [{"name": "orbit", "distance_m": {"uniform": [0.8, 1.3]}}]
+    check(table({**CAMERA, "name": "color"}, randomizers=near))
+
+
+@pytest.mark.parametrize(
+    ("elements", "place"),
+    [
+        ([{"type": "carrier", "name": "cart", "height_m": 1.7}], "sensors.front.offset_m: 1500 m"),
+        (
+            [
+                {"type": "carrier", "name": "cart"},
+                {"type": "surface", "name": "desk", "asset": "table", "height_m": 740},
+            ],
+            "elements.desk.height_m: 740 m",
+        ),
+    ],
+)
+def test_lengths_larger_than_the_scene_are_doubted(
+    elements: list[dict[str, Any]], place: str
+) -> None:
+    """Of elements and sensors: a warning with the numbers."""
+    offset = [1500, 0, 900] if "offset" in place else [1.0, 0, 0.9]
+    config = cart({**CAMERA, "name": "front", "offset_m": offset})
+    config["elements"][1:] = elements
+    with pytest.warns(gen_data.ConfigWarning) as caught:
+        check(config)
+    (text,) = [str(w.message) for w in caught if "metres" in str(w.message)]
+    assert text == f"{place} or more, but the scene is only 5 x 4 x 2.8 m; expected metres"
+
+
+def test_a_camera_on_a_carrier_that_looks_away_is_named() -> None:
+    """On the floor below the carrier, where the rig has its origin, instead of above a table."""
+    above = {**CAMERA, "name": "left", "offset_m": [0, 0.03, 1.7], "pitch_deg": -90}
+    below = {**CAMERA, "name": "right", "offset_m": [0, 0.03, 0]}
+    config = cart(above, below)
+    config["elements"].append(
+        {"type": "surface", "name": "desk", "asset": "table", "top_size_m": [1.3, 0.9]}
+    )
+    with pytest.warns(gen_data.ConfigWarning) as caught:
+        check(config)
+    (text,) = [str(w.message) for w in caught]
+    assert text.startswith("sensors.right: its image shows nothing of the scene's focus, 1.3 x 0.9")
+    assert "it is at (0, 0.03, 0) and looks along (1, 0, 0)" in text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(p.stem for p in Path("configs").glob("*.yaml")))
+def test_shipped_configurations_pass_without_a_warning(name: str) -> None:
+    """Every length and every camera."""
+    check(name)

@@ -15,7 +15,7 @@ from tests.end_to_end.running import gen_data as run
 
 pytestmark = pytest.mark.slow
 
-CAMERA = {"type": "rgb_camera", "size_px": [64, 48], "hfov_deg": 60}
+CAMERA = {"type": "rgb_camera", "size_px": [240, 180], "hfov_deg": 60}
 AWAY = {**CAMERA, "rig": "cart", "offset_m": [0.5, 0, 0.9], "pitch_deg": 80}
 """A camera that looks at the ceiling."""
 
@@ -124,11 +124,30 @@ def test_plan_measures_labels_by_class(tmp_path: Path) -> None:
     assert "class fruit" in done.stdout
     assert "apple, orange" in done.stdout
     assert "labels, measured" in done.stdout
-    refused = {"fruit": "aple"}
-    (tmp_path / "c.yaml").write_text(
-        yaml.safe_dump(room(SEES, labels={"map": {"classes": refused}}))
-    )
+    config["labels"]["map"]["classes"] = {"fruit": "aple"}
+    (tmp_path / "c.yaml").write_text(yaml.safe_dump(config))
     done = run("plan", "c.yaml", "--n", "10", cwd=tmp_path)
     assert done.returncode == 2
     assert "labels.map.classes.fruit: no object of the data set can be 'aple'" in done.stderr
     assert "did you mean 'apple'?" in done.stderr
+
+
+def test_sensors_that_an_exporter_of_the_source_cannot_hold_are_rendered_without_it(
+    tmp_path: Path,
+) -> None:
+    """It is named with its reason; an exporter that the user names is refused."""
+    kitti = [{"type": "coco"}, {"type": "kitti"}]
+    gen_data.generate(room(SEES, exporters=kitti), 1, out=tmp_path / "set", workers=0)
+    bent = {**CAMERA, "name": "wide", "hfov_deg": 150, "lens": {"model": "kannala_brandt"}}
+    (tmp_path / "wide.yaml").write_text(yaml.safe_dump({"sensors": [bent]}))
+    wide: dict[str, Any] = {"sensors": tmp_path / "wide.yaml", "workers": 0}
+    with pytest.warns(gen_data.ConfigWarning, match="kitti of the data set is left out") as caught:
+        gen_data.rerender(tmp_path / "set", tmp_path / "wide", **wide)
+
+    assert "camera 'wide' has a lens of the model 'kannala_brandt'" in str(caught[0].message)
+    assert (tmp_path / "wide/coco").is_dir()
+    assert gen_data.open(tmp_path / "wide").config["exporters"] == [{"type": "coco"}]
+    with pytest.raises(gen_data.ConfigError, match="exporter 'kitti': camera 'wide' has a lens"):
+        gen_data.rerender(
+            tmp_path / "set", tmp_path / "no", overrides=["exporters=[{type: kitti}]"], **wide
+        )
