@@ -252,7 +252,9 @@ def _load_template(document: Node) -> Node | None:
     if given is not None and isinstance(given.content, tuple):
         return None
     if template is None or not isinstance(template.content, str):
-        fact = "expected the name of a template, or a list of elements"
+        fact = "expected the name of a template, or its file"
+        is_list = template is not None and isinstance(template.content, tuple)
+        fact += "; a list of elements has the key 'elements'" if is_list else ", or 'elements'"
         refuse((template or document).position, "template", fact)
     shipped = _shipped_files(scene_templates)
     path = find_path(template.content, template.position, "template", "template", shipped=shipped)

@@ -16,7 +16,7 @@ from gen_data.generator.assemble.config import Config, SceneConfig
 from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, default_plugin
 from gen_data.generator.assemble.preflight import (
     cameras_that_look_away,
-    doubtful_lengths,
+    far_sensors,
     unrectified_pairs,
 )
 from gen_data.generator.assets.library import Library, open_library
@@ -130,10 +130,10 @@ class PipelineFactory:
         self._warn_of_doubtful_scenes()
 
     def _warn_of_doubtful_scenes(self) -> None:
-        """Warn with a ConfigWarning of lengths in another unit, and of cameras that look away."""
+        """Warn with a ConfigWarning of sensors far from their rigs and cameras that look away."""
         texts: dict[str, None] = {}
         for probe, scene in zip(self.config.probes, self.nominal, strict=True):
-            for find in (doubtful_lengths, cameras_that_look_away):
+            for find in (far_sensors, cameras_that_look_away):
                 texts |= dict.fromkeys(find(probe, scene))
         for text in texts:
             warnings.warn(text, ConfigWarning, stacklevel=3)

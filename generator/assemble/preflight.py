@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 
 import numpy as np
-from pydantic import BaseModel
 
 from gen_data.generator.assemble.config import SceneConfig
-from gen_data.generator.config.distributions.base import Distribution
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.interfaces import AssetIndex
-from gen_data.generator.core.scene import Camera, Scene
+from gen_data.generator.core.scene import Camera, Region, Scene
 from gen_data.generator.core.scene_time import place_sensors
 from gen_data.generator.core.stereo import baseline_m
 from gen_data.generator.core.streams import Streams
@@ -67,57 +65,22 @@ def _fault_of_pair(left: Camera, right: Camera) -> str:
     return ""
 
 
-FAR = 2.0
-"""Lengths above this multiple of a scene's diagonal are probably in another unit."""
-
-REACHES = ("range_m", "far_m", "max_m", "visibility_m")
-"""Ends of names of lengths that may exceed any scene: what a device could measure."""
-
-
-def doubtful_lengths(config: SceneConfig, scene: Scene) -> Iterator[str]:
-    """Lengths of a configuration that are larger than its scene, as with millimetres for metres."""
-    low, high = scene.interior_m
-    inside_m = [b - a for a, b in zip(low, high, strict=True)]
-    limit_m = FAR * math.hypot(*inside_m)
-    lists: dict[str, Sequence[object]] = {
-        "elements": config.elements,
-        "randomizers": config.randomizers,
-        "sensors": config.sensors,
-    }
-    for key, plugins in lists.items():
-        for plugin in plugins:
-            name = getattr(plugin, "name", getattr(plugin, "type", ""))
-            for field, least_m in _lengths(plugin):
-                if least_m > limit_m:
-                    yield (
-                        f"{key}.{name}.{field}: {least_m:g} m or more, but the scene is only "
-                        f"{' x '.join(f'{side:.3g}' for side in inside_m)} m; expected metres"
-                    )
-
-
-def _lengths(plugin: object) -> Iterator[tuple[str, float]]:
-    """Fields in metres and the least absolute value of each."""
-    if not isinstance(plugin, BaseModel):
-        return
-    for field in plugin.model_fields_set:
-        if not field.endswith("_m") or field.endswith(REACHES):
-            continue
-        value = getattr(plugin, field)
-        if isinstance(value, Distribution):
-            try:
-                low, high = value.support()
-            except (AttributeError, TypeError, ValueError):
-                continue
-            yield field, min(abs(low), abs(high)) if low * high > 0 else 0.0
-        elif isinstance(value, (int, float)):
-            yield field, abs(value)
-        elif isinstance(value, tuple) and all(isinstance(side, (int, float)) for side in value):
-            yield field, max(map(abs, value), default=0.0)
+def far_sensors(config: SceneConfig, scene: Scene) -> Iterator[str]:
+    """Sensors farther from their rig than the scene is long, as with millimetres for metres."""
+    sides_m = [high - low for low, high in zip(*scene.interior_m, strict=True)]
+    for sensor in config.sensors:
+        offset_m = math.hypot(*getattr(sensor, "offset_m", (0.0,)))
+        if offset_m > math.hypot(*sides_m):
+            yield (
+                f"sensors.{sensor.name}.offset_m: {offset_m:g} m from its rig, but the scene is "
+                f"{_meters(sides_m)} m inside; expected metres"
+            )
 
 
 def cameras_that_look_away(config: SceneConfig, scene: Scene) -> Iterator[str]:
-    """Cameras on carriers that stand still, which do not have the scene's focus in their image."""
-    if any(isinstance(randomizer, RoomPath) for randomizer in config.randomizers):
+    """Cameras on carriers that stand still, whose image shows nothing of the scene's focus."""
+    moves = any(isinstance(randomizer, RoomPath) for randomizer in config.randomizers)
+    if moves or scene.focus == Region():
         return
     carriers = {element.name for element in config.elements if isinstance(element, Carrier)}
     rigs = {rig.name for rig in scene.rigs if rig.body in carriers}
