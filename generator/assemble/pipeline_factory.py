@@ -131,6 +131,8 @@ class PipelineFactory:
 
     def _warn_of_doubtful_scenes(self) -> None:
         """Warn with a ConfigWarning of sensors far from their rigs and cameras that look away."""
+        if not self.config.annotations and not self.config.exporters:
+            return  # Images alone are made on purpose.
         texts: dict[str, None] = {}
         for probe, scene in zip(self.config.probes, self.nominal, strict=True):
             for find in (far_sensors, cameras_that_look_away):

@@ -26,7 +26,8 @@ def cart(*sensors: dict[str, Any], **sections: Any) -> dict[str, Any]:
         {"type": "room", "name": "room", "size_m": [5, 4, 2.8]},
         {"type": "carrier", "name": "cart"},
     ]
-    return {"elements": elements, "sensors": on_rig, **sections}
+    labels = {"annotations": ["boxes2d"]}
+    return {"elements": elements, "sensors": on_rig, **labels, **sections}
 
 
 def table(*sensors: dict[str, Any], **sections: Any) -> dict[str, Any]:
