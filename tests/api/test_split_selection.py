@@ -23,7 +23,7 @@ CONFIG = {
         {"type": "rgb_camera", "name": "color", "size_px": [32, 24], "hfov_deg": 60},
     ],
     "annotations": ["boxes2d"],
-    "labels": {"map": {"classes": {"table": None}}},
+    "labels": {"map": {"classes": {"mug": None}}},
 }
 
 
@@ -35,7 +35,7 @@ def number(sample: gen_data.Sample) -> int:
 class Numbered:
     """A source whose samples are drawn by nobody: only their numbers and splits are known."""
 
-    categories = ("table",)
+    categories = ("mug",)
     config = CONFIG
 
     def sample(self, index: int) -> Any:
