@@ -36,19 +36,15 @@ KEPT_MAX = 4000
 
 
 def open_source(args: argparse.Namespace) -> gen_data.SampleSequence:
-    """The samples to train on, with the classes of their label map if they have one."""
+    """The samples of the split train, with the classes of their label map if they have one."""
     source = Path(args.source)
     if (source / "manifest.json").is_file():
         samples: gen_data.SampleSequence = gen_data.open(source)
     else:
         samples = gen_data.Dataset(args.source, seed=args.seed)
+    samples = samples.split("train")
     has_map = bool((samples.config.get("labels") or {}).get("map"))
     return samples.relabelled() if has_map else samples
-
-
-def training_target(sample: gen_data.Sample) -> tuple[NDArray[np.uint8], dict[str, Any]] | None:
-    """Image and boxes of a training sample; None for the other splits."""
-    return detection_target(sample) if sample.split == "train" else None
 
 
 def read_batches(
@@ -61,19 +57,17 @@ def read_batches(
     """
     epoch = {} if samples.is_bounded else {"epoch_size": args.epoch_size}
     loader = gen_data.Loader(
-        samples, training_target, batch_size=args.batch, shuffle=True, seed=args.seed,
+        samples, detection_target, batch_size=args.batch, shuffle=True, seed=args.seed,
         workers=args.workers, **epoch,
     )  # fmt: skip
     is_small = samples.is_bounded and len(samples) <= KEPT_MAX
-    rng, seen = np.random.default_rng(args.seed), []
+    rng = np.random.default_rng(args.seed)
+    seen: list[tuple[NDArray[np.uint8], dict[str, Any]]] = []
     while not (is_small and seen):
         for batch in loader:
-            chosen = [pair for pair in batch if pair is not None]
-            seen += chosen if is_small else chosen[:1]
-            if chosen:
-                yield chosen
-        if not seen:
-            raise SystemExit(f"{args.source}: has no sample in the split 'train'")
+            if is_small:
+                seen += batch
+            yield batch
     while True:
         order = rng.permutation(len(seen))
         for numbers in np.split(order, range(args.batch, len(seen), args.batch)):

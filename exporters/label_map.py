@@ -9,6 +9,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from functools import cache, cached_property
 from importlib.resources import files
 from pathlib import Path
@@ -19,7 +20,12 @@ from pydantic import Field, field_validator, model_validator
 
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, ConfigWarning, did_you_mean
+from gen_data.generator.core.errors import (
+    ConfigError,
+    ConfigWarning,
+    did_you_mean,
+    list_names,
+)
 from gen_data.generator.core.interfaces import AssetLibrary, DatasetInfo, Exporter
 from gen_data.generator.core.path_names import CATEGORY_MAX, check_name
 from gen_data.generator.core.sample import ImageTruth, ObjectTruth, Sample
@@ -116,14 +122,19 @@ class LabelMap(Strict):
         """Compare the map with the categories of a data set.
 
         Raises:
-            ConfigError: no class has a category of the data set.
+            ConfigError: a class of the user has categories, but none of the data set; or no class
+                of a public list has one.
 
         Warns:
-            ConfigWarning: the user named a category that the data set does not have. A map may
-                serve several data sets, so this is no error.
+            ConfigWarning: the user named a category that the data set does not have, besides others
+                that it has. A map may serve several data sets, so this is no error.
         """
-        named = self.classes if isinstance(self.classes, Mapping) else {}
-        for category in (*(c for own in named.values() for c in own or ()), *self.ignore):
+        faults = self.faults(categories)
+        if faults:
+            texts = (f"labels.map.classes.{name}: {fact}" for name, fact in faults.items())
+            raise ConfigError("\n".join(texts))
+        named = self.classes_of if isinstance(self.classes, Mapping) else {}
+        for category in (*(c for own in named.values() for c in own), *self.ignore):
             if category not in categories:
                 text = f"labels.map: the data set has no category '{category}'"
                 warnings.warn(
@@ -135,6 +146,23 @@ class LabelMap(Strict):
                 "labels.map.classes: no class has a category of the data set; expected some of: "
                 f"{', '.join(categories)}"
             )
+
+    def faults(self, categories: Sequence[str]) -> Mapping[str, str]:
+        """Facts about the user's classes that no object of a data set can have, by class."""
+        if not isinstance(self.classes, Mapping):
+            return {}
+        any_case = {category.lower(): category for category in categories}
+        found = {}
+        for name, own in self.classes_of.items():
+            if own and not set(own) & set(categories):
+                near = [k for c in own for k in get_close_matches(c.lower(), any_case, n=1)]
+                guess = f" (did you mean '{any_case[near[0]]}'?)" if near else ""
+                named = ", ".join(f"'{category}'" for category in own)
+                found[name] = (
+                    f"no object of the data set can be {named}{guess}; expected some of "
+                    f"{list_names(categories, 40)}; or [] for a class without objects"
+                )
+        return found
 
 
 @cache
@@ -168,8 +196,7 @@ class MappedExporter:
         return self.exporter.has_own_classes
 
     def check(self, info: DatasetInfo) -> None:
-        """Refuse what the exporter refuses, and categories that do not exist."""
-        self.label_map.check(info.categories)
+        """Refuse what the exporter refuses."""
         self.exporter.check(self._mapping(info).info)
 
     def with_assets(self, assets: AssetLibrary) -> MappedExporter:

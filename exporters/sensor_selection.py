@@ -60,13 +60,17 @@ def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> 
     Raises:
         ConfigError: a camera is no pinhole.
     """
-    for camera in cameras:
-        model = info.sensor(camera).lens
-        if model != "pinhole":
-            raise ConfigError(
-                f"exporter '{exporter}': camera '{camera}' has a lens of the model '{model}', but "
-                "the format holds rectified images; use a pinhole, or export this one as coco"
-            )
+    lenses = {camera: info.sensor(camera).lens for camera in cameras}
+    bent = [
+        f"camera '{camera}' has a lens of the model '{model}'"
+        for camera, model in lenses.items()
+        if model != "pinhole"
+    ]
+    if bent:
+        raise ConfigError(
+            f"exporter '{exporter}': {', '.join(bent)}, but the format holds rectified images; "
+            "use a pinhole, or export such images as coco"
+        )
 
 
 def pinhole_camera(info: DatasetInfo, wanted: str, exporter: str) -> str:

@@ -1,9 +1,11 @@
 """Training targets: arrays of one sample, for the usual tasks.
 
 A target is a function of a Sample; these return NumPy arrays, which ``gen_data.torch`` turns into
-tensors. Images are [3, height, width], uint8, RGB. Boxes, masks, labels and keypoints have the
-names, types and conventions of torchvision's reference training: boxes are ``x_min, y_min, x_max,
-y_max`` in pixels, half-open; label 0 is background, label ``k`` the ``k``-th category.
+tensors. A target has one camera, the first with a colour image unless ``camera`` names another:
+``functools.partial(detection_target, camera="right")``. Images are [3, height, width], uint8, RGB.
+Boxes, masks, labels and keypoints have the names, types and conventions of torchvision's reference
+training: boxes are ``x_min, y_min, x_max, y_max`` in pixels, half-open; label 0 is background,
+label ``k`` the ``k``-th category.
 """
 
 from __future__ import annotations

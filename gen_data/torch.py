@@ -1,7 +1,7 @@
 """PyTorch: data sets, loaders and tensors of samples; the only module that imports torch.
 
 >>> import gen_data, gen_data.torch
->>> data = gen_data.Dataset("tabletop.yaml", n=10_000)      # or gen_data.open("out/tabletop")
+>>> data = gen_data.Dataset("tabletop.yaml", split="train", n=10_000)  # or gen_data.open(folder)
 >>> for images, targets in gen_data.torch.loader(data, batch_size=8, shuffle=True, workers=2):
 ...     losses = model(images, targets)
 """
@@ -32,6 +32,9 @@ class SampleDataset(Dataset[Any]):
         samples: A ``Dataset`` with ``n``, or a finished one.
         target: Function from a Sample to arrays, such as those of ``gen_data.targets``.
         transform: Called with the tensors.
+
+    Warns:
+        ConfigWarning: samples of several splits are mixed; ``data.split("train")`` selects one.
     """
 
     def __init__(
@@ -40,6 +43,7 @@ class SampleDataset(Dataset[Any]):
         target: Target = detection_target,
         transform: Callable[[Any], Any] | None = None,
     ) -> None:
+        samples.warn_of_mixed_splits()
         self.samples, self.target, self.transform = samples, target, transform
 
     def __len__(self) -> int:

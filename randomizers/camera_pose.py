@@ -96,6 +96,7 @@ class CameraPose(RandomizerBase):
             if name:
                 fault = f"randomizers.{self.name}.aim: nothing in the scene is named"
                 check_known(name, known, fault)
+        self._check_distance(scene)
         for camera in self._moved(scene):
             self._check_reach(camera, scene, assets)
 
@@ -183,6 +184,18 @@ class CameraPose(RandomizerBase):
             for side in sides_px
         )
         return Framing(share, toward, (u, v), math.radians(self.roll_deg.draw(rng)))
+
+    def _check_distance(self, scene: Scene) -> None:
+        """Raise ConfigError if no distance to draw leaves a camera in the scene's interior."""
+        least_m = self.distance_m.support()[0] - self.jitter_m.support()[1] * math.sqrt(3.0)
+        across_m = math.dist(*scene.interior_m)
+        if self.fills is None and least_m > across_m:
+            sides_m = (b - a for a, b in zip(*scene.interior_m, strict=True))
+            raise ConfigError(
+                f"randomizers.{self.name}.distance_m: at least {self.distance_m.support()[0]:g} m, "
+                f"but the scene is {' x '.join(f'{side:.3g}' for side in sides_m)} m inside, "
+                f"{across_m:.3g} m from corner to corner; expected metres within it"
+            )
 
     def _check_reach(self, camera: Camera, scene: Scene, assets: AssetIndex) -> None:
         """Raise ConfigError if every share to draw is out of reach, for anything to aim at."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import gc
 import sys
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
@@ -18,7 +19,13 @@ from numpy.typing import NDArray
 from gen_data.generator.api.config import ConfigLike, load_config
 from gen_data.generator.api.relabelling import LabelMapLike, RelabelledSamples, load_label_map
 from gen_data.generator.api.sample import Sample, SampleRecord
-from gen_data.generator.core.errors import ConfigError, SampleIndexError, did_you_mean
+from gen_data.generator.core.errors import (
+    ConfigError,
+    ConfigWarning,
+    SampleIndexError,
+    UnknownNameError,
+    did_you_mean,
+)
 from gen_data.generator.runner.stored_objects import open_stored
 
 if TYPE_CHECKING:
@@ -26,12 +33,16 @@ if TYPE_CHECKING:
 
     from gen_data.generator.core.capture import Channel
     from gen_data.generator.pipeline import Pipeline
+    from gen_data.generator.pipeline.splits import Splits
     from gen_data.generator.runner.stored import StoredSamples
 
 Self = TypeVar("Self", bound="SampleSequence")
 
 UNBOUNDED = range(sys.maxsize)
 """Indices of a data set without a size."""
+
+ALL = "all"
+"""All splits, chosen on purpose."""
 
 
 class SampleSource(Protocol):
@@ -63,9 +74,12 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
     same samples in another process.
     """
 
-    def __init__(self, source: SampleSource, indices: range) -> None:
+    def __init__(
+        self, source: SampleSource, indices: range | SplitIndices, split: str = ""
+    ) -> None:
         self._source = source
         self._indices = indices
+        self._split = split
 
     @overload
     def __getitem__(self, index: int) -> Sample: ...
@@ -79,11 +93,13 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
         Raises:
             SampleIndexError: the index is out of range; it is also an IndexError.
             SampleError: the sample cannot be generated.
+            TypeError: the index is no whole number.
         """
         if isinstance(index, slice):
             part = copy.copy(self)
             part._indices = self._indices[index]
             return part
+        _check_index(index)
         if index < 0 and not self.is_bounded:
             raise SampleIndexError(f"index {index}: a data set without a size has no end; give n=")
         try:
@@ -119,6 +135,67 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
         """The resolved configuration as plain dictionaries, lists, strings and numbers."""
         return self._source.config
 
+    def split(self: Self, name: str) -> Self:
+        """The samples of one split, in their order; all views of a scene are in one split.
+
+        Args:
+            name: ``train``, ``val`` or ``test``; or ``all``, for all samples on purpose, of which
+                loaders do not warn.
+
+        Raises:
+            UnknownNameError: the configuration has no such split.
+
+        Warns:
+            ConfigWarning: no sample is in it.
+        """
+        part = copy.copy(self)
+        part._split = name
+        if name == ALL:
+            return part
+        splits = self._splits
+        known = [*splits.shares, ALL]
+        if name not in known:
+            is_empty = name in ("train", "val", "test")
+            raise UnknownNameError(
+                f"there is no split '{name}'{': its share is 0' if is_empty else ''}; expected one "
+                f"of {', '.join(known)}{'' if is_empty else did_you_mean(str(name), known)}"
+            )
+        is_in = SplitTest(splits, self.config.get("seed", 0), self._samples_per_scene, name)
+        part._indices = SplitIndices(self._indices, is_in)
+        if part.is_bounded and not len(part):
+            text = f"split '{name}': none of the {len(self)} samples is in it"
+            warnings.warn(text, ConfigWarning, stacklevel=2)
+        return part
+
+    def _select(self, split: str) -> None:
+        """Keep the samples of a split; empty = all."""
+        if split:
+            chosen = self.split(split)
+            self._indices, self._split = chosen._indices, chosen._split
+
+    @property
+    def _split_note(self) -> str:
+        return f", {self._split}" if self._split else ""
+
+    def warn_of_mixed_splits(self) -> None:
+        """Warn with a ConfigWarning if samples of several splits are here, and none was chosen."""
+        splits = self._splits
+        names = list(splits.shares)
+        if self._split or len(names) == 1:
+            return
+        if self.is_bounded:
+            scenes = np.unique(self.scene_indices(np.arange(len(self)))).tolist()
+            found = (splits.of_scene(scene, self.config.get("seed", 0)) for scene in scenes)
+            first = next(found, "")
+            if all(split == first for split in found):
+                return
+        warnings.warn(
+            f"samples of the splits {', '.join(names[:-1])} and {names[-1]} are mixed; expected "
+            f"one split: data.split('{names[0]}'); data.split('all') mixes them on purpose",
+            ConfigWarning,
+            stacklevel=3,
+        )
+
     def relabelled(self, label_map: LabelMapLike | None = None) -> SampleSequence:
         """The same samples with the classes and objects of a label map.
 
@@ -130,7 +207,7 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
             ConfigError: it is invalid, or the configuration has none.
         """
         loaded = load_label_map(label_map, self.config)
-        return SampleSequence(RelabelledSamples(self._source, loaded), self._indices)
+        return SampleSequence(RelabelledSamples(self._source, loaded), self._indices, self._split)
 
     def scene_indices(self, positions: NDArray[np.int64]) -> NDArray[np.int64]:
         """Numbers of the scenes of samples, which are cheapest to read one scene after the other.
@@ -138,10 +215,22 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
         Args:
             positions: Indices into this sequence.
         """
-        config = self._source.config
-        per_scene = config.get("views_per_scene", 1) * config.get("steps_per_scene", 1)
-        numbers = self._indices.start + self._indices.step * positions
-        return np.asarray(numbers // per_scene)
+        if isinstance(self._indices, range):
+            numbers = self._indices.start + self._indices.step * positions
+        else:
+            numbers = np.array([self._indices[k] for k in positions.tolist()], np.int64)
+        return np.asarray(numbers // self._samples_per_scene)
+
+    @property
+    def _samples_per_scene(self) -> int:
+        count: int = self.config.get("views_per_scene", 1) * self.config.get("steps_per_scene", 1)
+        return count
+
+    @property
+    def _splits(self) -> Splits:
+        from gen_data.generator.pipeline.splits import Splits
+
+        return Splits(**self.config.get("splits", {}))
 
     def close(self) -> None:
         """Release the engines; further use restarts them."""
@@ -162,6 +251,77 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
         return self._indices.stop != UNBOUNDED.stop
 
 
+@dataclass(frozen=True)
+class SplitTest:
+    """Whether a sample of a configuration is in a split; picklable."""
+
+    splits: Splits
+    seed: int
+    samples_per_scene: int
+    split: str
+
+    def __call__(self, number: int) -> bool:
+        """Whether the sample is in it."""
+        return self.splits.of_scene(number // self.samples_per_scene, self.seed) == self.split
+
+
+class SplitIndices(Sequence[int]):
+    """Those of some indices whose scenes are in one split; picklable, and possibly endless.
+
+    Args:
+        indices: Numbers of samples.
+        is_in: Whether a sample is in the split.
+    """
+
+    def __init__(self, indices: range | SplitIndices, is_in: SplitTest) -> None:
+        self._indices, self._is_in = indices, is_in
+        self._found: list[int] = []
+        self._sought = 0
+        self._positions = UNBOUNDED
+        if indices.stop != UNBOUNDED.stop:
+            self._seek(len(indices))
+            self._positions = range(len(self._found))
+
+    @property
+    def stop(self) -> int:
+        """As of a range: that of ``UNBOUNDED`` if there is no end."""
+        return self._positions.stop
+
+    def __len__(self) -> int:
+        """Number of indices."""
+        return len(self._positions)
+
+    @overload
+    def __getitem__(self, index: int) -> int: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> SplitIndices: ...
+
+    def __getitem__(self, index: int | slice) -> int | SplitIndices:
+        """One index, or those of a slice."""
+        if isinstance(index, slice):
+            part = copy.copy(self)
+            part._positions = self._positions[index]
+            return part
+        position = self._positions[index]
+        while position >= len(self._found):
+            self._seek(2 * self._sought + 64)
+        return self._found[position]
+
+    def _seek(self, end: int) -> None:
+        """Look through the given indices up to a position."""
+        new = (self._indices[k] for k in range(self._sought, end))
+        self._found.extend(number for number in new if self._is_in(number))
+        self._sought = max(self._sought, end)
+
+
+def _check_index(index: Any) -> None:
+    """Raise TypeError if an index is no whole number; for a name, the text has the remedy."""
+    if not hasattr(index, "__index__"):
+        remedy = f"; .split({index!r}) has the samples of a split" if isinstance(index, str) else ""
+        raise TypeError(f"{index!r} is no index; expected a whole number or a slice{remedy}")
+
+
 class Dataset(SampleSequence):
     """Samples of a configuration, generated on access.
 
@@ -173,10 +333,11 @@ class Dataset(SampleSequence):
             a dictionary with the same content; paths in a dictionary are relative to the current
             folder.
         seed: Replaces the configuration's seed.
-        n: Number of samples; None = endless.
+        n: Number of samples, of all splits together; None = endless.
         overrides: ``KEY=VALUE`` texts, as for ``gen-data --set``.
         without: Names of randomizers to leave out.
         channels: Names of additional channels for every camera, such as ``normals``.
+        split: Only the samples of this split; see ``SampleSequence.split``. Empty = all.
 
     Raises:
         ConfigError: the configuration is wrong; the message lists all errors.
@@ -196,17 +357,19 @@ class Dataset(SampleSequence):
         overrides: Sequence[str] = (),
         without: Sequence[str] = (),
         channels: Sequence[str] = (),
+        split: str = "",
     ) -> None:
         if n is not None and n < 0:
             raise ConfigError(f"n: {n} is negative; expected 0 or more")
         loaded = load_config(config, seed=seed, overrides=overrides, without=without)
         indices = UNBOUNDED if n is None else range(n)
         super().__init__(GeneratedSamples(loaded, _parse_channels(channels)), indices)
+        self._select(split)
 
     def __repr__(self) -> str:
         """Name and size."""
         size = f"{len(self)} samples" if self.is_bounded else "no end"
-        return f"<Dataset '{self.config.get('template', '')}': {size}>"
+        return f"<Dataset '{self.config.get('template', '')}'{self._split_note}: {size}>"
 
 
 class GeneratedSamples:
@@ -308,26 +471,32 @@ class ReadSamples:
 class StoredDataset(SampleSequence):
     """Samples of a finished data set on disk."""
 
-    def __init__(self, folder: str | PathLike[str]) -> None:
+    def __init__(self, folder: str | PathLike[str], split: str = "") -> None:
         stored = open_stored(folder)
         super().__init__(ReadSamples(stored), range(stored.n))
         self.folder = stored.folder
+        self._select(split)
 
     def __repr__(self) -> str:
         """Folder and size."""
-        return f"<StoredDataset '{self.folder}': {len(self)} samples>"
+        return f"<StoredDataset '{self.folder}'{self._split_note}: {len(self)} samples>"
 
 
-def open_dataset(folder: str | PathLike[str]) -> StoredDataset:
+def open_dataset(folder: str | PathLike[str], split: str = "") -> StoredDataset:
     """Open a finished data set in a folder or at a URL; its samples equal the generated ones.
 
     Colours, ids and labels are exact; other quantities have the resolution of their files.
     Shards at a URL are copied to a cache in the user's cache folder when their samples are read.
 
+    Args:
+        folder: Of the data set, or its URL.
+        split: Only the samples of this split; see ``SampleSequence.split``. Empty = all.
+
     Raises:
         StorageError: the folder holds no finished data set.
+        UnknownNameError: its configuration has no such split.
     """
-    return StoredDataset(folder)
+    return StoredDataset(folder, split)
 
 
 def _parse_channels(names: Sequence[str]) -> frozenset[Channel]:

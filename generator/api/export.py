@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gen_data.generator.api.config import count_workers
+from gen_data.generator.api.label_gaps import check_label_gaps
 from gen_data.generator.core.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -51,6 +52,7 @@ def export(  # noqa: PLR0913  (keywords of one front door)
         ConfigError: a format is unknown, or needs a sensor or an annotation that the data set does
             not have.
         Interrupted: Ctrl-C or SIGTERM; the same call goes on.
+        NoLabels: the data set is finished, and the label map leaves no label.
     """
     from gen_data.generator.runner.store import LocalStore
 
@@ -68,13 +70,13 @@ def export(  # noqa: PLR0913  (keywords of one front door)
     entries = [{"type": f} if isinstance(f, str) else dict(f) for f in formats]
     overrides = [f"exporters={json.dumps(entries)}"]
     if label_map is not None:
-        overrides.append(label_map_override(Path(label_map)))
+        overrides.append(label_map_override(Path(label_map), stored.categories))
     source = os.fspath(folder)
     config = load_config(source, overrides=overrides)
     _check_annotations(load_config(source), config)
     exporters = ready_exporters(config, stored.info, open_library(config.asset_folders))
     check_scene(config, stored.sample(0).scene)
-    return write_exports(
+    summary = write_exports(
         stored,
         config,
         exporters,
@@ -84,17 +86,23 @@ def export(  # noqa: PLR0913  (keywords of one front door)
         progress=on_progress,
         force=force,
     )
+    return check_label_gaps(summary)
 
 
-def label_map_override(path: Path) -> str:
+def label_map_override(path: Path, categories: Sequence[str]) -> str:
     """Override of a configuration with the label map of a file.
 
     Raises:
-        ConfigError: the file is no label map; the message lists all errors with their positions.
+        ConfigError: the file is no label map, or has a class that no object of these categories can
+            have; the message lists all errors.
     """
     from gen_data.generator.api.relabelling import load_label_map
 
     label_map = load_label_map(path, {})
+    faults = label_map.faults(categories)
+    if faults:
+        texts = (f"{path}: classes.{name}: {fact}" for name, fact in faults.items())
+        raise ConfigError("\n".join(texts))
     return f"labels.map={label_map.model_dump_json(exclude_unset=True)}"
 
 

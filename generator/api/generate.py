@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gen_data.generator.api.config import ConfigLike, count_workers, load_config
+from gen_data.generator.api.label_gaps import check_label_gaps
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.urls import is_url
 
@@ -66,9 +67,11 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
         ConfigError: the configuration or an argument is wrong.
         GenDataError: any other failure; see ``gen_data.generator.core.errors``.
         Interrupted: Ctrl-C or SIGTERM; finished shards are kept.
+        NoLabels: labels were asked for, and no sample has one; the data set is finished.
 
     Warns:
-        ConfigWarning: ``n`` is so small that a split of the configuration stays empty.
+        ConfigWarning: ``n`` is so small that a split of the configuration stays empty; or a sensor,
+            or a class of the label map, has no label.
     """
     with _standby_worker(cluster, workers) as standby:
         _check_arguments(config, n, out, workers, repair)
@@ -82,7 +85,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
         factory = _make_factory(loaded, n)
         plan = make_plan(factory)
         with _opened(cluster, workers, standby) as (pool, count), _folder(loaded, out) as folder:
-            return run(
+            summary = run(
                 plan,
                 factory,
                 folder,
@@ -99,6 +102,7 @@ def generate(  # noqa: PLR0913  (keywords of one front door)
                 ),
                 progress=on_progress,
             )
+        return check_label_gaps(summary)
 
 
 @contextmanager

@@ -52,7 +52,10 @@ class Loader(Generic[T]):
             ones: epoch ``e`` has the samples from ``e * epoch_size``.
 
     Raises:
-        ConfigError: an argument is out of range.
+        ConfigError: an argument is out of range, or there is no sample.
+
+    Warns:
+        ConfigWarning: samples of several splits are mixed; ``data.split("train")`` selects one.
     """
 
     def __init__(  # noqa: PLR0913
@@ -85,6 +88,10 @@ class Loader(Generic[T]):
             raise ConfigError(
                 "epoch_size: expected for a data set without a size, and for no other"
             )
+        if samples.is_bounded and not len(samples):
+            raise ConfigError("samples: there are none; expected at least one")
+        if isinstance(samples, SampleSequence):
+            samples.warn_of_mixed_splits()
         self._samples, self._target = samples, target
         self._batch_size, self._shuffle, self._seed = batch_size, shuffle, seed
         self._workers, self._prefetch, self._mixed_scenes = workers, prefetch, mixed_scenes

@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gen_data.generator.api.label_gaps import check_label_gaps
 from gen_data.generator.api.repair import restore
 from gen_data.generator.core.errors import ConfigError
 
@@ -52,7 +53,7 @@ def merge(
     plan = common_plan(folders)
     store = LocalStore(target.absolute(), resume_command)
     gather_shards(plan, folders, store, allow_mixed_numerics)
-    return restore(
+    summary = restore(
         plan,
         target,
         workers=workers,
@@ -60,3 +61,4 @@ def merge(
         on_progress=on_progress,
         resume_command=resume_command,
     )
+    return check_label_gaps(summary)

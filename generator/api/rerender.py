@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import json
 import os
+import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gen_data.generator.api.config import count_workers
-from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.api.label_gaps import check_label_gaps
+from gen_data.generator.core.errors import ConfigError, ConfigWarning
 
 if TYPE_CHECKING:
+    from gen_data.generator.assemble.config import Config
     from gen_data.generator.runner.progress import RunProgress, Summary
+    from gen_data.generator.runner.stored import StoredSamples
 
 
 def rerender(  # noqa: PLR0913  (keywords of one front door)
@@ -32,7 +38,8 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
 
     Objects keep their ids, shapes and poses. Randomizers with changed settings are drawn again, all
     others are not, so that the two data sets are counterfactual pairs. A changed camera without a
-    rig keeps its pose; a new one has the pose of the first camera without a rig.
+    rig keeps its pose; a new one has the pose of the first camera without a rig. Exporters of the
+    data set that new sensors do not fit are left out, unless the overrides name exporters.
 
     Args:
         folder: A finished data set.
@@ -50,6 +57,10 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
         StorageError: the folder holds no finished data set, or ``out`` cannot be written.
         ConfigError: the change is invalid, or would change the scenes.
         Interrupted: Ctrl-C or SIGTERM; the same call goes on.
+        NoLabels: the data set is finished, and no sample has a label.
+
+    Warns:
+        ConfigWarning: an exporter of the data set is left out; or a sensor has no label.
     """
     from gen_data.generator.runner.store import LocalStore
 
@@ -67,11 +78,14 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
     texts = [_complete(text, names) for text in overrides]
     if sensors is not None:
         texts.insert(0, _sensors_override(Path(sensors)))
+    now = load_config(source, overrides=texts)
+    if not any(text.startswith("exporters") for text in texts):
+        now = _with_fitting_exporters(now, stored, partial(load_config, source), texts)
     with threadpool_limits(limits=1):
-        return render_again(
+        summary = render_again(
             stored,
             was,
-            load_config(source, overrides=texts),
+            now,
             Path(out),
             redraw=redraw,
             workers=count_workers(workers),
@@ -79,6 +93,39 @@ def rerender(  # noqa: PLR0913  (keywords of one front door)
             progress=on_progress,
             force=force,
         )
+    return check_label_gaps(summary)
+
+
+def _with_fitting_exporters(
+    now: Config, stored: StoredSamples, load: Callable[..., Config], overrides: Sequence[str]
+) -> Config:
+    """The configuration without those inherited exporters that its sensors do not fit.
+
+    Warns:
+        ConfigWarning: an exporter is left out; the text has the reason.
+    """
+    from gen_data.generator.assemble.pipeline_factory import dataset_info, ready_exporters
+    from gen_data.generator.assets.library import open_library
+
+    if now.general.labels.map.faults(stored.categories):
+        return now  # Refused by the run, whatever the exporters are.
+    library = open_library(now.asset_folders)
+    info = dataset_info(now, stored.n, stored.categories)
+    kept = []
+    for exporter, entry in zip(now.exporters, now.resolved["exporters"], strict=True):
+        try:
+            ready_exporters(replace(now, exporters=(exporter,)), info, library)
+            kept.append(entry)
+        except ConfigError as error:
+            warnings.warn(
+                f"{exporter.type} of the data set is left out, as the new sensors do not fit it; "
+                f"--set exporters=[...] names those that you want\n{error}",
+                ConfigWarning,
+                stacklevel=3,
+            )
+    if len(kept) == len(now.exporters):
+        return now
+    return load(overrides=[*overrides, f"exporters={json.dumps(kept)}"])
 
 
 def _complete(override: str, randomizers: set[str]) -> str:

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypedDict, TypeVar, cast
 
-from pydantic import Field, model_validator
+from pydantic import Field
 from typing_extensions import Unpack
 
 from gen_data.exporters.label_map import LabelMap
@@ -55,7 +55,7 @@ from gen_data.generator.core.plugins import PluginTable
 from gen_data.generator.core.scene import Box3dExtent, SharedValue
 from gen_data.generator.core.streams import Streams
 from gen_data.generator.physics import PhysicsConfig
-from gen_data.generator.pipeline.splits import Assignment
+from gen_data.generator.pipeline.splits import Splits
 
 SHARD_SIZE = 20
 """Small, so that a crash loses few samples and all workers stay busy."""
@@ -63,26 +63,6 @@ SHARD_SIZE = 20
 DEFAULT_RENDERER = "warp"
 
 P = TypeVar("P")
-
-
-class Splits(Strict):
-    """Shares of the scenes; all views of a scene are in one split."""
-
-    train: float = Field(0.8, ge=0, le=1)
-    val: float = Field(0.1, ge=0, le=1)
-    test: float = Field(0.1, ge=0, le=1)
-    assign: Assignment = Field(
-        "random",
-        description="random: every scene draws its split; round_robin: splits take turns, so that "
-        "small data sets have scenes in all of them.",
-    )
-
-    @model_validator(mode="after")
-    def _sums_to_one(self) -> Splits:
-        total = self.train + self.val + self.test
-        if abs(total - 1.0) > 1e-9:
-            raise ValueError(f"shares must sum to 1, got {total:g}")
-        return self
 
 
 class AssetFolders(Strict):
@@ -276,8 +256,7 @@ class Config:
     @property
     def split_shares(self) -> dict[str, float]:
         """Shares of the splits that are above 0, in order."""
-        shares = self.general.splits.model_dump(exclude={"assign"})
-        return {name: share for name, share in shares.items() if share > 0}
+        return self.general.splits.shares
 
 
 class Changes(TypedDict, total=False):

@@ -19,11 +19,15 @@ from gen_data.generator.config.renamed_keys import refuse_moved_keys, replace_ol
 from gen_data.generator.config.yaml_scalars import quote_value
 from gen_data.generator.config.yaml_tree import Node, load_yaml, parse_yaml, with_override
 from gen_data.generator.core.errors import ConfigError, did_you_mean
+from gen_data.generator.pipeline.splits import SHARES
 from gen_data.generator.sensors.lidar.datasheets import load_sheets
 from gen_data.randomizers.arm_task_table import load_tasks
 
 LISTS = ("randomizers", "sensors", "annotations", "exporters")
 """Lists of plug-ins of a configuration, besides its elements."""
+
+OUTPUTS = ("annotations", "exporters")
+"""Lists of what is computed and written; unlike plug-ins with names, a new one replaces another."""
 
 NAMED = (*LISTS, "elements", "shared")
 """Sections whose entries have names, by which ``without`` leaves them out."""
@@ -127,6 +131,7 @@ def _complete(document: Node, chain: tuple[Path, ...]) -> Node:
 
 def _merge_into_base(base: Node, document: Node) -> Node:
     """Merge a configuration into the one that it extends."""
+    _check_outputs(document)
     content = dict(_mapping_of(_without(base, document.get("without"))))
     for key, node in _mapping_of(document).items():
         if key in ("extends", "without"):
@@ -134,12 +139,31 @@ def _merge_into_base(base: Node, document: Node) -> Node:
         inherited = content.get(key)
         if inherited is None:
             content[key] = node
-        elif key in (*LISTS, "elements"):
+        elif key in (*LISTS, "elements") and key not in OUTPUTS:
             content[key] = _merge_items(inherited, node)
         else:
-            content[key] = merge_nodes(inherited, node)
+            content[key] = merge_nodes(_without_shares(key, inherited, node), node)
     positions = {**base.key_positions, **document.key_positions}
     return Node(document.position, content, positions)
+
+
+def _without_shares(section: str, base: Node, override: Node) -> Node:
+    """Drop inherited shares of splits where new ones are given: together they are one value."""
+    if section != "splits" or override.entries.keys().isdisjoint(SHARES):
+        return base
+    kept = {key: node for key, node in base.entries.items() if key not in SHARES}
+    return replace(base, content=kept)
+
+
+def _check_outputs(document: Node) -> None:
+    """Refuse names to leave out of an inherited list that the document replaces."""
+    problems = Problems()
+    for key in OUTPUTS:
+        names = document.get("without", key)
+        if document.get(key) is not None and names is not None and names.content != ALL:
+            fact = f"the list '{key}' replaces all inherited ones; expected one of the two"
+            problems.add(names.position, f"without.{key}", fact)
+    problems.raise_if_any()
 
 
 def _merge_items(base: Node, override: Node) -> Node:
@@ -228,7 +252,9 @@ def _load_template(document: Node) -> Node | None:
     if given is not None and isinstance(given.content, tuple):
         return None
     if template is None or not isinstance(template.content, str):
-        fact = "expected the name of a template, or a list of elements"
+        fact = "expected the name of a template, or its file"
+        is_list = template is not None and isinstance(template.content, tuple)
+        fact += "; a list of elements has the key 'elements'" if is_list else ", or 'elements'"
         refuse((template or document).position, "template", fact)
     shipped = _shipped_files(scene_templates)
     path = find_path(template.content, template.position, "template", "template", shipped=shipped)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
@@ -13,12 +14,17 @@ from gen_data.exporters.label_map import MappedExporter
 from gen_data.generator.annotations.annotate import annotate_ego, annotate_reading
 from gen_data.generator.assemble.config import Config, SceneConfig
 from gen_data.generator.assemble.plugin_tables import ANNOTATIONS, default_plugin
+from gen_data.generator.assemble.preflight import (
+    cameras_that_look_away,
+    far_sensors,
+    unrectified_pairs,
+)
 from gen_data.generator.assets.library import Library, open_library
 from gen_data.generator.config.error_positions import located_errors
 from gen_data.generator.config.problems import Problems, refuse
 from gen_data.generator.config.yaml_tree import find_text
 from gen_data.generator.core.capture import Channel
-from gen_data.generator.core.errors import ConfigError, UnknownAsset
+from gen_data.generator.core.errors import ConfigError, ConfigWarning, Refusals, UnknownAsset
 from gen_data.generator.core.interfaces import (
     AnyAnnotator,
     AssetIndex,
@@ -101,14 +107,38 @@ class PipelineFactory:
         """Refuse what no sample could be generated or exported with, before any engine starts.
 
         Raises:
-            ConfigError: a sequence is too long, the physics engine is not installed, or a format
-                cannot hold the data set.
+            ConfigError: a sequence is too long, the physics engine is not installed, cameras form
+                no rectified pair, or a format cannot hold the data set; all of it at once.
         """
-        _check_durations(self.config)
-        _check_engine(self.config)
-        ready_exporters(self.config, self.info, self.library)
-        for scene in self.nominal:
-            check_scene(self.config, scene)
+        refused, config = Refusals(), self.config
+        for check in (_check_durations, _check_engine):
+            with refused.collected():
+                check(config)
+        with refused.collected():
+            _ = self.nominal
+        if "nominal" not in self.__dict__:  # The other checks need the scenes.
+            refused.raise_if_any()
+        with refused.collected():
+            ready_exporters(config, self.info, self.library)
+        for probe, scene in zip(config.probes, self.nominal, strict=True):
+            with refused.collected():
+                check_scene(config, scene)
+            for error in unrectified_pairs(probe, scene, self.library):
+                with refused.collected(), located_errors(config.document):
+                    raise error
+        refused.raise_if_any()
+        self._warn_of_doubtful_scenes()
+
+    def _warn_of_doubtful_scenes(self) -> None:
+        """Warn with a ConfigWarning of sensors far from their rigs and cameras that look away."""
+        if not self.config.annotations and not self.config.exporters:
+            return  # Images alone are made on purpose.
+        texts: dict[str, None] = {}
+        for probe, scene in zip(self.config.probes, self.nominal, strict=True):
+            for find in (far_sensors, cameras_that_look_away):
+                texts |= dict.fromkeys(find(probe, scene))
+        for text in texts:
+            warnings.warn(text, ConfigWarning, stacklevel=3)
 
     @property
     def info(self) -> DatasetInfo:
@@ -282,8 +312,9 @@ def nominal_scene(config: Config, scene_config: SceneConfig, assets: AssetIndex)
         step_s=config.general.step_s,
         box3d=config.general.labels.box3d,
     )
-    with located_errors(config.document):
-        for sensor in scene_config.sensors:
+    refused = Refusals()
+    for sensor in scene_config.sensors:
+        with refused.collected(), located_errors(config.document):
             scene = sensor.mount(scene)
             info = sensor.describe()
             _check_mounted(scene, info)
@@ -291,6 +322,7 @@ def nominal_scene(config: Config, scene_config: SceneConfig, assets: AssetIndex)
                 _check_on_plate(sensor)
             if info.needs_clear_view:
                 check_not_buried(scene, info.name, assets)
+    refused.raise_if_any()
     return scene
 
 
@@ -355,26 +387,43 @@ def check_scene(config: Config, scene: Scene) -> None:
     Raises:
         ConfigError: the text names exporter and remedy.
     """
+    refused = Refusals()
     for exporter in config.exporters:
         if isinstance(exporter, ExporterBase):
-            with located_errors(config.document):
+            with refused.collected(), located_errors(config.document):
                 exporter.check_scene(scene)
+    refused.raise_if_any()
+
+
+def _check_label_map(config: Config, categories: Sequence[str]) -> None:
+    """Refuse classes that no object can have, at their places; warn of unknown categories."""
+    problems, label_map = Problems(), config.general.labels.map
+    classes = config.document.get("labels", "map", "classes") or config.document
+    for name, fact in label_map.faults(categories).items():
+        problems.add(classes.key_position(name), f"labels.map.classes.{name}", fact)
+    problems.raise_if_any()
+    label_map.check(categories)
 
 
 def ready_exporters(config: Config, info: DatasetInfo, library: Library) -> dict[str, Exporter]:
     """Exporters of a configuration by name, with its label map and the library.
 
     Raises:
-        ConfigError: a format cannot hold the data set, or is listed twice.
+        ConfigError: formats cannot hold the data set, or one is listed twice.
     """
+    refused = Refusals()
     exporters: dict[str, Exporter] = {}
     label_map = config.general.labels.map
+    with refused.collected():
+        _check_label_map(config, info.categories)
     for own in config.exporters:
         exporter = own if label_map.is_identity else MappedExporter(own, label_map)
         if exporter.type in exporters:
             raise ConfigError(f"exporters: '{exporter.type}' is listed twice")
-        with located_errors(config.document):
+        with refused.collected(), located_errors(config.document):
             check_image_formats(own, info)
+        with refused.collected(), located_errors(config.document):
             exporter.check(info)
         exporters[exporter.type] = exporter.with_assets(library)
+    refused.raise_if_any()
     return exporters

@@ -139,7 +139,8 @@ def check(folder: Path, sheet: Path | None, overlays: Path | None) -> None:
     unusable = [finding for finding in findings if finding.error]
     if unusable:
         raise AssetError(f"{folder}: {len(unusable)} of {len(findings)} assets cannot be used")
-    click.echo(f"{folder}: {len(findings)} assets, all can be used")
+    count = "1 asset" if len(findings) == 1 else f"{len(findings)} assets, all"
+    click.echo(f"{folder}: {count} can be used")
 
 
 @assets.command()

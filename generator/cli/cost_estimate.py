@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+from gen_data.generator.runner.durable_files import format_bytes
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,7 @@ class Probe:
         bytes: Size of its files; hard links count once.
         files: Number of files.
         has_gpu: Whether a GPU rendered.
+        objects: Visible labelled objects by exported class, or by category without a label map.
     """
 
     cpu_s: Mapping[str, float]
@@ -38,6 +41,7 @@ class Probe:
     bytes: float
     files: float
     has_gpu: bool
+    objects: Mapping[str, float] = field(default_factory=dict)
 
 
 def estimate_rows(probe: Probe, n: int, cores: int, prices: Prices) -> Iterator[tuple[str, str]]:
@@ -45,13 +49,18 @@ def estimate_rows(probe: Probe, n: int, cores: int, prices: Prices) -> Iterator[
     cpu_s = sum(probe.cpu_s.values())
     cpu_h, gpu_h = cpu_s * n / 3600.0, probe.wall_s * n / 3600.0
     size_gb = probe.bytes * n / 1e9
-    yield "size, measured", f"{size_gb:,.2f} GB ({probe.bytes / 1e3:.0f} kB per sample)"
+    size = format_bytes(probe.bytes * n)
+    yield "size, measured", f"{size} ({probe.bytes / 1e3:.0f} kB per sample)"
     yield "files, measured", f"{probe.files * n:,.0f} ({probe.files:.1f} per sample)"
     yield "CPU, measured", f"{cpu_h:,.2f} h ({cpu_s:.3f} s per sample)"
     stages = ", ".join(f"{name} {seconds:.3f}" for name, seconds in probe.cpu_s.items())
     if stages:
         yield "CPU s per sample", stages
     yield f"time on {cores} cores", f"{cpu_h / cores:,.2f} h"
+    most = sorted(probe.objects.items(), key=lambda item: -item[1])
+    total = sum(probe.objects.values())
+    shown = ", ".join(f"{name} {number:.2g}" for name, number in most if number)
+    yield "labels, measured", f"{total:.2g} per sample{': ' if shown else ''}{shown}"
     if probe.has_gpu and probe.wall_s:
         yield "GPU, measured", f"{gpu_h:,.2f} h ({probe.wall_s:.3f} s per sample, one worker each)"
     if prices.cpu_hour is not None:

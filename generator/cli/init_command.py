@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import re
+import shlex
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from gen_data.generator.core.errors import AssetError, ConfigError, did_you_mean
+from gen_data.generator.core.errors import ConfigError, did_you_mean
+
+if TYPE_CHECKING:
+    from gen_data.generator.cli.own_meshes import OwnMesh
 
 ASSETS = "assets"
 """Folder of the user's meshes, beside the configuration."""
@@ -18,44 +23,76 @@ ASSETS = "assets"
 @click.command("init")
 @click.option("--template", "-t", default="tabletop", help="Shipped configuration to start from.")
 @click.option(
-    "--mesh", type=click.Path(path_type=Path), help="Your own object: OBJ, GLB, STL, PLY."
+    "--mesh",
+    "paths",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help="Your own object (OBJ, GLB, glTF, PLY, STL, USD), or a folder of them. Repeatable.",
 )
-@click.option("--class", "category", default="", help="Its class name [default: its file's name].")
+@click.option(
+    "--class",
+    "categories",
+    multiple=True,
+    help="Class name of all meshes, or of each in their order [default: names of their files].",
+)
 @click.option(
     "--out", "-o", type=click.Path(path_type=Path), default=Path(), help="Folder [default: here]."
 )
-def init(template: str, mesh: Path | None, category: str, out: Path) -> None:
+def init(template: str, paths: tuple[Path, ...], categories: tuple[str, ...], out: Path) -> None:
     """Write a commented configuration and scene template to start from.
 
-    With --mesh, the scenes hold your object: its file is copied to assets/, and assets/assets.yaml
-    shows the guessed unit and axis.
+    With --mesh, the scenes hold your objects: their files are copied to assets/, with the materials
+    and images that they refer to, and assets/assets.yaml shows the guessed units and axes.
     """
-    files = dict(starter_files(template, mesh, category))
+    from gen_data.generator.cli.own_meshes import find_meshes, write_assets
+    from gen_data.generator.core.temporary_folders import temporary_folder
+
+    if categories and not paths:
+        raise ConfigError("--class: names the class of a mesh; expected --mesh with it")
+    meshes = find_meshes(paths, categories)
+    files = dict(starter_files(template, meshes))
+    with temporary_folder("init") as folder:
+        staging = folder / "files"
+        (staging / ASSETS).mkdir(parents=True)
+        for name, text in files.items():
+            (staging / name).write_text(text, encoding="utf-8", newline="\n")
+        if meshes:
+            write_assets(meshes, staging / ASSETS)
+        _move(staging, out)
+    config = out / next(iter(files))
+    written = [*files, *([f"{ASSETS}/"] if meshes else [])]
+    click.echo(f"wrote {', '.join(str(out / name) for name in written)}\n\nnext:")
+    if meshes:
+        _echo_command("assets", "check", out / ASSETS)
+    _echo_command("contact-sheet", config, "--n", 6)
+    _echo_command("--config", config, "--n", 100)
+
+
+def _echo_command(*arguments: object) -> None:
+    """Print a command as a shell takes it."""
+    click.echo(f"    {shlex.join(['gen-data', *map(str, arguments)])}")
+
+
+def _move(staging: Path, out: Path) -> None:
+    """Copy all files; none replaces another."""
+    files = sorted(path.relative_to(staging) for path in staging.rglob("*") if path.is_file())
     existing = [name for name in files if (out / name).exists()]
     if existing:
         raise ConfigError(f"{out / existing[0]}: exists already; choose another folder with --out")
-    for name, text in files.items():
+    for name in files:
         (out / name).parent.mkdir(parents=True, exist_ok=True)
-        (out / name).write_text(text, encoding="utf-8", newline="\n")
-    if mesh is not None:
-        shutil.copyfile(mesh, out / ASSETS / mesh.name)
-    config = out / next(iter(files))
-    click.echo(f"wrote {', '.join(str(out / name) for name in files)}\n\nnext:")
-    if mesh is not None:
-        click.echo(f"    gen-data assets check {out / ASSETS}")
-    click.echo(f"    gen-data contact-sheet {config} --n 6")
-    click.echo(f"    gen-data --config {config} --n 100")
+        shutil.copyfile(staging / name, out / name)
 
 
-def starter_files(template: str, mesh: Path | None, category: str) -> Iterator[tuple[str, str]]:
+def starter_files(template: str, meshes: Sequence[OwnMesh]) -> Iterator[tuple[str, str]]:
     """Names and texts of the files; the first one is the configuration.
 
     Raises:
         ConfigError: there is no such configuration, or its scenes take no objects.
-        AssetError: the mesh cannot be read.
     """
     from gen_data import configs, scene_templates
     from gen_data.generator.assemble.config import load_config
+    from gen_data.generator.cli.own_meshes import own_objects
 
     folder = Path(configs.__path__[0])
     known = sorted(path.stem for path in folder.glob("*.yaml"))
@@ -73,70 +110,16 @@ def starter_files(template: str, mesh: Path | None, category: str) -> Iterator[t
     text, changed = re.subn(r"(?m)^template: \S+", f"template: {scene_name}", text)
     if not changed:
         text = f"{text.rstrip()}\ntemplate: {scene_name}\n"
-    if mesh is None:
-        yield f"{name}.yaml", text
-    else:
+    if meshes:
         groups = [e["name"] for e in config.resolved["elements"] if e["type"] == "objects"]
         if not groups or re.search(r"(?m)^(assets|elements|labels):", text):
             raise ConfigError(
                 f"--mesh: the scenes of '{name}' take no objects of your own; expected --template "
                 "tabletop, bin_picking or shelf"
             )
-        kind = category or mesh.stem
-        yield f"{name}.yaml", f"{text.rstrip()}\n{_own_object(groups[0], mesh, kind)}"
-        yield f"{ASSETS}/assets.yaml", _asset_index(mesh, kind)
+        text = f"{text.rstrip()}\n{own_objects(groups[0], meshes, config.resolved)}"
+    yield f"{name}.yaml", text
     yield scene_name, scene.read_text("utf-8")
-
-
-def _own_object(group: str, mesh: Path, category: str) -> str:
-    return f"""
-# Your object; assets/assets.yaml has its unit, axes and class.
-assets: {{folders: [{ASSETS}]}}
-elements:
-  {group}: {{assets: {{ids: [user/{mesh.stem}]}}}}
-labels:
-  map: {{classes: {{{category}: }}}}     # exports have this class only; remove it for all
-"""
-
-
-def _asset_index(mesh: Path, category: str) -> str:
-    """Index of the user's folder, with the unit and axis that the mesh suggests."""
-    import numpy as np
-    import trimesh
-
-    if not mesh.is_file():
-        raise AssetError(f"{mesh}: no such file; expected a mesh: OBJ, GLB, STL or PLY")
-    try:
-        bounds = trimesh.load_scene(mesh).bounds
-    except Exception as error:
-        raise AssetError(f"{mesh}: cannot be read as a mesh: {error}") from error
-    if bounds is None:
-        raise AssetError(f"{mesh}: holds no triangles")
-    edges = np.ptp(bounds, axis=0)
-    size = " x ".join(f"{edge:g}" for edge in edges)
-    lines = [
-        "licence: unknown                 # under which terms may it be used?",
-        "assets:",
-        f"  - file: {mesh.name}",
-        f"    category: {category}",
-    ]
-    if mesh.suffix.lower() not in (".glb", ".gltf"):  # which are in metres, Y up
-        unit = guess_unit(float(edges.max()))
-        lines.append(f"    unit: {unit:<24}# a guess: its edges are {size} units")
-        lines.append(
-            "    up: z                        # a guess: the axis of the file that points up"
-        )
-    else:
-        lines.append(f"    # glTF is in metres with Y up: its edges are {size} m")
-    return "\n".join(lines) + "\n"
-
-
-def guess_unit(longest: float) -> str:
-    """Unit in which an object's longest edge is between 3 cm and 3 m, preferring metres."""
-    for unit, metres in (("m", 1.0), ("mm", 0.001), ("cm", 0.01), ("in", 0.0254)):
-        if 0.03 <= longest * metres <= 3.0:
-            return unit
-    return "m" if longest < 1.0 else "mm"
 
 
 @click.command("completion")

@@ -148,7 +148,7 @@ gen-data --config tabletop.yaml --n 1000 --without colors --out ablation
 
 An interrupted run is resumed by the same command. Exit codes: 0 done, 2 configuration or usage,
 3 asset, 4 storage (resumable), 5 determinism, 6 sample, 7 verification, 8 certification,
-130 interrupted.
+9 finished without any label, 130 interrupted.
 """
 
 

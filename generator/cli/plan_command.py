@@ -11,11 +11,12 @@ import click
 
 from gen_data.generator.cli.cost_estimate import Prices, Probe, estimate_rows
 from gen_data.generator.cli.options import ConfigurationOptions, configuration_options
-from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.errors import ConfigError, NoLabels
 from gen_data.generator.core.system_calls import usable_cores
 
 if TYPE_CHECKING:
     from gen_data.generator.assemble.config import Config
+    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
     from gen_data.generator.runner.progress import RunProgress
 
 
@@ -66,26 +67,20 @@ def plan(
 
 
 def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
-    from gen_data.generator.assemble.pipeline_factory import (
-        PipelineFactory,
-        dataset_info,
-        ready_exporters,
-    )
+    from gen_data.generator.assemble.pipeline_factory import PipelineFactory
     from gen_data.generator.assemble.size_estimate import estimate_image_bytes
-    from gen_data.generator.assets.library import open_library
     from gen_data.generator.config.schema import docstring_summary
     from gen_data.generator.pipeline.splits import split_of
+    from gen_data.generator.runner.durable_files import format_bytes
 
     general = config.general
     per_scene = general.views_per_scene * general.steps_per_scene
     scenes = -(-n // per_scene)
-    info = dataset_info(config, n, PipelineFactory(config, n).categories)
-    # Refused here as in a run: formats that cannot hold the data set.
-    exporters = ready_exporters(config, info, open_library(config.asset_folders))
-    yield (
-        "scenes",
-        f"{scenes} of {general.views_per_scene} views, {general.steps_per_scene} instants",
-    )
+    factory = PipelineFactory(config, n)
+    factory.check()
+    info = factory.info
+    exporters = {exporter.type: exporter for exporter in config.exporters}
+    yield "scenes", _product(scenes, general.views_per_scene, general.steps_per_scene)
     yield "shards", f"{-(-n // general.shard_size)} of {general.shard_size} samples"
     counted = min(scenes, 10_000)
     splits = Counter(
@@ -100,10 +95,27 @@ def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
         channels = ", ".join(c.value for c in sensor.channels) or sensor.kind or "points"
         yield f"sensor {sensor.name}", f"{sensor.modality.value}: {channels}"
     yield "categories", f"{len(info.categories)}: {', '.join(info.categories)}"
+    yield from _class_rows(config, factory)
     for name, exporter in exporters.items():
-        own = next(e for e in config.exporters if e.type == exporter.type)
-        yield f"export {name}", docstring_summary(type(own))
-    yield "size, estimated", f"{estimate_image_bytes(config, info) * n / 1e9:.2f} GB of images"
+        yield f"export {name}", docstring_summary(type(exporter))
+    yield "size, estimated", f"{format_bytes(estimate_image_bytes(config, info) * n)} of images"
+
+
+def _class_rows(config: Config, factory: PipelineFactory) -> Iterator[tuple[str, str]]:
+    """Classes of the label map, and how many assets each has in the groups of objects."""
+    assets = {a for scene in factory.nominal for g in scene.groups if g.annotated for a in g.assets}
+    counts = Counter(factory.library.get(asset).category for asset in assets)
+    for name, own in config.general.labels.map.classes_of.items():
+        used = [category for category in own if category in factory.categories]
+        drawn = sum(counts[category] for category in used)
+        text = ", ".join(used) or "no category: it stays empty"
+        yield f"class {name}", f"{text}; {drawn} of {len(assets)} assets to draw from"
+
+
+def _product(scenes: int, views: int, steps: int) -> str:
+    """Factors of the number of samples: ``4 scenes x 3 views x 1 instant``."""
+    counts = ((scenes, "scene"), (views, "view"), (steps, "instant"))
+    return " x ".join(f"{count:,} {noun}{'' if count == 1 else 's'}" for count, noun in counts)
 
 
 def _measure(choice: ConfigurationOptions, count: int) -> Probe:
@@ -111,6 +123,8 @@ def _measure(choice: ConfigurationOptions, count: int) -> Probe:
     from gen_data.generator.api.generate import generate
     from gen_data.generator.core.temporary_folders import temporary_folder
     from gen_data.generator.renderers.warp.device import open_device
+    from gen_data.generator.report.label_gaps import count_objects
+    from gen_data.generator.runner.stored import StoredSamples
 
     done_s: dict[int, float] = {}
 
@@ -118,16 +132,20 @@ def _measure(choice: ConfigurationOptions, count: int) -> Probe:
         done_s.setdefault(progress.done, time.monotonic())
 
     with temporary_folder("plan") as folder:
-        summary = generate(
-            choice.source,
-            count,
-            out=folder / "probe",
-            workers=0,
-            seed=choice.seed,
-            overrides=(*choice.overrides, "splits={train: 1, val: 0, test: 0}"),
-            without=choice.without,
-            on_progress=note,
-        )
+        try:
+            summary = generate(
+                choice.source,
+                count,
+                out=folder / "probe",
+                workers=0,
+                seed=choice.seed,
+                overrides=(*choice.overrides, "splits={train: 1, val: 0, test: 0}"),
+                without=choice.without,
+                on_progress=note,
+            )
+        except NoLabels as error:
+            summary = error.summary
+        objects = count_objects(StoredSamples(folder / "probe"))
         files = [p for p in (folder / "probe").rglob("*") if p.is_file() and "run" not in p.parts]
         # Hard links of exports take no space.
         size = sum({p.stat().st_ino: p.stat().st_size for p in files}.values())
@@ -138,4 +156,5 @@ def _measure(choice: ConfigurationOptions, count: int) -> Probe:
         size / count,
         len(files) / count,
         open_device("auto").is_cuda,
+        {name: number / count for name, number in objects.items()},
     )

@@ -5,7 +5,7 @@
 3. A mapping with another ``type`` (``model`` if it has no type) replaces the old one as a whole.
 4. Keys that select assets (``asset``, ``ids``, ``tags``, ``any_of``) are alternatives: giving one
    drops the inherited ones. So are the two ways to give a camera's distance.
-5. Lists of plug-ins merge item by item, see ``merge_named``.
+5. Elements, randomizers and sensors merge item by item, see ``merge_named``.
 """
 
 from __future__ import annotations

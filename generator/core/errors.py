@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import difflib
 import errno
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 
 class GenDataError(Exception):
@@ -120,6 +122,20 @@ class CertificationError(GenDataError):
     exit_code = 8
 
 
+class NoLabels(GenDataError):
+    """A finished data set was to have labels, and has none.
+
+    Attributes:
+        summary: Of the run that finished it; see ``generate``.
+    """
+
+    exit_code = 9
+
+    def __init__(self, message: str, summary: Any = None) -> None:
+        self.summary = summary
+        super().__init__(message)
+
+
 class Interrupted(GenDataError):
     """The user asked to stop; what was committed stays and the run can be resumed."""
 
@@ -171,6 +187,32 @@ class SceneRejected(SampleError):
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle by the constructor's arguments, so that it crosses process borders."""
         return (type(self), (self.scene_index, self.rejections))
+
+
+class Refusals:
+    """Errors of several checks, so that a user can correct all of them at once."""
+
+    def __init__(self) -> None:
+        self._errors: dict[str, ConfigError] = {}
+
+    def add(self, error: ConfigError) -> None:
+        """Add an error, unless there is one with the same text."""
+        self._errors.setdefault(str(error), error)
+
+    @contextmanager
+    def collected(self) -> Iterator[None]:
+        """Add the ConfigError of a block."""
+        try:
+            yield
+        except ConfigError as error:
+            self.add(error)
+
+    def raise_if_any(self) -> None:
+        """Raise the only error, or a ConfigError with the texts of all."""
+        if len(self._errors) > 1:
+            raise ConfigError("\n".join(self._errors))
+        for error in self._errors.values():
+            raise error
 
 
 def list_names(names: Collection[str], most: int = 12) -> str:

@@ -5,15 +5,58 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Literal
+from typing import Any, Literal
 
+from pydantic import Field, model_validator
+
+from gen_data.generator.config.base_model import Strict
 from gen_data.generator.core.errors import ConfigWarning
 from gen_data.generator.core.streams import Streams
 
 Assignment = Literal["random", "round_robin"]
 """``random``: every scene draws its split. ``round_robin``: splits take turns by their shares."""
 
+SHARES = ("train", "val", "test")
+
 _FIRST_BLOCK = 1024
+
+
+class Splits(Strict):
+    """Shares of the scenes; all views of a scene are in one split."""
+
+    train: float = Field(
+        0.8, ge=0, le=1, description="Share of the scenes; 0 if only other shares are given."
+    )
+    val: float = Field(0.1, ge=0, le=1, description="As train.")
+    test: float = Field(0.1, ge=0, le=1, description="As train.")
+    assign: Assignment = Field(
+        "random",
+        description="random: every scene draws its split; round_robin: splits take turns, so that "
+        "small data sets have scenes in all of them.",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _missing_shares_are_zero(cls, given: Any) -> Any:
+        if isinstance(given, Mapping) and not given.keys().isdisjoint(SHARES):
+            return {**dict.fromkeys(SHARES, 0.0), **given}
+        return given
+
+    @model_validator(mode="after")
+    def _sums_to_one(self) -> Splits:
+        total = self.train + self.val + self.test
+        if abs(total - 1.0) > 1e-9:
+            raise ValueError(f"shares must sum to 1, got {total:g}")
+        return self
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Shares above 0 by split, in order."""
+        return {name: share for name in SHARES if (share := getattr(self, name)) > 0}
+
+    def of_scene(self, scene_index: int, seed: int) -> str:
+        """Split of a scene; see ``split_of``."""
+        return split_of(scene_index, self.shares, self.assign, seed)
 
 
 def split_of(

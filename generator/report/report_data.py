@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from gen_data.generator.report.image_statistics import (
 )
 from gen_data.generator.report.label_checks import CheckResult, LabelChecks
 from gen_data.generator.report.label_files import read_records, read_scans
+from gen_data.generator.report.label_gaps import count_objects, find_label_gaps, read_label_map
 from gen_data.generator.report.label_statistics import Column, Survey, collect_statistics
 from gen_data.generator.report.report_tables import (
     Histogram,
@@ -99,7 +100,7 @@ def describe_dataset(
         objects.add(image)
         checks.add(image)
     scans = make_scan_tables(tuple(read_scans(folder)))
-    tables = (*make_tables(objects.survey), *scans)
+    tables = (*_label_tables(stored), *make_tables(objects.survey), *scans)
     progress("images")
     files, looks = _measure(stored, objects.splits)
     progress("parameters")
@@ -126,6 +127,19 @@ def describe_dataset(
         "licences": read_licences(folder / LICENCES_NAME),
         "browser": [{**image.facts, "pictures": image.pictures} for image in images],
     }
+
+
+def _label_tables(stored: StoredSamples) -> Iterator[Table]:
+    """What has no label, and the classes of exports, if they are not the categories."""
+    gaps = tuple((line,) for line in find_label_gaps(stored).lines())
+    if gaps:
+        yield Table("Without labels", ("what",), gaps)
+    classes = read_label_map(stored.config).classes_of
+    if classes:
+        counts = count_objects(stored)
+        rows = [(name, str(counts[name]), ", ".join(own)) for name, own in classes.items()]
+        note = "Visible objects in all images, before the limits of the label map."
+        yield Table("Exported classes", ("class", "objects", "categories"), tuple(rows), note)
 
 
 def without_pictures(report: Json) -> Json:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from gen_data.generator.core.errors import CacheWarning, GenDataError
 from gen_data.generator.core.serialization import canonical_json
+from gen_data.generator.runner.durable_files import format_bytes
 from gen_data.generator.runner.free_space import SpaceCheck
 from gen_data.generator.runner.store import LOG_NAME
 from gen_data.generator.runner.worker_events import (
@@ -99,7 +100,11 @@ class Summary:
             ("samples", _with_note(str(self.samples), self.samples - self.made, "from before")),
             ("time", f"{self.seconds:.1f} s, {self.samples_per_s:.2f} samples/s"),
             ("rejected layouts", str(self.rejections)),
-            ("size", f"{self.bytes / 1e6:.1f} MB, {mean_bytes / 1e3:.0f} kB/sample"),
+            (
+                "size",
+                f"{format_bytes(self.bytes)} in shards/, linked files included, "
+                f"{mean_bytes / 1e3:.0f} kB/sample",
+            ),
         ]
         stages = ", ".join(f"{name} {seconds:.3f}" for name, seconds in self.cpu_s.items())
         if stages:

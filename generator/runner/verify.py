@@ -16,6 +16,7 @@ from gen_data.generator.runner.durable_files import (
     IRREGULAR,
     Contents,
     Inode,
+    format_bytes,
     get_inode,
     hash_file,
     scan_tree,
@@ -80,8 +81,8 @@ class Report:
         """One line for a user."""
         depth = "every sha256 equal" if self.full else "sizes and records equal"
         return (
-            f"{self.samples} samples, {self.files} files, {self.bytes / 1e6:.1f} MB: {depth}; "
-            f"id {self.dataset_id[:16]}"
+            f"{self.samples} samples, {self.files} files, {format_bytes(self.bytes)} with linked "
+            f"files: {depth}; id {self.dataset_id[:16]}"
         )
 
 

@@ -74,9 +74,42 @@ exporters: [{type: kitti}]
             {"type": "materials", "name": "finish"},
         ],
         "sensors": [{"type": "rgb_camera", "name": "color", "size_px": [64, 48], "hfov_deg": 60}],
-        "annotations": ["boxes2d", "poses"],
-        "exporters": [{"type": "coco"}, {"type": "kitti"}],
+        "annotations": ["poses"],
+        "exporters": [{"type": "kitti"}],
     }
+
+
+def test_a_list_of_outputs_replaces_the_inherited_one(folder: Path) -> None:
+    """Annotations and exporters are computed and written as listed, and no others."""
+    text = "extends: base.yaml\nannotations: [poses, {type: boxes3d}]\nexporters: []\n"
+    spec = load_config(written(folder, text))
+
+    assert list(spec.annotations) == ["poses", "boxes3d"]
+    assert spec.exporters == ()
+
+
+@pytest.mark.parametrize("key", ["annotations", "exporters"])
+def test_errors_in_a_list_of_outputs_count_its_own_items(folder: Path, key: str) -> None:
+    """The second item of the user's list is number 1, whatever is inherited."""
+    items = {"annotations": "boxes2d, bokses", "exporters": "{type: yolo}, {type: koko}"}
+    message = refusal(written(folder, f"extends: base.yaml\n{key}: [{items[key]}]\n"))
+
+    assert f"mine.yaml:2:{24 if key == 'annotations' else 34}: {key}[1]" in message
+
+
+@pytest.mark.parametrize("key", ["annotations", "exporters"])
+def test_outputs_are_either_listed_or_left_out(folder: Path, key: str) -> None:
+    """Nothing is left of the inherited list when a new one replaces it."""
+    named = {"annotations": ("boxes2d", "[poses]"), "exporters": ("coco", "[{type: kitti}]")}
+    name, own = named[key]
+    text = f"extends: base.yaml\nwithout: {{{key}: [{name}]}}\n{key}: {own}\n"
+
+    assert (
+        f"mine.yaml:2:{13 + len(key)}: without.{key}: the list '{key}' replaces all inherited ones;"
+        " expected one of the two"
+    ) in refusal(written(folder, text))
+    everything = f"extends: base.yaml\nwithout: {{{key}: all}}\n{key}: {own}\n"
+    assert load_config(written(folder, everything)).resolved[key]
 
 
 def test_inherited_plugins_can_be_left_out(folder: Path) -> None:

@@ -140,6 +140,7 @@ def test_spec_crosses_process_borders() -> None:
     [
         ("seed: 1\n" + CAMERA, "template: expected the name of a template"),
         ("template: tabeltop\n" + CAMERA, "did you mean 'tabletop.yaml'?"),
+        ("template: [{type: room}]\n" + CAMERA, "a list of elements has the key 'elements'"),
         ("template: tabletop\n", "sensors: at least one sensor is needed"),
         ("template: tabletop\nseed: -1\n" + CAMERA, "seed: "),
         ("template: tabletop\nsplits: {train: 0.5, val: 0.1}\n" + CAMERA, "shares must sum to 1"),

@@ -85,7 +85,7 @@ def test_the_command_fails_if_an_asset_cannot_be_used(folder: Path) -> None:
     (folder / "assets.yaml").write_text("licence: CC0-1.0\nassets: [{file: crate.glb}]\n")
     result = CliRunner().invoke(assets, ["check", str(folder)], catch_exceptions=False)
     assert result.exit_code == 0
-    assert "1 assets, all can be used" in result.output
+    assert "1 asset can be used" in result.output
 
 
 def test_pictures_show_every_asset(folder: Path, tmp_path: Path) -> None:

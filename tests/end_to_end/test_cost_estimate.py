@@ -15,7 +15,7 @@ def test_a_billion_samples_cost_hours_times_prices() -> None:
     probe = Probe({"render": 0.27, "encode": 0.09}, 0.72, 50e3, 4.0, has_gpu=True)
     rows = dict(estimate_rows(probe, BILLION, 100, Prices(0.05, 2.0, 0.02)))
 
-    assert rows["size, measured"] == "50,000.00 GB (50 kB per sample)"
+    assert rows["size, measured"] == "50.0 TB (50 kB per sample)"
     assert rows["files, measured"] == "4,000,000,000 (4.0 per sample)"
     assert rows["CPU, measured"] == "100,000.00 h (0.360 s per sample)"
     assert rows["time on 100 cores"] == "1,000.00 h"

@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import subprocess
 from pathlib import Path
 
 import pytest
 import trimesh
+from trimesh.exchange.gltf import export_gltf
 
 from gen_data.exporters import TABLE
 from gen_data.generator.assemble.config import load_config
-from gen_data.generator.cli.init_command import guess_unit
+from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+from gen_data.generator.assets.library import open_library
+from gen_data.generator.cli.own_meshes import guess_unit
+from gen_data.generator.core.asset_types import Asset
 from tests.end_to_end.running import gen_data
 
 SHIPPED = ("tabletop", "street", "pedestrians", "bin_picking", "kitti_rig", "shelf")
@@ -64,13 +69,95 @@ def test_init_with_a_mesh_gives_a_data_set_of_that_class(tmp_path: Path) -> None
     assert len(data["annotations"]) > 5
 
 
+def textured_obj(folder: Path, name: str, rgb: tuple[int, int, int]) -> None:
+    """A triangle with a material library and an image, as exporters write them."""
+    from PIL import Image
+
+    (folder / "images").mkdir(parents=True, exist_ok=True)
+    Image.new("RGB", (2, 2), rgb).save(folder / "images/color.png")
+    (folder / "scene.mtl").write_text("newmtl m\nmap_Kd images/color.png\n")
+    (folder / f"{name}.obj").write_text(
+        "mtllib scene.mtl\nv 0 0 0\nv 0.1 0 0\nv 0 0.1 0.1\nvt 0 0\nvt 1 0\nvt 0 1\n"
+        "usemtl m\nf 1/1 2/2 3/3\n"
+    )
+
+
+@pytest.mark.slow
+def test_init_takes_every_mesh_with_the_files_that_it_refers_to(tmp_path: Path) -> None:
+    """Files and folders; material libraries of one name and different content; spaces."""
+    textured_obj(tmp_path / "a", "red duck", (255, 0, 0))
+    textured_obj(tmp_path / "b", "blue", (0, 0, 255))
+    box = trimesh.creation.box((0.1, 0.05, 0.03))
+    for name, data in export_gltf(trimesh.Scene(box)).items():  # with a buffer beside it
+        (tmp_path / "b" / name.replace("model", "loose")).write_bytes(data)
+    box.export(tmp_path / "bolt.ply")
+    box.export(tmp_path / "bolt.stl")
+    done = gen_data(
+        "init", "--mesh", "a/red duck.obj", "--mesh", "b", "--mesh", "bolt.ply",
+        "--mesh", "bolt.stl", "--out", "my parts", cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+    config = load_config(str(tmp_path / "my parts/tabletop.yaml"))
+    (group,) = [e for e in config.resolved["elements"] if e["name"] == "clutter"]
+    classes = ["red duck", "blue", "loose", "bolt"]
+    assert list(config.resolved["labels"]["map"]["classes"]) == classes
+    assets = {i: library_asset(tmp_path / "my parts/assets", i) for i in group["assets"]["ids"]}
+    assert [asset.category for asset in assets.values()] == [*classes, "bolt"]
+    albedos = [asset_albedo(tmp_path / "my parts/assets", i) for i in list(assets)[:2]]
+    assert albedos == [(255, 0, 0), (0, 0, 255)]
+    commands = re.findall(r"(?m)^    (gen-data .*)$", done.stdout)
+    assert [shlex.split(c)[-1] for c in commands] == ["my parts/assets", "6", "100"]
+    assert shlex.split(commands[1])[2] == "my parts/tabletop.yaml"
+
+
+def library_asset(folder: Path, asset_id: str) -> Asset:
+    """An asset of a user's folder."""
+    return open_library([folder]).get(asset_id)
+
+
+def asset_albedo(folder: Path, asset_id: str) -> tuple[int, ...]:
+    """Colour of the image on an asset's first material."""
+    library = open_library([folder])
+    material = library.mesh(asset_id).materials[0]
+    return tuple(library.texture(material.texture).albedo[0, 0].tolist())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("template", ["tabletop", "bin_picking"])
+def test_the_comments_of_init_tell_how_to_leave_the_robot_out(
+    template: str, tmp_path: Path
+) -> None:
+    """Done as they say, the configuration is valid and its scenes have no robot."""
+    trimesh.creation.box((0.1, 0.05, 0.03)).export(tmp_path / "part.stl")
+    done = gen_data("init", "--template", template, "--mesh", "part.stl", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    file, scene = (tmp_path / f"{template}{end}.yaml" for end in ("", "_scene"))
+    text = file.read_text()
+    deleted = re.findall(r"delete the (element|randomizer) '(\w+)'|the randomizer '(\w+)'", text)
+    names = {one or other for _, one, other in deleted}
+    for path in (file, scene):
+        lines = path.read_text().splitlines(keepends=True)
+        kept = [k for k in lines if not any(re.search(rf"name: {n}\b", k) for n in names)]
+        path.write_text("".join(kept))
+
+    (probe, *_) = PipelineFactory(load_config(str(file)), 1).nominal
+    assert probe.articulations == ()
+    assert ("'arm'" in text) == (template == "tabletop")
+
+
 @pytest.mark.parametrize(
     ("arguments", "code", "text"),
     [
         (("--template", "tabeltop"), 2, "unknown configuration.*did you mean 'tabletop'"),
         (("--mesh", "none.stl"), 3, "none.stl: no such file"),
         (("--mesh", "junk.stl"), 3, "junk.stl: holds no triangles"),
-        (("--mesh", "junk.xyz"), 3, "junk.xyz: cannot be read as a mesh"),
+        (("--mesh", "junk.xyz"), 3, "junk.xyz: is no mesh that can be read; expected one of .*obj"),
+        (("--mesh", "box.off"), 3, "box.off: is no mesh that can be read"),
+        (("--mesh", "empty"), 3, "empty: has no mesh"),
+        (("--mesh", "bare.obj"), 3, r"bare.obj: .*missing file bare.mtl"),
+        (("--mesh", "box.stl", "--class", "a", "--class", "b"), 2, "2 names for 1 mesh"),
+        (("--class", "a"), 2, "expected --mesh with it"),
         (("--template", "kitti_rig", "--mesh", "junk.stl"), 2, "take no objects of your own"),
     ],
 )
@@ -80,6 +167,12 @@ def test_init_refuses_what_it_cannot_write(
     """And writes nothing."""
     (tmp_path / "junk.stl").write_bytes(b"solid\n")
     (tmp_path / "junk.xyz").write_bytes(b"nonsense\n")
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "bare.obj").write_text(
+        "mtllib bare.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl m\nf 1 2 3\n"
+    )
+    for suffix in ("off", "stl"):
+        trimesh.creation.box((80.0, 40.0, 30.0)).export(tmp_path / f"box.{suffix}")
     done = gen_data("init", *arguments, "--out", "new", cwd=tmp_path)
 
     assert done.returncode == code, done.stderr
@@ -100,7 +193,8 @@ def test_plan_counts_without_rendering(tmp_path: Path) -> None:
     done = gen_data("plan", "tabletop.yaml", "--n", "10000", cwd=tmp_path)
 
     assert done.returncode == 0, done.stderr
-    for text in ("2000 of 5 views", "mug", "export coco", "export kitti", "train 80%", "GB of"):
+    texts = ["2,000 scenes x 5 views x 1 instant", "mug", "train 80%", "GB of"]
+    for text in (*texts, "export coco", "export kitti"):
         assert text in done.stdout, text
     assert not list(tmp_path.iterdir())
     refused = gen_data(

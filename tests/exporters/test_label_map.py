@@ -183,8 +183,37 @@ def test_categories_that_the_data_set_lacks_are_named(world: Any) -> None:
     known = world.info(7).categories
     with pytest.warns(ConfigWarning, match=f"no category '{first}x' .did you mean '{first}'"):
         parse(json.dumps({"classes": {"a": [first, first + "x"]}})).check(known)
-    with (
-        pytest.warns(ConfigWarning),
-        pytest.raises(ConfigError, match="no class has a category of the data set; expected some"),
-    ):
+    with pytest.raises(ConfigError, match="no object of the data set can be 'unheard'; expected"):
         parse('{"classes": {"a": ["unheard"]}}').check(known)
+
+
+@pytest.mark.parametrize(
+    ("classes", "fault"),
+    [
+        ({"bottel": None, "mug": None}, "bottel: no object .* 'bottel' .did you mean 'bottle'"),
+        ({"Mug": None, "bottle": None}, "Mug: no object .* 'Mug' .did you mean 'mug'"),
+        ({"cup": ["MUG", "Botle"]}, "cup: no object .* 'MUG', 'Botle' .did you mean 'mug'"),
+        ({"qqq": None, "mug": None}, r"qqq: .* 'qqq'; expected some of bottle, mug; or \[\] for"),
+    ],
+)
+def test_a_class_that_no_object_can_have_is_refused(classes: Any, fault: str) -> None:
+    """Misspelt, in other letters, or unknown; also if other classes have objects."""
+    with pytest.raises(ConfigError, match=f"labels.map.classes.{fault}"):
+        parse(json.dumps({"classes": classes})).check(["bottle", "mug"])
+
+
+def test_all_classes_without_objects_are_named_at_once() -> None:
+    """Each on a line."""
+    with pytest.raises(ConfigError) as caught:
+        parse('{"classes": {"bottel": null, "mugg": null, "mug": null}}').check(["bottle", "mug"])
+    assert [line.split(":")[0] for line in str(caught.value).splitlines()] == [
+        "labels.map.classes.bottel",
+        "labels.map.classes.mugg",
+    ]
+
+
+def test_an_empty_list_keeps_the_id_of_a_class_without_objects() -> None:
+    """A map may serve several data sets."""
+    label_map = parse('{"classes": {"bottle": [], "mug": null}}')
+    label_map.check(["mug"])
+    assert list(label_map.classes_of) == ["bottle", "mug"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections import Counter
+from pathlib import Path
 
 import pytest
 
@@ -80,3 +81,25 @@ def test_a_configuration_says_how_scenes_are_assigned() -> None:
     assert load_config("tabletop").general.splits.assign == "random"
     spec = load_config("tabletop", overrides=("splits.assign=round_robin",))
     assert spec.general.splits.assign == "round_robin"
+
+
+@pytest.mark.parametrize(
+    ("given", "shares"),
+    [
+        ("{train: 1.0}", {"train": 1.0}),
+        ("{val: 1}", {"val": 1.0}),
+        ("{train: 0.9, test: 0.1}", {"train": 0.9, "test": 0.1}),
+        ("{assign: round_robin}", {"train": 0.8, "val": 0.1, "test": 0.1}),
+    ],
+)
+def test_shares_that_are_not_given_are_zero_beside_those_that_are(
+    given: str, shares: dict[str, float], tmp_path: Path
+) -> None:
+    """Also where a configuration with all three shares is extended; the method is inherited."""
+    inherited = "splits: {train: 0.8, val: 0.1, test: 0.1, assign: round_robin}\n"
+    (tmp_path / "base.yaml").write_text(f"extends: tabletop.yaml\n{inherited}")
+    for base, method in (("tabletop.yaml", "random"), ("base.yaml", "round_robin")):
+        (tmp_path / "mine.yaml").write_text(f"extends: {base}\nsplits: {given}\n")
+        config = load_config(str(tmp_path / "mine.yaml"))
+        assert config.split_shares == shares
+        assert config.general.splits.assign == ("round_robin" if "assign" in given else method)

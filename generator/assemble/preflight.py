@@ -1,0 +1,111 @@
+"""Checks of nominal scenes before a run: what would stop it later, or give no labels."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from gen_data.generator.assemble.config import SceneConfig
+from gen_data.generator.core.errors import ConfigError
+from gen_data.generator.core.interfaces import AssetIndex
+from gen_data.generator.core.scene import Camera, Region, Scene
+from gen_data.generator.core.scene_time import place_sensors
+from gen_data.generator.core.stereo import baseline_m
+from gen_data.generator.core.streams import Streams
+from gen_data.randomizers.rig_calibration import RigCalibration
+from gen_data.randomizers.room_path import RoomPath
+from gen_data.scene_templates.carrier import Carrier
+
+PAIR_REMEDY = (
+    "mount them on one rig with the same size, field of view, lens and angles, the right one "
+    "beside the left, and vary neither alone by a randomizer"
+)
+
+
+def unrectified_pairs(
+    config: SceneConfig, scene: Scene, assets: AssetIndex
+) -> Iterable[ConfigError]:
+    """Pairs of ``stereo_with`` that are no rectified pair in any scene of a configuration.
+
+    Args:
+        config: Of the scene.
+        scene: The nominal one, with all sensors.
+        assets: Of the scene.
+    """
+    # A randomizer of another package may place cameras without a rig as a pair.
+    are_free_ones_known = all(
+        type(randomizer).__module__.startswith("gen_data.") for randomizer in config.randomizers
+    )
+    for randomizer in config.randomizers:
+        if isinstance(randomizer, RigCalibration) and any(camera.rig for camera in scene.cameras):
+            scene = randomizer(scene, assets, Streams(0, 0).rng(randomizer.name))
+    cameras = {camera.name: camera for camera in place_sensors(scene).cameras}
+    for sensor in config.sensors:
+        other = cameras.get(getattr(sensor, "stereo_with", ""))
+        here = cameras.get(sensor.name)
+        if here and other and (are_free_ones_known or (here.rig and other.rig)):
+            fault = _fault_of_pair(here, other)
+            if fault:
+                yield ConfigError(
+                    f"sensors.{here.name}.stereo_with: '{here.name}' and '{other.name}' are no "
+                    f"rectified pair: {fault}; {PAIR_REMEDY}"
+                )
+
+
+def _fault_of_pair(left: Camera, right: Camera) -> str:
+    """Why two cameras are no rectified pair; empty if they are one."""
+    if not left.rig and not right.rig:
+        return "each gets a pose of its own"
+    try:
+        baseline_m(left, right)
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+def far_sensors(config: SceneConfig, scene: Scene) -> Iterator[str]:
+    """Sensors farther from their rig than the scene is long, as with millimetres for metres."""
+    sides_m = [high - low for low, high in zip(*scene.interior_m, strict=True)]
+    for sensor in config.sensors:
+        offset_m = math.hypot(*getattr(sensor, "offset_m", (0.0,)))
+        if offset_m > math.hypot(*sides_m):
+            yield (
+                f"sensors.{sensor.name}.offset_m: {offset_m:g} m from its rig, but the scene is "
+                f"{_meters(sides_m)} m inside; expected metres"
+            )
+
+
+def cameras_that_look_away(config: SceneConfig, scene: Scene) -> Iterator[str]:
+    """Cameras on carriers that stand still, whose image shows nothing of the scene's focus."""
+    moves = any(isinstance(randomizer, RoomPath) for randomizer in config.randomizers)
+    if moves or scene.focus == Region():
+        return
+    carriers = {element.name for element in config.elements if isinstance(element, Carrier)}
+    rigs = {rig.name for rig in scene.rigs if rig.body in carriers}
+    center, size = np.array(scene.focus.center_m), np.array(scene.focus.size_m)
+    steps = np.linspace(-0.5, 0.5, 5)
+    points_m = center + size * np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(-1, 3)
+    for camera in place_sensors(scene).cameras:
+        if camera.rig not in rigs:
+            continue
+        T_world_camera = camera.T_world_camera
+        rotation = np.array(T_world_camera.rotation())
+        eye_m = np.array(T_world_camera.translation_m)
+        lens = camera.intrinsics
+        u, v = lens.project((points_m - eye_m) @ rotation).T
+        with np.errstate(invalid="ignore"):
+            is_seen = (u >= 0) & (u < lens.width_px) & (v >= 0) & (v < lens.height_px)
+        if not is_seen.any():
+            yield (
+                f"sensors.{camera.name}: its image shows nothing of the scene's focus, "
+                f"{_meters(size)} around ({_meters(center, ', ')}): it is at "
+                f"({_meters(eye_m, ', ')}) and looks along ({_meters(rotation[:, 2], ', ')}). The "
+                f"origin of the rig '{camera.rig}' is on the floor below the carrier, X forward, Z "
+                "up; expected another offset_m, yaw_deg or pitch_deg"
+            )
+
+
+def _meters(values: Iterable[float], separator: str = " x ") -> str:
+    return separator.join(f"{value:.3g}" for value in values)

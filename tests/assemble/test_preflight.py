@@ -1,0 +1,195 @@
+"""Everything that would stop a run is found before it, and all of it at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from click.testing import CliRunner
+
+import gen_data
+from gen_data.generator.api.config import load_config
+from gen_data.generator.assemble.pipeline_factory import PipelineFactory
+from gen_data.generator.cli.main import cli
+from gen_data.generator.core.errors import ConfigError
+
+CAMERA = {"type": "rgb_camera", "size_px": [64, 48], "hfov_deg": 60}
+BENT = {**CAMERA, "lens": {"model": "kannala_brandt", "k1": 0.01}}
+
+
+def cart(*sensors: dict[str, Any], **sections: Any) -> dict[str, Any]:
+    """A room with sensors on a carrier."""
+    on_rig = [{"rig": "cart", "offset_m": [1.0, 0, 0.9], **sensor} for sensor in sensors]
+    elements = [
+        {"type": "room", "name": "room", "size_m": [5, 4, 2.8]},
+        {"type": "carrier", "name": "cart"},
+    ]
+    labels = {"annotations": ["boxes2d"]}
+    return {"elements": elements, "sensors": on_rig, **labels, **sections}
+
+
+def table(*sensors: dict[str, Any], **sections: Any) -> dict[str, Any]:
+    """A tabletop with sensors."""
+    left_out = {"sensors": "all", "exporters": "all"}
+    return {"extends": "tabletop.yaml", "without": left_out, "sensors": [*sensors], **sections}
+
+
+def check(config: Any) -> None:
+    """Check a configuration as ``generate`` and ``plan`` do."""
+    PipelineFactory(load_config(config), 2).check()
+
+
+def refusal(config: dict[str, Any]) -> str:
+    """The message with which a configuration is refused."""
+    with pytest.raises(ConfigError) as caught:
+        check(config)
+    return str(caught.value)
+
+
+def test_every_exporter_and_every_camera_that_does_not_fit_is_named() -> None:
+    """Two formats of pinholes, two bent cameras, in one message."""
+    message = refusal(
+        cart(
+            {**BENT, "name": "front"},
+            {**BENT, "name": "side", "yaw_deg": 90},
+            {**CAMERA, "name": "rear", "yaw_deg": 180},
+            exporters=[
+                {"type": "solo"},
+                {"type": "kitti", "camera": "front"},
+                {"type": "coco"},
+            ],
+        )
+    )
+
+    lens = "has a lens of the model 'kannala_brandt'"
+    assert f"exporter 'solo': camera 'front' {lens}, camera 'side' {lens}, but" in message
+    assert f"exporter 'kitti': camera 'front' {lens}, but" in message
+    assert "exporter 'coco'" not in message
+    assert "'rear'" not in message
+
+
+def test_every_sensor_that_does_not_fit_is_named() -> None:
+    """Two cameras on rigs that do not exist: both, and what exists."""
+    message = refusal(
+        cart({**CAMERA, "name": "a", "rig": "kart"}, {**CAMERA, "name": "b", "rig": "ego"})
+    )
+
+    assert [f"sensors[{k}]" in message for k in range(3)] == [True, True, False]
+
+
+PAIR = ("rgb", "disparity")
+
+
+def test_cameras_without_a_rig_are_no_stereo_pair() -> None:
+    """``camera_pose`` gives each a pose of its own; the position is that of ``stereo_with``."""
+    message = refusal(
+        table(
+            {**CAMERA, "name": "left", "channels": [*PAIR], "stereo_with": "right"},
+            {**CAMERA, "name": "right"},
+        )
+    )
+
+    assert "sensors[0].stereo_with: 'left' and 'right' are no rectified pair: " in message
+    assert "mount them on one rig" in message
+
+
+@pytest.mark.parametrize(
+    ("right", "fault"),
+    [
+        ({"offset_m": [1.0, -0.1, 0.9], "yaw_deg": 2}, "they do not look the same way"),
+        ({"offset_m": [1.0, 0.1, 0.9]}, "not straight to its right"),
+        ({"offset_m": [1.0, -0.1, 0.9], "hfov_deg": 61}, "they are not the same pinhole"),
+    ],
+)
+def test_pairs_on_a_rig_are_compared(right: dict[str, Any], fault: str) -> None:
+    """Turned, on the wrong side, with another lens: each is refused before the first sample."""
+    left = {**CAMERA, "name": "left", "channels": [*PAIR], "stereo_with": "right"}
+    message = refusal(cart(left, {**CAMERA, "name": "right", **right}))
+
+    assert "'left' and 'right' are no rectified pair: " in message
+    assert fault in message
+
+
+def test_a_pair_whose_mounting_varies_is_refused() -> None:
+    """``rig_calibration`` moves each camera alone."""
+    left = {**CAMERA, "name": "left", "channels": [*PAIR], "stereo_with": "right"}
+    right = {**CAMERA, "name": "right", "offset_m": [1.0, -0.1, 0.9]}
+    varied = [{"type": "rig_calibration", "name": "mounts"}]
+
+    assert "no rectified pair" in refusal(cart(left, right, randomizers=varied))
+    check(cart(left, right))
+
+
+@pytest.mark.slow
+def test_shipped_pairs_pass() -> None:
+    """Of a street and of a wrist."""
+    for name in ("kitti_stereo.yaml", "depth_cameras.yaml"):
+        check(name)
+
+
+def test_plan_and_generate_refuse_all_faults_with_the_same_message(tmp_path: Path) -> None:
+    """A stereo pair and an exporter together; no folder is made."""
+    config = table(
+        {**BENT, "name": "left", "channels": ["rgb"]},
+        {**CAMERA, "name": "middle", "channels": [*PAIR], "stereo_with": "right"},
+        {**CAMERA, "name": "right"},
+        exporters=[{"type": "bop", "camera": "left"}],
+        splits={"train": 1},
+    )
+    file = tmp_path / "mine.yaml"
+    file.write_text(yaml.safe_dump(config))
+    planned = CliRunner().invoke(cli, ["plan", str(file), "--n", "2"])
+    with pytest.raises(ConfigError) as generated:
+        gen_data.generate(file, 2, out=tmp_path / "out", workers=0)
+
+    assert "no rectified pair" in str(generated.value)
+    assert "exporter 'bop': camera 'left' has a lens" in str(generated.value)
+    assert str(planned.exception) == str(generated.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_distance_beyond_the_scene_is_refused_with_the_numbers() -> None:
+    """Millimetres for metres: no camera is a kilometre away in a room of 5 m."""
+    far = [{"name": "orbit", "distance_m": {"uniform": [800, 1300]}}]
+    message = refusal(table({**CAMERA, "name": "color"}, randomizers=far))
+
+    assert (
+        "distance_m: at least 800 m, but the scene is 4.7 x 3.7 x 2.5 m inside, 6.48 m " in message
+    )
+    near = [{"name": "orbit", "distance_m": {"uniform": [0.8, 1.3]}}]
+    check(table({**CAMERA, "name": "color"}, randomizers=near))
+
+
+def test_a_sensor_farther_from_its_rig_than_the_scene_is_long_is_doubted() -> None:
+    """Millimetres for metres: a warning with the numbers."""
+    with pytest.warns(gen_data.ConfigWarning) as caught:
+        check(cart({**CAMERA, "name": "front", "offset_m": [1500, 0, 0]}))
+    (text,) = [str(w.message) for w in caught]
+    assert text == (
+        "sensors.front.offset_m: 1500 m from its rig, but the scene is 4.7 x 3.7 x 2.5 m inside; "
+        "expected metres"
+    )
+
+
+def test_a_camera_on_a_carrier_that_looks_away_is_named() -> None:
+    """On the floor below the carrier, where the rig has its origin, instead of above a table."""
+    above = {**CAMERA, "name": "left", "offset_m": [0, 0.03, 1.7], "pitch_deg": -90}
+    below = {**CAMERA, "name": "right", "offset_m": [0, 0.03, 0]}
+    config = cart(above, below)
+    config["elements"].append(
+        {"type": "surface", "name": "desk", "asset": "table", "top_size_m": [1.3, 0.9]}
+    )
+    with pytest.warns(gen_data.ConfigWarning) as caught:
+        check(config)
+    (text,) = [str(w.message) for w in caught]
+    assert text.startswith("sensors.right: its image shows nothing of the scene's focus, 1.3 x 0.9")
+    assert "it is at (0, 0.03, 0) and looks along (1, 0, 0)" in text
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["tabletop", "indoor_rgbd", "closeup", "wrist_camera", "drone"])
+def test_shipped_configurations_pass_without_a_warning(name: str) -> None:
+    """One of each kind of camera; other tests check the rest."""
+    check(name)
