@@ -65,7 +65,8 @@ def check_pinholes(info: DatasetInfo, cameras: Iterable[str], exporter: str) -> 
         if model != "pinhole":
             raise ConfigError(
                 f"exporter '{exporter}': camera '{camera}' has a lens of the model '{model}', but "
-                "the format holds rectified images; use a pinhole, or export this one as coco"
+                "the format holds rectified images; add rectify: true to the exporter, list the "
+                "others in its cameras:, use a pinhole, or export this one as coco"
             )
 
 

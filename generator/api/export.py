@@ -100,10 +100,12 @@ def label_map_override(path: Path) -> str:
 
 def _check_annotations(made: Config, wanted: Config) -> None:
     """Reject exporters that read annotations which the data set was made without."""
-    exported: set[str] = set().union(*(e.needs for e in made.exporters))
+    from gen_data.generator.pipeline.exporter_views import needs_of
+
+    exported: set[str] = set().union(*map(needs_of, made.exporters))
     known = {*made.annotations, *exported, *made.general.labels.map.needs}
     for exporter in wanted.exporters:
-        missing = sorted(exporter.needs - known)
+        missing = sorted(needs_of(exporter) - known)
         if missing:
             raise ConfigError(
                 f"exporter '{exporter.type}' reads the annotations {', '.join(missing)}, which the "
