@@ -18,8 +18,8 @@ An image without objects has the same keys, with empty lists. Additional keys:
 ``image/sensor``, ``image/sample``, ``image/scene``, ``image/intrinsics`` (3 x 3) and
 ``image/T_world_camera`` (4 x 4), row by row; ``image/object/instance_id``. Images of other lenses
 than a pinhole have ``image/lens/model``, ``image/lens/distortion`` (coefficients in the order of
-OpenCV's functions, to be applied before the intrinsics) and ``image/lens/half_field_rad``, the angle
-to the axis at which the image ends. In the intrinsics the centre of pixel i is i + 0.5.
+OpenCV's functions, to be applied before the intrinsics) and ``image/lens/half_field_rad``, the
+angle to the axis at which the image ends. In the intrinsics the centre of pixel i is i + 0.5.
 
 A record is its length (uint64), the masked CRC32C of the length, the data, and the masked CRC32C of
 the data. Feature maps are written sorted by key, so that the same values give the same bytes.
