@@ -10,8 +10,8 @@
 Record sets: ``images`` (a line of ``images.csv`` with the pixels as ``content``), ``objects``
 (a line of ``objects.csv``) and ``categories``. Ids and boxes equal those of the exporter ``coco``;
 ``fx fy cx cy`` are for image coordinates in which pixel ``i`` covers ``[i, i + 1)``. Data sets with
-a camera that is no pinhole have the columns ``lens``, its model, and ``distortion``, coefficients in
-the order of OpenCV's functions, separated by spaces and to be applied before ``fx fy cx cy``.
+a camera that is no pinhole have the columns ``lens``, its model, and ``distortion``: coefficients
+in the order of OpenCV's functions, separated by spaces, to be applied before ``fx fy cx cy``.
 
 Title, licence and creators are those of the section ``dataset`` of the configuration; without a
 licence, those of the assets in the scenes are stated. Every data set has a ``croissant.json`` of
