@@ -68,9 +68,9 @@ P = TypeVar("P")
 class Splits(Strict):
     """Shares of the scenes; all views of a scene are in one split."""
 
-    train: float = Field(0.8, ge=0, le=1)
-    val: float = Field(0.1, ge=0, le=1)
-    test: float = Field(0.1, ge=0, le=1)
+    train: float = Field(0.8, ge=0, le=1, description="Share of the scenes for training.")
+    val: float = Field(0.1, ge=0, le=1, description="Share for validation during training.")
+    test: float = Field(0.1, ge=0, le=1, description="Share for tests after training.")
     assign: Assignment = Field(
         "random",
         description="random: every scene draws its split; round_robin: splits take turns, so that "
