@@ -30,15 +30,18 @@ def describe_name(name: str) -> str:
     first, *path = name.split(".")
     found = [(first, model) for model in _start(first)]
     for field in path:
-        below = {at: nested for model in found for at, nested in _fields(*model)}
-        ends = {at.rpartition(".")[2] for at in below}
-        found = [
-            (at, m) for at, models in below.items() if at.endswith(f".{field}") for m in models
+        below = [
+            (at, one)
+            for place, model in found
+            for at, all_ in _fields(place, model)
+            for one in all_
         ]
+        found = [(at, one) for at, one in below if at.endswith(f".{field}")]
         if not found:
+            ends = sorted({at.rpartition(".")[2] for at, _ in below})
             raise ConfigError(
-                f"'{first}' has no mapping '{field}' to describe; expected one of "
-                f"{', '.join(sorted(ends)) or 'none'}{did_you_mean(field, ends)}"
+                f"'{name}': there is no mapping '{field}' to describe; expected one of "
+                f"{', '.join(ends) or 'none'}{did_you_mean(field, ends)}"
             )
     if not found:
         found = _selected_by(first)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import textwrap
 from pathlib import Path
 
 import click
@@ -58,11 +59,13 @@ def _shipped_texts() -> dict[str, dict[str, str]]:
 def formats() -> None:
     """List the output formats."""
     from gen_data.exporters import TABLE
+    from gen_data.generator.config.describe import TEXT_WIDTH
     from gen_data.generator.config.schema import docstring_summary
 
-    width = max(map(len, TABLE))
+    width = max(map(len, TABLE)) + 2
     for name in TABLE:
-        click.echo(f"{name:<{width}}  {docstring_summary(TABLE.load(name))}")
+        line = f"{name:<{width}}{docstring_summary(TABLE.load(name))}"
+        click.echo(textwrap.fill(line, TEXT_WIDTH, subsequent_indent=" " * width))
     click.echo("\ngen-data describe NAME lists the fields of a format.")
 
 
