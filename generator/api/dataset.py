@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from gen_data.generator.api.config import ConfigLike, load_config
+from gen_data.generator.api.config import ConfigLike, check_whole, load_config, path_text
 from gen_data.generator.api.relabelling import LabelMapLike, RelabelledSamples, load_label_map
 from gen_data.generator.api.sample import Sample, SampleRecord
 from gen_data.generator.core.errors import ConfigError, SampleIndexError, did_you_mean
@@ -84,6 +84,7 @@ class SampleSequence(Sequence[Sample], AbstractContextManager["SampleSequence", 
             part = copy.copy(self)
             part._indices = self._indices[index]
             return part
+        check_whole("index", index)
         if index < 0 and not self.is_bounded:
             raise SampleIndexError(f"index {index}: a data set without a size has no end; give n=")
         try:
@@ -197,8 +198,8 @@ class Dataset(SampleSequence):
         without: Sequence[str] = (),
         channels: Sequence[str] = (),
     ) -> None:
-        if n is not None and n < 0:
-            raise ConfigError(f"n: {n} is negative; expected 0 or more")
+        if n is not None:
+            check_whole("n", n, least=0)
         loaded = load_config(config, seed=seed, overrides=overrides, without=without)
         indices = UNBOUNDED if n is None else range(n)
         super().__init__(GeneratedSamples(loaded, _parse_channels(channels)), indices)
@@ -327,7 +328,7 @@ def open_dataset(folder: str | PathLike[str]) -> StoredDataset:
     Raises:
         StorageError: the folder holds no finished data set.
     """
-    return StoredDataset(folder)
+    return StoredDataset(path_text("folder", folder))
 
 
 def _parse_channels(names: Sequence[str]) -> frozenset[Channel]:

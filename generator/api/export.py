@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +17,9 @@ from gen_data.generator.core.errors import ConfigError
 if TYPE_CHECKING:
     from gen_data.generator.assemble.config import Config
     from gen_data.generator.runner.progress import RunProgress, Summary
+
+_EXCERPT = re.compile(r"\s+\d*\s*\|")
+"""Lines of messages that quote the source."""
 
 Format = str | Mapping[str, Any]
 """Name of an exporter, or its entry of a configuration: ``{"type": "coco", "amodal": False}``."""
@@ -70,10 +75,11 @@ def export(  # noqa: PLR0913  (keywords of one front door)
     if label_map is not None:
         overrides.append(label_map_override(Path(label_map)))
     source = os.fspath(folder)
-    config = load_config(source, overrides=overrides)
-    _check_annotations(load_config(source), config)
-    exporters = ready_exporters(config, stored.info, open_library(config.asset_folders))
-    check_scene(config, stored.sample(0).scene)
+    with _named_formats():
+        config = load_config(source, overrides=overrides)
+        _check_annotations(load_config(source), config)
+        exporters = ready_exporters(config, stored.info, open_library(config.asset_folders))
+        check_scene(config, stored.sample(0).scene)
     return write_exports(
         stored,
         config,
@@ -84,6 +90,20 @@ def export(  # noqa: PLR0913  (keywords of one front door)
         progress=on_progress,
         force=force,
     )
+
+
+@contextmanager
+def _named_formats() -> Iterator[None]:
+    """Name the formats in errors, rather than the override that they become."""
+    try:
+        yield
+    except ConfigError as error:
+        text = re.sub(r"^(\s*)--set:1:\d+: exporters\[", r"\1formats[", str(error), flags=re.M)
+        if text == str(error):
+            raise
+        # What was typed is short, and quoted by the shell: no excerpt.
+        kept = [line for line in text.splitlines() if not _EXCERPT.match(line)]
+        raise ConfigError("\n".join(kept)) from None
 
 
 def label_map_override(path: Path) -> str:
