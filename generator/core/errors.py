@@ -195,7 +195,8 @@ def one_of(wrong: str, known: Collection[str], most: int = 12) -> str:
     if len(known) <= most:
         return f"expected one of {', '.join(known)}{did_you_mean(wrong, known)}"
     near = difflib.get_close_matches(wrong, known, n=5, cutoff=0.0)
-    return f"the nearest of {len(known)} are {', '.join(near)}{did_you_mean(wrong, known)}"
+    some = f"expected one of {len(known)} names, such as {', '.join(near)}"
+    return f"{some}{did_you_mean(wrong, known)}"
 
 
 def no_folder(folder: Path) -> str:
