@@ -136,7 +136,7 @@ def draw_box3d(
             _draw_line(image, intrinsics.project(segment), color, width)
 
 
-def _draw_bent(  # noqa: PLR0913
+def _draw_bent(
     image: Image, a: NDArray[Any], b: NDArray[Any], intrinsics: Intrinsics, color: Rgb, width: int
 ) -> None:
     """Draw a segment in pieces, without pieces outside of the lens's field or across a seam."""
