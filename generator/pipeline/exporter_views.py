@@ -33,7 +33,7 @@ from gen_data.generator.core.interfaces import (
     table_path,
 )
 from gen_data.generator.core.sample import ImageTruth, Sample
-from gen_data.generator.core.scene import Camera, Scene
+from gen_data.generator.core.scene import Camera, Device, Lidar, Scene
 from gen_data.generator.pipeline.rectification import NOTHING, rectification, rectified_truth
 
 T = TypeVar("T")
@@ -190,7 +190,8 @@ class ExporterView:
 
     def _scene(self, scene: Scene, names: set[str]) -> Scene:
         """The scene with the cameras of the view, and those at which other sensors are mounted."""
-        kept = names | {s.camera for s in (*scene.lidars, *scene.devices) if s.name in names}
+        mounted: tuple[Lidar | Device, ...] = (*scene.lidars, *scene.devices)
+        kept = names | {sensor.camera for sensor in mounted if sensor.name in names}
         cameras = tuple(self._camera(c) for c in scene.cameras if c.name in kept)
         lidars = tuple(lidar for lidar in scene.lidars if lidar.name in names)
         devices = tuple(device for device in scene.devices if device.name in names)

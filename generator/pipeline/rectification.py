@@ -212,7 +212,7 @@ class Rectification:
             last = min(first + _ROWS_AT_ONCE, area.height_px)
             band = BoxPx(area.x_min, area.y_min + first, area.x_max, area.y_min + last)
             at = self._inside if band == self._window else self._sources(band)
-            seen = ((at >= 0.0) & (at < size)).all(axis=-1)
+            seen = np.asarray(((at >= 0.0) & (at < size)).all(axis=-1))
             columns, rows = np.moveaxis(np.where(seen[..., None], at, 0.0).astype(np.int32), -1, 0)
             places[first:last] = np.where(seen, rows * self.source.width_px + columns, -1)
         return places
@@ -239,7 +239,7 @@ class Rectification:
     def _interpolated(self, image: NDArray[Any]) -> NDArray[Any]:
         """Between the four nearest centres; beyond the outermost, the outermost."""
         last = np.array([self.source.width_px - 1, self.source.height_px - 1])
-        seen = ((self._inside >= 0.0) & (self._inside < last + 1)).all(axis=-1)
+        seen = np.asarray(((self._inside >= 0.0) & (self._inside < last + 1)).all(axis=-1))
         at = np.clip(np.where(seen[..., None], self._inside, 0.5) - 0.5, 0.0, last)
         column, row = np.moveaxis(at.astype(np.intp), -1, 0)
         right, below = np.minimum(column + 1, last[0]), np.minimum(row + 1, last[1])
