@@ -80,13 +80,14 @@ def check_whole(name: str, value: object, least: int | None = None) -> None:
     Raises:
         ConfigError: it is none; True and False are none either.
     """
-    bound = "a whole number" if least is None else f"a whole number of at least {least}"
     try:
         whole = operator.index(value)  # type: ignore[arg-type]
     except TypeError:
         whole = None
-    if whole is None or isinstance(value, bool) or (least is not None and whole < least):
-        raise ConfigError(f"{name}: {value!r}; expected {bound}")
+    if whole is None or isinstance(value, bool):
+        raise ConfigError(f"{name}: {value!r}; expected a whole number")
+    if least is not None and whole < least:
+        raise ConfigError(f"{name}: {whole}; expected at least {least}")
 
 
 def path_text(name: str, value: object) -> str:
