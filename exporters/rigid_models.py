@@ -130,6 +130,11 @@ def build_model(pieces: Sequence[Piece], assets: AssetLibrary) -> Model:
     return Model((x, y, z), rows, np.concatenate(faces).astype(np.int32), info)
 
 
+def _scaled(symmetry: Symmetry, scale: float) -> Symmetry:
+    x, y, z = symmetry.offset_m
+    return replace(symmetry, offset_m=(scale * x, scale * y, scale * z))
+
+
 def _samples(pieces: Sequence[Piece], assets: AssetLibrary, count: int, shift: float) -> Samples:
     """Points in the instance frame [m] on all pieces, with their colours."""
     meshes = [assets.mesh(piece.asset) for piece in pieces]

@@ -9,7 +9,7 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gen_data.generator.api.config import ConfigLike, count_workers, load_config
+from gen_data.generator.api.config import ConfigLike, check_whole, count_workers, load_config
 from gen_data.generator.api.label_gaps import check_label_gaps
 from gen_data.generator.core.errors import ConfigError
 from gen_data.generator.core.urls import is_url
@@ -162,6 +162,7 @@ def _check_arguments(
     """Refuse wrong numbers, repair at a URL, and a folder in which another run writes."""
     from gen_data.generator.runner.object_store import open_store
 
+    check_whole("n", n)
     if n < 1:
         raise ConfigError(f"n: {n} samples cannot be made; expected at least 1")
     count_workers(workers)

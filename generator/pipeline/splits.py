@@ -25,10 +25,13 @@ class Splits(Strict):
     """Shares of the scenes; all views of a scene are in one split."""
 
     train: float = Field(
-        0.8, ge=0, le=1, description="Share of the scenes; 0 if only other shares are given."
+        0.8,
+        ge=0,
+        le=1,
+        description="Share of the scenes for training; 0 if only other shares are given.",
     )
-    val: float = Field(0.1, ge=0, le=1, description="As train.")
-    test: float = Field(0.1, ge=0, le=1, description="As train.")
+    val: float = Field(0.1, ge=0, le=1, description="Share for validation during training.")
+    test: float = Field(0.1, ge=0, le=1, description="Share for tests after training.")
     assign: Assignment = Field(
         "random",
         description="random: every scene draws its split; round_robin: splits take turns, so that "

@@ -86,6 +86,10 @@ class ObjectFolder:
                 "URL of fsspec, and its library: pip install 'gen-data[cloud]' for s3://, "
                 "gcsfs for gs://, adlfs for az://"
             ) from None
+        except Exception as error:
+            # Some file systems connect at once.
+            fact = " ".join(str(error).split()) or type(error).__name__
+            raise StorageError(f"{self.url}: {fact} ({type(error).__name__})") from error
         return opened
 
     def __getstate__(self) -> dict[str, str]:
