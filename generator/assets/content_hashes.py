@@ -32,6 +32,7 @@ _TICK_NS = 2_000_000_000
 # Each matches the rest of its line as a whole: splitting it in the pattern takes quadratic time.
 _MTLLIB = re.compile(rb"^[ \t]*mtllib[ \t]([^\n]*)", re.MULTILINE)
 _MAP = re.compile(rb"^[ \t]*(?:map_\w+|norm|bump)[ \t]([^\n]*)", re.MULTILINE)
+_DAE_IMAGE = re.compile(rb"<(?:init_from|ref)>([^<]{1,1024})")
 _MAX_FILES = 2000
 _ASSETS_KEPT = 4000
 """Above this number of recorded assets, those whose files are gone are dropped.
@@ -176,6 +177,11 @@ def _references(folder: Folder, name: str) -> Iterator[str]:
         yield from (reference.decode("utf-8", errors="replace") for reference in references)
     elif suffix == ".gltf":
         yield from (unquote(uri) for uri in _uris(folder.read(name)))
+    elif suffix == ".dae":
+        found = (
+            uri.strip().decode("utf-8", "replace") for uri in _DAE_IMAGE.findall(folder.read(name))
+        )
+        yield from (unquote(uri.removeprefix("file://")) for uri in found)
     elif suffix in SUFFIXES:
         arrays = run_sandboxed(parse_layer_references, folder.root, {name: _MISSING}, name)
         yield from unpack_value(tuple[str, ...], arrays)

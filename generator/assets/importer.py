@@ -96,10 +96,11 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
     if piece:
         source = _read_piece(folder, entry, piece)
         looks, collides, images = [source.soup], list[TriangleSoup](), source.images
+        up = ""
         asset_id = f"{asset_id}/{piece}" if images else asset_id
         entry = entry.model_copy(update={"origin": "center"})
     else:
-        looks, collides, images = _read_geometry(folder, entry)
+        looks, collides, images, up = _read_geometry(folder, entry)
     decoded = {
         name: decode_image(data, f"{place}#{name}", alpha=True) for name, data in images.items()
     }
@@ -111,7 +112,7 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
 
     whole = trim_unreached_holes(join_soups(looks), image)
     soup = _apply_finishes(whole, entry.materials, place, asset_id)
-    matrix = upright_transform(entry)
+    matrix = upright_transform(entry, up)
     soup = soup.transformed(matrix)
     scale, shift = scale_and_shift(soup, entry, place)
     scaling = np.concatenate([scale * np.eye(3), shift[:, None]], axis=1)
@@ -172,8 +173,14 @@ def import_link(
 
 def _read_geometry(
     folder: Folder, entry: MeshEntry
-) -> tuple[list[TriangleSoup], list[TriangleSoup], Mapping[str, bytes]]:
-    """Visual soups, collision soups (empty = the visual ones) and embedded images of an entry."""
+) -> tuple[list[TriangleSoup], list[TriangleSoup], Mapping[str, bytes], str]:
+    """Geometry of an entry.
+
+    Returns:
+        Visual soups, collision soups (empty = the visual ones), embedded images, and the axis that
+        the file states as up (empty = none).
+    """
+    up = ""
     images: Mapping[str, bytes] = {}
     collides: list[TriangleSoup] = []
     if entry.file.lower().endswith(".urdf"):
@@ -188,10 +195,10 @@ def _read_geometry(
             collides = [_make_shape_soup(folder, s, pose, materials=False) for s, pose in solids]
     else:
         source = read_mesh(folder, entry.file)
-        looks, images = [source.soup], source.images
+        looks, images, up = [source.soup], source.images, source.up
     if entry.collision:
         collides = [read_mesh(folder, entry.collision, materials=False).soup]
-    return looks, collides, images
+    return looks, collides, images, up
 
 
 def _read_piece(folder: Folder, entry: MeshEntry, name: str) -> MeshSource:
@@ -357,10 +364,22 @@ def _palette_colors(folder: Folder, soup: TriangleSoup) -> TriangleSoup:
     return replace(soup, slots=tuple(slots), uvs=None)
 
 
-def upright_transform(entry: MeshEntry) -> Float64:
-    """Affine map [3, 4] that turns the file's up axis to Z and its front to +X."""
-    up = _axis_vector(entry.up_axis())
-    front = _axis_vector(entry.front or _DEFAULT_FRONT[entry.up_axis()])
+def upright_transform(entry: MeshEntry, stated_up: str = "") -> Float64:
+    """Affine map [3, 4] that turns the file's up axis to Z and its front to +X.
+
+    ``stated_up`` is the axis that the file itself states, which ``up`` of the entry overrides.
+
+    Raises:
+        AssetError: if the entry's front is the axis that the file states as up.
+    """
+    axis = entry.up or stated_up or entry.up_axis()
+    if entry.front is not None and entry.front[-1] == axis:
+        raise AssetError(
+            f"{entry.file}: front is {entry.front}, but {axis} of the file points up; correct "
+            "front, or give up"
+        )
+    up = _axis_vector(axis)
+    front = _axis_vector(entry.front or _DEFAULT_FRONT[axis])
     axes = np.stack([front, np.cross(up, front), up]) + 0.0
     yaw = math.radians(entry.yaw_deg)
     c, s = round(math.cos(yaw), 12), round(math.sin(yaw), 12)
