@@ -20,8 +20,8 @@ from urllib.parse import unquote
 from gen_data.generator.assets.asset_cache import DiskCache
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.parsing import parse_layer_references, unpack_value
+from gen_data.generator.assets.robot_formats import is_description, read_description
 from gen_data.generator.assets.sandbox import run_sandboxed
-from gen_data.generator.assets.urdf import read_urdf
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.usd.stage_reader import SUFFIXES
 
@@ -131,7 +131,7 @@ def find_referenced_files(folder: Folder, relative: str) -> tuple[str, ...]:
     """Find a file and all existing files it refers to, directly or not, sorted by name.
 
     Raises:
-        AssetError: if the file itself is missing, or an unreadable URDF.
+        AssetError: if the file itself is missing, or an unreadable description of a robot.
     """
     return tuple(name for name, exists in find_references(folder, relative).items() if exists)
 
@@ -140,7 +140,7 @@ def find_references(folder: Folder, relative: str) -> dict[str, bool]:
     """Find a file and everything it refers to: ``{name: whether it exists}``, sorted by name.
 
     Raises:
-        AssetError: if the file itself is missing, or an unreadable URDF.
+        AssetError: if the file itself is missing, or an unreadable description of a robot.
     """
     found: dict[str, bool] = {}
     pending = [relative]
@@ -164,9 +164,9 @@ def find_references(folder: Folder, relative: str) -> dict[str, bool]:
 
 def _references(folder: Folder, name: str) -> Iterator[str]:
     suffix = PurePosixPath(name).suffix.lower()
-    if suffix == ".urdf":
+    if is_description(name):
         depth = len(PurePosixPath(name).parent.parts)
-        yield from ("../" * depth + file for file in read_urdf(folder, name).files())
+        yield from ("../" * depth + file for file in read_description(folder, name).files())
     elif suffix in (".obj", ".mtl"):
         data = folder.read(name)
         if suffix == ".obj":

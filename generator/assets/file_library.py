@@ -47,11 +47,11 @@ from gen_data.generator.assets.parsing import (
     parse_surroundings,
     unpack_value,
 )
-from gen_data.generator.assets.robot_models import robot_model, robot_urdf
+from gen_data.generator.assets.robot_description import RobotDescription
+from gen_data.generator.assets.robot_models import describe_robot, robot_model
 from gen_data.generator.assets.robot_tools import VERSION as TOOLS_VERSION
 from gen_data.generator.assets.sandbox import run_sandboxed
 from gen_data.generator.assets.texture_maps import compose_texture, find_maps
-from gen_data.generator.assets.urdf import Urdf
 from gen_data.generator.assets.usd_stages import is_stage
 from gen_data.generator.core.asset_types import (
     Asset,
@@ -88,7 +88,7 @@ class FileLibrary:
         self._store = store
         self._digests = ContentHashes(disk)
         self._listed: dict[str, IndexedAsset] | None = None
-        self._urdfs: dict[str, Urdf] = {}
+        self._robots: dict[str, RobotDescription] = {}
         self._stages: dict[str, StageModel] = {}
         self._hashed: dict[str, dict[str, str]] = {}
         self._keys: dict[str, str] = {}
@@ -145,7 +145,7 @@ class FileLibrary:
             raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not an object")
 
         if isinstance(entry, RobotEntry) and not part:
-            links = ", ".join(f"{asset_id}/{n}" for n in list(self._urdf(one).links)[:2])
+            links = ", ".join(f"{asset_id}/{n}" for n in list(self._robot(one).links)[:2])
             raise AssetError(f"asset '{asset_id}': is a robot; its meshes are {links}, ...")
         key = content_key({"asset": self._key(one), "link": name})
         return self._store.get(key, compute, unpack_imported)
@@ -166,7 +166,7 @@ class FileLibrary:
         one = self._entries()[asset_id]
         if not isinstance(one.entry, RobotEntry):
             raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not a robot")
-        return robot_model(asset_id, self._urdf(one), one.entry, str(one.root / one.entry.file))
+        return robot_model(asset_id, self._robot(one), one.entry, str(one.root / one.entry.file))
 
     def stage(self, asset_id: str) -> StageModel:
         """Pieces, lights and cameras of a stage."""
@@ -283,16 +283,16 @@ class FileLibrary:
         if one is None or asset_id in self._entries():
             return None
         if one.kind == "robot":
-            return (one, part) if part in self._urdf(one).links else None
+            return (one, part) if part in self._robot(one).links else None
         if not is_stage(one.entry):
             return None
         return (one, part) if part in {p.name for p in self.stage(whole).pieces} else None
 
-    def _urdf(self, one: IndexedAsset) -> Urdf:
-        if one.asset_id not in self._urdfs:
+    def _robot(self, one: IndexedAsset) -> RobotDescription:
+        if one.asset_id not in self._robots:
             assert isinstance(one.entry, RobotEntry)
-            self._urdfs[one.asset_id] = robot_urdf(Folder(one.root), one.entry)
-        return self._urdfs[one.asset_id]
+            self._robots[one.asset_id] = describe_robot(Folder(one.root), one.entry)
+        return self._robots[one.asset_id]
 
     def _asset(self, one: IndexedAsset) -> Asset:
         entry = one.entry

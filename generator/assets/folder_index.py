@@ -26,6 +26,7 @@ from gen_data.generator.assets.asset_folder import (
     sanitize_word,
 )
 from gen_data.generator.assets.readers import MESH_SUFFIXES
+from gen_data.generator.assets.robot_formats import is_description, read_description
 from gen_data.generator.assets.texture_maps import TextureMaps as Maps
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.config.problems import Problems
@@ -568,7 +569,7 @@ def _index_files(root: Path) -> FolderIndex:
     meshes = {*MESH_SUFFIXES, ".urdf", ROAD_SUFFIX}
     files = [name for name, suffix in suffixes.items() if suffix in meshes]
     panoramas = [name for name, suffix in suffixes.items() if suffix in PANORAMA_SUFFIXES]
-    used = {f for name in files if name.lower().endswith(".urdf") for f in _urdf_meshes(root, name)}
+    used = {f for name in files if is_description(name) for f in _described_files(root, name)}
     return FolderIndex(
         licence="unknown",
         author="unknown",
@@ -589,13 +590,11 @@ def _index_files(root: Path) -> FolderIndex:
     )
 
 
-def _urdf_meshes(root: Path, urdf: str) -> tuple[str, ...]:
-    from gen_data.generator.assets.urdf import read_urdf
-
+def _described_files(root: Path, description: str) -> tuple[str, ...]:
     try:
-        return read_urdf(Folder(root), urdf).files()
+        return read_description(Folder(root), description).files()
     except AssetError:
-        # The URDF is listed nevertheless; its import reports the fault.
+        # It is listed nevertheless; its import reports the fault.
         return ()
 
 

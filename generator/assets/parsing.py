@@ -23,7 +23,7 @@ from gen_data.generator.assets.importer import (
     import_road_network,
     road_network_lanes,
 )
-from gen_data.generator.assets.robot_models import robot_urdf
+from gen_data.generator.assets.robot_models import describe_robot
 from gen_data.generator.assets.usd_stages import stage_model
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.plates import Plate
@@ -47,9 +47,9 @@ def parse_object(
 def parse_link(root: Path, digests: Digests, entry: RobotEntry, robot_id: str, link: str) -> Arrays:
     """Import a link of a robot (``importer.import_link``)."""
     folder = Folder(root)
-    urdf = robot_urdf(folder, entry)
+    robot = describe_robot(folder, entry)
     return _checked(
-        folder, digests, pack_imported(import_link(folder, entry, robot_id, urdf, link))
+        folder, digests, pack_imported(import_link(folder, entry, robot_id, robot, link))
     )
 
 

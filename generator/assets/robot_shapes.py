@@ -1,0 +1,114 @@
+"""Triangles of the shapes of a description, with its materials."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from gen_data.generator.assets.asset_folder import Folder
+from gen_data.generator.assets.readers import read_mesh
+from gen_data.generator.assets.readers.mesh_source import srgb_to_linear
+from gen_data.generator.assets.robot_description import Look, Shape
+from gen_data.generator.assets.triangle_soup import (
+    Float64,
+    MaterialSlot,
+    TriangleSoup,
+    box,
+    capsule,
+    cylinder,
+    face_crosses,
+    sphere,
+)
+from gen_data.generator.core.errors import AssetError
+from gen_data.generator.core.se3 import SE3
+
+
+def make_shape_soup(
+    folder: Folder, shape: Shape, T_root_link: SE3, *, materials: bool = True
+) -> TriangleSoup:
+    """Read or make the triangles of a shape, in the root frame and its colour.
+
+    Raises:
+        AssetError: if its mesh is unusable.
+    """
+    matrix = (T_root_link @ shape.T_link_shape).matrix()[:3]
+    if shape.kind == "mesh":
+        source = read_mesh(folder, shape.file, materials=materials)
+        if source.images:
+            raise AssetError(
+                f"{folder.root / shape.file}: has embedded images, which a robot's meshes may not; "
+                "export it with images as files"
+            )
+        soup = source.soup
+        matrix[:, :3] = matrix[:, :3] * np.array(shape.size)
+    else:
+        soup = TriangleSoup.of(_primitive(shape))
+        if shape.look.texture and materials:
+            soup = replace(soup, uvs=_wrapped(shape.kind, soup.corners))
+    extent = float(np.ptp(soup.corners.reshape(-1, 3), axis=0).max()) if soup.uvs is None else 0.0
+    slots = tuple(_apply_look(slot, shape.look, extent) for slot in soup.slots)
+    return replace(soup, slots=slots).transformed(matrix)
+
+
+def _primitive(shape: Shape) -> Float64:
+    if shape.kind == "box":
+        return box(shape.size)
+    if shape.kind == "cylinder":
+        return cylinder(shape.size[0], shape.size[1])
+    if shape.kind == "capsule":
+        return capsule(shape.size[0], shape.size[1])
+    if shape.kind == "ellipsoid":
+        stretched: Float64 = sphere(1.0) * np.array(shape.size)
+        return stretched
+    return sphere(shape.size[0])
+
+
+def _apply_look(slot: MaterialSlot, look: Look, extent_m: float) -> MaterialSlot:
+    """Apply the material of a description to a slot without texture.
+
+    White is the usual placeholder in descriptions; it does not replace the mesh's own colours.
+    Where there are no texture coordinates, the image is projected from three sides, once over the
+    ``extent_m``.
+    """
+    changes: dict[str, object] = {}
+    if look.opacity < 1.0:
+        changes["opacity"] = look.opacity
+    for name in ("roughness", "metallic"):
+        if getattr(look, name) is not None:
+            changes[name] = getattr(look, name)
+    placeholder = slot.from_file and look.color is not None and min(look.color) > 0.99
+    replaced = not slot.material.texture and not placeholder
+    if look.texture and not slot.material.texture:
+        changes |= {"texture": look.texture, "base_color": (1.0, 1.0, 1.0)}
+        changes["texture_scale_m"] = round(extent_m, 6)
+    if look.color is not None and replaced:
+        changes["base_color"] = srgb_to_linear(look.color)
+    if not changes:
+        return slot
+    material = replace(slot.material, **changes)  # type: ignore[arg-type]
+    named = look.name if (look.color is not None and replaced) or look.texture else ""
+    return MaterialSlot(named or slot.name, material, True)
+
+
+def _wrapped(kind: str, corners: Float64) -> Float64:
+    """Texture coordinates [m, 3, 2] of a primitive.
+
+    The whole image is upright on each face of a box, and goes once around anything else.
+    """
+    low, high = corners.reshape(-1, 3).min(axis=0), corners.reshape(-1, 3).max(axis=0)
+    shares = (corners - low) / (high - low)
+    if kind != "box":
+        around = np.arctan2(corners[..., 1], corners[..., 0]) / (2.0 * math.pi)
+        # Triangles across the seam continue beyond 1; at the poles any direction will do.
+        first = around[:, :1]
+        around = around + np.rint(first - around)
+        return np.round(np.stack([around, shares[..., 2]], axis=-1), 6)
+    normals = face_crosses(corners)
+    axis = np.abs(normals).argmax(axis=1)
+    sign = np.sign(np.take_along_axis(normals, axis[:, None], axis=1))
+    x, y, z = (shares[..., k] - 0.5 for k in range(3))
+    right = np.where(axis[:, None] == 0, sign * y, sign * np.where(axis[:, None] == 1, -x, x))
+    up = np.where(axis[:, None] == 2, y, z)
+    return np.stack([right + 0.5, up + 0.5], axis=-1)
