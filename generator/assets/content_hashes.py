@@ -19,8 +19,12 @@ from urllib.parse import unquote
 
 from gen_data.generator.assets.asset_cache import DiskCache
 from gen_data.generator.assets.asset_folder import Folder
-from gen_data.generator.assets.parsing import parse_layer_references, unpack_value
-from gen_data.generator.assets.robot_formats import is_description, read_description
+from gen_data.generator.assets.parsing import (
+    parse_described_files,
+    parse_layer_references,
+    unpack_value,
+)
+from gen_data.generator.assets.robot_formats import is_description, is_foreign, read_description
 from gen_data.generator.assets.sandbox import run_sandboxed
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.usd.stage_reader import SUFFIXES
@@ -155,6 +159,9 @@ def find_references(folder: Folder, relative: str) -> dict[str, bool]:
             raise AssetError(
                 f"{folder.root / relative}: refers to more than {_MAX_FILES} files; split it"
             )
+        if is_description(name) and name != relative:
+            # Part of the description that includes it, which has named all its files.
+            continue
         for reference in _references(folder, name):
             # References that leave the folder are skipped here; the reader refuses those it needs.
             with contextlib.suppress(AssetError):
@@ -166,7 +173,12 @@ def _references(folder: Folder, name: str) -> Iterator[str]:
     suffix = PurePosixPath(name).suffix.lower()
     if is_description(name):
         depth = len(PurePosixPath(name).parent.parts)
-        yield from ("../" * depth + file for file in read_description(folder, name).files())
+        if is_foreign(name):
+            arrays = run_sandboxed(parse_described_files, folder.root, {name: _MISSING}, name)
+            files = unpack_value(tuple[str, ...], arrays)
+        else:
+            files = read_description(folder, name).files()
+        yield from ("../" * depth + file for file in files)
     elif suffix in (".obj", ".mtl"):
         data = folder.read(name)
         if suffix == ".obj":

@@ -43,11 +43,13 @@ from gen_data.generator.assets.parsing import (
     parse_object,
     parse_plate,
     parse_road_network,
+    parse_robot,
     parse_stage,
     parse_surroundings,
     unpack_value,
 )
-from gen_data.generator.assets.robot_description import RobotDescription
+from gen_data.generator.assets.robot_description import Parts, RobotDescription
+from gen_data.generator.assets.robot_formats import is_foreign
 from gen_data.generator.assets.robot_models import describe_robot, robot_model
 from gen_data.generator.assets.robot_tools import VERSION as TOOLS_VERSION
 from gen_data.generator.assets.sandbox import run_sandboxed
@@ -160,6 +162,10 @@ class FileLibrary:
             lambda: self._parse(one, parse_lanes, one.entry.file),
             lambda arrays: unpack_value(tuple[Lane, ...], arrays),
         )
+
+    def robot_remarks(self, asset_id: str) -> tuple[str, ...]:
+        """What the description of a robot has and nothing uses."""
+        return self._robot(self._entries()[asset_id]).remarks
 
     def robot(self, asset_id: str) -> RobotModel:
         """Kinematics of a robot."""
@@ -290,8 +296,17 @@ class FileLibrary:
 
     def _robot(self, one: IndexedAsset) -> RobotDescription:
         if one.asset_id not in self._robots:
-            assert isinstance(one.entry, RobotEntry)
-            self._robots[one.asset_id] = describe_robot(Folder(one.root), one.entry)
+            entry = one.entry
+            assert isinstance(entry, RobotEntry)
+            if is_foreign(entry.file):
+                parts = self._store.get(
+                    content_key({"asset": self._key(one), "part": "robot"}),
+                    lambda: self._parse(one, parse_robot, entry),
+                    lambda arrays: unpack_value(Parts, arrays),
+                )
+                self._robots[one.asset_id] = RobotDescription.from_parts(parts)
+            else:
+                self._robots[one.asset_id] = describe_robot(Folder(one.root), entry)
         return self._robots[one.asset_id]
 
     def _asset(self, one: IndexedAsset) -> Asset:

@@ -7,6 +7,7 @@ by its folder.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -26,7 +27,13 @@ from gen_data.generator.assets.asset_folder import (
     sanitize_word,
 )
 from gen_data.generator.assets.readers import MESH_SUFFIXES
-from gen_data.generator.assets.robot_formats import is_description, read_description
+from gen_data.generator.assets.robot_formats import (
+    LISTED_SUFFIXES,
+    MJCF_SUFFIX,
+    is_description,
+    is_foreign,
+    read_description,
+)
 from gen_data.generator.assets.texture_maps import TextureMaps as Maps
 from gen_data.generator.config.base_model import Strict
 from gen_data.generator.config.problems import Problems
@@ -439,6 +446,7 @@ class FolderIndex(Origin):
     plates: tuple[PlateEntry, ...] = ()
 
 
+_FILE_NAME = re.compile(rb"""\bfile\s*=\s*["']([^"'<>]{1,500})["']""")
 Model = TypeVar("Model", bound=Strict)
 Entry = MeshEntry | RobotEntry | TextureEntry | ImageEntry | PlateEntry
 Kind = Literal["object", "robot", "texture", "environment", "plate"]
@@ -566,8 +574,12 @@ def _count_by_suffix(files: tuple[str, ...]) -> str:
 def _index_files(root: Path) -> FolderIndex:
     """Index a folder's files, except for meshes that a URDF uses."""
     suffixes = {name: PurePosixPath(name).suffix.lower() for name in list_files(root)}
-    meshes = {*MESH_SUFFIXES, ".urdf", ROAD_SUFFIX}
-    files = [name for name, suffix in suffixes.items() if suffix in meshes]
+    meshes = {*MESH_SUFFIXES, *LISTED_SUFFIXES, ROAD_SUFFIX}
+    files = [
+        name
+        for name, suffix in suffixes.items()
+        if suffix in meshes and (suffix != MJCF_SUFFIX or _is_mjcf(root, name))
+    ]
     panoramas = [name for name, suffix in suffixes.items() if suffix in PANORAMA_SUFFIXES]
     used = {f for name in files if is_description(name) for f in _described_files(root, name)}
     return FolderIndex(
@@ -590,8 +602,20 @@ def _index_files(root: Path) -> FolderIndex:
     )
 
 
+def _is_mjcf(root: Path, file: str) -> bool:
+    """Whether an XML file is a whole MJCF with bodies."""
+    data = Folder(root).read(file)
+    return b"<mujoco" in data and b"<worldbody" in data
+
+
 def _described_files(root: Path, description: str) -> tuple[str, ...]:
+    """Files that belong to a description, and are no assets themselves."""
     try:
+        if is_foreign(description):
+            # Its own reader starts a process: the names of its files are enough here.
+            names = set(_FILE_NAME.findall(Folder(root).read(description)))
+            parts = {PurePosixPath(name.decode("utf-8", "replace")).name for name in names}
+            return tuple(file for file in list_files(root) if PurePosixPath(file).name in parts)
         return read_description(Folder(root), description).files()
     except AssetError:
         # It is listed nevertheless; its import reports the fault.

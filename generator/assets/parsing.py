@@ -23,6 +23,7 @@ from gen_data.generator.assets.importer import (
     import_road_network,
     road_network_lanes,
 )
+from gen_data.generator.assets.robot_formats import read_description
 from gen_data.generator.assets.robot_models import describe_robot
 from gen_data.generator.assets.usd_stages import stage_model
 from gen_data.generator.core.errors import AssetError
@@ -42,6 +43,21 @@ def parse_object(
     """Import an object, or a piece of a stage (``importer.import_object``)."""
     folder = Folder(root)
     return _checked(folder, digests, pack_imported(import_object(folder, entry, asset_id, piece)))
+
+
+def parse_robot(root: Path, digests: Digests, entry: RobotEntry) -> Arrays:
+    """Read ``RobotDescription.parts`` of a robot, for ``unpack_value``."""
+    folder = Folder(root)
+    return _checked(folder, digests, _pack_value(describe_robot(folder, entry).parts()))
+
+
+def parse_described_files(root: Path, digests: Digests, file: str) -> Arrays:
+    """List the files that a description of links and joints consists of, for ``unpack_value``.
+
+    They are hashed after it; ``digests`` has none yet.
+    """
+    del digests
+    return _pack_value(read_description(Folder(root), file).files())
 
 
 def parse_link(root: Path, digests: Digests, entry: RobotEntry, robot_id: str, link: str) -> Arrays:

@@ -25,6 +25,7 @@ class Look:
         opacity: Share in (0, 1] of the background that it hides.
         texture: Image, relative to the folder; empty = none.
         roughness, metallic: In [0, 1]; None = not given.
+        whole: Whether materials of the mesh file itself have no effect.
     """
 
     name: str = ""
@@ -33,6 +34,7 @@ class Look:
     texture: str = ""
     roughness: float | None = None
     metallic: float | None = None
+    whole: bool = False
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,15 @@ class Link:
     collisions: tuple[Shape, ...]
 
 
+Parts = tuple[
+    tuple[Link, ...],
+    tuple[Joint, ...],
+    tuple[tuple[str, float], ...],
+    tuple[str, ...],
+    tuple[str, ...],
+]
+
+
 @dataclass(frozen=True)
 class RobotDescription:
     """Content of a description.
@@ -72,18 +83,33 @@ class RobotDescription:
         links: ``{name: link}``, root first, each after its parent.
         joints: In the order of their child links.
         home: Positions [rad or m] by joint that the file itself proposes.
+        included: Further files of the description, relative to the folder.
         remarks: What the file has and nothing here uses, for the user.
     """
 
     links: dict[str, Link]
     joints: tuple[Joint, ...]
     home: dict[str, float] = field(default_factory=dict)
+    included: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
 
+    @classmethod
+    def from_parts(cls, parts: Parts) -> RobotDescription:
+        """The description whose ``parts`` these are."""
+        links, joints, home, included, remarks = parts
+        return cls({link.name: link for link in links}, joints, dict(home), included, remarks)
+
+    def parts(self) -> Parts:
+        """The same as plain values without mappings, whose order JSON would lose."""
+        links, home = tuple(self.links.values()), tuple(self.home.items())
+        return links, self.joints, home, self.included, self.remarks
+
     def files(self) -> tuple[str, ...]:
-        """Every mesh and image that it refers to, sorted and without duplicates."""
+        """Every other file that it consists of, sorted and without duplicates."""
         shapes = [s for link in self.links.values() for s in (*link.visuals, *link.collisions)]
-        return tuple(sorted({f for s in shapes for f in (s.file, s.look.texture) if f}))
+        return tuple(
+            sorted({f for s in shapes for f in (s.file, s.look.texture) if f} | {*self.included})
+        )
 
     def poses_at_zero(self) -> dict[str, SE3]:
         """``T_root_link`` of every link with all joints at position 0."""

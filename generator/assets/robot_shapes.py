@@ -35,8 +35,9 @@ def make_shape_soup(
     """
     matrix = (T_root_link @ shape.T_link_shape).matrix()[:3]
     if shape.kind == "mesh":
-        source = read_mesh(folder, shape.file, materials=materials)
-        if source.images:
+        own = materials and not shape.look.whole
+        source = read_mesh(folder, shape.file, materials=own)
+        if source.images and own:
             raise AssetError(
                 f"{folder.root / shape.file}: has embedded images, which a robot's meshes may not; "
                 "export it with images as files"
