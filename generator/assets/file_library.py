@@ -48,7 +48,7 @@ from gen_data.generator.assets.parsing import (
     parse_surroundings,
     unpack_value,
 )
-from gen_data.generator.assets.robot_description import Parts, RobotDescription
+from gen_data.generator.assets.robot_description import DescriptionParts, RobotDescription
 from gen_data.generator.assets.robot_formats import is_foreign
 from gen_data.generator.assets.robot_models import describe_robot, robot_model
 from gen_data.generator.assets.robot_tools import VERSION as TOOLS_VERSION
@@ -299,12 +299,12 @@ class FileLibrary:
             entry = one.entry
             assert isinstance(entry, RobotEntry)
             if is_foreign(entry.file):
-                parts = self._store.get(
+                parts: DescriptionParts = self._store.get(
                     content_key({"asset": self._key(one), "part": "robot"}),
                     lambda: self._parse(one, parse_robot, entry),
-                    lambda arrays: unpack_value(Parts, arrays),
+                    lambda arrays: unpack_value(DescriptionParts, arrays),
                 )
-                self._robots[one.asset_id] = RobotDescription.from_parts(parts)
+                self._robots[one.asset_id] = parts.whole()
             else:
                 self._robots[one.asset_id] = describe_robot(Folder(one.root), entry)
         return self._robots[one.asset_id]

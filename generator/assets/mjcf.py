@@ -52,14 +52,17 @@ def read_mjcf(folder: Folder, relative: str) -> RobotDescription:
         AssetError: if MuJoCo refuses it or is not installed, or it refers outside the folder.
     """
     place = str(folder.root / relative)
-    root = parse_xml(folder.read(relative), place, "mujoco", "an MJCF", _MAX_ELEMENTS)
+    data = folder.read(relative)
+    root = parse_xml(data, place, "mujoco", "an MJCF", _MAX_ELEMENTS)
     included = _expand(folder, relative, root)
+    # Unchanged where nothing is included: MuJoCo's messages state lines.
+    text = tostring(root, encoding="unicode") if included else data.decode("utf-8", "replace")
     try:
         import mujoco
     except ImportError:
         raise AssetError(f"{place}: MJCF needs MuJoCo; run: pip install 'gen-data[mjcf]'") from None
     try:
-        spec = mujoco.MjSpec.from_string(tostring(root, encoding="unicode"))
+        spec = mujoco.MjSpec.from_string(text)
         source = _Source(folder, relative, *_strip_files(spec, mujoco))
         model = spec.compile()
     except ValueError as error:

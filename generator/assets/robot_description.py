@@ -66,13 +66,20 @@ class Link:
     collisions: tuple[Shape, ...]
 
 
-Parts = tuple[
-    tuple[Link, ...],
-    tuple[Joint, ...],
-    tuple[tuple[str, float], ...],
-    tuple[str, ...],
-    tuple[str, ...],
-]
+@dataclass(frozen=True)
+class DescriptionParts:
+    """A ``RobotDescription`` without mappings, whose order JSON would lose."""
+
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    home: tuple[tuple[str, float], ...]
+    included: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+    def whole(self) -> RobotDescription:
+        """The description."""
+        links, home = {link.name: link for link in self.links}, dict(self.home)
+        return RobotDescription(links, self.joints, home, self.included, self.remarks)
 
 
 @dataclass(frozen=True)
@@ -93,16 +100,10 @@ class RobotDescription:
     included: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
 
-    @classmethod
-    def from_parts(cls, parts: Parts) -> RobotDescription:
-        """The description whose ``parts`` these are."""
-        links, joints, home, included, remarks = parts
-        return cls({link.name: link for link in links}, joints, dict(home), included, remarks)
-
-    def parts(self) -> Parts:
-        """The same as plain values without mappings, whose order JSON would lose."""
+    def parts(self) -> DescriptionParts:
+        """Itself, to be stored."""
         links, home = tuple(self.links.values()), tuple(self.home.items())
-        return links, self.joints, home, self.included, self.remarks
+        return DescriptionParts(links, self.joints, home, self.included, self.remarks)
 
     def files(self) -> tuple[str, ...]:
         """Every other file that it consists of, sorted and without duplicates."""

@@ -8,6 +8,7 @@ from pathlib import PurePosixPath
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.mjcf import read_mjcf
 from gen_data.generator.assets.robot_description import RobotDescription
+from gen_data.generator.assets.sdf import read_sdf
 from gen_data.generator.assets.urdf import read_urdf
 from gen_data.generator.core.errors import AssetError
 
@@ -16,6 +17,7 @@ _READERS: dict[str, Callable[[Folder, str], RobotDescription]] = {
     # Refused with the command that expands it.
     ".xacro": read_urdf,
     ".xml": read_mjcf,
+    ".sdf": read_sdf,
 }
 MJCF_SUFFIX = ".xml"
 LISTED_SUFFIXES = frozenset(_READERS) - {".xacro"}

@@ -7,7 +7,6 @@ expanded. Inertia is not used: arms move as planned, and masses of objects have 
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
@@ -24,6 +23,7 @@ from gen_data.generator.assets.robot_description import (
     Shape,
     sort_links,
 )
+from gen_data.generator.assets.robot_files import resolve_uri
 from gen_data.generator.core.asset_types import Joint
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.kinematics import leader_of
@@ -37,8 +37,6 @@ _HELD = {"floating", "planar"}
 _ENDLESS_RAD = 100.0
 """Revolute joints with limits beyond this turn without end."""
 _UNUSED = ("gazebo", "transmission", "sensor", "ros2_control")
-_PACKAGE_FILE = "package.xml"
-_URI = re.compile(r"(?:package|model)://")
 
 
 class _Fault(ValueError):
@@ -153,7 +151,7 @@ def _read_look(folder: Folder, relative: str, material: Element) -> Look:
             red, green, blue, alpha = _parse_numbers(color.attrib["rgba"], 4)
             look = replace(look, color=(red, green, blue), opacity=min(max(alpha, 0.0), 1.0))
         if texture is not None and texture.get("filename"):
-            look = replace(look, texture=_resolve(folder, relative, texture.attrib["filename"]))
+            look = replace(look, texture=resolve_uri(folder, relative, texture.attrib["filename"]))
     except (ValueError, KeyError) as error:
         reason = f"missing {error}" if isinstance(error, KeyError) else error
         raise _Fault(material, f"material '{look.name[:40]}': {reason}") from None
@@ -205,7 +203,7 @@ _EXTENTS = {"box": 3, "cylinder": 2, "capsule": 1, "sphere": 1}
 def _read_shape(folder: Folder, relative: str, element: Element, pose: SE3) -> Shape:
     get = element.attrib
     if element.tag == "mesh":
-        file = _resolve(folder, relative, get["filename"])
+        file = resolve_uri(folder, relative, get["filename"])
         scale = get.get("scale", "1 1 1").split()
         size = _parse_vector(" ".join(scale * 3 if len(scale) == 1 else scale))
         if 0.0 in size:
@@ -222,41 +220,6 @@ def _read_shape(folder: Folder, relative: str, element: Element, pose: SE3) -> S
     if min(size) < 0.0:
         raise ValueError(f"<{element.tag}> of negative size {min(size):g}")
     return Shape(element.tag, "", size, pose)
-
-
-def _resolve(folder: Folder, relative: str, name: str) -> str:
-    """Resolve ``package://x/y`` or a relative path to a file below the folder.
-
-    A package is the folder of that name beside or above the URDF, or the one above it whose
-    ``package.xml`` has that name. Older descriptions omit the package's name, so the path is also
-    tried unchanged, and names of folders above the file may precede it.
-    """
-    name = name.strip()
-    if not _URI.match(name):
-        return folder.refer(relative, name)
-    path = PurePosixPath(name.partition("://")[2])
-    base = PurePosixPath(relative).parent
-    candidates = []
-    for ancestor in (base, *base.parents):
-        at = str(ancestor / "x.urdf")
-        is_root = str(ancestor) == "."
-        known = {ancestor.name or folder.root.resolve().name, _package_name(folder, ancestor)}
-        candidates.append(folder.refer(at, str(path)))
-        candidates += [
-            folder.refer(at, str(PurePosixPath(*path.parts[k:])))
-            for k in range(1, len(path.parts))
-            if path.parts[k - 1] in known or (is_root and k == 1 and known & {""})
-        ]
-    return next((c for c in candidates if folder.exists(c)), candidates[0])
-
-
-def _package_name(folder: Folder, ancestor: PurePosixPath) -> str:
-    """Name of the ROS package in a folder; empty if it is none."""
-    file = str(ancestor / _PACKAGE_FILE)
-    if not folder.exists(file):
-        return ""
-    found = re.search(rb"<name>\s*([\w.-]+)\s*</name>", folder.read(file))
-    return found.group(1).decode() if found else ""
 
 
 def _read_joint(element: Element, remarks: list[str]) -> Joint:
