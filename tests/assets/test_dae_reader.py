@@ -128,6 +128,16 @@ def test_alone_a_file_stands_as_its_up_axis_states(tmp_path: Path) -> None:
     assert heights == {"Z_UP": pytest.approx(1.0), "Y_UP": pytest.approx(0.5)}
 
 
+def test_geometry_with_a_broken_material_is_kept(tmp_path: Path) -> None:
+    """A sampler without its surface, as in ANYmal's foot: the triangles are there, in grey."""
+    folder = folder_of(tmp_path, material="wood")
+    text = (tmp_path / "a.dae").read_text().replace("<source>s</source>", "<source>x</source>")
+    (tmp_path / "a.dae").write_text(text)
+    soup = read_mesh(folder, "a.dae").soup
+    assert len(soup) == 2
+    assert soup.slots[0].material.base_color == (0.6, 0.6, 0.6)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "reason"),
     [

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 from urllib.parse import unquote, urlsplit
+from xml.etree.ElementTree import fromstring, tostring
 
 import numpy as np
 
@@ -46,7 +47,11 @@ def read_dae(folder: Folder, relative: str, materials: bool) -> MeshSource:
             # It multiplies by numpy.matrix, and sets the shapes of arrays.
             for category in (PendingDeprecationWarning, DeprecationWarning):
                 warnings.simplefilter("ignore", category)
-            document = Collada(io.BytesIO(data), ignore=[DaeUnsupportedError, DaeBrokenRefError])
+            tolerated = [DaeUnsupportedError, DaeBrokenRefError]
+            document = Collada(io.BytesIO(data), ignore=tolerated)
+            if document.errors:
+                mended = _without_broken_materials(data, {m.id for m in document.materials})
+                document = Collada(io.BytesIO(mended), ignore=tolerated)
             soups = [
                 _make_soup(folder, relative, document, *part, materials=materials)
                 for part in enumerate(_placed_geometries(document))
@@ -58,6 +63,17 @@ def read_dae(folder: Folder, relative: str, materials: bool) -> MeshSource:
     if not parts:
         raise AssetError(f"{place}: holds no triangles; export it again with its faces")
     return MeshSource(join_soups(parts), up=_UP.get(str(document.assetInfo.upaxis), "y"))
+
+
+def _without_broken_materials(data: bytes, known: set[str]) -> bytes:
+    """The file without uses of unknown materials: pycollada drops the geometry that uses one."""
+    root = fromstring(data)
+    for parent in list(root.iter()):
+        for child in list(parent):
+            use = str(child.tag).endswith("}instance_material")
+            if use and child.get("target", "").removeprefix("#") not in known:
+                parent.remove(child)
+    return tostring(root)
 
 
 def _placed_geometries(document: Any) -> Iterator[tuple[Any, Float64, dict[str, Any]]]:
