@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+ENDLESS = 1e3
 TOLERANCE_M = 1e-4
 """Of edges of the bounding box; meshes are not decimated."""
 
@@ -54,9 +55,7 @@ def ours(root: Path, file: str) -> dict[str, Any]:
     sited = [j for j in robot.joints if j.name.endswith("_site")]
     return {
         "links": len(robot.links) - (len(sited) + 1 if file.endswith(".xml") else 0),
-        "joints": {
-            j.name: None if j.kind == "continuous" else [j.lower, j.upper] for j in joints
-        },
+        "joints": {j.name: None if j.kind == "continuous" else [j.lower, j.upper] for j in joints},
         "colors": sorted(c for c in colors if c),
         "size_m": _size(points),
         "remarks": robot.remarks,
@@ -67,7 +66,7 @@ def reference(root: Path, file: str) -> dict[str, Any]:
     """The same facts from an independent reader."""
     try:
         return _mujoco(root / file) if file.endswith(".xml") else _yourdfpy(root / file)
-    except Exception as error:  # noqa: BLE001 - whatever the other reader cannot read
+    except Exception as error:
         return {"error": f"{type(error).__name__}: {str(error)[:200]}"}
 
 
@@ -90,7 +89,9 @@ def _yourdfpy(path: Path) -> dict[str, Any]:
         if joint.type == "continuous":
             joints[joint.name] = None
         elif joint.type in ("revolute", "prismatic") and joint.limit is not None:
-            joints[joint.name] = [joint.limit.lower or 0.0, joint.limit.upper or 0.0]
+            limits = [joint.limit.lower or 0.0, joint.limit.upper or 0.0]
+            # Such limits are none.
+            joints[joint.name] = limits if max(map(abs, limits)) < ENDLESS else None
     return {
         "reader": f"yourdfpy {yourdfpy.__version__}",
         "links": len(robot.robot.links),
@@ -105,7 +106,6 @@ def _mujoco(path: Path) -> dict[str, Any]:
 
     model = mujoco.MjModel.from_xml_path(str(path))
     data = mujoco.MjData(model)
-    data.qpos[:] = np.where(np.arange(model.nq) >= 0, data.qpos, 0.0)
     for j in range(model.njnt):
         if model.jnt_type[j] in (2, 3):
             data.qpos[model.jnt_qposadr[j]] = 0.0
@@ -131,13 +131,17 @@ def _mujoco(path: Path) -> dict[str, Any]:
             corners = model.mesh_vert[first : first + model.mesh_vertnum[mesh]]
         else:
             half = np.array(model.geom_aabb[g][3:])
-            corners = np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) * half
+            corners = (
+                np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) * half
+            )
             turn = data.geom_xmat[g].reshape(3, 3)
             if kind != 6:
                 corners = _round_corners(kind, model.geom_size[g], turn)
         points.append(corners @ data.geom_xmat[g].reshape(3, 3).T + data.geom_xpos[g])
     joints = {
-        model.joint(j).name: [float(v) for v in model.jnt_range[j]] if model.jnt_limited[j] else None
+        model.joint(j).name: [float(v) for v in model.jnt_range[j]]
+        if model.jnt_limited[j]
+        else None
         for j in range(model.njnt)
         if model.jnt_type[j] in (2, 3)
     }
@@ -178,21 +182,28 @@ def compare(mine: dict[str, Any], other: dict[str, Any]) -> dict[str, str]:
     wrong = [
         name
         for name in {*mine["joints"], *joints}
-        if name not in mine["joints"] or name not in joints
+        if name not in mine["joints"]
+        or name not in joints
         or (mine["joints"][name] is None) != (joints[name] is None)
-        or (joints[name] is not None and not np.allclose(mine["joints"][name], joints[name], atol=1e-6))
+        or (
+            joints[name] is not None
+            and not np.allclose(mine["joints"][name], joints[name], atol=1e-6)
+        )
     ]
     size = np.abs(np.array(mine["size_m"]) - other["size_m"]).max()
     colors = len(mine["colors"]) == len(other["colors"]) and np.allclose(
         np.array(mine["colors"]), np.array(other["colors"]), atol=1e-4
     )
+    pairs = {
+        "links": (mine["links"], other["links"], mine["links"] == other["links"]),
+        "limits": (f"differ: {', '.join(sorted(wrong)[:4])}", len(joints), not wrong),
+        "colours": (len(mine["colors"]), len(other["colors"]), colors),
+        "size": (mine["size_m"], other["size_m"], size <= TOLERANCE_M),
+    }
     return {
-        "links": "equal" if mine["links"] == other["links"] else f"{mine['links']}, {other['links']}",
-        "limits": f"{len(joints)} equal" if not wrong else f"differ: {', '.join(sorted(wrong)[:4])}",
-        "colours": f"{len(other['colors'])} equal" if colors
-                   else f"{len(mine['colors'])}, {len(other['colors'])}",
-        "size": "equal" if size <= TOLERANCE_M else f"{mine['size_m']}, {other['size_m']}",
-    }  # fmt: skip
+        name: f"{theirs} equal" if equal else f"{own}; {theirs}"
+        for name, (own, theirs, equal) in pairs.items()
+    }
 
 
 def main() -> None:

@@ -49,7 +49,7 @@ from gen_data.generator.assets.parsing import (
     unpack_value,
 )
 from gen_data.generator.assets.robot_description import DescriptionParts, RobotDescription
-from gen_data.generator.assets.robot_formats import is_foreign
+from gen_data.generator.assets.robot_formats import is_description, is_foreign
 from gen_data.generator.assets.robot_models import describe_robot, robot_model
 from gen_data.generator.assets.robot_tools import VERSION as TOOLS_VERSION
 from gen_data.generator.assets.sandbox import run_sandboxed
@@ -163,9 +163,14 @@ class FileLibrary:
             lambda arrays: unpack_value(tuple[Lane, ...], arrays),
         )
 
-    def robot_remarks(self, asset_id: str) -> tuple[str, ...]:
-        """What the description of a robot has and nothing uses."""
-        return self._robot(self._entries()[asset_id]).remarks
+    def remarks(self, asset_id: str) -> tuple[str, ...]:
+        """What a description of links and joints has and nothing uses; empty for other assets."""
+        one = self._entries()[asset_id]
+        if not isinstance(one.entry, RobotEntry):
+            if not is_description(one.entry.file):
+                return ()
+            one = replace(one, entry=RobotEntry(file=one.entry.file))
+        return self._robot(one).remarks
 
     def robot(self, asset_id: str) -> RobotModel:
         """Kinematics of a robot."""
@@ -298,7 +303,9 @@ class FileLibrary:
         if one.asset_id not in self._robots:
             entry = one.entry
             assert isinstance(entry, RobotEntry)
-            if is_foreign(entry.file):
+            if any(
+                is_foreign(file) for file in (entry.file, entry.tool.file if entry.tool else "")
+            ):
                 parts: DescriptionParts = self._store.get(
                     content_key({"asset": self._key(one), "part": "robot"}),
                     lambda: self._parse(one, parse_robot, entry),

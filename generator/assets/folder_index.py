@@ -288,9 +288,11 @@ class GripperEntry(Strict):
 
 
 class ToolEntry(Strict):
-    """A gripper made by code, on the flange of an arm; see ``robot_tools``."""
+    """A gripper on the flange of an arm: made by code (see ``robot_tools``), or from a file."""
 
-    kind: Literal["fingers", "suction"]
+    kind: Literal["fingers", "suction", "file"]
+    file: str = ""
+    """Description of the gripper, of kind ``file``; ``gripper`` states how it holds."""
     flange: str
     """Link whose Z points out of the arm."""
     offset_m: float = 0.0
@@ -300,20 +302,26 @@ class ToolEntry(Strict):
     instead_of: str = ""
     """Link that is left out, with all below it; empty = none."""
 
+    @model_validator(mode="after")
+    def _has_a_file(self) -> ToolEntry:
+        if (self.kind == "file") != bool(self.file):
+            raise ValueError("expected file with kind: file, and with no other kind")
+        return self
+
 
 class RobotEntry(Origin):
     """A robot."""
 
     id: Id | None = None
     file: str
-    """URDF file, relative to the folder."""
+    """URDF, MJCF or SDF file, relative to the folder."""
     category: Category = "robot"
     tags: tuple[Word, ...] = ()
     home: dict[str, float] = Field(default_factory=dict)
     """Position [rad or m] per joint; by default 0, or mid-range if 0 is outside the limits."""
     gripper: GripperEntry | None = None
     tool: ToolEntry | None = None
-    """Instead of a gripper in its URDF."""
+    """Instead of a gripper in its description."""
     workspace_from_m: Annotated[float, Field(ge=0.0)] = WORKSPACE_FROM_M
     """Horizontal distance from the base to where its workspace on a table begins: the things of
     tasks lie so much nearer or farther."""
@@ -327,13 +335,15 @@ class RobotEntry(Origin):
 
     @model_validator(mode="after")
     def _has_one_hand(self) -> RobotEntry:
-        if self.gripper is not None and self.tool is not None:
-            raise ValueError("expected either gripper or tool")
+        made = self.tool is not None and self.tool.kind != "file"
+        if self.gripper is not None and made:
+            raise ValueError("expected either gripper or a tool made by code")
         return self
 
     def files(self) -> tuple[str, ...]:
         """The files that it names."""
-        return _unique_files(self.file, *(finish.maps for finish in self.materials.values()))
+        tool = self.tool.file if self.tool else ""
+        return _unique_files(self.file, tool, *(f.maps for f in self.materials.values()))
 
 
 class TextureEntry(Origin):

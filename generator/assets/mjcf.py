@@ -19,6 +19,7 @@ import numpy as np
 
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.robot_description import (
+    FORMAT_ROOTS,
     MAX_LINKS,
     Link,
     Look,
@@ -33,7 +34,7 @@ from gen_data.generator.core.safe_xml import parse_xml
 from gen_data.generator.core.se3 import SE3, Vec3, rotation_to_quaternion
 
 _MAX_ELEMENTS = 200_000
-_ROOT = "world"
+_ROOT = FORMAT_ROOTS[0]
 _SHOWN_GROUPS = 3
 """MuJoCo's viewer shows the groups 0 to 2."""
 _PLAIN = (0.5, 0.5, 0.5, 1.0)

@@ -13,6 +13,8 @@ from gen_data.generator.core.kinematics import joint_transform
 from gen_data.generator.core.se3 import SE3, Vec3
 
 MAX_LINKS = 500
+FORMAT_ROOTS = ("world", "__model__")
+"""Root links of MJCF and SDF, which no body of the file stands for."""
 
 
 @dataclass(frozen=True)

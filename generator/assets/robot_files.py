@@ -28,7 +28,7 @@ def resolve_uri(folder: Folder, relative: str, uri: str) -> str:
     uri = uri.strip()
     if not _URI.match(uri):
         return folder.refer(relative, uri)
-    path, name = PurePosixPath(uri.partition("://")[2]), PurePosixPath(relative).name
+    path, name = PurePosixPath(uri.partition("://")[2].lstrip("/")), PurePosixPath(relative).name
     base = PurePosixPath(relative).parent
     candidates = []
     for ancestor in (base, *base.parents):

@@ -26,7 +26,10 @@ def describe_robot(folder: Folder, entry: RobotEntry) -> RobotDescription:
         AssetError: its description is malformed, or has no such flange.
     """
     arm = read_description(folder, entry.file)
-    return with_tool(arm, entry.tool, str(folder.root / entry.file)) if entry.tool else arm
+    if entry.tool is None:
+        return arm
+    hand = read_description(folder, entry.tool.file) if entry.tool.file else None
+    return with_tool(arm, entry.tool, str(folder.root / entry.file), hand)
 
 
 def robot_model(
@@ -100,7 +103,7 @@ def _home_positions(
 
 def _make_gripper(entry: RobotEntry) -> Gripper | None:
     gripper = entry.gripper
-    if entry.tool is not None:
+    if entry.tool is not None and not entry.tool.file:
         return tool_gripper(entry.tool)
     if gripper is None:
         return None

@@ -10,7 +10,13 @@ import math
 from dataclasses import replace
 
 from gen_data.generator.assets.folder_index import ToolEntry
-from gen_data.generator.assets.robot_description import Link, Look, RobotDescription, Shape
+from gen_data.generator.assets.robot_description import (
+    FORMAT_ROOTS,
+    Link,
+    Look,
+    RobotDescription,
+    Shape,
+)
 from gen_data.generator.core.asset_types import Gripper, Joint, SuctionCup
 from gen_data.generator.core.errors import AssetError, did_you_mean
 from gen_data.generator.core.se3 import SE3, Vec3
@@ -37,8 +43,16 @@ _DARK: Vec3 = (0.34, 0.34, 0.35)
 _RUBBER: Vec3 = (0.12, 0.16, 0.3)
 
 
-def with_tool(arm: RobotDescription, tool: ToolEntry, place: str) -> RobotDescription:
+def with_tool(
+    arm: RobotDescription, tool: ToolEntry, place: str, hand: RobotDescription | None = None
+) -> RobotDescription:
     """The robot with a tool on its flange; its links come last.
+
+    Args:
+        arm: The robot.
+        tool: Where the tool is, and its kind.
+        place: Name of the robot in error messages.
+        hand: Description of a tool of the kind ``file``.
 
     Raises:
         AssetError: there is no such flange, or it or a link of the tool's names exists already.
@@ -56,13 +70,35 @@ def with_tool(arm: RobotDescription, tool: ToolEntry, place: str) -> RobotDescri
             "correct the entry 'tool' of the asset index"
         )
     T_flange_tool = SE3.about_z(math.radians(tool.yaw_deg), (0.0, 0.0, tool.offset_m))
-    base = _fixed_joint(tool.flange, BASE, T_flange_tool)
-    links, joints = _suction_cup() if tool.kind == "suction" else _fingers()
+    if hand is None:
+        links, joints = _suction_cup() if tool.kind == "suction" else _fingers()
+    else:
+        links, joints = _with_own_root(hand)
+        kept = replace(
+            kept,
+            home={**kept.home, **hand.home},
+            included=(*kept.included, *hand.included),
+            remarks=(*kept.remarks, *hand.remarks),
+        )
+    base = _fixed_joint(tool.flange, links[0].name, T_flange_tool)
     taken = sorted({*kept.links} & {link.name for link in links})
+    taken += sorted({j.name for j in kept.joints} & {j.name for j in joints})
     if taken:
-        raise AssetError(f"{place}: it has a link '{taken[0]}' already; rename that link")
+        raise AssetError(
+            f"{place}: it has a link or joint '{taken[0]}', as its tool has; rename one of them"
+        )
     every = {**kept.links, **{x.name: x for x in links}}
     return replace(kept, links=every, joints=(*kept.joints, base, *joints))
+
+
+def _with_own_root(hand: RobotDescription) -> tuple[list[Link], list[Joint]]:
+    """Links and joints of a tool; a root that only its format has is called ``tool``."""
+    links, joints = list(hand.links.values()), list(hand.joints)
+    root = links[0].name
+    if root in FORMAT_ROOTS:
+        links[0] = replace(links[0], name=BASE)
+        joints = [replace(j, parent=BASE) if j.parent == root else j for j in joints]
+    return links, joints
 
 
 def tool_gripper(tool: ToolEntry) -> Gripper:

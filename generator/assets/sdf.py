@@ -15,6 +15,7 @@ from xml.etree.ElementTree import Element
 
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.robot_description import (
+    FORMAT_ROOTS,
     MAX_LINKS,
     Link,
     Look,
@@ -33,7 +34,7 @@ from gen_data.generator.core.se3 import SE3, Vec3
 _MAX_ELEMENTS = 100_000
 _MAX_DEPTH = 8
 """Of models inside models."""
-_MODEL = "__model__"
+_MODEL = FORMAT_ROOTS[1]
 _ENDLESS = 1e3
 """Limits [rad or m] beyond this are none; 1e16 is the format's default."""
 _KINDS = {"fixed", "revolute", "continuous", "prismatic"}

@@ -210,6 +210,14 @@ def test_a_ros_package_is_an_asset_folder(tmp_path: Path, urdf: str, mesh: str, 
     assert describe(tmp_path, PACKAGED, file=urdf).files() == (mesh,)
 
 
+def test_a_third_slash_of_a_package_uri_is_no_part_of_the_path(tmp_path: Path) -> None:
+    """As in TALOS' full description."""
+    (tmp_path / "arm_description/meshes").mkdir(parents=True)
+    (tmp_path / "arm_description/meshes/a.obj").write_text(TETRAHEDRON)
+    described = describe(tmp_path, PACKAGED.replace("package://", "package:///"))
+    assert described.files() == ("arm_description/meshes/a.obj",)
+
+
 def test_another_packages_mesh_is_not_taken_from_this_one(tmp_path: Path) -> None:
     """``package.xml`` has another name: the path that is looked for is the one in that package."""
     (tmp_path / "meshes").mkdir()
