@@ -135,8 +135,12 @@ def _link_name(name: str) -> str:
 
 
 def _named_looks(folder: Folder, relative: str, root: Element) -> Iterator[tuple[str, Look]]:
-    """Yield all named materials; the first definition comes last and wins."""
-    for material in reversed(root.findall(".//material")):
+    """Yield all named materials; the last one of a name wins.
+
+    That is the robot's own, as in urdfdom, else the first definition inside a link.
+    """
+    shared = root.findall("material")
+    for material in reversed([*shared, *root.findall("*//material")]):
         look = _read_look(folder, relative, material)
         if look.name and look != Look(look.name):
             yield look.name, look

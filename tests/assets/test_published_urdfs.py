@@ -66,6 +66,18 @@ def test_alpha_of_a_colour_is_opacity(tmp_path: Path) -> None:
     assert (green.opacity, green.base_color) == (0.4, (0.0, 0.214041, 0.0))
 
 
+def test_a_material_of_the_robot_wins_over_one_inside_a_link(tmp_path: Path) -> None:
+    """As in urdfdom, wherever it stands; TALOS has two materials named DarkGrey."""
+    described = describe(
+        tmp_path,
+        link("a", visual('<material name="grey"><color rgba="0.5 0.5 0.5 1"/></material>')),
+        link("b", visual('<material name="grey"/>')),
+        '<material name="grey"><color rgba="0.2 0.2 0.2 1"/></material>',
+        joint("j", "a", "b"),
+    )
+    assert described.links["b"].visuals[0].look.color == (0.2, 0.2, 0.2)
+
+
 def test_a_texture_is_whole_and_upright_on_every_face_of_a_box(tmp_path: Path) -> None:
     """Seen from outside with Z up, the image's left bottom is at the face's left bottom."""
     (tmp_path / "textures").mkdir()
