@@ -66,7 +66,7 @@ def read_mjcf(folder: Folder, relative: str) -> RobotDescription:
         spec = mujoco.MjSpec.from_string(text)
         source = _Source(folder, relative, *_strip_files(spec, mujoco))
         model = spec.compile()
-    except ValueError as error:
+    except (ValueError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split())[:300]
         raise AssetError(f"{place}: MuJoCo refuses it ({reason}); correct it") from None
     try:
@@ -132,6 +132,20 @@ class _Source:
 def _strip_files(spec: Any, mujoco: Any) -> tuple[Any, ...]:
     """Replace meshes by boxes and remove images; return what they were."""
     remarks: Counter[str] = Counter()
+    meshes = _strip_meshes(spec, mujoco)
+    images, colors = _strip_images(spec, mujoco, remarks)
+    for height in spec.hfields:
+        height.file, height.nrow, height.ncol, height.userdata = "", 2, 2, [0, 0, 0, 1]
+    for name, things in (("skin", spec.skins), ("flex", spec.flexes)):
+        for thing in list(things):
+            remarks[name] += 1
+            spec.delete(thing)
+    spec.compiler.fusestatic = False
+    spec.compiler.discardvisual = False
+    return meshes, images, colors, (spec.meshdir, spec.texturedir), +remarks
+
+
+def _strip_meshes(spec: Any, mujoco: Any) -> dict[str, _File]:
     meshes: dict[str, _File] = {}
     corners, faces = _unit_box()
     for mesh in spec.meshes:
@@ -140,18 +154,23 @@ def _strip_files(spec: Any, mujoco: Any) -> tuple[Any, ...]:
         mujoco.mju_quat2Mat(turn, np.array(mesh.refquat) / np.linalg.norm(mesh.refquat))
         turned = SE3((0.0, 0.0, 0.0), rotation_to_quaternion(turn.reshape(3, 3).T))
         if mesh.file:
-            moved = _vec3(-np.array(scale) * turned.rotate(shift))
-            T_ref = SE3(moved, turned.quaternion_wxyz)
             if len(set(scale)) > 1 and not np.allclose(turned.rotation(), np.eye(3)):
                 raise ValueError(f"mesh '{mesh.name}' is turned and scaled unevenly")
-            name = mesh.name or PurePosixPath(mesh.file).stem
-            meshes[name] = _File(mesh.file, scale, T_ref)
-            mesh.name = name
+            moved = _vec3(-np.array(scale) * turned.rotate(shift))
+            mesh.name = mesh.name or PurePosixPath(mesh.file).stem
+            meshes[mesh.name] = _File(mesh.file, scale, SE3(moved, turned.quaternion_wxyz))
         mesh.file, mesh.content_type = "", ""
         mesh.scale, mesh.refpos, mesh.refquat = [1, 1, 1], [0, 0, 0], [1, 0, 0, 0]
         mesh.uservert, mesh.userface = corners, faces
         for attribute in ("usernormal", "usertexcoord", "userfacenormal", "userfacetexcoord"):
             setattr(mesh, attribute, [])
+    return meshes
+
+
+def _strip_images(
+    spec: Any, mujoco: Any, remarks: Counter[str]
+) -> tuple[dict[str, str], dict[str, Vec3]]:
+    """Image file and colour of a procedural texture by material."""
     files = {texture.name or PurePosixPath(texture.file).stem: texture for texture in spec.textures}
     images, colors = dict[str, str](), dict[str, Vec3]()
     role = int(mujoco.mjtTextureRole.mjTEXROLE_RGB)
@@ -170,14 +189,9 @@ def _strip_files(spec: Any, mujoco: Any) -> tuple[Any, ...]:
             bool(name) for k, name in enumerate(used) if k != role
         )
         material.textures = [""] * len(used)
-    for name, things in (("", spec.textures), ("skin", spec.skins), ("flex", spec.flexes)):
-        for thing in list(things):
-            remarks[name] += bool(name)
-            spec.delete(thing)
-    spec.compiler.fusestatic = False
-    spec.compiler.discardvisual = False
-    folders = (spec.meshdir, spec.texturedir)
-    return meshes, images, colors, folders, +remarks
+    for texture in list(spec.textures):
+        spec.delete(texture)
+    return images, colors
 
 
 def _unit_box() -> tuple[list[float], list[int]]:

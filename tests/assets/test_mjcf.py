@@ -198,6 +198,16 @@ def test_what_is_not_used_is_named(tmp_path: Path) -> None:
     assert finding.warnings == described.remarks
 
 
+def test_a_height_field_is_named_and_its_file_not_opened(tmp_path: Path) -> None:
+    """Nothing outside the folder is read, and the robot on the terrain is used."""
+    terrain = '<asset><hfield name="h" file="/etc/passwd" size="1 1 1 1"/>'
+    ground = '<worldbody><geom type="hfield" hfield="h"/>'
+    text = ARM.replace("<asset>", terrain).replace("<worldbody>", ground)
+    described = read_mjcf(write(tmp_path, text), "arm.xml")
+    assert described.remarks == ("not used: 1 hfield geom", "not used: 1 plane geom")
+    assert len(described.joints) > 3
+
+
 def test_included_files_are_part_of_the_asset(tmp_path: Path) -> None:
     """A change of an included file changes the digest, as one of a mesh does."""
     write(tmp_path, ARM.replace("<default>\n", '<include file="looks.xml"/>\n<default>\n'))
@@ -227,6 +237,7 @@ def test_without_an_index_it_is_one_object(tmp_path: Path) -> None:
     ("old", "new", "reason"),
     [
         ("<worldbody>", "<worldbdy>", "malformed XML"),
+        ("<mujoco", "<!DOCTYPE a [<!ENTITY b 'c'>]><mujoco", "declares a document type"),
         ('axis="0 0 2"', 'axis="0 0 0"', "MuJoCo refuses it .*lift"),
         ('mesh="wedge"', 'mesh="edge"', "MuJoCo refuses it .*edge"),
         ('file="wedge.obj"', 'file="../../wedge.obj"', "outside"),

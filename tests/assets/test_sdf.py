@@ -224,6 +224,13 @@ def test_faults_have_one_clear_error(tmp_path: Path, part: str, reason: str) -> 
         read(tmp_path, part, *HINGED[:2])
 
 
+def test_entities_are_never_expanded(tmp_path: Path) -> None:
+    """A document type is refused."""
+    (tmp_path / "a.sdf").write_text("<!DOCTYPE a [<!ENTITY b 'c'>]><sdf><model name='&b;'/></sdf>")
+    with pytest.raises(AssetError, match=r"a\.sdf: .*declares a document type"):
+        read_sdf(Folder(tmp_path), "a.sdf")
+
+
 def test_a_file_with_two_models_is_refused(tmp_path: Path) -> None:
     """Nobody knows which one is meant."""
     (tmp_path / "a.sdf").write_text(
