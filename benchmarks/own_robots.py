@@ -29,7 +29,7 @@ def ours(root: Path, file: str) -> dict[str, Any]:
     """Facts of a description as this project reads it."""
     from gen_data.generator.assets.asset_folder import Folder
     from gen_data.generator.assets.robot_formats import read_description
-    from gen_data.generator.assets.robot_shapes import make_shape_soup
+    from gen_data.generator.assets.robot_shapes import read_shape
     from gen_data.generator.core.errors import AssetError
 
     folder = Folder(root)
@@ -37,13 +37,13 @@ def ours(root: Path, file: str) -> dict[str, Any]:
         robot = read_description(folder, file)
         poses = robot.poses_at_zero()
         points = [
-            make_shape_soup(folder, shape, poses[link.name]).corners.reshape(-1, 3)
+            read_shape(folder, shape, poses[link.name]).soup.corners.reshape(-1, 3)
             for link in robot.links.values()
             for shape in link.visuals
         ]
         for link in robot.links.values():
             for shape in link.collisions:
-                make_shape_soup(folder, shape, poses[link.name], materials=False)
+                read_shape(folder, shape, poses[link.name], materials=False)
     except AssetError as error:
         return {"error": str(error).replace(str(root), "")}
     colors = [

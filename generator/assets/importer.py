@@ -27,7 +27,7 @@ from gen_data.generator.assets.readers.usd import open_stage
 from gen_data.generator.assets.roads.network_surface import network_solid
 from gen_data.generator.assets.robot_description import RobotDescription, Shape
 from gen_data.generator.assets.robot_formats import is_description, read_description
-from gen_data.generator.assets.robot_shapes import make_shape_soup
+from gen_data.generator.assets.robot_shapes import read_shape
 from gen_data.generator.assets.texture_maps import texel_indices, trim_unreached_holes
 from gen_data.generator.assets.triangle_soup import (
     Float64,
@@ -100,9 +100,7 @@ def import_object(folder: Folder, entry: MeshEntry, asset_id: str, piece: str = 
         entry = entry.model_copy(update={"origin": "center"})
     else:
         looks, collides, images, up = _read_geometry(folder, entry)
-    decoded = {
-        name: decode_image(data, f"{place}#{name}", alpha=True) for name, data in images.items()
-    }
+    decoded = _decode_all(images, place)
 
     def image(name: str) -> UInt8:
         if name in decoded:
@@ -152,14 +150,20 @@ def import_link(
     link = robot.links[link_name]
     place = f"{folder.root / entry.file}: link '{link_name}'"
     mesh = collision = None
+    images: dict[str, UInt8] = {}
     if link.visuals:
-        soup = join_soups([make_shape_soup(folder, shape, SE3()) for shape in link.visuals])
+        sources = [read_shape(folder, shape, SE3()) for shape in link.visuals]
+        soup = join_soups([source.soup for source in sources])
+        for source in sources:
+            images |= _decode_all(source.images, place)
         if entry.palette:
             soup = _palette_colors(folder, soup)
-        soup = _apply_finishes(soup, entry.materials, place, robot_id)
+        # Images inside mesh files are those of the link, all others those of the robot.
+        owner = f"{robot_id}/{link_name}" if images else robot_id
+        soup = _apply_finishes(soup, entry.materials, place, owner)
         mesh = normal_form(soup, place, max_faces=entry.max_faces)
     if link.collisions:
-        solids = [make_shape_soup(folder, s, SE3(), materials=False) for s in link.collisions]
+        solids = [read_shape(folder, s, SE3(), materials=False).soup for s in link.collisions]
         check_coordinates(join_soups(solids), place)
         # One hull per element and group, as simulators treat the collision meshes of a URDF.
         hulls = [
@@ -167,7 +171,7 @@ def import_link(
             for s in solids
         ]
         collision = ConvexParts(tuple(part for hull in hulls for part in hull.parts_m))
-    return ImportedMesh(mesh, collision, {})
+    return ImportedMesh(mesh, collision, images)
 
 
 def _read_geometry(
@@ -189,9 +193,11 @@ def _read_geometry(
         solids = [(s, poses[n]) for n, link in thing.links.items() for s in link.collisions]
         if not visuals:
             raise AssetError(f"{folder.root / entry.file}: no visual geometry; give it a <visual>")
-        looks = [make_shape_soup(folder, shape, pose) for shape, pose in visuals]
+        sources = [read_shape(folder, shape, pose) for shape, pose in visuals]
+        looks = [source.soup for source in sources]
+        images = {name: data for s in sources for name, data in s.images.items()}
         if [_geometry_key(s) for s in solids] != [_geometry_key(v) for v in visuals]:
-            collides = [make_shape_soup(folder, s, pose, materials=False) for s, pose in solids]
+            collides = [read_shape(folder, s, pose, materials=False).soup for s, pose in solids]
     else:
         source = read_mesh(folder, entry.file)
         looks, images, up = [source.soup], source.images, source.up
@@ -207,6 +213,12 @@ def _read_piece(folder: Folder, entry: MeshEntry, name: str) -> MeshSource:
         if not pieces:
             raise AssetError(f"{folder.root / entry.file}: has no mesh '{name}'; correct the id")
         return stage.source(pieces)
+
+
+def _decode_all(images: Mapping[str, bytes], place: str) -> dict[str, UInt8]:
+    return {
+        name: decode_image(data, f"{place}#{name}", alpha=True) for name, data in images.items()
+    }
 
 
 def _geometry_key(placed: tuple[Shape, SE3]) -> tuple[object, ...]:

@@ -9,8 +9,9 @@ import numpy as np
 
 from gen_data.generator.assets.asset_folder import Folder
 from gen_data.generator.assets.readers import read_mesh
-from gen_data.generator.assets.readers.mesh_source import srgb_to_linear
+from gen_data.generator.assets.readers.mesh_source import MeshSource, srgb_to_linear
 from gen_data.generator.assets.robot_description import Look, Shape
+from gen_data.generator.assets.texture_maps import find_maps
 from gen_data.generator.assets.triangle_soup import (
     Float64,
     MaterialSlot,
@@ -21,14 +22,15 @@ from gen_data.generator.assets.triangle_soup import (
     face_crosses,
     sphere,
 )
-from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.se3 import SE3
 
 
-def make_shape_soup(
+def read_shape(
     folder: Folder, shape: Shape, T_root_link: SE3, *, materials: bool = True
-) -> TriangleSoup:
+) -> MeshSource:
     """Read or make the triangles of a shape, in the root frame and its colour.
+
+    The name of an image inside a mesh file is preceded by that of the file.
 
     Raises:
         AssetError: if its mesh is unusable.
@@ -36,21 +38,37 @@ def make_shape_soup(
     matrix = (T_root_link @ shape.T_link_shape).matrix()[:3]
     if shape.kind == "mesh":
         own = materials and not shape.look.whole
-        source = read_mesh(folder, shape.file, materials=own)
-        if source.images and own:
-            raise AssetError(
-                f"{folder.root / shape.file}: has embedded images, which a robot's meshes may not; "
-                "export it with images as files"
-            )
-        soup = source.soup
+        source = _with_named_images(read_mesh(folder, shape.file, materials=own), shape.file)
         matrix[:, :3] = matrix[:, :3] * np.array(shape.size)
     else:
-        soup = TriangleSoup.of(_primitive(shape))
+        source = MeshSource(TriangleSoup.of(_primitive(shape)))
         if shape.look.texture and materials:
-            soup = replace(soup, uvs=_wrapped(shape.kind, soup.corners))
+            uvs = _wrapped(shape.kind, source.soup.corners)
+            source = replace(source, soup=replace(source.soup, uvs=uvs))
+    soup = source.soup
     extent = float(np.ptp(soup.corners.reshape(-1, 3), axis=0).max()) if soup.uvs is None else 0.0
     slots = tuple(_apply_look(slot, shape.look, extent) for slot in soup.slots)
-    return replace(soup, slots=slots).transformed(matrix)
+    return replace(source, soup=replace(soup, slots=slots).transformed(matrix))
+
+
+def _with_named_images(source: MeshSource, file: str) -> MeshSource:
+    """The source with unique names of its images: a link may have several mesh files."""
+    if not source.images:
+        return source
+    known = {name: f"{file}/{name}" for name in source.images}
+
+    def renamed(texture: str) -> str:
+        maps = find_maps(texture)
+        if maps is None:
+            return known.get(texture, texture)
+        return maps.renamed(known).name()
+
+    slots = tuple(
+        replace(slot, material=replace(slot.material, texture=renamed(slot.material.texture)))
+        for slot in source.soup.slots
+    )
+    images = {known[name]: data for name, data in source.images.items()}
+    return replace(source, soup=replace(source.soup, slots=slots), images=images)
 
 
 def _primitive(shape: Shape) -> Float64:
