@@ -1,20 +1,16 @@
-#!/bin/sh
-# pycollada 0.9.3: a mesh disappears because one of its three materials has a broken image.
-#
-# Common guess: Collada(file, ignore=[DaeBrokenRefError]) skips what is broken, here the material,
-#   and keeps the triangles: the geometry and its bind_material are valid, the reference inside the
-#   effect of one material is not.
-# What happens: the material is skipped, then the instance of the geometry that names it fails to
-#   load and is skipped as a whole. The scene has no geometry, and no exception is raised; the
-#   geometry itself is still in Collada.geometries.
-# Why it matters: trimesh and yourdfpy read meshes of robots this way. ANYmal B's published
-#   anymal_foot.dae has such a material, so that the robot is drawn and measured without its feet.
-set -eu
-folder=$(mktemp -d)
-trap 'rm -rf "$folder"' EXIT
-python3 -m venv "$folder/venv"
-"$folder/venv/bin/pip" install --quiet pycollada==0.9.3
-cat > "$folder/a.py" <<'PYTHON'
+#!/usr/bin/env bash
+# Common guess: Collada(file, ignore=[DaeBrokenRefError]) of pycollada skips what is broken, and no more:
+#   a mesh whose material names a missing surface keeps its triangles.
+# What happens: the material is skipped; then the instance of the geometry that uses it fails to load,
+#   and is skipped as a whole. The scene is empty, and nothing is raised.
+# Why it matters: trimesh and yourdfpy read meshes of robots this way. The published anymal_foot.dae of
+#   ANYmal B has such a material, so that the robot is drawn and measured without its feet.
+set -euo pipefail
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+python3 -m venv "$work/venv"
+"$work/venv/bin/pip" install -q pycollada==0.9.3
+"$work/venv/bin/python" - <<'PY'
 import io
 
 import collada
@@ -55,5 +51,4 @@ print("sampler names an existing surface (materials, geometries, instances):", r
 print("sampler names a missing surface   (materials, geometries, instances):", read("none"))
 assert read("s") == (1, 1, 1), read("s")
 assert read("none") == (0, 1, 0), read("none")
-PYTHON
-"$folder/venv/bin/python" "$folder/a.py"
+PY
