@@ -81,7 +81,7 @@ def _inspect(one: IndexedAsset, library: Library) -> Finding:
     measure = _measure_robot if one.kind == "robot" else _measure_object
     triangles, low, high = measure(one, library)
     size_m = (high[0] - low[0], high[1] - low[1], high[2] - low[2])
-    warnings = (*_find_doubts(one, max(size_m)), *origin)
+    warnings = (*_find_doubts(one, max(size_m)), *library.remarks(one.asset_id), *origin)
     found = (triangles, size_m, _describe_unit(one), _describe_up(one))
     return Finding(one.asset_id, one.kind, one.category(), *found, warnings=warnings)
 
@@ -146,7 +146,7 @@ def _describe_up(one: IndexedAsset) -> str:
     entry = one.entry
     if not isinstance(entry, MeshEntry):
         return "z"
-    if entry.up is None and Path(entry.file).suffix.lower().startswith(".usd"):
+    if entry.up is None and Path(entry.file).suffix.lower().startswith((".usd", ".dae")):
         return ""
     return entry.up or f"{entry.up_axis()} (assumed)"
 

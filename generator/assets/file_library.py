@@ -43,15 +43,17 @@ from gen_data.generator.assets.parsing import (
     parse_object,
     parse_plate,
     parse_road_network,
+    parse_robot,
     parse_stage,
     parse_surroundings,
     unpack_value,
 )
-from gen_data.generator.assets.robot_models import robot_model, robot_urdf
+from gen_data.generator.assets.robot_description import DescriptionParts, RobotDescription
+from gen_data.generator.assets.robot_formats import is_description, is_foreign
+from gen_data.generator.assets.robot_models import describe_robot, robot_model
 from gen_data.generator.assets.robot_tools import VERSION as TOOLS_VERSION
 from gen_data.generator.assets.sandbox import run_sandboxed
 from gen_data.generator.assets.texture_maps import compose_texture, find_maps
-from gen_data.generator.assets.urdf import Urdf
 from gen_data.generator.assets.usd_stages import is_stage
 from gen_data.generator.core.asset_types import (
     Asset,
@@ -88,7 +90,7 @@ class FileLibrary:
         self._store = store
         self._digests = ContentHashes(disk)
         self._listed: dict[str, IndexedAsset] | None = None
-        self._urdfs: dict[str, Urdf] = {}
+        self._robots: dict[str, RobotDescription] = {}
         self._stages: dict[str, StageModel] = {}
         self._hashed: dict[str, dict[str, str]] = {}
         self._keys: dict[str, str] = {}
@@ -145,7 +147,7 @@ class FileLibrary:
             raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not an object")
 
         if isinstance(entry, RobotEntry) and not part:
-            links = ", ".join(f"{asset_id}/{n}" for n in list(self._urdf(one).links)[:2])
+            links = ", ".join(f"{asset_id}/{n}" for n in list(self._robot(one).links)[:2])
             raise AssetError(f"asset '{asset_id}': is a robot; its meshes are {links}, ...")
         key = content_key({"asset": self._key(one), "link": name})
         return self._store.get(key, compute, unpack_imported)
@@ -161,12 +163,21 @@ class FileLibrary:
             lambda arrays: unpack_value(tuple[Lane, ...], arrays),
         )
 
+    def remarks(self, asset_id: str) -> tuple[str, ...]:
+        """What a description of links and joints has and nothing uses; empty for other assets."""
+        one = self._entries()[asset_id]
+        if not isinstance(one.entry, RobotEntry):
+            if not is_description(one.entry.file):
+                return ()
+            one = replace(one, entry=RobotEntry(file=one.entry.file))
+        return self._robot(one).remarks
+
     def robot(self, asset_id: str) -> RobotModel:
         """Kinematics of a robot."""
         one = self._entries()[asset_id]
         if not isinstance(one.entry, RobotEntry):
             raise AssetError(f"asset '{asset_id}': is of kind {one.kind}, not a robot")
-        return robot_model(asset_id, self._urdf(one), one.entry, str(one.root / one.entry.file))
+        return robot_model(asset_id, self._robot(one), one.entry, str(one.root / one.entry.file))
 
     def stage(self, asset_id: str) -> StageModel:
         """Pieces, lights and cameras of a stage."""
@@ -219,7 +230,8 @@ class FileLibrary:
         self, owner: str, one: IndexedAsset, folder: Folder, name: str, channels: str
     ) -> UInt8:
         """Pixels of an image, embedded in a mesh file or beside it."""
-        if one.kind == "object" and name in (images := self.imported(owner).images):
+        has_mesh = one.kind == "object" or owner != one.asset_id
+        if has_mesh and name in (images := self.imported(owner).images):
             return images[name]
         pixels: UInt8 = self._decode_cached(folder, name, channels)
         return pixels
@@ -283,16 +295,27 @@ class FileLibrary:
         if one is None or asset_id in self._entries():
             return None
         if one.kind == "robot":
-            return (one, part) if part in self._urdf(one).links else None
+            return (one, part) if part in self._robot(one).links else None
         if not is_stage(one.entry):
             return None
         return (one, part) if part in {p.name for p in self.stage(whole).pieces} else None
 
-    def _urdf(self, one: IndexedAsset) -> Urdf:
-        if one.asset_id not in self._urdfs:
-            assert isinstance(one.entry, RobotEntry)
-            self._urdfs[one.asset_id] = robot_urdf(Folder(one.root), one.entry)
-        return self._urdfs[one.asset_id]
+    def _robot(self, one: IndexedAsset) -> RobotDescription:
+        if one.asset_id not in self._robots:
+            entry = one.entry
+            assert isinstance(entry, RobotEntry)
+            if any(
+                is_foreign(file) for file in (entry.file, entry.tool.file if entry.tool else "")
+            ):
+                parts: DescriptionParts = self._store.get(
+                    content_key({"asset": self._key(one), "part": "robot"}),
+                    lambda: self._parse(one, parse_robot, entry),
+                    lambda arrays: unpack_value(DescriptionParts, arrays),
+                )
+                self._robots[one.asset_id] = parts.whole()
+            else:
+                self._robots[one.asset_id] = describe_robot(Folder(one.root), entry)
+        return self._robots[one.asset_id]
 
     def _asset(self, one: IndexedAsset) -> Asset:
         entry = one.entry

@@ -162,6 +162,10 @@ class Library:
             raise AssetError(f"asset '{asset_id}': is not a robot")
         return self._files.robot(asset_id)
 
+    def remarks(self, asset_id: str) -> tuple[str, ...]:
+        """What the files of an asset of a folder have and nothing uses, for its owner."""
+        return self._files.remarks(asset_id)
+
     def stage(self, asset_id: str) -> StageModel:
         """Content of an OpenUSD stage. Raises AssetError if the asset is not a stage."""
         if self._is_generated(asset_id):

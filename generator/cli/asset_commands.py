@@ -135,7 +135,7 @@ def check(folder: Path, sheet: Path | None, overlays: Path | None) -> None:
         plates = [f.asset_id for f in findings if f.kind == "plate" and not f.error]
         _write_overlays(library, plates, overlays)
     if not findings:
-        raise AssetError(f"{folder}: has no assets; expected OBJ, GLB, PLY, STL, URDF or USD files")
+        raise AssetError(f"{folder}: has no assets; expected OBJ, GLB, PLY, STL, DAE, URDF or USD files")
     unusable = [finding for finding in findings if finding.error]
     if unusable:
         raise AssetError(f"{folder}: {len(unusable)} of {len(findings)} assets cannot be used")

@@ -24,10 +24,12 @@ class MeshSource:
         soup: Its triangles. ``Material.texture`` is an image's path relative to the folder, or a
             key of ``images``.
         images: ``{key: encoded image}`` of images inside the file itself.
+        up: Axis that the file states as up, ``x``, ``y`` or ``z``; empty = it states none.
     """
 
     soup: TriangleSoup
     images: Mapping[str, bytes] = field(default_factory=dict)
+    up: str = ""
 
 
 def check_face_count(count: int, place: str) -> None:
