@@ -18,6 +18,7 @@ from gen_data.generator.certificate import readers
 from gen_data.generator.certificate.certificate import Certificate, describe_failures
 from gen_data.generator.certificate.finding import Finding, Status
 from gen_data.generator.cli.main import cli
+from gen_data.generator.core.distribution import install_command
 from gen_data.generator.core.errors import (
     CertificationError,
     ConfigError,
@@ -406,7 +407,7 @@ def test_what_is_not_installed_is_not_checked(
     finding = findings(gen_data.certify(damaged(), samples=0, scenes=0))["exports: coco"]
 
     assert finding.status is Status.NOT_CHECKED
-    assert "pip install 'gen-data[certify]'" in finding.reason
+    assert install_command("certify") in finding.reason
 
 
 def test_verify_repeats_a_certificate(certified: Path, capsys: pytest.CaptureFixture[str]) -> None:
