@@ -92,9 +92,9 @@ def list_(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
 @click.option("--folder", "folders", multiple=True, type=FOLDER, help="A folder of your assets.")
 def show(asset_id: str, folders: tuple[Path, ...]) -> None:
     """Show an asset of the library: category, tags, licence, author, size."""
-    from gen_data.generator.assets.library import open_library
+    from gen_data.generator.packs.provision import open_assets
 
-    library = open_library(folders)
+    library = open_assets(folders)
     asset = library.get(asset_id)
     for name, value in _describe_asset(asset).items():
         click.echo(f"{name:<12} {value}")
@@ -202,9 +202,9 @@ def _warm_cache(pack: str) -> None:
 
 
 def _list_assets(tags: tuple[str, ...], folders: tuple[Path, ...]) -> None:
-    from gen_data.generator.assets.library import open_library
+    from gen_data.generator.packs.provision import open_assets
 
-    library = open_library(folders)
+    library = open_assets(folders)
     for kind in ("object", "robot", "texture", "environment", "plate"):
         for asset in library.find(tags, kind):
             click.echo(f"{asset.asset_id}  {asset.category}  [{' '.join(asset.tags)}]")

@@ -72,8 +72,8 @@ def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
         ready_exporters,
     )
     from gen_data.generator.assemble.size_estimate import estimate_image_bytes
-    from gen_data.generator.assets.library import open_library
     from gen_data.generator.config.schema import docstring_summary
+    from gen_data.generator.packs.provision import open_assets
     from gen_data.generator.pipeline.splits import split_of
 
     general = config.general
@@ -81,7 +81,7 @@ def _rows(config: Config, n: int) -> Iterator[tuple[str, str]]:
     scenes = -(-n // per_scene)
     info = dataset_info(config, n, PipelineFactory(config, n).categories)
     # Refused here as in a run: formats that cannot hold the data set.
-    exporters = ready_exporters(config, info, open_library(config.asset_folders))
+    exporters = ready_exporters(config, info, open_assets(config.asset_folders))
     yield (
         "scenes",
         f"{scenes} of {general.views_per_scene} views, {general.steps_per_scene} instants",
