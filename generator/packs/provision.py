@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from gen_data.generator.assets.file_library import PYBULLET
 from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.assets.paths import OFFLINE, may_fetch
 from gen_data.generator.core.errors import AssetError
-
-VARIABLE = "GEN_DATA_OFFLINE"
-"""Environment variable; with any text but ``0`` nothing is fetched."""
 
 
 def open_assets(user_roots: Sequence[Path] = ()) -> Library:
@@ -31,7 +28,7 @@ def provide_pybullet(folder: Path) -> None:
     Raises:
         AssetError: it cannot be fetched.
     """
-    if os.environ.get(VARIABLE, "0") not in ("", "0"):
+    if not may_fetch():
         return
     from gen_data.generator.packs.install import install_once
     from gen_data.generator.packs.pack_table import find_pack
@@ -49,6 +46,6 @@ def provide_pybullet(folder: Path) -> None:
         install_once(pack, folder, announce)
     except AssetError as error:
         raise AssetError(
-            f"{error}\n  Robot arms and some objects are files of pybullet. With {VARIABLE}=1, "
+            f"{error}\n  Robot arms and some objects are files of pybullet. With {OFFLINE}=1, "
             "what needs none of them goes on without"
         ) from None
