@@ -124,7 +124,7 @@ def _try_python() -> str:
 def _try_name() -> str:
     """Look for other projects that install ``gen_data`` too; pip lets them overwrite its files."""
     others = {*packages_distributions().get("gen_data", ())} - {DISTRIBUTION}
-    _expect(not others, f"{' and '.join(sorted(others))}: installs a package gen_data too")
+    _expect(not others, f"gen_data is also installed by {' and '.join(sorted(others))}")
     return f"no other distribution than {DISTRIBUTION} installs gen_data"
 
 
