@@ -118,7 +118,7 @@ def test_doctor_finds_another_project_that_installs_the_same_package(
 
     (check,) = (one for one in CHECKS if one.name == "name")
 
-    with pytest.raises(SampleError, match="gen_data is also installed by .*textual-data"):
+    with pytest.raises(SampleError, match=r"gen_data is also installed by .*textual-data"):
         check.attempt()
     assert not check.required
     assert check.remedy.startswith(f"uninstall it and {DISTRIBUTION}")
