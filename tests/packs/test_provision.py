@@ -16,6 +16,7 @@ from gen_data.generator.assets.library import open_library
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.packs import pack_table
 from gen_data.generator.packs.provision import open_assets, provide_pybullet
+from tests.end_to_end.running import ROOT
 from tests.packs.test_pybullet_pack import KINDS, pack_wheel, without_pybullet
 
 TEDDY = "pybullet/teddy"
@@ -147,3 +148,18 @@ def test_a_run_fetches_them_before_its_workers_start(
 
     assert calls(tmp_path) == 1
     assert "toy brick" in factory.categories
+
+
+def test_programs_open_the_library_that_provides_them() -> None:
+    """``open_assets``; only ``assets check`` and ``install`` work on what is there already."""
+    opened = {
+        path.relative_to(ROOT).as_posix()
+        for folder in ("generator", "exporters", "randomizers", "scene_templates")
+        for path in (ROOT / folder).rglob("*.py")
+        if "open_library(" in path.read_text("utf-8")
+    }
+    assert opened == {
+        "generator/assets/library.py",
+        "generator/cli/asset_commands.py",
+        "generator/packs/provision.py",
+    }
