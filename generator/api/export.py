@@ -65,7 +65,7 @@ def export(  # noqa: PLR0913  (keywords of one front door)
 
     from gen_data.generator.assemble.config import load_config
     from gen_data.generator.assemble.pipeline_factory import check_scene, ready_exporters
-    from gen_data.generator.assets.library import open_library
+    from gen_data.generator.packs.provision import open_assets
     from gen_data.generator.runner.exports import export as write_exports
     from gen_data.generator.runner.stored import StoredSamples
 
@@ -80,7 +80,7 @@ def export(  # noqa: PLR0913  (keywords of one front door)
     with _named_formats():
         config = load_config(source, overrides=overrides)
         _check_annotations(load_config(source), config)
-        exporters = ready_exporters(config, stored.info, open_library(config.asset_folders))
+        exporters = ready_exporters(config, stored.info, open_assets(config.asset_folders))
         check_scene(config, stored.sample(0).scene)
     summary = write_exports(
         stored,

@@ -180,9 +180,15 @@ def _make_factory(loaded: Config, n: int) -> PipelineFactory:
     from gen_data.generator.pipeline.splits import warn_of_empty_splits
     from gen_data.generator.sensors.mounting import warn_of_early_readings
 
-    general = loaded.general
+    general, stated = loaded.general, loaded.document.get("splits")
     scenes = -(-n // (general.views_per_scene * general.steps_per_scene))
-    warn_of_empty_splits(scenes, loaded.split_shares, general.splits.assign, general.seed)
+    warn_of_empty_splits(
+        scenes,
+        loaded.split_shares,
+        general.splits.assign,
+        general.seed,
+        stated=stated is not None and bool(stated.content),
+    )
     warn_of_early_readings(loaded.sensors, general.steps_per_scene)
     factory = PipelineFactory(loaded, n)
     factory.check()

@@ -19,7 +19,7 @@ from gen_data.generator.assemble.preflight import (
     far_sensors,
     unrectified_pairs,
 )
-from gen_data.generator.assets.library import Library, open_library
+from gen_data.generator.assets.library import Library
 from gen_data.generator.config.error_positions import located_errors
 from gen_data.generator.config.problems import Problems, refuse
 from gen_data.generator.config.yaml_tree import find_text
@@ -40,6 +40,7 @@ from gen_data.generator.core.interfaces import (
 from gen_data.generator.core.path_names import CATEGORY_MAX, check_name
 from gen_data.generator.core.plates import has_plate
 from gen_data.generator.core.scene import LABEL_IDS_MAX, Scene, SharedValue
+from gen_data.generator.packs.provision import open_assets
 from gen_data.generator.physics import missing_engine, open_engine
 from gen_data.generator.pipeline import Pipeline
 from gen_data.generator.pipeline.exporter_views import ExporterView, needs_of, view_of
@@ -90,7 +91,7 @@ class PipelineFactory:
     @cached_property
     def library(self) -> Library:
         """Assets, of this process: opening them takes as long as building a simple scene."""
-        return open_library(self.config.asset_folders)
+        return open_assets(self.config.asset_folders)
 
     @cached_property
     def nominal(self) -> tuple[Scene, ...]:

@@ -83,11 +83,17 @@ class FileLibrary:
     """
 
     def __init__(
-        self, packs: Path, user_roots: Sequence[Path], disk: DiskCache, store: Store
+        self,
+        packs: Path,
+        user_roots: Sequence[Path],
+        disk: DiskCache,
+        store: Store,
+        provide: Callable[[Path], object] | None = None,
     ) -> None:
         self._packs = packs
         self._user_roots = tuple(user_roots)
         self._store = store
+        self._provide = provide
         self._digests = ContentHashes(disk)
         self._listed: dict[str, IndexedAsset] | None = None
         self._robots: dict[str, RobotDescription] = {}
@@ -105,21 +111,24 @@ class FileLibrary:
 
     def is_missing(self, asset_id: str) -> bool:
         """Whether the files of a known asset are neither installed with pybullet nor as a pack."""
-        name = asset_id.partition("#")[0]
         return _pybullet_data(self._packs) is None and any(
-            name == one.asset_id or name.startswith(f"{one.asset_id}/")
-            for one in _list_pybullet(Path())
+            _is_of(asset_id, one) for one in _list_pybullet(Path())
         )
 
     def __contains__(self, asset_id: str) -> bool:
         """Whether the id names an asset, a robot's link or a stage's piece."""
+        self._provide_pybullet(lambda one: _is_of(asset_id, one))
         return asset_id in self._entries() or self._part(asset_id) is not None
 
     def find(self, tags: frozenset[str], kind: str) -> Iterator[Asset]:
         """Yield all assets of a kind that have every tag."""
-        for one in self._entries().values():
-            if one.kind == kind and tags.issubset(one.tags()):
-                yield self._asset(one)
+
+        def fits(one: IndexedAsset) -> bool:
+            return one.kind == kind and tags.issubset(one.tags())
+
+        self._provide_pybullet(fits)
+        for one in filter(fits, self._entries().values()):
+            yield self._asset(one)
         self._digests.save()
 
     def get(self, asset_id: str) -> Asset:
@@ -276,6 +285,16 @@ class FileLibrary:
         """Call a function of ``parsing`` for the files of an asset."""
         return run_sandboxed(parse, one.root, self._files(one), *arguments)
 
+    def _provide_pybullet(self, is_wanted: Callable[[IndexedAsset], bool]) -> None:
+        """Provide the files of pybullet if they are not here and one of its assets is wanted."""
+        if self._provide is None:
+            return
+        if _pybullet_data(self._packs) is not None:
+            self._provide = None
+        elif any(map(is_wanted, _list_pybullet(Path()))):
+            self._provide(self._packs)
+            self._provide = self._listed = None
+
     def _entries(self) -> dict[str, IndexedAsset]:
         if self._listed is None:
             self._listed = {}
@@ -377,6 +396,12 @@ def _convert_symmetries(entry: MeshEntry) -> tuple[Symmetry, ...]:
 
 def _is_road_network(entry: Entry) -> bool:
     return isinstance(entry, MeshEntry) and entry.file.lower().endswith(ROAD_SUFFIX)
+
+
+def _is_of(asset_id: str, one: IndexedAsset) -> bool:
+    """Whether an id names an asset, or a part or an image of it."""
+    name = asset_id.partition("#")[0]
+    return name == one.asset_id or name.startswith(f"{one.asset_id}/")
 
 
 def _list_everything(packs: Path, user_roots: Sequence[Path]) -> Iterator[IndexedAsset]:

@@ -29,6 +29,7 @@ from gen_data.generator.assets.robot_description import (
     jointed,
 )
 from gen_data.generator.core.asset_types import Joint
+from gen_data.generator.core.distribution import install_command
 from gen_data.generator.core.errors import AssetError
 from gen_data.generator.core.safe_xml import parse_xml
 from gen_data.generator.core.se3 import SE3, Vec3, rotation_to_quaternion
@@ -61,7 +62,7 @@ def read_mjcf(folder: Folder, relative: str) -> RobotDescription:
     try:
         import mujoco
     except ImportError:
-        raise AssetError(f"{place}: MJCF needs MuJoCo; run: pip install 'gen-data[mjcf]'") from None
+        raise AssetError(f"{place}: MJCF needs MuJoCo; run: {install_command('mjcf')}") from None
     try:
         spec = mujoco.MjSpec.from_string(text)
         source = _Source(folder, relative, *_strip_files(spec, mujoco))
