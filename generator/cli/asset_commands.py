@@ -137,7 +137,7 @@ def check(folder: Path, sheet: Path | None, overlays: Path | None) -> None:
         _write_overlays(library, plates, overlays)
     if not findings:
         raise AssetError(
-            f"{folder}: has no assets; expected OBJ, GLB, PLY, STL, DAE, USD, URDF, MJCF or SDF files"
+            f"{folder}: has no assets; expected OBJ, GLB, PLY, STL, DAE, USD, URDF, MJCF, SDF"
         )
     unusable = [finding for finding in findings if finding.error]
     if unusable:
