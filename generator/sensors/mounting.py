@@ -18,7 +18,7 @@ from gen_data.generator.core.measurement_dtypes import TABLE_COLUMNS, TIME_DECIM
 from gen_data.generator.core.motion import STILL, Trajectory, Twist
 from gen_data.generator.core.scene import Camera, Device, Lidar, Scene
 from gen_data.generator.core.scene_time import RIG_AXES
-from gen_data.generator.core.se3 import SE3, Array
+from gen_data.generator.core.se3 import SE3, Array, turned
 
 BURIED_M = 0.05
 """Allowed depth of a sensor inside its body's bounding box, which is larger than the body."""
@@ -50,12 +50,8 @@ class Mounted(Strict):
     @property
     def T_rig_sensor(self) -> SE3:  # noqa: N802
         """Pose on the rig; both frames are X forward, Y left, Z up."""
-        half_pitch = -0.5 * math.radians(self.pitch_deg)
-        half_roll = 0.5 * math.radians(self.roll_deg)
-        pitch = SE3((0.0, 0.0, 0.0), (math.cos(half_pitch), 0.0, math.sin(half_pitch), 0.0))
-        roll = SE3((0.0, 0.0, 0.0), (math.cos(half_roll), math.sin(half_roll), 0.0, 0.0))
-        yaw = SE3.about_z(math.radians(self.yaw_deg), self.offset_m)
-        return (yaw @ pitch @ roll).rounded()
+        angles = (math.radians(a) for a in (self.yaw_deg, self.pitch_deg, self.roll_deg))
+        return turned(self.offset_m, *angles).rounded()
 
     def _info(self, name: str, modality: Modality, kind: str = "", **more: Any) -> SensorInfo:
         """Description with the rate of its readings; ``more`` are further fields.
@@ -160,6 +156,8 @@ def check_not_buried(scene: Scene, name: str, assets: AssetIndex) -> None:
     if not rig_name:
         return
     rig = scene.rig(rig_name)
+    if not rig.body:
+        return
     body = scene.body(rig.body)
     low_m, high_m = assets.bounds_m(body.asset)
     place_m = (rig.T_body_rig @ T_rig_sensor).translation_m
@@ -337,10 +335,8 @@ def mount_motion(scene: Scene, device: str) -> MountMotion:
     """Motion of the device of that name; KeyError if the scene has none."""
     mounted = scene.device(device)
     rig = scene.rig(mounted.rig)
-    body = scene.body(rig.body)
-    return MountMotion(
-        scene.track(rig.body), body.T_world_body, rig.T_body_rig @ mounted.T_rig_device
-    )
+    T_world_body = scene.body(rig.body).T_world_body if rig.body else SE3()
+    return MountMotion(scene.track(rig.body), T_world_body, rig.T_body_rig @ mounted.T_rig_device)
 
 
 def velocity_at(twist: Twist, lever_m: Array) -> Array:
@@ -361,6 +357,8 @@ def rotation_vector(turn: SE3) -> Array:
 
 def remove_carrier(scene: Scene, rig: str) -> Scene:
     """The scene without the body that carries a rig, so that it does not occlude devices."""
+    if not scene.rig(rig).body:
+        return scene
     carrier = scene.body(scene.rig(rig).body)
     own = carrier.instance_id
     bodies = tuple(
