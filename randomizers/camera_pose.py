@@ -108,9 +108,7 @@ class CameraPose(RandomizerBase):
     def __call__(self, scene: Scene, assets: AssetIndex, rng: Rng) -> Scene:
         """Return the scene with its cameras moved, all outside of bodies and inside the room."""
         place = self._move_camera if self.fills is None else self._frame_thing
-        moved = {
-            camera.name: place(camera, scene, assets, rng) for camera in self._moved(scene)
-        }
+        moved = {camera.name: place(camera, scene, assets, rng) for camera in self._moved(scene)}
         if self.rig:
             (aimed,) = moved.values()
             return _with_rig(scene, self.rig, aimed)
@@ -140,8 +138,7 @@ class CameraPose(RandomizerBase):
         others = [c for c in scene.cameras if self.rig and c.rig == self.rig and c != camera]
         places = [pose, *(T_world_rig @ other.T_rig_camera for other in others)]
         return all(
-            is_in_the_open(place.translation_m, scene, assets, self.clearance_m)
-            for place in places
+            is_in_the_open(place.translation_m, scene, assets, self.clearance_m) for place in places
         )
 
     def _move_camera(self, camera: Camera, scene: Scene, assets: AssetIndex, rng: Rng) -> Camera:

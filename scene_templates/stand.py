@@ -10,7 +10,7 @@ from pydantic import Field
 
 from gen_data.generator.core.interfaces import AssetIndex
 from gen_data.generator.core.scene import Rig, Scene
-from gen_data.generator.core.se3 import SE3, Vec3, turned
+from gen_data.generator.core.se3 import Vec3, turned
 from gen_data.scene_templates.element import Element
 
 

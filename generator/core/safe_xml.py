@@ -53,6 +53,7 @@ def parse_xml(data: bytes, place: str, root_tag: str, kind: str, max_elements: i
     def refuse(*_: Any) -> None:
         raise ValueError("it declares a document type, which is not allowed; remove it")
 
+    parser.CharacterDataHandler = builder.data
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = refuse
     try:

@@ -6,10 +6,11 @@ import math
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
+from typing_extensions import Self
 
 from gen_data.generator.config.base_model import NAME_PATTERN, Strict
 from gen_data.generator.core.errors import ConfigError, ConfigWarning, did_you_mean
@@ -24,6 +25,31 @@ BURIED_M = 0.05
 """Allowed depth of a sensor inside its body's bounding box, which is larger than the body."""
 
 
+class Mounting(Strict):
+    """A sensor's place on its rig, from the file of a calibration.
+
+    Files of Kalibr, OpenCV (a pair), ROS (transforms in YAML, URDF), nuScenes and KITTI.
+
+    Attributes:
+        file: Its name. The place in it replaces this key in the configuration, as ``offset_m``,
+            ``yaw_deg``, ``pitch_deg`` and ``roll_deg``.
+        frame: Name of the sensor's frame in it, such as cam1; empty = the only one.
+        relative_to: Name of the frame that is the rig's: its origin, and X forward, Y left, Z up
+            (a camera's frame is turned to these axes); empty = the root above ``frame``.
+        axes: Of ``frame``: optical, X right, Y down, Z forward; or body, X forward, Y left, Z up.
+            null = as the format has them; by the frame's name for ROS (REP 103).
+        rectified: Whether to take the place of the rectified camera, from its projection matrix.
+        unit: Of lengths in the file.
+    """
+
+    file: str
+    frame: str = ""
+    relative_to: str = ""
+    axes: Literal["optical", "body"] | None = None
+    rectified: bool = False
+    unit: Literal["m", "cm", "mm"] = "m"
+
+
 class Mounted(Strict):
     """Base of sensors that may be mounted on a rig.
 
@@ -35,6 +61,8 @@ class Mounted(Strict):
         rate_hz: Readings per second; null = one per step.
         time_offset_s: Delay of its readings after the step's instant; the reading and its labels
             belong to the step.
+        mounting: Place on the rig from the file of a calibration, instead of ``offset_m`` and the
+            angles.
         inside: Whether it may be inside the body that carries its rig.
     """
 
@@ -45,7 +73,14 @@ class Mounted(Strict):
     roll_deg: float = Field(0.0, ge=-180, le=180)
     rate_hz: float | None = Field(None, gt=0, le=10_000)
     time_offset_s: float = Field(0.0, ge=-10, le=10)
+    mounting: Mounting | None = None
     inside: bool = False
+
+    @model_validator(mode="after")
+    def _is_placed(self) -> Self:
+        if self.mounting is not None:
+            raise ValueError("mounting: only a configuration can name a file, and not by a switch")
+        return self
 
     @property
     def T_rig_sensor(self) -> SE3:  # noqa: N802

@@ -98,9 +98,9 @@ def test_an_unknown_name_is_refused(given: dict[str, Any], told: str) -> None:
 def test_a_whole_rig_is_disturbed_as_one() -> None:
     """Its sensors keep their places on it; its origin moves by 1 cm along each of its axes."""
     scene = pair(pitch_deg=0.0)
-    moved = RigCalibration(
-        name="sag", whole=True, offset_m=Constant(0.01), turn_deg=Constant(0.0)
-    )(scene, FakeAssets(), rng_of("sag"))
+    moved = RigCalibration(name="sag", whole=True, offset_m=Constant(0.01), turn_deg=Constant(0.0))(
+        scene, FakeAssets(), rng_of("sag")
+    )
 
     assert [c.T_rig_camera for c in moved.cameras] == [c.T_rig_camera for c in scene.cameras]
     assert moved.rig_pose("pair").translation_m == pytest.approx((0.01, 0.01, 1.51))
