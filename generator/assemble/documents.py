@@ -83,11 +83,16 @@ def _with_files(document: Node) -> Node:
     """Replace names of data sheets and calibrations in sensors, and of tasks in randomizers, by the content."""
     sensors, randomizers = document.entries["sensors"], document.entries["randomizers"]
     if isinstance(sensors.content, tuple):
-        sensors = sensors.with_children(lambda _, sensor: load_calibrations(load_sheets(sensor)))
+        sensors = sensors.with_children(_with_sensor_files)
     if isinstance(randomizers.content, tuple):
         randomizers = randomizers.with_children(lambda _, randomizer: load_tasks(randomizer))
     content = {**document.entries, "sensors": sensors, "randomizers": randomizers}
     return replace(document, content=content)
+
+
+def _with_sensor_files(number: str | int, sensor: Node) -> Node:
+    field = f"sensors[{number}]"
+    return load_calibrations(load_sheets(sensor, field), field)
 
 
 def load_config_document(name: str) -> Node:

@@ -32,8 +32,10 @@ _EXCLUDED = {
 }
 
 
-def load_calibrations(sensor: Node) -> Node:
+def load_calibrations(sensor: Node, field: str) -> Node:
     """Replace the names of calibration files in a sensor's document by their content.
+
+    ``field`` is the path of the sensor in messages: ``sensors[0]``.
 
     Raises:
         ConfigError: a file cannot be read, has another layout, or what has no counterpart here.
@@ -43,23 +45,25 @@ def load_calibrations(sensor: Node) -> Node:
     content = dict(sensor.content)
     lens, mounting = content.get("lens"), content.get("mounting")
     if lens is not None and lens.get("file") is not None:
-        content |= _load_lens(sensor, lens)
+        content |= _load_lens(sensor, lens, field)
     if mounting is not None and mounting.get("file") is not None:
-        content |= _load_mounting(sensor, mounting)
+        content |= _load_mounting(sensor, mounting, field)
         del content["mounting"]
     return replace(sensor, content=content)
 
 
-def _load_lens(sensor: Node, lens: Node) -> dict[str, Node]:
+def _load_lens(sensor: Node, lens: Node, field: str) -> dict[str, Node]:
     """The lens, intrinsics and size of a camera in a calibration file."""
-    _check_alone(sensor, "lens")
-    asked = _validated(lens, CalibratedLens, "lens")
+    _check_alone(sensor, "lens", field)
+    asked = _validated(lens, CalibratedLens, f"{field}.lens")
     file = lens.entries["file"]
-    calibration = _read(file, "lens.file", fisheye=asked.fisheye, rectified=asked.rectified)
+    calibration = _read(
+        file, f"{field}.lens.file", fisheye=asked.fisheye, rectified=asked.rectified
+    )
     try:
         camera = calibration.camera(asked.camera)
     except ValueError as error:
-        refuse((lens.get("camera") or file).position, "lens.camera", str(error))
+        refuse((lens.get("camera") or file).position, f"{field}.lens.camera", str(error))
     place = camera.position
     found = {
         "lens": _node(place, _lens_entries(camera)),
@@ -70,17 +74,17 @@ def _load_lens(sensor: Node, lens: Node) -> dict[str, Node]:
     return found
 
 
-def _load_mounting(sensor: Node, mounting: Node) -> dict[str, Node]:
+def _load_mounting(sensor: Node, mounting: Node, field: str) -> dict[str, Node]:
     """The place on its rig of a sensor in a calibration file."""
-    _check_alone(sensor, "mounting")
-    asked = _validated(mounting, Mounting, "mounting")
+    _check_alone(sensor, "mounting", field)
+    asked = _validated(mounting, Mounting, f"{field}.mounting")
     file = mounting.entries["file"]
-    calibration = _read(file, "mounting.file", rectified=asked.rectified)
+    calibration = _read(file, f"{field}.mounting.file", rectified=asked.rectified)
     optical = None if asked.axes is None else asked.axes == "optical"
     try:
         pose = calibration.mount(asked.frame, asked.relative_to, optical=optical)
     except ValueError as error:
-        refuse(mounting.position, "mounting", str(error))
+        refuse(mounting.position, f"{field}.mounting", str(error))
     return {
         name: _node(file.position, value)
         for name, value in place_of(pose, _UNITS[asked.unit]).items()
@@ -108,11 +112,11 @@ def _read(file: Node, field: str, *, fisheye: bool = False, rectified: bool = Fa
     return calibration
 
 
-def _check_alone(sensor: Node, key: str) -> None:
+def _check_alone(sensor: Node, key: str, field: str) -> None:
     for other in _EXCLUDED[key]:
         if sensor.get(other) is not None:
             place = sensor.key_position(other)
-            refuse(place, other, f"the file that {key} names gives it: leave it out")
+            refuse(place, f"{field}.{other}", f"the file that {key} names gives it: leave it out")
 
 
 def _validated(node: Node, model: type[M], field: str) -> M:
