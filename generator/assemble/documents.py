@@ -80,7 +80,7 @@ def resolve_document(
 
 
 def _with_files(document: Node) -> Node:
-    """Replace names of data sheets and calibrations in sensors, and of tasks in randomizers, by the content."""
+    """Replace names of sheets and calibrations in sensors, of tasks in randomizers, by content."""
     sensors, randomizers = document.entries["sensors"], document.entries["randomizers"]
     if isinstance(sensors.content, tuple):
         sensors = sensors.with_children(_with_sensor_files)

@@ -11,7 +11,6 @@ from typing import Any
 
 import cv2
 import numpy as np
-import pytest
 
 import gen_data
 from gen_data.generator.core.capture import Channel
