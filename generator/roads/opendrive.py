@@ -9,6 +9,7 @@ else is counted in ``Network.unused`` (``opendrive_unused``).
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal, TypeVar
@@ -305,8 +306,8 @@ def read_opendrive(data: bytes, place: str) -> Network:
             message names the road.
     """
     declaration = data.find(b"<?xml")
-    if declaration > 0 and b"<" not in data[:declaration]:
-        data = data[declaration:]  # Text before it, such as an empty line, is malformed XML.
+    if declaration > 0 and b"<" not in re.sub(rb"<!--.*?-->", b"", data[:declaration], flags=re.S):
+        data = data[declaration:]  # An empty line or a licence before it is malformed XML.
     root = parse_xml(data, place, "OpenDRIVE", "an OpenDRIVE file", _MAX_ELEMENTS)
     elements = root.findall("road")
     if not elements:

@@ -39,9 +39,8 @@ def _unused(element: Element) -> Iterator[str]:
     if element.tag == "header":
         return
     yield from _unused_attributes(element)
-    heights = 0
+    yield from _repeated(element)
     for child in element:
-        heights += child.tag == "height"
         if child.tag in _REMARKS:
             continue
         if child.tag in _GROUPS:
@@ -50,8 +49,13 @@ def _unused(element: Element) -> Iterator[str]:
             yield f"{child.tag} of {element.tag}"
         else:
             yield from _unused(child)
-    if heights > 1:
-        yield from ["height after a lane's first"] * (heights - 1)
+
+
+def _repeated(element: Element) -> Iterator[str]:
+    """Records of a lane of which only the first has an effect."""
+    for tag, path in (("height", "height"), *((tag, f"link/{tag}") for tag in sorted(_LINKS))):
+        if element.tag == "lane":
+            yield from [f"{tag} after a lane's first"] * (len(element.findall(path)) - 1)
 
 
 def _unused_attributes(element: Element) -> Iterator[str]:

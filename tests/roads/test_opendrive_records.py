@@ -307,7 +307,8 @@ def test_a_virtual_junction_is_left_out_and_named() -> None:
 
 
 @pytest.mark.parametrize(
-    "before", [b"\xef\xbb\xbf", b"\n\n", b"\xef\xbb\xbf\n", b"saved by a tool\n"]
+    "before",
+    [b"\xef\xbb\xbf", b"\n\n", b"\xef\xbb\xbf\n", b"saved by a tool\n", b"<!-- the\nlicence -->\n"],
 )
 def test_a_mark_or_text_before_the_declaration_is_skipped(before: bytes) -> None:
     data = text(road(right=lane(-1)))
